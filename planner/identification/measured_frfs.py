@@ -81,14 +81,16 @@ def stack(
     most_lines: int,
     model_error: float,
     spread: float = 0.0,
+    geometric: bool = False,
 ) -> Measured:
     """FRFs in a band, thinned out evenly to at most `most_lines` a pose.
 
     `model_error` is a relative sd added to that of the noise, for all that a simulation cannot
     follow: calibration, angles, friction; it goes with each FRF and, by the share `spread`, with
-    the rms of all FRFs of the pose at that frequency.
+    the rms of all FRFs of the pose at that frequency. Lines are evenly spaced, or evenly on a
+    logarithmic scale.
     """
-    chosen = [_lines(frf, band_hz, most_lines) for frf in frfs]
+    chosen = [_lines(frf, band_hz, most_lines, geometric) for frf in frfs]
     layout = layout_of(frfs)
     n, f = len(frfs), max(len(c) for c in chosen)
     if f == 0:
@@ -149,14 +151,23 @@ def with_sensors(found: Matrices, robot: Robot, layout: Layout, there: np.ndarra
     return replace(found, mass=mass)
 
 
-def _lines(frf: Frf, band_hz: tuple[float, float], most: int) -> np.ndarray:
+def _lines(
+    frf: Frf, band_hz: tuple[float, float], most: int, geometric: bool = False
+) -> np.ndarray:
     low = max(band_hz[0], frf.usable_band_hz[0])
     high = min(band_hz[1], frf.usable_band_hz[1])
     inside = np.flatnonzero((frf.frequency_hz >= low) & (frf.frequency_hz <= high))
     inside = inside[frf.frequency_hz[inside] > 0]
     if len(inside) <= most:
         return inside
-    return inside[np.linspace(0, len(inside) - 1, most).round().astype(int)]
+    if not geometric:
+        return inside[np.linspace(0, len(inside) - 1, most).round().astype(int)]
+    # Of lines that would be chosen twice the next one is taken: as many as were asked for.
+    wanted = np.geomspace(frf.frequency_hz[inside[0]], frf.frequency_hz[inside[-1]], most)
+    near = np.searchsorted(frf.frequency_hz[inside], wanted).clip(0, len(inside) - 1)
+    order = np.arange(most)
+    near = np.maximum.accumulate(near - order) + order
+    return inside[np.minimum(near, len(inside) - most + order)]
 
 
 def noise_sd(frf: Frf) -> np.ndarray:

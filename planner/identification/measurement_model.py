@@ -31,7 +31,8 @@ class Tolerances:
 
     `angle_rad`, `offset_m`: of each of two directions of a hit; `gain`, `cross_axis`,
     `mounting_rad`, `position_m`: of the sensor; `force_gain` of the hammer; `delay_s`; `joint_rad`:
-    of each joint's readback, (dof,) where some are of joints that slide (m).
+    of each joint's readback, (dof,) where some are of joints that slide (m); `visit_stiffness` of
+    ln k of each spring from visit to visit, as temperature and preload go.
     """
 
     angle_rad: float = np.deg2rad(_HITS.angle_sd_deg)
@@ -43,6 +44,7 @@ class Tolerances:
     force_gain: float = _SENSOR.force_gain_sd_percent / 100
     delay_s: float = 6e-5
     joint_rad: float | tuple[float, ...] = np.deg2rad(ReadbackTable().joint_sd_deg)
+    visit_stiffness: float = 0.004
 
     @classmethod
     def of(cls, config: RobotConfig, slides: Sequence[bool] = ()) -> "Tolerances":

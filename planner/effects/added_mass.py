@@ -1,0 +1,65 @@
+"""A mass on a link that the simulation does not know, or a payload stated too large."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.dynamics.gradient import Impedance
+from planner.effects.effect import ACROSS, Effect, Gain, Motions, Poses, Start, moving, turning
+
+LEAST = 0.05  # of the mass's sd: a start needs some mass for its place to matter
+FARTHEST = 2.0  # prior sds, of a start's mass; its place begins within one
+
+
+@dataclass(frozen=True)
+class AddedMass(Effect):
+    """A point mass of ψ₀ sds at a place (ψ₁..₃ sds about the link's centre of mass)."""
+
+    joint: str = ""
+    centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mass_kg: float = 1.0  # its sd
+    size_m: float = 1.0  # sd of its place
+
+    kind = "added_mass"
+
+    def impedance(self, poses: Poses, psi: np.ndarray) -> Impedance:
+        """m s² Jₚᵀ Jₚ at the place p."""
+        place = np.array(self.centre_m) + self.size_m * psi[1:]
+        ports = np.concatenate([poses.carried(self.joint, place), poses.body(self.joint)[:, 3:]], 1)
+        shapes = np.array([moving(np.eye(3)), *map(turning, ACROSS)])
+        unit = self.mass_kg * poses.s**2
+        moved = [((1 + k, self.size_m * psi[0] * unit),) for k in range(3)]
+        return Impedance(ports, shapes, ((0, psi[0] * unit),), (((0, unit),), *moved))
+
+    def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
+        """By the columns of the mass and of its first moments."""
+        poses = motions.poses
+        one = self.impedance(poses, np.array([1.0, 0, 0, 0]))
+        minus = -(poses.s**2)[:, None, None]
+        shape = (len(poses.q), 4, motions.x_sensor.shape[2], motions.x_hit.shape[2], minus.shape[3])
+        columns = np.empty(shape, dtype=complex)
+        one.gradient(motions.x_hit * minus, motions.x_sensor, columns)
+        nats, psi = gain(columns, np.array([1.0, 0.7, 0.7, 0.7]))
+        mass = float(np.clip(psi[0], -FARTHEST, FARTHEST))
+        if abs(mass) < LEAST:
+            mass = LEAST
+        return (Start(self, np.append(mass, np.clip(psi[1:] / mass, -1, 1)), nats),)
+
+    def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray]:
+        """See `Effect.inertia`."""
+        x, y, z = np.array(self.centre_m) + self.size_m * psi[1:]
+        moments = [y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y]
+        return self.joint, self.mass_kg * psi[0] * np.array([1.0, x, y, z, *moments])
+
+    def vanishing(self, psi: np.ndarray) -> np.ndarray:
+        """See `Effect.vanishing`."""
+        return -psi[:1]
+
+    def words(self, values: Mapping[str, tuple[float, float]]) -> str:
+        """See `Effect.words`."""
+        mass, sd = values["mass"]
+        return (
+            f"{self.at} carries {self.mass_kg * mass:.2g} ± {self.mass_kg * sd:.1g} kg that is not "
+            f"stated: check what is mounted there."
+        )

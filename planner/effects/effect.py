@@ -1,0 +1,150 @@
+"""What a simulation can lack, as an operator on the dynamic stiffness at a place.
+
+Everything that a new effect must give stands in `Effect`; adding one touches its own file and
+`table`. An effect frees springs that robot.toml does not state (`springs`), or adds an impedance
+with numbers ψ of its own, each with a normal prior, or both.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from planner.dynamics.gradient import Impedance
+
+# (columns (n, k, r, c, F) of changes of H, their prior sds (k,)) → nats gained, likeliest ψ (k,).
+Gain = Callable[[np.ndarray, np.ndarray], tuple[float, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Number:
+    """One of an effect's own numbers: normal about `mean`; where it is `log`, its logarithm is."""
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+    log: bool = False
+
+    def value(self, psi: float) -> float:
+        """In its unit."""
+        return float(np.exp(psi)) if self.log else float(psi)
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Poses q (n, dof) in rad at s (n, F), and how e springs move bodies, (n, B, 6, e).
+
+    `springs` (e,) are the numbers of the springs among all that the robot may have.
+    """
+
+    q: np.ndarray
+    s: np.ndarray
+    jacobians: np.ndarray
+    bodies: tuple[str, ...]
+    springs: tuple[int, ...]
+
+    def body(self, joint: str) -> np.ndarray:
+        """(n, 6, e): how the springs move what turns with a joint, linear part first."""
+        return self.jacobians[:, self.bodies.index(joint)]
+
+    def carried(self, joint: str, place: np.ndarray) -> np.ndarray:
+        """(n, 3, e): how they move a point at `place` (3,) in m of the joint's frame."""
+        moved = self.body(joint)
+        return moved[:, :3] + np.tensordot(place, ACROSS, 1) @ moved[:, 3:]
+
+
+# (3, 3, 3): what turns with a link at w moves what lies at e_v by ACROSS[v] w = w × e_v.
+ACROSS = np.array([np.cross(np.eye(3), e).T for e in np.eye(3)])
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """How hits (n, e, c, F) and sensors (n, e, r, F) move the springs, per unit of force."""
+
+    poses: Poses
+    x_hit: np.ndarray
+    x_sensor: np.ndarray
+
+    def at(self, ports: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Motions (n, p, c, F) and (n, p, r, F) of ports (n, p, e)."""
+        hit, sensor = (
+            np.einsum("npe,nejf->npjf", ports, x, optimize=True)
+            for x in (self.x_hit, self.x_sensor)
+        )
+        return hit, sensor
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """An effect, where a fit begins with it (ψ), and the nats that the first order promises."""
+
+    effect: "Effect"
+    psi: np.ndarray
+    nats: float
+
+
+@dataclass(frozen=True)
+class Effect(ABC):
+    """One thing that the simulation may lack, at a place ("base", "joint_2", "link_3")."""
+
+    at: str
+    springs: tuple[int, ...] = ()
+    numbers: tuple[Number, ...] = ()
+
+    kind: ClassVar[str] = ""
+
+    @property
+    def label(self) -> str:
+        """ "local_resonator at link_3"."""
+        return f"{self.kind} at {self.at}"
+
+    @property
+    def mean(self) -> np.ndarray:
+        """Prior mean of ψ."""
+        return np.array([n.mean for n in self.numbers])
+
+    @property
+    def sd(self) -> np.ndarray:
+        """Prior sd of ψ."""
+        return np.array([n.sd for n in self.numbers])
+
+    def impedance(self, poses: Poses, psi: np.ndarray) -> Impedance | None:
+        """What it adds to the dynamic stiffness beside its springs, with slopes by ψ."""
+        return None
+
+    def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
+        """Where fits with it begin, by its first-order columns; springs are tried as they are."""
+        return (Start(self, self.mean, np.inf),)
+
+    def vanishing(self, psi: np.ndarray) -> np.ndarray:
+        """Changes of the first numbers of ψ at which it is no more, to first order."""
+        return np.zeros(0)
+
+    def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray] | None:
+        """The body whose inertia (10,) it changes, where it is nothing else, and by what."""
+        return None
+
+    @abstractmethod
+    def words(self, values: Mapping[str, tuple[float, float]]) -> str:
+        """What it is, for whoever stands at the robot; values and sds by name."""
+
+    def tables(self, values: Mapping[str, tuple[float, float]]) -> dict[str, list[dict[str, Any]]]:
+        """Blocks of robot.toml that state it, beside its springs'."""
+        return {}
+
+
+def moving(shape: np.ndarray) -> np.ndarray:
+    """(6, 6): a shape (3, 3) of velocities alone."""
+    out = np.zeros((6, 6))
+    out[:3, :3] = shape
+    return out
+
+
+def turning(shape: np.ndarray) -> np.ndarray:
+    """(6, 6): a shape (3, 3) between velocities and rates of turn, and its transpose."""
+    out = np.zeros((6, 6))
+    out[:3, 3:], out[3:, :3] = shape, shape.T
+    return out

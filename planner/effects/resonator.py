@@ -1,0 +1,135 @@
+"""Something loose on a link: a mass on a spring of its own (hose pack, bracket)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from planner.dynamics.gradient import Impedance
+from planner.effects.effect import (
+    ACROSS,
+    Effect,
+    Gain,
+    Motions,
+    Number,
+    Poses,
+    Start,
+    moving,
+    turning,
+)
+
+SCREENED = 30  # frequencies over the band
+SCREEN_DAMPING = 0.04  # so that none falls between them
+DIRECTION_SD = 0.5  # of a direction about the one it begins with: about 0 it shrinks to nothing
+PAIRS = tuple((i, k) for i in range(3) for k in range(i, 3))
+
+
+@dataclass(frozen=True)
+class LocalResonator(Effect):
+    """A mass that slides along a direction of the link, held by spring and damper.
+
+    ψ: ln mass, ln frequency, ln damping ratio, direction (3), place (3) in m.
+    """
+
+    joint: str = ""
+    band_hz: tuple[float, float] = (1.0, 100.0)
+
+    kind = "local_resonator"
+
+    def impedance(self, poses: Poses, psi: np.ndarray) -> Impedance:
+        """s² m Jₚᵀ [1 + (T − 1) d dᵀ] Jₚ with the transmissibility T of spring and damper."""
+        mass, omega, zeta = np.exp(psi[0]), 2 * np.pi * np.exp(psi[1]), np.exp(psi[2])
+        length = np.linalg.norm(psi[3:6]) + 1e-12
+        d, s = psi[3:6] / length, poses.s
+        below = s**2 + 2 * zeta * omega * s + omega**2
+        above = 2 * zeta * omega * s + omega**2
+        t = above / below
+        # Derivatives of T with respect to ln ω and ln ζ.
+        d_above = np.stack([2 * zeta * omega * s + 2 * omega**2, 2 * zeta * omega * s])
+        t_slope = (d_above * below - above * d_above) / below**2
+        turn, along = (np.eye(3) - np.outer(d, d)) / length, np.outer(d, d)
+        shapes = [moving(np.eye(3)), moving(along)]
+        shapes += [moving(np.outer(turn[v], d) + np.outer(d, turn[v])) for v in range(3)]
+        shapes += [turning(one) for one in ACROSS]
+        shapes += [turning(along @ one) for one in ACROSS]
+        m = mass * s**2
+        u = m * (t - 1)
+        values = (0, m), (1, u)
+        slope = [values, ((1, m * t_slope[0]),), ((1, m * t_slope[1]),)]
+        slope += [((2 + v, u),) for v in range(3)]
+        slope += [((5 + v, m), (8 + v, u)) for v in range(3)]
+        ports = [poses.carried(self.joint, psi[6:9]), poses.body(self.joint)[:, 3:]]
+        return Impedance(np.concatenate(ports, axis=1), np.array(shapes), values, tuple(slope))
+
+    def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
+        """The best of many frequencies; its direction and mass are the first order's."""
+        low, high = self.band_hz
+        tried = [
+            self.at_frequency(f, motions, gain) for f in np.geomspace(low * 1.1, high, SCREENED)
+        ]
+        return (max(tried, key=lambda start: start.nats),)
+
+    def at_frequency(self, hertz: float, motions: Motions, gain: Gain) -> Start:
+        """Where it begins at one frequency: six columns, one for each pair of directions."""
+        poses, middle = motions.poses, self.mean
+        hit, sensor = motions.at(poses.carried(self.joint, middle[6:9]))
+        s, omega = poses.s, 2 * np.pi * hertz
+        above = 2 * SCREEN_DAMPING * omega * s + omega**2
+        shown = (-(s**4) * above / (s**2 + above))[:, None, None]
+        columns = [
+            shown
+            * (
+                sensor[:, i][:, :, None] * hit[:, k][:, None]
+                + (i != k) * sensor[:, k][:, :, None] * hit[:, i][:, None]
+            )
+            for i, k in PAIRS
+        ]
+        usual = float(np.exp(middle[0]))
+        sds = usual * np.array([1.0 if i == k else 0.5 for i, k in PAIRS])
+        nats, psi = gain(np.stack(columns, axis=1), sds)
+        dyad = np.zeros((3, 3))
+        for value, (i, k) in zip(psi, PAIRS, strict=True):
+            dyad[i, k] = dyad[k, i] = value
+        sizes, ways = np.linalg.eigh(dyad)
+        most = int(np.argmax(np.abs(sizes)))
+        start = middle.copy()
+        start[0] = np.log(np.clip(abs(sizes[most]), 0.2 * usual, 5 * usual))
+        start[1], start[3:6] = np.log(hertz), ways[:, most]
+        return Start(self.towards(ways[:, most]), start, nats)
+
+    def towards(self, way: np.ndarray) -> "LocalResonator":
+        """The same with its direction expected about `way` (3,)."""
+        unit = way / np.linalg.norm(way)
+        directed = tuple(
+            Number(f"direction_{a}", "1", float(w), DIRECTION_SD)
+            for a, w in zip("xyz", unit, strict=True)
+        )
+        return replace(self, numbers=(*self.numbers[:3], *directed, *self.numbers[6:]))
+
+    def vanishing(self, psi: np.ndarray) -> np.ndarray:
+        """See `Effect.vanishing`."""
+        return np.array([-1.0])  # of ln mass
+
+    def words(self, values: Mapping[str, tuple[float, float]]) -> str:
+        """See `Effect.words`."""
+        return (
+            f"Something of {values['mass'][0]:.2g} kg on {self.at} swings on its own at "
+            f"{values['frequency'][0]:.1f} Hz: check hose pack, brackets and covers there."
+        )
+
+    def tables(self, values: Mapping[str, tuple[float, float]]) -> dict[str, list[dict[str, Any]]]:
+        """A [[resonator]]."""
+        place, way = (
+            np.array([values[f"{what}_{a}"][0] for a in "xyz"])
+            for what in ("position", "direction")
+        )
+        block = {
+            "joint": self.joint,
+            "position_m": place.tolist(),
+            "direction": (way / np.linalg.norm(way)).tolist(),
+            "mass": values["mass"][0],
+            "frequency_hz": values["frequency"][0],
+            "damping_ratio": values["damping_ratio"][0],
+        }
+        return {"resonator": [block]}

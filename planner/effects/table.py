@@ -1,0 +1,195 @@
+"""Everything that a robot's simulation may lack: all effects at all places, and all their springs.
+
+Springs that robot.toml does not state are expected stiffer than those that are, by a factor that
+nobody knows. The wider robot has them all, one after the other; a structure uses some of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import msgspec
+import numpy as np
+
+from planner.dynamics.simulation import Simulation
+from planner.effects.added_mass import AddedMass
+from planner.effects.angle_spring import AngleSpring
+from planner.effects.effect import Effect, Number
+from planner.effects.resonator import LocalResonator
+from planner.effects.springs import BendingLink, SoftBase, Tilt
+from planner.errors import InputError
+from planner.identification.parameters import Priors, place_name
+from planner.robot.config import BASE, Compliance
+from planner.robot.massless_base import massless_base
+from planner.robot.robot import Robot
+
+# Stiffness of what is not stated, in that of the stiffest spring stated at the joint (the floor: of
+# the whole robot), and damping in s of stiffness: 0.1 to 3 % of critical at 5 to 30 Hz.
+STIFFNESS, DAMPING_S = (1.0, 300.0), (1e-4, 3e-3)
+ALONG = 0.5  # cosine above which a stated axis already covers this one
+SHORT, BEND = 0.1, 0.3  # of the longest link: does not bend; of the joint's stiffness: a link's
+ADDED_MASS, ADDED_PLACE = 0.22, 0.35  # sds: of the links' mean mass, of the longest link
+RESONATOR_MASS, RESONATOR_DAMPING = 0.05, 0.03  # medians: of the links' mean mass; ratio
+ANGLE_SHARE = 0.3  # sd of a joint's stiffness that goes with its angle
+
+
+@dataclass(frozen=True, eq=False)
+class Repertoire:
+    """`simulation` with every spring, the first `stated` of which robot.toml states, and effects.
+
+    `stiff` is the stated simulation alone, with its own priors.
+    """
+
+    stiff: Simulation
+    stiff_priors: Priors
+    simulation: Simulation
+    priors: Priors
+    stated: int
+    effects: tuple[Effect, ...]
+
+    @classmethod
+    def of(cls, simulation: Simulation, priors: Priors) -> "Repertoire":
+        """Of a robot as robot.toml states it."""
+        robot = simulation.robot
+        config = msgspec.structs.replace(
+            robot.config, payload=(*robot.config.payload, *massless_base(robot))
+        )
+        wider = replace(robot, config=config)
+        bounds, found = dict(priors.bounds), []
+        for kind, at, block, scale in _springs(wider):
+            joined = _joined(wider, block)
+            if joined is None:
+                continue
+            wider = joined
+            bounds |= _bounds(block, scale)
+            found.append((kind, at))
+        stated, groups = len(config.compliance), {}
+        for number, key in enumerate(found, stated):
+            groups.setdefault(key, []).append(number)
+        effects = [kind(at, tuple(numbers)) for (kind, at), numbers in groups.items()]
+        effects += _operators(simulation)
+        widest = Simulation(wider)
+        return cls(
+            simulation, priors, widest, replace(priors, bounds=bounds), stated, tuple(effects)
+        )
+
+
+def _joined(robot: Robot, block: Compliance) -> Robot | None:
+    """With one more spring; None where that moves no inertia of its own, as a base's on a rail."""
+    config = robot.config
+    if place_name(block) in {place_name(one) for one in config.compliance}:
+        return None
+    wider = msgspec.structs.replace(config, compliance=(*config.compliance, block))
+    found = replace(robot, config=wider)
+    try:
+        Simulation(found)
+    except InputError:
+        return None
+    return found
+
+
+def _springs(robot: Robot) -> list[tuple[type[Effect], str, Compliance, float]]:
+    """Kind and place of the effect that frees it, the spring, and its scale."""
+    stated = [b for b in robot.config.compliance]
+    turning = [b for b in stated if not robot.slides_along(b)]
+    stiffest = max((b.stiffness for b in turning), default=max(robot.turning_stiffness()))
+    names, found = list(robot.joint_names), []
+    for joint in dict.fromkeys(b.joint for b in stated if b.joint in names):
+        mine = [b for b in turning if b.joint == joint]
+        scale = max((b.stiffness for b in mine), default=stiffest)
+        for axis in np.eye(3):
+            if not any(abs(float(axis @ np.array(b.axis))) > ALONG for b in mine):
+                at = f"joint_{names.index(joint) + 1}"
+                found.append((Tilt, at, _spring(joint, axis, scale), scale))
+    ways = _links(robot)
+    longest = max((float(np.linalg.norm(way)) for _, _, way in ways), default=0.0) or robot.reach_m
+    if BASE not in names:
+        covered = [np.array(b.axis) for b in turning if b.joint == BASE]
+        for axis in np.eye(3):
+            if not any(abs(float(axis @ there)) > ALONG for there in covered):
+                found.append((SoftBase, BASE, _spring(BASE, axis, stiffest), stiffest))
+        shift = stiffest / (2 * longest) ** 2
+        found += [(SoftBase, BASE, _spring(BASE, a, shift, True), shift) for a in np.eye(3)]
+    for link, joint, way in ways:
+        length = float(np.linalg.norm(way))
+        if length > SHORT * longest:
+            own = [b.stiffness for b in turning if b.joint == joint] or [stiffest]
+            at, scale = f"link_{names.index(joint) + 1}", BEND * max(own)
+            axes = (*across(way / length), way / length)
+            found += [(BendingLink, at, _spring(link, axis, scale), scale) for axis in axes]
+    return found
+
+
+def _links(robot: Robot) -> list[tuple[str, str, np.ndarray]]:
+    """Links that carry a joint: name, the joint that moves it, and the way (3,) to the next."""
+    found = []
+    for joint in robot.joint_names:
+        link = robot.link_of(joint)
+        carried = robot.carries(link)
+        if carried is not None and link not in robot.joint_names:
+            way = np.array(robot.model.jointPlacements[carried[1]].translation)
+            found.append((link, joint, way))
+    return found
+
+
+def _spring(joint: str, axis: np.ndarray, scale: float, slide: bool = False) -> Compliance:
+    low, high = (scale * factor for factor in STIFFNESS)
+    stiffness, damping = np.sqrt(low * high), np.sqrt(low * DAMPING_S[0] * high * DAMPING_S[1])
+    x, y, z = map(float, axis)
+    return Compliance(joint, (x, y, z), float(stiffness), float(damping), slide=slide)
+
+
+def _bounds(block: Compliance, scale: float) -> dict[str, tuple[float, float]]:
+    place, (low, high) = place_name(block), (scale * factor for factor in STIFFNESS)
+    damping = low * DAMPING_S[0], high * DAMPING_S[1]
+    return {f"stiffness of {place}": (low, high), f"damping of {place}": damping}
+
+
+def across(axis: np.ndarray) -> np.ndarray:
+    """(2, 3): two unit vectors normal to a unit vector (3,) and to each other."""
+    first = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(axis, first)])
+
+
+def _operators(simulation: Simulation) -> list[Effect]:
+    """Masses and resonators on every link, and springs that go with the angle."""
+    robot, elastic = simulation.robot, simulation.elastic
+    masses = [b[0] for b in elastic.inertia if b[0] > 0]
+    mean, band = float(np.mean(masses)), robot.config.band_hz
+    size = ADDED_PLACE * max(
+        float(np.linalg.norm(p.translation)) for p in robot.model.jointPlacements
+    )
+    low, high = band
+    found: list[Effect] = []
+    for number, joint in enumerate(robot.joint_names, 1):
+        if joint not in elastic.bodies:
+            continue
+        body = elastic.inertia[elastic.bodies.index(joint)]
+        centre = tuple(map(float, body[1:4] / body[0])) if body[0] > 0 else (0.0, 0.0, 0.0)
+        at = f"link_{number}"
+        places = tuple(Number(f"position_{a}", "1", 0.0, 1.0) for a in "xyz")
+        numbers = (Number("mass", "1", 0.0, 1.0), *places)
+        found.append(AddedMass(at, (), numbers, joint, centre, ADDED_MASS * mean, size))
+        numbers = (
+            Number("mass", "kg", float(np.log(RESONATOR_MASS * mean)), 1.0, True),
+            Number("frequency", "Hz", float(np.log(low * high)) / 2,
+                   float(np.log(high / low)) / np.sqrt(12), True),
+            Number("damping_ratio", "1", float(np.log(RESONATOR_DAMPING)), 1.0, True),
+            *(Number(f"direction_{a}", "1", 0.0, 1.0) for a in "xyz"),
+            *(Number(f"position_{a}", "m", c, size) for a, c in zip("xyz", centre, strict=True)),
+        )  # fmt: skip
+        found.append(LocalResonator(at, (), numbers, joint, band))
+    own = [(n, b) for n, b in enumerate(robot.config.compliance) if robot.is_own(b)]
+    for spring, block in own:
+        number = robot.joint_names.index(block.joint)
+        shares = tuple(Number(name, "1", 0.0, ANGLE_SHARE) for name in ("cosine", "sine"))
+        if not robot.slides_along(block):
+            at = f"joint_{number + 1}"
+            wave = block.joint, number, spring, block.stiffness
+            found.append(AngleSpring(at, (), shares, *wave))
+    return found
+
+
+def of_kinds(effects: Sequence[Effect], *kinds: type[Effect]) -> tuple[Effect, ...]:
+    """Those of some kinds."""
+    return tuple(e for e in effects if isinstance(e, kinds))

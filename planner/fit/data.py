@@ -1,0 +1,84 @@
+"""FRFs of several poses on chosen lines, and the robot's matrices there."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.effects.effect import Poses
+from planner.fit.structure import RobotPrior, Structure
+from planner.frf.frf import Frf
+from planner.identification.measured_frfs import Measured, common_band, matrices_at, stack
+from planner.robot.angle_slopes import AngleSlopes
+from planner.robot.elastic_model import Matrices
+
+SMALLEST = 1e-4  # relative sd of any value: no record is more exact
+
+
+@dataclass(frozen=True, eq=False)
+class FrfData:
+    """What was measured at q (n, dof) in rad, and matrices with every spring that there may be."""
+
+    q: np.ndarray
+    measured: Measured
+    matrices: Matrices
+    jacobians: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        prior: RobotPrior,
+        frfs: Sequence[Frf],
+        q: np.ndarray,
+        band_hz: tuple[float, float],
+        lines: int,
+    ) -> "FrfData":
+        """On so many lines a pose, closer together where half-power bands are narrow."""
+        seen = common_band(frfs, band_hz)
+        measured = stack(frfs, seen, lines, SMALLEST, geometric=True)
+        elastic = prior.carried
+        return cls(
+            q, measured, matrices_at(elastic, q, frfs, sloped=True), elastic.body_jacobians(q)
+        )
+
+    @property
+    def sensors(self) -> int:
+        """How many sensors heard the hits."""
+        return self.measured.accelerance.shape[1] // 3
+
+    def poses(self, structure: Structure) -> Poses:
+        """As effects see them."""
+        springs = list(structure.springs)
+        bodies = structure.prior.repertoire.simulation.elastic.bodies
+        jacobians = self.jacobians[..., springs]
+        return Poses(self.q, self.measured.s, jacobians, bodies, structure.springs)
+
+    def at(self, poses: np.ndarray) -> "FrfData":
+        """Of some of the poses, by their numbers."""
+        return FrfData(
+            self.q[poses], self.measured.at(poses), self.matrices.at(poses), self.jacobians[poses]
+        )
+
+
+def among(m: Matrices, springs: Sequence[int]) -> Matrices:
+    """Matrices of some of the springs, by their numbers."""
+    some = list(springs)
+    square = np.ix_(range(len(m.mass)), some, some)
+    by = m.by_angle
+    if by is not None:
+        by = AngleSlopes(
+            by.mass[:, :, some][:, :, :, some],
+            by.hit[..., some],
+            by.sensor[..., some],
+            by.stiffness[..., some],
+        )
+    return replace(
+        m,
+        mass=m.mass[square],
+        hit=m.hit[..., some],
+        sensor=m.sensor[..., some],
+        geometric=m.geometric[square],
+        hit_turn=m.hit_turn[..., some],
+        sensor_turn=m.sensor_turn[..., some],
+        by_angle=by,
+    )

@@ -1,0 +1,56 @@
+"""One solver: damped Gauss–Newton steps (Levenberg–Marquardt) of a misfit from x on."""
+
+import numpy as np
+
+from planner.fit.misfit import At, Misfit
+from planner.fit.structure import REACH
+
+GOOD, GROWTH, MOST_REJECTED, MOST_DAMPED = 0.5, 3.0, 8, 1e9
+SOFTER, STIFFER = 6.0, 0.8  # of a new spring's step, in shares of its compliance
+
+
+def minimised(
+    misfit: Misfit,
+    x: np.ndarray,
+    steps: int,
+    tolerance: float = 0.5,
+    own: np.ndarray | None = None,
+    by_prior: bool = False,
+) -> At:
+    """Where at most so many steps lead, none of which promises less than `tolerance` nats.
+
+    `by_prior`: damped in the prior's sds, not the data's: so it follows what they leave open.
+    """
+    s = misfit.structure
+    low, high = s.mean - REACH * s.sd, s.mean + REACH * s.sd
+    at, rejected, growth = misfit(x, own), 0, GROWTH
+    damping = 1e-2 if by_prior else 1e-3
+    for _ in range(steps):
+        normal, gradient = at.normal + s.precision, at.gradient + s.precision @ (at.x - s.mean)
+        scale = np.diag(s.precision) if by_prior else np.diag(normal)
+        step = -np.linalg.solve(normal + damping * np.diag(scale), gradient)
+        promised = -float(gradient @ step + 0.5 * step @ normal @ step)
+        if promised < tolerance:
+            break
+        there = np.clip(_moved(misfit, at.x, step), low, high)
+        tried = misfit(there, at.own) if misfit.possible(there) else None
+        if tried is not None and tried.value < at.value:
+            if at.value - tried.value > GOOD * promised:
+                damping = max(0.2 * damping, 1e-4 if by_prior else 1e-7)
+            at, rejected, growth = tried, 0, GROWTH
+            continue
+        damping = max(damping, 0.1 if by_prior else 0.0) * growth * (3 if by_prior else 1)
+        growth, rejected = 2 * growth, rejected + 1
+        if rejected > MOST_REJECTED or damping > MOST_DAMPED:
+            break
+    return at
+
+
+def _moved(misfit: Misfit, x: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """No number goes farther than it may; springs not stated go in compliance, in which FRFs are
+    linear."""
+    s = misfit.structure
+    out = x + np.clip(step, -s.longest, s.longest)
+    new = [i for i in range(s.stiffnesses) if not s.parameters[i].stated]
+    out[new] = x[new] - np.log1p(np.clip(-step[new], -STIFFER, SOFTER))
+    return out

@@ -1,0 +1,355 @@
+"""How far a structure is from measured FRFs, what belongs to single poses integrated out.
+
+Two residuals: logarithms of ratios lead home from afar, plain ones in units of what is not
+explained end there. That is noise, and a discrepancy proportional to |H| that neighbouring lines
+share (`ρ`). Hits, readback and the scatter of springs from visit to visit are eliminated pose by
+pose (Woodbury), linearised about where they were last; the chain is common to all poses.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from planner.dynamics.gradient import Impedance, Inertias, motion_slopes, moved
+from planner.dynamics.motion import Motion, Turned
+from planner.effects.effect import Motions
+from planner.fit.data import FrfData, among
+from planner.fit.inertias import spatial
+from planner.fit.structure import REACH, Structure
+from planner.identification.measurement_model import OpenNumbers, Tolerances, basis
+from planner.identification.missed_ports import actual_ports
+from planner.robot.elastic_model import Matrices
+
+ELL = 0.03  # of the frequency: lines so near share the discrepancy, about a half-power band
+SHARE = 0.3  # of the rms of all FRFs of a pose at a line, in the size of each
+LOG_FLOOR, LOG_DROP = 0.3, 0.3  # relative sds: no logarithm counts more; from which it counts none
+LOG_PRIOR = 10.0  # far away data err alike, and the prior counts for more
+FARTHEST = 4.0  # sds of what hits, readback and visits are linearised about
+UNUSED = 1e6  # sds of what was not measured, in the size of FRFs
+
+
+@dataclass(frozen=True, eq=False)
+class At:
+    """A misfit at x: χ², half its gradient and the normal of the data (the bodies' barrier in it).
+
+    `own` (n, l) are the likeliest numbers of each pose, `volume` what eliminating them costs.
+    `white` (n, D + l + 1, N) are all columns, the residual last, where they were kept.
+    """
+
+    x: np.ndarray
+    chi2: float
+    gradient: np.ndarray
+    normal: np.ndarray
+    volume: float
+    value: float
+    own: np.ndarray
+    factors: tuple[np.ndarray, ...] = ()
+    onto: tuple[np.ndarray, ...] = ()
+    white: np.ndarray | None = None
+    motion: Motion | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Around:
+    """The model at x: columns (n, D + l + 1, r, c, F) by x and own numbers, the residual last."""
+
+    x: np.ndarray
+    columns: np.ndarray
+    motion: Motion
+
+
+@dataclass(frozen=True, eq=False)
+class Misfit:
+    """Of a structure on data; `rho` is the discrepancy's size, None: logarithms are compared."""
+
+    structure: Structure
+    data: FrfData
+    tolerances: Tolerances
+    rho: float | None = 0.03
+
+    @cached_property
+    def matrices(self) -> Matrices:
+        """Of the structure's springs."""
+        return among(self.data.matrices, self.structure.springs)
+
+    @cached_property
+    def jacobians(self) -> np.ndarray:
+        """(n, L, 6, e) of the structure's bodies."""
+        springs, live = list(self.structure.springs), list(self.structure.live)
+        return np.ascontiguousarray(self.data.jacobians[:, live][..., springs])
+
+    def with_rho(self, rho: float | None) -> "Misfit":
+        """With a discrepancy of another size; what does not depend on it is kept."""
+        other = replace(self, rho=rho)
+        for name in ("matrices", "jacobians", "poses", "_weightless"):
+            if name in vars(self):
+                vars(other)[name] = vars(self)[name]
+        return other
+
+    @cached_property
+    def poses(self):
+        """As effects see them."""
+        return self.data.poses(self.structure)
+
+    @cached_property
+    def size(self) -> np.ndarray:
+        """(n, r, c, F) of FRFs, to which the discrepancy is proportional; at least a share of
+        the rms of all of the pose at that frequency."""
+        m = self.data.measured
+        square = np.where(m.used, np.abs(m.accelerance) ** 2, 0.0)
+        count = np.maximum(m.used.sum(axis=(1, 2), keepdims=True), 1)
+        rms = np.sqrt(square.sum(axis=(1, 2), keepdims=True) / count)
+        return np.sqrt(square + SHARE**2 * rms**2)
+
+    @cached_property
+    def whitening(self) -> np.ndarray:
+        """(n, r, c, F, F): inverse of the covariance's root, of real and imaginary part each."""
+        m, size, rho = self.data.measured, self.size, self.rho
+        assert rho is not None
+        noise = np.where(m.used, m.sd**2 / 2, (UNUSED * size) ** 2)
+        width = ELL * m.frequency_hz
+        apart = (m.frequency_hz[:, :, None] - m.frequency_hz[:, None]) ** 2
+        both = width[:, :, None] ** 2 + width[:, None] ** 2
+        alike = np.sqrt(2 * width[:, :, None] * width[:, None] / both) * np.exp(-apart / both)
+        lines = np.arange(alike.shape[-1])
+        covariance = size[..., :, None] * alike[:, None, None] * size[..., None, :] * (rho**2 / 2)
+        covariance[..., lines, lines] += noise
+        return np.linalg.inv(np.linalg.cholesky(covariance))
+
+    @cached_property
+    def log_weight(self) -> np.ndarray:
+        """(n, r, c, F) of logarithms."""
+        m = self.data.measured
+        relative = np.where(m.used, m.sd, np.inf) / np.abs(m.accelerance)
+        kept = relative < LOG_DROP
+        sd = np.hypot(np.where(kept, relative, 1.0), LOG_FLOOR)
+        return np.where(kept, np.sqrt(2 / LOG_PRIOR) / sd, 0.0)
+
+    @cached_property
+    def noise_volume(self) -> float:
+        """ln of the determinant of the residuals' covariance."""
+        if self.rho is None:
+            return 0.0
+        used = self.data.measured.used
+        diagonal = np.log(np.einsum("...ff->...f", self.whitening))
+        return -4 * float(np.sum(np.where(used, diagonal, 0.0)))
+
+    # ---------------------------------------------------------------- the model
+
+    def inertias(self, x: np.ndarray) -> np.ndarray:
+        """(L, 6, 6): by what bodies differ from the nominal ones."""
+        return spatial(self.structure.bodies.difference(x[self.structure.inertial]))
+
+    def mass(self, x: np.ndarray) -> np.ndarray:
+        """(n, e, e)."""
+        change = np.swapaxes(self.jacobians, 2, 3) @ self.inertias(x) @ self.jacobians
+        return self.matrices.mass + change.sum(axis=1)
+
+    def impedances(self, x: np.ndarray) -> list[Impedance]:
+        """Of the effects that have any."""
+        pairs = zip(self.structure.effects, self.structure.own, strict=True)
+        found = (e.impedance(self.poses, x[own]) for e, own in pairs)
+        return [one for one in found if one is not None]
+
+    def possible(self, x: np.ndarray) -> bool:
+        """Whether such a robot can be, and stands."""
+        s = self.structure
+        if np.any(np.abs((x - s.mean) / s.sd) > REACH + 0.5):
+            return False
+        if not np.isfinite(s.bodies.barrier(x[s.inertial])[0]) or not s.massive(x):
+            return False
+        try:
+            np.linalg.cholesky(self.mass(x))
+            stiffness = np.diag(s.elasticity(x).stiffness)
+            np.linalg.cholesky(stiffness + self.matrices.geometric)
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+    def motion(self, x: np.ndarray, eta: np.ndarray | None) -> Motion:
+        """At x, between the ports that hits and sensors had by eta (n, l); None: as stated."""
+        m, mass = self.matrices, self.mass(x)
+        if m.by_angle is not None:  # slopes by the joints' angles go with the masses as they are
+            nominal, now = (np.trace(a, axis1=1, axis2=2) for a in (m.mass, mass))
+            scaled = m.by_angle.mass * (now / nominal)[:, None, None, None]
+            m = replace(m, by_angle=replace(m.by_angle, mass=scaled))
+        s, shape = self.data.measured.s, self.data.measured.accelerance.shape[1:3]
+        ports = None if eta is None else actual_ports(eta, s, self.tolerances, shape)
+        elasticity = self.structure.elasticity(x)
+        return moved(m, elasticity, s, mass, self.impedances(x), ports)
+
+    def slopes(self, motion: Motion, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives (n, D − chain, r, c, F) by x, and (n, e, r, c, F) by ln k of each spring."""
+        structure, elasticity = self.structure, self.structure.elasticity(x)
+        kinds, e = structure.spread.shape[:2]
+        numbers = structure.bodies.slopes(x[structure.inertial])
+        # All bodies' numbers in one rectangle, for one product; a number of two bodies is added.
+        most = max(len(one) for one in numbers)
+        block = np.zeros((len(numbers), most, 6, 6))
+        for b, one in enumerate(numbers):
+            block[b, : len(one)] = spatial(one)
+        added = self.impedances(x)
+        raw = motion_slopes(motion, elasticity, Inertias(self.jacobians, block), added)
+        springs = (3 if elasticity.loss_factor.any() else 2) * e
+        by_block = raw[:, : kinds * e]
+        out = np.empty((len(raw), structure.chain.start, *raw.shape[2:]), dtype=complex)
+        out[:, : len(structure.parameters)] = structure.spring_slopes(by_block)
+        bodies = out[:, structure.inertial]
+        bodies[:] = 0.0
+        at = springs
+        for mine, one in zip(structure.bodies.mine, numbers, strict=True):
+            if np.array_equal(mine, np.arange(mine[0], mine[0] + len(mine))):
+                bodies[:, mine[0] : mine[0] + len(mine)] += raw[:, at : at + len(one)]
+            else:
+                bodies[:, mine] += raw[:, at : at + len(one)]
+            at += most
+        out[:, structure.inertial.stop :] = raw[:, springs + block.shape[0] * most :]
+        visits = by_block[:, :e] + by_block[:, e : 2 * e]  # dampers scatter with their springs
+        return out, visits
+
+    def columns(self, x: np.ndarray, eta: np.ndarray) -> tuple[np.ndarray, np.ndarray, Motion]:
+        """Accelerance (n, r, c, F), columns (n, D + l, r, c, F) by x and own numbers, and motion.
+
+        `eta` (n, all numbers that a pose leaves open) is what they are linearised about.
+        """
+        motion = self.motion(x, eta)
+        h, turned = motion.accelerance, Turned((motion,))
+        open_ = basis(h, turned, self.data.measured.s, self.tolerances)
+        slopes, visits = self.slopes(motion, x)
+        numbers = OpenNumbers.of(h)
+        parts = (
+            slopes,
+            open_[:, numbers.hits : numbers.known],
+            open_[:, : numbers.hits],
+            open_[:, numbers.known :],
+            self.tolerances.visit_stiffness * visits,
+        )
+        return h, np.concatenate(parts, axis=1), motion
+
+    @cached_property
+    def open_numbers(self) -> tuple[OpenNumbers, int]:
+        """Of hits and chain, and of joints."""
+        by_angle = self.matrices.by_angle
+        joints = 0 if by_angle is None else by_angle.mass.shape[1]
+        return OpenNumbers.of(self.data.measured.accelerance), joints
+
+    def nothing_open(self) -> np.ndarray:
+        """(n, l): own numbers, all 0."""
+        numbers, joints = self.open_numbers
+        return np.zeros((len(self.data.q), numbers.hits + joints + len(self.structure.springs)))
+
+    def _about(self, own: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """(n, hits + chain + joints), from own numbers and the chain as x has it."""
+        numbers, joints = self.open_numbers
+        chain = np.tile(x[self.structure.chain], (len(own), 1))
+        kept = own[:, : numbers.hits + joints]
+        return np.hstack([kept[:, : numbers.hits], chain, kept[:, numbers.hits :]])
+
+    def __call__(self, x: np.ndarray, own: np.ndarray | None = None, keep: bool = False) -> At:
+        """At x, linearised about own numbers (n, l); those of springs count from 0."""
+        return self.weighed(self.around(x, own), keep)
+
+    def around(self, x: np.ndarray, own: np.ndarray | None = None) -> "Around":
+        """What does not depend on the discrepancy's size."""
+        numbers, joints = self.open_numbers
+        size = numbers.hits + joints
+        given = self.nothing_open()
+        if own is not None:
+            given[:, :size] = np.clip(own[:, :size], -FARTHEST, FARTHEST)
+        m, d = self.data.measured, self.structure.size
+        h, columns, motion = self.columns(x, self._about(given, x))
+        there = np.einsum("nl,nlijf->nijf", given[:, :size], columns[:, d : d + size])
+        if self.rho is None:
+            off = h * np.log(np.where(m.used, h / m.accelerance, 1.0)) - there
+        else:
+            off = np.where(m.used, h - m.accelerance, 0.0) - there
+        return Around(x, np.concatenate([columns, off[:, None]], axis=1), motion)
+
+    def weighed(self, around: "Around", keep: bool = False) -> At:
+        """By noise and discrepancy."""
+        white = self._white(around.columns, around.motion.accelerance)
+        return self._eliminated(around.x, white, keep, around.motion)
+
+    def _white(self, columns: np.ndarray, h: np.ndarray) -> np.ndarray:
+        """(n, k, N) real, of (n, k, r, c, F)."""
+        n, k = columns.shape[:2]
+        if self.rho is None:
+            scaled = columns * (self.log_weight / h)[:, None]
+            return np.ascontiguousarray(scaled).reshape(n, k, -1).view(float)
+        return self.whitened(columns)
+
+    def whitened(self, columns: np.ndarray) -> np.ndarray:
+        """The same of plain residuals."""
+        n, k = columns.shape[:2]
+        turned = np.ascontiguousarray(np.moveaxis(columns, 1, -1))
+        flat = turned.view(float).reshape(*turned.shape[:-1], 2 * k)
+        out = (self.whitening @ flat).view(complex)
+        return np.ascontiguousarray(np.moveaxis(out, -1, 1)).reshape(n, k, -1).view(float)
+
+    def _eliminated(self, x: np.ndarray, white: np.ndarray, keep: bool, motion: Motion) -> At:
+        s, d = self.structure, self.structure.size
+        count = white.shape[1] - d - 1
+        mine = slice(d, d + count)
+        normal, gradient = np.zeros((d, d)), np.zeros(d)
+        chi2 = volume = 0.0
+        own = np.empty((len(white), count))
+        factors, ontos = [], []
+        for p, rows in enumerate(white):
+            gram = rows @ rows.T
+            factor = np.linalg.cholesky(gram[mine, mine] + np.eye(count))
+            onto = np.linalg.solve(factor, gram[mine])
+            normal += gram[:d, :d] - onto[:, :d].T @ onto[:, :d]
+            gradient += gram[:d, -1] - onto[:, :d].T @ onto[:, -1]
+            chi2 += gram[-1, -1] - onto[:, -1] @ onto[:, -1]
+            volume += 2 * float(np.sum(np.log(np.diag(factor))))
+            own[p] = -np.linalg.solve(factor.T, onto[:, -1])
+            factors.append(factor)
+            ontos.append(onto)
+        beyond, pull, curvature = s.bodies.barrier(x[s.inertial])
+        chi2 += 2 * beyond
+        gradient[s.inertial] += pull
+        normal[s.inertial, s.inertial] += curvature
+        away = x - s.mean
+        value = 0.5 * (chi2 + float(away @ s.precision @ away))
+        kept = {"factors": tuple(factors), "onto": tuple(ontos), "white": white} if keep else {}
+        return At(x, chi2, gradient, normal, volume, value, own, **kept, motion=motion)
+
+    # ---------------------------------------------------------------- what follows from it
+
+    def evidence(self, at: At) -> float:
+        """ln of the marginal likelihood by Laplace's method, but for a constant."""
+        s = self.structure
+        away = at.x - s.mean
+        prior = float(away @ s.precision @ away)
+        spent = np.linalg.slogdet(at.normal + s.precision)[1] - np.linalg.slogdet(s.precision)[1]
+        return -0.5 * (at.chi2 + prior + at.volume + self.noise_volume + float(spent))
+
+    def gain(self, at: At, columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
+        """Nats that columns (n, k, r, c, F) of sds (k,) gain beside all else, and their size."""
+        s, d = self.structure, self.structure.size
+        assert at.white is not None
+        new = self.whitened(columns)
+        k = new.shape[1]
+        square, cross, pull = np.zeros((k, k)), np.zeros((d, k)), np.zeros(k)
+        for p, mine in enumerate(new):
+            rows, factor, onto = at.white[p], at.factors[p], at.onto[p]
+            both = rows @ mine.T
+            taken = np.linalg.solve(factor, both[d:-1])
+            square += mine @ mine.T - taken.T @ taken
+            cross += both[:d] - onto[:, :d].T @ taken
+            pull += both[-1] - taken.T @ onto[:, -1]
+        slope = at.gradient + s.precision @ (at.x - s.mean)
+        solved = np.linalg.solve(at.normal + s.precision, np.column_stack([cross, slope]))
+        square -= cross.T @ solved[:, :-1]
+        pull -= cross.T @ solved[:, -1]
+        inner = square * np.outer(sd, sd) + np.eye(k)
+        z = -np.linalg.solve(inner, pull * sd)
+        nats = 0.5 * float(z @ inner @ z) - 0.5 * float(np.linalg.slogdet(inner)[1])
+        return nats, z * sd
+
+    def motions(self, at: At) -> Motions:
+        """How hits and sensors move the springs, as effects' first-order columns need it."""
+        motion = at.motion
+        assert motion is not None
+        return Motions(self.poses, motion.x_hit, motion.scaled(motion.x_sensor))
