@@ -18,6 +18,7 @@ from planner.campaign.cell import Cell
 from planner.campaign.check import refuse_errors
 from planner.campaign.config import CampaignConfig, check_config, load_campaign_config
 from planner.campaign.events import MeasuredMode, Proposal
+from planner.campaign.fit_memory import FitMemory
 from planner.campaign.log_conversion import from_modal, from_mode
 from planner.campaign.model import Model
 from planner.campaign.planned import inside
@@ -65,6 +66,7 @@ class AskTell:
             config = load_campaign_config(Path(tables))
         self._cell = Cell.load(loaded.path, config, loaded)
         refuse_errors(self._cell.examined)
+        self._memory = FitMemory()
         self._state = CampaignState()
         self._frfs: dict[str, Frf] = {}
         self._model: Model | None = None
@@ -142,7 +144,9 @@ class AskTell:
         """What is believed after all that was told."""
         if self._model is None:
             with threadpool_limits(1):
-                self._model = build(self._cell, self._state, lambda m, _: self._frfs[m.pose])
+                self._model = build(
+                    self._cell, self._state, lambda m, _: self._frfs[m.pose], memory=self._memory
+                )
         return self._model
 
     @property

@@ -7,6 +7,7 @@ import numpy as np
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
+from planner.campaign.fit_memory import FitMemory
 from planner.campaign.frequencies_by_simulation import TunedFrequencies, tuned_frequencies
 from planner.campaign.labels import LabelledPose, label, observations
 from planner.campaign.low_fidelity import LowFidelity, learn
@@ -30,24 +31,26 @@ def build(
     state: CampaignState,
     frf_of: FrfOf,
     hits_of: Callable[[Measurement, ModesTable], PoseHits] | None = None,
+    memory: FitMemory | None = None,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
     `frf_of` gives the tool's FRFs of a measurement, `hits_of` what its hits say at all points,
     which is asked only where the simulation learns. Without it nothing is told of single hits.
+    `memory` keeps what was found of the first measurements, so that nothing is found twice.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
     noise, told, tuned, learns = None, None, None, cell.config.fidelity.simulation == "updated"
     if learns and used:
         frfs = tuple(frf_of(m, table) for m in used)
         hits = tuple(hits_of(m, table) for m in used) if hits_of else None
-        whole = tuple(h.whole for h in hits) if hits is not None and cell.hits_err else frfs
+        whole = tuple(h.whole for h in hits) if hits is not None else frfs
         joints = cell.robot.joints
         q = joints.internal([m.joints_deg for m in used])
-        low = learn(low, whole, q, table.band_hz)
+        low = learn(low, whole, q, table.band_hz, memory, used)
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(whole, table.band_hz, misfit)
-        if cell.hits_err and low.learned is not None:
+        if low.learned is not None:
             simulation, count = low.learned.identified.simulation, low.count
             seen = tuple(f.within(table.band_hz) for f in frfs)
             tuned = tuned_frequencies(simulation, seen, q, table.band_hz, cell.tolerances, count)
@@ -73,7 +76,7 @@ def build(
         taught=best.low.taught,
         visits=cell.visit_scatter,
     )
-    if hits_of is not None and cell.hits_err:
+    if hits_of is not None:
         frf_of = _OfOneHit(frf_of, hits_of)
     model = Model(cell, best.labelled, best.low, best.seen, surrogate, noise, told, used, frf_of)
     if learns:
@@ -119,8 +122,8 @@ class _Guided:
         labelled = label(cell, used, low)
         seen = observations(cell, labelled)
         seen = seen if tuned is None else tuned.into(seen)
-        known = low.discrepancy(seen.frequency_hz) if labelled else None
-        primary = fit_primary(seen, known, low.left_out, low.belief, cell.visit_scatter)
+        known = low.discrepancy if labelled else None
+        primary = fit_primary(seen, known, None, low.belief, cell.visit_scatter)
         return cls(low, used, labelled, seen, primary)
 
     @property

@@ -148,8 +148,7 @@ class Cell:
     @cached_property
     def frozen(self) -> LowFidelity:
         """The simulation as robot.toml states it."""
-        tolerances = self.tolerances if self.hits_err else None
-        return LowFidelity(self.config.modes.count, self.simulation, tolerances)
+        return LowFidelity(self.config.modes.count, self.simulation, self.tolerances)
 
     def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
         """What the simulation of robot.toml says at q (n, dof) in rad; see `LowFidelity`."""

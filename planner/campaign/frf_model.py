@@ -1,8 +1,7 @@
-"""FRFs anywhere: the simulation's own, and the fused modes', weighed by what each left out showed.
+"""FRFs anywhere: the simulation's own where it explains the recordings, else the fused modes'.
 
-The simulation brings all of its modes, over the whole band. Where it explains the recordings it is
-used alone; else it shares with FRFs made of fused modes, as much as makes the FRFs of measured
-poses, each predicted from the others, best. Their errors also say how far off FRFs are elsewhere.
+The simulation brings all of its modes, over the whole band. FRFs made of fused modes are as far off
+as those of measured poses, each predicted from the others, say.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.campaign.frf_posterior import FrfPosterior, LeftOutFrf
+from planner.fit.posterior import Posterior
 from planner.identification.measured_frfs import Measured
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
 
@@ -20,9 +19,6 @@ ZONES = (
 )
 WIDTH = 0.05  # of the frequency: over which an FRF's size is averaged
 OWN = 0.5  # share of an FRF's own square in its size; the rest is the mean of all nine
-# χ² per value up to which the simulation is not weighed against fused modes: on generated cells
-# these never came near it. A share too small to matter would only widen the bands.
-ALONE, LITTLE_SHARE = 3.0, 0.05
 # What is expected of an error's size before any pose is left out: its median, and sds of its
 # logarithm, of a whole campaign and of a zone within it. Of generated campaigns in which physics
 # lacked zones were 0.01 to 0.3 off, where nothing lacked 0.003 to 0.03.
@@ -74,15 +70,6 @@ class ErrorByZone:
             log_likelihood += _log_likelihood(pose, edges)
         return cls(edges, np.sqrt(_posterior(log_likelihood) @ SIZES**2))
 
-    @property
-    def common(self) -> float:
-        """Relative error that may be the same at all poses: leaving poses out does not show it.
-
-        What lacks in one zone moves parameters, and the measuring chain follows: of generated
-        campaigns the scale of FRFs was off by 0.2 to 2 times the root mean square of all zones.
-        """
-        return float(np.sqrt(np.mean(self.relative**2)))
-
     def at(self, frequency_hz: np.ndarray) -> np.ndarray:
         """(F,) from middle to middle of the zones."""
         middle = np.sqrt(self.edges_hz[:-1] * self.edges_hz[1:])
@@ -132,69 +119,42 @@ def local_size(h: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class FrfModel:
-    """`share` of the simulation (None: there is none) beside fused modes, and the error of each."""
+    """The simulation that explains the recordings, or None and the error of fused modes."""
 
-    simulated: FrfPosterior | None
-    share: float
-    simulated_error: ErrorByZone
+    simulated: Posterior | None
     modal_error: ErrorByZone
 
     def predict(
         self, q: np.ndarray, frequency_hz: np.ndarray, modal: Callable[[], Moments]
     ) -> Moments:
         """FRFs at q (n, dof) in rad; `modal` gives those of the fused modes there, where needed."""
-        found: list[tuple[float, Moments]] = []
-        if self.simulated is not None and self.share > 0:
-            error = self.simulated_error
-            relative = np.hypot(error.at(frequency_hz), error.common)
-            moments = self.simulated.response(q, frequency_hz)
-            found.append((self.share, _widened(moments, relative, frequency_hz)))
-        if self.share < 1:
-            moments = _widened(modal(), self.modal_error.at(frequency_hz), frequency_hz)
-            found.append((1 - self.share, moments))
-        mean = sum(w * m for w, (m, _) in found)
-        variance = sum(w * (sd**2 + np.abs(m - mean) ** 2) for w, (m, sd) in found)
-        return np.asarray(mean), np.sqrt(variance)
-
-
-def _widened(moments: Moments, relative: np.ndarray, frequency_hz: np.ndarray) -> Moments:
-    mean, sd = moments
-    return mean, np.hypot(sd, relative * local_size(mean, frequency_hz))
+        if self.simulated is not None:
+            return self.simulated.predicted(q, frequency_hz)
+        mean, sd = modal()
+        relative = self.modal_error.at(frequency_hz)
+        return mean, np.hypot(sd, relative * local_size(mean, frequency_hz))
 
 
 def frf_model(
-    simulated: FrfPosterior | None,
+    simulated: Posterior | None,
     measured: Measured,
     band_hz: tuple[float, float],
     left_out_modes: Callable[[], ModalPrediction],
     above: Callable[[int, np.ndarray], np.ndarray],
 ) -> FrfModel:
-    """Weigh simulation and fused modes by the FRFs of n measured poses.
+    """Of the FRFs of n measured poses.
 
     Args:
-        simulated: the simulation after these FRFs, where there is one.
-        measured: what it was fitted to.
+        simulated: the simulation after these FRFs, where it explains them.
+        measured: what was measured.
         band_hz: over which FRFs are predicted.
         left_out_modes: fused modes (n, k) at each pose without it.
         above: what higher modes add at a pose, by its number, on lines (F,): (3, 3, F) in m/s²/N.
     """
-    several = len(measured.s) > 1
-    by_simulation = simulated.left_out() if simulated is not None and several else []
-    first = [_simulated(pose) for pose in by_simulation]
-    enough = simulated is not None and (simulated.misfit <= ALONE or not several)
-    second = [] if enough or not several else _fused(measured, left_out_modes(), above)
-    share = float(simulated is not None)
-    if first and second:
-        share = share_of(first, second)
-    return FrfModel(
-        simulated, share, ErrorByZone.of(first, band_hz), ErrorByZone.of(second, band_hz)
-    )
-
-
-def _simulated(pose: LeftOutFrf) -> LeftOut:
-    used = np.isfinite(pose.noise_sd)
-    known = np.where(used, pose.noise_sd, 0.0) ** 2 + pose.sd**2
-    return LeftOut(pose.frequency_hz, pose.measured, pose.predicted, pose.missed, known, used)
+    found: list[LeftOut] = []
+    if simulated is None and len(measured.s) > 1:
+        found = _fused(measured, left_out_modes(), above)
+    return FrfModel(simulated, ErrorByZone.of(found, band_hz))
 
 
 def _fused(
@@ -222,22 +182,3 @@ def _windowed(modes: ModalPrediction, rate_1_s: float) -> ModalPrediction:
     real, imaginary = zeta * omega + rate_1_s, omega * np.sqrt(np.maximum(0.0, 1 - zeta**2))
     size = np.hypot(real, imaginary)
     return replace(modes, frequency_hz=size / (2 * np.pi), damping_ratio=real / size)
-
-
-def share_of(simulated: Sequence[LeftOut], fused: Sequence[LeftOut]) -> float:
-    """Of the simulation: that with which the FRFs of all poses left out are least off.
-
-    One pose more, at which it is right, speaks for it.
-    """
-    along, across = [], []
-    for a, b in zip(simulated, fused, strict=True):
-        apart = np.where(a.used, b.predicted - a.predicted, 0.0)
-        size = np.sum(np.abs(np.where(a.used, a.measured, 0.0)) ** 2, axis=-1)
-        size = np.where(size > 0, size, np.inf)
-        along.append(np.mean(np.sum((apart.conj() * a.off).real, axis=-1) / size))
-        across.append(np.mean(np.sum(np.abs(apart) ** 2, axis=-1) / size))
-    total = float(np.sum(across) + np.mean(across))
-    modal = float(np.sum(along)) / total if total > 0 else 0.0
-    return 1 - float(
-        np.where(modal > 1 - LITTLE_SHARE, 1.0, modal if modal > LITTLE_SHARE else 0.0)
-    )

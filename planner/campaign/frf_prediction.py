@@ -6,15 +6,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.frf_model import FrfModel, frf_model
-from planner.campaign.frf_posterior import MODEL_ERROR, closely
-from planner.campaign.frf_simulation import learned_simulation
-from planner.identification.extended_structure import ExtendedModel
 from planner.identification.measured_frfs import common_band, stack
 from planner.surrogate.frf_bands import ModalPrediction
 from planner.surrogate.left_out_modes import left_out_modes
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
+
+LINES, LEAST, MOST = 300, 20, 80  # of all poses together, and of one at least and at most
+MODEL_ERROR = 0.01  # relative sd of what no modes follow
 
 
 def frf_model_of(model: "Model") -> FrfModel:
@@ -26,19 +26,10 @@ def frf_model_of(model: "Model") -> FrfModel:
 def _frf_model(model: "Model") -> FrfModel:
     q = np.array([pose.q for pose in model.labelled])
     band = model.cell.config.modes.band_hz
-    learned = model.low.learned or model.low.suspect
-    simulated = None
-    if learned is not None:
-        frozen = model.cell.frozen
-        assert frozen.nominal is not None
-        stated = ExtendedModel(frozen.nominal, frozen.priors)
-        simulated = learned_simulation(learned, stated, model.frfs, q, band)
-    if simulated is not None:
-        measured = simulated.objective.misfit.measured
-    else:
-        seen = common_band(model.frfs, band)
-        grade = closely(len(q))
-        measured = stack(model.frfs, seen, grade.lines, MODEL_ERROR)
+    learned = model.low.learned
+    simulated = learned.posterior if learned is not None and learned.fits else None
+    lines = int(np.clip(LINES // len(q), LEAST, MOST))
+    measured = stack(model.frfs, common_band(model.frfs, band), lines, MODEL_ERROR)
 
     def modes() -> ModalPrediction:
         return left_out_modes(model.with_residues, model.seen_exactly)

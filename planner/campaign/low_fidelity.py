@@ -1,64 +1,33 @@
 """The low fidelity of a campaign: the simulation as it stands, or as the recordings teach it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from planner.campaign.learned import PLACED, SUSPECT, Learned, lacking, likeliest
-from planner.campaign.missing_physics import (
-    BEST,
-    SWINGS,
-    with_loss_factors,
-    with_springs,
-    with_strayed_springs_again,
-    with_swinging_mass,
-)
+from planner.campaign.fit_memory import FitMemory, steps
+from planner.campaign.learned import Learned
+from planner.campaign.state import Measurement
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
+from planner.effects.table import Repertoire
+from planner.fit.identified import as_identification
+from planner.fit.posterior import Posterior
+from planner.fit.search import Search
+from planner.fit.structure import RobotPrior
 from planner.frf import synthesis
 from planner.frf.frf import Frf
-from planner.identification.effort import QUICK, Effort
-from planner.identification.extended_structure import ExtendedModel
 from planner.identification.frequency_uncertainty import frequency_sd
-from planner.identification.identify import identify
-from planner.identification.measured_frfs import layout_of
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import CAD_INERTIAS, Priors
 from planner.identification.result import Identification
 from planner.surrogate.hedged import PRIOR_BELIEF
 
-# Where hits count as exact: masses and moments are right to 5 %, centres of mass to 1 cm.
-OF_EXACT_HITS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
-# Misfit from which the simulation is suspected to lack physics where hits count as exact. Where
-# springs that robot.toml does not state do not mend that, what it says of a pose is tested by
-# identifying it without that pose; into so many parts at most.
-EXACT_SUSPECT, FOLDS = 3.0, 2
-BELIEVED = 0.99  # in a simulation that fits the recordings to their noise
-RIGHT = 0.003  # of ln f: what is left where the simulation explains the recordings
-LINES, LOG_LINES, LAST_LINES = 180, 150, 300  # of all poses together: nobody waits between hits
-FEWEST = 12  # of them a pose
-# Misfit of what is stated from which it is followed to the end only if nothing that is added fits:
-# twice what those may leave, by a search of as many steps as the last fit has.
-HOPELESS = 2 * SWINGS
-# Factor on it at PLACED poses and fewer, where what few hits leave open leads through more
-# than that. Looked at on starts 0 to 9 of the KR10 that lacks nothing (tests: fidelity_cells).
-AMONG_FEW = 10.0
-OPENINGS = 4  # rounds at most, in which what hits leave open follows the stated structure's fit
-
-
-def _effort(frfs: Sequence[Frf]) -> Effort:
-    """Lines a pose that keep the time about the same however many poses and sensors there are."""
-    rows, columns = layout_of(frfs).shape
-    of_all = len(frfs) * np.sqrt(rows * columns / 9)
-    lines, log_lines, last = (int(n // of_all) for n in (LINES, LOG_LINES, LAST_LINES))
-    return replace(
-        QUICK,
-        lines=max(FEWEST, min(QUICK.lines, lines)),
-        log_lines=min(QUICK.log_lines, max(FEWEST, log_lines)),
-        last_lines=max(20, min(QUICK.last_lines, last)),
-        searched=LINES // FEWEST,
-    )
+BELIEVED = 0.99  # in a simulation that fits the recordings
+# Of ln f: what is left where the simulation explains the recordings, and where not, in shares of
+# what is not explained of |H|: resonances of a few per cent of damping shift by so much of it.
+RIGHT, DAMPING = 0.001, 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,16 +35,13 @@ class LowFidelity:
     """What the simulation says at any pose; None: the campaign uses none.
 
     What `tolerances` leave open of hits, measuring chain and readback is integrated out where it is
-    identified; None: all are exact, as campaigns took them that began so.
-    `left_out` (n, count) is what simulations that were identified without a pose say of its
-    natural frequencies (Hz), NaN where that was not asked.
+    identified.
     """
 
     count: int
     nominal: Simulation | None
-    tolerances: Tolerances | None = None
+    tolerances: Tolerances = field(default_factory=Tolerances)
     learned: Learned | None = None
-    left_out: np.ndarray | None = None
     suspect: Learned | None = None  # what was identified and then found worse than nominal
 
     @property
@@ -86,7 +52,7 @@ class LowFidelity:
     @property
     def priors(self) -> Priors:
         """What is known before anything is measured."""
-        return OF_EXACT_HITS if self.tolerances is None else CAD_INERTIAS
+        return CAD_INERTIAS
 
     @property
     def taught(self) -> bool:
@@ -133,23 +99,12 @@ class LowFidelity:
         below = synthesis.accelerance(frequency_hz, pole, residue)
         return simulation.accelerance(q, frequency_hz) - below
 
-    def discrepancy(self, measured_hz: np.ndarray) -> np.ndarray | None:
-        """Size of ln f's error (count,) where the simulation was not fitted; None: not known.
-
-        measured_hz (n, count), NaN where a mode was not found. A simulation that explains its
-        recordings is nearly right; another is as uncertain as ever before a pose was left out.
-        """
-        if self.learned is None:
+    @property
+    def discrepancy(self) -> np.ndarray | None:
+        """Size of ln f's error (count,) where the simulation was not fitted; None: not known."""
+        if self.learned is None or not self.learned.fits:
             return None
-        if self.learned.fits:
-            return np.full(self.count, RIGHT * max(self.learned.identified.misfit, 1.0))
-        if self.left_out is None:
-            return None
-        error = np.log(measured_hz / self.left_out)
-        known = np.isfinite(error)
-        square = np.where(known, error, 0.0) ** 2
-        # A prior observation keeps few errors that happen to be small from being trusted.
-        return np.sqrt((RIGHT**2 + square.sum(axis=0)) / np.maximum(known.sum(axis=0), 1))
+        return np.full(self.count, RIGHT + DAMPING * self.learned.posterior.size)
 
     @property
     def misses(self) -> float:
@@ -165,10 +120,8 @@ class LowFidelity:
         learned = self.learned or self.suspect
         if learned is None:
             return ""
-        swinging = learned.structure.swinging
         if learned.fits:
-            more = lacking(learned.found, learned.poses) if learned.structure.added else ""
-            return " ".join(filter(None, (swinging, more)))
+            return learned.words
         text = (
             f"Fitted to the recordings, the simulation still differs from them by "
             f"{self.misses:.2g} times their noise: it lacks physics"
@@ -197,115 +150,35 @@ class LowFidelity:
 
 
 def learn(
-    before: LowFidelity, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
+    before: LowFidelity,
+    frfs: Sequence[Frf],
+    q: np.ndarray,
+    band_hz: tuple[float, float],
+    memory: FitMemory | None = None,
+    used: tuple[Measurement, ...] = (),
 ) -> LowFidelity:
-    """The simulation identified again from the FRFs measured at q (n, dof) in rad.
+    """The simulation identified from the FRFs measured at q (n, dof) in rad.
 
-    They may be between any points. A function of its arguments alone, whatever was identified
-    before: replays must agree.
+    They may be between any points. Where the measurements in use are named, from what was found of
+    the first of them, which `memory` keeps.
     """
     nominal = before.nominal
     if nominal is None or not frfs:
         return before
-    lesson = Lesson(tuple(frfs), q, band_hz, before.tolerances)
-    structure = ExtendedModel(nominal, before.priors)
-    stated, learned = _with_what_is_missing(lesson.glanced(structure), lesson)
-    if stated.identified.misfit > lesson.hopeless and learned.identified.misfit > SWINGS:
-        # Nothing explains the recordings: now it matters how nearly what is stated does.
-        stated = lesson.identified(stated.structure)
-        learned = likeliest([stated, learned])
-    learned = with_swinging_mass(stated, learned, lesson)
-    learned = with_strayed_springs_again(learned, lesson)
-    left_out = None
-    if not learned.fits and len(frfs) > 1:
-        left_out = _left_out(learned, lesson, before.count)
-    return replace(before, learned=learned, left_out=left_out)
+    prior = RobotPrior(Repertoire.of(nominal, before.priors))
 
+    def search(count: int) -> Search:
+        return Search(prior, tuple(frfs[:count]), q[:count], band_hz, before.tolerances)
 
-def _with_what_is_missing(stated: Learned, lesson: "Lesson") -> tuple[Learned, Learned]:
-    """What is stated, with loss factors where they help, and the same with springs beside it.
-
-    Springs that would imitate loss factors come second; but where what is stated is far from the
-    recordings and springs bring it to their noise, loss factors are not asked for.
-    """
-    learned = with_springs(stated, lesson) if stated.identified.misfit > HOPELESS else stated
-    if learned.identified.misfit > BEST:
-        lossy = with_loss_factors(stated, lesson)
-        if learned is stated or lossy is not stated:
-            return lossy, with_springs(lossy, lesson)
-    return stated, learned
-
-
-@dataclass(frozen=True, eq=False)
-class Lesson:
-    """FRFs at q (n, dof) in rad, by which a simulation is identified, and how they err."""
-
-    frfs: tuple[Frf, ...]
-    q: np.ndarray
-    band_hz: tuple[float, float]
-    tolerances: Tolerances | None
-
-    @property
-    def hopeless(self) -> float:
-        """See HOPELESS."""
-        return HOPELESS if len(self.frfs) > PLACED else AMONG_FEW * HOPELESS
-
-    def identified(
-        self,
-        structure: ExtendedModel,
-        warm: Identification | None = None,
-        starts: int | np.ndarray = 1,
-    ) -> Learned:
-        found = self._identify(structure, warm, _effort(self.frfs), starts)
-        return self._learned(structure, found)
-
-    def _learned(self, structure: ExtendedModel, found: Identification) -> Learned:
-        suspect = EXACT_SUSPECT if self.tolerances is None else SUSPECT
-        return Learned(structure, found, suspect, len(self.frfs))
-
-    def glanced(self, structure: ExtendedModel) -> Learned:
-        """As `identified`; not followed to the end where it is far from the recordings.
-
-        Where it is near, what hits leave open follows the fit more closely: as long as it has not
-        settled, springs that are not there would seem to explain what is left. Of few
-        poses what seems hopeless is followed farther.
-        """
-        effort = replace(_effort(self.frfs), openings=OPENINGS, hopeless=self.hopeless)
-        return self._learned(structure, self._identify(structure, None, effort))
-
-    def without(self, away: np.ndarray, warm: Learned) -> Identification:
-        """From fewer poses, starting where all of them led; `away` (n,) bool."""
-        kept = tuple(frf for frf, gone in zip(self.frfs, away, strict=True) if not gone)
-        # Beside an error of a percent, forty lines and no completion are exact enough.
-        rough = replace(_effort(kept), last_lines=40, last_completions=0)
-        fewer = replace(self, frfs=kept, q=self.q[~away])
-        return fewer._identify(warm.structure, warm.identified, rough)
-
-    def _identify(
-        self,
-        structure: ExtendedModel,
-        warm: Identification | None,
-        effort: Effort,
-        starts: int | np.ndarray = 1,
-    ) -> Identification:
-        return identify(
-            self.frfs,
-            self.q,
-            structure.simulation,
-            structure.priors,
-            band_hz=self.band_hz,
-            starts=starts,
-            warm=warm,
-            effort=effort,
-            tolerances=self.tolerances,
-        )
-
-
-def _left_out(warm: Learned, lesson: Lesson, count: int) -> np.ndarray:
-    out = np.full((len(lesson.frfs), count), np.nan)
-    folds = min(len(lesson.frfs), FOLDS)
-    for fold in range(folds):
-        away = np.arange(len(lesson.frfs)) % folds == fold
-        found = lesson.without(away, warm)
-        out[away] = found.simulation.modes(lesson.q[away], count).frequency_hz
-    return out
+    memory, warm = memory or FitMemory(), None
+    with threadpool_limits(1):
+        for count in (*steps(len(used)), len(used)) if used else ():
+            known = memory.get(used[:count])
+            if known is None:
+                known = search(count).found(warm).remembered
+                memory.put(used[:count], known)
+            warm = known
+        whole = search(len(frfs))
+        posterior = Posterior.of(whole.recalled(warm) if warm else whole.found())
+        structure, identified = as_identification(posterior)
+    return replace(before, learned=Learned(posterior, structure, identified, len(frfs)))

@@ -1,6 +1,7 @@
 """What a campaign folder says: its log, the state and the model that follow from it."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -123,6 +124,9 @@ class CampaignReads:
     def _model_name(self, configured: Configured, state: CampaignState) -> str:
         return model_cache.key("model", self.directory, configured, state.used)
 
+    def _fit_name(self, configured: Configured, used: tuple[Measurement, ...]) -> str:
+        return model_cache.key("fit", self.directory, configured, used)
+
     def of_model(self, what: str, kind: type[T], make: Callable[["Model"], T]) -> T:
         """What follows from the model, kept on disk: where it is, the model is not loaded.
 
@@ -139,11 +143,13 @@ class CampaignReads:
         from threadpoolctl import threadpool_limits
 
         from planner.campaign.build import build
+        from planner.campaign.fit_memory import FitMemory
 
         kept = self.recordings
         kept.look_through(state.used, self._kept)  # a damaged one is told now
         with threadpool_limits(1):
-            model = build(self.cell, state, kept.frf, kept.hits)
+            memory = FitMemory(self._kept, partial(self._fit_name, self._configured()))
+            model = build(self.cell, state, kept.frf, kept.hits, memory)
             _ = model.frequency_sd_percent  # kept with it: every command needs it
         return model
 

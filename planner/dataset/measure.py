@@ -17,7 +17,7 @@ from planner.modal.modes import ModalModel
 from planner.recording.points import SENSOR, TCP, TOOL
 from planner.recording.records import FrfRecord, Hit
 
-OVER = 5.5  # e^−OVER of the slowest decay is left where the record ends
+OVER = 7.5  # e^−OVER, 0.06 %, of a decay that does not damp is left where the record ends
 PACKAGES = "recording", "frf", "modal", "dataset", "inference"  # that results here depend on
 
 ACCEPTED = "accepted frf"  # what the store calls the FRF of a pose's accepted files

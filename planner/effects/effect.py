@@ -127,6 +127,10 @@ class Effect(ABC):
         """The body whose inertia (10,) it changes, where it is nothing else, and by what."""
         return None
 
+    def losses(self, psi: np.ndarray) -> dict[int, float]:
+        """Loss factors that it gives springs, by their numbers."""
+        return {}
+
     @abstractmethod
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """What it is, for whoever stands at the robot; values and sds by name."""

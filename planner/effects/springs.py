@@ -39,10 +39,14 @@ class BendingLink(Effect):
         return f"{self.at} bends ({_stiffness(values)})."
 
 
+KNOWN = 0.3  # relative sd to which a stiffness is told
+
+
 def _stiffness(values: Mapping[str, tuple[float, float]]) -> str:
+    told = {n.split(" of ")[1]: v for n, v in values.items() if n.startswith("stiffness")}
+    known = {name: v for name, v in told.items() if v[1] < KNOWN * v[0]}
     said = [
-        f"{name.split(' of ')[1]} {value:.3g} ± {sd:.1g}"
-        for name, (value, sd) in values.items()
-        if name.startswith("stiffness")
+        f"{name.split(' ', 1)[1]} {value:.3g} ± {sd:.1g} {'N/m' if ' along ' in name else 'N·m/rad'}"
+        for name, (value, sd) in known.items()
     ]
-    return ", ".join(said)
+    return ", ".join(said) if said else "the recordings do not tell yet by how much"

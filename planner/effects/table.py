@@ -4,7 +4,7 @@ Springs that robot.toml does not state are expected stiffer than those that are,
 nobody knows. The wider robot has them all, one after the other; a structure uses some of them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import msgspec
@@ -16,6 +16,7 @@ from planner.effects.angle_spring import AngleSpring
 from planner.effects.effect import Effect, Number
 from planner.effects.resonator import LocalResonator
 from planner.effects.springs import BendingLink, SoftBase, Tilt
+from planner.effects.structural_damping import StructuralDamping
 from planner.errors import InputError
 from planner.identification.parameters import Priors, place_name
 from planner.robot.config import BASE, Compliance
@@ -29,6 +30,7 @@ ALONG = 0.5  # cosine above which a stated axis already covers this one
 SHORT, BEND = 0.1, 0.3  # of the longest link: does not bend; of the joint's stiffness: a link's
 ADDED_MASS, ADDED_PLACE = 0.22, 0.35  # sds: of the links' mean mass, of the longest link
 RESONATOR_MASS, RESONATOR_DAMPING = 0.05, 0.03  # medians: of the links' mean mass; ratio
+LOSS_FACTOR = 0.02  # median, with a factor of e as its sd
 ANGLE_SHARE = 0.3  # sd of a joint's stiffness that goes with its angle
 
 
@@ -71,6 +73,10 @@ class Repertoire:
         return cls(
             simulation, priors, widest, replace(priors, bounds=bounds), stated, tuple(effects)
         )
+
+    def priors_with(self, bounds: Mapping[str, tuple[float, float]]) -> Priors:
+        """What is known of a robot that has some of the springs."""
+        return replace(self.priors, bounds=dict(bounds))
 
 
 def _joined(robot: Robot, block: Compliance) -> Robot | None:
@@ -179,6 +185,8 @@ def _operators(simulation: Simulation) -> list[Effect]:
             *(Number(f"position_{a}", "m", c, size) for a, c in zip("xyz", centre, strict=True)),
         )  # fmt: skip
         found.append(LocalResonator(at, (), numbers, joint, band))
+    if not any(b.loss_factor for b in robot.config.compliance):
+        found.append(_structural(robot))
     own = [(n, b) for n, b in enumerate(robot.config.compliance) if robot.is_own(b)]
     for spring, block in own:
         number = robot.joint_names.index(block.joint)
@@ -190,6 +198,15 @@ def _operators(simulation: Simulation) -> list[Effect]:
     return found
 
 
-def of_kinds(effects: Sequence[Effect], *kinds: type[Effect]) -> tuple[Effect, ...]:
-    """Those of some kinds."""
-    return tuple(e for e in effects if isinstance(e, kinds))
+def _structural(robot: Robot) -> Effect:
+    groups: dict[str, list[int]] = {}
+    for number, block in enumerate(robot.config.compliance):
+        groups.setdefault(block.tie or f"\0{number}", []).append(number)
+    blocks = tuple(tuple(group) for group in groups.values())
+    firsts = [robot.config.compliance[group[0]] for group in blocks]
+    median = float(np.log(LOSS_FACTOR))
+    numbers = tuple(
+        Number(f"loss_factor of {place_name(b)}", "1", median, 1.0, True) for b in firsts
+    )
+    stiffness = tuple(b.stiffness for b in firsts)
+    return StructuralDamping("joints", (), numbers, blocks, stiffness)

@@ -26,7 +26,8 @@ SHARE = 0.3  # of the rms of all FRFs of a pose at a line, in the size of each
 LOG_FLOOR, LOG_DROP = 0.3, 0.3  # relative sds: no logarithm counts more; from which it counts none
 LOG_PRIOR = 10.0  # far away data err alike, and the prior counts for more
 FARTHEST = 4.0  # sds of what hits, readback and visits are linearised about
-UNUSED = 1e6  # sds of what was not measured, in the size of FRFs
+UNUSED = 1e4  # sds of what was not measured, in the size of FRFs
+JITTER = 1e-6  # of the discrepancy's variance, that each line has for itself
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,22 +101,24 @@ class Misfit:
         square = np.where(m.used, np.abs(m.accelerance) ** 2, 0.0)
         count = np.maximum(m.used.sum(axis=(1, 2), keepdims=True), 1)
         rms = np.sqrt(square.sum(axis=(1, 2), keepdims=True) / count)
-        return np.sqrt(square + SHARE**2 * rms**2)
+        size = np.sqrt(square + SHARE**2 * rms**2)
+        return np.where(size > 0, size, 1.0)
 
     @cached_property
     def whitening(self) -> np.ndarray:
         """(n, r, c, F, F): inverse of the covariance's root, of real and imaginary part each."""
         m, size, rho = self.data.measured, self.size, self.rho
         assert rho is not None
-        noise = np.where(m.used, m.sd**2 / 2, (UNUSED * size) ** 2)
         width = ELL * m.frequency_hz
         apart = (m.frequency_hz[:, :, None] - m.frequency_hz[:, None]) ** 2
         both = width[:, :, None] ** 2 + width[:, None] ** 2
         alike = np.sqrt(2 * width[:, :, None] * width[:, None] / both) * np.exp(-apart / both)
         lines = np.arange(alike.shape[-1])
-        covariance = size[..., :, None] * alike[:, None, None] * size[..., None, :] * (rho**2 / 2)
-        covariance[..., lines, lines] += noise
-        return np.linalg.inv(np.linalg.cholesky(covariance))
+        relative = np.repeat(alike[:, None, None] * (rho**2 / 2), size.shape[1], axis=1)
+        relative = np.repeat(relative, size.shape[2], axis=2)
+        noise = np.where(m.used, m.sd**2 / (2 * size**2), UNUSED**2)
+        relative[..., lines, lines] += noise + JITTER * rho**2
+        return np.linalg.inv(np.linalg.cholesky(relative)) / size[..., None, :]
 
     @cached_property
     def log_weight(self) -> np.ndarray:

@@ -1,13 +1,14 @@
 """What is believed of a robot after a fit: its simulation, its FRFs anywhere, and how unsure."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.effect import Effect
 from planner.fit.data import FrfData
-from planner.fit.misfit import Misfit
+from planner.fit.misfit import SHARE, Misfit
 from planner.fit.search import Found
 from planner.fit.structure import Structure, exported
 from planner.identification.measured_frfs import Measured
@@ -58,6 +59,12 @@ class Posterior:
             sds.append(sd.reshape(means[-1].shape))
         return np.array(means), np.array(sds)
 
+    def predicted(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same; in the sds what no structure explains too, in proportion to the FRFs."""
+        mean, sd = self.response(q, frequency_hz)
+        rms = np.sqrt(np.mean(np.abs(mean) ** 2, axis=(1, 2), keepdims=True))
+        return mean, np.hypot(sd, self.size * np.hypot(np.abs(mean), SHARE * rms))
+
     @property
     def tolerances(self):
         """Of hits, chain and readback."""
@@ -77,6 +84,47 @@ class Posterior:
     def _carried(self):
         return self.structure.prior.carried
 
+    @cached_property
     def scale_sd(self) -> float:
-        """Relative sd of the common scale of all FRFs, which only gains and masses hold."""
-        return 0.0
+        """Relative sd of the FRFs' common scale, which only gains and masses hold."""
+        data = self.found.misfit.data
+        misfit = replace(self.found.misfit, data=data)
+        motion = misfit.motion(self.x, None)
+        slopes, _ = misfit.slopes(motion, self.x)
+        h = motion.accelerance
+        along = np.einsum("nijf,ndijf->d", h.conj(), slopes).real / float(np.sum(np.abs(h) ** 2))
+        return float(np.linalg.norm(self.root.T @ along))
+
+    def misfits(self, least: float) -> tuple[float, np.ndarray]:
+        """Variance that is not explained over that of the noise, of all and by pose (n,).
+
+        `least` is a relative sd that counts as noise.
+        """
+        m, size = self.found.misfit.data.measured, self.found.misfit.size
+        noise = m.sd**2 + (least * size) ** 2
+        ratio = np.where(m.used, 1 + (self.size * size) ** 2 / noise, 0.0)
+        count = np.maximum(m.used.sum(axis=(1, 2, 3)), 1)
+        return float(ratio.sum() / count.sum()), ratio.sum(axis=(1, 2, 3)) / count
+
+    def values(self, effect: Effect) -> dict[str, tuple[float, float]]:
+        """An effect's stiffnesses and own numbers by name, with sds, in their units."""
+        s, sd = self.structure, np.sqrt(np.diagonal(self.covariance))
+        out = {}
+        for i, p in enumerate(s.parameters[: s.stiffnesses]):
+            if set(p.blocks) <= set(effect.springs):
+                out[p.name] = float(np.exp(self.x[i])), float(np.exp(self.x[i]) * sd[i])
+        own = s.own[s.effects.index(effect)]
+        for number, value, spread in zip(effect.numbers, self.x[own], sd[own], strict=True):
+            at = number.value(float(value))
+            out[number.name] = at, float(spread * at if number.log else spread)
+        return out
+
+    @cached_property
+    def words(self) -> tuple[str, ...]:
+        """What the structure has beside what is stated, and by how much that changes FRFs."""
+        pairs = zip(self.structure.effects, self.found.shares, strict=True)
+        return tuple(
+            f"{effect.words(self.values(effect)).replace(effect.at, effect.at.split('#')[0])} "
+            f"Without that the FRFs would differ by {100 * min(share, 1.0):.2g} %."
+            for effect, share in sorted(pairs, key=lambda pair: -pair[1])
+        )

@@ -7,6 +7,7 @@ springs are always tried nonlinearly, a few steps each, the best are settled.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -26,7 +27,9 @@ USUAL, SPREAD = 0.02, 1.5  # its prior: log-normal
 ANNEALED = ((0.5, 6), (0.2, 8), (0.07, 8))  # sizes by which a start comes near, and steps at each
 LOG_STEPS, TRIED, FURTHER, SETTLED = 15, 6, 3, 8  # steps
 LEAST = 12.0  # nats that one more effect must gain
+MATTERS = 0.01  # share of |H| that an effect must change: nothing wrong changes up to 0.7 %
 SAME = 3.0  # nats that one less may cost
+MOST_OPERATORS = 3
 IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which a few steps are not settled
 OPERATORS, FINALISTS, ENDS = 5, 4, 2  # how many are tried, followed, settled
 UNEXPLAINED = 0.03  # size of the discrepancy from which a structure begins afresh
@@ -43,10 +46,42 @@ class Found:
     at: At
     evidence: float
 
+    @cached_property
+    def shares(self) -> tuple[float, ...]:
+        """By how much of |H| at the measured poses each effect's going changes the best fit."""
+        h = self.at.motion.accelerance
+        found = []
+        for effect in self.structure.effects:
+            fewer = _without(self, [effect])
+            gone = 0.0 * h if fewer is None else fewer.at.motion.accelerance
+            found.append(float(np.linalg.norm(gone - h) / np.linalg.norm(h)))
+        return tuple(found)
+
+    @property
+    def remembered(self) -> "Remembered":
+        """What is worth keeping of it."""
+        s = self.structure
+        return Remembered(s.effects, s.names, self.at.x, self.at.own, _size(self), self.shares)
+
     @property
     def structure(self) -> Structure:
         """Of what it is made."""
         return self.misfit.structure
+
+
+@dataclass(frozen=True, eq=False)
+class Remembered:
+    """A structure's effects, its numbers by name, the discrepancy's size, and what each pose had.
+
+    From it a fit goes on, or is recalled without any step.
+    """
+
+    effects: tuple[Effect, ...]
+    names: tuple[str, ...]
+    x: np.ndarray
+    own: np.ndarray
+    size: float
+    shares: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,15 +99,16 @@ class Search:
         """On so many lines a pose."""
         return FrfData.of(self.prior, self.frfs, self.q, self.band_hz, lines)
 
-    def found(self, warm: Found | None = None) -> Found:
+    def found(self, warm: Remembered | None = None) -> Found:
         """The structure that explains them best; from what was found before, if that is given."""
         data, dense = self.data(SEARCHED), self.data(SCREENED)
         if warm is None:
             springs = tuple(e for e in self.prior.repertoire.effects if e.springs)
             best = self._begun(data, Structure(self.prior, springs, data.sensors))
         else:
-            misfit = Misfit(warm.structure, data, self.tolerances, max(_size(warm), UNEXPLAINED))
-            best = settled(misfit, minimised(misfit, warm.at.x, 4, 1.0))
+            size = max(warm.size, UNEXPLAINED)
+            misfit, x = self._again(warm, data, size)
+            best = settled(misfit, minimised(misfit, x, 4, 1.0))
         best = self._evolved(converged(best), dense)
         for _ in range(3 if warm is None else 1):
             if _size(best) < UNEXPLAINED:
@@ -81,7 +117,22 @@ class Search:
             if fresh is None:
                 break
             best = self._evolved(converged(fresh), dense)
-        return self._last(best)
+        return self._last(_that_matters(best))
+
+    def _again(self, known: Remembered, data: FrfData, size: float) -> tuple[Misfit, np.ndarray]:
+        structure = Structure(self.prior, known.effects, data.sensors)
+        numbers = dict(zip(known.names, known.x, strict=True))
+        pairs = zip(structure.names, structure.mean, strict=True)
+        x = np.array([numbers.get(name, mean) for name, mean in pairs])
+        return Misfit(structure, data, self.tolerances, size), x
+
+    def recalled(self, known: Remembered) -> Found:
+        """What was found of these FRFs before, as it was."""
+        misfit, x = self._again(known, self.data(LAST), known.size)
+        at = misfit(x, known.own)
+        found = Found(misfit, at, misfit.evidence(at))
+        vars(found)["shares"] = known.shares
+        return found
 
     def _begun(self, data: FrfData, structure: Structure, x: np.ndarray | None = None) -> Found:
         """From x (the prior's mean): logarithms first, then FRFs that count more and more."""
@@ -109,7 +160,12 @@ class Search:
         return best
 
     def _added(self, best: Found, dense: FrfData) -> Found:
-        """With the one effect that gains most, if that is enough."""
+        """With the one effect that gains most, if that is enough.
+
+        Where so many operators do not explain the FRFs, more would only imitate what does.
+        """
+        if sum(not e.springs for e in best.structure.effects) >= MOST_OPERATORS:
+            return best
         ends = self._compete(best, self._starts(best, dense), best.evidence)
         if not ends or ends[0].evidence < best.evidence + LEAST:
             return best
@@ -260,6 +316,17 @@ class Search:
         return Found(best.misfit, at, best.misfit.evidence(at))
 
 
+def _that_matters(best: Found) -> Found:
+    """Without effects that change the FRFs by less than one would see."""
+    while True:
+        pairs = zip(best.structure.effects, best.shares, strict=True)
+        small = [effect for effect, share in pairs if share < MATTERS]
+        fewer = _without(best, small) if small else None
+        if fewer is None:
+            return best
+        best = settled(fewer.misfit, fewer.at)
+
+
 def settled(misfit: Misfit, at: At, rounds: int = 1, steps: int = SETTLED) -> Found:
     """With a discrepancy of the likeliest size, inferred again after each round of steps."""
     misfit, at = _sized(misfit, at)
@@ -279,7 +346,7 @@ def converged(found: Found) -> Found:
 
 
 def _sized(misfit: Misfit, at: At) -> tuple[Misfit, At]:
-    """With the likeliest size of the discrepancy, uphill from the present one, and what is there."""
+    """With the likeliest size of the discrepancy, uphill from the present one; what is there."""
     around, known = misfit.around(at.x, at.own), {}
 
     def worth(k: int) -> float:

@@ -18,11 +18,12 @@ from planner.fit.inertias import BodyNumbers, body_numbers
 from planner.identification.feasible_inertias import pseudo_inertia
 from planner.identification.measurement_model import OF_HAMMER, OF_SENSOR
 from planner.identification.parameters import Parameter, Parametrisation, parametrise
-from planner.robot.config import BASE
+from planner.robot.config import BASE, LOSS_FACTOR_BELOW, Harmonic, Resonator
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.virtual_joints import OUTER
 
 STIFF = 1e13  # N·m/rad of springs that carry no weight as they do not give
+MOST_LOSS = 0.999 * LOSS_FACTOR_BELOW  # that robot.toml takes
 REACH = 7.5  # prior sds beyond which nothing is looked for
 LONGEST = 0.5, 1.0, 1.5  # of a step: in logarithms of springs, in sds of bodies and effects, chain
 
@@ -267,6 +268,7 @@ def exported(structure: Structure, x: np.ndarray) -> tuple[Simulation, Sequence[
     robot = repertoire.simulation.robot
     elasticity = structure.elasticity(x)
     blocks = [robot.config.compliance[i] for i in structure.springs]
+    losses: dict[int, float] = {}
     tables: dict[str, list[dict[str, object]]] = {"resonator": [], "harmonic": []}
     for effect, own in zip(structure.effects, structure.own, strict=True):
         values = {
@@ -274,14 +276,25 @@ def exported(structure: Structure, x: np.ndarray) -> tuple[Simulation, Sequence[
         }
         for key, rows in effect.tables(values).items():
             tables[key] += rows
-    config = msgspec.convert(
-        {
-            **msgspec.to_builtins(robot.config),
-            "compliance": [msgspec.to_builtins(b) for b in blocks],
-            "resonator": [*msgspec.to_builtins(robot.config.resonator), *tables["resonator"]],
-            "harmonic": [*msgspec.to_builtins(robot.config.harmonic), *tables["harmonic"]],
-        },
-        type(robot.config),
+        losses |= effect.losses(x[own])
+    # Loss factors are those of stiffnesses as stated: of the springs as found they are less.
+    factors = {
+        spring: eta * blocks[k].stiffness / elasticity.stiffness[k]
+        for k, spring in enumerate(structure.springs) if (eta := losses.get(spring))
+    }  # fmt: skip
+    blocks = [
+        msgspec.structs.replace(b, loss_factor=float(min(factors.get(i, b.loss_factor), MOST_LOSS)))
+        for i, b in zip(structure.springs, blocks, strict=True)
+    ]
+    resonators, harmonics = (
+        tuple(msgspec.convert(row, kind) for row in tables[name])
+        for name, kind in (("resonator", Resonator), ("harmonic", Harmonic))
+    )
+    config = msgspec.structs.replace(
+        robot.config,
+        compliance=tuple(blocks),
+        resonator=(*robot.config.resonator, *resonators),
+        harmonic=(*robot.config.harmonic, *harmonics),
     )
     simulation = Simulation(replace(robot, config=config))
     own = simulation.elastic
@@ -289,7 +302,7 @@ def exported(structure: Structure, x: np.ndarray) -> tuple[Simulation, Sequence[
     whole = Elasticity(
         np.append(elasticity.stiffness, own.stiffness[-small:] if small else []),
         np.append(elasticity.damping, own.damping[-small:] if small else []),
-        np.append(elasticity.loss_factor, own.loss_factor[-small:] if small else []),
+        own.loss_factor,
     )
     change = np.zeros_like(own.inertia)
     difference = structure.bodies.difference(x[structure.inertial]) + structure.added_inertia(x)

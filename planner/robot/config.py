@@ -185,8 +185,8 @@ class HitsTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class SensorTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What sensor and hammer are specified to, and how well the sensor's seat is known: sds."""
 
-    gain_sd_percent: float = 2.0
-    force_gain_sd_percent: float = 3.0
+    gain_sd_percent: float = 1.5
+    force_gain_sd_percent: float = 1.5
     cross_axis_sd_percent: float = 3.0
     mounting_sd_deg: float = 2.0
     position_sd_mm: float = 10.0

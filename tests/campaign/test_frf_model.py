@@ -7,23 +7,13 @@ import pytest
 
 from planner.campaign import frf_prediction
 from planner.campaign.campaign import Campaign
-from planner.campaign.frf_model import ErrorByZone, LeftOut, local_size, share_of
-from planner.campaign.frf_posterior import FrfPosterior
-from planner.campaign.frf_simulation import completed, widened
-from planner.campaign.low_fidelity import OF_EXACT_HITS
+from planner.campaign.frf_model import ErrorByZone, LeftOut, local_size
 from planner.dataset.store import Store
 from planner.demo import NAME, shipped
-from planner.dynamics.simulation import Simulation
-from planner.frf.frf import Frf
 from planner.frf.metrics import agreement, direct_mean
-from planner.identification.extended_structure import ExtendedModel
-from planner.identification.parameters import parametrise, place_name
-from planner.identification.truncated_decay import cut_off
-from planner.robot.robot import Robot
 from planner.surrogate.left_out_modes import left_out_modes
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.frf_campaigns import FrfScore, make
-from tests.support.known_robots import KR210
 from tests.support.surrogates import observed
 
 BAND_HZ = 5.0, 50.0
@@ -59,13 +49,6 @@ def test_what_is_known_of_an_error_counts_once(rng, true):
     assert np.max(ErrorByZone.of(known, BAND_HZ).relative) < 0.06
 
 
-def test_the_better_of_two_predictions_has_the_larger_share(rng, true):
-    good, bad = ([left_out(rng, e, true) for _ in range(4)] for e in (0.02, 0.5))
-    assert share_of(good, bad) == 1.0
-    assert share_of(bad, good) < 0.3
-    assert 0.4 < share_of(bad, [left_out(rng, 0.5, true) for _ in range(4)]) < 0.8
-
-
 def test_modes_left_out_are_those_of_a_fit_without_the_pose():
     seen = observed(8, 1)
     found = left_out_modes(fit_surrogate(seen), seen)
@@ -90,31 +73,6 @@ def test_missing_modes_are_predicted_where_they_are_left_out():
     assert all(np.all(np.isfinite(values)) for values in vars(found).values())
 
 
-def test_a_record_cut_off_is_completed(tmp_path):
-    simulation = Simulation(Robot.load(KR210.write(tmp_path)))
-    q, tail = KR210.poses(1, 3), 0.8
-    full = simulation.accelerance(q, HERTZ)
-    lost = cut_off(simulation.poles(q), 2j * np.pi * HERTZ[None], np.array([tail]))
-    unknown = np.full((3, 3, 80), np.nan)
-    cut = Frf(HERTZ, full[0] - lost[0], unknown, unknown, (1, 1, 1), BAND_HZ, tail_s=tail)
-    assert np.abs(lost).max() > 0.01 * np.abs(full).max()
-    (found,) = completed([cut], simulation, q)
-    np.testing.assert_allclose(found.accelerance, full[0], atol=1e-12 * np.abs(full).max())
-    assert found.tail_s == np.inf
-
-
-def test_a_wider_structure_lists_every_spring_once_and_can_be_identified(tmp_path):
-    simulation = Simulation(Robot.load(KR210.write(tmp_path)))
-    wide = widened(ExtendedModel(simulation, OF_EXACT_HITS))
-    places = [place_name(block) for block in wide.simulation.robot.config.compliance]
-    assert len(set(places)) == len(places)
-    assert {"base along x", "base along y", "base along z", "base about z"} <= set(places)
-    assert any(place.startswith("link_2 about") for place in places)
-    assert wide.added == len(places) - len(simulation.robot.config.compliance)
-    names = {p.name for p in parametrise(wide.simulation, wide.priors).parameters}
-    assert set(wide.priors.bounds) <= names
-
-
 @pytest.fixture(scope="module")
 def base(tmp_path_factory):
     """A robot on a soft base that nobody knows of, hit as people hit; two poses."""
@@ -131,22 +89,9 @@ def test_frfs_of_a_soft_base_get_better_with_the_second_pose(base):
     assert min(second.covered_low, second.covered_high) > 0.85
 
 
-def test_a_pose_is_predicted_without_its_own_frf(base):
-    model = base.model(2)
-    simulated = model.frf_model.simulated
-    assert isinstance(simulated, FrfPosterior)
-    for pose, measured in zip(simulated.left_out(), base.measurements, strict=True):
-        frf = base.frfs[measured.pose]
-        seen = np.isfinite(pose.noise_sd)
-        assert seen.any()
-        off = np.abs(pose.measured - pose.predicted)[seen]
-        assert np.mean(off <= 2 * np.hypot(pose.sd, 0.05 * np.abs(pose.measured))[seen]) > 0.8
-        assert pose.frequency_hz.min() >= frf.usable_band_hz[0]
-
-
 def test_without_a_simulation_frfs_are_those_of_fused_modes_and_less_sure(tmp_path):
     case = make("kr210", "nothing", 2, tmp_path, poses=3, unseen=3, simulation="none")
-    model = case.model(3)
+    model = case.model(2)
     mean, sd = model.frf(case.unseen, case.lines_hz)
     fused, fused_sd = model._modal_frf(case.unseen, case.lines_hz)
     np.testing.assert_allclose(mean, fused)
@@ -182,11 +127,11 @@ def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
 
 
-def test_a_link_that_bends_is_found_though_other_springs_fit_two_poses(tmp_path):
+def test_a_link_that_bends_is_found_though_other_springs_nearly_fit(tmp_path):
     case = make("irb6640", "bending link", 7308, tmp_path, poses=5)
-    model = case.model(2, hits=False)
+    model = case.model(2)
     assert model.low.learned is not None
     assert model.low.learned.fits
     score = FrfScore.of(case, model)
-    assert score.alone < 0.98 < 0.998 < score.frac
+    assert score.frac > 0.998
     assert score.covered > 0.85

@@ -14,9 +14,9 @@ from planner.campaign.log_conversion import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.hit_columns import PoseHits, no_columns
+from planner.dataset.measure import MeasuredPose
 from planner.errors import RefusedError
 from planner.frf import metrics
-from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
 from planner.recording.records import Hit
@@ -127,13 +127,14 @@ def _measured(
             Hit(Path("hit"), h.axis, rate, h.force_n, h.acceleration_m_s2, simulated=True)
             for h in recorded
         )
-        name, frf = f"P{number + 1}", estimate(hits, band_hz)
+        pose = MeasuredPose((), band_hz, given=hits)
+        name, frf = f"P{number + 1}", pose.frf
         try:
             modes = from_modal(estimate_modes(frf, band_hz))
         except RefusedError:
             modes = ()
         measurements.append(Measurement(name, tuple(np.rad2deg(q[number])), (), modes))
-        frfs[name], one_hit[name] = frf, estimate(hits, band_hz, "one_hit")
+        frfs[name], one_hit[name] = frf, pose.one_hit_frf
     return tuple(measurements), frfs, one_hit
 
 

@@ -43,7 +43,7 @@ class Robot:
     nodes: Mapping[str, int] = field(default_factory=dict)
 
 
-def _known(name: str, folder: Path, rng: np.random.Generator) -> Robot:
+def known(name: str, folder: Path, rng: np.random.Generator) -> Robot:
     arm = replace(ARMS[name], damping_s=DAMPING_S)
     toml = arm.write(folder / "robot", int(rng.choice([1, 3])))
     rate = 1000.0 if name == "kr10" else 400.0
@@ -76,8 +76,8 @@ def _drawn(folder: Path, rng: np.random.Generator) -> Robot:
 
 ROBOTS: dict[str, Callable[[Path, np.random.Generator], Robot]] = {
     "kr240 plane": _shipped,
-    "kr10": lambda folder, rng: _known("kr10", folder, rng),
-    "irb6640": lambda folder, rng: _known("irb6640", folder, rng),
+    "kr10": lambda folder, rng: known("kr10", folder, rng),
+    "irb6640": lambda folder, rng: known("irb6640", folder, rng),
     "arm of four": _pointed,
     "drawn arm": _drawn,
 }
@@ -86,6 +86,13 @@ ROBOTS: dict[str, Callable[[Path, np.random.Generator], Robot]] = {
 def lacking(kind: str, robot: Robot, rng: np.random.Generator) -> tuple[Secret, float]:
     """What the simulation lacks, beside the scatter of springs and inertias, and its size."""
     secret, size = Secret(REAL.scatter.of(int(rng.integers(2**31)))), log_uniform(rng, *SIZES)
+    return added(secret, kind, size, robot, rng), size
+
+
+def added(
+    secret: Secret, kind: str, size: float, robot: Robot, rng: np.random.Generator
+) -> Secret:
+    """One thing more that the simulation lacks."""
     table = tomllib.loads(robot.toml.read_text())
     root = ElementTree.parse(robot.toml.parent / table["urdf"]).getroot()
     truth = load_truth(robot.toml, secret.deviation)
@@ -118,7 +125,7 @@ def lacking(kind: str, robot: Robot, rng: np.random.Generator) -> tuple[Secret, 
             log_uniform(rng, 0.01, 0.05),
         )  # fmt: skip
         secret = deviate(secret, resonators=[small])
-    return secret, size
+    return secret
 
 
 def _mass_that_moves(root: ElementTree.Element) -> float:

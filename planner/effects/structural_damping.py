@@ -1,0 +1,63 @@
+"""Springs that dissipate by a loss factor beside their dampers, as gears and bearings do."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.dynamics.gradient import Impedance
+from planner.effects.effect import Effect, Gain, Motions, Poses, Start
+
+LEAST, MOST = 0.002, 0.3  # of a start
+
+
+@dataclass(frozen=True)
+class StructuralDamping(Effect):
+    """i k η of every stated spring; ψ are the ln η. `stiffness` are those that robot.toml states.
+
+    `blocks` are the springs' numbers, those with a number in common together.
+    """
+
+    blocks: tuple[tuple[int, ...], ...] = ()
+    stiffness: tuple[float, ...] = ()
+
+    kind = "structural_damping"
+
+    def impedance(self, poses: Poses, psi: np.ndarray) -> Impedance:
+        """A loss factor η of a spring k turns it into k (1 + i η)."""
+        every = [spring for group in self.blocks for spring in group]
+        ports = np.zeros((len(poses.q), len(every), len(poses.springs)))
+        for row, spring in enumerate(every):
+            ports[:, row, poses.springs.index(spring)] = 1.0
+        shapes = np.zeros((len(self.blocks), len(every), len(every)))
+        for k, group in enumerate(self.blocks):
+            at = [every.index(spring) for spring in group]
+            shapes[k, at, at] = 1.0
+        one = 1j * np.ones(poses.s.shape)
+        pairs = zip(self.stiffness, np.exp(psi), strict=True)
+        values = tuple((k, stiffness * eta * one) for k, (stiffness, eta) in enumerate(pairs))
+        return Impedance(ports, shapes, values, tuple((value,) for value in values))
+
+    def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
+        """By the columns of all loss factors."""
+        poses, usual = motions.poses, np.exp(self.mean)
+        one, minus = self.impedance(poses, self.mean), -(poses.s**2)[:, None, None]
+        shape = (len(poses.q), len(usual), motions.x_sensor.shape[2], motions.x_hit.shape[2])
+        columns = np.empty((*shape, minus.shape[3]), dtype=complex)
+        one.gradient(motions.x_hit * minus, motions.x_sensor, columns)
+        nats, share = gain(columns, np.ones(len(usual)))
+        return (Start(self, np.log(np.clip(share * usual, LEAST, MOST)), nats),)
+
+    def losses(self, psi: np.ndarray) -> dict[int, float]:
+        """See `Effect.losses`."""
+        pairs = zip(self.blocks, np.exp(psi), strict=True)
+        return {spring: float(eta) for group, eta in pairs for spring in group}
+
+    def vanishing(self, psi: np.ndarray) -> np.ndarray:
+        """See `Effect.vanishing`."""
+        return -np.ones(len(psi))
+
+    def words(self, values: Mapping[str, tuple[float, float]]) -> str:
+        """See `Effect.words`."""
+        least, most = (100 * f(v for v, _ in values.values()) for f in (min, max))
+        return f"Gears and bearings dissipate by loss factors, of {least:.1g} to {most:.1g} %."

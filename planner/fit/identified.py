@@ -1,0 +1,77 @@
+"""What was found, as an identification: a simulation, its parameters and their covariance."""
+
+import numpy as np
+
+from planner.dynamics.simulation import Simulation
+from planner.fit.posterior import Posterior
+from planner.identification.agreement import MODEL_ERROR
+from planner.identification.extended_structure import ExtendedModel
+from planner.identification.parameters import Parametrisation, parametrise
+from planner.identification.result import Identification, estimates, undetermined
+
+
+def as_identification(posterior: Posterior) -> tuple[ExtendedModel, Identification]:
+    """The structure with what was known of it before, and what the FRFs made of it.
+
+    Effects' own numbers are held where they were found; what else is known is as unsure as they
+    make it.
+    """
+    structure, repertoire = posterior.structure, posterior.structure.prior.repertoire
+    simulation = posterior.simulation
+    nominal = Simulation(simulation.robot)
+    names = {p.name for p in structure.parameters}
+    bounds = {n: b for n, b in repertoire.priors.bounds.items() if n in names}
+    model = ExtendedModel(
+        nominal,
+        repertoire.priors_with(bounds),
+        len(structure.springs) - repertoire.stated,
+    )
+    p = parametrise(nominal, model.priors)
+    mean, turned = _translated(posterior, p, simulation, nominal)
+    covariance = turned @ posterior.covariance @ turned.T
+    covariance += np.diag(np.full(len(covariance), 1e-9))  # of bodies that nothing moves
+    misfit, by_pose = posterior.misfits(MODEL_ERROR)
+    used = 2 * int(np.count_nonzero(posterior.found.misfit.data.measured.used))
+    result = Identification(
+        simulation, estimates(p, mean[: len(p.parameters)], covariance), p.nuisances, mean,
+        covariance, misfit, used, by_pose, undetermined(p, covariance), (), True, 0.0,
+    )  # fmt: skip
+    return model, result
+
+
+def _translated(
+    posterior: Posterior, p: Parametrisation, simulation: Simulation, nominal: Simulation
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (P + R,) in its numbers, and the matrix (P + R, D) by which x moves them."""
+    structure, x = posterior.structure, posterior.x
+    springs, bodies = structure.parameters, structure.bodies
+    count = len(p.parameters)
+    turned = np.zeros((count + len(p.nuisances), structure.size))
+    mean = np.zeros(len(turned))
+    by_name = {name: k for k, name in enumerate(structure.names)}
+    springs_named = {q.name: q for q in springs}
+    stiffness = [q.name for q in springs if q.kind == "stiffness"]
+    for i, parameter in enumerate(p.parameters):
+        if parameter.name in by_name:
+            turned[i, by_name[parameter.name]] = 1.0
+            mean[i] = x[by_name[parameter.name]]
+        else:  # a loss factor that an effect brought
+            own = next(k for n, k in by_name.items() if n.startswith(f"{parameter.name} of "))
+            turned[i, own], mean[i] = 1.0, np.log(parameter.median)
+        if parameter.kind == "damping":
+            blocks = set(springs_named[parameter.name].blocks)
+            there = (n for n in stiffness if blocks & set(springs_named[n].blocks))
+            at = by_name[next(there)]
+            turned[i, at] += 1.0
+            mean[i] += x[at]
+    difference = simulation.elastic.inertia - nominal.elastic.inertia
+    slopes = bodies.slopes(x[structure.inertial])
+    per = p.inertia.shape[1]
+    for b, name in enumerate(nominal.elastic.bodies):
+        rows = slice(count + b * per, count + (b + 1) * per)
+        onto = np.linalg.pinv(p.inertia[b].T)
+        mean[rows] = onto @ difference[b]
+        if name in bodies.bodies:
+            k = bodies.bodies.index(name)
+            turned[rows, structure.inertial.start + bodies.mine[k]] = onto @ slopes[k].T
+    return mean, turned
