@@ -59,19 +59,12 @@ class _Cells:
         self._cells: dict[bytes, Cell] = {}
 
     def of(self, configured: Configured) -> Cell:
-        frozen = configured.geometric_stiffness, configured.visit_scatter, configured.hits_err
-        key = msgspec.json.encode((configured.config, configured.robot, frozen))
+        key = msgspec.json.encode((configured.config, configured.robot))
         if key not in self._cells:
             config = config_from_builtins(configured.config)
             root = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
             store.restore_robot(self._campaign.directory, configured.robot, root / store.ROBOT)
-            self._cells[key] = Cell.load(
-                root / config.robot,
-                config,
-                geometric_stiffness=configured.geometric_stiffness,
-                visit_scatter=configured.visit_scatter,
-                hits_err=configured.hits_err,
-            )
+            self._cells[key] = Cell.load(root / config.robot, config)
         return self._cells[key]
 
 

@@ -74,7 +74,6 @@ def build(
         primary=best.primary,
         residues=False,
         taught=best.low.taught,
-        visits=cell.visit_scatter,
     )
     if hits_of is not None:
         frf_of = _OfOneHit(frf_of, hits_of)
@@ -123,7 +122,7 @@ class _Guided:
         seen = observations(cell, labelled)
         seen = seen if tuned is None else tuned.into(seen)
         known = low.discrepancy if labelled else None
-        primary = fit_primary(seen, known, None, low.belief, cell.visit_scatter)
+        primary = fit_primary(seen, known, low.belief)
         return cls(low, used, labelled, seen, primary)
 
     @property

@@ -383,5 +383,5 @@ def _first_entry(directory: Path) -> bytes:
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
     units = cell.robot.joints.declared
-    event = Configured(as_logged(config), hashes, __version__, True, True, True, units, True)
+    event = Configured(as_logged(config), hashes, __version__, units)
     return encode_line("", Entry(1, now, event))[0]

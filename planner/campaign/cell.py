@@ -35,10 +35,6 @@ class Cell:
     robot: Robot
     simulation: Simulation | None
     workspace: Workspace
-    # Whether the scatter of frequencies from visit to visit is learned.
-    visit_scatter: bool = field(default=True, kw_only=True)
-    # Whether the simulation is identified from all points, by hits that err; see `Configured`.
-    hits_err: bool = field(default=True, kw_only=True)
     # The cut whose stability is to be decided, where campaign.toml names one.
     cut: Cut | None = field(default=None, kw_only=True)
 
@@ -48,28 +44,19 @@ class Cell:
         robot_toml: Path,
         config: CampaignConfig,
         robot: Robot | None = None,
-        *,
-        geometric_stiffness: bool = True,
-        visit_scatter: bool = True,
-        hits_err: bool = True,
     ) -> "Cell":
         """Load the robot and hold the workspace against it; InputError where they disagree.
 
-        `robot` is the one of robot_toml, where it was loaded already. `geometric_stiffness` holds
-        where robot.toml does not say. `visit_scatter` and `hits_err` are off for campaigns that
-        began without.
+        `robot` is the one of robot_toml, where it was loaded already.
         """
         check_name(config.acquisition.name, "campaign.toml, [acquisition] name")
-        robot = _handled(robot or Robot.load(robot_toml, geometric_stiffness), config)
+        robot = _handled(robot or Robot.load(robot_toml), config)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         with _of_campaign_toml():
             workspace = Workspace.from_table(config.workspace, robot)
         _check_angles(robot, config)
         cut = _cut_of(robot_toml, config)
-        return cls(
-            config, robot, simulation, workspace,
-            visit_scatter=visit_scatter, hits_err=hits_err, cut=cut,
-        )  # fmt: skip
+        return cls(config, robot, simulation, workspace, cut=cut)
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:

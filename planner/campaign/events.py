@@ -15,12 +15,6 @@ class Configured(Event, frozen=True, tag="configured"):
     """The campaign was started, or its campaign.toml or robot folder was changed by hand.
 
     `config` is campaign.toml; `robot` maps each file of the robot folder to its sha256.
-    `geometric_stiffness` is what holds where robot.toml does not say: campaigns whose log does
-    not say either began when gravity's own stiffness was left out, and go on like that. So it is
-    with `visit_scatter`: whether the scatter of frequencies from visit to visit is learned; and
-    with `hits_err`: whether the simulation is identified from hits at all points that err, as
-    hits and measuring chains do, or from the tool's sensor as if they did not; and with
-    `unhit_stay_open`: whether a pose of which every hit was refused is still to be measured.
     `joint_units` are those of all `joints_deg` that follow, "deg" or "mm" of each joint; unset
     where all are degrees.
     """
@@ -28,11 +22,7 @@ class Configured(Event, frozen=True, tag="configured"):
     config: dict
     robot: dict[str, str]
     planner: str
-    geometric_stiffness: bool = False
-    visit_scatter: bool = False
-    hits_err: bool = False
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
-    unhit_stay_open: bool = False
 
 
 class Proposal(msgspec.Struct, frozen=True):

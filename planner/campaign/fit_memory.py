@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from planner.campaign.state import Measurement
 from planner.dataset.store import Store
-from planner.fit.search import Remembered
+from planner.fit.fitted import FitRecord
 
 Used = tuple[Measurement, ...]
 
@@ -31,9 +31,9 @@ class FitMemory:
 
     store: Store = field(default_factory=lambda: Store(None))
     name: Callable[[Used], str] = lambda used: ""
-    kept: dict[Used, Remembered] = field(default_factory=dict)
+    kept: dict[Used, FitRecord] = field(default_factory=dict)
 
-    def get(self, used: Used) -> Remembered | None:
+    def get(self, used: Used) -> FitRecord | None:
         """What was found of these, where that is known."""
         if used not in self.kept and self.store.folder is not None:
             data = self.store.get(self.name(used), bytes)
@@ -41,11 +41,11 @@ class FitMemory:
                 found = None if data is None else pickle.loads(data)  # this user's own file
             except Exception:  # whatever a library makes of it, it is found again
                 found = None
-            if isinstance(found, Remembered):
+            if isinstance(found, FitRecord):
                 self.kept[used] = found
         return self.kept.get(used)
 
-    def put(self, used: Used, found: Remembered) -> None:
+    def put(self, used: Used, found: FitRecord) -> None:
         """Keep what was found."""
         self.kept[used] = found
         if self.store.folder is not None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.fit.posterior import Posterior
+from planner.fit.posterior import RobotPosterior
 from planner.identification.measured_frfs import Measured
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
 
@@ -121,7 +121,7 @@ def local_size(h: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
 class FrfModel:
     """The simulation that explains the recordings, or None and the error of fused modes."""
 
-    simulated: Posterior | None
+    simulated: RobotPosterior | None
     modal_error: ErrorByZone
 
     def predict(
@@ -136,7 +136,7 @@ class FrfModel:
 
 
 def frf_model(
-    simulated: Posterior | None,
+    simulated: RobotPosterior | None,
     measured: Measured,
     band_hz: tuple[float, float],
     left_out_modes: Callable[[], ModalPrediction],

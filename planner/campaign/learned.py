@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from planner.fit.posterior import Posterior
+from planner.fit.posterior import RobotPosterior
 from planner.identification.extended_structure import ExtendedModel
 from planner.identification.parameters import Priors
 from planner.identification.result import Estimate, Identification
@@ -12,7 +12,7 @@ from planner.words import counted
 # that lacks nothing it is 0.001 to 0.015. Chosen.
 FOLLOWED = 0.06
 KNOWN = 0.3  # sd of ln k to which a spring not stated is known when it is told of
-# Poses from which a place is told as found: from one, neighbours imitate each other.
+# PosedBodies from which a place is told as found: from one, neighbours imitate each other.
 PLACED = 3
 
 
@@ -21,7 +21,7 @@ class Learned:
     """What so many `poses` taught the simulation; `structure` and `identified` say it in numbers
     of springs and bodies, effects held as they are."""
 
-    posterior: Posterior
+    posterior: RobotPosterior
     structure: ExtendedModel
     identified: Identification
     poses: int = PLACED

@@ -13,7 +13,7 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.effects.table import Repertoire
 from planner.fit.identified import as_identification
-from planner.fit.posterior import Posterior
+from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf import synthesis
@@ -179,6 +179,6 @@ def learn(
                 memory.put(used[:count], known)
             warm = known
         whole = search(len(frfs))
-        posterior = Posterior.of(whole.recalled(warm) if warm else whole.found())
+        posterior = RobotPosterior.of(whole.recalled(warm) if warm else whole.found())
         structure, identified = as_identification(posterior)
     return replace(before, learned=Learned(posterior, structure, identified, len(frfs)))

@@ -284,7 +284,7 @@ class Model:
                     f"The simulation disagrees with the measurements of mode {', '.join(left)}: "
                     f"predicted without it."
                 )
-        if self.cell.visit_scatter and len(self.labelled) >= SCATTER_POSES:
+        if len(self.labelled) >= SCATTER_POSES:
             percent = 100 * float(np.sqrt(np.mean(self.surrogate.visit_scatter**2)))
             if percent > TOLD_SCATTER_PERCENT:
                 found.append(

@@ -81,13 +81,7 @@ class CampaignReads:
         key = _text(configured)
         if key not in self._cells:
             config = config_from_builtins(configured.config)
-            loaded = Cell.load(
-                self.directory / config.robot,
-                config,
-                geometric_stiffness=configured.geometric_stiffness,
-                visit_scatter=configured.visit_scatter,
-                hits_err=configured.hits_err,
-            )
+            loaded = Cell.load(self.directory / config.robot, config)
             if loaded.robot.joints.declared != configured.joint_units:
                 raise InputError(
                     f"{loaded.robot.urdf_path}: other joints slide than when the campaign began, "
@@ -218,9 +212,7 @@ class CampaignReads:
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        kept = begun.geometric_stiffness, begun.visit_scatter, begun.hits_err, begun.joint_units
-        kept += (begun.unhit_stay_open,)
-        return Configured(as_logged(config), hashes, __version__, *kept)
+        return Configured(as_logged(config), hashes, __version__, begun.joint_units)
 
     # -- what is expected ----------------------------------------------------------------------
 

@@ -93,17 +93,13 @@ class CampaignState:
 
     @property
     def over(self) -> tuple[Measurement, ...]:
-        """Poses that are not to be proposed again, for there were hits; see `unhit_stay_open`."""
-        return self.measured if self._unhit_stay_open else tuple(self.measurements.values())
-
-    @property
-    def _unhit_stay_open(self) -> bool:
-        return self.configured is not None and self.configured.unhit_stay_open
+        """Poses that are not to be proposed again, for there were hits."""
+        return self.measured
 
     def unchanged_by(self, event: AnyEvent) -> bool:
         """Whether an act changes neither the model nor what is proposed."""
         if isinstance(event, Imported):
-            return event.question is not None or (event.unhit and self._unhit_stay_open)
+            return event.question is not None or event.unhit
         return isinstance(event, Starred | Refused | FilesShown | FilesPlaced)
 
     @property

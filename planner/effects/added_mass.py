@@ -6,14 +6,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.gradient import Impedance
-from planner.effects.effect import ACROSS, Effect, Gain, Motions, Poses, Start, moving, turning
+from planner.effects.effect import (
+    ACROSS,
+    Gain,
+    Motions,
+    Operator,
+    PosedBodies,
+    Start,
+    moving,
+    turning,
+)
 
 LEAST = 0.05  # of the mass's sd: a start needs some mass for its place to matter
 FARTHEST = 2.0  # prior sds, of a start's mass; its place begins within one
 
 
 @dataclass(frozen=True)
-class AddedMass(Effect):
+class PointMass(Operator):
     """A point mass of ψ₀ sds at a place (ψ₁..₃ sds about the link's centre of mass)."""
 
     joint: str = ""
@@ -23,7 +32,7 @@ class AddedMass(Effect):
 
     kind = "added_mass"
 
-    def impedance(self, poses: Poses, psi: np.ndarray) -> Impedance:
+    def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """m s² Jₚᵀ Jₚ at the place p."""
         place = np.array(self.centre_m) + self.size_m * psi[1:]
         ports = np.concatenate([poses.carried(self.joint, place), poses.body(self.joint)[:, 3:]], 1)
@@ -47,17 +56,17 @@ class AddedMass(Effect):
         return (Start(self, np.append(mass, np.clip(psi[1:] / mass, -1, 1)), nats),)
 
     def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray]:
-        """See `Effect.inertia`."""
+        """See `Operator.inertia`."""
         x, y, z = np.array(self.centre_m) + self.size_m * psi[1:]
         moments = [y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y]
         return self.joint, self.mass_kg * psi[0] * np.array([1.0, x, y, z, *moments])
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
-        """See `Effect.vanishing`."""
+        """See `Operator.vanishing`."""
         return -psi[:1]
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
-        """See `Effect.words`."""
+        """See `Operator.words`."""
         mass, sd = values["mass"]
         return (
             f"{self.at} carries {self.mass_kg * mass:.2g} ± {self.mass_kg * sd:.1g} kg that is not "

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from planner.dynamics.gradient import Impedance
-from planner.effects.effect import Effect, Gain, Motions, Poses, Start
+from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
 
 FARTHEST = 0.5  # share of the stiffness, of a start
 
 
 @dataclass(frozen=True)
-class AngleSpring(Effect):
+class AngleSpring(Operator):
     """k (1 + ψ₀ cos q + ψ₁ sin q) of a joint's own spring."""
 
     joint: str = ""
@@ -23,7 +23,7 @@ class AngleSpring(Effect):
 
     kind = "angle_dependent_spring"
 
-    def impedance(self, poses: Poses, psi: np.ndarray) -> Impedance:
+    def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """Its share of the stated stiffness."""
         ports = np.zeros((len(poses.q), 1, len(poses.springs)))
         ports[:, 0, poses.springs.index(self.spring)] = 1.0
@@ -43,11 +43,11 @@ class AngleSpring(Effect):
         return (Start(self, np.clip(psi, -FARTHEST, FARTHEST), nats),)
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
-        """See `Effect.vanishing`."""
+        """See `Operator.vanishing`."""
         return -psi
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
-        """See `Effect.words`."""
+        """See `Operator.words`."""
         share = np.hypot(values["cosine"][0], values["sine"][0])
         return f"The stiffness of {self.at} goes with its angle, by ± {100 * share:.2g} %."
 

@@ -1,6 +1,6 @@
 """What a simulation can lack, as an operator on the dynamic stiffness at a place.
 
-Everything that a new effect must give stands in `Effect`; adding one touches its own file and
+Everything that a new effect must give stands in `Operator`; adding one touches its own file and
 `table`. An effect frees springs that robot.toml does not state (`springs`), or adds an impedance
 with numbers ψ of its own, each with a normal prior, or both.
 """
@@ -34,8 +34,8 @@ class Number:
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
-    """Poses q (n, dof) in rad at s (n, F), and how e springs move bodies, (n, B, 6, e).
+class PosedBodies:
+    """PosedBodies q (n, dof) in rad at s (n, F), and how e springs move bodies, (n, B, 6, e).
 
     `springs` (e,) are the numbers of the springs among all that the robot may have.
     """
@@ -64,7 +64,7 @@ ACROSS = np.array([np.cross(np.eye(3), e).T for e in np.eye(3)])
 class Motions:
     """How hits (n, e, c, F) and sensors (n, e, r, F) move the springs, per unit of force."""
 
-    poses: Poses
+    poses: PosedBodies
     x_hit: np.ndarray
     x_sensor: np.ndarray
 
@@ -81,13 +81,13 @@ class Motions:
 class Start:
     """An effect, where a fit begins with it (ψ), and the nats that the first order promises."""
 
-    effect: "Effect"
+    effect: "Operator"
     psi: np.ndarray
     nats: float
 
 
 @dataclass(frozen=True)
-class Effect(ABC):
+class Operator(ABC):
     """One thing that the simulation may lack, at a place ("base", "joint_2", "link_3")."""
 
     at: str
@@ -111,7 +111,7 @@ class Effect(ABC):
         """Prior sd of ψ."""
         return np.array([n.sd for n in self.numbers])
 
-    def impedance(self, poses: Poses, psi: np.ndarray) -> Impedance | None:
+    def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance | None:
         """What it adds to the dynamic stiffness beside its springs, with slopes by ψ."""
         return None
 

@@ -9,11 +9,11 @@ import numpy as np
 from planner.dynamics.gradient import Impedance
 from planner.effects.effect import (
     ACROSS,
-    Effect,
     Gain,
     Motions,
     Number,
-    Poses,
+    Operator,
+    PosedBodies,
     Start,
     moving,
     turning,
@@ -26,7 +26,7 @@ PAIRS = tuple((i, k) for i in range(3) for k in range(i, 3))
 
 
 @dataclass(frozen=True)
-class LocalResonator(Effect):
+class LinkResonator(Operator):
     """A mass that slides along a direction of the link, held by spring and damper.
 
     ψ: ln mass, ln frequency, ln damping ratio, direction (3), place (3) in m.
@@ -37,7 +37,7 @@ class LocalResonator(Effect):
 
     kind = "local_resonator"
 
-    def impedance(self, poses: Poses, psi: np.ndarray) -> Impedance:
+    def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """s² m Jₚᵀ [1 + (T − 1) d dᵀ] Jₚ with the transmissibility T of spring and damper."""
         mass, omega, zeta = np.exp(psi[0]), 2 * np.pi * np.exp(psi[1]), np.exp(psi[2])
         length = np.linalg.norm(psi[3:6]) + 1e-12
@@ -98,7 +98,7 @@ class LocalResonator(Effect):
         start[1], start[3:6] = np.log(hertz), ways[:, most]
         return Start(self.towards(ways[:, most]), start, nats)
 
-    def towards(self, way: np.ndarray) -> "LocalResonator":
+    def towards(self, way: np.ndarray) -> "LinkResonator":
         """The same with its direction expected about `way` (3,)."""
         unit = way / np.linalg.norm(way)
         directed = tuple(
@@ -108,11 +108,11 @@ class LocalResonator(Effect):
         return replace(self, numbers=(*self.numbers[:3], *directed, *self.numbers[6:]))
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
-        """See `Effect.vanishing`."""
+        """See `Operator.vanishing`."""
         return np.array([-1.0])  # of ln mass
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
-        """See `Effect.words`."""
+        """See `Operator.words`."""
         return (
             f"Something of {values['mass'][0]:.2g} kg on {self.at} swings on its own at "
             f"{values['frequency'][0]:.1f} Hz: check hose pack, brackets and covers there."

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.gradient import Impedance
-from planner.effects.effect import Effect, Gain, Motions, Poses, Start
+from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
 
 LEAST, MOST = 0.002, 0.3  # of a start
 
 
 @dataclass(frozen=True)
-class StructuralDamping(Effect):
+class LossFactors(Operator):
     """i k η of every stated spring; ψ are the ln η. `stiffness` are those that robot.toml states.
 
     `blocks` are the springs' numbers, those with a number in common together.
@@ -23,7 +23,7 @@ class StructuralDamping(Effect):
 
     kind = "structural_damping"
 
-    def impedance(self, poses: Poses, psi: np.ndarray) -> Impedance:
+    def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """A loss factor η of a spring k turns it into k (1 + i η)."""
         every = [spring for group in self.blocks for spring in group]
         ports = np.zeros((len(poses.q), len(every), len(poses.springs)))
@@ -49,15 +49,15 @@ class StructuralDamping(Effect):
         return (Start(self, np.log(np.clip(share * usual, LEAST, MOST)), nats),)
 
     def losses(self, psi: np.ndarray) -> dict[int, float]:
-        """See `Effect.losses`."""
+        """See `Operator.losses`."""
         pairs = zip(self.blocks, np.exp(psi), strict=True)
         return {spring: float(eta) for group, eta in pairs for spring in group}
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
-        """See `Effect.vanishing`."""
+        """See `Operator.vanishing`."""
         return -np.ones(len(psi))
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
-        """See `Effect.words`."""
+        """See `Operator.words`."""
         least, most = (100 * f(v for v, _ in values.values()) for f in (min, max))
         return f"Gears and bearings dissipate by loss factors, of {least:.1g} to {most:.1g} %."

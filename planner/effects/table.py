@@ -11,12 +11,12 @@ import msgspec
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.effects.added_mass import AddedMass
+from planner.effects.added_mass import PointMass
 from planner.effects.angle_spring import AngleSpring
-from planner.effects.effect import Effect, Number
-from planner.effects.resonator import LocalResonator
+from planner.effects.effect import Number, Operator
+from planner.effects.resonator import LinkResonator
 from planner.effects.springs import BendingLink, SoftBase, Tilt
-from planner.effects.structural_damping import StructuralDamping
+from planner.effects.structural_damping import LossFactors
 from planner.errors import InputError
 from planner.identification.parameters import Priors, place_name
 from planner.robot.config import BASE, Compliance
@@ -46,7 +46,7 @@ class Repertoire:
     simulation: Simulation
     priors: Priors
     stated: int
-    effects: tuple[Effect, ...]
+    effects: tuple[Operator, ...]
 
     @classmethod
     def of(cls, simulation: Simulation, priors: Priors) -> "Repertoire":
@@ -93,7 +93,7 @@ def _joined(robot: Robot, block: Compliance) -> Robot | None:
     return found
 
 
-def _springs(robot: Robot) -> list[tuple[type[Effect], str, Compliance, float]]:
+def _springs(robot: Robot) -> list[tuple[type[Operator], str, Compliance, float]]:
     """Kind and place of the effect that frees it, the spring, and its scale."""
     stated = [b for b in robot.config.compliance]
     turning = [b for b in stated if not robot.slides_along(b)]
@@ -157,7 +157,7 @@ def across(axis: np.ndarray) -> np.ndarray:
     return np.array([first, np.cross(axis, first)])
 
 
-def _operators(simulation: Simulation) -> list[Effect]:
+def _operators(simulation: Simulation) -> list[Operator]:
     """Masses and resonators on every link, and springs that go with the angle."""
     robot, elastic = simulation.robot, simulation.elastic
     masses = [b[0] for b in elastic.inertia if b[0] > 0]
@@ -166,16 +166,17 @@ def _operators(simulation: Simulation) -> list[Effect]:
         float(np.linalg.norm(p.translation)) for p in robot.model.jointPlacements
     )
     low, high = band
-    found: list[Effect] = []
+    found: list[Operator] = []
     for number, joint in enumerate(robot.joint_names, 1):
         if joint not in elastic.bodies:
             continue
         body = elastic.inertia[elastic.bodies.index(joint)]
-        centre = tuple(map(float, body[1:4] / body[0])) if body[0] > 0 else (0.0, 0.0, 0.0)
+        x, y, z = map(float, body[1:4] / body[0]) if body[0] > 0 else (0.0, 0.0, 0.0)
+        centre = x, y, z
         at = f"link_{number}"
         places = tuple(Number(f"position_{a}", "1", 0.0, 1.0) for a in "xyz")
         numbers = (Number("mass", "1", 0.0, 1.0), *places)
-        found.append(AddedMass(at, (), numbers, joint, centre, ADDED_MASS * mean, size))
+        found.append(PointMass(at, (), numbers, joint, centre, ADDED_MASS * mean, size))
         numbers = (
             Number("mass", "kg", float(np.log(RESONATOR_MASS * mean)), 1.0, True),
             Number("frequency", "Hz", float(np.log(low * high)) / 2,
@@ -184,7 +185,7 @@ def _operators(simulation: Simulation) -> list[Effect]:
             *(Number(f"direction_{a}", "1", 0.0, 1.0) for a in "xyz"),
             *(Number(f"position_{a}", "m", c, size) for a, c in zip("xyz", centre, strict=True)),
         )  # fmt: skip
-        found.append(LocalResonator(at, (), numbers, joint, band))
+        found.append(LinkResonator(at, (), numbers, joint, band))
     if not any(b.loss_factor for b in robot.config.compliance):
         found.append(_structural(robot))
     own = [(n, b) for n, b in enumerate(robot.config.compliance) if robot.is_own(b)]
@@ -198,7 +199,7 @@ def _operators(simulation: Simulation) -> list[Effect]:
     return found
 
 
-def _structural(robot: Robot) -> Effect:
+def _structural(robot: Robot) -> Operator:
     groups: dict[str, list[int]] = {}
     for number, block in enumerate(robot.config.compliance):
         groups.setdefault(block.tie or f"\0{number}", []).append(number)
@@ -209,4 +210,4 @@ def _structural(robot: Robot) -> Effect:
         Number(f"loss_factor of {place_name(b)}", "1", median, 1.0, True) for b in firsts
     )
     stiffness = tuple(b.stiffness for b in firsts)
-    return StructuralDamping("joints", (), numbers, blocks, stiffness)
+    return LossFactors("joints", (), numbers, blocks, stiffness)

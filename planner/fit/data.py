@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.effects.effect import Poses
-from planner.fit.structure import RobotPrior, Structure
+from planner.effects.effect import PosedBodies
+from planner.fit.structure import RobotPrior, RobotStructure
 from planner.frf.frf import Frf
 from planner.identification.measured_frfs import Measured, common_band, matrices_at, stack
 from planner.robot.angle_slopes import AngleSlopes
@@ -46,12 +46,12 @@ class FrfData:
         """How many sensors heard the hits."""
         return self.measured.accelerance.shape[1] // 3
 
-    def poses(self, structure: Structure) -> Poses:
+    def poses(self, structure: RobotStructure) -> PosedBodies:
         """As effects see them."""
         springs = list(structure.springs)
         bodies = structure.prior.repertoire.simulation.elastic.bodies
         jacobians = self.jacobians[..., springs]
-        return Poses(self.q, self.measured.s, jacobians, bodies, structure.springs)
+        return PosedBodies(self.q, self.measured.s, jacobians, bodies, structure.springs)
 
     def at(self, poses: np.ndarray) -> "FrfData":
         """Of some of the poses, by their numbers."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planner.fit.misfit import At, Misfit
+from planner.fit.misfit import At, FrfMisfit
 from planner.fit.structure import REACH
 
 GOOD, GROWTH, MOST_REJECTED, MOST_DAMPED = 0.5, 3.0, 8, 1e9
@@ -10,7 +10,7 @@ SOFTER, STIFFER = 6.0, 0.8  # of a new spring's step, in shares of its complianc
 
 
 def minimised(
-    misfit: Misfit,
+    misfit: FrfMisfit,
     x: np.ndarray,
     steps: int,
     tolerance: float = 0.5,
@@ -46,7 +46,7 @@ def minimised(
     return at
 
 
-def _moved(misfit: Misfit, x: np.ndarray, step: np.ndarray) -> np.ndarray:
+def _moved(misfit: FrfMisfit, x: np.ndarray, step: np.ndarray) -> np.ndarray:
     """No number goes farther than it may; springs not stated go in compliance, in which FRFs are
     linear."""
     s = misfit.structure

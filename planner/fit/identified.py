@@ -3,14 +3,14 @@
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.fit.posterior import Posterior
+from planner.fit.posterior import RobotPosterior
 from planner.identification.agreement import MODEL_ERROR
 from planner.identification.extended_structure import ExtendedModel
 from planner.identification.parameters import Parametrisation, parametrise
 from planner.identification.result import Identification, estimates, undetermined
 
 
-def as_identification(posterior: Posterior) -> tuple[ExtendedModel, Identification]:
+def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identification]:
     """The structure with what was known of it before, and what the FRFs made of it.
 
     Effects' own numbers are held where they were found; what else is known is as unsure as they
@@ -40,7 +40,7 @@ def as_identification(posterior: Posterior) -> tuple[ExtendedModel, Identificati
 
 
 def _translated(
-    posterior: Posterior, p: Parametrisation, simulation: Simulation, nominal: Simulation
+    posterior: RobotPosterior, p: Parametrisation, simulation: Simulation, nominal: Simulation
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean (P + R,) in its numbers, and the matrix (P + R, D) by which x moves them."""
     structure, x = posterior.structure, posterior.x

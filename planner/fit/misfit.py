@@ -16,10 +16,11 @@ from planner.dynamics.motion import Motion, Turned
 from planner.effects.effect import Motions
 from planner.fit.data import FrfData, among
 from planner.fit.inertias import spatial
-from planner.fit.structure import REACH, Structure
+from planner.fit.structure import REACH, RobotStructure
 from planner.identification.measurement_model import OpenNumbers, Tolerances, basis
 from planner.identification.missed_ports import actual_ports
 from planner.robot.elastic_model import Matrices
+from planner.robot.virtual_joints import inertia_basis
 
 ELL = 0.03  # of the frequency: lines so near share the discrepancy, about a half-power band
 SHARE = 0.3  # of the rms of all FRFs of a pose at a line, in the size of each
@@ -45,10 +46,10 @@ class At:
     volume: float
     value: float
     own: np.ndarray
+    motion: Motion
     factors: tuple[np.ndarray, ...] = ()
     onto: tuple[np.ndarray, ...] = ()
     white: np.ndarray | None = None
-    motion: Motion | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +62,10 @@ class Around:
 
 
 @dataclass(frozen=True, eq=False)
-class Misfit:
+class FrfMisfit:
     """Of a structure on data; `rho` is the discrepancy's size, None: logarithms are compared."""
 
-    structure: Structure
+    structure: RobotStructure
     data: FrfData
     tolerances: Tolerances
     rho: float | None = 0.03
@@ -80,7 +81,7 @@ class Misfit:
         springs, live = list(self.structure.springs), list(self.structure.live)
         return np.ascontiguousarray(self.data.jacobians[:, live][..., springs])
 
-    def with_rho(self, rho: float | None) -> "Misfit":
+    def with_rho(self, rho: float | None) -> "FrfMisfit":
         """With a discrepancy of another size; what does not depend on it is kept."""
         other = replace(self, rho=rho)
         for name in ("matrices", "jacobians", "poses", "_weightless"):
@@ -187,27 +188,20 @@ class Misfit:
         structure, elasticity = self.structure, self.structure.elasticity(x)
         kinds, e = structure.spread.shape[:2]
         numbers = structure.bodies.slopes(x[structure.inertial])
-        # All bodies' numbers in one rectangle, for one product; a number of two bodies is added.
-        most = max(len(one) for one in numbers)
-        block = np.zeros((len(numbers), most, 6, 6))
-        for b, one in enumerate(numbers):
-            block[b, : len(one)] = spatial(one)
-        added = self.impedances(x)
-        raw = motion_slopes(motion, elasticity, Inertias(self.jacobians, block), added)
+        added, bodies = self.impedances(x), len(numbers)
+        every = Inertias(self.jacobians, np.broadcast_to(inertia_basis(), (bodies, 10, 6, 6)))
+        raw = motion_slopes(motion, elasticity, every, added)
         springs = (3 if elasticity.loss_factor.any() else 2) * e
         by_block = raw[:, : kinds * e]
         out = np.empty((len(raw), structure.chain.start, *raw.shape[2:]), dtype=complex)
         out[:, : len(structure.parameters)] = structure.spring_slopes(by_block)
-        bodies = out[:, structure.inertial]
-        bodies[:] = 0.0
-        at = springs
-        for mine, one in zip(structure.bodies.mine, numbers, strict=True):
-            if np.array_equal(mine, np.arange(mine[0], mine[0] + len(mine))):
-                bodies[:, mine[0] : mine[0] + len(mine)] += raw[:, at : at + len(one)]
-            else:
-                bodies[:, mine] += raw[:, at : at + len(one)]
-            at += most
-        out[:, structure.inertial.stop :] = raw[:, springs + block.shape[0] * most :]
+        out[:, structure.inertial] = 0.0
+        for b, (mine, one) in enumerate(zip(structure.bodies.mine, numbers, strict=True)):
+            own = raw[:, springs + 10 * b : springs + 10 * (b + 1)].reshape(len(raw), 10, -1)
+            moved = (one @ own.view(float)).view(complex)
+            at = structure.inertial.start + mine
+            out[:, at] += moved.reshape(len(raw), len(mine), *raw.shape[2:])
+        out[:, structure.inertial.stop :] = raw[:, springs + 10 * bodies :]
         visits = by_block[:, :e] + by_block[:, e : 2 * e]  # dampers scatter with their springs
         return out, visits
 
@@ -316,7 +310,7 @@ class Misfit:
         away = x - s.mean
         value = 0.5 * (chi2 + float(away @ s.precision @ away))
         kept = {"factors": tuple(factors), "onto": tuple(ontos), "white": white} if keep else {}
-        return At(x, chi2, gradient, normal, volume, value, own, **kept, motion=motion)
+        return At(x, chi2, gradient, normal, volume, value, own, motion, **kept)
 
     # ---------------------------------------------------------------- what follows from it
 
@@ -354,5 +348,4 @@ class Misfit:
     def motions(self, at: At) -> Motions:
         """How hits and sensors move the springs, as effects' first-order columns need it."""
         motion = at.motion
-        assert motion is not None
         return Motions(self.poses, motion.x_hit, motion.scaled(motion.x_sensor))

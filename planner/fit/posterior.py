@@ -6,27 +6,27 @@ from functools import cached_property
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.effects.effect import Effect
+from planner.effects.effect import Operator
 from planner.fit.data import FrfData
-from planner.fit.misfit import SHARE, Misfit
-from planner.fit.search import Found
-from planner.fit.structure import Structure, exported
+from planner.fit.fitted import StructureFit
+from planner.fit.misfit import SHARE, FrfMisfit
+from planner.fit.structure import RobotStructure, exported
 from planner.identification.measured_frfs import Measured
 from planner.inference.least_squares import inverse
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class RobotPosterior:
     """A structure at x with the covariance of x; `size` is that of the discrepancy."""
 
-    structure: Structure
+    structure: RobotStructure
     x: np.ndarray
     covariance: np.ndarray
     size: float
-    found: Found
+    found: StructureFit
 
     @classmethod
-    def of(cls, found: Found) -> "Posterior":
+    def of(cls, found: StructureFit) -> "RobotPosterior":
         """After a fit."""
         covariance = inverse(found.at.normal + found.structure.precision)
         assert found.misfit.rho is not None
@@ -50,7 +50,7 @@ class Posterior:
         """FRFs (n, 3, 3, F) of the tool in m/s²/N at q (n, dof) in rad, and their sds."""
         means, sds = [], []
         for row in np.atleast_2d(q):
-            misfit = Misfit(self.structure, self._at(row[None], frequency_hz), self.tolerances)
+            misfit = FrfMisfit(self.structure, self._at(row[None], frequency_hz), self.tolerances)
             motion = misfit.motion(self.x, None)
             slopes, _ = misfit.slopes(motion, self.x)
             moved = self.root.T @ slopes[0].reshape(slopes.shape[1], -1)
@@ -106,7 +106,7 @@ class Posterior:
         count = np.maximum(m.used.sum(axis=(1, 2, 3)), 1)
         return float(ratio.sum() / count.sum()), ratio.sum(axis=(1, 2, 3)) / count
 
-    def values(self, effect: Effect) -> dict[str, tuple[float, float]]:
+    def values(self, effect: Operator) -> dict[str, tuple[float, float]]:
         """An effect's stiffnesses and own numbers by name, with sds, in their units."""
         s, sd = self.structure, np.sqrt(np.diagonal(self.covariance))
         out = {}

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from planner.dynamics.simulation import Elasticity, Simulation
-from planner.effects.effect import Effect
+from planner.effects.effect import Operator
 from planner.effects.table import Repertoire
 from planner.fit.inertias import BodyNumbers, body_numbers
 from planner.identification.feasible_inertias import pseudo_inertia
@@ -83,11 +83,11 @@ class RobotPrior:
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class RobotStructure:
     """A robot with some effects; `sensors` hear it."""
 
     prior: RobotPrior
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[Operator, ...] = ()
     sensors: int = 1
 
     @cached_property
@@ -204,7 +204,7 @@ class Structure:
     def elasticity(self, x: np.ndarray) -> Elasticity:
         """Its springs at x; a damper that is not stated stays away."""
         log_k, log_t, *log_eta = self.spread @ x[: len(self.parameters)]
-        given = self.spread.any(axis=2)
+        given = np.any(self.spread, axis=2)
         k = np.exp(log_k)
         damping = np.where(given[1], k * np.exp(log_t), 0.0)
         loss = np.where(given[2], np.exp(log_eta[0]), 0.0) if log_eta else np.zeros(len(k))
@@ -237,18 +237,18 @@ class Structure:
         there = self.bodies.nominal + self.bodies.difference(x[self.inertial]) + added
         return bool(np.linalg.eigvalsh(pseudo_inertia(there[changed])).min() > 0)
 
-    def carried(self, other: "Structure", x: np.ndarray) -> np.ndarray:
+    def carried(self, other: "RobotStructure", x: np.ndarray) -> np.ndarray:
         """Numbers x of another structure in this one; what that lacks is as expected."""
         known = dict(zip(other.names, x, strict=True))
         return np.array([known.get(n, m) for n, m in zip(self.names, self.mean, strict=True)])
 
-    def with_effect(self, effect: Effect) -> "Structure":
+    def with_effect(self, effect: Operator) -> "RobotStructure":
         """One more; of a label that is there already the place counts up."""
         taken = sum(e.label.split("#")[0] == effect.label for e in self.effects)
         named = replace(effect, at=f"{effect.at}#{taken + 1}") if taken else effect
         return replace(self, effects=(*self.effects, named))
 
-    def without(self, effect: Effect) -> "Structure":
+    def without(self, effect: Operator) -> "RobotStructure":
         """All but one."""
         return replace(self, effects=tuple(e for e in self.effects if e is not effect))
 
@@ -256,13 +256,13 @@ class Structure:
 KINDS = ("stiffness", "damping", "loss_factor")
 
 
-def effects_free(structure: Structure) -> tuple[Effect, ...]:
+def effects_free(structure: RobotStructure) -> tuple[Operator, ...]:
     """Those of the repertoire that it has not."""
     there = {e.label for e in structure.effects}
     return tuple(e for e in structure.prior.repertoire.effects if e.label not in there)
 
 
-def exported(structure: Structure, x: np.ndarray) -> tuple[Simulation, Sequence[str]]:
+def exported(structure: RobotStructure, x: np.ndarray) -> tuple[Simulation, Sequence[str]]:
     """The simulation that a structure is at x, and the names of its springs' parameters."""
     repertoire = structure.prior.repertoire
     robot = repertoire.simulation.robot

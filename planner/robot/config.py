@@ -260,7 +260,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     band_hz: tuple[float, float] = (4.0, 90.0)
     held: dict[str, float] = {}
-    geometric_stiffness: bool | None = None  # a bool once `load_config` has read it
+    geometric_stiffness: bool = True
     stiffness_sd_percent: float | None = None
     stiffness_bias_sd_percent: float | None = None
     compliance: tuple[Compliance, ...] = ()

@@ -25,14 +25,9 @@ LARGEST_SD_PERCENT = 1000.0  # a factor of 11 either way: beyond, nothing is sta
 LARGEST_STIFFNESS = 1e14
 
 
-def load_config(path: Path, geometric_stiffness: bool = True) -> RobotConfig:
-    """Read and check robot.toml; InputError with one sentence where it is wrong.
-
-    `geometric_stiffness` holds where robot.toml does not say.
-    """
+def load_config(path: Path) -> RobotConfig:
+    """Read and check robot.toml; InputError with one sentence where it is wrong."""
     config = load_toml(path, RobotConfig, "robot.toml")
-    if config.geometric_stiffness is None:
-        config = msgspec.structs.replace(config, geometric_stiffness=geometric_stiffness)
     _check(config, path)
     return with_effects(config, path)
 

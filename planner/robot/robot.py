@@ -49,12 +49,9 @@ class Robot:
     left_out: tuple[UnusableShape, ...] = ()  # shapes of the URDF that cannot be used
 
     @classmethod
-    def load(cls, robot_toml: Path | str, geometric_stiffness: bool = True) -> "Robot":
-        """Read robot.toml and its URDF. Raises InputError naming file, entry and remedy.
-
-        `geometric_stiffness` holds where robot.toml does not say.
-        """
-        return cls.of(load_config(Path(robot_toml), geometric_stiffness), Path(robot_toml))
+    def load(cls, robot_toml: Path | str) -> "Robot":
+        """Read robot.toml and its URDF. Raises InputError naming file, entry and remedy."""
+        return cls.of(load_config(Path(robot_toml)), Path(robot_toml))
 
     @classmethod
     def of(cls, config: RobotConfig, robot_toml: Path) -> "Robot":

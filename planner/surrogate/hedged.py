@@ -66,33 +66,25 @@ def fit_hedged(
     centre: np.ndarray,
     samples: int = 256,
     kept: int = 32,
-    judged: tuple[np.ndarray, tuple[OutputPrior, ...]] | None = None,
     belief: float = PRIOR_BELIEF,
     fit_fused: Callable[..., AR1] = fit_ar1,
 ) -> HedgedAR1:
     """Fit m outputs; arguments as of `fit_ar1`.
 
-    `judged` are low-fidelity values (n, m) and their priors by which the simulation is judged, for
-    a simulation that was fitted to these very measurements: what it gave each pose before it was
-    fitted to that pose. `belief` is the simulation's probability before these data.
+    `belief` is the simulation's probability before these data.
     `fit_fused` fits with the simulation, arguments as of `fit_ar1`.
     """
     fused = fit_fused(data, with_low, without_low, centre, samples, kept)
-    believed = fused
-    if judged is not None:
-        low, prior = judged
-        unseen = replace(data, low=np.where(np.isfinite(low), low, data.low))
-        believed = fit_fused(unseen, prior, without_low, centre, samples, kept)
     nothing = np.full(len(centre), np.nan)
     ignored = replace(data, low=np.full_like(data.low, np.nan))
     alone = fit_ar1(ignored, with_low, without_low, nothing, samples, kept)
-    gap = believed.posterior.log_evidence - alone.posterior.log_evidence
+    gap = fused.posterior.log_evidence - alone.posterior.log_evidence
     gap = np.where(fused.uses_low, gap + np.log(belief / (1 - belief)), np.inf)
     # Without a measurement there is nothing to doubt the simulation by.
     gap = np.where(fused.posterior.mask.any(axis=1), gap, np.inf)
     trust = gap >= 0
     weight = 1 / (1 + np.exp(-np.minimum(np.abs(gap), 700.0)))
-    evidence = np.logaddexp(believed.posterior.log_evidence, alone.posterior.log_evidence)
+    evidence = np.logaddexp(fused.posterior.log_evidence, alone.posterior.log_evidence)
     return HedgedAR1(_choose(trust, fused, alone), _choose(~trust, fused, alone), weight, evidence)
 
 

@@ -158,7 +158,6 @@ def _parts(residue: np.ndarray) -> np.ndarray:
 def fit_primary(
     seen: ModalObservations,
     discrepancy: np.ndarray | None = None,
-    left_out_hz: np.ndarray | None = None,
     belief: float = PRIOR_BELIEF,
     visits: bool = True,
 ) -> HedgedAR1:
@@ -168,8 +167,6 @@ def fit_primary(
         seen: modes by label at n poses, and the simulation's there.
         discrepancy: how far ln f (k,) of a simulation that was fitted to these very modes is off
             elsewhere; its error at the measured poses says too little. None: it was not fitted.
-        left_out_hz: frequencies (n, k) that the simulation gave each pose before it was fitted to
-            that pose, by which it is judged.
         belief: probability of the simulation before these frequencies.
         visits: whether the scatter from visit to visit is looked for, in all modes together. If
             not, this is the model of campaigns that began before it was.
@@ -177,11 +174,9 @@ def fit_primary(
     k = seen.frequency_hz.shape[1]
     y, low = _log(seen.frequency_hz), _log(seen.simulated.frequency_hz)
     with_low = _frequency_priors(k, discrepancy)
-    ordinary, alone = FREQUENCY_PRIOR, FREQUENCY_PRIOR_ALONE
+    alone = FREQUENCY_PRIOR_ALONE
     if visits:
-        with_low = [_scattering(prior) for prior in with_low]
-        ordinary, alone = _scattering(ordinary), _scattering(alone)
-    judged = None if left_out_hz is None else (_log(left_out_hz), (ordinary,) * k)
+        with_low, alone = [_scattering(prior) for prior in with_low], _scattering(alone)
     return fit_hedged(
         TrainingData(seen.x, y, seen.frequency_sd_hz / np.exp(y), low),
         tuple(with_low),
@@ -189,7 +184,6 @@ def fit_primary(
         _centre(low, np.full(k, FREQUENCY_PRIOR_ALONE.mean)),
         SAMPLES,
         KEPT,
-        judged,
         belief,
         fit_plain_or_free if visits else fit_ar1,
     )

@@ -1,16 +1,11 @@
 """A pose of which every hit was refused is still to be measured, and counts nowhere as measured."""
 
-import json
-import re
 import shutil
 
 import pytest
 
 from planner.campaign.campaign import Campaign
-from tests.support.earlier_logs import written_earlier
 from tests.support.outside import call, make_cell, record, told
-
-STAY = b',"unhit_stay_open":true'
 
 
 @pytest.fixture(scope="module")
@@ -83,15 +78,3 @@ def test_another_readback_is_taken_where_nothing_was_accepted(refused, made, tmp
     table.write_text("\n".join(map(",".join, lines)) + "\n")
     assert call("import", cell, folder)[0] == 0
     assert Campaign(cell).state.used[0].joints_deg[0] == pytest.approx(first + 0.5)
-
-
-def test_a_log_written_before_goes_on_as_it_did(refused, made):
-    """There the pose was over: another is proposed, and replay computes the same."""
-    cell = written_earlier(refused[0], (STAY,))
-    assert told("next", cell)["proposals"][0]["pose"] != made[1]["pose"]
-    found = told("replay", cell)
-    assert found["reproduced"]
-    assert found["steps"][-1]["check"] == "identical"
-    _, out, _ = call("replay", cell)
-    assert "1 hit refused" in " ".join(re.sub(r"[│┃]", " ", out).split())
-    assert json.loads(call("status", cell, "--json")[1])["measurements"] == []

@@ -11,12 +11,11 @@ import pytest
 from rich.console import Console
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Configured, Proposed
+from planner.campaign.events import Proposed
 from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESIGNS
 from planner.session.keys import NoKeys
 from planner.session.watch import watch
-from tests.support.earlier_logs import GRAVITY, SCATTER, written_earlier
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 UNCHECKED = "Nothing is checked for collision, because plain.urdf has no collision geometry"
@@ -123,43 +122,6 @@ def test_a_robot_with_collision_geometry_is_not_told_of(robot, tmp_path):
     shape = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>'
     urdf.write_text(urdf.read_text().replace("</inertial></link>", f"</inertial>{shape}", 1))
     assert ask("next", begun(tmp_path, robot))["remarks"] == []
-
-
-def test_a_campaign_goes_on_with_the_gravity_that_it_began_with(robot, tmp_path):
-    left_out = make_plain_arm(tmp_path / "out", "geometric_stiffness = false")
-    begun_without = written_earlier(begun(tmp_path / "without", left_out), (SCATTER,))
-    without = ask("next", begun_without)["proposals"]
-    fresh = written_earlier(begun(tmp_path / "fresh", robot), (SCATTER,))
-    with_it = ask("next", fresh)["proposals"]
-    assert with_it[0]["expected"] != without[0]["expected"]
-
-    earlier = written_earlier(begun(tmp_path / "earlier", robot), (GRAVITY, SCATTER))
-    assert ask("next", earlier)["proposals"] == without
-    toml = earlier / "campaign.toml"
-    toml.write_text(toml.read_text() + "[stop]\nmeasurements_max = 20\n")
-    assert ask("next", earlier)["proposals"][0]["expected"] == without[0]["expected"]
-    for cell in (fresh, earlier):
-        assert all(s["check"] in ("kept", "identical") for s in ask("replay", cell)["steps"])
-
-    stated = earlier / "robot" / "robot.toml"
-    stated.write_text("geometric_stiffness = true\n" + stated.read_text())
-    after = ask("next", earlier)["proposals"]
-    assert after[0]["joints_deg"] == with_it[0]["joints_deg"]
-    assert after[0]["expected"] == with_it[0]["expected"]
-    configured = [e.event for e in Campaign(earlier).entries if isinstance(e.event, Configured)]
-    assert [event.geometric_stiffness for event in configured] == [False] * 3
-    assert [event.visit_scatter for event in configured] == [False] * 3
-    assert all(s["check"] in ("kept", "identical") for s in ask("replay", earlier)["steps"])
-
-
-def test_a_campaign_goes_on_without_the_scatter_that_it_began_without(robot, tmp_path):
-    fresh = begun(tmp_path / "fresh", robot)
-    earlier = written_earlier(begun(tmp_path / "earlier", robot), (SCATTER,))
-    now, before = (ask("next", cell)["proposals"] for cell in (fresh, earlier))
-    assert now[0]["expected"] != before[0]["expected"]
-    for cell, learned in ((fresh, True), (earlier, False)):
-        assert all(s["check"] in ("kept", "identical") for s in ask("replay", cell)["steps"])
-        assert Campaign(cell).cell.visit_scatter is learned
 
 
 def without_damping(robot: Path) -> None:

@@ -16,7 +16,7 @@ from tests.support.visit_scatter import (
     visited,
 )
 
-KNOWN = np.full(MODES, OFF), None, 0.99  # a simulation that was identified and fits
+KNOWN = np.full(MODES, OFF), 0.99  # a simulation that was identified and fits
 
 
 def scatter_percent(fitted):

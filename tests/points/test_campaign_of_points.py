@@ -1,6 +1,5 @@
 """A campaign learns from every sensor that listened, as identify and diagnose do."""
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,13 +8,11 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.dataset.store import Store
-from planner.replay import replay
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.handling import EVERYDAY
 from planner.truth.model import Truth
 from planner.truth.secret import Secret
 from tests.support.arm_with_points import poses, record, write_arm
-from tests.support.earlier_logs import ERRING, written_earlier
 
 PLAN = "[workspace]\njoints_deg = [[-60, 60], [-40, 30], [20, 100], [-50, 50]]\n"
 PLAN += "[modes]\ncount = 3\nband_hz = [4.0, 80.0]\n"
@@ -55,15 +52,3 @@ def test_the_simulation_explains_what_all_sensors_heard(cell: tuple[Path, Truth]
     assert "base about x" in model.remarks[0]
     assert worst_percent(campaign, truth) < 0.1
     assert model.frequency_sd_percent.max() < 0.3
-
-
-def test_a_campaign_that_began_with_the_tools_sensor_goes_on_so(
-    cell: tuple[Path, Truth], tmp_path: Path
-) -> None:
-    folder, truth = cell
-    shutil.copytree(folder / "new", tmp_path / "old")
-    campaign = Campaign(written_earlier(tmp_path / "old", (ERRING,)), Store(None))
-    assert campaign.cell.hits_err is False
-    assert not campaign.model.low.taught
-    assert worst_percent(campaign, truth) > 0.1
-    assert {step.check for step in replay(campaign)} <= {"identical", "kept"}

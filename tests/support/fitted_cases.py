@@ -9,7 +9,7 @@ import numpy as np
 from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
 from planner.effects.table import Repertoire
-from planner.fit.posterior import Posterior
+from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
@@ -17,17 +17,17 @@ from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import CAD_INERTIAS
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from planner.truth.deviation import AttachedMass, Spring
+from planner.truth.deviation import Spring
 from planner.truth.handling import EVERYDAY, Handling, together
-from planner.truth.hits import AXES, Hammer
+from planner.truth.hits import AXES
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
 from planner.truth.scene import deviate, log_uniform, triple
 from planner.truth.secret import HitVisit, Secret, hit_poses
 from planner.truth.world import REAL
+from tests.support.counted_modes import true_modes
 from tests.support.lacking_robots import ROBOTS, added, known
 from tests.support.lacking_robots import Robot as Arm
-from tests.support.counted_modes import true_modes
 
 POSES, UNSEEN, REPEATS, LINES = 6, 8, 3, 300
 ROUGH = replace(EVERYDAY, angle_deg=3.0, offset_m=0.005)
@@ -70,12 +70,12 @@ class Case:
     true_hz: tuple[np.ndarray, ...]
     concealed: tuple[str, ...]
 
-    def posterior(self) -> Posterior:
+    def posterior(self) -> RobotPosterior:
         """What a fit makes of it."""
         simulation = Simulation(Robot.load(self.toml))
         tolerances = Tolerances.of(simulation.robot.config, simulation.robot.joints.slides)
         prior = RobotPrior(Repertoire.of(simulation, CAD_INERTIAS))
-        return Posterior.of(Search(prior, self.frfs, self.q, self.band_hz, tolerances).found())
+        return RobotPosterior.of(Search(prior, self.frfs, self.q, self.band_hz, tolerances).found())
 
 
 def everyday(name: str, seed: int, folder: Path) -> Case:
@@ -185,7 +185,7 @@ class Judged:
     size: float
 
     @classmethod
-    def of(cls, case: Case, found: Posterior) -> "Judged":
+    def of(cls, case: Case, found: RobotPosterior) -> "Judged":
         """Scale is the least squares factor from the truth, the mean over poses."""
         from tests.support.frf_campaigns import frac_of
 

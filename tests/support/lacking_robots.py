@@ -89,9 +89,7 @@ def lacking(kind: str, robot: Robot, rng: np.random.Generator) -> tuple[Secret, 
     return added(secret, kind, size, robot, rng), size
 
 
-def added(
-    secret: Secret, kind: str, size: float, robot: Robot, rng: np.random.Generator
-) -> Secret:
+def added(secret: Secret, kind: str, size: float, robot: Robot, rng: np.random.Generator) -> Secret:
     """One thing more that the simulation lacks."""
     table = tomllib.loads(robot.toml.read_text())
     root = ElementTree.parse(robot.toml.parent / table["urdf"]).getroot()

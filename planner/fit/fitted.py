@@ -1,0 +1,164 @@
+"""A structure fitted to FRFs: its discrepancy by evidence, and what its effects are worth."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from planner.effects.effect import Operator
+from planner.fit.gauss_newton import minimised
+from planner.fit.misfit import At, FrfMisfit
+from planner.fit.structure import RobotStructure
+
+SIZES = (0.001, 0.002, 0.004, 0.008, 0.015, 0.03, 0.06, 0.12, 0.3)  # of the discrepancy
+USUAL, SPREAD = 0.02, 1.5  # its prior: log-normal
+SETTLED = 8  # steps
+MATTERS = 0.01  # share of |H| that an effect must change: nothing wrong changes up to 0.7 %
+
+
+@dataclass(frozen=True, eq=False)
+class StructureFit:
+    """A structure fitted to FRFs."""
+
+    misfit: FrfMisfit
+    at: At
+    evidence: float
+
+    @cached_property
+    def shares(self) -> tuple[float, ...]:
+        """By how much of |H| at the measured poses each effect's going changes the best fit."""
+        h = self.at.motion.accelerance
+        found = []
+        for effect in self.structure.effects:
+            fewer = without(self, [effect])
+            gone = 0.0 * h if fewer is None else fewer.at.motion.accelerance
+            found.append(float(np.linalg.norm(gone - h) / np.linalg.norm(h)))
+        return tuple(found)
+
+    @property
+    def remembered(self) -> "FitRecord":
+        """What is worth keeping of it."""
+        s = self.structure
+        return FitRecord(s.effects, s.names, self.at.x, self.at.own, size_of(self), self.shares)
+
+    @property
+    def structure(self) -> RobotStructure:
+        """Of what it is made."""
+        return self.misfit.structure
+
+
+@dataclass(frozen=True, eq=False)
+class FitRecord:
+    """A structure's effects, its numbers by name, the discrepancy's size, and what each pose had.
+
+    From it a fit goes on, or is recalled without any step.
+    """
+
+    effects: tuple[Operator, ...]
+    names: tuple[str, ...]
+    x: np.ndarray
+    own: np.ndarray
+    size: float
+    shares: tuple[float, ...]
+
+
+def settled(misfit: FrfMisfit, at: At, rounds: int = 1, steps: int = SETTLED) -> StructureFit:
+    """With a discrepancy of the likeliest size, inferred again after each round of steps."""
+    misfit, at = sized(misfit, at)
+    for _ in range(rounds):
+        misfit, at = sized(misfit, minimised(misfit, at.x, steps, own=at.own))
+    return StructureFit(misfit, at, misfit.evidence(at) + _of_size(misfit))
+
+
+def converged(found: StructureFit) -> StructureFit:
+    """Fitted on until the evidence stays: half-fitted, any candidate looks useful."""
+    for _ in range(5):
+        more = settled(found.misfit, found.at, steps=10)
+        if more.evidence <= found.evidence + 2:
+            return more if more.evidence > found.evidence else found
+        found = more
+    return found
+
+
+def sized(misfit: FrfMisfit, at: At) -> tuple[FrfMisfit, At]:
+    """With the likeliest size of the discrepancy, uphill from the present one; what is there."""
+    around, known = misfit.around(at.x, at.own), {}
+
+    def worth(k: int) -> float:
+        if k not in known:
+            one = misfit.with_rho(SIZES[k])
+            there = one.weighed(around)
+            known[k] = one.evidence(there) + _of_size(one), one, there
+        return known[k][0]
+
+    k = int(np.argmin(np.abs(np.log(np.array(SIZES) / _rho(misfit)))))
+    while True:
+        near = [j for j in (k - 1, k, k + 1) if 0 <= j < len(SIZES)]
+        best = max(near, key=worth)
+        if best == k:
+            return known[k][1], known[k][2]
+        k = best
+
+
+def _of_size(misfit: FrfMisfit) -> float:
+    return -0.5 * float((np.log(_rho(misfit) / USUAL) / SPREAD) ** 2)
+
+
+def _rho(misfit: FrfMisfit) -> float:
+    assert misfit.rho is not None
+    return misfit.rho
+
+
+def size_of(found: StructureFit) -> float:
+    return _rho(found.misfit)
+
+
+def evidence_of(found: StructureFit) -> float:
+    return found.evidence
+
+
+def stepped(found: StructureFit, steps: int) -> StructureFit:
+    at = minimised(found.misfit, found.at.x, steps, 1.0, found.at.own)
+    return StructureFit(found.misfit, at, found.misfit.evidence(at) + _of_size(found.misfit))
+
+
+def removal_costs(found: StructureFit) -> dict[Operator, float]:
+    """Nats that each effect's going would cost, all else at its best again, to first order.
+
+    Springs vanish in compliance: their logarithms go by one.
+    """
+    s = found.structure
+    covariance = np.linalg.inv(found.at.normal + s.precision)
+    costs = {}
+    for effect, own in zip(s.effects, s.own, strict=True):
+        change = effect.vanishing(found.at.x[own])
+        at = list(range(own.start, own.start + len(change)))
+        mine = set(effect.springs)
+        springs = [i for i in range(s.stiffnesses) if mine.issuperset(s.parameters[i].blocks)]
+        change, at = np.append(change, np.ones(len(springs))), at + springs
+        costs[effect] = 0.5 * float(change @ np.linalg.solve(covariance[np.ix_(at, at)], change))
+    return costs
+
+
+def without(best: StructureFit, effects: Sequence[Operator], steps: int = 5) -> StructureFit | None:
+    structure = best.structure
+    for effect in effects:
+        structure = structure.without(effect)
+    misfit = replace(best.misfit, structure=structure)
+    x = structure.carried(best.structure, best.at.x)
+    if not misfit.possible(x):
+        return None
+    at = minimised(misfit, x, steps, 1.0, best.at.own)
+    return StructureFit(misfit, at, misfit.evidence(at) + _of_size(misfit))
+
+
+def that_matters(best: StructureFit) -> StructureFit:
+    """Without effects that change the FRFs by less than one would see."""
+    while True:
+        pairs = zip(best.structure.effects, best.shares, strict=True)
+        small = [effect for effect, share in pairs if share < MATTERS]
+        fewer = without(best, small) if small else None
+        if fewer is None:
+            return best
+        best = settled(fewer.misfit, fewer.at)
