@@ -2,6 +2,7 @@
 
 import math
 import shlex
+from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
 
@@ -43,6 +44,20 @@ def short_name(path: str | Path, most: int = 24) -> str:
     name = Path(path).name
     begin = most // 3
     return name if len(name) <= most else f"{name[:begin]}…{name[begin + 1 - most :]}"
+
+
+def by_reason(told: Iterable[tuple[str, str]]) -> list[str]:
+    """Files and what is said of each: a sentence each, or one of all of which the same is said."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for file, why in told:
+        same = why.replace(file, "the file").replace(Path(file).name, "the file")
+        groups.setdefault(same, []).append((file, why))
+    return [
+        f"{len(group)} files ({group[0][0]} to {Path(group[-1][0]).name}): {same}"
+        if len(group) > 1
+        else f"{group[0][0]}: {group[0][1]}"
+        for same, group in groups.items()
+    ]
 
 
 def command(*words: object) -> str:

@@ -122,7 +122,7 @@ class UndoneAct(Answer):
     def text(self) -> str:
         """One sentence."""
         follow = f"; with it: {', '.join(self.with_it)}" if self.with_it else ""
-        return f"Took back entry {self.undone}: {self.what}{follow}."
+        return f"Took back entry {self.undone} of the log: {self.what}{follow}."
 
 
 @dataclass(frozen=True)

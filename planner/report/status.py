@@ -27,7 +27,7 @@ from planner.report.refitted_springs import (
     springs_table,
 )
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, table
-from planner.words import counted, local_time, significant
+from planner.words import by_reason, counted, local_time, significant
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -236,7 +236,8 @@ class StatusReport(Answer):
         if self.decision is not msgspec.UNSET:
             lines.append(self.decision.text)
         lines += [*self.remarks, *self.leave_one_out.text]
-        return lines + [f"refused {r.file}: {r.reason}" for r in self.refused]
+        told = by_reason((r.file, r.reason) for r in self.refused)
+        return lines + [f"refused {one}" for one in told]
 
 
 def status(campaign: Campaign) -> StatusReport:

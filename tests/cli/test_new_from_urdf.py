@@ -65,6 +65,22 @@ def odd_limits(folder: Path) -> Path:
     return urdf
 
 
+def test_its_robot_toml_says_how_to_move_the_tcp(tmp_path, capsys):
+    cell = tmp_path / "cell"
+    ask(capsys, "new", cell, "--urdf", whole(tmp_path / "src"))
+    toml = cell / "robot" / "robot.toml"
+    flange, text = Robot.load(toml), toml.read_text()
+    said = [line[2:] for line in text.splitlines() if line.startswith("# ")]
+    block = "\n".join(said[said.index("[[point]]") :])
+    text = text.replace('tcp_frame = "tool0"', 'tcp_frame = "tcp"')
+    text = text.replace('sensor_frame = "tool0"', 'sensor_frame = "tcp"')
+    toml.write_text(f"{text}\n{block}\n")
+    q = np.full(len(flange.joint_names), 0.2)
+    moved = Robot.load(toml).forward(q)[1] - flange.forward(q)[1]
+    assert np.linalg.norm(moved) == pytest.approx(0.25, abs=1e-3)
+    assert ask(capsys, "next", cell)["proposals"]
+
+
 KINDS = {
     "whole": whole, "renamed": renamed, "no meshes": no_meshes, "zero sizes": zero_sizes,
     "rail": rail, "hand": hand, "odd limits": odd_limits,
