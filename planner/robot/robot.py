@@ -13,6 +13,7 @@ from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout, PointNames
 from planner.robot.config import Compliance, PointTable, RobotConfig
 from planner.robot.config_file import check_own_springs, load_config, with_effects
+from planner.robot.controller_axes import with_axes
 from planner.robot.link_inertias import state_inertias
 from planner.robot.linkage import Linkage
 from planner.robot.points import PREFIX, check_points, names_of, with_points
@@ -80,6 +81,7 @@ class Robot:
         model = build_model(text, urdf)
         linkage = Linkage.of(root, tuple(model.names)[1:])
         joints = JointUnits(linkage.leading(linkage.names), linkage.leading(linkage.slides))
+        joints = with_axes(config.controller, joints, robot_toml)
         robot = cls(config, robot_toml, urdf, text, model, linkage, joints, left_out)
         check_points(config.point, robot_toml)
         with_points(model, config.point, (robot._link_of_point(p) for p in config.point))
