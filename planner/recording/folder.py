@@ -10,7 +10,7 @@ from pathlib import Path
 
 from planner.errors import InputError
 from planner.recording.column_names import hit_direction
-from planner.recording.joints import JointColumn, JointUnits
+from planner.recording.joints import AxisColumn, JointUnits
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.records import PoseRow, RecordingsFolder
 from planner.recording.text_tables import decoded
@@ -162,9 +162,9 @@ def table_of(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str
     return header, numbered[1:]
 
 
-def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[JointColumn, ...]:
+def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[AxisColumn, ...]:
     """The joints' columns in the robot's order: by their names, or by the controller's axes."""
-    own = tuple(JointColumn(name) for name in joints.columns)
+    own = tuple(AxisColumn(name) for name in joints.columns)
     lacking = {kind: [c.name for c in kind if c.name not in header] for kind in (own, joints.axes)}
     found = min((kind for kind in lacking if kind), key=lambda kind: len(lacking[kind]))
     wanted = [column.name for column in found]
@@ -193,7 +193,7 @@ def _pose(path: Path, number: int, cells: dict[str, str]) -> str:
 
 
 def _angles(
-    path: Path, number: int, cells: dict[str, str], columns: Sequence[JointColumn]
+    path: Path, number: int, cells: dict[str, str], columns: Sequence[AxisColumn]
 ) -> tuple[float, ...]:
     return tuple(c.stated(_number(path, number, c.name, cells[c.name])) for c in columns)
 
@@ -212,7 +212,7 @@ def _number(path: Path, number: int, column: str, cell: str) -> float:
 
 
 def _recording_row(
-    path: Path, folder: Path, number: int, cells: dict[str, str], columns: Sequence[JointColumn]
+    path: Path, folder: Path, number: int, cells: dict[str, str], columns: Sequence[AxisColumn]
 ) -> PoseRow:
     angles = _angles(path, number, cells, columns)
     frame = "hit point's" if cells.get("hit_point", "").strip() else "tcp"

@@ -19,7 +19,7 @@ SCALES = {"deg": 180 / np.pi, "mm": MM}
 
 
 @dataclass(frozen=True)
-class JointColumn:
+class AxisColumn:
     """A table's column of a joint, whose numbers are sign · the joint's + offset (deg or mm)."""
 
     name: str
@@ -41,7 +41,7 @@ class JointUnits:
 
     names: tuple[str, ...]
     slides: tuple[bool, ...]
-    axes: tuple[JointColumn, ...] = field(default=(), compare=False)
+    axes: tuple[AxisColumn, ...] = field(default=(), compare=False)
 
     @classmethod
     def of(cls, joints: "JointUnits | Sequence[str]") -> "JointUnits":

@@ -27,8 +27,10 @@ def act(entry: Entry) -> str:
         used = sum(hit.accepted for hit in event.hits)
         if event.unhit:
             return f"refused all of {counted(len(event.hits), 'hit')} at {event.pose}"
-        held = ", held until its question is answered" if event.question else ""
-        return f"import of {counted(len(event.hits), 'hit')} at {event.pose}, {used} good{held}"
+        hits = counted(len(event.hits), "hit")
+        if event.question:
+            return f"held {hits} at {event.pose} until a question is answered"
+        return f"imported {used} of {hits} at {event.pose}"
     if isinstance(event, Refused):
         return f"refused {counted(len(event.hits), 'hit')} at {event.pose}"
     if isinstance(event, Undone):

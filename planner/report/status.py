@@ -211,10 +211,14 @@ class StatusReport(Answer):
         more += f", {without} without modes" if without else ""
         return f"{counted(self.used, 'pose')} measured{more}"
 
+    def _waiting(self) -> str:
+        held = ", ".join(h.measured.pose for h in self.held)
+        return f"; hit, and waiting for your answer: {held}" if held else ""
+
     def _lines(self) -> list[str]:
         each = enumerate(self.frequency_sd_percent, 1)
         lines = [
-            "open: " + (", ".join(p.pose for p in self.open) or "none"),
+            "open: " + (", ".join(p.pose for p in self.open) or "none") + self._waiting(),
             "skipped: " + (", ".join(s.pose for s in self.skipped) or "none"),
             "sd of frequencies over the workspace: "
             + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from planner.errors import InputError
-from planner.recording.joints import JointColumn, JointUnits
+from planner.recording.joints import AxisColumn, JointUnits
 from planner.robot.config import ControllerTable
 
 
@@ -50,5 +50,5 @@ def with_axes(table: ControllerTable, joints: JointUnits, path: Path) -> JointUn
     external = len(table.external)
     named = zip(axes, column_names(len(axes) - external, external), strict=True)
     unit = dict(zip(joints.names, joints.units, strict=True))
-    found = {j: JointColumn(f"{name}_{unit[j]}", s, o) for (j, s, o), name in named}
+    found = {j: AxisColumn(f"{name}_{unit[j]}", s, o) for (j, s, o), name in named}
     return replace(joints, axes=tuple(found[name] for name in joints.names))
