@@ -52,12 +52,12 @@ def by_reason(told: Iterable[tuple[str, str]]) -> list[str]:
     for file, why in told:
         same = why.replace(file, "the file").replace(Path(file).name, "the file")
         groups.setdefault(same, []).append((file, why))
-    return [
-        f"{len(group)} files ({group[0][0]} to {Path(group[-1][0]).name}): {same}"
-        if len(group) > 1
-        else f"{group[0][0]}: {group[0][1]}"
-        for same, group in groups.items()
-    ]
+    said = []
+    for same, group in groups.items():
+        (first, why), (last, _) = min(group), max(group)
+        many = f"{len(group)} files ({first} to {Path(last).name}): {same}"
+        said.append(many if len(group) > 1 else f"{first}: {why}")
+    return said
 
 
 def command(*words: object) -> str:
