@@ -165,8 +165,9 @@ def table_of(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str
 def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[AxisColumn, ...]:
     """The joints' columns in the robot's order: by their names, or by the controller's axes."""
     own = tuple(AxisColumn(name) for name in joints.columns)
-    lacking = {kind: [c.name for c in kind if c.name not in header] for kind in (own, joints.axes)}
-    found = min((kind for kind in lacking if kind), key=lambda kind: len(lacking[kind]))
+    kinds = (own, joints.axes) if joints.axes else (own,)
+    lacking = {kind: [c.name for c in kind if c.name not in header] for kind in kinds}
+    found = min(kinds, key=lambda kind: len(lacking[kind]))
     wanted = [column.name for column in found]
     if lacking[found]:
         near = [name for name in header if ANGLE_LIKE.search(name) and name not in wanted]

@@ -137,7 +137,9 @@ def test_the_screen_says_what_to_put_right_first(tmp_path, capsys):
     cell = tmp_path / "cell"
     assert run(["new", str(cell), "--urdf", str(published(tmp_path)), *GIVEN]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert 'Put right first: tcp_frame = "tool0" and the tool\'s mass' in said
+    assert 'Put right first: tcp_frame = "tool0", where the hammer hits' in said
+    assert "and the tool's mass" in said
+    assert "a factor of 3" in said
     assert "Masses are guessed" in said
     assert run(["check", str(cell / "robot" / "robot.toml")]) == 0
     assert "(guessed)" in capsys.readouterr().out
