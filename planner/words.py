@@ -2,6 +2,7 @@
 
 import math
 import shlex
+from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
 
@@ -43,6 +44,20 @@ def short_name(path: str | Path, most: int = 24) -> str:
     name = Path(path).name
     begin = most // 3
     return name if len(name) <= most else f"{name[:begin]}…{name[begin + 1 - most :]}"
+
+
+def by_reason(told: Iterable[tuple[str, str]]) -> list[str]:
+    """Files and what is said of each: a sentence each, or one of all of which the same is said."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for file, why in told:
+        same = why.replace(file, "the file").replace(Path(file).name, "the file")
+        groups.setdefault(same, []).append((file, why))
+    said = []
+    for same, group in groups.items():
+        (first, why), (last, _) = min(group), max(group)
+        many = f"{len(group)} files ({first} to {Path(last).name}): {same}"
+        said.append(many if len(group) > 1 else f"{first}: {why}")
+    return said
 
 
 def command(*words: object) -> str:

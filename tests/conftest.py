@@ -13,6 +13,12 @@ pytest_plugins = ["tests.support.proof_table"]
 SHARED_DATA = Path(__file__).parents[2] / "shared" / "data"
 
 
+@pytest.fixture(autouse=True)
+def no_lines_of_progress(monkeypatch):
+    """What a command says hangs on no clock: lines of progress come after seconds."""
+    monkeypatch.setattr("planner.cli.progress.FIRST_S", 3600.0)
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of real recordings; the test is skipped where it is missing."""

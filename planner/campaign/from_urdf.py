@@ -29,6 +29,7 @@ POSES = 12  # of the workspace, at which modes are looked for to state a band
 WIDER = 0.5, 2.0  # of the lowest and highest simulated frequency: springs may be off by 3
 PAYLOAD_SHARE, PAYLOAD_SD = 1 / 6, 0.5  # of the robot's mass: 1/3 to 1/9 in data sheets
 TOOL_SD, DAMPING_SD = 0.3, 4.0  # relative; of dampers e^sd is 5 in identification
+EXAMPLE_M = 0.25  # from flange to tool tip, in robot.toml's comment
 BELOW_M = 0.01  # how far below the base the floor lies
 
 
@@ -120,11 +121,16 @@ def guess(urdf: Path, weights: StatedMasses, robot_toml: Path, planned: bool = T
 def _tool(tcp: str, mass: float, robot: Robot) -> Payload:
     """A cube of the tool's mass that lies on the tcp frame, on its far side from the arm."""
     side = (mass / PAYLOAD_KG_M3) ** (1 / 3)
-    q = (robot.lower_rad + robot.upper_rad) / 2
-    place = robot.forward(q)[0].T @ tool_direction(robot, q) * side / 2
+    place = _off_the_arm(robot) * side / 2
     moment = round(mass * side**2 / 6, 5)
     x, y, z = (round(float(v), 4) + 0.0 for v in place)
     return Payload(tcp, mass, (x, y, z), (moment, moment, moment, 0.0, 0.0, 0.0))
+
+
+def _off_the_arm(robot: Robot) -> np.ndarray:
+    """Direction (3,) in the tcp frame in which the tool points."""
+    q = (robot.lower_rad + robot.upper_rad) / 2
+    return robot.forward(q)[0].T @ tool_direction(robot, q)
 
 
 def _floor(robot: Robot) -> Obstacle:
@@ -194,7 +200,8 @@ def _remarks(robot: Robot, chain: ArmChain, weights: StatedMasses) -> Iterator[s
             f"The arm is the longest chain of moving joints, {chain.joints[0]} to "
             f"{chain.joints[-1]}; {', '.join(chain.others)} stay where [held] of robot.toml says."
         )
-    first = f'tcp_frame = "{chain.tcp}"' + ("" if weights.tool else " and the tool's mass")
+    first = f'tcp_frame = "{chain.tcp}", where the hammer hits (robot.toml says how to move it)'
+    first += "" if weights.tool else " and the tool's mass"
     asked = ["[workspace] of campaign.toml", "floor, table and fence as [[obstacle]]"]
     asked += [] if weights.payload else ["the rated payload, by which springs are guessed"]
     yield f"Put right first: {first}; then {'; '.join(asked)}."
@@ -217,6 +224,14 @@ def _robot_text(guessed: Guessed) -> str:
         "Begun by planner new --urdf: numbers here are guesses by size and payload until they are",
         "put right. First: tcp_frame and sensor_frame, the tool ([[payload]]), obstacles.",
     ):
+        document.add(tomlkit.comment(line))
+    x, y, z = (round(float(v), 4) + 0.0 for v in EXAMPLE_M * _off_the_arm(guessed.robot))
+    for line in (
+        f"To move the tcp {EXAMPLE_M:g} m beyond {config.tcp_frame}, where a tool's tip is, write",
+        'tcp_frame = "tcp" and sensor_frame = "tcp" below, and at the end of this file:',
+        "[[point]]", 'name = "tcp"', f'link = "{config.tcp_frame}"',
+        f"position_m = [{x}, {y}, {z}]",
+    ):  # fmt: skip
         document.add(tomlkit.comment(line))
     for entry in ("name", "urdf", "tcp_frame", "sensor_frame"):
         document.add(entry, getattr(config, entry))

@@ -19,6 +19,8 @@ from planner.cli.new import new
 from planner.cli.proving import prove
 from planner.cli.stability import stability
 from planner.cli.study import study
+from planner.errors import InputError
+from planner.words import command
 
 app = typer.Typer(
     name="planner",
@@ -134,6 +136,11 @@ def watch(
     """
     from planner.cli.progress import console
 
+    if not folder.is_dir():
+        raise InputError(
+            f"{folder} is no folder; name the one the analyser exports into, or make it: "
+            f"{command('mkdir', '-p', folder)}"
+        )
     screen = console(quiet=False, stderr=as_json)
     # What follows takes seconds before the first page: libraries, the model.
     screen.print(f"Opening {directory}: the first pose comes in a few seconds.")
@@ -171,14 +178,18 @@ def predict(
     Example: planner predict cell7 poses.csv --out frfs.npz
     """
     from planner.campaign.campaign import Campaign
+    from planner.cli.progress import reporting
     from planner.recording.folder import read_poses
     from planner.report.predictions import predictions
 
-    campaign = Campaign(directory)
-    cell, rows = campaign.cell, read_poses(poses, campaign.cell.robot.joints)
-    q = [cell.check_pose(row.joints_deg, f"{poses}, row {row.row}") for row in rows]
-    npz = out or campaign.directory / "predictions" / f"{poses.stem}.npz"
-    return respond(predictions(campaign, [row.pose for row in rows], q, npz), as_json)
+    with reporting("predicting", quiet=as_json) as progress:
+        campaign = Campaign(directory)
+        cell, rows = campaign.cell, read_poses(poses, campaign.cell.robot.joints)
+        q = [cell.check_pose(row.joints_deg, f"{poses}, row {row.row}") for row in rows]
+        npz = out or campaign.directory / "predictions" / f"{poses.stem}.npz"
+        progress(f"{len(rows)} poses")
+        answer = predictions(campaign, [row.pose for row in rows], q, npz)
+    return respond(answer, as_json)
 
 
 @app.command()

@@ -51,7 +51,8 @@ def diagnose(
             answer = answer.write(out)
     if given.campaign is not None and robot is None:
         both = model_beside(given.campaign, answer.to_json())
-        answer = replace(answer, remarks=(*answer.remarks, *filter(None, (both,))))
+        said = (*answer.remarks, *filter(None, (both,)))
+        answer = replace(answer, remarks=said, campaign_robot=given.campaign.robot_toml)
     answer = replace(answer, seconds=time.perf_counter() - started)
     return respond(answer, as_json, refusals(answer.refused))
 

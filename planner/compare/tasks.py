@@ -9,6 +9,7 @@ from planner.compare.bench import Bench
 from planner.design.propose import check_name
 from planner.design.space_filling import NESTED
 from planner.errors import InputError
+from planner.words import counted
 
 DEFAULT = "default"  # the strategy that `next` uses
 BUDGET, LEFT = 15, 2  # measurements; poses that must be left to judge by
@@ -67,7 +68,13 @@ class Study:
             if name not in NESTED:
                 check_name(name)
         most = len(bench.measurements) - LEFT
-        budget = min(BUDGET, max(most, 1)) if budget is None else budget
+        if budget is None and initial > most:
+            less = f"give --initial {most} at most, or " if most > 0 else ""
+            raise InputError(
+                f"The pool has {counted(most + LEFT, 'pose')}: {LEFT} are left to judge by, and "
+                f"--initial {initial} needs {initial + LEFT} in all; {less}record more poses."
+            )
+        budget = min(BUDGET, most) if budget is None else budget
         if budget > most:
             less = f"give {most} at most, or " if most > 0 else ""
             raise InputError(

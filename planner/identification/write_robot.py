@@ -1,6 +1,6 @@
 """An identified robot as a folder: robot.toml, whose comments and order stay, and its URDF."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -103,13 +103,18 @@ def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
         raise InputError(
             f"{out} cannot be written ({error.strerror}); name another file with --out."
         ) from None
-    return Written(out, urdf, tuple(_impossible(body, share) for body, share in shares.items()))
+    return Written(out, urdf, _impossible(shares))
 
 
-def _impossible(body: str, share: float) -> str:
+def _impossible(shares: Mapping[str, float]) -> tuple[str, ...]:
+    """What became of inertias that no body of matter can have; nothing where there are none."""
+    if not shares:
+        return ()
+    each = ", ".join(f"{body} ({100 * share:.0f} %)" for body, share in shares.items())
     return (
-        f"No matter can form the inertia identified for what turns with {body}; the URDF takes "
-        f"{100 * share:.0f} % of its change."
+        f"Of what turns with {each} the URDF takes only that part of the identified change of "
+        f"inertia, as no body can have all of it (moments below 0, or against the triangle "
+        f"inequality): the written robot fits as well as the FRAC under Written says.",
     )
 
 

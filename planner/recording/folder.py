@@ -3,13 +3,14 @@
 import csv
 import io
 import math
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from planner.errors import InputError
 from planner.recording.column_names import hit_direction
-from planner.recording.joints import JointUnits
+from planner.recording.joints import AxisColumn, JointUnits
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.records import PoseRow, RecordingsFolder
 from planner.recording.text_tables import decoded
@@ -20,6 +21,7 @@ TABLES = (TABLE, CHANNELS)
 MAX_BYTES = 32 * 1024 * 1024
 MAX_ROWS = 200_000
 ANGLE, SLIDE = "_deg", "_mm"
+ANGLE_LIKE = re.compile(r"deg|rad$|°|_mm$|angle|joint|axis|^[AEJ]\d", re.IGNORECASE)
 
 
 def several_poses(paths: list[Path], least: int = 2) -> bool:
@@ -105,7 +107,7 @@ def read_poses(path: Path, joints: JointUnits | Sequence[str]) -> tuple[PoseRow,
         force = None
         if cells.get("peak_force_n", "").strip():
             force = _number(path, number, "peak_force_n", cells["peak_force_n"])
-        angles = tuple(_number(path, number, name, cells[name]) for name in columns)
+        angles = _angles(path, number, cells, columns)
         rows.append(PoseRow(pose, angles, number, peak_force_n=force))
     return tuple(rows)
 
@@ -160,14 +162,19 @@ def table_of(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str
     return header, numbered[1:]
 
 
-def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[str, ...]:
-    """Names of the joints' columns in the robot's order."""
-    wanted = joints.columns
-    missing = [name for name in wanted if name not in header]
-    if missing:
+def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[AxisColumn, ...]:
+    """The joints' columns in the robot's order: by their names, or by the controller's axes."""
+    own = tuple(AxisColumn(name) for name in joints.columns)
+    kinds = (own, joints.axes) if joints.axes else (own,)
+    lacking = {kind: [c.name for c in kind if c.name not in header] for kind in kinds}
+    found = min(kinds, key=lambda kind: len(lacking[kind]))
+    wanted = [column.name for column in found]
+    if lacking[found]:
+        near = [name for name in header if ANGLE_LIKE.search(name) and name not in wanted]
+        seen = f" and has {', '.join(near)}" if near else ""
         raise InputError(
-            f"{path} has no column {missing[0]}; the robot's joints are "
-            f"{', '.join(wanted)}: add what is missing."
+            f"{path} has no column {lacking[found][0]}{seen}; the robot's joints are "
+            f"{', '.join(wanted)}: {'rename, or ' if near else ''}add what is missing."
         )
     slides = (SLIDE,) if any(joints.slides) else ()
     ends = (ANGLE, "_rad", *slides)
@@ -176,7 +183,7 @@ def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[s
         raise InputError(
             f"{path} has a column {extra[0]} that is no joint of the robot; remove or rename it."
         )
-    return wanted
+    return found
 
 
 def _pose(path: Path, number: int, cells: dict[str, str]) -> str:
@@ -184,6 +191,12 @@ def _pose(path: Path, number: int, cells: dict[str, str]) -> str:
     if not pose or len(pose) > 100 or any(ord(c) < 32 for c in pose):
         raise InputError(f"{path}, row {number}: the pose has no usable name; give it one.")
     return pose
+
+
+def _angles(
+    path: Path, number: int, cells: dict[str, str], columns: Sequence[AxisColumn]
+) -> tuple[float, ...]:
+    return tuple(c.stated(_number(path, number, c.name, cells[c.name])) for c in columns)
 
 
 def _number(path: Path, number: int, column: str, cell: str) -> float:
@@ -200,9 +213,9 @@ def _number(path: Path, number: int, column: str, cell: str) -> float:
 
 
 def _recording_row(
-    path: Path, folder: Path, number: int, cells: dict[str, str], columns: Sequence[str]
+    path: Path, folder: Path, number: int, cells: dict[str, str], columns: Sequence[AxisColumn]
 ) -> PoseRow:
-    angles = tuple(_number(path, number, name, cells[name]) for name in columns)
+    angles = _angles(path, number, cells, columns)
     frame = "hit point's" if cells.get("hit_point", "").strip() else "tcp"
     hit = _signed_axis(path, number, "hit", cells["hit"], frame)
     response = None

@@ -4,7 +4,7 @@ Inside all is in rad and m. This is the one place where one becomes the other.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import msgspec
@@ -19,14 +19,29 @@ SCALES = {"deg": 180 / np.pi, "mm": MM}
 
 
 @dataclass(frozen=True)
+class AxisColumn:
+    """A table's column of a joint, whose numbers are sign · the joint's + offset (deg or mm)."""
+
+    name: str
+    sign: float = 1.0
+    offset: float = 0.0
+
+    def stated(self, value: float) -> float:
+        """The joint's own number of one in the column."""
+        return self.sign * (value - self.offset)
+
+
+@dataclass(frozen=True)
 class JointUnits:
     """Names of a robot's joints in order, and which of them slide (prismatic) and do not turn.
 
-    "Stated" numbers are degrees of joints that turn, millimetres of those that slide.
+    "Stated" numbers are degrees of joints that turn, millimetres of those that slide. `axes` are
+    the joints' columns in tables that count as the robot's controller does; () where none is known.
     """
 
     names: tuple[str, ...]
     slides: tuple[bool, ...]
+    axes: tuple[AxisColumn, ...] = field(default=(), compare=False)
 
     @classmethod
     def of(cls, joints: "JointUnits | Sequence[str]") -> "JointUnits":

@@ -67,15 +67,22 @@ class NewCampaign(Answer):
 
 def _guesses(guessed: tuple[Guess, ...]) -> Table:
     """What was guessed; dampers follow their springs, and stand in the JSON alone."""
-    made = table("guessed", "what", "value", "± 1 sd")
+    made = table("guessed", "what", "value", "known to (1 sd)")
     for guess in guessed:
         if not guess.what.startswith("damping"):
             known = isinstance(guess.value, int | float)
             value = f"{guess.value:.4g} {guess.unit}" if known else str(guess.value)
-            made.add_row(
-                guess.what, Text(value.strip()), "–" if guess.sd is None else f"{guess.sd:.3g}"
-            )
+            made.add_row(guess.what, Text(value.strip()), _known_to(guess))
     return made
+
+
+def _known_to(guess: Guess) -> str:
+    """How well a guess is known: springs by a factor, as their priors are of logarithms."""
+    if guess.sd is None or not isinstance(guess.value, int | float):
+        return "–"
+    if guess.what.startswith("stiffness"):
+        return f"a factor of {1 + guess.sd / guess.value:.2g}"
+    return f"± {guess.sd:.3g}"
 
 
 @dataclass(frozen=True)
@@ -122,7 +129,7 @@ class UndoneAct(Answer):
     def text(self) -> str:
         """One sentence."""
         follow = f"; with it: {', '.join(self.with_it)}" if self.with_it else ""
-        return f"Took back entry {self.undone}: {self.what}{follow}."
+        return f"Took back entry {self.undone} of the log ({self.what}{follow})."
 
 
 @dataclass(frozen=True)
@@ -143,7 +150,7 @@ class RedoneAct(Answer):
     def text(self) -> str:
         """One sentence."""
         follow = f"; with it: {', '.join(self.with_it)}" if self.with_it else ""
-        return f"Entry {self.redone} holds again: {self.what}{follow}."
+        return f"Entry {self.redone} of the log holds again ({self.what}{follow})."
 
 
 @dataclass(frozen=True)

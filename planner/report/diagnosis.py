@@ -17,7 +17,14 @@ from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, pla
 from planner.report.established_effects import EstablishedEffect, drift_of, established_effects
 from planner.report.mismatch import MismatchPlaces, MismatchShares, TwoMisfits
 from planner.report.place_names import place_names, with_names
-from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
+from planner.report.text import (
+    SIMULATED,
+    SIMULATED_TITLE,
+    command_line,
+    drawn,
+    remarks,
+    table,
+)
 from planner.words import probable
 
 if TYPE_CHECKING:
@@ -88,6 +95,8 @@ class DiagnosisReport(Answer):
     place_names: Mapping[str, str]
     npz: str | None = None
     robot: str | None = None
+    urdf: Path | None = field(default=None, metadata=NOT_IN_JSON)
+    campaign_robot: Path | None = field(default=None, metadata=NOT_IN_JSON)
     plots: tuple[str, ...] = ()
     next: NextHit | None = None
     next_sensor: ExtraSensor | None = None
@@ -152,7 +161,8 @@ class DiagnosisReport(Answer):
         mark = SIMULATED_TITLE if self.simulated else ""
         figures = diagnosis_figures(found, self.explained.recorded.poses, mark)
         plots = Pictures(folder).write(figures, robot.name)["plots"]
-        written = replace(self, robot=str(path), plots=plots)
+        urdf = path.parent / robot.urdf_path.name
+        written = replace(self, robot=str(path), urdf=urdf, plots=plots)
         (folder / "diagnosis.json").write_bytes(encoded(written))  # for planner report
         return written
 
@@ -170,8 +180,8 @@ class DiagnosisReport(Answer):
         more = (self.next, self.next_sensor)
         parts += [Text(one.sentence, style="bold") for one in more if one]
         parts += remarks(self.remarks)
-        files = (("Predictions", self.npz), ("Robot with what was found", self.robot))
-        parts += [Text(f"{what}: {path}") for what, path in files if path]
+        parts += [Text(f"Predictions: {self.npz}")] if self.npz else []
+        parts += self._robot_text()
         parts += drawn(self.plots)
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
@@ -200,6 +210,18 @@ class DiagnosisReport(Answer):
             f"sensor, hammer and the stated poses, and look for what else touched or hung on the "
             f"robot."
         )
+
+    def _robot_text(self) -> list[Text]:
+        """Both files of the robot, and the commands that put them into the campaign."""
+        if self.robot is None or self.urdf is None:
+            return []
+        both = f"{self.robot}, which needs {self.urdf.name} beside it"
+        said = [Text(f"Robot with what was found: {both}")]
+        if self.campaign_robot is None:
+            return said
+        said.append(Text("To let the campaign use it from its next command on, copy both:"))
+        into = (self.urdf, self.campaign_robot.parent), (self.robot, self.campaign_robot)
+        return said + [command_line("  ", "cp", *files) for files in into]
 
     def _agreement(self) -> RenderableType:
         made = table(

@@ -131,8 +131,7 @@ class PoseImport(Answer):
         if self.unhit:
             return [Text(self._without_hits()), *remarks(self.remarks)]
         made = table(
-            f"Pose {self.pose}: {counted(len(self.accepted), 'hit')} accepted, "
-            f"{len(self.refused)} refused, {len(self.already_imported)} known before",
+            f"Pose {self.pose}: {self._counts()}, {len(self.already_imported)} known before",
             *("mode", "frequency (Hz)", "expected (Hz)", "damping (%)"),
         )
         for mode in self.modes:
@@ -142,8 +141,15 @@ class PoseImport(Answer):
             f"{significant(before)} → {significant(after)} %" for before, after in both
         )
         said = Text(f"  sd of frequencies: {change} (refit {self.refit_seconds:.2f} s)")
-        asked = [Text(f"  {self.question.text}", style="bold red")] if self.question else []
-        return [made, *self._others(), *remarks(self.remarks), said, *asked]
+        return [made, *self._others(), *remarks(self.remarks), said]
+
+    def _counts(self) -> str:
+        """How many hits are used, held by the question, and refused."""
+        asked = self.question.text if self.question else ""
+        held = sum(asked.startswith(file.reason) for file in self.refused) if asked else 0
+        waiting = f", {held} held until the question is answered" if held else ""
+        used = counted(len(self.accepted), "hit")
+        return f"{used} accepted, {len(self.refused) - held} refused{waiting}"
 
     def _others(self) -> list[Text]:
         counted_on = len(self.frequency_sd_percent)

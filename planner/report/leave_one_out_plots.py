@@ -54,8 +54,9 @@ def _errors(panel: Axes, found: LeaveOneOut, poses: tuple[str, ...]) -> None:
         k = int(np.nanargmax(np.abs(score[i]))) if np.isfinite(score[i]).any() else 0
         if abs(score[i, k]) > 1.96:
             text = f"{plain_text(poses[i])}, mode {k + 1}: {100 * found.error[i, k]:+.1f} %"
-            panel.annotate(text, (i, score[i, k]), xytext=(4, 4), textcoords="offset points",
-                           fontsize=8)  # fmt: skip
+            right = i > len(poses) / 2  # a name there would run out of the axes
+            panel.annotate(text, (i, score[i, k]), xytext=(-4 if right else 4, 4), fontsize=8,
+                           textcoords="offset points", ha="right" if right else "left")  # fmt: skip
     panel.set_xticks(
         place,
         [plain_text(pose) for pose in poses],

@@ -25,10 +25,12 @@ def act(entry: Entry) -> str:
         return f"proposed {poses} by {event.acquisition}"
     if isinstance(event, Imported):
         used = sum(hit.accepted for hit in event.hits)
-        held = "; held: a question was asked" if event.question else ""
         if event.unhit:
             return f"refused all of {counted(len(event.hits), 'hit')} at {event.pose}"
-        return f"imported {used} of {counted(len(event.hits), 'hit')} at {event.pose}{held}"
+        hits = counted(len(event.hits), "hit")
+        if event.question:
+            return f"held {hits} at {event.pose} until a question is answered"
+        return f"imported {used} of {hits} at {event.pose}"
     if isinstance(event, Refused):
         return f"refused {counted(len(event.hits), 'hit')} at {event.pose}"
     if isinstance(event, Undone):

@@ -1,6 +1,7 @@
 """Answer of `next`: where to measure, and what to expect there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -11,9 +12,9 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.design.stopping import Forecast
 from planner.recording.joints import JointUnits
-from planner.report.answer import Answer, plain
+from planner.report.answer import NOT_IN_JSON, Answer, plain
 from planner.report.predictions import ExpectedMode
-from planner.report.text import table
+from planner.report.text import command_line, table
 from planner.robot.room_directions import axes_in_the_room
 
 if TYPE_CHECKING:
@@ -88,6 +89,7 @@ class ProposalsReport(Answer):
     joint_units: Any = msgspec.UNSET
     done: bool = False
     waits_for: str = ""
+    campaign: Path | None = field(default=None, metadata=NOT_IN_JSON)
 
     @property
     def joints(self) -> JointUnits:
@@ -108,7 +110,20 @@ class ProposalsReport(Answer):
         ]
         said += [self.places.sentence if self.places else ""]
         remarks = [Text(remark, style="yellow") for remark in self.remarks]
-        return Group(*parts, Text(" ".join(filter(None, said))), *remarks)
+        return Group(*parts, Text(" ".join(filter(None, said))), *remarks, *self._then())
+
+    def _then(self) -> list[Text]:
+        """Where the recordings go, and the command that takes them in."""
+        if self.campaign is None:
+            return []
+        pose = self.proposals[0].proposal.pose
+        where = Text(
+            f"Export the hits of {pose} into a folder of their own, say exports/{pose}, under any "
+            f"names; where files do not say the axis that was hit, a recordings.csv beside them "
+            f"does (columns pose, hit, file). Then:"
+        )
+        act = "planner", "import", self.campaign, f"exports/{pose}", "--pose", pose
+        return [where, command_line("  ", *act)]
 
 
 def target_sentence(waits_for: str) -> str:
@@ -143,4 +158,5 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
         joint_units=campaign.cell.robot.joints.declared,
         done=bool(model.done),
         waits_for=model.waits_for,
+        campaign=campaign.directory,
     )

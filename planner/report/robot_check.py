@@ -17,6 +17,7 @@ from planner.report.text import drawn, number, table
 from planner.words import counted
 
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
+SHOWN_TO = 2.0  # times the end of the band; the others stand in the JSON
 
 
 @dataclass(frozen=True)
@@ -122,8 +123,10 @@ class RobotCheckReport(Answer):
 
     def text(self) -> Group:
         """Masses, modes, then what was found, worst first."""
+        still = self.mass_kg - self.moving_mass_kg
         masses = table(
-            f"{self.robot}: {self.moving_mass_kg:.4g} kg move, reach at most {self.reach_m:.3g} m",
+            f"{self.robot}: {self.moving_mass_kg:.4g} kg move{self._carried()}, {still:.4g} kg "
+            f"stand still, reach at most {self.reach_m:.3g} m",
             *("link", "moved by", "mass (kg)", "centre of mass (m)", "collision shapes"),
         )
         for link in self.links:
@@ -134,16 +137,24 @@ class RobotCheckReport(Answer):
                 mass += " (guessed)" if link.guessed else ""
                 cells = link.joint or "–", mass, place, str(link.collision_shapes)
                 masses.add_row(Text(link.link), *cells)
-        modes = table("simulated modes", "pose", "frequency in Hz (damping in %), from the lowest")
+        most = SHOWN_TO * self.band_hz[1]
+        asked = f"frequency in Hz (damping in %), up to {most:g} Hz"
+        modes = table("simulated modes", "pose", asked)
         names = [joint.joint for joint in self.joints]
         joints = JointUnits.declared_as(names, self.joint_units)
         for pose in self.poses:
             at = ", ".join(joints.text(i, v, 0) for i, v in enumerate(pose.joints_deg))
-            modes.add_row(f"{pose.pose}: {at}", _cell(pose))
+            modes.add_row(f"{pose.pose}: {at}", _cell(pose, most))
         low, high = self.band_hz
         said = [Text(f"band_hz is {low:g} to {high:g} Hz."), *map(_line, self.findings)]
         parts = [masses, *([modes] if self.poses else []), *said, _summary(self.findings)]
         return Group(*parts, *drawn(self.plots))
+
+    def _carried(self) -> str:
+        """What [[payload]] of robot.toml adds to the links that move, in words."""
+        carried = self.found.robot.config.payload if self.found else ()
+        mass = sum(body.mass for body in carried)
+        return f", and {mass:.4g} kg of [[payload]]" if mass else ""
 
 
 def _poses(found: Examination) -> tuple[CheckedPose, ...]:
@@ -165,8 +176,9 @@ def _poses(found: Examination) -> tuple[CheckedPose, ...]:
     return tuple(made)
 
 
-def _cell(pose: CheckedPose) -> str:
-    pairs = zip(pose.frequency_hz, pose.damping_ratio, strict=True)
+def _cell(pose: CheckedPose, most_hz: float) -> str:
+    both = zip(pose.frequency_hz, pose.damping_ratio, strict=True)
+    pairs = [pair for pair in both if pair[0] <= most_hz]
     # Frequency and damping of a mode stay on one line.
     return "   ".join(f"{number(f, '.1f')}\u00a0({number(100 * d, '.1f')})" for f, d in pairs)
 

@@ -16,14 +16,13 @@ LINK, SHAPE, OBSTACLE, MASS = "0.25", "tab:blue", "tab:brown", "tab:orange"
 AXIS_COLOURS = "tab:red", "tab:green", "tab:blue"  # x, y, z, as CAD programs have them
 VIEWS = (("seen from the side", (0, 2)), ("seen from above", (0, 1)))
 FRAME = 0.14  # length of a drawn frame, in units of the arm's length
-BESIDE = 0.3  # in the same units: as far as obstacles are drawn beside the robot
 NEAR = 0.07  # in the same units: joints so close to each other share a label
 AREA_PER_SHARE = 1200.0  # of a mass's dot in points², times its share of the whole
 
 
 def robot_figure(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Figure:
     """The robot at q (dof,) in rad: from the side, from above, and in space."""
-    lines = _close(robot_lines(robot, q, links), BESIDE * robot.arm_m)
+    lines = _close(robot_lines(robot, q, links), robot.shoulder_m, robot.reach_m)
     figure = Figure(figsize=(15.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
     stands = robot.joints.listed(robot.joints.shown(q), 0)
@@ -39,11 +38,9 @@ def robot_figure(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Fi
     return figure
 
 
-def _close(lines: RobotLines, beside: float) -> RobotLines:
-    """Without what of the obstacles lies farther than so many m beside the robot."""
-    own = [*(end for link in lines.links for end in link), *(c for s in lines.shapes for c in s)]
-    own += [place for _, place, _ in lines.frames]
-    low, high = np.min(own, axis=0) - beside, np.max(own, axis=0) + beside
+def _close(lines: RobotLines, shoulder_m: np.ndarray, reach_m: float) -> RobotLines:
+    """Without what of the obstacles lies where the tool never comes."""
+    low, high = shoulder_m - reach_m, shoulder_m + reach_m
     cut = (np.clip(corners, low, high) for corners in lines.obstacles)
     return replace(lines, obstacles=[c for c in cut if np.ptp(c, axis=0).all()])
 

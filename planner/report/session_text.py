@@ -21,11 +21,12 @@ from planner.words import counted, short_name, significant
 HELP = """\
 a, Enter  import the hits that wait          r  set bad hits aside, do not import them
 R         set all waiting hits aside
-k         skip this pose; asks why           n  another pose, never this one
+k         skip this pose; asks why           n  never offer this pose again
 b, h      late hits: of the pose named, or of this one; h: unsure hits are right too
 s         mark this pose with a star (★)     u, U  take back the last act; redo it
 q         quit; everything is on disk, and planner watch goes on from here"""
 NONE_BAD = "No hit is to be repeated: press r again, or R, to set all that wait aside."
+NOTHING_NEW = "Nothing to import yet: no new recording is whole and usable."
 FULLY, SHORTLY = 2, 4  # refusals that are said in full, and those of which is said what to do
 LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it may be followed
 
@@ -128,6 +129,17 @@ def uncertainty_line(model: Model) -> Text:
     return Text(f"sd of frequencies over the workspace: {each} (target {target:g} %)")
 
 
+def not_now(key: str) -> str:
+    """What is said of a key that does nothing here; those that do are on the page."""
+    shown = key if key.isprintable() else repr(key)
+    return f"{shown} is not possible now: the keys that are stand above in [brackets]."
+
+
+def never_again(which: str) -> str:
+    """What is said once a pose is skipped."""
+    return f"{which} will not be offered again ([u] takes that back)."
+
+
 def incomplete(page: PosePage) -> str:
     """What is missing where a pose is accepted too early."""
     counts = ", ".join(f"{a} {page.counts[a]}/{page.per_axis}" for a in page.proposal.hits)
@@ -184,7 +196,7 @@ def progress_line(
             more += f", {_span((rounded[0] or 1, rounded[1]))} min to go"
         parts.append(more)
     elif len(history) > 1:
-        parts.append("no trend yet that tells how many more it takes")
+        parts.append("no trend yet for how many more")
     return Text("; ".join(parts))
 
 

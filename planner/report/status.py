@@ -27,7 +27,7 @@ from planner.report.refitted_springs import (
     springs_table,
 )
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, table
-from planner.words import counted, local_time, significant
+from planner.words import by_reason, counted, local_time, significant
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -211,10 +211,14 @@ class StatusReport(Answer):
         more += f", {without} without modes" if without else ""
         return f"{counted(self.used, 'pose')} measured{more}"
 
+    def _waiting(self) -> str:
+        held = ", ".join(h.measured.pose for h in self.held)
+        return f"; hit, and waiting for your answer: {held}" if held else ""
+
     def _lines(self) -> list[str]:
         each = enumerate(self.frequency_sd_percent, 1)
         lines = [
-            "open: " + (", ".join(p.pose for p in self.open) or "none"),
+            "open: " + (", ".join(p.pose for p in self.open) or "none") + self._waiting(),
             "skipped: " + (", ".join(s.pose for s in self.skipped) or "none"),
             "sd of frequencies over the workspace: "
             + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)
@@ -236,7 +240,8 @@ class StatusReport(Answer):
         if self.decision is not msgspec.UNSET:
             lines.append(self.decision.text)
         lines += [*self.remarks, *self.leave_one_out.text]
-        return lines + [f"refused {r.file}: {r.reason}" for r in self.refused]
+        told = by_reason((r.file, r.reason) for r in self.refused)
+        return lines + [f"refused {one}" for one in told]
 
 
 def status(campaign: Campaign) -> StatusReport:

@@ -155,8 +155,9 @@ class PointTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Simulations beside recordings carry that mass where the sensor was, and `modes` takes it out.
     Its frame lies at `position_m` in that of a link (or another frame of the URDF), turned by
-    roll, pitch and yaw. `node` is its number in universal files. One called "tcp" or "sensor" is
-    where the tool is hit, or its sensor sits, and needs no link.
+    roll, pitch and yaw. `node` is its number in universal files. One called "tcp" or "sensor"
+    without a link is where `tcp_frame` or `sensor_frame` is; with link and place it may be named
+    by these.
     """
 
     name: str
@@ -239,7 +240,8 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
     `urdf` is a file, named from the folder of robot.toml. `tcp_frame` names the link of it where
-    the hammer hits, `sensor_frame` the one where the accelerometer sits; their axes are parallel.
+    the hammer hits, `sensor_frame` the one where the accelerometer sits, or a [[point]] beside a
+    link; their axes are parallel.
     `gravity` is in m/s² along the axes of the URDF's base. `band_hz` is where the simulation is
     meant to hold.
     `held` says where joints stay that do not move in the tests: NAME_m = 1.2 or NAME_mm = 1200 for

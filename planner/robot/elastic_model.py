@@ -84,7 +84,10 @@ class ElasticModel:
         """Every elastic rotation must move inertia of its own; otherwise no M⁻¹ exists."""
         middle = (self.robot.lower_rad + self.robot.upper_rad) / 2
         mass = self.matrices(middle).mass[0]
-        scale = np.sqrt(np.maximum(np.diagonal(mass), np.finfo(float).tiny))
+        mass = np.where(np.isfinite(mass), mass, 0.0)  # of bodies that no matter can form
+        own = np.diagonal(mass)
+        least = np.finfo(float).eps * (np.abs(own).max() or 1.0)  # less is rounding, and singular
+        scale = np.sqrt(np.maximum(own, least))
         values, vectors = np.linalg.eigh(mass / np.outer(scale, scale))
         if not values[0] > SINGULAR:
             number = int(np.argmax(np.abs(vectors[:, 0])))

@@ -1,6 +1,6 @@
 """Points of robot.toml: frames of the robot's model that may be hit and carry sensors."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +41,7 @@ def check_points(points: Sequence[PointTable], path: Path) -> None:
 
 
 def with_points(
-    model: pin.Model, points: Sequence[PointTable], ids: Sequence[int]
+    model: pin.Model, points: Sequence[PointTable], ids: Iterable[int]
 ) -> tuple[int, ...]:
     """Numbers of new frames of the model, at the points; `ids` are those of their links' frames."""
     found = []
@@ -67,8 +67,8 @@ def names_of(
     for name, there in ((TCP, tcp), (SENSOR, sensor)):
         if name in place and not _same(model, place[name], there):
             raise InputError(
-                f'{path}: [[point]] "{name}" is not where robot.toml\'s {name}_frame is; give it '
-                f"another name, or leave its place to that frame."
+                f'{path}: [[point]] "{name}" is not where robot.toml\'s {name}_frame is: state '
+                f'{name}_frame = "{name}" to put that there, or leave out its link and place.'
             )
         place.setdefault(name, there)
     return PointNames(

@@ -13,6 +13,7 @@ from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout, PointNames
 from planner.robot.config import Compliance, PointTable, RobotConfig
 from planner.robot.config_file import check_own_springs, load_config, with_effects
+from planner.robot.controller_axes import with_axes
 from planner.robot.link_inertias import state_inertias
 from planner.robot.linkage import Linkage
 from planner.robot.points import PREFIX, check_points, names_of, with_points
@@ -77,19 +78,19 @@ class Robot:
         model = build_model(text, urdf)
         linkage = Linkage.of(root, tuple(model.names)[1:])
         joints = JointUnits(linkage.leading(linkage.names), linkage.leading(linkage.slides))
+        joints = with_axes(config.controller, joints, robot_toml)
         robot = cls(config, robot_toml, urdf, text, model, linkage, joints, left_out)
+        check_points(config.point, robot_toml)
+        with_points(model, config.point, (robot._link_of_point(p) for p in config.point))
         check_entries(robot)
         check_own_springs(config, joints, robot.joint_axes, robot_toml)
-        check_points(config.point, robot_toml)
-        with_points(model, config.point, [robot._link_of_point(p) for p in config.point])
         _ = robot.points
         return robot
 
     def _link_of_point(self, point: PointTable) -> int:
         """Number of the frame that a point lies in."""
-        own = {TCP: self.tcp_id, SENSOR: self.sensor_id}
-        if not point.link and point.name in own:
-            return own[point.name]
+        if not point.link and point.name in (TCP, SENSOR):
+            return self.tcp_id if point.name == TCP else self.sensor_id
         return self.frame_id(f"[[point]] {point.name}: link", point.link)
 
     @property
@@ -172,12 +173,18 @@ class Robot:
     @cached_property
     def tcp_id(self) -> int:
         """Pinocchio's frame number of the tcp."""
-        return self.frame_id("tcp_frame", self.config.tcp_frame)
+        return self._tool_frame("tcp_frame", self.config.tcp_frame)
 
     @cached_property
     def sensor_id(self) -> int:
         """Pinocchio's frame number of the sensor."""
-        return self.frame_id("sensor_frame", self.config.sensor_frame)
+        return self._tool_frame("sensor_frame", self.config.sensor_frame)
+
+    def _tool_frame(self, entry: str, name: str) -> int:
+        """Number of a frame of the URDF, or of a [[point]] that lies in one of its links."""
+        placed = any(p.name == name and p.link for p in self.config.point)
+        point = placed and not any(self.model.existFrame(name, kind) for kind in FRAME_TYPES)
+        return self.frame_id(entry, PREFIX + name if point else name)
 
     @cached_property
     def points(self) -> PointNames:

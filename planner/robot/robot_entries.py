@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 def check_entries(robot: "Robot") -> None:
     """Raise InputError where robot.toml names what there is not, or a joint has no range."""
-    for entry, name in (
-        ("tcp_frame", robot.config.tcp_frame),
-        ("sensor_frame", robot.config.sensor_frame),
+    for entry, name, number in (
+        ("tcp_frame", robot.config.tcp_frame, robot.tcp_id),
+        ("sensor_frame", robot.config.sensor_frame, robot.sensor_id),
     ):
-        if robot.model.frames[robot.frame_id(entry, name)].parentJoint == 0:
+        if robot.model.frames[number].parentJoint == 0:
             raise InputError(
                 f'{robot.path}: {entry} "{name}" is fixed to the base and never moves; name a '
                 f"frame on the tool."

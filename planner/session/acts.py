@@ -89,12 +89,16 @@ def on_key(station: Station, course: Course, visit: PoseInProgress, key: str | N
 
 def _act(station: Station, course: Course, visit: PoseInProgress, key: str | None) -> Course:
     campaign, pose = station.campaign, visit.proposal.pose
+    if key is None:
+        return course
+    again, visit = key == visit.asked, replace(visit, asked="")
+    asked, course = replace(course, visit=replace(visit, asked=key)), replace(course, visit=visit)
     over = replace(course, visit=None)
     match key:
         case "a" | "\n" | "\r":
-            if visit.good and not visit.page.complete and not visit.pressed:
+            if visit.good and not visit.page.complete and not again:
                 station.say(session_text.incomplete(visit.page), "yellow")
-                return replace(course, visit=replace(visit, pressed=True))
+                return asked
             out = visit.late | visit.unsure | visit.unstated
             files = [path for path in visit.whole if path not in out]
             return import_waiting(station, course, visit, files)
@@ -104,9 +108,9 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
             return _right_here(station, course, visit)
         case "r" if visit.whole:
             bad = visit.paths("repeat") or visit.paths(*BAD)
-            if not bad and not visit.refusing:
+            if not bad and not again:
                 station.say(session_text.NONE_BAD, "yellow")
-                return replace(course, visit=replace(visit, refusing=True))
+                return asked
             _refuse(station, visit, bad or visit.whole)
         case "R" if visit.whole:
             _refuse(station, visit, visit.whole)
@@ -120,15 +124,18 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
         case "U":
             return _redo(station, over)
         case "n":
+            if not again:
+                station.say(f"Press n again, and {pose} is never offered again.", "yellow")
+                return asked
             campaign.skip(pose, "another was asked for")
-            station.say(f"{pose} will not be offered again.")
+            station.say(session_text.never_again(pose))
             return over
         case "q":
             return replace(course, stop="quit")
         case "?":
             station.say(session_text.HELP)
         case _:
-            pass
+            station.say(session_text.not_now(key), "dim")
     return course
 
 
@@ -142,7 +149,7 @@ def _refuse(station: Station, visit: PoseInProgress, files: Collection[Path]) ->
     station.teller.note()
     numbers = [str(v.number) for v in visit.verdicts if v.path in chosen]
     said = f"{counted(len(numbers), 'hit')} set aside ({', '.join(numbers)})"
-    station.say(f"{said}; hit again.")
+    station.say(f"{said}; hit again ([u] takes that back).")
 
 
 def _as_stated(station: Station, visit: PoseInProgress, path: Path) -> Source:
@@ -159,7 +166,7 @@ def import_waiting(
     """Import the waiting hits; the pose is over when it gave modes."""
     files = [path for path in files if path not in visit.weak]
     if not files:
-        station.say("No whole new file waits yet.", "yellow")
+        station.say(session_text.NOTHING_NEW, "yellow")
         return course
     # What the import would take as good, or ask for at every pose from here on.
     _refuse(station, visit, visit.weak | (frozenset() if station.auto else visit.unsure))
@@ -238,7 +245,7 @@ def answer(station: Station, course: Course, key: str | None, other: str) -> Cou
     elif key == "r":
         campaign.refuse_held(pose)
         station.teller.note()
-        station.say(f"The hits of {pose} are set aside; hit again.")
+        station.say(f"The hits of {pose} are set aside; hit again ([u] takes that back).")
     elif key == "o" and other:
         with station.screen.working(IMPORTING):
             report = campaign.move(pose, other)
@@ -246,8 +253,11 @@ def answer(station: Station, course: Course, key: str | None, other: str) -> Cou
         answered = _after(station, answered, report)
     elif key == "u":
         answered = undo(station, answered)
+    elif key == "q":
+        return replace(course, stop="quit")
     else:
-        return replace(course, stop="quit") if key == "q" else course
+        station.say(session_text.not_now(key), "dim") if key else None
+        return course
     station.teller.tell()
     return answered
 

@@ -21,8 +21,8 @@ BAD = ("repeat", "unsure", "unstated")
 class PoseInProgress:
     """A pose while the robot stands there: what is on the page, and which files wait.
 
-    `since` is when (monotonic, s) the files were last seen to change; `pressed`: accept was
-    pressed though hits are missing; `refusing`: refuse was, though no hit is bad. `numbers` are
+    `since` is when (monotonic, s) the files were last seen to change; `asked` is the key that was
+    pressed and acts only when pressed once more, until another is or files change. `numbers` are
     those of its hits, as they came; `typed` is the reason for a skip as far as it is typed, None
     where none is asked for; `before` is the pose measured last.
     """
@@ -34,8 +34,7 @@ class PoseInProgress:
     whole: tuple[Path, ...] = ()
     verdicts: tuple[HitVerdict, ...] = ()
     shown: tuple | None = None
-    pressed: bool = False
-    refusing: bool = False
+    asked: str = ""
     numbers: dict[Part, int] = field(default_factory=dict)
     typed: str | None = None
 
@@ -137,5 +136,5 @@ class Course:
             ends = "as many measurements as campaign.toml allows"
         return replace(
             self, measured=measured, history=history, announced=self.announced or model.done,
-            progress=f"sd of all {significant(overall)} %; {left}", stop=ends,
+            progress=f"frequencies known to ±{significant(overall)} %; {left}", stop=ends,
         )  # fmt: skip

@@ -93,7 +93,7 @@ def _keys(page: PosePage, late: set[str], can: TakingBack) -> str:
         ("R", "refuse all", bool(page.hits)),
         ("b", f"late ones to {' and '.join(sorted(late))}", "late" in kinds),
         ("h", _right_here(kinds), bool(kinds & {"late", "unsure"})),
-        ("s", "star", True), ("k", "skip, say why", True), ("n", "never this pose", True),
+        ("s", "mark ★", True), ("k", "skip (asks why)", True), ("n", "never again", True),
         ("u", "undo", can.undo), ("U", "redo", can.redo), ("q", "quit", True), ("?", "help", True),
     ])  # fmt: skip
 

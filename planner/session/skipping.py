@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from planner.report import session_text
 from planner.session.course import Course, PoseInProgress
 from planner.session.station import Station
 
@@ -32,7 +33,7 @@ def on_reason_key(
         reason = typed.strip()
         station.campaign.skip(pose, reason or "skipped in the session", neighbours=bool(reason))
         which = f"{pose} and poses around it" if reason else pose
-        station.say(f"{which} will not be offered again.")
+        station.say(session_text.never_again(which))
         return replace(course, visit=None)
     typed = typed[:-1] if key in ERASE else typed + key * key.isprintable()
     return replace(course, visit=ask_why(station, visit, typed))

@@ -184,7 +184,7 @@ def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInPr
     station.screen.show(page.page)
     seen = replace(
         visit, page=page, whole=tuple(whole), verdicts=verdicts, shown=now, since=time.monotonic(),
-        numbers=numbers, refusing=False,
+        numbers=numbers, asked="",
     )  # fmt: skip
     for at, files in seen.late_by_pose.items() if station.auto else ():
         station.say(session_text.held_of(at, files), "yellow")

@@ -92,7 +92,8 @@ def test_poses_named_twice_in_scripts_that_fonts_lack(folder, tmp_path, robot):
     options = ["--robot", toml] if robot else []
     run = planner("modes", two, "--plot", tmp_path / "plots", *options)
     assert run.returncode == 0
-    assert run.stderr == ""
+    others = [s for s in run.stderr.splitlines() if not s.startswith("identifying: ")]
+    assert others == []  # beside progress, on a slow machine
     assert (tmp_path / "plots" / "campbell.png").stat().st_size > 10_000
 
 

@@ -65,6 +65,22 @@ def odd_limits(folder: Path) -> Path:
     return urdf
 
 
+def test_its_robot_toml_says_how_to_move_the_tcp(tmp_path, capsys):
+    cell = tmp_path / "cell"
+    ask(capsys, "new", cell, "--urdf", whole(tmp_path / "src"))
+    toml = cell / "robot" / "robot.toml"
+    flange, text = Robot.load(toml), toml.read_text()
+    said = [line[2:] for line in text.splitlines() if line.startswith("# ")]
+    block = "\n".join(said[said.index("[[point]]") :])
+    text = text.replace('tcp_frame = "tool0"', 'tcp_frame = "tcp"')
+    text = text.replace('sensor_frame = "tool0"', 'sensor_frame = "tcp"')
+    toml.write_text(f"{text}\n{block}\n")
+    q = np.full(len(flange.joint_names), 0.2)
+    moved = Robot.load(toml).forward(q)[1] - flange.forward(q)[1]
+    assert np.linalg.norm(moved) == pytest.approx(0.25, abs=1e-3)
+    assert ask(capsys, "next", cell)["proposals"]
+
+
 KINDS = {
     "whole": whole, "renamed": renamed, "no meshes": no_meshes, "zero sizes": zero_sizes,
     "rail": rail, "hand": hand, "odd limits": odd_limits,
@@ -121,7 +137,9 @@ def test_the_screen_says_what_to_put_right_first(tmp_path, capsys):
     cell = tmp_path / "cell"
     assert run(["new", str(cell), "--urdf", str(published(tmp_path)), *GIVEN]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert 'Put right first: tcp_frame = "tool0" and the tool\'s mass' in said
+    assert 'Put right first: tcp_frame = "tool0", where the hammer hits' in said
+    assert "and the tool's mass" in said
+    assert "a factor of 3" in said
     assert "Masses are guessed" in said
     assert run(["check", str(cell / "robot" / "robot.toml")]) == 0
     assert "(guessed)" in capsys.readouterr().out

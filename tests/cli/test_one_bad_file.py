@@ -16,6 +16,7 @@ from planner.campaign.journal import Journal
 from planner.errors import InputError
 from planner.recording.read import read
 from planner.robot.mesh_files import copy_meshes
+from planner.words import by_reason
 from tests.support.odd_recordings import ODD
 from tests.support.outside import call, make_cell, record, told
 from tests.support.robots import JOINTS_DEG
@@ -76,6 +77,15 @@ def test_bad_files_are_refused_and_the_others_imported(bench, cell, tmp_path):
     more.write_bytes(next((good / "data").glob("*px_1.uff")).read_bytes() + b"\n")
     code, _, err = call("import", cell, more, "--pose", "G1")
     assert (code, kept.name in err, "restore it" in err) == (2, True, True), err
+
+
+def test_files_refused_alike_are_one_sentence():
+    files = [(f"d/P3_{i}.csv", f"d/P3_{i}.csv has no force; export it.") for i in (2, 3, 1)]
+    files.append(("d/other.csv", "other.csv is empty; export it."))
+    assert by_reason(files) == [
+        "3 files (d/P3_1.csv to P3_3.csv): the file has no force; export it.",
+        "d/other.csv: other.csv is empty; export it.",
+    ]
 
 
 def test_a_pose_whose_name_looks_like_markup(bench, cell, tmp_path):

@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.errors import InputError
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
 from planner.robot.urdf_inertias import urdf_with_inertias
 from tests.support.known_robots import KNOWN_ROBOTS
+from tests.support.plain_arm import make_plain_arm
 
 
 @pytest.mark.parametrize("name", list(KNOWN_ROBOTS))
@@ -57,3 +59,12 @@ def test_comments_of_the_urdf_stay(tmp_path: Path):
     text, _ = urdf_with_inertias(robot, elastic.bodies, 0.001 * elastic.inertia)
     assert text.startswith(head)
     assert "<!-- a joint -->" in text
+
+
+@pytest.mark.parametrize("times", [1, 2, 5, 200])
+def test_a_body_of_less_than_no_inertia_is_refused_in_a_sentence(tmp_path, times):
+    robot = Robot.load(make_plain_arm(tmp_path))
+    change = np.zeros_like(ElasticModel(robot).inertia)
+    change[-1] = -times * ElasticModel(robot).inertia[-1]
+    with pytest.raises(InputError, match="moves no inertia of its own"):
+        ElasticModel(robot, change)

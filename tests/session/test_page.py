@@ -59,7 +59,7 @@ def page():
         (8.12, 12.5, 17.8, 22.3, 28.9, 33.1), (0.12, 0.2, 0.3, 0.4, 0.5, 0.6),
         Path("/home/someone/projects/2026/cell7/measurements/exports/analyser-3"),
         unfinished=(("foreign.uff", FOREIGN), ("half.uff", "half.uff is still being written")),
-        progress="sd of all 1.23 %; 2.3 min per pose; 3 to 5 more poses, 7 to 12 min to go",
+        progress="frequencies known to ±1.23 %; 2.3 min per pose; 3 more poses, 7 min to go",
         keys=KEYS,
     )  # fmt: skip
 

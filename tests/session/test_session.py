@@ -135,7 +135,7 @@ def test_refused_hits_are_not_offered_again_even_by_the_next_session(cell):
     console = screen()
     script = Script(console, [(wait("all hits are in"), "r"), (wait("No hit is to be"), "r"),
                               (wait("9 hits set aside (1, 2, 3"), "a"),
-                              (wait("No whole new file"), "q")])  # fmt: skip
+                              (wait("Nothing to import yet"), "q")])  # fmt: skip
     watch(campaign, tmp_path / "inbox", console=console, keys=script, hits_per_pose=9,
           quiet_s=0.05, limit_s=30)  # fmt: skip
     assert campaign.state.measurements == {}

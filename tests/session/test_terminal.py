@@ -36,12 +36,16 @@ def test_keys_and_screen_of_a_terminal(tmp_path):
         for words in ("go to pose P001", "joint_a1", "angle (°)", "tool at x", "expected (Hz)"):
             assert words in first, words
         os.write(ours, b"a")
-        read_until(ours, "No whole new file waits yet.")
+        read_until(ours, "Nothing to import yet")
+        os.write(ours, b"b")
+        read_until(ours, "b is not possible now")
+        os.write(ours, b"n")
+        read_until(ours, "Press n again")
         os.write(ours, b"k")
         read_until(ours, "stands in the way?")
         os.write(ours, b"\n")
         second = read_until(ours, "go to pose P002")
-        assert "P001 will not be offered again." in second
+        assert "P001 will not be offered again ([u]" in second
         os.write(ours, b"q")
         read_until(ours, "Session ended: quit")
         assert process.wait(timeout=30) == 0

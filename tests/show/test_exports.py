@@ -12,6 +12,7 @@ from scipy.io import loadmat
 from planner.campaign.campaign import Campaign
 from planner.cli.run import run
 from planner.errors import InputError
+from planner.recording.folder import read_poses
 from planner.recording.records import FrfRecord
 from planner.recording.uff import read_uff
 from planner.report.handing_on.controller import PoseToDrive, program
@@ -108,6 +109,17 @@ def turned(tmp_path) -> Robot:
     )
     toml.write_text(toml.read_text() + table)
     return Robot.load(toml)
+
+
+def test_tables_in_the_controllers_axes_are_read_back(turned, tmp_path):
+    angles, file = (10.0, -20.0, 30.0, -40.0, 50.0, -60.0), tmp_path / "poses.csv"
+    file.write_text(program("poses", turned, "cell", [PoseToDrive("P1", angles)]))
+    assert "A1_deg" in file.read_text()
+    (row,) = read_poses(file, turned.joints)
+    assert row.joints_deg == pytest.approx(angles)
+    file.write_text(file.read_text().replace("_deg", ""))
+    with pytest.raises(InputError, match="has no column joint_a1_deg and has A1, A2, "):
+        read_poses(file, turned.joints)
 
 
 def test_controllers_get_their_own_order_signs_and_offsets(turned):

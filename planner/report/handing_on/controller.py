@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from planner.errors import InputError
 from planner.robot.collision import Collisions
 from planner.robot.config import ControllerTable
+from planner.robot.controller_axes import axes_of, column_names
 from planner.robot.robot import Robot
 from planner.words import counted
 
@@ -76,7 +77,8 @@ def program(
     `simulated`: the campaign that chose them rests on simulated recordings, which is said.
     Raises InputError where the robot's axes do not suit the controller.
     """
-    table, axes = robot.config.controller, axes_of(robot)
+    table = robot.config.controller
+    axes = axes_of(table, robot.joints, robot.path)
     arm = [axis for axis in axes if axis[0] not in table.external]
     external = [axis for axis in axes if axis[0] in table.external]
     if kind == "urscript":
@@ -128,32 +130,6 @@ def unique(name: str, used: set[str]) -> str:
         found, number = f"{name[:20]}_{number}", number + 1
     used.add(found.lower())
     return found
-
-
-def axes_of(robot: Robot) -> list[tuple[str, float, float]]:
-    """The controller's axes in order: joint of the URDF, sign, offset in degrees (slides: mm)."""
-    table, joints = robot.config.controller, robot.joint_names
-    order = table.joints or joints
-    if sorted(order) != sorted(joints):
-        raise InputError(
-            f"{robot.path}: [controller] joints names {', '.join(order)}; it needs each of "
-            f"{', '.join(joints)} once."
-        )
-    for entry, values in (("signs", table.signs), ("offsets_deg", table.offsets_deg)):
-        if values and len(values) != len(order):
-            raise InputError(
-                f"{robot.path}: [controller] {entry} has {len(values)} numbers, the robot "
-                f"{len(order)} joints; give one a joint."
-            )
-    missing = [name for name in table.external if name not in joints]
-    if missing:
-        raise InputError(
-            f'{robot.path}: [controller] external names "{missing[0]}", which is no joint of the '
-            f"robot; it has {', '.join(joints)}."
-        )
-    signs = table.signs or (1.0,) * len(order)
-    offsets = table.offsets_deg or (0.0,) * len(order)
-    return list(zip(order, signs, offsets, strict=True))
 
 
 def _krl(
@@ -214,9 +190,8 @@ def _poses(_: str, poses: Sequence[DrivenPose], table: ControllerTable, said: Se
     )
     axes: list[str] = []
     if poses:
-        axes = [f"A{k}" for k in range(1, len(poses[0].arm) + 1)]
-        axes += [f"E{k}" for k in range(1, len(poses[0].external) + 1)]
-        axes = [f"{axis}_{unit}" for axis, unit in zip(axes, poses[0].units, strict=True)]
+        names = column_names(len(poses[0].arm), len(poses[0].external))
+        axes = [f"{axis}_{unit}" for axis, unit in zip(names, poses[0].units, strict=True)]
     rows = [",".join(["pose", *axes, "note"])]
     for pose in poses:
         numbers = [f"{v:.4f}" for v in (*pose.arm, *pose.external)]
