@@ -11,6 +11,7 @@ from planner.words import counted
 # What no structure explains, in shares of |H|, up to which the simulation is followed: of a fit
 # that lacks nothing it is 0.001 to 0.015. Chosen.
 FOLLOWED = 0.06
+BEYOND = 2.0  # sds of the gains, from which their deviation is told
 KNOWN = 0.3  # sd of ln k to which a spring not stated is known when it is told of
 # PosedBodies from which a place is told as found: from one, neighbours imitate each other.
 PLACED = 3
@@ -48,6 +49,19 @@ class Learned:
             e for e in self.identified.estimates
             if e.kind == "stiffness" and min(e.blocks) >= self.stated and e.log_sd < KNOWN
         )  # fmt: skip
+
+    @property
+    def scale(self) -> str:
+        """What to say where recordings are larger or smaller than gains and masses allow."""
+        off, allowed = self.posterior.chain_scale
+        if abs(off) < BEYOND * allowed:
+            return ""
+        more = "larger" if off > 0 else "smaller"
+        return (
+            f"The recordings are {100 * abs(off):.2g} % {more} than the robot's FRFs, though gains "
+            f"of sensor and hammer are stated to {100 * allowed:.2g} %: check their sensitivities, "
+            f"and the masses in the URDF."
+        )
 
     @property
     def words(self) -> str:

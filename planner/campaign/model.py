@@ -295,6 +295,14 @@ class Model:
         return tuple(found)
 
     @cached_property
+    def frf_sd_percent(self) -> tuple[float, ...]:
+        """Sd of predicted FRFs over the workspace in %, and of their common scale; () not known."""
+        learned = self.low.learned
+        if learned is None or not learned.fits:
+            return ()
+        return learned.posterior.frf_sd_percent(self.cell.candidates.q[:FEW_POSES])
+
+    @cached_property
     def frequency_sd_percent(self) -> np.ndarray:
         """Predicted sd of each natural frequency, root mean square over the workspace, in %."""
         candidates, said = self.cell.candidates, self.simulated_candidates

@@ -144,7 +144,7 @@ class CampaignReads:
         with threadpool_limits(1):
             memory = FitMemory(self._kept, partial(self._fit_name, self._configured()))
             model = build(self.cell, state, kept.frf, kept.hits, memory)
-            _ = model.frequency_sd_percent  # kept with it: every command needs it
+            _ = model.frequency_sd_percent, model.frf_sd_percent  # kept: every command needs them
         return model
 
     @property

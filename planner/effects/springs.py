@@ -8,13 +8,24 @@ from planner.effects.effect import Operator
 
 @dataclass(frozen=True)
 class SoftBase(Operator):
-    """The base tilts, turns and shifts on its floor."""
+    """The base tilts on its floor."""
 
     kind = "soft_base"
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
         return f"The base gives way ({_stiffness(values)}): check anchor bolts and foundation."
+
+
+@dataclass(frozen=True)
+class ShiftingBase(Operator):
+    """The base turns and shifts on its floor."""
+
+    kind = "shifting_base"
+
+    def words(self, values: Mapping[str, tuple[float, float]]) -> str:
+        """See `Operator.words`."""
+        return f"The base shifts or turns ({_stiffness(values)}): check anchor bolts and pins."
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from planner.effects.added_mass import PointMass
 from planner.effects.angle_spring import AngleSpring
 from planner.effects.effect import Number, Operator
 from planner.effects.resonator import LinkResonator
-from planner.effects.springs import BendingLink, SoftBase, Tilt
+from planner.effects.springs import BendingLink, ShiftingBase, SoftBase, Tilt
 from planner.effects.structural_damping import LossFactors
 from planner.errors import InputError
 from planner.identification.parameters import Priors, place_name
@@ -112,9 +112,10 @@ def _springs(robot: Robot) -> list[tuple[type[Operator], str, Compliance, float]
         covered = [np.array(b.axis) for b in turning if b.joint == BASE]
         for axis in np.eye(3):
             if not any(abs(float(axis @ there)) > ALONG for there in covered):
-                found.append((SoftBase, BASE, _spring(BASE, axis, stiffest), stiffest))
+                kind = ShiftingBase if axis[2] else SoftBase
+                found.append((kind, BASE, _spring(BASE, axis, stiffest), stiffest))
         shift = stiffest / (2 * longest) ** 2
-        found += [(SoftBase, BASE, _spring(BASE, a, shift, True), shift) for a in np.eye(3)]
+        found += [(ShiftingBase, BASE, _spring(BASE, a, shift, True), shift) for a in np.eye(3)]
     for link, joint, way in ways:
         length = float(np.linalg.norm(way))
         if length > SHORT * longest:

@@ -14,6 +14,8 @@ from planner.fit.structure import RobotStructure, exported
 from planner.identification.measured_frfs import Measured
 from planner.inference.least_squares import inverse
 
+LOOKED_AT = 60  # lines of the band, where sds of FRFs are told
+
 
 @dataclass(frozen=True, eq=False)
 class RobotPosterior:
@@ -94,6 +96,23 @@ class RobotPosterior:
         h = motion.accelerance
         along = np.einsum("nijf,ndijf->d", h.conj(), slopes).real / float(np.sum(np.abs(h) ** 2))
         return float(np.linalg.norm(self.root.T @ along))
+
+    def frf_sd_percent(self, q: np.ndarray) -> tuple[float, float]:
+        """Root mean square sd of FRFs at q (n, dof) in rad in % of them, and of it the scale's."""
+        lines = np.unique(self.found.misfit.data.measured.frequency_hz)
+        mean, sd = self.predicted(q, lines[:: max(1, len(lines) // LOOKED_AT)])
+        return 100 * float(np.linalg.norm(sd) / np.linalg.norm(mean)), 100 * self.scale_sd
+
+    @property
+    def chain_scale(self) -> tuple[float, float]:
+        """By what share the recordings are larger than the robot's FRFs, and what gains allow (sd).
+
+        Of force and of the mean of three channels.
+        """
+        t, chain = self.tolerances, self.x[self.structure.chain]
+        own = np.mean(chain[[0, 4, 8]])
+        allowed = float(np.hypot(t.gain / np.sqrt(3), t.force_gain))
+        return float(t.gain * own + t.force_gain * chain[-2]), allowed
 
     def misfits(self, least: float) -> tuple[float, np.ndarray]:
         """Variance that is not explained over that of the noise, of all and by pose (n,).

@@ -117,6 +117,7 @@ class ModelStatus:
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     springs: tuple[RefittedSpring, ...] = ()
     waits_for: str = ""
+    frf_sd_percent: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, model: "Model") -> "ModelStatus":
@@ -135,6 +136,7 @@ class ModelStatus:
             joint_units=cell.robot.joints.declared,
             springs=refitted_springs(model),
             waits_for=model.waits_for,
+            frf_sd_percent=model.frf_sd_percent,
         )
 
 
@@ -174,6 +176,7 @@ class StatusReport(Answer):
     used: int = 0  # of the measured poses, those that the model rests on
     springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
     waits_for: str = ""  # what lacks until the target is reached
+    frf_sd_percent: tuple[float, ...] = ()  # of predicted FRFs, and of their common scale
     model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
@@ -226,6 +229,10 @@ class StatusReport(Answer):
             f"{self.forecast.text} {target_sentence(self.waits_for)}",
             f"log: {counted(self.log.entries, 'entry', 'entries')}",
         ]
+        if self.frf_sd_percent:
+            whole, scale = map(significant, self.frf_sd_percent)
+            lines.insert(3, f"sd of FRFs over the workspace: {whole} %, of which {scale} % is a "
+                            f"scale common to all (gains and masses)")  # fmt: skip
         if self.log.torn_bytes:
             lines.append("The log's last line was torn by a crash; the next act sets it aside.")
         if self.stored_but_not_imported:
@@ -275,6 +282,7 @@ def status(campaign: Campaign) -> StatusReport:
         used=len(state.used),
         springs=believed.springs,
         waits_for=believed.waits_for,
+        frf_sd_percent=believed.frf_sd_percent,
         model=lambda: campaign.model,
     )
 

@@ -1,0 +1,133 @@
+"""One fit: slopes are derivatives, a common scale costs nothing, what lacks is found and sized."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.dynamics.simulation import Simulation
+from planner.effects.table import Repertoire
+from planner.fit.data import FrfData
+from planner.fit.gauss_newton import minimised
+from planner.fit.misfit import FrfMisfit
+from planner.fit.posterior import RobotPosterior
+from planner.fit.search import Search
+from planner.fit.structure import RobotPrior, RobotStructure, exported
+from planner.identification.measurement_model import Tolerances
+from planner.identification.parameters import CAD_INERTIAS
+from planner.robot.robot import Robot
+from tests.support.fitted_cases import Case, Judged, everyday
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory) -> Case:
+    """A robot of another engine with a soft base, a link that bends and a hose."""
+    return everyday("kr210", 1, tmp_path_factory.mktemp("case"))
+
+
+@pytest.fixture(scope="module")
+def prior(case) -> RobotPrior:
+    return RobotPrior(Repertoire.of(Simulation(Robot.load(case.toml)), CAD_INERTIAS))
+
+
+@pytest.fixture(scope="module")
+def few(case, prior) -> FrfData:
+    return FrfData.of(prior, case.frfs[:2], case.q[:2], case.band_hz, 12)
+
+
+def structure_of(prior: RobotPrior, *labels: str) -> RobotStructure:
+    found = RobotStructure(prior)
+    for effect in prior.repertoire.effects:
+        if effect.label in labels:
+            found = found.with_effect(effect)
+    assert len(found.effects) == len(labels)
+    return found
+
+
+def set_to(structure: RobotStructure, x: np.ndarray, kind: str, first: int, *values: float):
+    """Some of an effect's own numbers."""
+    number = next(k for k, e in enumerate(structure.effects) if e.kind == kind)
+    at = structure.own[number].start + first
+    x[at : at + len(values)] = values
+
+
+EVERYTHING = (
+    "soft_base at base", "shifting_base at base", "bending_link at link_2",
+    "added_mass at link_3", "local_resonator at link_4", "angle_dependent_spring at joint_2",
+    "structural_damping at joints",
+)  # fmt: skip
+
+
+def test_slopes_are_the_derivatives(prior, few):
+    structure = structure_of(prior, *EVERYTHING)
+    misfit = FrfMisfit(structure, few, Tolerances())
+    rng = np.random.default_rng(0)
+    x = structure.mean + 0.1 * structure.sd * rng.standard_normal(structure.size)
+    assert misfit.possible(x)
+    about = misfit._about(misfit.nothing_open(), x)
+    h, columns, _ = misfit.columns(x, about)
+    for i, name in enumerate(structure.names[: structure.chain.start]):
+        step = 1e-5 * structure.sd[i] * np.eye(structure.size)[i]
+        ahead, behind = (misfit.motion(y, about).accelerance for y in (x + step, x - step))
+        slope = (ahead - behind) / (2e-5 * structure.sd[i])
+        size = np.linalg.norm(slope) + 1e-9 * np.linalg.norm(h) / structure.sd[i]
+        assert np.linalg.norm(slope - columns[:, i]) < 1e-4 * size, name
+
+
+def test_masses_springs_and_gain_times_one_number_leave_frfs_as_they_are(prior, few):
+    structure = structure_of(prior, "soft_base at base")
+    misfit = FrfMisfit(structure, few, Tolerances())
+    x, other, by = structure.mean, structure.mean.copy(), 1.1
+    other[: structure.stiffnesses] += np.log(by)
+    bodies = structure.bodies
+    scaled = bodies.scaled[bodies.sigma > 0]
+    other[structure.inertial.start + scaled] += np.log(by) / bodies.sigma[bodies.sigma > 0]
+    there, h = (misfit.motion(y, None).accelerance for y in (other, x))
+    # Gravity's own stiffness stays what the URDF's weight makes it.
+    np.testing.assert_allclose(there * by, h, rtol=0, atol=2e-3 * np.abs(h).max())
+    assert bodies.barrier(other[structure.inertial])[0] < 1e-12
+
+
+def test_what_was_found_is_a_simulation_of_its_own(prior, few):
+    structure = structure_of(prior, *EVERYTHING[:5])
+    x = structure.mean.copy()
+    set_to(structure, x, "added_mass", 0, 0.5, 0.3, -0.2, 0.1)
+    set_to(structure, x, "local_resonator", 3, 1.0, 0.5, 0.0)
+    x[structure.chain] = 0.0
+    simulation, _ = exported(structure, x)
+    lines = few.measured.frequency_hz[0]
+    true = replace(few, measured=replace(few.measured, s=2j * np.pi * few.measured.frequency_hz))
+    fitted = FrfMisfit(structure, true, Tolerances()).motion(x, None).accelerance[0]
+    again = simulation.accelerance(few.q[:1], lines)[0]
+    np.testing.assert_allclose(again, fitted, rtol=0, atol=2e-3 * np.abs(fitted).max())
+
+
+def test_a_step_never_leads_uphill_nor_to_what_no_body_can_be(prior, few):
+    structure = structure_of(prior, *EVERYTHING)
+    misfit = FrfMisfit(structure, few, Tolerances(), 0.1)
+    x = structure.mean.copy()
+    set_to(structure, x, "local_resonator", 3, 1.0, 0.0, 0.0)
+    found = minimised(misfit, x, 4)
+    assert found.value < misfit(x).value
+    assert misfit.possible(found.x)
+
+
+def test_a_soft_base_a_bending_link_and_a_hose_are_found_together(case):
+    found = case.posterior()
+    judged = Judged.of(case, found)
+    kinds = {name.split(" at ")[0] for name in judged.named}
+    assert {"soft_base", "bending_link", "local_resonator"} <= kinds
+    assert judged.rmse_percent < 0.3
+    assert judged.frac > 0.998
+    assert abs(judged.scale - 1) < 2.5 * judged.scale_sd < 0.1
+    assert isinstance(found, RobotPosterior)
+
+
+def test_what_was_found_is_recalled_as_it_was(case, prior):
+    tolerances = Tolerances.of(prior.repertoire.simulation.robot.config)
+    search = Search(prior, case.frfs[:1], case.q[:1], case.band_hz, tolerances)
+    found = search.found()
+    again = search.recalled(found.remembered)
+    np.testing.assert_array_equal(again.at.x, found.at.x)
+    assert again.structure.names == found.structure.names
+    assert again.evidence == pytest.approx(found.evidence, abs=0.1)
