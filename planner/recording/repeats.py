@@ -16,12 +16,17 @@ UNLIKE, FAR_BELOW, LIKE = 0.5, 0.3, 0.8
 MOST_TILT = 0.1  # rad: three times what a hand usually tilts by
 SAME = 0.95  # from which, in size too, two hits are of one axis: as like as hits of one pose are
 WHOLE = 0.5  # share of another axis' FRF that is no tilt: that axis was hit
+# ln of sizes by which repeats differ: hands and force levels by some 30 % at most. Chosen.
+OTHER_SIZE = np.log(2.0)
+# ln of what FRFs grow by where a file is in another unit than its repeats, and how near that is.
+UNITS = {-np.log(9.80665): "g instead of m/s²", np.log(4.44822): "lbf instead of N"}
+NEAR_UNIT = 0.1
 
 
 def screen_repeats(
     hits: tuple[Hit, ...], band_hz: tuple[float, float]
 ) -> tuple[tuple[Fault, ...], ...]:
-    """Per hit, whether its FRF disagrees with the others of its axis (wrong axis, incoherent).
+    """Per hit, whether its FRF disagrees with its axis' others (wrong axis, size, incoherent).
 
     Only hits at one point that the same sensors heard, sampled alike, are compared, and where three
     or more were made along an axis; a robust vote needs a majority. What a careful hand misses by
@@ -53,7 +58,12 @@ def _screen_alike(
         own = _Agreement(centre, tuple(across.values()))
         alike = np.array([own.of(frf) for frf in frfs[group]])
         typical = float(np.median(alike))
-        for i, share in zip(group.tolist(), alike, strict=True):
+        sizes = own.sizes(frfs[group])
+        for i, share, size in zip(group.tolist(), alike, sizes, strict=True):
+            if size and _outvoted(sizes):
+                text = f"It {other_size(size, 'its repeats')} Correct the file, or hit again."
+                faults[i] = (Fault("other_size", text),)
+                continue
             usual = share > UNLIKE or share > typical - FAR_BELOW
             if usual and not _struck(frfs[i], centre, across):
                 continue
@@ -76,18 +86,21 @@ class Doubt:
     """Why one of a few hits is wrong, and nothing tells which: a vote needs three along an axis.
 
     `others` are the hits it contradicts, by their places among all; with `along` they are of
-    that other axis and answer as it does, which hits of two axes do not.
+    that other axis and answer as it does, which hits of two axes do not. With a `size`, the ln of
+    how much larger it is, it differs from them in that alone.
     """
 
     others: tuple[int, ...]
     likeness: float
     along: str = ""
+    size: float = 0.0
 
 
 def doubts(hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> tuple[Doubt | None, ...]:
-    """Per hit, whether it contradicts the only other one of its axis, or repeats another axis'.
+    """Per hit, whether it contradicts the only other of its axis, or repeats another axis'.
 
-    Of two hits that disagree the one that answers as another axis does is doubted alone.
+    Of two hits that disagree the one that answers as another axis does is doubted alone. More may
+    differ in size, and no majority tells which is right.
     """
     found: list[Doubt | None] = [None] * len(hits)
     for own in _groups(hits):
@@ -116,7 +129,17 @@ class _Few:
         same = [int(j) for j in np.flatnonzero(self.axes == self.axes[i]) if j != i]
         if not same:
             return self._repeated(i)
-        return self._contradicted(i, same[0]) if len(same) == 1 else None
+        sized = self._sized(i, same)
+        return self._contradicted(i, same[0]) if len(same) == 1 and not sized else sized
+
+    def _sized(self, i: int, same: list[int]) -> Doubt | None:
+        own = self.frfs[[i, *same]]
+        agreement = _Agreement(_centre(own), tuple(self._across(i).values()))
+        sizes = agreement.sizes(own)
+        if not sizes[0] or _outvoted(sizes):
+            return None
+        other = tuple(j for j, size in zip(same, sizes[1:], strict=True) if size * sizes[0] <= 0)
+        return Doubt(other, agreement.of(own[0]), size=float(sizes[0]))
 
     def _across(self, i: int) -> dict[int, np.ndarray]:
         others = set(self.axes.tolist()) - {int(self.axes[i])}
@@ -171,10 +194,46 @@ class _Agreement:
 
     def of(self, frf: np.ndarray) -> float:
         """Likeness of an FRF, had it been tilted to the axis as far as hands tilt at most."""
+        return _likeness(self._upright(frf[None])[0], self.centre)
+
+    def sizes(self, frfs: np.ndarray) -> np.ndarray:
+        """ln of how much larger FRFs (n, N) are than half of all or more; 0 where no half differs.
+
+        Only of those that are alike otherwise: what moves modes is no unit.
+        """
+        upright = self._upright(frfs)
+        size, straight = (
+            np.log(np.maximum(np.linalg.norm(f, axis=1), SILENCE)) for f in (frfs, upright)
+        )
+        other = np.minimum(_apart(size), _apart(straight)) > OTHER_SIZE
+        odd = 2 * other.sum(axis=1) >= len(frfs)
+        odd &= [_likeness(frf, self.centre) > LIKE for frf in upright]
+        return np.array([
+            size[i] - np.median(size[other[i]]) if odd[i] else 0.0 for i in range(len(frfs))
+        ])  # fmt: skip
+
+    def _upright(self, frfs: np.ndarray) -> np.ndarray:
+        """FRFs (n, N) without what tilts of the hits explain."""
         if not self.across:
-            return _likeness(frf, self.centre)
-        off = untilted((frf - self.centre)[None], np.array(self.across))[0]
-        return _likeness(self.centre + off, self.centre)
+            return frfs
+        return self.centre + untilted(frfs - self.centre, np.array(self.across))
+
+
+def _apart(size: np.ndarray) -> np.ndarray:
+    """By how much each two (n, n) of (n,) differ."""
+    return np.abs(size[:, None] - size)
+
+
+def _outvoted(sizes: np.ndarray) -> bool:
+    """Whether most of three hits and more are of the usual size, so that the others are wrong."""
+    return len(sizes) > 2 and 2 * np.count_nonzero(sizes) < len(sizes)
+
+
+def other_size(size: float, others: str) -> str:
+    """What is said of a hit that is larger than `others`, by the ln of how much, and which unit."""
+    units = [unit for grown, unit in UNITS.items() if abs(size - grown) < NEAR_UNIT]
+    way, unit = "larger" if size > 0 else "smaller", "".join(units) or "another unit or sensitivity"
+    return f"is {np.exp(abs(size)):.2g} times {way} than {others}: {unit}?"
 
 
 def untilted(off: np.ndarray, across: np.ndarray) -> np.ndarray:

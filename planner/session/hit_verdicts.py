@@ -10,7 +10,14 @@ from planner.recording.force_levels import far_below, peak_n
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import version
 from planner.recording.records import Hit
-from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
+from planner.recording.repeats import (
+    SAME,
+    Doubt,
+    doubts,
+    likeness_to,
+    other_size,
+    screen_repeats,
+)
 from planner.recording.sampling_rates import sampled_otherwise
 from planner.session.table import FolderTable
 
@@ -226,6 +233,8 @@ def _weak(verdict: HitVerdict, usable: list[Hit], before: tuple[Hit, ...]) -> Hi
 
 def _asked(hit: Hit, doubt: Doubt, others: str) -> str:
     again = f"hit along {hit.axis[-1]} once more, that tells which is right"
+    if doubt.size:
+        return f"{other_size(doubt.size, others)} {again.capitalize()}"
     if doubt.along:
         return f"answers as {others} along {doubt.along} did: {again}"
     return f"disagrees with {others} (likeness {doubt.likeness:.2f}): {again}"
