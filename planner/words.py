@@ -2,6 +2,7 @@
 
 import math
 import shlex
+from collections.abc import Iterable
 from datetime import datetime
 from pathlib import Path
 
@@ -43,6 +44,15 @@ def short_name(path: str | Path, most: int = 24) -> str:
     name = Path(path).name
     begin = most // 3
     return name if len(name) <= most else f"{name[:begin]}…{name[begin + 1 - most :]}"
+
+
+def by_reason(files: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Of files and reasons: the first file of each reason with how many more have it."""
+    named: dict[str, list[str]] = {}
+    for file, reason in files:
+        named.setdefault(reason, []).append(file)
+    more = ((n, f" and {len(n) - 1} more" if len(n) > 1 else "") for n in named.values())
+    return [(f"{n[0]}{text}", why) for why, (n, text) in zip(named, more, strict=True)]
 
 
 def command(*words: object) -> str:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from planner.words import by_reason
+
 if TYPE_CHECKING:
     from planner.report.answer import Answer, RefusedFile
 
@@ -54,10 +56,10 @@ def warn(sentence: str) -> None:
 def refusals(files: "Iterable[RefusedFile]", questions: Iterable[str] = ()) -> int:
     """Say on stderr what was refused, and what is asked; the exit code that goes with it."""
     refused, asked = list(files), list(questions)
-    for file in refused:
+    for names, reason in by_reason((file.file, file.reason) for file in refused):
         # What is held is said once, with the question, not hit by hit.
-        if not any(question.startswith(file.reason) for question in asked):
-            warn(f"Refused {file.file}: {file.reason}")
+        if not any(question.startswith(reason) for question in asked):
+            warn(f"Refused {names}: {reason}")
     for question in asked:
         warn(question)
     return 3 if refused or asked else 0
