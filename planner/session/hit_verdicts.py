@@ -29,11 +29,12 @@ Part = tuple[Path, int]  # which of a file's hits, from 1
 
 @dataclass(frozen=True, eq=False)
 class HitVerdict:
-    """One hit that waits: `kind` is "good", "repeat", "unstated", "late" or "unsure".
+    """One hit that waits: `kind` is "good", "repeat", "unstated", "late", "elsewhere" or "unsure".
 
     Of one to be repeated `text` says why; nothing says along which axis an unstated one is. The
     `text` of a good one says what is to be known of it, if anything is. A late one answers as
-    another pose did, the one before as a rule, or was shown there: `came` names that pose. An
+    another pose did, the one before as a rule, or was shown there: `came` names that pose. One
+    from elsewhere is of that pose by its table, and imported there. An
     unsure one contradicts others, and nothing tells which is right. `axis`
     is "" where the file does not say it; `hits` is what of it can be used. `number` counts hits as
     they came to the pose. `weak`: it is to be repeated only because it is; an import would take it.
@@ -162,9 +163,12 @@ class Verdicts:
         late = [(v, at) for v in every if (at := came.get(v.path))]
         alike = [bool(self._alike(v, {at: hits.get(at, ())})) for v, at in late]
         return [
-            replace(v, kind="late", text="", came=at, alike=like)
+            replace(v, kind=self._came(v), text="", came=at, alike=like)
             for (v, at), like in zip(late, alike, strict=True)
         ]
+
+    def _came(self, verdict: HitVerdict) -> str:
+        return "late" if self.table.row(verdict.path) is None else "elsewhere"
 
     def _alike(self, verdict: HitVerdict, hits: Mapping[str, tuple[Hit, ...]]) -> str:
         """The pose of which hits are answered like one of these; "": none is."""
