@@ -226,7 +226,7 @@ def _apart(size: np.ndarray) -> np.ndarray:
 
 def _outvoted(sizes: np.ndarray) -> bool:
     """Whether most of three hits and more are of the usual size, so that the others are wrong."""
-    return len(sizes) > 2 and 2 * np.count_nonzero(sizes) < len(sizes)
+    return bool(len(sizes) > 2 and 2 * np.count_nonzero(sizes) < len(sizes))
 
 
 def other_size(size: float, others: str) -> str:
