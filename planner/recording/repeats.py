@@ -231,8 +231,12 @@ def _outvoted(sizes: np.ndarray) -> bool:
 
 def other_size(size: float, others: str) -> str:
     """What is said of a hit that is larger than `others`, by the ln of how much, and which unit."""
-    units = [unit for grown, unit in UNITS.items() if abs(size - grown) < NEAR_UNIT]
-    way, unit = "larger" if size > 0 else "smaller", "".join(units) or "another unit or sensitivity"
+    own = [unit for grown, unit in UNITS.items() if abs(size - grown) < NEAR_UNIT]
+    theirs = [f"those in {unit}" for grown, unit in UNITS.items() if abs(size + grown) < NEAR_UNIT]
+    way, unit = (
+        "larger" if size > 0 else "smaller",
+        "".join(own or theirs) or "another unit or sensitivity",
+    )
     return f"is {np.exp(abs(size)):.2g} times {way} than {others}: {unit}?"
 
 
