@@ -3,7 +3,8 @@
 from planner.campaign.events import Question
 from planner.dataset.measure import MeasuredPose
 from planner.recording.records import Hit
-from planner.recording.repeats import Doubt, doubts, other_size
+from planner.recording.repeat_sizes import other_size
+from planner.recording.repeats import Doubt, doubts
 
 
 def contradiction(pose: str, measured: MeasuredPose, known: int) -> Question | None:

@@ -7,6 +7,7 @@ import numpy as np
 from planner.recording.band_spectra import band_spectra
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.records import AXES, Fault, Hit
+from planner.recording.repeat_sizes import other_size, other_sizes, outvoted
 from planner.recording.sampling_rates import same_rate
 from planner.recording.screening import SILENCE
 
@@ -16,11 +17,6 @@ UNLIKE, FAR_BELOW, LIKE = 0.5, 0.3, 0.8
 MOST_TILT = 0.1  # rad: three times what a hand usually tilts by
 SAME = 0.95  # from which, in size too, two hits are of one axis: as like as hits of one pose are
 WHOLE = 0.5  # share of another axis' FRF that is no tilt: that axis was hit
-# ln of sizes by which repeats differ: hands and force levels by some 30 % at most. Chosen.
-OTHER_SIZE = np.log(2.0)
-# ln of what FRFs grow by where a file is in another unit than its repeats, and how near that is.
-UNITS = {-np.log(9.80665): "g instead of m/s²", np.log(4.44822): "lbf instead of N"}
-NEAR_UNIT = 0.1
 
 
 def screen_repeats(
@@ -60,7 +56,7 @@ def _screen_alike(
         typical = float(np.median(alike))
         sizes = own.sizes(frfs[group])
         for i, share, size in zip(group.tolist(), alike, sizes, strict=True):
-            if size and _outvoted(sizes):
+            if size and outvoted(sizes):
                 text = f"It {other_size(size, 'its repeats')} Correct the file, or hit again."
                 faults[i] = (Fault("other_size", text),)
                 continue
@@ -136,7 +132,7 @@ class _Few:
         own = self.frfs[[i, *same]]
         agreement = _Agreement(_centre(own), tuple(self._across(i).values()))
         sizes = agreement.sizes(own)
-        if not sizes[0] or _outvoted(sizes):
+        if not sizes[0] or outvoted(sizes):
             return None
         other = tuple(j for j, size in zip(same, sizes[1:], strict=True) if size * sizes[0] <= 0)
         return Doubt(other, agreement.of(own[0]), size=float(sizes[0]))
@@ -197,47 +193,16 @@ class _Agreement:
         return _likeness(self._upright(frf[None])[0], self.centre)
 
     def sizes(self, frfs: np.ndarray) -> np.ndarray:
-        """ln of how much larger FRFs (n, N) are than half of all or more; 0 where no half differs.
-
-        Only of those that are alike otherwise: what moves modes is no unit.
-        """
+        """As `other_sizes` of FRFs (n, N), where they are alike: what moves modes is no unit."""
         upright = self._upright(frfs)
-        size, straight = (
-            np.log(np.maximum(np.linalg.norm(f, axis=1), SILENCE)) for f in (frfs, upright)
-        )
-        other = np.minimum(_apart(size), _apart(straight)) > OTHER_SIZE
-        odd = 2 * other.sum(axis=1) >= len(frfs)
-        odd &= [_likeness(frf, self.centre) > LIKE for frf in upright]
-        return np.array([
-            size[i] - np.median(size[other[i]]) if odd[i] else 0.0 for i in range(len(frfs))
-        ])  # fmt: skip
+        alike = np.array([_likeness(frf, self.centre) > LIKE for frf in upright])
+        return np.where(alike, other_sizes(frfs, upright), 0.0)
 
     def _upright(self, frfs: np.ndarray) -> np.ndarray:
         """FRFs (n, N) without what tilts of the hits explain."""
         if not self.across:
             return frfs
         return self.centre + untilted(frfs - self.centre, np.array(self.across))
-
-
-def _apart(size: np.ndarray) -> np.ndarray:
-    """By how much each two (n, n) of (n,) differ."""
-    return np.abs(size[:, None] - size)
-
-
-def _outvoted(sizes: np.ndarray) -> bool:
-    """Whether most of three hits and more are of the usual size, so that the others are wrong."""
-    return bool(len(sizes) > 2 and 2 * np.count_nonzero(sizes) < len(sizes))
-
-
-def other_size(size: float, others: str) -> str:
-    """What is said of a hit that is larger than `others`, by the ln of how much, and which unit."""
-    own = [unit for grown, unit in UNITS.items() if abs(size - grown) < NEAR_UNIT]
-    theirs = [f"those in {unit}" for grown, unit in UNITS.items() if abs(size + grown) < NEAR_UNIT]
-    way, unit = (
-        "larger" if size > 0 else "smaller",
-        "".join(own or theirs) or "another unit or sensitivity",
-    )
-    return f"is {np.exp(abs(size)):.2g} times {way} than {others}: {unit}?"
 
 
 def untilted(off: np.ndarray, across: np.ndarray) -> np.ndarray:
