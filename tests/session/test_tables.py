@@ -98,6 +98,19 @@ def test_hits_of_another_pose_by_their_table_are_not_counted_here(cell):
     assert [m.pose for m in campaign.state.used] == ["X1"]
 
 
+def test_a_left_over_file_of_the_pose_before_is_left_out_alone(cell, tmp_path):
+    campaign, pose, made, inbox = cell
+    campaign.import_paths((made,))
+    second = campaign.next()[0]
+    truth = make_cell(tmp_path / "again")[2]
+    there = record(truth, inbox / "there", second.pose, second.joints_deg)
+    (left,) = (there / "data").glob("*z_3.uff")
+    shutil.copy(next((made / "data").glob("*z_1.uff")), left)
+    said = session(campaign, inbox, limit_s=6)
+    assert f"it was imported before as a recording of pose {pose.pose} and cannot" in said
+    assert [len(m.accepted) for m in campaign.state.used] == [9, 8]
+
+
 def test_an_angle_that_no_joint_reaches_is_said_at_once_and_read_again(cell):
     campaign, pose, made, inbox = cell
     right = (made / TABLE).read_text()
