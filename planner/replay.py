@@ -26,7 +26,7 @@ from planner.campaign.fit_memory import FitMemory
 from planner.campaign.log_conversion import from_modal
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
-from planner.campaign.state import CampaignState, Measurement, fold
+from planner.campaign.state import CampaignState, Measurement, fold, without
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.store import Store
 from planner.errors import InputError, NoPoseLeftError, PlannerError
@@ -131,7 +131,7 @@ def _check(
 def _check_import(
     campaign: Campaign, event: Imported, before: CampaignState, model: Model
 ) -> tuple[str, str, MeasuredPose]:
-    known = before.measurements.get(event.pose)
+    known = without(before.measurements.get(event.pose), event.replaced)
     hits = (*(known.accepted if known else ()), *event.hits)
     sources = tuple(map(campaign.recordings.source, hits))
     table = model.cell.config.modes

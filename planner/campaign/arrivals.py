@@ -4,6 +4,7 @@
 row, its place or its neighbours may have changed.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace as replaced
 from pathlib import Path
@@ -12,11 +13,14 @@ from msgspec.structs import replace
 
 from planner.campaign import store
 from planner.campaign.deliveries import Delivery
-from planner.campaign.events import REFUSED, HitRecord
-from planner.campaign.state import CampaignState
+from planner.campaign.events import REFUSED, HitRecord, Imported
+from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
+from planner.recording.joints import JointUnits
+from planner.words import command
 
+REPLACED = "replaced by a newer"
 Kept = tuple[Source, str, str]  # a file with its sha256 and suffix
 
 
@@ -58,12 +62,14 @@ def keep_files(
     """Keep the raw files; those in use at this pose are only named.
 
     A file that the engineer refused, or that was shown at another pose, is new only where it is
-    itself among the `named` paths or its table says so; one that cannot be read is left out.
-    Raises InputError for a recording that is in use at another pose.
+    itself among the `named` paths or its table says so; one that cannot be read is left out, as is
+    a recording that is in use at another pose. Raises InputError where all are.
     """
     owner = _owners(state)
+    known = state.measurements.get(delivery.pose)
+    withdrawn = _withdrawn(directory, known) if known is not None and known.withdrawn else ""
     fresh: list[Kept] = []
-    already, left_out = [], []
+    already, left_out, elsewhere = [], [], []
     seen: set[str] = set()
     for source in delivery.sources:
         try:
@@ -72,11 +78,17 @@ def keep_files(
             left_out.append(_left(source, "", str(error)))
             continue
         if owner.get(digest, delivery.pose) != delivery.pose:
-            raise InputError(
-                f"{source.path} was imported before as a recording of pose {owner[digest]}; "
-                f"it cannot belong to {delivery.pose} too."
+            reason = (
+                f"it was imported before as a recording of pose {owner[digest]} and cannot belong "
+                f"to {delivery.pose} too; delete it, or put the right file there"
             )
-        if reason := _reason_against(delivery, source, digest, source.path in named, state):
+            if len(delivery.sources) == 1 + len(elsewhere):
+                raise InputError(f"{source.path}: {reason}.")
+            elsewhere.append(_left(source, digest, reason))
+            continue
+        named_itself = source.path in named
+        reason = withdrawn or _reason_against(delivery, source, digest, named_itself, state)
+        if reason:
             left_out.append(_left(source, digest, reason))
         elif digest in owner or (digest in seen and not source.part):
             already.append(source.name)
@@ -85,7 +97,44 @@ def keep_files(
             digest, suffix = store.store_recording(directory, source.path)
             kept = replaced(source, path=store.recording_path(directory, digest, suffix))
             fresh += [(part, digest, suffix) for part in kept.parts()]
-    return KeptFiles(tuple(fresh), tuple(already), tuple(left_out))
+    return KeptFiles(tuple(fresh), tuple(already), (*left_out, *elsewhere))
+
+
+def _withdrawn(directory: Path, known: Measurement) -> str:
+    """How to get the hits of a withdrawn pose back."""
+    again = command("planner", "confirm", directory, known.pose)
+    return (
+        f"{known.pose} was withdrawn; to use its hits again: {again}; else give the new "
+        f"measurement another name"
+    )
+
+
+@dataclass(frozen=True)
+class Superseded:
+    """An earlier hit that a newer file takes the place of, and why."""
+
+    hit: HitRecord
+    why: str
+
+
+def superseded(before: Sequence[HitRecord], sources: Sequence[Source]) -> tuple[Superseded, ...]:
+    """Which hits of a pose newer files take the place of.
+
+    Those written over, and those of the same name for the same axis and repeat of a table.
+    """
+    found = []
+    for hit in before:
+        name = hit.file.rpartition(" (hit ")[0] if hit.part else hit.file
+        for source in sources:
+            same = Path(source.whole_name).name == Path(name).name
+            if source.hit is None or source.repeat is None:
+                same = source.whole_name == name
+            elif (source.hit, source.repeat) != (hit.hit, hit.repeat):
+                same = False
+            if same:
+                found.append(Superseded(hit, f"{REPLACED} {Path(name).name}"))
+                break
+    return tuple(found)
 
 
 def stated_otherwise(source: Source, record: HitRecord) -> bool:
@@ -95,20 +144,23 @@ def stated_otherwise(source: Source, record: HitRecord) -> bool:
     return points != known or (source.hit is not None and source.hit != (record.hit or ""))
 
 
-def let_go(
-    delivery: Delivery, hits: tuple[HitRecord, ...], held_at: str
-) -> tuple[HitRecord, ...] | None:
+def let_go(delivery: Delivery, held: Imported, joints: JointUnits) -> tuple[HitRecord, ...] | None:
     """Files of a held import that a delivery brings anew, to be judged again; None: it does not.
 
-    It does where a table says something else of one of them, or where all are said to be of
-    another pose. Those given are the held `hits` that the delivery lacks.
+    It does where a table says something else of one of them, or of the pose's joints, where one has
+    other content now, or where all are said to be of another pose. Those given are the held hits
+    that the delivery lacks.
     """
     brought = {_digest(source): source for source in delivery.sources}
-    lacking = [hit for hit in hits if hit.sha256 not in brought]
-    if delivery.pose != held_at:
+    lacking = [hit for hit in held.hits if hit.sha256 not in brought]
+    if delivery.pose != held.pose:
         return () if delivery.said and not lacking else None
-    both = ((brought[hit.sha256], hit) for hit in hits if hit.sha256 in brought)
-    return tuple(lacking) if any(stated_otherwise(*one) for one in both) else None
+    both = ((brought[hit.sha256], hit) for hit in held.hits if hit.sha256 in brought)
+    gone = [one.hit for one in superseded(lacking, delivery.sources)]
+    stood = delivery.joints_deg
+    moved = stood is not None and joints.apart(held.joints_deg, stood)
+    anew = gone or moved or any(stated_otherwise(*one) for one in both)
+    return tuple(hit for hit in lacking if hit not in gone) if anew else None
 
 
 def still_refused(
@@ -134,9 +186,10 @@ def _hit_of(hit: HitRecord) -> tuple[str, int]:
 
 
 def _owners(state: CampaignState) -> dict[str, str]:
-    """Poses of all that is in use, was until its pose was withdrawn, or is held, by sha256."""
+    """Poses of all that is in use, or is held, by sha256."""
     held = {h.sha256: pose for pose, m in state.held.items() for h in m.hits}
-    return held | {h.sha256: m.pose for m in state.measurements.values() for h in m.accepted}
+    used = (m for m in state.measurements.values() if not m.withdrawn)
+    return held | {h.sha256: m.pose for m in used for h in m.accepted}
 
 
 def _digest(source: Source) -> str:
@@ -157,8 +210,11 @@ def _reason_against(
     """Why a file is not imported; empty: it is, or it is in use."""
     pose, known = delivery.pose, state.measurements.get(delivery.pose)
     held = state.held.get(pose)
-    if known is not None and any(h.sha256 == digest for h in known.accepted):
-        return f"it is of {pose}, which was withdrawn" if known.withdrawn else ""
+    before = [h for h in (known.hits if known else ()) if h.sha256 == digest]
+    if any(hit.accepted for hit in before):
+        return ""
+    if not named and (gone := [hit.reason for hit in before if hit.reason.startswith(REPLACED)]):
+        return f"{gone[0]}; to use it again, name the file itself"
     if held is not None:
         if any(hit.sha256 == digest for hit in held.hits):
             return ""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from planner.campaign.chain_question import chain_question
 from planner.campaign.events import MeasuredMode, Question
 from planner.campaign.model import Model
-from planner.campaign.question import question
+from planner.campaign.question import question, repeated
 from planner.campaign.readback import readback_question
 from planner.campaign.state import CampaignState
 from planner.frf.frf import Frf
@@ -22,7 +22,7 @@ class NewHits:
 
 
 def asked_of(model: Model, state: CampaignState, new: NewHits) -> Question | None:
-    """The chain first: what it gets wrong looks like another pose, too.
+    """Whether the robot has moved at all, then the chain: its faults look like another pose, too.
 
     `model` and `state` are those before the import; None: nothing is asked.
     """
@@ -31,7 +31,8 @@ def asked_of(model: Model, state: CampaignState, new: NewHits) -> Question | Non
     if known is not None and known.question is not None:  # answered
         return None
     return (
-        chain_question(model, state, *said, new.frf)
+        repeated(model, *said, new.modes)
+        or chain_question(model, state, *said, new.frf)
         or readback_question(model, state, *said, new.modes)
         or question(model, state, *said, new.modes)
     )

@@ -132,9 +132,11 @@ class Campaign(CampaignReads):
                 self._append(Refused(pose, hits))
 
     def confirm(self, pose: str) -> None:
-        """The held hits of a pose are from there indeed: the model uses them."""
+        """Held hits are from their pose indeed, or those of a withdrawn one good: they are used."""
         with self._acting():
-            self._held(pose)
+            known = self.state.measurements.get(pose)
+            if known is None or not known.withdrawn:
+                self._held(pose)
             self._append(Confirmed(pose))
 
     def move(self, pose: str, other: str) -> "ImportReport":
@@ -276,7 +278,7 @@ class Campaign(CampaignReads):
 
         for held_at in tuple(self.state.held):
             entry, event = self._held(held_at)
-            lacking = let_go(delivery, event.hits, held_at)
+            lacking = let_go(delivery, event, self.cell.robot.joints)
             if lacking is not None:
                 self._append(Undone(entry.seq))
                 more = tuple(self.source_of(hit) for hit in lacking)
@@ -307,8 +309,8 @@ class Campaign(CampaignReads):
         before, state, pose = self.model, self.state, delivery.pose
         known = state.hit_at(pose)
         kept = keep_files(self.directory, delivery, state, named)
-        old, table = self.recordings.sources(known) if known else (), self.cell.config.modes
-        judged = JudgedFiles.of(pose, state, old, kept.fresh, table) if kept.fresh else None
+        table, keeps = self.cell.config.modes, self.recordings
+        judged = JudgedFiles.of(pose, state, keeps, kept.fresh, table) if kept.fresh else None
         left_out = (*kept.left_out, *(judged.still if judged else ()))
         if judged is None or not judged.fresh:
             held, known = state.held.get(pose), state.measurements.get(pose)
@@ -316,10 +318,11 @@ class Campaign(CampaignReads):
                 pose, (), (), kept.already, held or known, None, before, before, 0.0,
                 left_out=left_out, question=held.question if held else None,
             )  # fmt: skip
-        fresh, hits, measured = judged.fresh, judged.hits, judged.measured
+        fresh, hits, measured, old = judged.fresh, judged.hits, judged.measured, judged.old
         joints_deg, stood = known.joints_deg if known else joints_deg, joints_deg
         alone = measured
-        if old:  # among earlier hits, wrong ones would not stand out
+        # Among earlier hits, wrong ones would not stand out; one that was replaced is no new visit.
+        if old and not judged.superseded:
             alone = measure_files((), fresh, table)[1]
         modes, new_modes = from_modal(measured.modal), from_modal(alone.modal)
         new = NewHits(pose, joints_deg, alone.frf, new_modes)
@@ -334,6 +337,7 @@ class Campaign(CampaignReads):
             amplitude=from_homogeneity(measured.homogeneity),
             question=asked,
             again=drift.again if drift else "",
+            replaced=tuple((one.hit.sha256, one.why) for one in judged.superseded),
         )
         told = alerts(before, state, event, measured, new_modes, drift)
         self._append(event)
@@ -341,7 +345,7 @@ class Campaign(CampaignReads):
         # Beside new hits earlier ones may look wrong; they stay accepted all the same.
         agreed = all(verdict.accepted for verdict in measured.verdicts[: len(old)])
         if measured.frf is not None and agreed:
-            self.recordings.keep_frf(measured.frf, measurement, table)
+            keeps.keep_frf(measured.frf, measurement, table)
         model = self.model
         return ImportReport(
             pose=pose,
@@ -357,6 +361,7 @@ class Campaign(CampaignReads):
                 *hits_of_files(measured.verdicts[len(old) :]),
                 *measured.remarks,
                 *told,
+                *(f"{one.hit.file} is set aside, {one.why}." for one in judged.superseded),
                 *taken_after_all(state, fresh),
                 *displacement(self.cell.robot.joints, state, delivery, stood),
                 *lacking(state, measurement),

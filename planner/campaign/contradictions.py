@@ -3,6 +3,7 @@
 from planner.campaign.events import Question
 from planner.dataset.measure import MeasuredPose
 from planner.recording.records import Hit
+from planner.recording.repeat_sizes import other_size
 from planner.recording.repeats import Doubt, doubts
 
 
@@ -40,6 +41,8 @@ def contradiction(pose: str, measured: MeasuredPose, known: int) -> Question | N
 
 def _told(hit: Hit, doubt: Doubt, names: tuple[str, ...], both_doubted: bool) -> str:
     first, others = names[0], " and ".join(names[1:])
+    if doubt.size:
+        return f"{first}, along {hit.axis[-1]}, {other_size(doubt.size, others).rstrip('?')}"
     if doubt.along:
         return f"{first} is said to be {hit.axis}, but answers as {others} along {doubt.along} did"
     said = f"(likeness {doubt.likeness:.2f})"

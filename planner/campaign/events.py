@@ -131,7 +131,8 @@ class Imported(Event, frozen=True, tag="imported"):
     """Hits at one pose were imported; `modes` are those of all its accepted hits so far.
 
     With a `question` they are held: not used until a Confirmed follows. `again` names the measured
-    pose that is to be hit again, where these hits hint at drift.
+    pose that is to be hit again, where these hits hint at drift. `replaced` are earlier files of
+    the pose (sha256) that newer ones of these take the place of, and why.
     """
 
     pose: str
@@ -142,6 +143,7 @@ class Imported(Event, frozen=True, tag="imported"):
     amplitude: Amplitude | None = None  # null: all hits of one strength
     question: Question | None = None
     again: str = ""
+    replaced: tuple[tuple[str, str], ...] = ()
 
     @property
     def unhit(self) -> bool:
@@ -150,7 +152,7 @@ class Imported(Event, frozen=True, tag="imported"):
 
 
 class Confirmed(Event, frozen=True, tag="confirmed"):
-    """The engineer said that held hits are from the pose that they are said to be from."""
+    """The engineer said that held hits, or those of a withdrawn pose, are to be used."""
 
     pose: str
 

@@ -9,12 +9,13 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from planner.campaign import store
-from planner.campaign.arrivals import Kept, still_refused, without
+from planner.campaign.arrivals import Kept, Superseded, still_refused, superseded, without
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.deliveries import Delivery
 from planner.campaign.events import REFUSED, HitRecord, Question
 from planner.campaign.hit_habits import HitMiss, misses_of
+from planner.campaign.kept_recordings import KeptRecordings
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose, measure
@@ -55,9 +56,9 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
 
     Raises InputError where they are not known or contradict each other.
     """
-    known = state.hit_at(delivery.pose) or state.held.get(delivery.pose)
+    known = state.hit_at(delivery.pose)
     if delivery.joints_deg is None:
-        stated = known or state.proposals.get(delivery.pose)
+        stated = known or state.held.get(delivery.pose) or state.proposals.get(delivery.pose)
         if stated is None:
             raise InputError(
                 f"No joint angles are known for pose {delivery.pose}; give recordings.csv columns "
@@ -70,7 +71,8 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
         if off:
             raise InputError(
                 f"{delivery.row}: pose {delivery.pose} was imported before with a joint {off} "
-                f"away; give the new measurement another name."
+                f"away; if that was typed wrong, take its import back first (planner undo); else "
+                f"give the new measurement another name."
             )
     return delivery.joints_deg
 
@@ -117,29 +119,44 @@ def taken_after_all(state: CampaignState, fresh: tuple[Kept, ...]) -> tuple[str,
 
 @dataclass(frozen=True, eq=False)
 class JudgedFiles:
-    """New files of a pose, judged; `still` are those refused as before, which nothing rests on."""
+    """New files of a pose, judged; `still` are those refused as before, which nothing rests on.
+
+    `old` are the earlier ones beside which they stand, without those `superseded` by good new ones.
+    """
 
     fresh: tuple[Kept, ...]
     hits: tuple[HitRecord, ...]
     measured: MeasuredPose
     still: tuple[HitRecord, ...]
+    old: tuple[Source, ...]
+    superseded: tuple[Superseded, ...]
 
     @classmethod
     def of(
         cls,
         pose: str,
         state: CampaignState,
-        old: tuple[Source, ...],
+        kept: KeptRecordings,
         fresh: tuple[Kept, ...],
         table: ModesTable,
     ) -> "JudgedFiles":
         """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
-        hits, measured = measure_files(old, fresh, table)
+        known = state.hit_at(pose)
+        before = known.accepted if known else ()
+        newer, hits = [source for source, _, _ in fresh], ()
+        while True:
+            gone = superseded(before, newer)
+            old = tuple(kept.source(hit) for hit in before if hit not in [one.hit for one in gone])
+            hits, measured = measure_files(old, fresh, table)
+            good = [s for (s, _, _), hit in zip(fresh, hits, strict=True) if hit.accepted]
+            if superseded(before, good) == gone:
+                break
+            newer = [source for source in newer if source in good]
         still = still_refused(hits, pose, state)
         left = without(fresh, still)
         if still and left:
-            return replaced(cls.of(pose, state, old, left, table), still=still)
-        return cls(left, hits if left else (), measured, still)
+            return replaced(cls.of(pose, state, kept, left, table), still=still)
+        return cls(left, hits if left else (), measured, still, old, gone)
 
 
 def measure_files(

@@ -173,8 +173,6 @@ def question(
     if not model.labelled or not any(m.likely for m in modes):
         return None
     here, sure = compared(model, joints_deg, modes), model.low.taught
-    if measured := _measured_elsewhere(model, pose, joints_deg, modes):
-        return _asked(pose, here, measured, repeated=True)
     few = len(model.labelled) < LEAST
     if few:
         here = replace(here, otherwise=np.full_like(here.otherwise, np.nan))
@@ -193,6 +191,17 @@ def question(
     fitting = {name: c.log_density for name, c in elsewhere if c.fits}
     fits = max(fitting, key=lambda name: fitting[name]) if fitting else ""
     return _asked(pose, here, fits)
+
+
+def repeated(
+    model: Model, pose: str, joints_deg: tuple[float, ...], modes: tuple[MeasuredMode, ...]
+) -> Question | None:
+    """The same, of hits that are those of another measured pose: no chain makes them so."""
+    if not model.labelled or not any(m.likely for m in modes):
+        return None
+    measured = _measured_elsewhere(model, pose, joints_deg, modes)
+    here = compared(model, joints_deg, modes)
+    return _asked(pose, here, measured, repeated=True) if measured else None
 
 
 def _measured_elsewhere(

@@ -40,6 +40,7 @@ def readback_question(
     )
     text = (
         f"These hits fit the setpoint of {pose} better than its readback, where mode {k + 1} is "
-        f"{percent:+.1f} % off: is {which}? Is the readback right as it is?"
+        f"{percent:+.1f} % off: is {which}? If it was typed wrong, correct recordings.csv and "
+        f"import again. Is the readback right as it is?"
     )
     return Question(text, k + 1, float(far[k]), percent, about="readback")

@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
+import msgspec
+
 from planner.campaign.events import (
     Amplitude,
     AnyEvent,
@@ -171,7 +173,8 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
             return _imported(state, changed, event, entry)
         case Confirmed():
             held = {pose: m for pose, m in state.held.items() if pose != event.pose}
-            measurements = {**state.measurements, event.pose: state.held[event.pose]}
+            known = state.held.get(event.pose) or state.measurements[event.pose]
+            measurements = {**state.measurements, event.pose: replace(known, withdrawn=False)}
             return replace(changed, measurements=measurements, held=held)
         case Refused():
             hits = {hit.sha256: (event.pose, hit) for hit in event.hits}
@@ -199,7 +202,7 @@ def _imported(
     state: CampaignState, changed: CampaignState, event: Imported, entry: Entry
 ) -> CampaignState:
     came = {hit.sha256 for hit in event.hits}
-    before = _judged_before(state, came).get(event.pose)
+    before = without(_judged_before(state, came).get(event.pose), event.replaced)
     measurement = Measurement(
         pose=event.pose,
         joints_deg=event.joints_deg,
@@ -222,6 +225,19 @@ def _imported(
         return replace(state, refused=refused, measurements=measurements)
     doubt = (event.again, event.pose) if event.again else _doubt(state, event.pose)
     return replace(changed, open=left, refused=refused, measurements=measurements, doubt=doubt)
+
+
+def without(known: Measurement | None, replaced: Sequence[tuple[str, str]]) -> Measurement | None:
+    """A measurement without files that newer ones take the place of: by sha256, and why."""
+    if known is None or not replaced:
+        return known
+    why = dict(replaced)
+    hits = tuple(
+        hit if hit.sha256 not in why
+        else msgspec.structs.replace(hit, accepted=False, reason=why[hit.sha256])
+        for hit in known.hits
+    )  # fmt: skip
+    return replace(known, hits=hits)
 
 
 def _judged_before(state: CampaignState, came: set[str]) -> dict[str, Measurement]:

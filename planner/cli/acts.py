@@ -21,6 +21,8 @@ def confirm(
 ) -> int:
     """Use the held hits of a pose: they are from there indeed, or from another pose.
 
+    Those of a withdrawn pose are used again.
+
     Example: planner confirm cell7 P014 --at P009
     """
     from planner.campaign.campaign import Campaign

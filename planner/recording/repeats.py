@@ -7,6 +7,7 @@ import numpy as np
 from planner.recording.band_spectra import band_spectra
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.records import AXES, Fault, Hit
+from planner.recording.repeat_sizes import other_size, other_sizes, outvoted
 from planner.recording.sampling_rates import same_rate
 from planner.recording.screening import SILENCE
 
@@ -21,7 +22,7 @@ WHOLE = 0.5  # share of another axis' FRF that is no tilt: that axis was hit
 def screen_repeats(
     hits: tuple[Hit, ...], band_hz: tuple[float, float]
 ) -> tuple[tuple[Fault, ...], ...]:
-    """Per hit, whether its FRF disagrees with the others of its axis (wrong axis, incoherent).
+    """Per hit, whether its FRF disagrees with its axis' others (wrong axis, size, incoherent).
 
     Only hits at one point that the same sensors heard, sampled alike, are compared, and where three
     or more were made along an axis; a robust vote needs a majority. What a careful hand misses by
@@ -53,7 +54,12 @@ def _screen_alike(
         own = _Agreement(centre, tuple(across.values()))
         alike = np.array([own.of(frf) for frf in frfs[group]])
         typical = float(np.median(alike))
-        for i, share in zip(group.tolist(), alike, strict=True):
+        sizes = own.sizes(frfs[group])
+        for i, share, size in zip(group.tolist(), alike, sizes, strict=True):
+            if size and outvoted(sizes):
+                text = f"It {other_size(size, 'its repeats')} Correct the file, or hit again."
+                faults[i] = (Fault("other_size", text),)
+                continue
             usual = share > UNLIKE or share > typical - FAR_BELOW
             if usual and not _struck(frfs[i], centre, across):
                 continue
@@ -76,18 +82,21 @@ class Doubt:
     """Why one of a few hits is wrong, and nothing tells which: a vote needs three along an axis.
 
     `others` are the hits it contradicts, by their places among all; with `along` they are of
-    that other axis and answer as it does, which hits of two axes do not.
+    that other axis and answer as it does, which hits of two axes do not. With a `size`, the ln of
+    how much larger it is, it differs from them in that alone.
     """
 
     others: tuple[int, ...]
     likeness: float
     along: str = ""
+    size: float = 0.0
 
 
 def doubts(hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> tuple[Doubt | None, ...]:
-    """Per hit, whether it contradicts the only other one of its axis, or repeats another axis'.
+    """Per hit, whether it contradicts the only other of its axis, or repeats another axis'.
 
-    Of two hits that disagree the one that answers as another axis does is doubted alone.
+    Of two hits that disagree the one that answers as another axis does is doubted alone. More may
+    differ in size, and no majority tells which is right.
     """
     found: list[Doubt | None] = [None] * len(hits)
     for own in _groups(hits):
@@ -116,7 +125,17 @@ class _Few:
         same = [int(j) for j in np.flatnonzero(self.axes == self.axes[i]) if j != i]
         if not same:
             return self._repeated(i)
-        return self._contradicted(i, same[0]) if len(same) == 1 else None
+        sized = self._sized(i, same)
+        return self._contradicted(i, same[0]) if len(same) == 1 and not sized else sized
+
+    def _sized(self, i: int, same: list[int]) -> Doubt | None:
+        own = self.frfs[[i, *same]]
+        agreement = _Agreement(_centre(own), tuple(self._across(i).values()))
+        sizes = agreement.sizes(own)
+        if not sizes[0] or outvoted(sizes):
+            return None
+        other = tuple(j for j, size in zip(same, sizes[1:], strict=True) if size * sizes[0] <= 0)
+        return Doubt(other, agreement.of(own[0]), size=float(sizes[0]))
 
     def _across(self, i: int) -> dict[int, np.ndarray]:
         others = set(self.axes.tolist()) - {int(self.axes[i])}
@@ -171,10 +190,19 @@ class _Agreement:
 
     def of(self, frf: np.ndarray) -> float:
         """Likeness of an FRF, had it been tilted to the axis as far as hands tilt at most."""
+        return _likeness(self._upright(frf[None])[0], self.centre)
+
+    def sizes(self, frfs: np.ndarray) -> np.ndarray:
+        """As `other_sizes` of FRFs (n, N), where they are alike: what moves modes is no unit."""
+        upright = self._upright(frfs)
+        alike = np.array([_likeness(frf, self.centre) > LIKE for frf in upright])
+        return np.where(alike, other_sizes(frfs, upright), 0.0)
+
+    def _upright(self, frfs: np.ndarray) -> np.ndarray:
+        """FRFs (n, N) without what tilts of the hits explain."""
         if not self.across:
-            return _likeness(frf, self.centre)
-        off = untilted((frf - self.centre)[None], np.array(self.across))[0]
-        return _likeness(self.centre + off, self.centre)
+            return frfs
+        return self.centre + untilted(frfs - self.centre, np.array(self.across))
 
 
 def untilted(off: np.ndarray, across: np.ndarray) -> np.ndarray:

@@ -162,7 +162,10 @@ class WithdrawnPose(Answer):
 
     def text(self) -> str:
         """One sentence."""
-        return f"Pose {self.withdrawn} is set aside; its recordings are kept."
+        return (
+            f"Pose {self.withdrawn} is set aside; its recordings are kept: planner confirm uses "
+            f"them again."
+        )
 
 
 @dataclass(frozen=True)

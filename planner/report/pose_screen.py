@@ -18,7 +18,7 @@ from planner.report.text import with_sd
 WIDTH, HEIGHT = 80, 22  # of the smallest terminal, less a line for work and the cursor's
 LAST = 4  # verdicts that are shown
 COLOURS = {"good": "bold green", "repeat": "bold red", "late": "bold yellow",
-           "unsure": "bold yellow", "unstated": "bold yellow"}  # fmt: skip
+           "elsewhere": "yellow", "unsure": "bold yellow", "unstated": "bold yellow"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class JudgedHit:
         named = f"{self.number} ({axis})"
         said = {
             "repeat": f"REPEAT HIT {named}:", "late": f"hit {named}, late?",
-            "unsure": f"hit {named}, right?",
+            "unsure": f"hit {named}, right?", "elsewhere": f"hit {named}, not from here:",
             "unstated": f"hit {self.number}{self.when}, along which axis?",
         }  # fmt: skip
         return Text(f"{said[self.kind]} {text}", style=COLOURS[self.kind])
@@ -198,7 +198,7 @@ def _unfinished(name: str, said: str) -> Said:
     do, why = remedy_first(said)
     if not why:
         return Said([None, _said(f"not whole yet: {said}", "dim")], 5)
-    short = f"cannot be read: {name}: {do}"
+    short = f"cannot be used: {name}: {do}"
     return Said([None, _said(short, "dim"), _said(f"{short} {why}", "dim")], 5)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from rich.text import Text
 
 from planner.campaign.events import (
+    REFUSED,
     Confirmed,
     FilesPlaced,
     Imported,
@@ -28,7 +29,7 @@ from planner.session.course import BAD, Course, PoseInProgress
 from planner.session.page import TakingBack, page_with_hits, page_without_hits
 from planner.session.skipping import ask_why, on_reason_key
 from planner.session.station import Station
-from planner.words import counted
+from planner.words import by_reason, counted, short_name
 
 ENTER = ("a", "\n", "\r")
 IMPORTING = "importing and refitting"
@@ -181,8 +182,12 @@ def import_waiting(
     for report in reports:
         if report.question is not None and report.question.disagree and course.here:
             return _right(station, course, report)
-        left = {station.mark(Path(hit.file), hit.sha256) for hit in report.left_out}
-        course = replace(course, aside=course.aside | left)
+        left = {hit: station.mark(Path(hit.file), hit.sha256) for hit in report.left_out}
+        new = [hit for hit, mark in left.items() if mark not in course.aside]
+        told = ((short_name(h.file), h.reason) for h in new if not h.reason.startswith(REFUSED))
+        for one in by_reason(told):
+            station.say(f"Left out: {one.rstrip('.')}.", "yellow")
+        course = replace(course, aside=course.aside | set(left.values()))
         course = _imported(station, course, report)
     if not any(report.measurement and report.measurement.modes for report in reports):
         station.teller.tell()

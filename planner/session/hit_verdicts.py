@@ -10,6 +10,7 @@ from planner.recording.force_levels import far_below, peak_n
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import version
 from planner.recording.records import Hit
+from planner.recording.repeat_sizes import other_size
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
 from planner.recording.sampling_rates import sampled_otherwise
 from planner.session.table import FolderTable
@@ -22,11 +23,12 @@ Part = tuple[Path, int]  # which of a file's hits, from 1
 
 @dataclass(frozen=True, eq=False)
 class HitVerdict:
-    """One hit that waits: `kind` is "good", "repeat", "unstated", "late" or "unsure".
+    """One hit that waits: `kind` is "good", "repeat", "unstated", "late", "elsewhere" or "unsure".
 
     Of one to be repeated `text` says why; nothing says along which axis an unstated one is. The
     `text` of a good one says what is to be known of it, if anything is. A late one answers as
-    another pose did, the one before as a rule, or was shown there: `came` names that pose. An
+    another pose did, the one before as a rule, or was shown there: `came` names that pose. One
+    from elsewhere is of that pose by its table, and imported there. An
     unsure one contradicts others, and nothing tells which is right. `axis`
     is "" where the file does not say it; `hits` is what of it can be used. `number` counts hits as
     they came to the pose. `weak`: it is to be repeated only because it is; an import would take it.
@@ -155,9 +157,12 @@ class Verdicts:
         late = [(v, at) for v in every if (at := came.get(v.path))]
         alike = [bool(self._alike(v, {at: hits.get(at, ())})) for v, at in late]
         return [
-            replace(v, kind="late", text="", came=at, alike=like)
+            replace(v, kind=self._came(v), text="", came=at, alike=like)
             for (v, at), like in zip(late, alike, strict=True)
         ]
+
+    def _came(self, verdict: HitVerdict) -> str:
+        return "late" if self.table.row(verdict.path) is None else "elsewhere"
 
     def _alike(self, verdict: HitVerdict, hits: Mapping[str, tuple[Hit, ...]]) -> str:
         """The pose of which hits are answered like one of these; "": none is."""
@@ -226,6 +231,8 @@ def _weak(verdict: HitVerdict, usable: list[Hit], before: tuple[Hit, ...]) -> Hi
 
 def _asked(hit: Hit, doubt: Doubt, others: str) -> str:
     again = f"hit along {hit.axis[-1]} once more, that tells which is right"
+    if doubt.size:
+        return f"{other_size(doubt.size, others)} {again.capitalize()}"
     if doubt.along:
         return f"answers as {others} along {doubt.along} did: {again}"
     return f"disagrees with {others} (likeness {doubt.likeness:.2f}): {again}"

@@ -66,6 +66,8 @@ def _judged(verdict: HitVerdict, names: Sequence[str]) -> JudgedHit:
     said = f"answers as {verdict.came} did" if verdict.alike else f"came at {verdict.came}"
     late = f"{said}: [b] it is from there, [h] from here"
     text = late if verdict.kind == "late" else verdict.text
+    if verdict.kind == "elsewhere":
+        text = f"of {verdict.came} by recordings.csv, goes there with [a]"
     if verdict.kind == "unsure":
         text = f"{text}, or [h]: it is right"
     for name in names:
@@ -87,8 +89,9 @@ def _streams(verdicts: Sequence[HitVerdict]) -> tuple[str, ...]:
 
 def _keys(page: PosePage, late: set[str], can: TakingBack) -> str:
     kinds = {hit.kind for hit in page.hits}
+    usable = bool(kinds & {"good", "elsewhere"})
     return keys_that_do([
-        ("a", "accept" if page.complete else "accept as it is", "good" in kinds),
+        ("a", "accept" if page.complete else "accept as it is", usable),
         ("r", "refuse bad hits", bool(kinds & {*BAD})),
         ("R", "refuse all", bool(page.hits)),
         ("b", f"late ones to {' and '.join(sorted(late))}", "late" in kinds),

@@ -84,7 +84,7 @@ def watch(
         cell, started = campaign.cell, time.monotonic()
         verdicts = Verdicts(
             cell.config.modes.band_hz, cell.robot.points,
-            FolderTable(folder, cell.robot.joints, cell.robot.points),
+            FolderTable(folder, cell.robot.joints, cell.robot.points, cell.check_pose),
         )  # fmt: skip
         inbox = Inbox(folder, quiet_s, verdicts.unfit)
         return _run(Station(
@@ -168,7 +168,8 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
 
 def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInProgress:
     """The visit with what the folder holds now; what changed is drawn, and rung for."""
-    station.verdicts.table.follow()
+    for table in station.verdicts.table.follow():
+        station.say(f"{table.parent.name}/{table.name} was read again and is right now.", "green")
     whole, waiting = station.inbox.scan(lambda path, digest: station.known(path, digest, course))
     waiting += station.verdicts.table.waiting
     for path in station.inbox.ignored():
@@ -205,7 +206,8 @@ def _shown(
     pose, known = visit.proposal.pose, station.campaign.state.shown
     digests = {path: station.inbox.digest(path) for path in whole}
     shown = {path: known[digest] for path, digest in digests.items() if digest in known}
-    shown |= {path: pose for path in whole if station.verdicts.table.row(path) is not None}
+    rows = ((path, station.verdicts.table.row(path)) for path in whole)
+    shown |= {path: row.pose for path, row in rows if row is not None}
     verdicts = station.verdicts.of(whole, visit.before, here, numbers, shown, pose)
     new: dict[str, dict[str, None]] = {}
     for verdict in verdicts:

@@ -5,10 +5,11 @@ import csv
 import numpy as np
 import pytest
 
+from planner.campaign.asking import NewHits, asked_of
 from planner.campaign.campaign import Campaign
 from planner.campaign.log_conversion import from_modal
 from planner.campaign.question import question
-from planner.dataset.measure import measure
+from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from tests.support.generated_arms import BAND_HZ, Arm, make_generated_arm
@@ -29,6 +30,11 @@ def measured(arm: Arm, folder, poses: int = 3) -> Campaign:
 
 def modes_at(arm: Arm, folder, q: np.ndarray) -> list:
     """Modes by the hits at each of the poses q (n, dof) in rad."""
+    return [from_modal(one.modal) for one in measured_at(arm, folder, q)]
+
+
+def measured_at(arm: Arm, folder, q: np.ndarray) -> list[MeasuredPose]:
+    """What the hits at each of the poses q (n, dof) in rad give."""
     made = arm.record(folder / "others", [(f"W{i}", row) for i, row in enumerate(q)], 9)
     with open(made / TABLE, newline="") as file:
         rows = list(csv.DictReader(file))
@@ -37,7 +43,7 @@ def modes_at(arm: Arm, folder, q: np.ndarray) -> list:
                        for r in rows if r["pose"] == f"W{i}")
         for i in range(len(q))
     }  # fmt: skip
-    return [from_modal(measure(own, BAND_HZ).modal) for own in sources.values()]
+    return [measure(own, BAND_HZ) for own in sources.values()]
 
 
 def judged(folder, seed: int, joints: int, modes: int) -> tuple[bool, int, int]:
@@ -63,11 +69,12 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path, poses):
     campaign = measured(arm, tmp_path, poses)
     q = np.random.default_rng(924).uniform(*arm.box_rad.T, (6, 4))
     first = np.deg2rad(campaign.state.used[0].joints_deg)
-    *found, again = modes_at(arm, tmp_path, np.vstack([q, first]))
+    *found, again = measured_at(arm, tmp_path, np.vstack([q, first]))
 
-    def asked(at: int, modes):
+    def asked(at: int, one: MeasuredPose):
         angles = tuple(np.rad2deg(q[at]).tolist())
-        return question(campaign.model, campaign.state, "X", angles, modes)
+        new = NewHits("X", angles, one.frf, from_modal(one.modal))
+        return asked_of(campaign.model, campaign.state, new)
 
     assert not any(asked(i, found[i]) for i in range(6))
     repeated = [asked(i, again) for i in range(6)]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.recording.repeats import screen_repeats
+from planner.recording.repeats import doubts, screen_repeats
 from planner.recording.screening import screen
 from tests.support.simulated_hits import POLES, RESIDUES, make_hit
 
@@ -109,6 +109,35 @@ def test_a_hit_along_another_axis_stands_out_at_a_level_of_its_own():
     hits[2] = replace(make_hit(rng, "+y", peak_n=1900.0), axis="+x")
     (fault,) = screen_repeats(tuple(hits), BAND)[2]
     assert (fault.kind, "along y" in fault.text) == ("wrong_axis", True)
+
+
+@pytest.mark.parametrize(
+    ("force", "acceleration", "said"),
+    [
+        (1, 1 / 9.80665, "9.8 times smaller than its repeats: g instead of m/s²?"),
+        (1 / 4.44822, 1, "times larger than its repeats: lbf instead of N?"),
+        (1, 3, "3 times larger than its repeats: another unit or sensitivity?"),
+        (3, 3, ""),
+        (1, 1.3, ""),
+    ],
+)
+def test_a_file_in_another_unit_than_its_repeats_is_told(force, acceleration, said):
+    rng = np.random.default_rng(9)
+    hits = [make_hit(rng, axis) for axis in ("+x", "+y", "+z") for _ in range(4)]
+
+    def changed(hit):
+        return replace(
+            hit, force_n=force * hit.force_n, acceleration_m_s2=acceleration * hit.acceleration_m_s2
+        )
+
+    hits[5] = changed(hits[5])
+    faults = screen_repeats(tuple(hits), BAND)
+    assert [i for i, found in enumerate(faults) if found] == ([5] if said else [])
+    assert said in "".join(fault.text for fault in faults[5])
+    # Of two, or of two and two, nobody knows which is right: all are asked about.
+    for few in (hits[4:6], [changed(hits[4]), *hits[5:8]]):
+        assert not any(screen_repeats(tuple(few), BAND))
+        assert [bool(d) for d in doubts(tuple(few), BAND)] == [bool(said)] * len(few)
 
 
 def test_hits_that_tilt_as_hands_do_agree():

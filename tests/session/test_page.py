@@ -101,7 +101,7 @@ def test_what_to_do_comes_first(page):
     assert remedy_first(LATE.text) == (LATE.text, "")
     said = whole(lines(replace(page, hits=(CLIPPED,))))
     assert f"REPEAT HIT 3 (axis not stated): {force} Raise the range of acceleration x" in said
-    assert "cannot be read: foreign.uff: Export it again." in said
+    assert "cannot be used: foreign.uff: Export it again." in said
     assert "not whole yet: half.uff is still being written" in said
 
 
@@ -154,7 +154,7 @@ def test_names_of_files_leave_room_for_what_is_said_of_them(page):
     text = whole(lines(made, height=40))
     assert name not in text
     assert "disagrees with hit 2 (measurem…n_hit_x_003.uff) (likeness 0.42)" in text
-    assert "cannot be read: measurem…n_hit_x_003.uff: Export it again." in text
+    assert "cannot be used: measurem…n_hit_x_003.uff: Export it again." in text
     assert short_name("exports/P001_x_1.uff") == "P001_x_1.uff"
     refused = HitRecord(name, "", "", reason="A second pulse follows; hit once.")
     lying = SimpleNamespace(refused=[refused] * 6)

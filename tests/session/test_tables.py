@@ -12,6 +12,7 @@ from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from planner.session.keys import NoKeys
+from planner.session.table import FolderTable
 from planner.session.watch import watch
 from tests.support.hit_csv import write_csv
 from tests.support.outside import call, make_cell, record
@@ -86,11 +87,52 @@ def test_a_table_of_another_pose_without_joints_says_what_it_lacks(cell):
     assert "No joint angles are known for pose P077; give recordings.csv columns of" in said
 
 
+def test_hits_of_another_pose_by_their_table_are_not_counted_here(cell):
+    campaign, pose, made, inbox = cell
+    table = made / TABLE
+    table.write_text(table.read_text().replace(f"{pose.pose},", "X1,"))
+    shutil.copytree(made, inbox / "export")
+    said = session(campaign, inbox)
+    assert "not from here: of X1 by recordings.csv" in said
+    assert "all hits are in" not in said
+    assert [m.pose for m in campaign.state.used] == ["X1"]
+
+
+def test_a_left_over_file_of_the_pose_before_is_left_out_alone(cell, tmp_path):
+    campaign, pose, made, inbox = cell
+    campaign.import_paths((made,))
+    second = campaign.next()[0]
+    truth = make_cell(tmp_path / "again")[2]
+    there = record(truth, inbox / "there", second.pose, second.joints_deg)
+    (left,) = (there / "data").glob("*z_3.uff")
+    shutil.copy(next((made / "data").glob("*z_1.uff")), left)
+    said = session(campaign, inbox, limit_s=6)
+    assert f"it was imported before as a recording of pose {pose.pose} and cannot" in said
+    assert [len(m.accepted) for m in campaign.state.used] == [9, 8]
+
+
+def test_an_angle_that_no_joint_reaches_is_said_at_once_and_read_again(cell):
+    campaign, pose, made, inbox = cell
+    right = (made / TABLE).read_text()
+    stated = right.splitlines()[1].split(",")[1]
+    (made / TABLE).write_text(right.replace(f",{stated},", ",624.87,"))
+    shutil.copytree(made, inbox / "export")
+    assert "at 624.87° is outside its limits" in session(campaign, inbox, limit_s=2)
+    robot = campaign.cell.robot
+    table = FolderTable(inbox, robot.joints, robot.points, campaign.cell.check_pose)
+    path = inbox / "export" / TABLE
+    assert (table.follow(), [where for where, _ in table.waiting]) == (set(), [path])
+    path.write_text(right)
+    assert (table.follow(), table.waiting, table.follow()) == ({path}, [], set())
+    session(campaign, inbox)
+    assert [m.pose for m in campaign.state.used] == [pose.pose]
+
+
 def test_a_table_without_one_of_the_joints_is_not_followed_and_says_why(cell):
     campaign, _, made, inbox = cell
     without(made, lambda name: name == "joint_a2_deg")
     shutil.copytree(made, inbox / "export")
     said = session(campaign, inbox, limit_s=2)
-    assert "cannot be read: recordings.csv" in said
+    assert "cannot be used: recordings.csv" in said
     assert "has no column joint_a2_deg" in said
     assert not campaign.state.used
