@@ -40,7 +40,8 @@ SAME = 3.0  # nats that one less may cost
 MOST_OPERATORS = 3  # beside springs: more would imitate what the fit lacks
 IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which a few steps are not settled
 OPERATORS, FINALISTS, ENDS = 5, 4, 2  # how many are tried, followed, settled
-CLOSE, UNEXPLAINED = 0.01, 0.03  # sizes: at first with all lines; from which one begins afresh
+# Sizes: with all lines at first; up to which nothing need be missing; from which one begins afresh.
+CLOSE, EXPLAINED, UNEXPLAINED = 0.01, 0.008, 0.03
 FRESH = 10.0  # nats that this must gain
 LIGHTER = np.log(6.0)  # a resonator is begun once more by so much
 
@@ -63,14 +64,19 @@ class Search:
     def found(self, warm: FitRecord | None = None) -> StructureFit:
         """The structure that explains them best; from what was found before, if that is given."""
         data, dense = self.data(SEARCHED), self.data(SCREENED)
-        if warm is None:
+        stated = RobotStructure(self.prior, (), data.sensors)
+        plain = converged(self._begun(data, stated))
+        if size_of(plain) <= EXPLAINED:  # nothing need be missing
+            best = plain
+        elif warm is None:
             springs = tuple(e for e in self.prior.repertoire.effects if e.springs)
-            best = self._begun(data, RobotStructure(self.prior, springs, data.sensors))
+            best = converged(self._begun(data, replace(stated, effects=springs)))
         else:
-            size = max(warm.size, UNEXPLAINED)
-            misfit, x = self._again(warm, data, size)
-            best = settled(misfit, minimised(misfit, x, 4, 1.0))
-        best = self._evolved(converged(best), dense)
+            misfit, x = self._again(warm, data, max(warm.size, UNEXPLAINED))
+            best = converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
+        best = self._evolved(best, dense)
+        if plain.evidence > best.evidence:
+            best = self._evolved(plain, dense)
         for _ in range(3 if warm is None else 1):
             if size_of(best) < UNEXPLAINED:
                 break

@@ -1,13 +1,10 @@
 """How exact an identification is: quick between hits, thorough when asked for by itself."""
 
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from planner.identification.agreement import MOST_LINES
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
-HOPELESS_STEPS = 8
 
 
 @dataclass(frozen=True)
@@ -29,15 +26,7 @@ class Effort:
     log_steps: int = 40
     steps: int = 80
     doubtful: bool = True  # of a warm start that fits worse than before: all is searched anew
-    # Rounds at most, in which what hits leave open follows the fit; beyond `hopeless` one at most.
-    openings: int = 4
-    searched: int | None = None  # poses at most, spread over all, by which a start is searched
-    # Misfit of the best start from which the last fit takes a few steps only: physics is missing.
-    hopeless: float = np.inf
-
-    def last(self, misfit: float) -> "Effort":
-        """Of the last fit, where the best start has this misfit."""
-        return replace(self, steps=HOPELESS_STEPS, openings=0) if misfit > self.hopeless else self
+    openings: int = 4  # rounds at most, in which what hits leave open follows the fit
 
 
 THOROUGH = Effort()

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import Priors, axis_name, parametrise
+from planner.identification.parameters import Priors, axis_name
 from planner.robot.config import Compliance
 
 # Stiffness of what is not stated, in that of the stiffest spring stated at the joint (the floor:
@@ -25,13 +25,12 @@ FLOOR = "base"
 class ExtendedModel:
     """A simulation whose parameters can be identified, and what is known of them before.
 
-    Its last `added` springs are not in robot.toml, nor is what `swinging` tells of.
+    Its last `added` springs are not in robot.toml.
     """
 
     simulation: Simulation
     priors: Priors
     added: int = 0
-    swinging: str = ""
 
 
 def extended(simulation: Simulation, priors: Priors) -> ExtendedModel:
@@ -57,17 +56,6 @@ def extended(simulation: Simulation, priors: Priors) -> ExtendedModel:
     wider = msgspec.structs.replace(config, compliance=(*stated, *added))
     robot = replace(simulation.robot, config=wider)
     return ExtendedModel(Simulation(robot), replace(priors, bounds=bounds), len(added))
-
-
-def added_softer(structure: ExtendedModel, factor: float) -> np.ndarray:
-    """Starts (1, P), in the parameters' units: stated springs as stated, added ones so much softer.
-
-    They keep the relation of damping to stiffness.
-    """
-    p = parametrise(structure.simulation, structure.priors)
-    first = len(structure.simulation.robot.config.compliance) - structure.added
-    added = np.array([min(one.blocks) >= first for one in p.parameters])
-    return np.exp(p.mean - np.log(factor) * added)[None]
 
 
 def _spring(

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from planner.inference.least_squares import Minimum, inverse
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 SAME = 1e-3  # relative difference of two starts that found the same minimum
 AT_NOISE = 1.1  # misfit that no other start could better by much
-FAR = 2.0  # times what is hopeless: what measurements leave open need not follow such a fit
 STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is searched anew
 
 
@@ -77,8 +76,7 @@ def identify(
     best = None if warm is None else _warm(problem, warm)
     misfits: tuple[float, ...] = ()
     if best is None:
-        x, misfits = _search(problem.to_search(), _starting_points(p, starts, seed))
-        problem = replace(problem, effort=effort.last(min(misfits)))
+        x, misfits = _search(problem, _starting_points(p, starts, seed))
         best = _refine(*problem.carried(x))
         if not np.isfinite(best.misfit):  # it can't be with the weight that these springs carry
             best = _refine(problem, x)
@@ -168,12 +166,8 @@ def _plain(
     for _ in range(2 if near and problem.tolerances else 1):
         objective = problem.prepared(objective, x, tail)
     end = problem.minimise(objective, x, number, stage, problem.effort.steps)
-    hopeless = problem.effort.hopeless * max(objective.count, 1)
-    near_enough = end.at.chi2 < hopeless
-    openings = problem.effort.openings if near_enough else min(problem.effort.openings, 1)
-    rounds = max(completions if tail else 0, openings if problem.tolerances else 0)
-    far = end.at.chi2 > FAR * hopeless
-    for _ in range(0 if far else rounds):
+    rounds = max(completions if tail else 0, problem.effort.openings if problem.tolerances else 0)
+    for _ in range(rounds):
         objective = problem.prepared(objective, end.x, tail)
         before, end = end.x, problem.minimise(objective, end.x, number, stage, problem.effort.steps)
         moved = end.x - before

@@ -68,21 +68,6 @@ class StagedProblem:
         there = replace(self, matrices=matrices, inertias=inertias)
         return there, np.concatenate([there.standing(x[:count]), x[count:]])
 
-    def to_search(self) -> "StagedProblem":
-        """The same of as many poses, spread evenly over all, as a start is searched by."""
-        count, most = len(self.frfs), self.effort.searched
-        if most is None or count <= most:
-            return self
-        few = np.linspace(0, count - 1, most).round().astype(int)
-        inertias = replace(self.inertias, jacobians=self.inertias.jacobians[few])
-        return replace(
-            self,
-            frfs=tuple(self.frfs[i] for i in few),
-            q=self.q[few],
-            matrices=self.matrices.at(few),
-            inertias=inertias,
-        )
-
     def standing(self, theta: np.ndarray) -> np.ndarray:
         """θ (P,) with all springs as much stiffer as it takes to carry the robot's weight."""
         p = self.parametrisation

@@ -49,6 +49,6 @@ def test_the_simulation_explains_what_all_sensors_heard(cell: tuple[Path, Truth]
     campaign = Campaign(folder / "new", Store(None))
     model = campaign.model
     assert model.low.taught
-    assert "base about x" in model.remarks[0]
+    assert "The base gives way (about x" in model.remarks[0]
     assert worst_percent(campaign, truth) < 0.1
     assert model.frequency_sd_percent.max() < 0.3

@@ -120,8 +120,10 @@ NUMBERS = (
     ("coverage",
      "share of measured frequencies inside intervals that claim 50, 80, 90, 95 %. With few "
      "poses it scatters: the grey band of the picture says by how much."),
-    ("frf_sd", "root of E|H − mean|² in m/s²/N. Above the highest counted mode it rests on the "
-     "simulation alone."),
+    ("frf_sd", "root of E|H − mean|² in m/s²/N. Where the simulation explains the recordings it "
+     "holds a scale common to all FRFs, which only the gains of sensor and hammer ([sensor] "
+     "gain_sd_percent, force_gain_sd_percent: 1.5 % each unless a certificate says better) and the "
+     "masses in the URDF tell; status says how large both are."),
     ("probability of a mode",
      "that the pole is a mode of the structure, from how it stands out "
      "of noise and comes back at other model orders."),
