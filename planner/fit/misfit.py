@@ -27,6 +27,7 @@ SHARE = 0.3  # of the rms of all FRFs of a pose at a line, in the size of each
 LOG_FLOOR, LOG_DROP = 0.3, 0.3  # relative sds: no logarithm counts more; from which it counts none
 LOG_PRIOR = 10.0  # far away data err alike, and the prior counts for more
 FARTHEST = 4.0  # sds of what hits, readback and visits are linearised about
+NOTHING = 1e-9  # of an FRF's size, that has no logarithm
 UNUSED = 1e4  # sds of what was not measured, in the size of FRFs
 JITTER = 1e-6  # of the discrepancy's variance, that each line has for itself
 
@@ -258,7 +259,7 @@ class FrfMisfit:
         h, columns, motion = self.columns(x, self._about(given, x))
         there = np.einsum("nl,nlijf->nijf", given[:, :size], columns[:, d : d + size])
         if self.rho is None:
-            off = h * np.log(np.where(m.used, h / m.accelerance, 1.0)) - there
+            off = h * np.log(np.where(self._told(h), h / m.accelerance, 1.0)) - there
         else:
             off = np.where(m.used, h - m.accelerance, 0.0) - there
         return Around(x, np.concatenate([columns, off[:, None]], axis=1), motion)
@@ -272,9 +273,15 @@ class FrfMisfit:
         """(n, k, N) real, of (n, k, r, c, F)."""
         n, k = columns.shape[:2]
         if self.rho is None:
-            scaled = columns * (self.log_weight / h)[:, None]
+            told = self._told(h)
+            weight = np.where(told, self.log_weight / np.where(told, h, 1.0), 0.0)
+            scaled = columns * weight[:, None]
             return np.ascontiguousarray(scaled).reshape(n, k, -1).view(float)
         return self.whitened(columns)
+
+    def _told(self, h: np.ndarray) -> np.ndarray:
+        """(n, r, c, F) bool: where both have a logarithm; what no hit moves has none."""
+        return self.data.measured.used & (np.abs(h) > NOTHING * self.size)
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
         """The same of plain residuals."""

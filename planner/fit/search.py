@@ -28,15 +28,17 @@ from planner.fit.fitted import (
 )
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import At, FrfMisfit
-from planner.fit.structure import RobotPrior, RobotStructure, effects_free
+from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
 from planner.identification.measurement_model import Tolerances
+from planner.identification.truncated_decay import completed
 
 SEARCHED, SCREENED, LAST = 28, 64, 44  # lines a pose: while searching, for operators, at the end
 ANNEALED = ((0.5, 6), (0.2, 8), (0.07, 8))  # sizes by which a start comes near, and steps at each
 LOG_STEPS, TRIED, FURTHER = 15, 6, 3  # steps
 LEAST = 12.0  # nats that one more effect must gain
 SAME = 3.0  # nats that one less may cost
+COMPLETIONS = 2  # rounds
 MOST_OPERATORS = 3  # beside springs: more would imitate what the fit lacks
 IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which a few steps are not settled
 OPERATORS, FINALISTS, ENDS = 5, 4, 2  # how many are tried, followed, settled
@@ -62,7 +64,26 @@ class Search:
         return FrfData.of(self.prior, self.frfs, self.q, self.band_hz, lines)
 
     def found(self, warm: FitRecord | None = None) -> StructureFit:
-        """The structure that explains them best; from what was found before, if that is given."""
+        """The structure that explains them best; from what was found before, if that is given.
+
+        Decays that the ends of records cut off are filled in as it has them, and it is found again.
+        """
+        best = self._found(warm)
+        for _ in range(COMPLETIONS if any(np.isfinite(f.tail_s) for f in self.frfs) else 0):
+            known = best.remembered
+            best = self._completed(known)._found(known)
+        return best
+
+    def _completed(self, known: FitRecord) -> "Search":
+        """With the decays that records cut off, as a structure has them."""
+        if not any(np.isfinite(f.tail_s) for f in self.frfs):
+            return self
+        misfit, x = self._again(known, self.data(SEARCHED), known.size)
+        simulation = exported(misfit.structure, x)[0]
+        out = [completed(frf, simulation, row) for frf, row in zip(self.frfs, self.q, strict=True)]
+        return replace(self, frfs=tuple(out))
+
+    def _found(self, warm: FitRecord | None) -> StructureFit:
         data, dense = self.data(SEARCHED), self.data(SCREENED)
         stated = RobotStructure(self.prior, (), data.sensors)
         plain = converged(self._begun(data, stated))
@@ -95,7 +116,7 @@ class Search:
 
     def recalled(self, known: FitRecord) -> StructureFit:
         """What was found of these FRFs before, as it was."""
-        misfit, x = self._again(known, self.data(LAST), known.size)
+        misfit, x = self._again(known, self._completed(known).data(LAST), known.size)
         at = misfit(x, known.own)
         found = StructureFit(misfit, at, misfit.evidence(at))
         vars(found)["shares"] = known.shares

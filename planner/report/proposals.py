@@ -15,7 +15,6 @@ from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import command_line, table
-from planner.robot.room_directions import axes_in_the_room
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -140,7 +139,9 @@ def forecast_json(forecast: Forecast) -> dict[str, Any]:
 
 def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsReport:
     """Of the poses that `Campaign.next` gave."""
-    from planner.campaign.proposals import places_for  # status needs none of what it imports
+    # Status needs none of what these import.
+    from planner.campaign.proposals import places_for
+    from planner.robot.room_directions import axes_in_the_room
 
     robot, model = campaign.cell.robot, campaign.model
     q = robot.joints.internal([p.joints_deg for p in found])

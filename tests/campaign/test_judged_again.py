@@ -40,7 +40,7 @@ def test_refused_files_are_judged_again_once_a_table_lists_them(cell):
     table = without_axes(made)
     for _ in range(2):  # nothing changed: nothing more is in the log, and it is told again
         code, out, said = call("import", folder, made)
-        assert (code, said.count("axis")) == (3, 9), said
+        assert (code, "Refused 9 files" in said) == (3, True), said
         assert "known before" not in out
         assert len(Campaign(folder).entries) == 3
     (made / TABLE).write_text(table)
@@ -115,7 +115,7 @@ def test_a_withdrawn_pose_says_how_its_hits_are_used_again(cell):
     assert call("import", folder, made)[0] == 0
     assert call("withdraw", folder, pose.pose)[0] == 0
     code, _, said = call("import", folder, made)
-    assert (code, said.count("Refused"), "and 8 more" in said) == (3, 1, True)
+    assert (code, said.count("Refused"), "9 files" in said) == (3, 1, True)
     assert f"planner confirm '{folder}' {pose.pose}" in said
     assert call("confirm", folder, pose.pose)[0] == 0
     assert len(Campaign(folder).state.used[0].accepted) == 9
@@ -171,7 +171,7 @@ def test_what_was_shown_at_a_pose_is_not_imported_at_another_by_its_folder(cell)
     for more in ((), ("--pose", other)):
         code, _, said = call("import", folder, made / "data", *more)
         assert code == 3
-        assert f" and 8 more: it came at {pose.pose}, and nobody said that it is of {other}" in said
+        assert f"it came at {pose.pose}, and nobody said that it is of {other}" in said
     assert not Campaign(folder).state.recorded
     assert call("import", folder, *files, "--pose", other)[0] == 0
     assert Campaign(folder).state.used[0].pose == other

@@ -169,7 +169,7 @@ def test_a_session_in_which_all_goes_wrong(cell):
             for number in (1, 2):
                 elsewhere.write(f"wrong_{axis}{number}", elsewhere.good(f"+{axis}"))
         terminal.until("all hits are in")
-        terminal.press("a", f"Is the robot at {now}?")
+        terminal.press("a", f"Pose {now}: a question", "not used until you answer")
         terminal.press("r", "set aside; hit again")
         terminal.press("q", "Session ended: quit")
         assert terminal.process.wait(timeout=30) == 0
