@@ -69,7 +69,7 @@ def test_identify_takes_a_campaign(campaign, capsys):
 
 def test_compare_takes_a_campaign_with_its_own_workspace(campaign, capsys):
     assert run(["compare", str(campaign.directory), "--strategies", "random"]) == 2
-    assert "of the pool's 2 poses to judge by; record more" in capsys.readouterr().err
+    assert "The pool has 2 poses: 2 are left to judge by" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from planner.dataset.dataset import LAID, Dataset, Recording, Visit
+from planner.dataset.measure import OVER
 from planner.dataset.recordings import recordings_in
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
@@ -77,7 +78,7 @@ def test_frfs_of_a_pose_and_of_a_visit(read):
     np.testing.assert_array_equal(read.frfs[0].accelerance, estimate(a, BAND_HZ).accelerance)
     assert read.frfs[0].exponential_rate_1_s == 0
     ended = read.ended_frfs[0]
-    assert ended.exponential_rate_1_s * read.frfs[0].tail_s == pytest.approx(5.5)
+    assert ended.exponential_rate_1_s * read.frfs[0].tail_s == pytest.approx(OVER)
     assert [frf.exponential_rate_1_s for frf in read.visit_frfs] == [LAID] * 3
 
 

@@ -102,7 +102,7 @@ def test_without_scatter_nothing_is_lost():
         for seed in range(5):
             case = visited("plain", simulation, 5, 0.0, seed)
             for visits, errors in ((True, ours), (False, before)):
-                fitted = fit_primary(case.seen, *(known or (None, None, 0.5)), visits)
+                fitted = fit_primary(case.seen, *(known or (None, 0.5)), visits)
                 mean, _ = fitted.predict(case.x, case.simulated)
                 errors.append(np.mean((mean - case.shown) ** 2))
         assert np.mean(ours) < 1.1 * np.mean(before)
