@@ -208,7 +208,7 @@ def _structural(robot: Robot) -> Operator:
     firsts = [robot.config.compliance[group[0]] for group in blocks]
     median = float(np.log(LOSS_FACTOR))
     numbers = tuple(
-        Number(f"loss_factor of {place_name(b)}", "1", median, 1.0, True) for b in firsts
+        Number(f"loss_factor of {b.tie or place_name(b)}", "1", median, 1.0, True) for b in firsts
     )
     stiffness = tuple(b.stiffness for b in firsts)
     return LossFactors("joints", (), numbers, blocks, stiffness)
