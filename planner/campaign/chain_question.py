@@ -1,4 +1,4 @@
-"""Whether a measuring chain shows what it should, by the simulation, from the first pose on.
+"""Whether a measuring chain shows what it should, by the simulation, at the first pose.
 
 The imaginary part of an accelerance over frequency, added up over a band, is Σ φ φᵀ of the modes in
 it but for a factor: neither damping nor where exactly modes lie matter, so that a simulation tells
@@ -15,7 +15,6 @@ import numpy as np
 from planner.campaign.chain_faults import NONE, SCALED, TURNED, ChainFault, log_prior
 from planner.campaign.events import Question
 from planner.campaign.model import Model
-from planner.campaign.state import CampaignState
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import solve_poles
 from planner.frf.frf import Frf
@@ -30,7 +29,6 @@ RATE_1_S, LINES = 2.0, 120  # modes are widened by that much, so that few lines 
 # of so many degrees forgives a simulation that is farther off.
 DISCREPANCY, DEGREES = 0.12, 4
 LOG_ODDS = np.log(1000.0)  # against a wrong chain, before anything is measured
-BY = 8  # poses, the last ones, that tell which draws are likely
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,18 +115,11 @@ def _width(frequency_hz: np.ndarray) -> np.ndarray:
     return np.gradient(frequency_hz) / frequency_hz
 
 
-def likeliest(sums: Sums, before: Sequence[Sums]) -> tuple[ChainFault, float]:
-    """The likeliest fault of a pose's chain, and by how much log likelihood it beats none.
-
-    Poses measured `before`, whose chain is believed, tell which draws are likely. All together
-    count as one: a simulation that lacks physics errs alike at all of them.
-    """
-    weight = np.zeros(len(sums.drawn))
-    if before:
-        weight = np.mean([one.log_density([NONE])[0] for one in before], axis=0)
+def likeliest(sums: Sums) -> tuple[ChainFault, float]:
+    """The likeliest fault of a pose's chain, and by how much log likelihood it beats none."""
 
     def likelihood(faults: Sequence[ChainFault]) -> np.ndarray:
-        return np.logaddexp.reduce(sums.log_density(faults) + weight, axis=1)
+        return np.logaddexp.reduce(sums.log_density(faults), axis=1)
 
     found = [(float(value), one) for value, one in zip(likelihood(TURNED), TURNED, strict=True)]
     for family in SCALED:
@@ -139,28 +130,20 @@ def likeliest(sums: Sums, before: Sequence[Sums]) -> tuple[ChainFault, float]:
 
 
 def chain_question(
-    model: Model,
-    state: CampaignState,
-    pose: str,
-    joints_deg: tuple[float, ...],
-    frf: Frf | None,
+    model: Model, pose: str, joints_deg: tuple[float, ...], frf: Frf | None
 ) -> Question | None:
-    """What to ask of the chain behind a pose's new hits, before they are believed; None: nothing.
+    """What to ask of the chain behind the first pose's hits, before they are believed.
 
-    `frf` is the tool's by the new hits alone; `model` and `state` are those before the import.
-    Once the engineer has said that such hits are right, nothing is asked of the chain any more.
+    `frf` is the tool's by the new hits alone; None: nothing is asked.
     """
-    simulation, earlier = model.cell.simulation, state.measurements.values()
-    answered = any(m.question is not None and m.question.about == "chain" for m in earlier)
-    if frf is None or simulation is None or answered:
+    simulation = model.cell.simulation
+    if frf is None or simulation is None:
         return None
     draws, band = Draws(simulation, model.cell.tolerances), model.cell.config.modes.band_hz
     here = draws.sums(model.cell.robot.joints.internal([joints_deg])[0], frf.within(band))
     if here is None:
         return None
-    both = [*zip(model.labelled, model.frfs, strict=True)][-BY:]
-    before = [draws.sums(one.q, own) for one, own in both if one.pose != pose]
-    fault, gain = likeliest(here, [one for one in before if one is not None])
+    fault, gain = likeliest(here)
     if gain < LOG_ODDS:
         return None
     text = f"At {pose}, by the simulation, {fault.asked} Are these hits right as they are?"

@@ -109,18 +109,15 @@ class Amplitude(msgspec.Struct, frozen=True):
 
 
 class Question(msgspec.Struct, frozen=True):
-    """What the engineer is asked of hits that lie far from what the model is sure of.
+    """What the engineer is asked of hits that are not what is to be expected of a pose.
 
-    The `mode` that is furthest off is so by `off_sd` standard deviations; `fits` names the pose
-    whose modes these are instead, if there is one. Where hits contradict each other instead,
-    `disagree` are their files, and no mode is named (0). `about` is "chain" where units, signs or
-    axes of the measuring chain look wrong (no mode is named then, either), "readback" where the
-    modes are those of the proposed joint angles and not of the stated ones; "" else.
+    Their FRFs are `off_percent` of the expected ones away from these; `fits` names the pose that
+    they fit instead, if there is one. Where hits contradict each other instead, `disagree` are
+    their files. `about` is "chain" where units, signs or axes of the measuring chain look wrong,
+    "readback" where the joint angles are to be typed otherwise; "" else.
     """
 
     text: str
-    mode: int = 0
-    off_sd: float = 0.0
     off_percent: float = 0.0
     fits: str = ""
     disagree: tuple[str, ...] = ()

@@ -1,162 +1,39 @@
-"""Whether hits can be from the pose they are said to be from: measured modes against expected.
+"""Whether hits are of the pose, and by the chain, that they are said to be of.
 
-Hits that answer as another measured pose did, though these poses are expected to differ, are asked
-about at any count of poses. The rest is calibrated on the shipped plane and on five true robots,
-from three measured poses on. Of 6992 times
-that a model judged a pose's own hits it asked never, and once when two modes were left out. Of
-hits under another pose's name, where a frequency differs by 2 %, it asks for 99 % on the plane and
-91 to 99 % in joint boxes, if the simulation learns and can have the physics; for a third on the
-plane with a frozen one, a tenth with none, and for none in joint boxes where no simulation fits:
-the model is not sure enough there (all of this by frequencies alone). Poses whose frequencies are
-alike differ in how their modes answer at the tool: residues are held against the simulation's, and
-alike poses are asked about too. After one and two poses frequencies alone are held against the
-model: a pose's own hits were within 7 sd then, of 330 times on robots whose simulations lack
-physics of any size or are not fitted.
+What was found of the hits before tells which FRFs are to be expected anywhere, and how unsure that
+is. Where "something else" is likelier than the pose as stated, what that may be competes by
+evidence: another known pose, the setpoint, an angle with the other sign, axes of the sensor
+exchanged, a channel with a wrong scale. Without a simulation, or before the first measurement,
+nothing is expected.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from planner.campaign.events import MeasuredMode, Question
-from planner.campaign.labels import ABOVE
-from planner.campaign.log_conversion import to_mode
+from planner.campaign.chain_faults import LEAST, NONE, TURNED, ChainFault
+from planner.campaign.events import Question
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
-from planner.dynamics.vibration import SimulatedModes
-from planner.inference.assignment import least_cost
-from planner.modal.modes import Mode
+from planner.fit.predictive import LINES, SIZES, Predictive, turned
+from planner.frf.frf import Frf
 
-LEAST = 3  # measured poses before which residues are not to be relied on, nor slight hints at drift
-# Off is what lies further than both. Right poses are within 2.2 sd where the simulation fits
-# (without it up to 23 in one mode, 7 in two); what changes from day to day stays below 2 %.
-FAR_SD, FAR = 10.0, 0.02
-# Of ln f: no pose is so far from where a mode was expected; that mode was not found.
-NOT_FOUND = 0.25
-MANY = 3  # modes that are not missed all at once
-FITS_SD = 5.0  # in every mode, at a pose that is named as where the robot may be instead
-# Of residues, relative, on average over the modes that are near where they are expected. Right
-# poses differ by 0.03 to 0.22 (hits tilted by 2°; in one arm that no simulation fits by 0.45 at
-# most), other poses by 1 as a rule. Chosen between, on generated arms. A simulation that does worse
-# at the measured poses is to be off by that much more than it is there.
-ANSWERS_OTHERWISE, MORE_THAN_THERE = 0.5, 3.0
-# Of ln f: by no more do visits to one pose differ, in every mode and beside what noise leaves open.
-SAME_POSE, SAME_POSE_SD, LEAST_MODES = 3e-3, 3.0, 2
-TOGETHER = 0.08  # of ln f: modes so close mix, and answer together
-AS_STRONG = 0.5  # share of a missing mode's residues above which another was found in its stead
+LOG_ODDS = np.log(1000.0)  # against a mistake, before anything is measured
+BETTER = 3.0  # times less is left by a mistake that explains them
+FOLLOWED = 3  # mistakes that are fitted, those that seem likeliest at once
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
-    """Measured less expected, ln f (count,), and the sd of that; NaN where a mode is missing.
+class Mistake:
+    """Where the robot may be, q (dof,) in rad, and what the chain may show, instead; in words."""
 
-    `otherwise` (count,) is by how much residues differ from the simulation's, relative, NaN where
-    a mode is not near, and `limit` from where on that is another pose; `instead` (count,): another
-    mode, which nothing explains, was found where a strong one is missing.
-    """
-
-    off: np.ndarray
-    sd: np.ndarray
-    otherwise: np.ndarray
-    instead: np.ndarray
-    limit: float = ANSWERS_OTHERWISE
-
-    @property
-    def in_sd(self) -> np.ndarray:
-        """How far off each mode (count,) is, in sd."""
-        return np.abs(self.off) / self.sd
-
-    @property
-    def far(self) -> np.ndarray:
-        """Which modes (count,) are off."""
-        return (self.in_sd > FAR_SD) & (np.abs(self.off) > FAR)
-
-    def contradicts(self, sure: bool) -> bool:
-        """Whether the pose is to be asked for; one mode is enough where the model is `sure`.
-
-        Elsewhere a mode that was not found, or that veers, can look like one that is off.
-        """
-        found, far = np.isfinite(self.off), self.far
-        near = far & ((np.abs(self.off) < NOT_FOUND) | self.instead)
-        nothing_fits = sure and found.sum() >= 2 and bool(np.all(far[found]))
-        away = nothing_fits or far.sum() >= MANY or int(near.sum()) >= (1 if sure else 2)
-        return away or self.answers_otherwise
-
-    @property
-    def difference(self) -> float:
-        """Of residues, on average; NaN where nothing is known."""
-        known = self.otherwise[np.isfinite(self.otherwise)]
-        return float(np.mean(known)) if known.size else np.nan
-
-    @property
-    def answers_otherwise(self) -> bool:
-        """Whether the modes that are near answer unlike what is expected at the tool."""
-        return self.difference > self.limit
-
-    @property
-    def log_density(self) -> float:
-        """Of the measured modes; what is off counts as FAR_SD."""
-        size = np.minimum(np.nan_to_num(self.in_sd, nan=FAR_SD), FAR_SD)
-        return float(-np.sum(size**2 / 2 + np.log(np.nan_to_num(self.sd, nan=FAR))))
-
-    @property
-    def fits(self) -> bool:
-        """Whether all that was found agrees."""
-        found = np.isfinite(self.off)
-        near = bool(found.any() and np.all(self.in_sd[found] < FITS_SD))
-        return near and not self.answers_otherwise
-
-
-def compare(
-    expected_hz: np.ndarray,
-    sd_hz: np.ndarray,
-    modes: tuple[MeasuredMode, ...],
-    simulated: SimulatedModes | None = None,
-) -> Comparison:
-    """Expected (count,) with sd in Hz against measured modes, paired so that most agree.
-
-    `simulated` are modes of that pose alone, those counted and some above; None: not known.
-    """
-    likely = [mode for mode in modes if mode.likely]
-    hz = np.array([mode.frequency_hz for mode in likely])
-    own = np.array([mode.frequency_sd_hz for mode in likely])
-    off = np.log(hz[None, :] / expected_hz[:, None])
-    sd = np.hypot((sd_hz / expected_hz)[:, None], (own / hz)[None, :])
-    # Capped: a mode that was not found costs one pair, not a shift of all pairs above it.
-    cost = np.minimum(np.abs(off) / sd, FAR_SD) + np.abs(off)
-    rows, columns = least_cost(np.where(np.isfinite(cost), cost, 2 * FAR_SD))
-    paired = np.full((3, len(expected_hz)), np.nan)
-    paired[0, rows], paired[1, rows] = off[rows, columns], sd[rows, columns]
-    instead = np.zeros(len(expected_hz), dtype=bool)
-    if simulated is not None:
-        measured = np.array([to_mode(mode).residue for mode in likely])
-        there, theirs = simulated.frequency_hz[0], simulated.residue[0]
-        for k, j in zip(rows.tolist(), columns.tolist(), strict=True):
-            if abs(off[k, j]) < TOGETHER:
-                expected = _together(there, theirs, float(there[k]))
-                paired[2, k] = _difference(expected, _together(hz, measured, float(hz[j])))
-            elif abs(off[k, j]) >= NOT_FOUND:
-                unexplained = np.nanmin(np.abs(np.log(hz[j] / there))) > TOGETHER
-                instead[k] = unexplained and _size(measured[j]) > AS_STRONG * _size(theirs[k]) > 0
-    return Comparison(paired[0], paired[1], paired[2], instead)
-
-
-def _size(residue: np.ndarray) -> float:
-    return float(np.linalg.norm(np.nan_to_num(residue)))
-
-
-def _together(hz: np.ndarray, residue: np.ndarray, at_hz: float) -> np.ndarray:
-    """Sum (3, 3) of the residues (m, 3, 3) of modes that are close to a frequency, and so mix."""
-    near = np.isfinite(hz) & (np.abs(np.log(hz / at_hz)) < TOGETHER)
-    return np.sum(residue[near], axis=0)
-
-
-def _difference(expected: np.ndarray, measured: np.ndarray) -> float:
-    """Of residues (3, 3), relative, where both are known; NaN where nothing is."""
-    known = np.isfinite(expected) & np.isfinite(measured)
-    size = np.linalg.norm(expected[known])
-    return float(np.linalg.norm((measured - expected)[known]) / size) if size > 0 else np.nan
+    q: np.ndarray
+    what: str
+    pose: str = ""
+    about: str = ""
+    fault: ChainFault = NONE
 
 
 def question(
@@ -164,131 +41,142 @@ def question(
     state: CampaignState,
     pose: str,
     joints_deg: tuple[float, ...],
-    modes: tuple[MeasuredMode, ...],
+    frf: Frf | None,
 ) -> Question | None:
     """What to ask the engineer before new hits of a pose are believed; None: nothing.
 
-    `modes` are those of the new hits alone; `model` and `state` are those before the import.
+    `frf` is the tool's by the new hits alone; `model` and `state` are those before the import.
     """
-    if not model.labelled or not any(m.likely for m in modes):
+    learned = model.low.learned or model.low.suspect
+    if frf is None or learned is None:
         return None
-    here, sure = compared(model, joints_deg, modes), model.low.taught
-    few = len(model.labelled) < LEAST
-    if few:
-        here = replace(here, otherwise=np.full_like(here.otherwise, np.nan))
-    if not here.contradicts(sure):
+    expected = Predictive(learned.posterior, model.cell.config.modes.band_hz)
+    q = model.cell.robot.joints.internal([joints_deg])[0]
+    stated = StatedHits(expected, q, frf)
+    if not stated.doubted:
         return None
-    limit = np.inf if few else _limit(model, state)  # no less than the one before
-    here = replace(here, limit=limit)
-    if not here.contradicts(sure):
+    mistakes = [*_poses(model, state, pose, joints_deg), *_chains(state, expected, q, frf)]
+    fits = stated.instead(mistakes)
+    if fits is None and not stated.impossible:
         return None
-    others = {m.pose: m.joints_deg for m in state.used}
-    others |= {name: state.proposals[name].joints_deg for name in state.open}
-    others.pop(pose, None)
-    same = [modes] * len(others)
-    found = _compared(model, [*others.values()], same, limit) if others else []
-    elsewhere = zip(others, found, strict=True)
-    fitting = {name: c.log_density for name, c in elsewhere if c.fits}
-    fits = max(fitting, key=lambda name: fitting[name]) if fitting else ""
-    return _asked(pose, here, fits)
+    return _asked(pose, 100 * expected.off(q, frf), fits)
 
 
-def repeated(
-    model: Model, pose: str, joints_deg: tuple[float, ...], modes: tuple[MeasuredMode, ...]
-) -> Question | None:
-    """The same, of hits that are those of another measured pose: no chain makes them so."""
-    if not model.labelled or not any(m.likely for m in modes):
-        return None
-    measured = _measured_elsewhere(model, pose, joints_deg, modes)
-    here = compared(model, joints_deg, modes)
-    return _asked(pose, here, measured, repeated=True) if measured else None
+@dataclass(frozen=True, eq=False)
+class StatedHits:
+    """Hits as they are said to be: of q (dof,) in rad, by a chain as it should be."""
+
+    expected: Predictive
+    q: np.ndarray
+    frf: Frf
+
+    @cached_property
+    def strange(self) -> float:
+        """Log density of something else."""
+        return self.expected.strange(self.q, self.frf)
+
+    @cached_property
+    def density(self) -> tuple[float, float]:
+        """Log density as stated, and the size of the discrepancy that it takes."""
+        return self.expected.density(self.q, self.frf)
+
+    @property
+    def impossible(self) -> bool:
+        """Whether it is something else, whatever that is."""
+        return self.strange - self.density[0] > LOG_ODDS
+
+    @property
+    def doubted(self) -> bool:
+        """Whether a mistake may explain it better."""
+        return self.impossible or self.density[1] >= BETTER * SIZES[-1]
+
+    def instead(self, mistakes: Sequence[Mistake]) -> Mistake | None:
+        """The mistake that explains the hits, by evidence and size; None where none does."""
+        columns = int(np.count_nonzero(self.frf.measured))
+        value, size = self.density
+
+        def shown(one: Mistake) -> tuple[Frf, float]:
+            frf, volume = turned(self.frf, one.fault.matrix)
+            return frf, volume * columns * LINES
+
+        def glanced(one: Mistake) -> float:
+            frf, volume = shown(one)
+            return self.expected.strange(one.q, frf) + volume
+
+        found = []
+        for one in sorted(mistakes, key=glanced, reverse=True)[:FOLLOWED]:
+            frf, volume = shown(one)
+            its, left = self.expected.density(one.q, frf)
+            gain, better = its + volume - value, BETTER * left <= size
+            if gain > LOG_ODDS and (better or its + volume > self.strange > value):
+                found.append((gain, one))
+        return max(found, key=lambda pair: pair[0], default=(0.0, None))[1]
 
 
-def _measured_elsewhere(
-    model: Model, pose: str, joints_deg: tuple[float, ...], modes: tuple[MeasuredMode, ...]
-) -> str:
-    """The measured pose whose hits these repeat, though the simulation sets both poses apart.
+def _poses(
+    model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...]
+) -> Iterator[Mistake]:
+    """Where else the robot may be."""
+    joints = model.cell.robot.joints
+    known = {m.pose: m.joints_deg for m in state.used}
+    known |= {name: state.proposals[name].joints_deg for name in state.open}
+    known.pop(pose, None)
+    for name, there in known.items():
+        what = f"repeat those of {name}" if state.hit_at(name) else f"fit {name} far better"
+        yield Mistake(joints.internal([there])[0], what, name)
+    sent = state.proposals[pose].joints_deg if pose in state.proposals else joints_deg
+    typed = np.flatnonzero(np.abs(np.subtract(sent, joints_deg)) > joints.same()).tolist()
+    if typed:
+        which = ", ".join(_either(joints, i, sent[i], joints_deg[i]) for i in typed)
+        what = f"fit the setpoint of {pose} better than its readback: is {which}?"
+        yield Mistake(joints.internal([sent])[0], what, about="readback")
+    for i, angle in enumerate(joints_deg):
+        other = tuple(-a if k == i else a for k, a in enumerate(joints_deg))
+        if abs(angle) > joints.same()[i]:
+            what = f"fit the other sign of an angle: is {_either(joints, i, -angle, angle)}?"
+            yield Mistake(joints.internal([other])[0], what, about="readback")
 
-    Poses that it holds to be alike, such as those that differ in a turn of the whole robot, may
-    well be. Without a simulation nothing tells.
-    """
-    q = model.cell.robot.joints.internal([joints_deg])
-    there = model.low.frequencies(q).frequency_hz[0]
-    new = [to_mode(mode) for mode in modes if mode.likely]
-    for known in model.labelled:
-        off = np.abs(np.log(there / model.low.frequencies(known.q[None]).frequency_hz[0]))
-        found = [mode is not None for mode in known.modes]
-        apart = bool(np.any(off[: len(found)][found] > FAR))  # False where it is not known
-        if known.pose != pose and apart and _repeats(known.modes, new):
-            return known.pose
-    return ""
+
+def _either(joints, number: int, one: float, other: float) -> str:
+    return (
+        f"{joints.names[number]} {joints.text(number, one, 2)} or {joints.text(number, other, 2)}"
+    )
 
 
-def _repeats(known: Sequence[Mode | None], new: Sequence[Mode]) -> bool:
-    """Whether each known mode is found again, where it was and as it answered."""
-    differences = []
-    for mode in known:
-        if mode is None:
-            continue
-        off = [abs(float(np.log(one.frequency_hz / mode.frequency_hz))) for one in new]
-        again = new[int(np.argmin(off))]
-        sd = np.hypot(
-            mode.frequency_sd_hz / mode.frequency_hz, again.frequency_sd_hz / again.frequency_hz
+def _chains(
+    state: CampaignState, expected: Predictive, q: np.ndarray, frf: Frf
+) -> Iterator[Mistake]:
+    """What the chain may show instead; nothing once the engineer has said that it is right."""
+    earlier = state.measurements.values()
+    if any(m.question is not None and m.question.about == "chain" for m in earlier):
+        return
+    for fault in (*TURNED, *scaled(expected.ratio(q, frf))):
+        yield Mistake(q, fault.asked, about="chain", fault=fault)
+
+
+def scaled(ratio: np.ndarray) -> Iterator[ChainFault]:
+    """All channels by one factor, or one of them, by `ratio` (3,) of measured to expected."""
+    for channels in ((0, 1, 2), (0,), (1,), (2,)):
+        factor = float(np.median(ratio[list(channels)]))
+        if abs(np.log(factor)) > LEAST:
+            diagonal = np.ones(3)
+            diagonal[list(channels)] = factor
+            yield ChainFault(np.diag(diagonal), channels, factor)
+
+
+def _asked(pose: str, off_percent: float, fits: Mistake | None) -> Question:
+    if fits is not None and fits.about == "chain":
+        text = f"At {pose}, {fits.what} Are these hits right as they are?"
+    elif fits is not None and fits.about == "readback":
+        text = (
+            f"These hits {fits.what} If it was typed wrong, correct recordings.csv and import "
+            f"again. Are the angles right as they are?"
         )
-        if min(off) > SAME_POSE + SAME_POSE_SD * sd:
-            return False
-        differences.append(_difference(mode.residue, again.residue))
-    told = [difference for difference in differences if np.isfinite(difference)]
-    alike = not told or float(np.mean(told)) < ANSWERS_OTHERWISE
-    return len(differences) >= LEAST_MODES and alike
-
-
-def compared(
-    model: Model, joints_deg: tuple[float, ...], modes: tuple[MeasuredMode, ...]
-) -> Comparison:
-    """Modes measured at a pose against what the model expects there."""
-    return _compared(model, [joints_deg], [modes])[0]
-
-
-def _limit(model: Model, state: CampaignState) -> float:
-    """How far residues may be off, by how far they are at the measured poses."""
-    used = [m for m in state.used if any(mode.likely for mode in m.modes)]
-    there = _compared(model, [m.joints_deg for m in used], [m.modes for m in used])
-    known = [one.difference for one in there if np.isfinite(one.difference)]
-    return max(ANSWERS_OTHERWISE, MORE_THAN_THERE * float(np.median(known)) if known else 0.0)
-
-
-def _compared(
-    model: Model,
-    poses_deg: Sequence[tuple[float, ...]],
-    modes: Sequence[tuple[MeasuredMode, ...]],
-    limit: float = ANSWERS_OTHERWISE,
-) -> list[Comparison]:
-    """What is expected at each of at least one pose, against the modes that are said to be its."""
-    q = model.cell.robot.joints.internal(poses_deg)
-    (hz, sd), simulated = model.frequencies(q), model.low.simulate(q, ABOVE)
-    known = model.low.simulation is not None
-    found = []
-    for i, own in enumerate(modes):
-        theirs = simulated[i : i + 1] if known else None
-        one = compare(hz[i], sd[i], own, theirs)
-        found.append(replace(one, limit=limit))
-    return found
-
-
-def _asked(pose: str, here: Comparison, fits: str, repeated: bool = False) -> Question:
-    near = np.where(np.abs(here.off) < NOT_FOUND, here.in_sd, np.nan)
-    k = int(np.nanargmax(near if np.isfinite(near).any() else here.in_sd))
-    off_sd, percent = float(here.in_sd[k]), float(100 * np.expm1(here.off[k]))
-    instead = f"they fit {fits} far better" if fits else "they fit no other known pose either"
-    what = f"lie {off_sd:.0f} sd ({percent:+.1f} %, mode {k + 1}) from what is expected at {pose}"
-    if repeated:
-        what, instead = f"repeat the modes measured at {fits}", f"others are expected at {pose}"
-    elif not here.far.any():
-        mean = 100 * here.difference
-        what = (
-            f"have the frequencies expected at {pose}, but other mode shapes at the tool (their "
-            f"residues differ by {mean:.0f} %)"
+    else:
+        instead = fits.what if fits else "fit no other known pose either"
+        text = (
+            f"These hits are {off_percent:.0f} % off the FRFs expected at {pose}; they {instead}. "
+            f"Is the robot at {pose}?"
         )
-    text = f"These hits {what}; {instead}. Is the robot at {pose}?"
-    return Question(text, k + 1, off_sd, percent, fits)
+    told = fits or Mistake(np.zeros(0), "")
+    return Question(text, off_percent=off_percent, fits=told.pose, about=told.about)

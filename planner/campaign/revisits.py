@@ -7,9 +7,9 @@ import numpy as np
 
 from planner.campaign.events import MeasuredMode
 from planner.campaign.model import SCATTER_POSES, Model
-from planner.campaign.question import LEAST, compared
 from planner.campaign.state import CampaignState, Measurement
 
+LEAST_POSES = 3  # measured, before which hints at drift are not to be relied on
 SAME_MODE = 0.05  # of ln f: so near, a mode of a second visit is that of the first
 # A visit differs from the one before, or all modes from what is expected, beyond so many sds, and
 # by so much at least: less matters to nobody.
@@ -50,13 +50,11 @@ def suspected(
 
     `model` and `state` are those before the import; it is a hint only where they expect enough.
     """
-    if len(model.labelled) < LEAST or state.hit_at(pose) is not None:
+    if len(model.labelled) < LEAST_POSES or state.hit_at(pose) is not None:
         return None
-    here = compared(model, joints_deg, tuple(modes))
-    near = np.abs(here.off) < SAME_MODE
-    off = here.off[near]
+    off, in_sd = _off(model, joints_deg, [mode for mode in modes if mode.likely])
     one_sided = abs(np.sum(np.sign(off))) == len(off) >= LEAST_MODES
-    if not one_sided or np.any(here.in_sd[near] < SUSPECT_SD) or np.mean(np.abs(off)) < SMALLEST:
+    if not one_sided or np.any(in_sd < SUSPECT_SD) or np.mean(np.abs(off)) < SMALLEST:
         return None
     early = _telling(state)
     joints = model.cell.robot.joints
@@ -68,6 +66,22 @@ def suspected(
         f"{which}, again ({joints.listed(early.joints_deg, 3)}) and import with --pose "
         f"{early.pose}: it says whether. It is proposed next.",
     )
+
+
+def _off(
+    model: Model, joints_deg: tuple[float, ...], modes: Sequence[MeasuredMode]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of each mode that is expected at a pose and found near by: ln f of it, and that in sds."""
+    hz, sd = (row[0] for row in model.frequencies(model.cell.robot.joints.internal([joints_deg])))
+    found = []
+    for expected, unsure in zip(hz, sd / hz, strict=True):
+        off = [float(np.log(mode.frequency_hz / expected)) for mode in modes]
+        k = int(np.argmin(np.abs(off))) if off else -1
+        if k >= 0 and abs(off[k]) < SAME_MODE:
+            own = modes[k].frequency_sd_hz / modes[k].frequency_hz
+            found.append((off[k], abs(off[k]) / np.hypot(unsure, own)))
+    away = np.array(found).reshape(-1, 2)
+    return away[:, 0], away[:, 1]
 
 
 def _telling(state: CampaignState) -> Measurement:

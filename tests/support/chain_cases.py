@@ -92,9 +92,9 @@ def fault(name: str, rng: np.random.Generator) -> np.ndarray:
     return -one if name == "force's sign" else one - 2 * np.outer(one[axis], one[axis])
 
 
-def judged(sums: Sums, before: tuple[Sums, ...]) -> ChainFault | None:
+def judged(sums: Sums) -> ChainFault | None:
     """What is asked about; None: nothing."""
-    found, gain = likeliest(sums, before)
+    found, gain = likeliest(sums)
     return found if gain >= LOG_ODDS else None
 
 

@@ -1,0 +1,100 @@
+"""What hits of one more pose are to be expected, after a fit: their density, by evidence.
+
+The posterior of the fit is the prior of one more pose, and is refitted with it: far from what was
+measured before, FRFs bend with the springs in a way that no first order follows.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from planner.fit.data import FrfData
+from planner.fit.gauss_newton import minimised
+from planner.fit.misfit import FrfMisfit
+from planner.fit.posterior import RobotPosterior
+from planner.fit.structure import RobotStructure
+from planner.frf.frf import Frf
+
+LINES, STEPS = 44, 5
+SIZES = (0.2, 0.06, 0.015, 0.004)  # of the pose's own discrepancy, if it is what it is said to be
+SPREAD = 1.0  # of its logarithm about that of the poses before
+STRANGE = 0.6  # where it is something else: little is left of what is expected
+
+
+@dataclass(frozen=True, eq=False)
+class _Informed(RobotStructure):
+    """A structure of which `x` is expected, with the inverse covariance `known`."""
+
+    x: np.ndarray = None  # pyright: ignore[reportAssignmentType]
+    known: np.ndarray = None  # pyright: ignore[reportAssignmentType]
+
+    @property
+    def mean(self) -> np.ndarray:
+        return self.x
+
+    @property
+    def precision(self) -> np.ndarray:
+        return self.known
+
+
+@dataclass(frozen=True, eq=False)
+class Predictive:
+    """Of one more pose, after what `posterior` knows; FRFs in `band_hz` count."""
+
+    posterior: RobotPosterior
+    band_hz: tuple[float, float]
+
+    @cached_property
+    def _structure(self) -> _Informed:
+        p, s = self.posterior, self.posterior.structure
+        known = p.found.at.normal + s.precision
+        return _Informed(s.prior, s.effects, s.sensors, p.x, known)
+
+    def _misfit(self, q: np.ndarray, frf: Frf, size: float) -> FrfMisfit:
+        data = FrfData.of(self._structure.prior, (frf,), q[None], self.band_hz, LINES)
+        return FrfMisfit(self._structure, data, self.posterior.tolerances, size)
+
+    def strange(self, q: np.ndarray, frf: Frf) -> float:
+        """Log density of an FRF measured at q (dof,) in rad if it is hardly what is expected."""
+        misfit = self._misfit(q, frf, STRANGE)
+        return misfit.evidence(misfit(self.posterior.x))
+
+    def density(self, q: np.ndarray, frf: Frf) -> tuple[float, float]:
+        """The same if it is, but for a discrepancy like that of the poses before; its size."""
+        misfit = self._misfit(q, frf, SIZES[0])
+        usual, each = np.log(max(self.posterior.size, SIZES[-1])), []
+        x, own = self.posterior.x, None
+        for size in SIZES:
+            misfit = misfit.with_rho(size)
+            at = minimised(misfit, x, STEPS, own=own)
+            x, own = at.x, at.own
+            each.append(misfit.evidence(at))
+        weight = -0.5 * ((np.log(SIZES) - usual) / SPREAD) ** 2
+        weight -= np.logaddexp.reduce(weight)
+        value = float(np.logaddexp.reduce(np.array(each) + weight))
+        return value, SIZES[int(np.argmax(each))]
+
+    def off(self, q: np.ndarray, frf: Frf) -> float:
+        """By what share of the FRFs these differ from the expected ones."""
+        misfit = self._misfit(q, frf, STRANGE)
+        m, h = misfit.data.measured, misfit.motion(self.posterior.x, None).accelerance
+        away = np.where(m.used, m.accelerance - h, 0.0)
+        return float(np.linalg.norm(away) / np.linalg.norm(np.where(m.used, h, 0.0)))
+
+    def ratio(self, q: np.ndarray, frf: Frf) -> np.ndarray:
+        """(r,): by what factor a channel's FRFs are larger than expected (median of lines)."""
+        misfit = self._misfit(q, frf, STRANGE)
+        m, h = misfit.data.measured, misfit.motion(self.posterior.x, None).accelerance
+        off = np.where(m.used, np.log(np.abs(m.accelerance / h)), np.nan)[0]
+        return np.exp(np.nanmedian(off, axis=(1, 2)))
+
+
+def turned(frf: Frf, matrix: np.ndarray) -> tuple[Frf, float]:
+    """FRF (3, c, F) of which `matrix` (3, 3) was shown, and ln of the Jacobian of one complex value
+    of every column."""
+    inverse = np.linalg.inv(matrix)
+    shown = np.einsum("ij,jcf->icf", inverse, frf.accelerance)
+    variance = np.einsum("ij,jcf->icf", inverse**2, frf.variance)
+    volume = 2 * float(np.log(np.abs(np.linalg.det(inverse))))
+    return replace(frf, accelerance=shown, variance=variance), volume
