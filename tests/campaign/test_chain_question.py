@@ -19,7 +19,7 @@ POSES = 1
 
 
 def counted(folder, seeds: range, rough: bool) -> tuple[dict[str, np.ndarray], int, int]:
-    """By fault, how often each pose (POSES,) was asked about; of good imports: how many, and asked."""
+    """By fault, how often each pose was asked about; of good imports: how many, and asked."""
     asked = {name: np.zeros(POSES, dtype=int) for name in FAULTS}
     good = false = 0
     for seed, case in zip(seeds, cases(folder, seeds, POSES, rough), strict=True):
