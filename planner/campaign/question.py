@@ -17,7 +17,7 @@ from planner.campaign.chain_faults import LEAST, NONE, TURNED, ChainFault
 from planner.campaign.events import Question
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
-from planner.fit.predictive import LINES, SIZES, Predictive, turned
+from planner.fit.expected import LINES, SIZES, ExpectedFrfs, turned
 from planner.frf.frf import Frf
 
 LOG_ODDS = np.log(1000.0)  # against a mistake, before anything is measured
@@ -50,7 +50,7 @@ def question(
     learned = model.low.learned or model.low.suspect
     if frf is None or learned is None:
         return None
-    expected = Predictive(learned.posterior, model.cell.config.modes.band_hz)
+    expected = ExpectedFrfs(learned.posterior, model.cell.config.modes.band_hz)
     q = model.cell.robot.joints.internal([joints_deg])[0]
     stated = StatedHits(expected, q, frf)
     if not stated.doubted:
@@ -66,7 +66,7 @@ def question(
 class StatedHits:
     """Hits as they are said to be: of q (dof,) in rad, by a chain as it should be."""
 
-    expected: Predictive
+    expected: ExpectedFrfs
     q: np.ndarray
     frf: Frf
 
@@ -144,7 +144,7 @@ def _either(joints, number: int, one: float, other: float) -> str:
 
 
 def _chains(
-    state: CampaignState, expected: Predictive, q: np.ndarray, frf: Frf
+    state: CampaignState, expected: ExpectedFrfs, q: np.ndarray, frf: Frf
 ) -> Iterator[Mistake]:
     """What the chain may show instead; nothing once the engineer has said that it is right."""
     earlier = state.measurements.values()

@@ -11,8 +11,8 @@ from planner.campaign.chain_faults import TURNED
 from planner.campaign.question import Mistake, StatedHits, scaled
 from planner.dynamics.simulation import Simulation
 from planner.effects.table import Repertoire
+from planner.fit.expected import ExpectedFrfs
 from planner.fit.posterior import RobotPosterior
-from planner.fit.predictive import Predictive
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
@@ -46,7 +46,7 @@ def opposite(q: np.ndarray, joint: int) -> np.ndarray:
     return np.where(np.arange(len(q)) == joint, -q, q)
 
 
-def asked(expected: Predictive, q: np.ndarray, frf: Frf, others: dict[str, np.ndarray]) -> str:
+def asked(expected: ExpectedFrfs, q: np.ndarray, frf: Frf, others: dict[str, np.ndarray]) -> str:
     """What is asked about: a pose, "sign", "chain", "?" where nothing fits; "" where nothing is."""
     stated = StatedHits(expected, q, frf)
     if not stated.doubted:
@@ -69,7 +69,7 @@ def answers(case: Case, rng: np.random.Generator) -> list[dict[str, tuple[str, s
     poses = {f"P{k}": q for k, q in enumerate(case.q)}
     for n in range(1, len(case.q)):
         fit = Search(prior, case.frfs[:n], case.q[:n], case.band_hz, tolerances).found(warm)
-        expected, warm = Predictive(RobotPosterior.of(fit), case.band_hz), fit.remembered
+        expected, warm = ExpectedFrfs(RobotPosterior.of(fit), case.band_hz), fit.remembered
         q, frf, true = case.q[n], case.frfs[n], f"P{(n + 1) % len(case.q)}"
         others = {name: there for name, there in poses.items() if name != f"P{n}"}
         strange = case.frfs[(n + 1) % len(case.q)]

@@ -39,7 +39,7 @@ class _Informed(RobotStructure):
 
 
 @dataclass(frozen=True, eq=False)
-class Predictive:
+class ExpectedFrfs:
     """Of one more pose, after what `posterior` knows; FRFs in `band_hz` count."""
 
     posterior: RobotPosterior
