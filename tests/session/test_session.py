@@ -18,7 +18,7 @@ from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from planner.replay import replay
-from planner.report.rerun_story import Story
+from planner.report.rerun.story import Story
 from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
 from planner.session.teller import Teller
 from planner.session.watch import watch

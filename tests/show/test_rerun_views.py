@@ -7,8 +7,8 @@ from rerun.chunk import RrdReader
 
 from planner.replay import replay
 from planner.report.rerun_chart import HEIGHT, ChartAxis, log_range
-from planner.report.rerun_story import Story
-from planner.report.rerun_view import _blueprint
+from planner.report.rerun.story import Story
+from planner.report.rerun.campaign import _blueprint
 
 # What a view of each kind draws.
 DRAWN = {

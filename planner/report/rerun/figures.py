@@ -1,0 +1,121 @@
+"""Matplotlib figures in a Rerun recording: the plots of files and pages, as they are there.
+
+Rerun's plots run over its timelines and linearly; frequency responses need neither. So a figure is
+a view in two dimensions: its frame and text an image, its lines strips that stay sharp however
+near one looks, and that hide one by one.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.path import Path as Path2D
+
+from planner.report.frf_plots import png
+from planner.report.rerun.stream import open_stream
+
+DPI = 160
+WHITE = (255, 255, 255)  # behind what is drawn in black, whatever theme the viewer has
+More = Callable[[rr.RecordingStream], tuple[rrb.View | rrb.Container, rrb.TimePanel]]
+
+
+def figure_view(path: str, name: str) -> rrb.Spatial2DView:
+    """The view of the figure that is drawn at a path."""
+    return rrb.Spatial2DView(origin=f"/{path}", name=name, background=WHITE)
+
+
+def draw(stream: rr.RecordingStream, path: str, figure: Figure, static: bool = False) -> None:
+    """Log a figure at a path, at the recording's current time, or for all times."""
+    if not static:  # what was drawn there before may have had other lines
+        stream.log(path, rr.Clear(recursive=True))
+    sharp = [(panel, line) for panel in figure.axes for line in _solid_lines(panel)]
+    for _, line in sharp:
+        line.set_visible(False)
+    frame = rr.EncodedImage(contents=png(figure, DPI), media_type="image/png", draw_order=0.0)
+    stream.log(f"{path}/frame", frame, static=static)
+    for k, (panel, line) in enumerate(sharp):
+        line.set_visible(True)
+        strips = rr.LineStrips2D(
+            _strips(figure, panel, line), colors=_colour(line), draw_order=1.0 + line.zorder,
+            radii=rr.Radius.ui_points(0.5 * line.get_linewidth()),
+        )  # fmt: skip
+        stream.log(f"{path}/{_entity(line, k)}", strips, static=static)
+
+
+def record_figures(
+    figures: Mapping[str, Figure], name: str, note: str, rrd: Path, more: More | None = None
+) -> None:
+    """Write a recording with a tab for each figure by its name, then what `more` draws.
+
+    InputError if the file cannot be written.
+    """
+    tabs: list[rrb.View | rrb.Container] = []
+    time = rrb.TimePanel(state="hidden")
+    # The blueprint comes last: only then it is known what there is to be seen.
+    stream = open_stream(f"{' '.join(figures)}|{name}", name, rrb.Blueprint(), rrd)
+    for key, figure in figures.items():
+        draw(stream, f"figures/{key}", figure, static=True)
+        tabs.append(figure_view(f"figures/{key}", key.replace("_", " ")))
+    if more is not None:
+        view, time = more(stream)
+        tabs.append(view)
+    if note:
+        text = rr.TextDocument(f"# {name}\n{note}", media_type="text/markdown")
+        stream.log("note", text, static=True)
+        tabs.append(rrb.TextDocumentView(origin="/note", name="What is what"))
+    stream.send_blueprint(rrb.Blueprint(rrb.Tabs(*tabs), time, collapse_panels=True))
+    stream.flush(timeout_sec=10.0)
+    stream.disconnect()
+
+
+def one_by_one(timeline: str, name: str, figures: Iterable[Figure]) -> More:
+    """Draws figures one after the other along a timeline, counted from 1."""
+
+    def drawn(stream: rr.RecordingStream) -> tuple[rrb.View, rrb.TimePanel]:
+        for number, figure in enumerate(figures, 1):
+            stream.set_time(timeline, sequence=number)
+            draw(stream, timeline, figure)
+        stream.reset_time()
+        return figure_view(timeline, name), rrb.TimePanel(state="collapsed", timeline=timeline)
+
+    return drawn
+
+
+def _solid_lines(panel: Axes) -> list[Line2D]:
+    """Those that a plot of two dimensions shows without gaps; dashes stay in the image."""
+    if panel.name == "3d":
+        return []
+    return [line for line in panel.lines if line.get_visible() and line.get_linestyle() == "-"
+            and not line.get_marker()]  # fmt: skip
+
+
+def _strips(figure: Figure, panel: Axes, line: Line2D) -> list[np.ndarray]:
+    """Each part (n, 2) of a line in pixels of the image, cut off at the panel's frame."""
+    low, high = panel.bbox.get_points()
+    inside = line.get_path().cleaned(
+        line.get_transform(), remove_nans=True, clip=(*low, *high), simplify=False
+    )
+    starts = np.flatnonzero(inside.codes == Path2D.MOVETO)
+    ends = np.append(starts[1:], np.count_nonzero(inside.codes != Path2D.STOP))
+    places = np.stack([inside.vertices[:, 0], figure.bbox.height - inside.vertices[:, 1]], axis=1)
+    places *= DPI / figure.dpi
+    return [places[a:b] for a, b in zip(starts, ends, strict=True) if b - a > 1]
+
+
+def _colour(line: Line2D) -> list[int]:
+    alpha = line.get_alpha()
+    rgba = to_rgba(line.get_color(), 1.0 if alpha is None else alpha)
+    return [round(255 * share) for share in rgba]
+
+
+def _entity(line: Line2D, number: int) -> str:
+    """The part of an entity's path that names a line: its label, where it has one."""
+    label = str(line.get_label())
+    named = "" if label.startswith("_") else "".join(c if c.isalnum() else "_" for c in label)
+    return f"line_{number}_{named}" if named else f"line_{number}"
