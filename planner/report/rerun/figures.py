@@ -34,18 +34,18 @@ def draw(stream: rr.RecordingStream, path: str, figure: Figure, static: bool = F
     """Log a figure at a path, at the recording's current time, or for all times."""
     if not static:  # what was drawn there before may have had other lines
         stream.log(path, rr.Clear(recursive=True))
-    sharp = [(panel, line) for panel in figure.axes for line in _solid_lines(panel)]
-    for _, line in sharp:
-        line.set_visible(False)
+    sharp = _solid_lines(figure)
+    for _, line in sharp.values():
+        line.set_linestyle("None")
     frame = rr.EncodedImage(contents=png(figure, DPI), media_type="image/png", draw_order=0.0)
     stream.log(f"{path}/frame", frame, static=static)
-    for k, (panel, line) in enumerate(sharp):
-        line.set_visible(True)
+    for name, (panel, line) in sharp.items():
+        line.set_linestyle("-")
         strips = rr.LineStrips2D(
             _strips(figure, panel, line), colors=_colour(line), draw_order=1.0 + line.zorder,
             radii=rr.Radius.ui_points(0.5 * line.get_linewidth()),
         )  # fmt: skip
-        stream.log(f"{path}/{_entity(line, k)}", strips, static=static)
+        stream.log(f"{path}/{name}", strips, static=static)
 
 
 def record_figures(
@@ -87,35 +87,34 @@ def one_by_one(timeline: str, name: str, figures: Iterable[Figure]) -> More:
     return drawn
 
 
-def _solid_lines(panel: Axes) -> list[Line2D]:
-    """Those that a plot of two dimensions shows without gaps; dashes stay in the image."""
-    if panel.name == "3d":
-        return []
-    return [line for line in panel.lines if line.get_visible() and line.get_linestyle() == "-"
-            and not line.get_marker()]  # fmt: skip
+def _solid_lines(figure: Figure) -> dict[str, tuple[Axes, Line2D]]:
+    """Lines of plots of two dimensions by panel and label; dashes and marks stay in the image."""
+    found: dict[str, tuple[Axes, Line2D]] = {}
+    for number, panel in enumerate(figure.axes):
+        for k, line in enumerate(panel.lines if panel.name != "3d" else ()):
+            label = str(line.get_label())
+            named = (
+                "" if label.startswith("_") else "".join(c if c.isalnum() else "_" for c in label)
+            )
+            name = f"{number}/{named or f'line_{k}'}"
+            if line.get_visible() and line.get_linestyle() == "-":
+                found[f"{name}_{k}" if name in found else name] = panel, line
+    return found
 
 
 def _strips(figure: Figure, panel: Axes, line: Line2D) -> list[np.ndarray]:
     """Each part (n, 2) of a line in pixels of the image, cut off at the panel's frame."""
     low, high = panel.bbox.get_points()
-    inside = line.get_path().cleaned(
-        line.get_transform(), remove_nans=True, clip=(*low, *high), simplify=False
-    )
-    starts = np.flatnonzero(inside.codes == Path2D.MOVETO)
-    ends = np.append(starts[1:], np.count_nonzero(inside.codes != Path2D.STOP))
-    places = np.stack([inside.vertices[:, 0], figure.bbox.height - inside.vertices[:, 1]], axis=1)
-    places *= DPI / figure.dpi
-    return [places[a:b] for a, b in zip(starts, ends, strict=True) if b - a > 1]
+    path = line.get_transform().transform_path(line.get_path())
+    inside = path.cleaned(remove_nans=True, clip=(*low, *high), simplify=False)
+    drawn = inside.codes != Path2D.STOP
+    starts = np.flatnonzero(inside.codes[drawn] == Path2D.MOVETO)
+    x, y = inside.vertices[drawn].T
+    places = np.stack([x, figure.bbox.height - y], axis=1) * DPI / figure.dpi
+    return [part for part in np.split(places, starts) if len(part) > 1]
 
 
 def _colour(line: Line2D) -> list[int]:
     alpha = line.get_alpha()
     rgba = to_rgba(line.get_color(), 1.0 if alpha is None else alpha)
     return [round(255 * share) for share in rgba]
-
-
-def _entity(line: Line2D, number: int) -> str:
-    """The part of an entity's path that names a line: its label, where it has one."""
-    label = str(line.get_label())
-    named = "" if label.startswith("_") else "".join(c if c.isalnum() else "_" for c in label)
-    return f"line_{number}_{named}" if named else f"line_{number}"

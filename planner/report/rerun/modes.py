@@ -136,12 +136,12 @@ def _mac_figure(pose: LabelledPose, mac: np.ndarray, points: int) -> Figure:
     columns = [f"{j + 1}: {hz:.1f}" for j, hz in enumerate(pose.simulated_hz)]
     panel.set_yticks(range(len(rows)), rows)
     panel.set_xticks(range(len(columns)), columns)
-    few = "; different modes can look alike in so few" if points == 1 else ""
+    few = ";\ndifferent modes can look alike in so few" if points == 1 else ""
     panel.set(
         xlabel="simulated (Hz)", ylabel="measured",
         title=f"{plain_text(pose.pose)}: MAC of shapes at {3 * points} coordinates{few}",
     )  # fmt: skip
-    panel.title.set(fontsize=9, wrap=True)
+    panel.title.set_fontsize(9)
     return figure
 
 
