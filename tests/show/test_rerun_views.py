@@ -7,7 +7,7 @@ from rerun.chunk import RrdReader
 
 from planner.replay import replay
 from planner.report.rerun.campaign import _blueprint
-from planner.report.rerun.progress import Progress
+from planner.report.rerun.progress import MeasuredSeries
 from planner.report.rerun.story import Story
 from planner.report.rerun.stream import open_stream
 
@@ -104,7 +104,7 @@ def test_modes_move_on_a_timeline_of_their_own_and_stand_still_on_the_other(told
 def test_what_was_taken_back_is_in_no_series_that_is_shown(tmp_path):
     shown = []
     stream = open_stream("key", "name", rrb.Blueprint(), tmp_path / "a.rrd")
-    series = Progress(stream, shown.append)
+    series = MeasuredSeries(stream, shown.append)
     for number, value in ((1, 5.0), (2, 4.0), (2, 4.0), (3, 9.0), (2, 4.0), (3, 3.0)):
         series.log(number, {"learning/mode_1": value, "learning/mode_2": np.nan})
     stream.flush(timeout_sec=10.0)
@@ -112,6 +112,6 @@ def test_what_was_taken_back_is_in_no_series_that_is_shown(tmp_path):
     assert shown == ["progress/1"]
     rows = rows_of(tmp_path / "a.rrd")
     assert not any("mode_2" in entity for entity in rows)
-    values = [(row["measurement"], row["Scalars:scalars"][0])
-              for row in rows["/progress/1/learning/mode_1"] if row.get("Scalars:scalars")]  # fmt: skip
+    told = [row for row in rows["/progress/1/learning/mode_1"] if row.get("Scalars:scalars")]
+    values = [(row["measurement"], row["Scalars:scalars"][0]) for row in told]
     assert values == [(1, 5.0), (2, 4.0), (3, 3.0)]

@@ -22,7 +22,7 @@ from planner.report.frf_plots import AXES
 from planner.report.rerun.figures import draw, figure_view
 from planner.report.rerun.modes import GROUND, VIBRATION, ModeDrawing, mode_views
 from planner.report.rerun.progress import (
-    Progress,
+    MeasuredSeries,
     force_figure,
     frf_figures,
     learning_view,
@@ -68,7 +68,7 @@ class RerunView:
         identity = f"{cell.robot.name}|{cell.config}"
         layout = _blueprint(cell, "progress/0")
         self._stream = open_stream(identity, cell.robot.name, layout, rrd, viewer)
-        self._progress = Progress(
+        self._progress = MeasuredSeries(
             self._stream, lambda path: self._stream.send_blueprint(_blueprint(cell, path))
         )
         self._modes = ModeDrawing(self._stream)

@@ -110,7 +110,7 @@ def uncertainty(sd_percent: np.ndarray, target_percent: float) -> dict[str, floa
     }
 
 
-class Progress:
+class MeasuredSeries:
     """Series over the number of measurements; `arrange` shows those below a path.
 
     Rerun keeps what it was told: where a measurement is taken back, all series start again at
