@@ -22,7 +22,7 @@ from planner.recording.folder import read_recordings
 from planner.recording.joints import JointUnits
 from planner.recording.records import PoseRow
 from planner.report.demonstration import DemonstrationReport, DemonstrationStep
-from planner.report.rerun_story import Story
+from planner.report.rerun.story import Story
 
 NAME = "kr240_plane"
 Z_95 = 1.959964  # two-sided 95 % of a normal distribution

@@ -148,10 +148,10 @@ class ComparisonReport(Answer):
             shown = replace(shown, out=str(out.absolute()), plots=plots)
             save(figure, out / PICTURE)
         if rrd is not None:
-            from planner.report.rerun_learning import write
+            from planner.report.rerun.figures import record_figures
 
             shown = replace(shown, rrd=str(rrd.absolute()))
-            write(learned, rrd, key, self.robot, title)
+            record_figures({"curves": figure}, self.robot, f"{title}\n\nPool {key}.", rrd)
         return shown
 
     def write(self, folder: Path) -> None:

@@ -108,15 +108,7 @@ class CouplingReport(Answer):
         title = f"{mark}{self.tool} at {self.pose}"
         before = "as measured" if self.reference is None else f"measured: {self.reference}"
         figures = coupling_figures(self.before, self.coupled, title, before)
-        both = self.before, self.coupled
-
-        def record(rrd: Path) -> None:
-            from planner.report.rerun_coupling import NOTE, coupling_sheets
-            from planner.report.rerun_sheet import record_sheets
-
-            record_sheets(coupling_sheets(*both, before), "coupling", title, mark + NOTE, rrd)
-
-        written = pictures.write(figures, self.tool, record)
+        written = pictures.write(figures, self.tool, title)
         return replace(self, plots=tuple(written["plots"]), rrd=written["rrd"])
 
 

@@ -118,8 +118,8 @@ class IdentificationReport(Answer):
         if not pictures.wanted or self.basis is None:
             return self
         from planner.report.identification_plots import (
-            DirectFrfs,
             ShownPose,
+            direct_figure,
             identification_figures,
         )
 
@@ -135,13 +135,14 @@ class IdentificationReport(Answer):
         nominal = self.basis.nominal
         figures = identification_figures(poses, nominal, self.band_hz, mark)
         name = nominal.robot.name
+        note = f"{mark}Those held out are shown with what was identified without them."
+        more = None
+        if poses and pictures.rrd is not None:
+            from planner.report.rerun.figures import one_by_one
 
-        def recorded(rrd: Path) -> None:
-            from planner.report.rerun_identification import record
-
-            record(poses, DirectFrfs.of(poses, nominal, self.band_hz), name, mark, rrd)
-
-        return replace(self, **pictures.write(figures, name, recorded if poses else None))
+            each = (direct_figure(pose, nominal, self.band_hz, mark) for pose in poses)
+            more = one_by_one("pose", "FRFs, pose by pose", each)
+        return replace(self, **pictures.write(figures, name, note, more))
 
     def write(self, robot_toml: Path) -> "IdentificationReport":
         """Write the identified robot, read it again, and say how well that one agrees.

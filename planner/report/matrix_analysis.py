@@ -185,15 +185,14 @@ def _draw(
     from planner.report.shape_motion import animate
 
     name = files[0].name[-LONGEST_NAME:] + (f" and {len(files) - 1} more" if files[1:] else "")
+    mark, more = SIMULATED_TITLE if matrix.simulated else "", None
+    if geometry is not None and pictures.rrd is not None:
+        from planner.report.rerun.modes import moving_shapes
 
-    def record(rrd: Path) -> None:
-        from planner.report.rerun_matrix import record_matrix
-
-        record_matrix(matrix, found, geometry, name, rrd)
-
-    drawn = pictures.write(matrix_figures(matrix, found, geometry, name), name, record)
+        more = moving_shapes(found, geometry)
+    note = f"{mark}On the timeline shapes move, exaggerated; grey: at rest." if more else mark
+    drawn = pictures.write(matrix_figures(matrix, found, geometry, name), name, note, more)
     if geometry is not None and pictures.folder is not None:
-        mark = SIMULATED_TITLE if matrix.simulated else ""
         moving = animate(found, geometry, pictures.folder.absolute(), mark)
         drawn["plots"] = [*drawn["plots"], *map(str, moving)]
     return drawn

@@ -24,7 +24,7 @@ from planner.recording.points import ANYWHERE, PointNames
 from planner.recording.read import READERS
 from planner.report.answer import Answer, RefusedFile
 from planner.report.plot_files import Pictures
-from planner.report.text import SIMULATED, drawn, remarks, table, with_sd
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
 
 DEFAULT_BAND_HZ = (4.0, 60.0)
 ESTIMATORS = ("h1", "h2", "hv")
@@ -215,13 +215,8 @@ def _draw(
 
     more = f" and {len(accepted) - 1} more" if len(accepted) > 1 else ""
     name = f"{Path(accepted[0]).name[-LONGEST_NAME:]}{more}"
-
-    def record(rrd: Path) -> None:
-        from planner.report.rerun_modal import record_modes
-
-        record_modes(frf, found, modal, name, simulated, rrd)
-
-    return pictures.write(modal_figures(frf, found, modal, name, simulated), name, record)
+    mark = SIMULATED_TITLE if simulated else ""
+    return pictures.write(modal_figures(frf, found, modal, name, simulated), name, mark)
 
 
 def _by_channel(

@@ -140,10 +140,5 @@ def _draw(pictures: Pictures, found: OperatingModes, name: str, simulated: bool)
         ),
         "mac": mac_figure(found, f"{mark}AutoMAC, unscaled · {name}"),
     }
-
-    def record(rrd: Path) -> None:
-        from planner.report.rerun_operating import record_operating
-
-        record_operating(found, name, mark, rrd)
-
-    return pictures.write(figures, name, record)
+    note = f"{mark}Responses alone give no scale: neither FRFs nor modal masses follow."
+    return pictures.write(figures, name, note)

@@ -1,6 +1,5 @@
 """Where pictures go: files in a folder, and a Rerun recording."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +8,8 @@ from planner.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from planner.report.rerun.figures import More
 
 FORMATS = ("png", "svg")
 
@@ -33,17 +34,18 @@ class Pictures:
         self,
         figures: dict[str, "Figure"],
         name: str,
-        record: Callable[[Path], None] | None = None,
+        note: str = "",
+        more: "More | None" = None,
     ) -> dict[str, Any]:
         """Write every figure; answers where they are. Raises InputError if that is impossible.
 
-        `record` writes the Rerun file, which else has the figures.
+        In the Rerun file a `note` says what is what, and `more` draws what is no figure.
         """
         files = [] if self.folder is None else _files(figures, self.folder, self.format)
-        if self.rrd is not None and record is not None:
-            record(self.rrd)
-        elif self.rrd is not None:
-            _recording(figures, self.rrd, name)
+        if self.rrd is not None:
+            from planner.report.rerun.figures import record_figures
+
+            record_figures(figures, name, note, self.rrd, more)
         return {
             "plots": [str(file) for file in files],
             "rrd": None if self.rrd is None else str(self.rrd.absolute()),
@@ -65,19 +67,3 @@ def _files(figures: dict[str, "Figure"], folder: Path, form: str) -> list[Path]:
             f"The pictures cannot be written to {folder} ({error.strerror}); name another folder."
         ) from None
     return files
-
-
-def _recording(figures: dict[str, "Figure"], rrd: Path, name: str) -> None:
-    import rerun as rr
-    import rerun.blueprint as rrb
-
-    from planner.report.frf_plots import png
-    from planner.report.rerun_stream import open_stream
-
-    views = [rrb.Spatial2DView(origin=f"/modes/{key}", name=key) for key in figures]
-    stream = open_stream(f"modes|{name}", name, rrb.Blueprint(rrb.Tabs(*views)), rrd)
-    for key, figure in figures.items():
-        image = rr.EncodedImage(contents=png(figure, dpi=150), media_type="image/png")
-        stream.log(f"modes/{key}", image, static=True)
-    stream.flush(timeout_sec=10.0)
-    stream.disconnect()

@@ -27,8 +27,9 @@ def ink(colour: ArrayLike) -> str:
 
 
 def write_values(panel: "Axes", image: "AxesImage", form: str, **style: Any) -> None:
-    """The value of every cell of an image in it (`form` as of `format`), in readable ink."""
+    """Values of an image (`form` as of `format`) in its cells, in readable ink."""
     values = np.asarray(image.get_array(), dtype=float)
     for (i, j), value in np.ndenumerate(values):
-        colour = ink(image.to_rgba(value))
-        panel.text(j, i, format(value, form), ha="center", va="center", color=colour, **style)
+        if np.isfinite(value):
+            colour = ink(image.to_rgba(value))
+            panel.text(j, i, format(value, form), ha="center", va="center", color=colour, **style)

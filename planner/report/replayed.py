@@ -143,7 +143,7 @@ def replayed(
     With an `acquisition` also what that would have proposed, and saved. Raises InputError where
     a recording is missing or changed.
     """
-    from planner.report.rerun_story import Story
+    from planner.report.rerun.story import Story
 
     steps = []
     simulated = any(m.simulated for m in campaign.state.recorded)

@@ -1,7 +1,6 @@
 """Answer of `stability --map`: what a cut is allowed all over a campaign's workspace."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -123,20 +122,9 @@ def map_report(
     coordinates = _coordinates(campaign)
     features = candidates.features[kept]
     figure = _figure(answer, features, coordinates, cut)
-
-    def record(rrd: Path) -> None:
-        from planner.report.rerun_sheet import record_sheets
-        from planner.report.rerun_stability import MAP, map_sheets
-
-        shown = np.minimum(answer.depth_limit_m_at_95, cut.depth_m[1])
-        most = _most(features, shown)
-        of = features[:, most], coordinates[most], answer.wanted_depth_m
-        sheets = map_sheets(answer.position_m, shown, *of)
-        mark = SIMULATED_TITLE if answer.simulated else ""
-        said = f"{mark}At {answer.spindle_rpm:.0f} rpm. {MAP}"
-        record_sheets(sheets, "stability_map", asked.source.name, said, rrd)
-
-    written = pictures.write({"stability_map": figure}, asked.source.name, record)
+    mark = SIMULATED_TITLE if answer.simulated else ""
+    note = f"{mark}At {answer.spindle_rpm:.0f} rpm: poses by the depth stable with 95 %."
+    written = pictures.write({"stability_map": figure}, asked.source.name, note)
     return replace(answer, plots=tuple(written["plots"]), rrd=written["rrd"])
 
 

@@ -1,7 +1,6 @@
 """From a source of FRFs and a cut to the answer of `stability`."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from planner.report.stability_doubts import doubts
 from planner.report.stability_source import Asked, structure_of
 from planner.report.text import SIMULATED_TITLE
 
+LOBES = "Where a line has a gap every depth that was asked for is stable."
 LOBES_SHARE = 0.2  # of the time, where samples follow
 
 
@@ -41,16 +41,8 @@ def stability_of(
 
         mark = SIMULATED_TITLE if answer.simulated else ""
         figure = lobes_figure(cut, found, drawn, point, mark)
-        name = asked.source.name
-
-        def record(rrd: Path) -> None:
-            from planner.report.rerun_sheet import record_sheets
-            from planner.report.rerun_stability import LOBES, lobes_sheets
-
-            sheets = lobes_sheets(cut, found, drawn, point)
-            record_sheets(sheets, "stability", name, mark + LOBES, rrd)
-
-        answer = replace(answer, **pictures.write({"stability": figure}, name, record))
+        written = pictures.write({"stability": figure}, asked.source.name, mark + LOBES)
+        answer = replace(answer, **written)
     return answer
 
 

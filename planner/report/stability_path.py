@@ -1,7 +1,6 @@
 """Answer of `stability` along a path: the tightest pose, the best speed, the better feed."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -147,19 +146,8 @@ def path_report(
     figures = {"path": _figure(limits, answer, cut, mark)}
     if answer.turn is not None:
         figures["turns"] = turns_figure(answer.turn, answer.poses, answer.best_spindle_rpm, mark)
-
-    def record(rrd: Path) -> None:
-        from planner.report.rerun_sheet import record_sheets
-        from planner.report.rerun_stability import PATH, path_sheets, turns_sheets
-
-        feed = answer.feed.turn_deg, answer.feed.depth_m
-        sheets = dict(path_sheets(limits, cut, answer.best_spindle_rpm, feed))
-        if answer.turn is not None:
-            turn = answer.turn
-            sheets |= turns_sheets(np.array(turn.turn_deg), np.array(turn.depth_m), answer.poses)
-        record_sheets(sheets, "path", asked.source.name, mark + PATH, rrd)
-
-    written = pictures.write(figures, asked.source.name, record)
+    note = f"{mark}Depths that are stable with 95 % probability at all poses, and at each."
+    written = pictures.write(figures, asked.source.name, note)
     return replace(answer, plots=tuple(written["plots"]), rrd=written["rrd"])
 
 

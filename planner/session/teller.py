@@ -8,7 +8,7 @@ from planner.campaign.events import AnyEvent, Entry, FilesPlaced, FilesShown, Im
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
-from planner.report.rerun_story import Story
+from planner.report.rerun.story import Story
 
 
 class Teller:

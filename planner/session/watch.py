@@ -14,7 +14,7 @@ from planner.errors import InputError, PlannerError
 from planner.replay import replay
 from planner.report import session_text
 from planner.report.answer import Answer
-from planner.report.rerun_story import Story
+from planner.report.rerun.story import Story
 from planner.session.acts import (
     answer,
     arrive,

@@ -46,7 +46,8 @@ def check_recording(path):
     """Opened with the SDK: entities, timeline and blueprint are there."""
     contents, frames = recording_contents(path), Frames(path)
     wanted = ("/robot", "/cell/workspace", "/cell/measured", "/cell/proposed", "/frf/xx",
-              "/frequency", "/hits/force", "/learning", "/log", "/note", "/modes")  # fmt: skip
+              "/progress/0/frequency", "/progress/0/learning", "/hits/force", "/log", "/note",
+              "/modes")  # fmt: skip
     for entity in wanted:
         assert any(e.startswith(entity) for e in contents["entities"]), entity
     assert contents["timelines"] == {"measurement", "vibration"}

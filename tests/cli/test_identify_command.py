@@ -16,6 +16,7 @@ from planner.truth.hits import record_poses
 from planner.truth.load import load_truth
 from tests.support.outside import HAMMER, planner
 from tests.support.outside import answer as planner_json
+from tests.support.rerun_columns import columns_of
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
 
 POSES = 5
@@ -105,6 +106,7 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
     shutil.copytree(robot.parent, copy)
     toml, out = copy / robot.name, copy / "identified.toml"
     options = ["--starts", 1, "--held-out", 0, "--plot", tmp_path / "plots"]
+    options += ["--rrd", tmp_path / "found.rrd"]
     run = planner("identify", folder, "--robot", toml, "--out", out, *options)
     assert "joint_a1" in run.stdout
     assert "N·m/rad" in run.stdout
@@ -112,6 +114,9 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
     assert "No pose was held out" in " ".join(run.stdout.split())
     assert (tmp_path / "plots" / "map_xx_after.png").stat().st_size > 10_000
     assert (tmp_path / "plots" / "frf_P0.png").stat().st_size > 10_000
+    drawn = columns_of(tmp_path / "found.rrd")
+    assert drawn[("/pose/0/measured", "pose")] == list(range(1, POSES + 1))
+    assert ("/figures/map_zz_after/frame", "EncodedImage:blob") in drawn
     assert tomllib.loads(out.read_text())["urdf"] == "identified.urdf"
     Robot.load(out)
     again = planner("identify", folder, "--robot", toml, "--out", out, check=False)

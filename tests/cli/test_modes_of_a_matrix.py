@@ -241,8 +241,9 @@ def test_the_recording_has_charts_shapes_and_mac_in_place_of_pictures(
     assert (code, err) == (0, "")
     drawn = entities_of(answer["rrd"])
     count = len(answer["modes"])
-    wanted = {"/modes/stabilisation/CMIF", "/modes/driving/2/fit", "/modes/mac/cells", "/note"}
-    own = "points" if placed else "shape"
-    wanted |= {f"/modes/shape/{k + 1}/{own}" for k in range(count)}
+    wanted = {f"/figures/{name}/frame" for name in ("stabilisation", "driving_points", "mac")}
+    if placed:
+        wanted |= {f"/modes/shape/{k + 1}/points" for k in range(count)} | {"/modes/shape/1/rest"}
+    else:
+        wanted |= {"/figures/shapes/frame"}
     assert wanted <= drawn
-    assert "/modes/shape/1/rest" in drawn or not placed

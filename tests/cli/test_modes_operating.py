@@ -8,7 +8,7 @@ import pyuff
 
 from planner.cli.run import run
 from planner.modal.mac import mac
-from tests.support.rerun_columns import columns_of, of
+from tests.support.rerun_columns import lines_of
 from tests.support.running import response
 from tests.support.structures import plate
 
@@ -81,9 +81,8 @@ def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path, c
     assert answer["tones_hz"] == [pytest.approx(TONE_HZ, rel=1e-3)]
     assert "UNSCALED" in " ".join(answer["remarks"])
     assert [path.rsplit("/", 1)[1] for path in answer["plots"]] == ["stabilisation.png", "mac.png"]
-    drawn = columns_of(tmp_path / "modes.rrd")
-    assert {path for path, name in drawn if "blob" in name.lower()} <= {"/operating/mac/cells"}
-    assert len(of(drawn, "/operating/0/0/mode", "strips")[0]) == len(answer["modes"])
+    drawn = lines_of(tmp_path / "modes.rrd")
+    assert {f"/figures/stabilisation/0/singular_value_{k}" for k in (1, 2, 3)} <= set(drawn)
 
 
 def test_the_text_says_that_nothing_is_scaled(record, capsys):

@@ -13,7 +13,7 @@ import pyuff
 from planner.cli.run import run
 from planner.milling.tip_files import read_tip
 from tests.milling.test_stability_command import CUT
-from tests.support.rerun_columns import columns_of, of
+from tests.support.rerun_columns import lines_of
 
 LEI = Path(__file__).parents[2] / "campaigns" / "irb6660_lei2023"
 PAIR = ["--tool", f"{LEI}/target.toml", "--reference", f"{LEI}/reference.toml"]
@@ -59,10 +59,11 @@ def test_the_shipped_example(coupled):
 
 
 def test_the_recording_has_charts_and_no_picture_of_one(coupled):
-    found = columns_of(Path(coupled["rrd"]))
-    assert not any("blob" in name.lower() for _, name in found)
-    for entity in ("/coupling/0/0/this_tool", "/coupling/1/1/this_tool", "/coupling/2/0/errors"):
-        places = np.array(of(found, entity, "strips")[0][0]).reshape(-1, 2)
+    found = lines_of(Path(coupled["rrd"]))
+    tool = [entity for entity in found if "this_tool" in entity]
+    assert len(tool) == 4  # hits along x and y, responses along both
+    for entity in (*tool, "/figures/coupling/4/line_0"):
+        places = np.concatenate(found[entity])
         assert len(places) > 100
         assert np.all(np.diff(places[:, 0]) >= 0)
 

@@ -18,7 +18,7 @@ from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from planner.replay import replay
-from planner.report.rerun_story import Story
+from planner.report.rerun.story import Story
 from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
 from planner.session.teller import Teller
 from planner.session.watch import watch
@@ -249,7 +249,7 @@ def test_a_table_of_recordings_in_the_folder_gives_the_readback(cell):
               hits_per_pose=9, quiet_s=0.05, limit_s=limit_s, rrd=rrd)  # fmt: skip
     reader = RrdReader(rrd)
     seen = {str(chunk.entity_path) for chunk in reader.stream(store=reader.recordings()[0])}
-    assert {"/note", "/frf/xx/measured", "/cell/measured", "/cell/proposed"} <= seen
+    assert {"/note", "/frf/xx/0/measured", "/cell/measured", "/cell/proposed"} <= seen
     measured = campaign.state.measurements[proposal.pose].joints_deg
     off = np.max(np.abs(np.subtract(measured, proposal.joints_deg)))
     assert 0 < off <= 0.011

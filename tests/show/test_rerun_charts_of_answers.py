@@ -1,55 +1,55 @@
-"""Learning curves and identifications as Rerun recordings: charts, not pictures of charts."""
+"""Figures in a Rerun recording: their lines lie where their numbers say."""
 
-from typing import Any, cast
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from planner.report.identification_plots import DirectFrfs, ShownPose
-from planner.report.learning_curves import Band, Learning
-from planner.report.rerun_chart import HEIGHT
-from planner.report.rerun_identification import CELLS, record
-from planner.report.rerun_learning import TALL, write
-from tests.support.rerun_columns import columns_of, of
+from planner.report.rerun.figures import one_by_one, record_figures
+from tests.support.rerun_columns import columns_of, lines_of
 
-
-def test_learning_curves_lie_where_their_numbers_say(tmp_path):
-    n = np.arange(2, 6)
-
-    def band(values: list[float]) -> Band:
-        middle = np.array(values)
-        return Band(0.9 * middle, middle, 1.1 * middle)
-
-    one = Learning(n, band([10, 4, 2, 1]), band([0.5, 0.7, 0.9, 0.95]), band([0.9] * 4))
-    other = Learning(n, band([20, 9, 5, 3]), band([0.2, 0.4, 0.6, 0.8]), band([0.8] * 4))
-    rrd = tmp_path / "curves.rrd"
-    write({"default": one, "random": other}, rrd, "key", "KR240", "pool of 9 poses")
-    found = columns_of(rrd)
-    assert not any("blob" in name.lower() for _, name in found)  # no picture of a chart
-    strips = of(found, "/rmse_percent/default", "strips")[0][0]
-    places = np.array(strips).reshape(-1, 2)
-    assert places[:, 0] == pytest.approx(TALL * HEIGHT * n / 5.5, abs=1e-3)
-    # Logarithmic: 10 to 4 is as far as 20 to 8; less error is further down.
-    steps = np.diff(places[:, 1])
-    assert np.all(steps > 0)
-    assert steps[1] == pytest.approx(steps[2], rel=1e-3)
-    assert "KR240" in of(found, "/note", "text")[0][0]
+X = np.linspace(1.0, 9.0, 33)
 
 
-def test_an_identification_is_a_chart_for_each_pose_and_a_map_of_all(tmp_path):
-    hz = np.linspace(5.0, 60.0, 80)
-    measured = np.tile(1.0 + 1 / (1 + (hz - 20) ** 2), (4, 3, 1))
-    measured[2, 1] = np.nan  # a direction in which a pose was not hit
-    shown = DirectFrfs(hz, measured, 0.5 * measured, 0.9 * measured)
-    poses = [ShownPose(f"P{i}", np.zeros(3), cast(Any, None), cast(Any, None), i == 3)
-             for i in range(4)]  # fmt: skip
-    rrd = tmp_path / "identified.rrd"
-    record(poses, shown, "arm", "SIMULATED recordings · ", rrd)
-    found = columns_of(rrd)
-    assert len(of(found, "/frf/xx/measured", "strips")) == 4
-    assert sum(len(s) > 0 for s in of(found, "/frf/yy/measured", "strips")) == 3
-    titles = [labels for labels in of(found, "/frf/xx/words", "Points2D:labels") if labels]
-    assert "P3, held out: H xx" in titles[-1]
-    format_ = of(found, "/map/zz/cells", "format")[0][0]
-    assert format_["height"] == CELLS
-    assert "SIMULATED" in of(found, "/note", "text")[0][0]
+def figure(scale: float = 1.0) -> Figure:
+    made = Figure(figsize=(6, 4), layout="constrained")
+    left, right = made.subplots(1, 2)
+    gap = np.where(np.abs(X - 5) < 0.6, np.nan, X)
+    left.semilogy(X, scale * 10.0**gap, label="grown (m)")
+    left.plot(X, X, "--", label="dashed")
+    left.set(xlim=(0, 10), ylim=(1e-3, 1e10))
+    right.plot(X, X, "o", label="points")
+    right.plot(2 * X, X)
+    right.set(xlim=(0, 10), ylim=(0, 10))
+    return made
+
+
+def test_lines_lie_in_the_picture_where_their_numbers_say(tmp_path):
+    shown = figure()
+    record_figures({"some_plot": shown}, "KR240", "SIMULATED", tmp_path / "a.rrd")
+    found = lines_of(tmp_path / "a.rrd")
+    assert set(found) == {"/figures/some_plot/0/grown__m_", "/figures/some_plot/1/line_1"}
+    parts = found["/figures/some_plot/0/grown__m_"]
+    assert len(parts) == 2  # the gap stays one
+    places = np.concatenate(parts)
+    expected = [shown.axes[0].transData.transform((x, 10.0**x)) for x in X if abs(x - 5) >= 0.6]
+    scale = 160 / shown.dpi
+    height = shown.bbox.height
+    assert places == pytest.approx(
+        np.array([(scale * x, scale * (height - y)) for x, y in expected]), abs=0.5
+    )
+    (beyond,) = found["/figures/some_plot/1/line_1"]
+    assert np.max(beyond[:, 0]) <= scale * shown.axes[1].bbox.x1 + 2.0  # cut off at the frame
+    assert [line.get_linestyle() for line in shown.axes[0].lines] == ["-", "--"]
+    text = columns_of(tmp_path / "a.rrd")[("/note", "TextDocument:text")]
+    assert text == [["# KR240\nSIMULATED"]]
+
+
+def test_figures_follow_each_other_on_a_timeline(tmp_path):
+    each = one_by_one("pose", "FRFs", (figure(scale) for scale in (1.0, 0.1, 0.01)))
+    record_figures({}, "KR240", "", tmp_path / "a.rrd", each)
+    found = columns_of(tmp_path / "a.rrd")
+    drawn = [np.array(s[0]) for s in found[("/pose/0/grown__m_", "LineStrips2D:strips")] if s]
+    assert found[("/pose/0/grown__m_", "pose")] == [1, 2, 3]
+    assert all(np.all(a[:, 1] < b[:, 1]) for a, b in pairwise(drawn))

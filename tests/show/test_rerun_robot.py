@@ -9,7 +9,7 @@ import pytest
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
 from planner.campaign.events import Proposal
-from planner.report.rerun_view import RerunView
+from planner.report.rerun.campaign import RerunView
 from tests.support.rerun_frames import WORLD, Frames, rotation
 from tests.support.robots import campaign_text, make_arm, urdf
 

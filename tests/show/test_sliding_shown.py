@@ -18,7 +18,7 @@ from planner.check.examine import examine
 from planner.errors import InputError
 from planner.report.handing_on.controller import PoseToDrive, program
 from planner.report.pose_screen import PosePage
-from planner.report.rerun_view import RerunView
+from planner.report.rerun.campaign import RerunView
 from planner.robot.robot import Robot
 from tests.support.rails import GANTRY, GANTRY_BOX, make_sliding, sliding_campaign
 from tests.support.rerun_frames import Frames

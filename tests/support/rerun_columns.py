@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rerun.chunk import RrdReader
 
 
@@ -15,7 +16,13 @@ def columns_of(rrd: Path) -> dict[tuple[str, str], list[Any]]:
     return found
 
 
-def of(found: dict[tuple[str, str], list[Any]], entity: str, part: str) -> list[Any]:
-    """Of one entity, the component whose name has this part."""
-    (values,) = [v for (path, name), v in found.items() if path == entity and part in name]
-    return values
+def lines_of(rrd: Path) -> dict[str, list[np.ndarray]]:
+    """The lines (parts of (n, 2)) drawn last at each entity; of figures the image is the frame."""
+    found = columns_of(rrd)
+    images = {entity for entity, name in found if "blob" in name.lower()}
+    assert all(entity.endswith("/frame") for entity in images)
+    return {
+        entity: [np.array(strip) for strip in values[-1] or ()]
+        for (entity, name), values in found.items()
+        if name == "LineStrips2D:strips"
+    }

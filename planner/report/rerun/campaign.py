@@ -18,11 +18,20 @@ from planner.campaign.events import Proposal
 from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
-from planner.report.rerun_chart import GROUND, chart_view
-from planner.report.rerun_curves import WIDE, CurveDrawing, frf_views, progress_views
-from planner.report.rerun_modes import VIBRATION, ModeDrawing, mode_views
-from planner.report.rerun_robot import WORLD, RobotDrawing
-from planner.report.rerun_stream import open_stream
+from planner.report.frf_plots import AXES
+from planner.report.rerun.figures import draw, figure_view
+from planner.report.rerun.modes import GROUND, VIBRATION, ModeDrawing, mode_views
+from planner.report.rerun.progress import (
+    MeasuredSeries,
+    force_figure,
+    frf_figures,
+    learning_view,
+    measured_modes,
+    progress_views,
+    uncertainty,
+)
+from planner.report.rerun.robot import WORLD, RobotDrawing
+from planner.report.rerun.stream import open_stream
 
 TIMELINE = "measurement"
 COLOURS = {
@@ -43,7 +52,7 @@ measured last, slowed down and exaggerated.
 - **Cell**: the robot at the pose measured last or proposed next; orange: proposed; red: measured;
   blue: hits; grey: table and fences; small dots: poses of the workspace, coloured by the sd of
   their natural frequencies ({scale}).
-- **FRFs**: white as measured; orange what was predicted before it was measured, with ± 2 sd; blue
+- **FRFs**: black as measured; orange what was predicted before it was measured, with ± 2 sd; blue
   what is believed with it.
 - **Modes**: the robot as the simulation has it, yellow where it moves most; white: sensors as
   measured; thin: at rest. MAC 1: same shape, 0: none in common.
@@ -57,8 +66,11 @@ class RerunView:
     def __init__(self, cell: Cell, rrd: Path | None, viewer: bool = False, simulated: bool = False):
         self._cell = cell
         identity = f"{cell.robot.name}|{cell.config}"
-        self._stream = open_stream(identity, cell.robot.name, _blueprint(cell), rrd, viewer)
-        self._curves = CurveDrawing(self._stream, cell.config.stop.frequency_sd_percent)
+        layout = _blueprint(cell, "progress/0")
+        self._stream = open_stream(identity, cell.robot.name, layout, rrd, viewer)
+        self._progress = MeasuredSeries(
+            self._stream, lambda path: self._stream.send_blueprint(_blueprint(cell, path))
+        )
         self._modes = ModeDrawing(self._stream)
         self._drawing = self._robot()
         self._obstacles()
@@ -133,9 +145,12 @@ class RerunView:
         self._move(pose.q)
         if measured is not None:
             self._hits(pose, measured)
-            self._curves.hits(measured)
-        self._curves.frfs(model, before, pose, measured)
-        self._curves.frequencies(number, before, pose)
+            draw(self._stream, "hits/force", force_figure(measured))
+        figures = frf_figures(model, before, pose, measured)
+        for axis, figure in zip(AXES, figures, strict=True):
+            draw(self._stream, f"frf/{axis}{axis}", figure)
+        self._progress.log(number, measured_modes(pose, before))
+        self._at(number)
         self._modes.pose(model, pose, measured)
         self._measured_poses(model)
         self.workspace(number, model)
@@ -185,8 +200,8 @@ class RerunView:
 
     def learning(self, number: int, sd_percent: np.ndarray) -> None:
         """The sd (count,) in % of the natural frequencies over the workspace."""
-        self._at(number)
-        self._curves.learning(number, sd_percent)
+        target = self._cell.config.stop.frequency_sd_percent
+        self._progress.log(number, uncertainty(sd_percent, target))
 
     def text(self, number: int, text: str, level: str = "INFO") -> None:
         """A line in the log."""
@@ -228,7 +243,8 @@ def _eye(cell: Cell, near: float = 1.0) -> rrb.EyeControls3D:
     )
 
 
-def _blueprint(cell: Cell) -> rrb.Blueprint:
+def _blueprint(cell: Cell, progress: str) -> rrb.Blueprint:
+    """All views; series of what was learned lie below the path `progress`."""
     count = cell.config.modes.count
     robot = rrb.Spatial3DView(
         origin="/",
@@ -243,17 +259,14 @@ def _blueprint(cell: Cell) -> rrb.Blueprint:
         name="Decisions",
         columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"]),
     )
-    beside = rrb.Vertical(
-        chart_view("frf/xx", "FRF xx of the tool", WIDE),
-        chart_view("learning", "What is not known yet", WIDE),
-        log,
-    )
+    beside = rrb.Vertical(figure_view("frf/xx", "FRF xx of the tool"), learning_view(progress), log)
+    frfs = [figure_view(f"frf/{a}{a}", f"FRF {a}{a} of the tool") for a in AXES]
     return rrb.Blueprint(
         rrb.Tabs(
             rrb.Horizontal(robot, beside, column_shares=[3, 2], name="Cell"),
-            frf_views(),
+            rrb.Grid(*frfs, figure_view("hits/force", "Force of the hits"), name="FRFs"),
             mode_views(count, _eye(cell, NEAR)),
-            progress_views(count),
+            progress_views(progress, count),
             rrb.TextDocumentView(origin="/note", name="What is what"),
         ),
         rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="following"),

@@ -8,13 +8,17 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
+from planner.modal.matrix_modes import MatrixModes
+from planner.recording.geometry import Geometry
 from planner.recording.points import Layout
-from planner.report.rerun_chart import BRIGHT, GROUND
-from planner.report.rerun_modal import draw_mac, mac_view
+from planner.report.plot_text import plain_text, write_values
+from planner.report.rerun.figures import More, draw, figure_view
 from planner.report.robot_motion import (
     PointShapes,
     agreement,
@@ -23,14 +27,17 @@ from planner.report.robot_motion import (
     measured_shapes,
     simulated_shapes,
 )
+from planner.report.shape_motion import motions, moved
 from planner.robot.skeleton import Skeleton, skeleton
 
 VIBRATION = "vibration"
 FRAMES, FRAME_MS = 24, 100  # of one period on the screen
 LARGEST = 0.12  # of the arm's length: how far the point moves that moves most
+MOST_SHOWN = 12  # modes of measured points with a view of their own
 PIECES = 6  # a line is drawn in, each in the colour of its motion
 THICK, THIN, BALL = 0.02, 0.004, 0.03  # radii in units of the same
-MEASURED, REST = (255, 255, 255), (85, 88, 92)
+MEASURED, REST, BRIGHT = (255, 255, 255), (85, 88, 92), (235, 235, 235)
+GROUND = (13, 16, 17)  # behind all that is bright, whatever theme the viewer has
 
 
 def mode_views(count: int, eye: rrb.EyeControls3D) -> rrb.Container:
@@ -44,8 +51,7 @@ def mode_views(count: int, eye: rrb.EyeControls3D) -> rrb.Container:
         )
         for k in range(count)
     ]
-    mac = mac_view("modes/mac", "MAC: measured (rows) and simulated (columns)", count)
-    return rrb.Grid(*views, mac, name="Modes")
+    return rrb.Grid(*views, figure_view("modes/mac", "MAC"), name="Modes")
 
 
 class ModeDrawing:
@@ -66,7 +72,8 @@ class ModeDrawing:
             layout = Layout(sensors=seen.names)
             count = len(pose.modes)
             whole, there = simulated_shapes(simulation, pose.q, drawn, layout, count)
-            self._mac(pose, agreement(seen, there), len(seen.names))
+            mac = agreement(seen, there)
+            draw(self._stream, "modes/mac", _mac_figure(pose, mac, len(seen.names)))
             seen = matched(seen, there)
         for k in range(len(pose.modes)):
             path = f"modes/mode_{k + 1}"
@@ -114,15 +121,28 @@ class ModeDrawing:
             columns = rr.Points3D.columns(positions=every).partition([len(places)] * FRAMES)
             self._stream.send_columns(path, [_times()], columns)
 
-    def _mac(self, pose: LabelledPose, mac: np.ndarray, points: int) -> None:
-        rows = [
-            f"{k + 1}: {mode.frequency_hz:.1f} Hz" if mode else f"{k + 1}: none"
-            for k, mode in enumerate(pose.modes)
-        ]
-        columns = [f"{j + 1}: {hz:.1f}" for j, hz in enumerate(pose.simulated_hz)]
-        note = f"{pose.pose}, shapes at {3 * points} coordinates"
-        few = "; different modes can look alike in so few" if points == 1 else ""
-        draw_mac(self._stream, "modes/mac", mac, rows, columns, note + few)
+
+def _mac_figure(pose: LabelledPose, mac: np.ndarray, points: int) -> Figure:
+    """MAC (k, l) of measured and simulated shapes; white where nothing is known."""
+    figure = Figure(figsize=(6.0, 5.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    panel = figure.add_subplot()
+    image = panel.imshow(mac, vmin=0.0, vmax=1.0, cmap="Blues")
+    write_values(panel, image, ".2f", fontsize=8)
+    rows = [
+        f"{k + 1}: {mode.frequency_hz:.1f} Hz" if mode else f"{k + 1}: none"
+        for k, mode in enumerate(pose.modes)
+    ]
+    columns = [f"{j + 1}: {hz:.1f}" for j, hz in enumerate(pose.simulated_hz)]
+    panel.set_yticks(range(len(rows)), rows)
+    panel.set_xticks(range(len(columns)), columns)
+    few = ";\ndifferent modes can look alike in so few" if points == 1 else ""
+    panel.set(
+        xlabel="simulated (Hz)", ylabel="measured",
+        title=f"{plain_text(pose.pose)}: MAC of shapes at {3 * points} coordinates{few}",
+    )  # fmt: skip
+    panel.title.set_fontsize(9)
+    return figure
 
 
 def _title(pose: LabelledPose, k: int) -> str:
@@ -153,3 +173,46 @@ def _turns() -> np.ndarray:
 
 def _times() -> rr.TimeColumn:
     return rr.TimeColumn(VIBRATION, duration=FRAME_MS * np.arange(FRAMES).astype("timedelta64[ms]"))
+
+
+def moving_shapes(found: MatrixModes, geometry: Geometry) -> More:
+    """Draws the first modes of measured points in motion, coloured by how far each point moves."""
+
+    def drawn(stream: rr.RecordingStream) -> tuple[rrb.Container, rrb.TimePanel]:
+        shown = list(enumerate(found.modes[:MOST_SHOWN], 1))
+        for k, mode in shown:
+            motion = motions(found.dofs, mode.shape, geometry)
+            _points_and_lines(stream, f"modes/shape/{k}", geometry, motion)
+        views = [
+            rrb.Spatial3DView(
+                origin=f"/modes/shape/{k}", name=f"{k}: {mode.frequency_hz:.4g} Hz",
+                background=GROUND,
+            )
+            for k, mode in shown
+        ]  # fmt: skip
+        moves = rrb.TimePanel(
+            state="collapsed", timeline=VIBRATION, play_state="playing", loop_mode="all", fps=FRAMES
+        )
+        return rrb.Grid(*views, name="Mode shapes"), moves
+
+    return drawn
+
+
+def _points_and_lines(
+    stream: rr.RecordingStream, path: str, geometry: Geometry, motion: np.ndarray
+) -> None:
+    index = {node: k for k, node in enumerate(geometry.nodes)}
+    ends = np.array([(index[a], index[b]) for a, b in geometry.lines], int).reshape(-1, 2)
+    rest = geometry.position_m
+    radius = 0.004 * (float(np.linalg.norm(np.ptp(rest, axis=0))) or 1.0)
+    still = rr.LineStrips3D(rest[ends], colors=REST, radii=radius / 4)
+    stream.log(f"{path}/rest", still, static=True)
+    for frame, turn in enumerate(_turns()):
+        stream.set_time(VIBRATION, sequence=frame)
+        place = moved(geometry, motion, float(np.angle(turn)))
+        size = np.linalg.norm(np.real(motion * turn), axis=1)
+        colours = (255 * colormaps["plasma"](size)[:, :3]).astype(np.uint8)
+        stream.log(f"{path}/points", rr.Points3D(place, colors=colours, radii=radius))
+        between = (255 * colormaps["plasma"](size[ends].mean(axis=1))[:, :3]).astype(np.uint8)
+        stream.log(f"{path}/lines", rr.LineStrips3D(place[ends], colors=between, radii=radius / 2))
+    stream.reset_time()

@@ -27,7 +27,7 @@ class Story:
         self._view = None
         self._before: Model | None = None  # the model of the entry told last
         if rrd is not None or viewer:
-            from planner.report.rerun_view import RerunView
+            from planner.report.rerun.campaign import RerunView
 
             self._view = RerunView(cell, rrd, viewer, simulated)
 

@@ -1,0 +1,193 @@
+"""Figures of a measurement, and series of what was learned in Rerun's own plots over time."""
+
+from collections.abc import Callable
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from planner.campaign.labels import LabelledPose
+from planner.campaign.model import Model
+from planner.dataset.measure import MeasuredPose
+from planner.report.frf_plots import AXES
+from planner.report.plot_text import plain_text
+
+LINES = 300  # frequency lines of a plot: as many as its width shows
+DECADES = 4.0  # of an FRF shown below its largest value
+PULSE_MS = (5.0, 35.0)  # of a hit shown before and after its peak
+SIZE = (7.0, 3.6)  # inches
+EXPECTED, SPREAD, TARGET = (255, 150, 40), (150, 95, 40), (120, 200, 120)
+MEASURED, ALL = (235, 235, 235), (150, 154, 158)
+
+
+def frf_figures(
+    model: Model, before: Model | None, pose: LabelledPose, measured: MeasuredPose | None
+) -> list[Figure]:
+    """Direct FRFs xx, yy, zz of the tool: measured, predicted before that, and believed now."""
+    low, high = model.cell.config.modes.band_hz
+    lines = np.linspace(low, high, LINES)
+    now = np.abs(model.frf(pose.q[None], lines)[0][0])
+    then = None if before is None or not before.labelled else before.frf(pose.q[None], lines)
+    frf = None if measured is None else measured.frf
+    figures = []
+    for i, axis in enumerate(AXES):
+        title = f"{plain_text(pose.pose)}: response along {axis} to hits along {axis}"
+        figure, panel = _figure(title, "frequency (Hz)", "|H| (m/s²/N)")
+        top = float(np.nanmax(now[i, i]))
+        if then is not None:
+            size, sd = np.abs(then[0][0, i, i]), then[1][0, i, i]
+            panel.fill_between(
+                lines, np.maximum(size - 2 * sd, 0.0), size + 2 * sd, color="tab:orange",
+                alpha=0.25, lw=0, label="± 2 sd",
+            )  # fmt: skip
+            panel.plot(lines, size, color="tab:orange", label="predicted before")
+            top = max(top, float(np.nanmax(size)))
+        panel.plot(lines, now[i, i], color="tab:blue", lw=1.8, label="believed now")
+        if frf is not None:
+            seen = np.interp(lines, frf.frequency_hz, np.abs(frf.accelerance[i, i]))
+            panel.plot(lines, seen, color="black", lw=1.0, label="measured")
+            top = max(top, float(np.nanmax(seen, initial=0.0)))
+        panel.set(yscale="log", xlim=(low, high), ylim=(2 * top * 10**-DECADES, 2 * top))
+        panel.legend(fontsize=7, loc="upper right", ncols=4)
+        figures.append(figure)
+    return figures
+
+
+def force_figure(measured: MeasuredPose) -> Figure:
+    """The force of one hit along each axis around its peak."""
+    title = "Force, one hit an axis" if measured.hits else "FRFs were imported: no hits to show"
+    figure, panel = _figure(title, "time after the peak (ms)", "force (N)")
+    shown = {hit.axis[-1]: hit for hit in reversed(measured.hits)}
+    for axis, hit in sorted(shown.items()):
+        ms = 1000 * np.arange(hit.force_n.size) / hit.sampling_rate_hz
+        ms = ms - ms[int(np.argmax(np.abs(hit.force_n)))]
+        panel.plot(ms, np.abs(hit.force_n), label=f"along {axis}")
+    panel.set(xlim=(-PULSE_MS[0], PULSE_MS[1]))
+    if shown:
+        panel.legend(fontsize=7)
+    return figure
+
+
+def _figure(title: str, x: str, y: str):
+    figure = Figure(figsize=SIZE, layout="constrained")
+    FigureCanvasAgg(figure)
+    panel = figure.add_subplot()
+    panel.set(title=title, xlabel=x, ylabel=y)
+    panel.grid(True, which="both", alpha=0.25)
+    return figure, panel
+
+
+def measured_modes(pose: LabelledPose, before: Model | None) -> dict[str, float]:
+    """Frequencies (Hz) and damping (%) of a pose's modes, and what was expected before, by series.
+
+    Before the first measurement nothing was expected.
+    """
+    rows: dict[str, float] = {}
+    said = before.predict(pose.q[None]) if before is not None and before.labelled else None
+    for k, mode in enumerate(pose.modes, 1):
+        if mode is not None:
+            rows[f"frequency/mode_{k}/measured"] = mode.frequency_hz
+            rows[f"damping/mode_{k}"] = 100 * mode.damping_ratio
+            rows[f"damping/mode_{k}_low"] = 100 * (mode.damping_ratio - 2 * mode.damping_sd)
+            rows[f"damping/mode_{k}_high"] = 100 * (mode.damping_ratio + 2 * mode.damping_sd)
+        if said is not None:
+            hz, sd = said.frequency_hz[0, k - 1], said.frequency_sd_hz[0, k - 1]
+            rows[f"frequency/mode_{k}/expected"] = hz
+            rows[f"frequency/mode_{k}/low"] = hz - 2 * sd
+            rows[f"frequency/mode_{k}/high"] = hz + 2 * sd
+    return rows
+
+
+def uncertainty(sd_percent: np.ndarray, target_percent: float) -> dict[str, float]:
+    """The sd (count,) in % of each frequency over the workspace, of all, and the target."""
+    rows = {f"learning/mode_{k}": sd for k, sd in enumerate(sd_percent, 1)}
+    return rows | {
+        "learning/all": float(np.sqrt(np.mean(sd_percent**2))),
+        "learning/target": target_percent,
+    }
+
+
+class MeasuredSeries:
+    """Series over the number of measurements; `arrange` shows those below a path.
+
+    Rerun keeps what it was told: where a measurement is taken back, all series start again at
+    another path.
+    """
+
+    def __init__(self, stream: rr.RecordingStream, arrange: Callable[[str], None]):
+        self._stream, self._arrange = stream, arrange
+        self._rows: dict[int, dict[str, float]] = {}
+        self._start = 0
+
+    @property
+    def path(self) -> str:
+        """Below which the series are that hold."""
+        return f"progress/{self._start}"
+
+    def log(self, number: int, values: dict[str, float]) -> None:
+        """Values after so many measurements, by series; those not finite are left out."""
+        values = {name: v for name, v in values.items() if np.isfinite(v)}
+        known = self._rows.get(number, {})
+        again = any(known.get(name, v) != v for name, v in values.items())
+        again |= max(self._rows, default=0) > number
+        if not again and values.items() <= known.items():
+            return
+        self._rows = {n: row for n, row in self._rows.items() if n < number}
+        self._rows[number] = known | values
+        if again:
+            self._start += 1
+            self._arrange(self.path)
+        for n, row in self._rows.items() if again else [(number, values)]:
+            self._stream.set_time("measurement", sequence=n)
+            for name, value in row.items():
+                self._series(name, n, value)
+
+    def _series(self, name: str, number: int, value: float) -> None:
+        path = f"{self.path}/{name}"
+        if not any(name in row for n, row in self._rows.items() if n < number):
+            self._stream.log(path, *_style(name), static=True)
+        self._stream.log(path, rr.Scalars(value))
+
+
+def _style(name: str) -> list[rr.SeriesLines | rr.SeriesPoints]:
+    """How a series is drawn: measured values as points, others as lines."""
+    kind = name.rpartition("/")[2]
+    own = {
+        "measured": MEASURED, "expected": EXPECTED, "low": SPREAD, "high": SPREAD,
+        "target": TARGET, "all": ALL,
+    }  # fmt: skip
+    label = {"low": "expected − 2 sd", "high": "expected + 2 sd", "all": "all modes"}
+    said = label.get(kind, kind.replace("_low", " − 2 sd").replace("_high", " + 2 sd"))
+    said = said.replace("_", " ")
+    colour = own[kind] if kind in own else mode_colour(int(kind.split("_")[1]) - 1)
+    thin = kind.endswith(("low", "high"))
+    line = rr.SeriesLines(colors=colour, names=said, widths=0.7 if thin else 1.8)
+    dots = rr.SeriesPoints(colors=colour, names=said, marker_sizes=4.0)
+    return [dots] if kind == "measured" else [line] if thin or kind == "target" else [line, dots]
+
+
+def mode_colour(k: int) -> tuple[int, int, int]:
+    """The colour of mode k wherever it is drawn over a dark ground."""
+    red, green, blue = (np.array(colormaps["tab10"](k % 10)[:3]) * 155 + 100).astype(int)
+    return int(red), int(green), int(blue)
+
+
+def progress_views(path: str, count: int) -> rrb.Container:
+    """What is not known yet, and the frequencies measured against those expected."""
+    modes = [
+        rrb.TimeSeriesView(origin=f"/{path}/frequency/mode_{k}", name=f"mode {k}: frequency (Hz)")
+        for k in range(1, count + 1)
+    ]
+    damping = rrb.TimeSeriesView(origin=f"/{path}/damping", name="damping (%), ± 2 sd")
+    return rrb.Horizontal(
+        learning_view(path), rrb.Grid(*modes, damping), column_shares=[2, 3], name="Progress"
+    )
+
+
+def learning_view(path: str) -> rrb.TimeSeriesView:
+    """The sd of the natural frequencies over the workspace."""
+    name = "What is not known yet: sd of the natural frequencies (%)"
+    return rrb.TimeSeriesView(origin=f"/{path}/learning", name=name)
