@@ -6,13 +6,11 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.milling.cut import Cut
-from planner.milling.cutter_fit import CutterFit
+from planner.milling.cutter_fit import CutterFit, hidden_below
 from planner.milling.cutter_frf import EXACT, CutterFrf, PlaneFrf
-from planner.milling.cutter_modes import CutterModes
+from planner.milling.cutter_modes import CutterModes, ModeFile
 from planner.milling.directional import Coefficients, mean_matrix
-from planner.milling.hidden_modes import hidden_below
 from planner.milling.machine import Machine, check_structure
-from planner.milling.mode_file import ModeFile
 from planner.milling.spread import ModeSpread, explaining, sampled
 from planner.milling.uncertainty import REPLICATES
 from planner.milling.zeroth_order import LobeCurves, curves

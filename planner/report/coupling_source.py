@@ -12,7 +12,7 @@ from planner.errors import InputError
 from planner.milling.contact_fit import ContactFit, fit_contact
 from planner.milling.coupling import TipReceptance
 from planner.milling.cutter_frf import read_frf
-from planner.milling.simulated_rotations import completed
+from planner.milling.rotations import completed
 from planner.milling.tip_files import MEASURE, TipMotion, read_tip
 from planner.milling.tool import Tool
 from planner.robot.robot import Robot

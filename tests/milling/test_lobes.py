@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planner.milling.lobes import losses
-from planner.milling.point import multiplier
+from planner.milling.machine import multiplier
 from planner.milling.zeroth_order import limits
 from tests.support.milling_cases import (
     MULTIPLIERS,

@@ -11,7 +11,7 @@ from planner.dynamics.simulation import Elasticity, Simulation
 from planner.errors import InputError
 from planner.milling.beam import Segment, ToolMaterial
 from planner.milling.coupling import couple
-from planner.milling.simulated_rotations import completed
+from planner.milling.rotations import completed
 from planner.milling.tip_files import TipMotion
 from planner.milling.tool import Tool, ToolPart
 from planner.report.coupling_source import tip_of
