@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from planner.errors import InputError
-from planner.milling.cutter_frf import PlaneFrf
+from planner.milling.cutter_frf import CutterFrf
 from planner.milling.cutter_modes import CutterModes
 from planner.modal.fit_data import Data
 from planner.modal.mode_selection import scales
@@ -31,13 +31,13 @@ class CutterFit:
     of one column where some are not.
     """
 
-    frf: PlaneFrf
+    frf: CutterFrf
     there: np.ndarray
     found: PoleIdentification
     plain: PlainModes
 
     @classmethod
-    def of(cls, frf: PlaneFrf) -> "CutterFit":
+    def of(cls, frf: CutterFrf) -> "CutterFit":
         """InputError where the FRFs hold no mode."""
         accelerance = frf.receptance * (2j * np.pi * frf.frequency_hz) ** 2
         there = np.any(accelerance != 0, axis=-1)

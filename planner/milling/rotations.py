@@ -19,7 +19,7 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import receptance, solve_poles
 from planner.errors import InputError
 from planner.milling.coupling import TipReceptance
-from planner.milling.tip_files import TipMotion
+from planner.milling.cutter_frf import CutterFrf
 from planner.milling.tool import Point, Tool
 from planner.recording.records import AXES
 
@@ -115,7 +115,7 @@ LEAST = 0.05
 ROTATIONS_SD = 0.1
 
 
-def completed(motion: TipMotion, simulation: Simulation, q: np.ndarray) -> TipReceptance:
+def completed(motion: CutterFrf, simulation: Simulation, q: np.ndarray) -> TipReceptance:
     """All receptances of the tcp at q (dof,) in rad, from those of motion and a simulation."""
     g, seen = _simulated(simulation, q, motion.frequency_hz)
     own = np.moveaxis(motion.receptance, -1, 0)

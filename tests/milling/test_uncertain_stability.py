@@ -8,7 +8,7 @@ import pytest
 
 from planner.errors import InputError
 from planner.frf.quantities import convert
-from planner.milling.cutter_frf import CutterFrf, PlaneFrf, of_accelerance
+from planner.milling.cutter_frf import CutterFrf, of_accelerance
 from planner.milling.cutter_modes import CutterModes, real_modes
 from planner.milling.lobes import losses
 from planner.milling.spread import ModeSpread, explaining, moved, sampled
@@ -283,7 +283,7 @@ def test_mean_of_uncertain_frfs_is_fitted_by_modes_as_close_as_its_sd_asks():
         for factor in 1 + 0.02 * random.standard_normal((100, 5))
     ]
     mean, sd = np.mean(drawn, axis=0), np.std(drawn, axis=0)
-    frf = PlaneFrf("uncertain", lines, mean.transpose(1, 2, 0), sd.transpose(1, 2, 0))
+    frf = CutterFrf("uncertain", lines, mean.transpose(1, 2, 0), sd.transpose(1, 2, 0))
     fit = rational_fit(lines, frf.receptance)
     assert np.all(fit.poles.imag > 0)
     assert frf.error(frf.fitted()) < 0.03
