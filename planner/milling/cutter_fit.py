@@ -12,11 +12,10 @@ import numpy as np
 from planner.errors import InputError
 from planner.milling.cutter_frf import CutterFrf
 from planner.milling.cutter_modes import CutterModes
+from planner.modal.estimate_modes import PoleIdentification, identify, inflation
 from planner.modal.fit_data import Data
 from planner.modal.mode_selection import scales
-from planner.modal.model_check import inflation
 from planner.modal.plain_modes import PlainModes
-from planner.modal.pole_identification import PoleIdentification, identify
 from planner.modal.residues import Residues
 
 # Of a residue's second part: share of the FRF, anywhere, and sds of its noise that count.

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.errors import InputError, RefusedError
+from planner.modal.estimate_modes import Identified, PoleIdentification, identify
+from planner.modal.fit_data import Data
 from planner.modal.mac import mac
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel, Mode
-from planner.modal.pole_identification import Identified, PoleIdentification
 from planner.modal.residues import rank_one
-from planner.modal.ringdown import identify_decays
 from planner.recording.records import Channel, TimeRecord
 
 # A hit stands out of the force channel's own noise by this factor and reaches this share of the
@@ -291,3 +291,36 @@ def _mode(mode: Identified) -> Mode:
         _shape(mode),
         mode.probability,
     )
+
+
+# Poles of higher orders than this do not help with a handful of channels.
+MAX_ORDER = 30
+# Lines outside the band that are fitted too.
+MARGIN = 0.15
+LEAST_LINES = 6
+
+
+def identify_decays(
+    samples: np.ndarray,
+    sampling_rate_hz: float,
+    band_hz: tuple[float, float],
+    max_order: int = MAX_ORDER,
+) -> PoleIdentification | None:
+    """Modes of simultaneous channels over several decays, None where there is none.
+
+    samples (channels, decays, n). Means are taken off; slower drifts stay below the band.
+    """
+    n = samples.shape[-1]
+    frequency = np.fft.rfftfreq(n, 1 / sampling_rate_hz)
+    low, high = band_hz[0] / (1 + MARGIN), band_hz[1] * (1 + MARGIN)
+    chosen = (frequency >= low) & (frequency <= high) & (frequency > 0)
+    # The highest line of an even DFT is real and holds no phase.
+    chosen &= frequency < 0.499 * sampling_rate_hz
+    if np.count_nonzero(chosen) < LEAST_LINES:
+        return None
+    centred = samples - np.mean(samples, axis=-1, keepdims=True)
+    spectrum = np.fft.rfft(centred, axis=-1)[..., chosen]
+    if not np.any(spectrum):
+        return None
+    data = Data(frequency[chosen], spectrum, None, step_s=1 / sampling_rate_hz)
+    return identify(data, max_order)

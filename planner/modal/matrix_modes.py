@@ -7,17 +7,16 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.frf.matrix import FrfMatrix, by_number
 from planner.modal.consistency import Consistency, check
-from planner.modal.matrix_poles import MatrixPoles, identify_matrix
-from planner.modal.neighbours import expected
-from planner.modal.pole_identification import natural, probability, support
-from planner.modal.rank_one_fit import Entries, FittedShape, fit_shape
-from planner.modal.residues import realign
-from planner.modal.row_gains import FREE_GAIN, row_gain
-from planner.modal.shape_measures import (
+from planner.modal.estimate_modes import natural, probability, support
+from planner.modal.mac import (
     phase_collinearity,
     phase_deviation_deg,
     real_normal_modes,
 )
+from planner.modal.matrix_poles import MatrixPoles, identify_matrix
+from planner.modal.motion_fields import expected
+from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, fit_shape, row_gain
+from planner.modal.residues import realign
 from planner.recording.dof import Dof
 from planner.recording.excited_band import FIRST_LINE
 from planner.recording.geometry import Geometry

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.modal.fit_data import Data
-from planner.modal.matched_filter import falls
-from planner.modal.mode_selection import MAX_DAMPING, excess, running_mean
+from planner.modal.mode_selection import MAX_DAMPING, excess, falls, running_mean
 from planner.modal.refine import refine
 from planner.modal.residues import unit
 from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets

@@ -15,10 +15,9 @@ import scipy.linalg
 import scipy.signal
 
 from planner.errors import RefusedError
-from planner.modal.mac import mac
+from planner.modal.mac import mac, phase_collinearity, phase_deviation_deg
 from planner.modal.plscf import PoleSet
 from planner.modal.residues import realign
-from planner.modal.shape_measures import phase_collinearity, phase_deviation_deg
 from planner.modal.stabilisation import Diagram, Line, diagram, stable
 
 MAX_ORDER = 60

@@ -10,10 +10,10 @@ import numpy as np
 
 from planner.errors import InputError, RefusedError
 from planner.frf.quantities import DERIVATIVE, convert
-from planner.modal.lines_in_band import too_few_lines
+from planner.modal.estimate_modes import ladder
+from planner.modal.fit_data import too_few_lines
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.plscf import plscf
-from planner.modal.pole_identification import ladder
 from planner.modal.residues import lsfd, rank_one
 from planner.modal.stabilisation import Line, diagram, stable
 from planner.recording.records import FrfRecord

@@ -8,13 +8,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from planner.frf.frf import Frf
+from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.mac import mac_matrix
 from planner.modal.matrix_modes import MatrixMode, MatrixModes
 from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.operating import OperatingMode
-from planner.modal.pole_identification import PoleIdentification
 from planner.report.frf_plots import AXES
 from planner.report.modal_plots import poles_by_stability
 from planner.report.plot_text import ink

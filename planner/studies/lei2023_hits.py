@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.modal.estimate_modes import Identified, identify
 from planner.modal.fit_data import Data
 from planner.modal.modes import LEAST_PROBABILITY, Mode
-from planner.modal.pole_identification import Identified, identify
 from planner.modal.residues import rank_one
 from planner.modal.tracking import Guide, track
 from planner.progress import Tell
