@@ -20,6 +20,7 @@ from planner.modal.residues import Residues
 
 # Of a residue's second part: share of the FRF, anywhere, and sds of its noise that count.
 SECOND, TOLD = 1e-3, 3.0
+SAME = 1e-9  # relative, of a pole and itself: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +81,11 @@ class CutterFit:
         poles, residues = self.plain.modes()
         s = 2j * np.pi * self.frf.frequency_hz
         size = np.linalg.norm(self.frf.receptance, axis=(0, 1))
-        known = {mode.pole for mode in self.found.modes}
+        known = np.array([mode.pole for mode in self.found.modes])
         sd = np.sqrt(self.plain.residue_variance().sum(axis=0))
         residue, parts = self._whole(residues.residue), []
         for k, pole in enumerate(poles):
-            if complex(self.found.fit.refined.poles[k]) not in known:
+            if np.min(np.abs(known / self.found.fit.refined.poles[k] - 1)) > SAME:
                 continue
             second = np.linalg.svd(residue[..., k], compute_uv=False)[1]
             shows = second * np.max((1 / np.abs(s - pole) + 1 / np.abs(s - pole.conj())) / size)

@@ -1,6 +1,6 @@
 """From the FRF matrix of one pose to its modes, without an expert."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -85,26 +85,10 @@ MAX_ORDER = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
-    """One mode in rad/s and the units of the data."""
-
-    pole: complex
-    frequency_hz: float
-    frequency_sd_hz: float
-    damping_ratio: float
-    damping_sd: float
-    residue: np.ndarray  # (outputs, inputs)
-    residue_sd: np.ndarray  # (outputs, inputs) of real and imaginary part each
-    presence: float  # share of the response at its frequency that is this mode's, roughly
-    support: float  # share of the higher model orders that have this pole
-    probability: float
-
-
-@dataclass(frozen=True, eq=False)
 class PoleIdentification:
     """Modes in increasing frequency, and what they came from."""
 
-    modes: tuple[Identified, ...]
+    modes: tuple[Mode, ...]
     data: Data
     diagram: Diagram
     fit: PoleFit
@@ -143,7 +127,7 @@ def ladder(top: int) -> tuple[int, ...]:
     return tuple(sorted(orders | {top}))
 
 
-def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Identified, ...]:
+def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Mode, ...]:
     """The poles of a fit that are established, with standard deviations and probabilities."""
     refined = fitted.refined
     m = refined.poles.size
@@ -167,20 +151,14 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
         variance = variance + np.mean(shared_residue[..., k], axis=-1)
         presence = _presence(data, refined, k)
         supported = support(pole - data.rate_1_s, sets)
+        residue_sd = np.sqrt(np.maximum(variance, 0.0))  # less by rounding alone
         modes.append(
-            Identified(
-                pole,
-                frequency,
-                float(sd[0]),
-                damping,
-                float(sd[1]),
-                residue,
-                np.sqrt(np.maximum(variance, 0.0)),  # less by rounding alone
-                presence,
-                supported,
-                probability(presence, supported, float(weak[k])),
+            Mode(
+                frequency, float(sd[0]), damping, float(sd[1]), residue, residue_sd,
+                rank_one(residue)[0], probability(presence, supported, float(weak[k])),
+                support=supported,
             )
-        )
+        )  # fmt: skip
     return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
 
 
@@ -292,21 +270,13 @@ def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:
     )
 
 
-def _mode(mode: Identified, columns: np.ndarray) -> Mode:
+def _mode(mode: Mode, columns: np.ndarray) -> Mode:
+    """With residues at all three hit axes, NaN where nothing was hit."""
     residue = np.full((3, 3), np.nan + 1j * np.nan)
     residue_sd = np.full((3, 3), np.nan)
     residue[:, columns] = mode.residue
     residue_sd[:, columns] = mode.residue_sd
-    return Mode(
-        mode.frequency_hz,
-        mode.frequency_sd_hz,
-        mode.damping_ratio,
-        mode.damping_sd,
-        residue,
-        residue_sd,
-        rank_one(mode.residue)[0],
-        mode.probability,
-    )
+    return replace(mode, residue=residue, residue_sd=residue_sd)
 
 
 def _remarks(found: PoleIdentification, doubtful: tuple[Mode, ...]) -> tuple[str, ...]:

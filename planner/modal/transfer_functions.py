@@ -114,15 +114,14 @@ def _presence(f: np.ndarray, h: np.ndarray, pole: complex, residue: np.ndarray) 
 
 def _mode(line: Line, residue: np.ndarray, certain: float) -> Mode:
     late = line.poles[len(line.poles) // 2 :]
-    nothing = np.full((3, 3), np.nan)
     return Mode(
         line.frequency_hz,
         float(np.std(np.abs(late)) / (2 * np.pi)),
         line.damping_ratio,
         float(np.std(-late.real / np.abs(late))),
-        nothing.astype(complex),
-        nothing,
+        residue,
+        residue.real,
         rank_one(residue)[0],
         # Rough: how often it was there, how still it stood, how much of the response it is.
         float(certain * (1 - line.scatter)),
-    )
+    ).unscaled()

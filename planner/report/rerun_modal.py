@@ -10,11 +10,10 @@ import rerun.blueprint as rrb
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.mac import mac_matrix
-from planner.modal.matrix_modes import MatrixMode, MatrixModes
+from planner.modal.matrix_modes import MatrixModes
 from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel, Mode
-from planner.modal.operating import OperatingMode
 from planner.report.frf_plots import AXES
 from planner.report.modal_plots import poles_by_stability
 from planner.report.plot_text import ink
@@ -40,7 +39,6 @@ MOST_VALUES, WORTH_A_VALUE = 8, 0.1  # modes of whose MAC all values are written
 # Cells of shapes that are alike, and of different ones: bright words are read on both.
 ALIKE, DIFFERENT = np.array([28, 100, 180]), np.array([32, 34, 38])
 WIDE, WIDER = 2.0, 5.0  # times the height; where charts lie one above the other
-ShapedMode = Mode | MatrixMode | OperatingMode
 
 
 def record_modes(
@@ -69,13 +67,13 @@ def record_modes(
     stream.disconnect()
 
 
-def mode_names(modes: Sequence[ShapedMode], digits: str = ".2f") -> list[str]:
+def mode_names(modes: Sequence[Mode], digits: str = ".2f") -> list[str]:
     """Number and frequency of each mode."""
     return [f"{k + 1}: {mode.frequency_hz:{digits}} Hz" for k, mode in enumerate(modes)]
 
 
 def draw_auto_mac(
-    stream: rr.RecordingStream, path: str, modes: Sequence[ShapedMode], names: list[str], about: str
+    stream: rr.RecordingStream, path: str, modes: Sequence[Mode], names: list[str], about: str
 ) -> None:
     """Log how alike modes are to each other; `about` says of what shapes are, {} of how many."""
     shapes = np.array([mode.shape for mode in modes])
