@@ -10,6 +10,7 @@ from planner.modal.fit_data import Data
 from planner.modal.mac import mac
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel, Mode
+from planner.modal.residues import rank_one
 from planner.recording.records import Channel, TimeRecord
 
 # A hit stands out of the force channel's own noise by this factor and reaches this share of the
@@ -229,11 +230,12 @@ def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarr
 
 def _rescaled(found: PoleIdentification, scale: np.ndarray) -> PoleIdentification:
     factor = scale[:, :, 0]
-    modes = tuple(
-        replace(m, residue=m.residue * factor, residue_sd=m.residue_sd * factor)
-        for m in found.modes
-    )
-    return replace(found, modes=modes)
+    modes = []
+    for mode in found.modes:
+        residue = mode.residue * factor
+        sd, shape = mode.residue_sd * factor, rank_one(residue)[0]
+        modes.append(replace(mode, residue=residue, residue_sd=sd, shape=shape))
+    return replace(found, modes=tuple(modes))
 
 
 def _merge(modes: list[Mode], remarks: list[str]) -> tuple[Mode, ...]:

@@ -10,7 +10,7 @@ from planner.modal.refine import refine
 from planner.modal.residues import unit
 from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
 from planner.modal.set_search import Places, searched_again
-from planner.modal.split_modes import REACH, around, drifted, explains, thinned, unsplit
+from planner.modal.split_modes import REACH, around, explains, thinned, unsplit
 
 # Share of the response at its frequency that a mode must be: one of the diagram's stable lines,
 # and one that only the fit's error tells of. Chosen on simulated plates and aeroplanes.
@@ -52,7 +52,7 @@ def established(
 ) -> tuple[SetPoles, np.ndarray]:  # fmt: skip
     """Fit with every set's own poles, weak modes left out and missing ones added."""
     fit = _fit(data, sets, variance, poles, rounds=0)
-    fit = _fit(data, sets, variance, fit.poles, drifted(data, sets, fit, variance), ROUGH_ROUNDS)
+    fit = _fit(data, sets, variance, fit.poles, fit.own, ROUGH_ROUNDS)
     searched = False
     for _ in range(PASSES):
         variance = _variance(data, fit.fitted, fit.poles.size)
