@@ -159,10 +159,10 @@ def losses(machine: Machine, tell: Tell = quietly) -> tuple[Loss, ...]:
 def zeroth_losses(machine: Machine) -> tuple[Loss, ...]:
     """By the average of the cutting force; kind and error are not known to it, kinds are Hopf."""
     cut = machine.cut
-    found = limits(machine.floor(), cut.speeds_rpm, cut.teeth)
+    depths, chatter = limits(machine.floor(), cut.speeds_rpm, cut.teeth)
     return tuple(
         Loss(depth, "hopf", hertz) if depth <= cut.depth_m[1] else NO_LOSS
-        for depth, hertz in zip(found.depth_m, found.chatter_hz, strict=True)
+        for depth, hertz in zip(depths, chatter, strict=True)
     )
 
 

@@ -7,11 +7,11 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.frf.frf import Frf
 from planner.modal.fit_data import Data, too_few_lines
-from planner.modal.mode_selection import PoleFit, fit, model, scales, strongest, weakness
+from planner.modal.mode_selection import PoleFit, fit, model, presences, scales, strongest, weakness
 from planner.modal.modes import LEAST_PROBABILITY, ModalModel, Mode
 from planner.modal.plscf import PoleSet, plscf
-from planner.modal.refine import Refined, evaluate, shared_error
-from planner.modal.residues import rank_one, unit
+from planner.modal.refine import evaluate, shared_error
+from planner.modal.residues import rank_one
 from planner.modal.stabilisation import Diagram, diagram, stable
 
 # Of the band's span, taken away above, then below; at most half of what lies beside a mode there,
@@ -137,6 +137,7 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
     shared_pole, shared_residue = shared_error(data.lines, fitted.variance, refined, errors)
     if data.step_s is None:
         scale = scale * inflation(data, fitted, shared_pole)
+    present = presences(data, refined.poles, refined.residues.residue)
     modes = []
     for k in range(m):
         if weak[k] > 1:
@@ -149,13 +150,12 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
         residue = refined.residues.residue[..., k]
         variance = scale[k] * np.mean(refined.residue_variance[..., k], axis=-1)
         variance = variance + np.mean(shared_residue[..., k], axis=-1)
-        presence = _presence(data, refined, k)
         supported = support(pole - data.rate_1_s, sets)
         residue_sd = np.sqrt(np.maximum(variance, 0.0))  # less by rounding alone
         modes.append(
             Mode(
                 frequency, float(sd[0]), damping, float(sd[1]), residue, residue_sd,
-                rank_one(residue)[0], probability(presence, supported, float(weak[k])),
+                rank_one(residue)[0], probability(float(present[k]), supported, float(weak[k])),
                 support=supported,
             )
         )  # fmt: skip
@@ -182,16 +182,6 @@ def support(pole: complex, sets: tuple[PoleSet, ...]) -> float:
     reach = max(abs(pole.real), 0.005 * abs(pole))
     near = [np.any(np.abs(entry.poles.imag - pole.imag) < reach) for entry in upper]
     return float(np.mean(near))
-
-
-def _presence(data: Data, refined: Refined, k: int) -> float:
-    """‖response of mode k‖/‖response‖ at the line nearest its frequency."""
-    frequency = refined.poles[k].imag / (2 * np.pi)
-    line = int(np.argmin(np.abs(data.frequency_hz - frequency)))
-    lines = data.lines.part(slice(line, line + 1))
-    one = unit(lines, data.to_plane(refined.poles[k : k + 1]))[0, 0]
-    whole = np.linalg.norm(data.response[..., line])
-    return float(np.linalg.norm(refined.residues.residue[..., k] * one) / max(whole, 1e-300))
 
 
 def probability(presence: float, support: float, weak: float) -> float:

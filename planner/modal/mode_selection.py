@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.modal.fit_data import Data
 from planner.modal.refine import Refined, refine
-from planner.modal.residues import basis, rank_one, synthesize
+from planner.modal.residues import basis, rank_one, synthesize, unit
 
 # Damping ratios of the atoms with which the error is searched.
 TRIAL_DAMPING = (0.003, 0.01, 0.03, 0.08)
@@ -285,3 +285,15 @@ def strongest(data: Data) -> np.ndarray:
     weight = (2 / variance).reshape(data.entries, -1)
     poles, fall = falls(data, weight, weight * data.response.reshape(data.entries, -1))
     return poles[[int(np.argmax(fall))]] if np.max(fall) > data.threshold else poles[:0]
+
+
+def presences(data: Data, poles: np.ndarray, residue: np.ndarray) -> np.ndarray:
+    """(m,) ‖response of a mode‖/‖response‖ at the line nearest its frequency.
+
+    poles (m,) in rad/s, residue (…, m) of all entries.
+    """
+    lines = [int(np.argmin(np.abs(data.frequency_hz - p.imag / (2 * np.pi)))) for p in poles]
+    ones = unit(data.lines, data.to_plane(poles))[np.arange(poles.size), lines]
+    whole = np.linalg.norm(data.response[..., lines].reshape(-1, poles.size), axis=0)
+    own = np.linalg.norm(residue.reshape(-1, poles.size) * ones, axis=0)
+    return own / np.maximum(whole, 1e-300)
