@@ -12,10 +12,9 @@ from planner.design.frequency_posterior import FrequencyOutputs, Margins
 from planner.design.stability import share_left, stability, with_margins
 from planner.errors import InputError
 from planner.frf.frequency_lines import frequency_lines
-from planner.milling.cut import Cut
+from planner.milling.cut import Cut, cuts_at
 from planner.milling.cutter_frf import of_accelerance
-from planner.milling.decision import PoseDecision, decide
-from planner.milling.feed import cuts_at
+from planner.milling.path import PoseDecision, decide
 from planner.milling.structure import of_frf
 
 if TYPE_CHECKING:

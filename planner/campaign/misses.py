@@ -27,8 +27,7 @@ from planner.identification.parameters import parametrise
 from planner.identification.simulated_visit import SolvedPoses
 from planner.identification.visit_equations import AIMED, OWN
 from planner.modal.modes import Mode
-from planner.modal.residue_change import residue_changes
-from planner.modal.residues import laplace
+from planner.modal.residues import laplace, residue_changes
 from planner.recording.joints import JointUnits
 from planner.recording.records import AXES
 

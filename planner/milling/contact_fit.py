@@ -12,8 +12,7 @@ from scipy.optimize import least_squares
 
 from planner.errors import InputError
 from planner.milling.coupling import TipReceptance, couple
-from planner.milling.interface import NUMBERS, ToolContact
-from planner.milling.tool import Tool
+from planner.milling.tool import NUMBERS, Tool, ToolContact
 
 FARTHEST = np.log(1e3)  # from the numbers stated: the prior's bounds
 PRIOR_SD = np.log(10.0)  # of each number around its stated one

@@ -1,5 +1,6 @@
-"""cut.toml: which cut is asked about, as a typed table."""
+"""cut.toml: which cut is asked about, as a typed table; its feed at poses of a robot."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -39,9 +40,7 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     feed: tuple[float, float, float] = (1.0, 0.0, 0.0)
     feed_in: Literal["frf", "base", "path"] = "frf"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    method: Literal["full_discretisation", "semi_discretisation", "zeroth_order"] = (
-        "full_discretisation"
-    )
+    method: Literal["full_discretisation", "zeroth_order"] = "full_discretisation"
     pitch_deg: list[float] | None = None
     helix_deg: float = 0.0
     kt_sd_percent: float = 0.0
@@ -151,3 +150,62 @@ def _check_directions(cut: Cut, path: Path) -> None:
             raise InputError(f"{path}: {name} is not of length 1; give a unit vector.")
     if cut.feed_in == "frf" and abs(float(np.dot(cut.feed, cut.axis))) > UNIT:
         raise InputError(f"{path}: feed is not at right angles to the axis; correct one of them.")
+
+
+LEAST_ACROSS = 0.2  # of a feed's length across the tool's axis: with less it is a plunge
+
+
+def cuts_at(
+    cut: Cut, rotation: np.ndarray, position_m: np.ndarray, names: Sequence[str]
+) -> list[Cut]:
+    """The cut at each of p poses, its feed in the axes of the FRFs there.
+
+    rotation (p, 3, 3) of the tcp in the base frame, position_m (p, 3) of the path in order, which
+    gives the feed where `feed_in` is "path". InputError where a feed is along the tool's axis.
+    """
+    if cut.feed_in == "frf":
+        return [cut] * len(rotation)
+    feeds = np.tile(np.array(cut.feed, float), (len(rotation), 1))
+    if cut.feed_in == "path":
+        feeds = _tangents(position_m)
+    return [
+        turned_to(cut, turn, feed, name)
+        for turn, feed, name in zip(rotation, feeds, names, strict=True)
+    ]
+
+
+def turned_to(cut: Cut, rotation: np.ndarray, feed: np.ndarray, name: str) -> Cut:
+    """The cut with a feed (3,) in the base frame, at a rotation (3, 3) of the tcp there.
+
+    What counts of the feed is its part across the tool's axis.
+    """
+    axis = np.array(cut.axis) / np.linalg.norm(cut.axis)
+    own = rotation.T @ (feed / max(float(np.linalg.norm(feed)), 1e-300))
+    across = own - axis * (axis @ own)
+    size = float(np.linalg.norm(across))
+    if not size > LEAST_ACROSS:
+        raise InputError(
+            f"{name}: the feed is along the tool's axis, or there is none; check feed, feed_in and "
+            f"axis in the cut's file, and the path."
+        )
+    x, y, z = (float(v) for v in across / size)
+    return msgspec.structs.replace(cut, feed=(x, y, z), feed_in="frf")
+
+
+def no_pose(cut: Cut, source: object) -> None:
+    """InputError where the cut's feed asks for a pose that a source does not know."""
+    if cut.feed_in != "frf":
+        raise InputError(
+            f"{source} does not say how the robot stands, which feed_in = {cut.feed_in!r} in the "
+            f"cut's file needs; name a campaign, or state the feed in the axes of the FRFs (frf)."
+        )
+
+
+def _tangents(position_m: np.ndarray) -> np.ndarray:
+    """(p, 3) from each pose's neighbour to the next."""
+    if len(position_m) < 2:
+        raise InputError(
+            'A path of one pose has no direction, which feed_in = "path" in the cut\'s file needs; '
+            "give more poses, or state the feed."
+        )
+    return np.gradient(position_m, axis=0)

@@ -10,17 +10,17 @@ from functools import cached_property
 import numpy as np
 
 from planner.errors import InputError
-from planner.milling.cutter_frf import PlaneFrf
+from planner.milling.cutter_frf import CutterFrf
 from planner.milling.cutter_modes import CutterModes
+from planner.modal.estimate_modes import PoleIdentification, identify, inflation
 from planner.modal.fit_data import Data
 from planner.modal.mode_selection import scales
-from planner.modal.model_check import inflation
 from planner.modal.plain_modes import PlainModes
-from planner.modal.pole_identification import PoleIdentification, identify
 from planner.modal.residues import Residues
 
 # Of a residue's second part: share of the FRF, anywhere, and sds of its noise that count.
 SECOND, TOLD = 1e-3, 3.0
+SAME = 1e-9  # relative, of a pole and itself: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,13 +31,13 @@ class CutterFit:
     of one column where some are not.
     """
 
-    frf: PlaneFrf
+    frf: CutterFrf
     there: np.ndarray
     found: PoleIdentification
     plain: PlainModes
 
     @classmethod
-    def of(cls, frf: PlaneFrf) -> "CutterFit":
+    def of(cls, frf: CutterFrf) -> "CutterFit":
         """InputError where the FRFs hold no mode."""
         accelerance = frf.receptance * (2j * np.pi * frf.frequency_hz) ** 2
         there = np.any(accelerance != 0, axis=-1)
@@ -81,11 +81,11 @@ class CutterFit:
         poles, residues = self.plain.modes()
         s = 2j * np.pi * self.frf.frequency_hz
         size = np.linalg.norm(self.frf.receptance, axis=(0, 1))
-        known = {mode.pole for mode in self.found.modes}
+        known = np.array([mode.pole for mode in self.found.modes])
         sd = np.sqrt(self.plain.residue_variance().sum(axis=0))
         residue, parts = self._whole(residues.residue), []
         for k, pole in enumerate(poles):
-            if complex(self.found.fit.refined.poles[k]) not in known:
+            if np.min(np.abs(known / self.found.fit.refined.poles[k] - 1)) > SAME:
                 continue
             second = np.linalg.svd(residue[..., k], compute_uv=False)[1]
             shows = second * np.max((1 / np.abs(s - pole) + 1 / np.abs(s - pole.conj())) / size)
@@ -120,3 +120,22 @@ class CutterFit:
     def error(self) -> float:
         """‖accelerance − fit‖/‖accelerance‖."""
         return self.found.fit_error
+
+
+DAMPING = 0.01  # of a mode that may be hidden: less damped ones are rare; chosen
+SLOWEST_HZ = 2.0  # machines and robots have no mode below; chosen
+
+
+def hidden_below(fit: CutterFit, mean: np.ndarray, depth_m: float) -> float | None:
+    """The highest frequency in Hz at which a mode that chatters below a depth could hide, if any.
+
+    A mode whose receptance peaks at P chatters from about 1/(K·P) on, K the norm of the cut's mean
+    matrix (2, 2) in N/m². It stands out from the noise of the accelerance where its χ², summed over
+    the lines that meet its resonance, passes chance; between two of them at the worst.
+    """
+    hertz = fit.frf.frequency_hz
+    half = np.pi * DAMPING * hertz / np.median(np.diff(hertz))  # π times lines in half a width
+    met = half * np.tanh(half)  # Σ |H/P|² over the lines
+    seen = fit.noise * np.sqrt(fit.found.data.threshold / (2 * met))
+    hidden = hertz[(seen * np.linalg.norm(mean, 2) * depth_m > 1) & (hertz > SLOWEST_HZ)]
+    return float(hidden[-1]) if hidden.size else None

@@ -1,6 +1,6 @@
 """FRFs at the cutter: read from files, seen in the plane of a cut, and, if predicted, as modes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +28,11 @@ BESIDE_SD = 0.1  # of the FRFs' sd: a fit as close as this adds nothing to it; c
 
 @dataclass(frozen=True, eq=False)
 class CutterFrf:
-    """Receptance (3, 3, F) in m/N at lines (F,) above 0 Hz: response axis, then force axis.
+    """Receptance (d, d, F) in m/N at lines (F,) above 0 Hz: response axis, then force axis.
 
-    Entries that are not known are NaN. `sd` (3, 3, F) is the root of E|H − mean|², None if unknown;
-    `name` says of what.
+    d is 3 in the axes of the FRFs (NaN where not known), 2 in the plane of a cut. `sd` (d, d, F) is
+    the root of E|H − mean|², None if unknown; `name` says of what; `joints_rad` (dof,) where the
+    source says how the robot stood.
     """
 
     name: str
@@ -39,8 +40,10 @@ class CutterFrf:
     receptance: np.ndarray
     sd: np.ndarray | None = None
     simulated: bool = False
+    remarks: tuple[str, ...] = ()
+    joints_rad: np.ndarray | None = None
 
-    def in_plane(self, cut: Cut) -> "PlaneFrf":
+    def in_plane(self, cut: Cut) -> "CutterFrf":
         """In the plane of the cut; InputError where an axis that this needs is not known.
 
         Cross FRFs that lack are those of the other way round, else 0, as a tap test has it.
@@ -59,7 +62,7 @@ class CutterFrf:
             # Errors of different entries are taken as independent of each other.
             square = _turned(np.nan_to_num(self.sd) ** 2, cut.plane**2)
             sd = np.sqrt(square.real)
-        return PlaneFrf(self.name, self.frequency_hz, h, sd, self.simulated, remarks)
+        return replace(self, receptance=h, sd=sd, remarks=remarks)
 
     @property
     def _known(self) -> np.ndarray:
@@ -76,28 +79,8 @@ class CutterFrf:
             said.append(f"{self.name} lacks the FRF {AXES[i]}{AXES[j]}: it is taken {other}.")
         return h, tuple(said)
 
-
-def _turned(values: np.ndarray, plane: np.ndarray) -> np.ndarray:
-    """(2, 2, F) of (3, 3, F); entries that the plane does not see may be NaN."""
-    weight = np.where(np.abs(plane) > SEEN, plane, 0.0)
-    share = np.einsum("ia,jb->ijab", weight, weight)
-    parts = np.where(share[..., None] == 0, 0.0, share[..., None] * values)
-    return parts.sum(axis=(2, 3))
-
-
-@dataclass(frozen=True, eq=False)
-class PlaneFrf:
-    """Receptance (2, 2, F) in m/N in the plane of a cut, and its sd."""
-
-    name: str
-    frequency_hz: np.ndarray
-    receptance: np.ndarray
-    sd: np.ndarray | None = None
-    simulated: bool = False
-    remarks: tuple[str, ...] = ()
-
     def fitted(self) -> CutterModes:
-        """Predicted FRFs, which have no noise, as modes; of measured ones see `cutter_fit`."""
+        """Predicted FRFs in a plane, without noise, as modes; of measured ones see `cutter_fit`."""
         fit = rational_fit(self.frequency_hz, self.receptance, close=self._close)
         modes = as_modes(fit, self.frequency_hz)
         if self.error(modes) > max(WORSE * fit.error, CLOSE):
@@ -121,6 +104,14 @@ class PlaneFrf:
         off = self.receptance - modes.receptance(self.frequency_hz).transpose(1, 2, 0)
         share = np.linalg.norm(off, axis=(0, 1)) / np.linalg.norm(self.receptance, axis=(0, 1))
         return float(np.sqrt(np.mean(share**2)))
+
+
+def _turned(values: np.ndarray, plane: np.ndarray) -> np.ndarray:
+    """(2, 2, F) of (3, 3, F); entries that the plane does not see may be NaN."""
+    weight = np.where(np.abs(plane) > SEEN, plane, 0.0)
+    share = np.einsum("ia,jb->ijab", weight, weight)
+    parts = np.where(share[..., None] == 0, 0.0, share[..., None] * values)
+    return parts.sum(axis=(2, 3))
 
 
 def as_modes(fit: RationalFit, frequency_hz: np.ndarray, far: float = FAR) -> CutterModes:
@@ -176,40 +167,53 @@ def of_accelerance(
 
 def names_in(path: Path) -> list[str | None]:
     """Every pose of an npz of `predict`, in its order; of other files None, the one they hold."""
-    return list(_held(path)[0]) if path.suffix.lower() == ".npz" else [None]
+    return list(read_npz(path)[0]) if path.suffix.lower() == ".npz" else [None]
 
 
 def _npz(path: Path, pose: str | None) -> CutterFrf:
-    poses, hertz, mean, sd = _held(path)
-    if pose is None and len(poses) > 1:
-        raise InputError(f"{path} holds {len(poses)} poses; say which with --pose, as {poses[0]}.")
-    if pose is not None and pose not in poses:
-        raise InputError(f"{path} has no pose {pose}; choose one of {', '.join(poses[:10])}.")
-    i = 0 if pose is None else poses.index(pose)
-    return of_accelerance(f"{path}, pose {poses[i]}", hertz, mean[i], None if sd is None else sd[i])
+    names, held = read_npz(path)
+    row, sd = row_of(path, names, pose), held.get("frf_sd")
+    spread = None if sd is None else sd[row]
+    name = f"{path}, pose {names[row]}"
+    return of_accelerance(name, held["frequency_hz"], held["frf_mean"][row], spread)
 
 
-def _held(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray | None]:
-    """Poses, lines, mean and sd that an npz holds."""
+def read_npz(path: Path) -> tuple[list[str], dict[str, np.ndarray]]:
+    """Names of the poses and all arrays of an npz; InputError where they do not fit together."""
     try:
         with np.load(path, allow_pickle=False) as file:
             held = {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError, KeyError):
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist; name an npz of predict.") from None
+    except Exception:  # zip, pickle and array faults of a broken file
         raise InputError(
             f"{path} cannot be read as an npz; write it with planner predict."
         ) from None
-    for name in ("frequency_hz", "frf_mean"):
-        if name not in held:
-            raise InputError(f"{path} holds no {name}; write it with planner predict.")
-    mean, sd, hertz = held["frf_mean"], held.get("frf_sd"), np.asarray(held["frequency_hz"])
-    poses = [str(name) for name in np.atleast_1d(held.get("pose", np.array(["1"])))]
-    shape = (len(poses), 3, 3, len(hertz))
-    if mean.shape != shape or (sd is not None and sd.shape != shape):
-        raise InputError(
-            f"{path}: frf_mean must be of shape (poses, 3, 3, lines) = {shape}, and frf_sd too; "
-            f"write it with planner predict."
-        )
-    return poses, hertz, mean, sd
+    lacking = [name for name in ("frequency_hz", "frf_mean") if name not in held]
+    if lacking:
+        raise InputError(f"{path} holds no {lacking[0]}; write it with planner predict --out.")
+    hertz = held["frequency_hz"] = np.asarray(held["frequency_hz"], float)
+    if hertz.ndim != 1 or len(hertz) < 2 or not np.all(np.diff(hertz) > 0):
+        raise InputError(f"{path}: frequency_hz does not increase; write it with predict --out.")
+    names = [str(name) for name in np.atleast_1d(held.get("pose", np.array(["1"])))]
+    for name, size in (("frf_mean", 3), ("frf_sd", 3), ("frf6_mean", 6), ("frf6_sd", 6)):
+        shape = (len(names), size, size, len(hertz))
+        if name in held and held[name].shape != shape:
+            raise InputError(
+                f"{path}: {name} has the shape {held[name].shape} instead of (poses, {size}, "
+                f"{size}, lines) = {shape}; write it with planner predict."
+            )
+    return names, held
+
+
+def row_of(path: Path, names: list[str], pose: str | None) -> int:
+    """Number of a pose in an npz; InputError where it is not there, or several are."""
+    few = ", ".join(names[:5]) + (", …" if len(names) > 5 else "")
+    if pose is None and len(names) > 1:
+        raise InputError(f"{path} holds {len(names)} poses; say which of {few} with --pose.")
+    if pose is not None and pose not in names:
+        raise InputError(f"{path} has no pose {pose}; choose one of {few}.")
+    return 0 if pose is None else names.index(pose)
 
 
 def _exported(path: Path, records: tuple[FrfRecord, ...]) -> CutterFrf:

@@ -1,19 +1,23 @@
-"""Cutting forces by the teeth's angle: the directional matrices of the regenerative chip.
+"""Cutting forces by the teeth's angle, and when teeth are in the cut.
 
 A tooth's angle φ is counted from the normal (the cut plane's second axis) towards the feed (its
 first), as the spindle turns. Its chip is Δx sin φ + Δy cos φ thick beyond the static one, and its
 force on the cutter is −K_t along the cut and −K_r inwards times that (Altintas and Budak, CIRP
-Annals 44, 1995).
+Annals 44, 1995). The force jumps where a tooth
+enters or leaves; between two such angles it is smooth: elements lie between them, so that
+polynomials through the points of an element converge.
 """
 
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
 
 import numpy as np
+from numpy.polynomial import legendre
 
 from planner.milling.cut import Cut
 
 IN_CUT = 1e-9  # rad: what an angle may miss the cut's ends by
-AVERAGED = 60  # slices of a helix over which its lag is averaged
 
 
 @dataclass(frozen=True)
@@ -75,21 +79,128 @@ def tooth_matrix(cut: Cut, k: Coefficients, tip_rad: np.ndarray, depth_m: float)
     return (_integral(high, k) - _integral(low, k)) / lag
 
 
-def step_matrices(cut: Cut, k: Coefficients, count: int, depth_m: float) -> np.ndarray:
-    """(count, 2, 2) in N/m²: of all teeth, averaged over equal steps of a tooth's period.
+APART = 1e-9  # rad: breakpoints closer than this are one
 
-    The first step begins where a tooth enters the cut.
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """Lobatto points (s+1,) of a polynomial of degree s on [0, 1], and its integrals.
+
+    `points` (s+1, q) and `values` (s+1, q, s+1): Gauss points of [0, c_i], as shares of c_i, with
+    the Lagrange polynomials there times the weights. `weights` (s+1,) integrate over [0, 1].
+    """
+
+    nodes: np.ndarray
+    points: np.ndarray
+    values: np.ndarray
+    weights: np.ndarray
+
+
+@cache
+def lobatto(degree: int) -> Rule:
+    """The rule of a polynomial degree, 1 or more."""
+    inner = legendre.legroots(legendre.legder([0.0] * degree + [1.0])) if degree > 1 else []
+    nodes = (np.concatenate([[-1.0], np.sort(np.real(inner)), [1.0]]) + 1) / 2
+    x, w = legendre.leggauss(degree + 12)  # polynomial times an exponential over one element
+    x, w = (x + 1) / 2, w / 2
+    values = lagrange(nodes, nodes[:, None] * x[None, :]) * w[None, :, None]
+    whole = np.einsum("qj,q->j", lagrange(nodes, x), w)
+    return Rule(nodes, np.broadcast_to(x, (len(nodes), len(x))), values, whole)
+
+
+def lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """(..., n): the Lagrange polynomials of nodes (n,) at points (...)."""
+    at = np.asarray(at)[..., None]
+    found = np.ones((*at.shape[:-1], len(nodes)))
+    for j, node in enumerate(nodes):
+        others = np.delete(nodes, j)
+        found[..., j] = np.prod((at - others) / (node - others), axis=-1)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Engagement:
+    """Elements of one period in which teeth cut, as angles (rad) of the first tooth's tip.
+
+    `start`, `end` (e,): of each element, within [0, `period`] after the first entry. `teeth`: which
+    teeth cut in it. `segment` (e,): elements with the same number follow without a jump.
+    """
+
+    period: float
+    offset: float
+    start: np.ndarray
+    end: np.ndarray
+    teeth: tuple[tuple[int, ...], ...]
+    segment: np.ndarray
+
+
+def tooth_angles(cut: Cut) -> np.ndarray:
+    """(teeth,): by how much each tooth is ahead of the first one."""
+    return np.concatenate([[0.0], np.cumsum(cut.pitches_rad)[:-1]])
+
+
+def contact(cut: Cut, depth_m: float, longest_rad: float) -> Engagement:
+    """Elements no longer than `longest_rad`; with a helix they depend on the depth.
+
+    One tooth's period if all teeth follow alike, else a turn of the spindle.
     """
     start, end = cut.immersion_rad
-    edges = start + np.arange(count + 1) * 2 * np.pi / (cut.teeth * count)
-    tips = edges + 2 * np.pi / cut.teeth * np.arange(cut.teeth)[:, None]
-    lag, slices = cut.lag_rad_m * depth_m, AVERAGED if cut.lag_rad_m * depth_m > IN_CUT else 1
-    lags = lag * (np.arange(slices) + 0.5) / slices
-    total = np.zeros((count, 2, 2))
-    for behind in lags:
-        turned = np.mod(tips[:, :-1] - behind - start, 2 * np.pi) + start
-        ahead = turned + np.diff(tips, axis=1)
-        for turn in (0.0, 2 * np.pi):
-            a, b = (np.clip(angle - turn, start, end) for angle in (turned, ahead))
-            total += (_integral(b, k) - _integral(a, k)).sum(axis=0)
-    return total / slices / np.diff(edges)[:, None, None]
+    period = 2 * np.pi / cut.teeth if cut.even else 2 * np.pi
+    lag = cut.lag_rad_m * depth_m
+    ahead = tooth_angles(cut)
+    edges = np.array([start, start + lag, end, end + lag])
+    breaks = np.mod(edges[None, :] - ahead[:, None] - start, period).ravel()
+    breaks = _distinct(np.append(breaks, [0.0, period]), period)
+    found: list[tuple[float, float, tuple[int, ...], int]] = []
+    for k, (a, b) in enumerate(pairwise(breaks)):
+        tip = np.mod((a + b) / 2 + ahead, 2 * np.pi) + start
+        inside = tip < end + lag
+        cutting = tuple(int(j) for j in np.flatnonzero(inside))
+        if cutting:
+            cuts = np.linspace(a, b, 1 + max(1, int(np.ceil((b - a) / longest_rad))))
+            found += [(x, y, cutting, k) for x, y in pairwise(cuts)]
+    return Engagement(
+        float(period),
+        start,
+        np.array([f[0] for f in found]),
+        np.array([f[1] for f in found]),
+        tuple(f[2] for f in found),
+        np.array([f[3] for f in found]),
+    )
+
+
+def _distinct(values: np.ndarray, period: float) -> np.ndarray:
+    kept = [0.0]
+    for value in np.sort(values):
+        if value - kept[-1] > APART and period - value > APART:
+            kept.append(float(value))
+    return np.array([*kept, period])
+
+
+def directions(
+    cut: Cut, k: Coefficients, teeth: tuple[int, ...], angle: np.ndarray, depth_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Chip rows (m, r, 2) and force columns (m, 2, r) at tip angles (m,) of the first tooth.
+
+    Force per depth = columns · rows · displacement. r is 1 where one tooth without helix cuts.
+    """
+    ahead = tooth_angles(cut)
+    if len(teeth) == 1 and cut.lag_rad_m == 0:
+        phi = angle + ahead[teeth[0]]
+        return chip_direction(phi)[:, None, :], force_direction(phi, k)[:, :, None]
+    matrix = sum(each_tooth(cut, k, j, angle, depth_m) for j in teeth)
+    return np.broadcast_to(np.eye(2), (len(angle), 2, 2)), np.asarray(matrix)
+
+
+def each_tooth(
+    cut: Cut, k: Coefficients, tooth: int, angle: np.ndarray, depth_m: float
+) -> np.ndarray:
+    """(m, 2, 2) of one tooth that is known to cut, at tip angles (m,) of the first tooth."""
+    start, _ = cut.immersion_rad
+    phi = np.mod(angle + tooth_angles(cut)[tooth] - start + APART, 2 * np.pi) + start - APART
+    lag = cut.lag_rad_m * depth_m
+    if lag == 0:
+        return force_direction(phi, k)[:, :, None] * chip_direction(phi)[:, None, :]
+    # The upper part of a long helix may still cut where the tip came round again.
+    turns = 2 * np.pi * np.arange(1 + int(lag // (2 * np.pi) + 1))
+    return tooth_matrix(cut, k, phi[:, None] + turns, depth_m).sum(axis=1)

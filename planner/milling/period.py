@@ -10,7 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.milling.contact import (
+from planner.milling.cut import Cut
+from planner.milling.cutter_modes import CutterModes
+from planner.milling.directional import (
+    Coefficients,
     Engagement,
     contact,
     directions,
@@ -18,9 +21,6 @@ from planner.milling.contact import (
     lagrange,
     lobatto,
 )
-from planner.milling.cut import Cut
-from planner.milling.cutter_modes import CutterModes
-from planner.milling.directional import Coefficients
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.stats import norm, qmc
 
-from planner.milling.cutter_frf import PlaneFrf
+from planner.milling.cutter_frf import CutterFrf
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.directional import Coefficients
 
@@ -76,7 +76,7 @@ def moved(modes: CutterModes, by: np.ndarray) -> CutterModes:
     )
 
 
-def explaining(modes: CutterModes, frf: PlaneFrf) -> tuple[ModeSpread, float]:
+def explaining(modes: CutterModes, frf: CutterFrf) -> tuple[ModeSpread, float]:
     """Sds that explain those of an FRF, and the share of its variance that they give."""
     count = len(np.unique(modes.poles))
     if frf.sd is None or not np.any(frf.sd > 0):

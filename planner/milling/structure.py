@@ -6,13 +6,11 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.milling.cut import Cut
-from planner.milling.cutter_fit import CutterFit
-from planner.milling.cutter_frf import EXACT, CutterFrf, PlaneFrf
-from planner.milling.cutter_modes import CutterModes
+from planner.milling.cutter_fit import CutterFit, hidden_below
+from planner.milling.cutter_frf import EXACT, CutterFrf
+from planner.milling.cutter_modes import CutterModes, ModeFile
 from planner.milling.directional import Coefficients, mean_matrix
-from planner.milling.hidden_modes import hidden_below
 from planner.milling.machine import Machine, check_structure
-from planner.milling.mode_file import ModeFile
 from planner.milling.spread import ModeSpread, explaining, sampled
 from planner.milling.uncertainty import REPLICATES
 from planner.milling.zeroth_order import LobeCurves, curves
@@ -35,7 +33,7 @@ class Structure:
 
     modes: CutterModes
     spread: ModeSpread
-    frf: PlaneFrf | None = None
+    frf: CutterFrf | None = None
     remarks: tuple[str, ...] = ()
     fit: CutterFit | None = None
 
@@ -81,7 +79,7 @@ def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
     return _measured(fit, plane, cut)
 
 
-def _measured(fit: CutterFit, plane: PlaneFrf, cut: Cut) -> Structure:
+def _measured(fit: CutterFit, plane: CutterFrf, cut: Cut) -> Structure:
     mean = mean_matrix(cut, Coefficients.of(cut))
     check_structure(fit.modes)
     floor = Machine(fit.modes, cut, Coefficients.of(cut)).floor().floor_m
@@ -94,7 +92,7 @@ def _measured(fit: CutterFit, plane: PlaneFrf, cut: Cut) -> Structure:
     return Structure(fit.modes, ModeSpread.none(count), plane, (*plane.remarks, said), noisy)
 
 
-def _computed(plane: PlaneFrf, cut: Cut) -> Structure:
+def _computed(plane: CutterFrf, cut: Cut) -> Structure:
     mean = mean_matrix(cut, Coefficients.of(cut))
     check_band(plane, curves(plane.frequency_hz, plane.receptance.transpose(2, 0, 1), mean))
     modes = plane.fitted()
@@ -114,7 +112,7 @@ def _computed(plane: PlaneFrf, cut: Cut) -> Structure:
     return Structure(modes, spread, plane, tuple(remarks))
 
 
-def check_band(frf: PlaneFrf, found: LobeCurves, told: np.ndarray | None = None) -> None:
+def check_band(frf: CutterFrf, found: LobeCurves, told: np.ndarray | None = None) -> None:
     """OutOfBandError where chatter would be at the end of the FRFs' lines, or beyond.
 
     Or at the first of the lines (F,) bool that tell of modes below, where it is not theirs.

@@ -6,7 +6,7 @@ second point x, second point y), with H = Σ right·leftᵀ / (iω − λ) + con
 where the second point was for that mode (Lei et al. 2023, eq. 15).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +17,7 @@ from planner.errors import InputError
 from planner.frf.labelled import labelled_frfs
 from planner.frf.synthesis import pole
 from planner.milling.coupling import TipReceptance
+from planner.milling.cutter_frf import CutterFrf, read_npz, row_of
 from planner.milling.rotations import TwoPoints, two_point_receptance
 from planner.milling.smoothing import smoothed
 from planner.milling.tool import Tool
@@ -34,23 +35,9 @@ MEASURE = (
 MOST_LINES = 200_000
 
 
-@dataclass(frozen=True, eq=False)
-class TipMotion:
-    """FRFs of motion alone at one pose: receptances (3, 3, F) in m/N and sd; no rotations.
-
-    `joints_rad` (dof,) where the file says how the robot stood.
-    """
-
-    pose: str
-    frequency_hz: np.ndarray
-    receptance: np.ndarray
-    sd: np.ndarray
-    joints_rad: np.ndarray | None
-
-
 def read_tip(
     path: Path, tool: Tool | None, pose: str | None, noise: float, from_names: bool = False
-) -> TipReceptance | TipMotion:
+) -> TipReceptance | CutterFrf:
     """What a file holds; `tool` is the tested one, `noise` a relative sd where it states none.
 
     `from_names` as in `read_frfs`, of FRFs. Raises InputError in one sentence.
@@ -62,70 +49,39 @@ def read_tip(
     return _frfs(path, read_frfs(path, from_names), tool, noise)
 
 
-def _npz(path: Path, pose: str | None) -> TipReceptance | TipMotion:
-    stored = _arrays(path)
-    frequency = np.asarray(stored["frequency_hz"], float)
-    names = [str(name) for name in stored["pose"]] if "pose" in stored else ["1"]
-    row = _row(path, names, pose)
-    keep = frequency > 0
-    full = "frf6_mean" in stored
-    kind = "frf6" if full else "frf"
-    mean, sd = (np.asarray(stored[f"{kind}_{what}"]) for what in ("mean", "sd"))
-    size = 6 if full else 3
-    for name, values in ((f"{kind}_mean", mean), (f"{kind}_sd", sd)):
-        if values.shape != (len(names), size, size, len(frequency)):
-            raise InputError(
-                f"{path}: {name} has the shape {values.shape}, where {len(names)} poses, "
-                f"{size} × {size} and {len(frequency)} lines are stated; write it again."
-            )
-    s2 = (2j * np.pi * frequency[keep]) ** 2
-    h, spread = mean[row][..., keep] / s2, np.abs(sd[row][..., keep] / s2)
-    if full:
-        kept = tuple(int(k) for k in stored["motions"]) if "motions" in stored else tuple(range(6))
+def _npz(path: Path, pose: str | None) -> TipReceptance | CutterFrf:
+    """With rotations where the file holds them for this pose, else motions alone."""
+    names, stored = read_npz(path)
+    row = row_of(path, names, pose)
+    keep = stored["frequency_hz"] > 0
+    frequency = stored["frequency_hz"][keep]
+    for kind in ("frf6", "frf"):
+        if f"{kind}_mean" not in stored:
+            continue
+        if f"{kind}_sd" not in stored:
+            raise InputError(f"{path} lacks {kind}_sd; write it with planner predict --out.")
+        s2 = (2j * np.pi * frequency) ** 2
+        h = stored[f"{kind}_mean"][row][..., keep] / s2
+        spread = np.abs(stored[f"{kind}_sd"][row][..., keep] / s2)
+        kept = (
+            tuple(int(k) for k in stored.get("motions", range(6))) if kind == "frf6" else (0, 1, 2)
+        )
         h, spread = h[np.ix_(kept, kept)], spread[np.ix_(kept, kept)]
         if np.all(np.isfinite(h)) and np.all(np.isfinite(spread)):
-            return TipReceptance.known(frequency[keep], h, spread, kept)
-    if not (np.all(np.isfinite(h)) and np.all(np.isfinite(spread))):
-        raise InputError(f"{path}: FRFs of {names[row]} are not finite; measure what lacks.")
-    stands = None
-    if "joints_deg" in stored:
-        stated = stored["joints_deg"][row]
-        units = stored.get("joint_units", msgspec.UNSET)
-        stands = JointUnits.declared_as([""] * len(stated), units).internal(stated)
-    return TipMotion(names[row], frequency[keep], h, spread, stands)
+            if kind == "frf6":
+                return TipReceptance.known(frequency, h, spread, kept)
+            joints = _joints(stored, row)
+            return CutterFrf(names[row], frequency, h, spread, joints_rad=joints)
+    raise InputError(f"{path}: FRFs of {names[row]} are not finite; measure what lacks.")
 
 
-def _arrays(path: Path) -> dict[str, np.ndarray]:
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist; name an npz of predict.") from None
-    except Exception as error:  # zip, pickle and array faults of a broken file
-        raise InputError(
-            f"{path} cannot be read as npz ({type(error).__name__}); write it again with predict."
-        ) from None
-    lacking = [name for name in ("frequency_hz", "frf_mean", "frf_sd") if name not in arrays]
-    if lacking:
-        raise InputError(f"{path} lacks {', '.join(lacking)}; write it with predict --out.")
-    frequency = arrays["frequency_hz"]
-    if frequency.ndim != 1 or len(frequency) < 2 or not np.all(np.diff(frequency) > 0):
-        raise InputError(f"{path}: frequency_hz does not increase; write it with predict --out.")
-    return arrays
-
-
-def _row(path: Path, names: list[str], pose: str | None) -> int:
-    if pose is None and len(names) == 1:
-        return 0
-    if pose is None:
-        raise InputError(f"{path} holds {len(names)} poses; name one of {_few(names)} by --pose.")
-    if pose not in names:
-        raise InputError(f"{path} holds no pose {pose}; name one of {_few(names)}.")
-    return names.index(pose)
-
-
-def _few(names: list[str]) -> str:
-    return ", ".join(names[:5]) + (", …" if len(names) > 5 else "")
+def _joints(stored: dict[str, np.ndarray], row: int) -> np.ndarray | None:
+    """How the robot stood, in rad and m; None where the file does not say."""
+    if "joints_deg" not in stored:
+        return None
+    stated = stored["joints_deg"][row]
+    units = stored.get("joint_units", msgspec.UNSET)
+    return JointUnits.declared_as([""] * len(stated), units).internal(stated)
 
 
 def _frfs(

@@ -41,8 +41,7 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.milling.beam import Segment, ToolMaterial
-from planner.milling.interface import NUMBERS, ToolContact
-from planner.milling.tool import Point, Tool, ToolPart, loaded
+from planner.milling.tool import NUMBERS, Point, Tool, ToolContact, ToolPart, loaded
 from planner.toml_file import load_toml
 
 # Of the cutting diameter, as which flutes bend (Kops and Vo, CIRP Annals 39, 1990).

@@ -6,14 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.inference.parallel import side_by_side
-from planner.milling.first_loss import (
+from planner.milling.lobes import (
     GrowthAtDepth,
+    Loss,
     first_unstable,
     levels,
+    losses,
     refined,
     scanned_depths,
 )
-from planner.milling.lobes import Loss, losses
 from planner.milling.machine import Machine
 from planner.progress import Tell, quietly
 

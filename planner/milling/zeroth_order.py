@@ -13,14 +13,6 @@ NOTHING = 1e-60  # 1/m: of an eigenvalue
 
 
 @dataclass(frozen=True, eq=False)
-class Zeroth:
-    """Limits at speeds: depth (n,) in m, chatter frequency (n,) in Hz; NaN where never unstable."""
-
-    depth_m: np.ndarray
-    chatter_hz: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class LobeCurves:
     """Per line (f,) and eigenvalue λ (f, 2): 1/λ in m, depth of the limit (inf: none), phase."""
 
@@ -74,8 +66,11 @@ def _followed(values: np.ndarray) -> np.ndarray:
     return np.where(odd[:, None], values[:, ::-1], values)
 
 
-def limits(found: LobeCurves, rpm: np.ndarray, teeth: int) -> Zeroth:
-    """First loss of stability at speeds (n,) in rpm: between lines 1/λ is straight."""
+def limits(found: LobeCurves, rpm: np.ndarray, teeth: int) -> tuple[np.ndarray, np.ndarray]:
+    """First loss at speeds (n,) in rpm: depth in m, chatter frequency in Hz; NaN where none is.
+
+    Between lines 1/λ is straight.
+    """
     hertz, phase = found.frequency_hz, found.phase
     depth, chatter = np.full(len(rpm), np.inf), np.full(len(rpm), np.nan)
     for i, speed in enumerate(rpm):
@@ -96,4 +91,4 @@ def limits(found: LobeCurves, rpm: np.ndarray, teeth: int) -> Zeroth:
             best = int(np.argmin(here))
             depth[i] = here[best]
             chatter[i] = hertz[line[best]] + share[best] * np.diff(hertz)[line[best]]
-    return Zeroth(np.where(np.isfinite(depth), depth, np.nan), chatter)
+    return np.where(np.isfinite(depth), depth, np.nan), chatter

@@ -1,14 +1,200 @@
 """From the FRF matrix of one pose to its modes, without an expert."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from planner.errors import RefusedError
 from planner.frf.frf import Frf
-from planner.modal.fit_data import Data
-from planner.modal.lines_in_band import too_few_lines
+from planner.modal.fit_data import Data, too_few_lines
+from planner.modal.mode_selection import PoleFit, fit, model, presences, scales, strongest, weakness
 from planner.modal.modes import LEAST_PROBABILITY, ModalModel, Mode
-from planner.modal.pole_identification import MAX_ORDER, Identified, PoleIdentification, identify
+from planner.modal.plscf import PoleSet, plscf
+from planner.modal.refine import evaluate, shared_error
 from planner.modal.residues import rank_one
+from planner.modal.stabilisation import Diagram, diagram, stable
+
+# Of the band's span, taken away above, then below; at most half of what lies beside a mode there,
+# so that it is judged by lines that hold it.
+CUT = 0.12
+LEAST_LINES = 32
+HELD = 1e-10  # of the information on the best held pole: below, rounding rules
+
+
+def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
+    """(m,) factors ≥ 1 on the covariance of each mode for what noise does not explain.
+
+    For poles in the s-plane (accelerance). `shared` (2m, 2m) is the covariance of the poles from
+    errors that lines have in common: it moves the poles of parts of the band too.
+    """
+    refined, scale = fitted.refined, scales(data, fitted)
+    m = refined.poles.size
+    own, common = _pairs(refined.pole_covariance) * scale[:, None], _pairs(shared)
+    factor = np.ones(m)
+    for part, judged in _parts(data, refined.poles).items():
+        moved, covariance = _step(data, fitted, slice(*part))
+        k = np.array(judged)
+        variance = np.maximum(_pairs(covariance) * scale[:, None], own)[k]
+        by_chance = variance - own[k] + common[k]
+        # An error of the model, too, moves a pole the farther the less the lines hold it. Real and
+        # imaginary parts suffer from the same cause: one factor a mode.
+        beyond = np.maximum(moved.reshape(2, m).T[k] ** 2 - by_chance, 0.0) / variance
+        factor[k] = np.maximum(factor[k], 1 + np.max(beyond, axis=1))
+    return factor
+
+
+def _parts(data: Data, poles: np.ndarray) -> dict[tuple[int, int], list[int]]:
+    """Ranges of lines, first and end, and the poles that each judges."""
+    frequency = data.frequency_hz
+    low, high = frequency[[0, -1]]
+    cut = CUT * (high - low)
+    found: dict[tuple[int, int], list[int]] = {}
+    for k, hz in enumerate(np.abs(poles) / (2 * np.pi)):
+        if not low < hz < high:
+            continue
+        below = int(np.searchsorted(frequency, low + min(cut, (hz - low) / 2)))
+        above = int(np.searchsorted(frequency, high - min(cut, (high - hz) / 2)))
+        for part in ((0, above), (below, frequency.size)):
+            if part[1] - part[0] >= LEAST_LINES:
+                found.setdefault(part, []).append(k)
+    return found
+
+
+def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndarray]:
+    """How the poles move (2m,) when part of the lines is fitted, and their covariance (2m, 2m).
+
+    Linearised where all lines have them: poles that a part does not hold would stray in a fit, to
+    where their variance is that of another place.
+    """
+    refined = fitted.refined
+    weight = 2 / fitted.variance[..., part].reshape(data.entries, -1)
+    response = data.response[..., part].reshape(data.entries, -1)
+    point = evaluate(data.lines.part(part), response, weight, refined.poles)
+    unit = np.sqrt(np.maximum(np.diag(refined.pole_covariance), 1e-300))
+    turned = np.outer(unit, unit)
+    covariance = np.linalg.pinv(point.normal * turned, rcond=HELD, hermitian=True) * turned
+    return -covariance @ point.gradient, covariance
+
+
+def _pairs(covariance: np.ndarray) -> np.ndarray:
+    """(m, 2) variances of the real and imaginary parts of the poles."""
+    return np.maximum(np.diag(covariance), 0.0).reshape(2, -1).T
+
+
+MAX_ORDER = 40
+
+
+@dataclass(frozen=True, eq=False)
+class PoleIdentification:
+    """Modes in increasing frequency, and what they came from."""
+
+    modes: tuple[Mode, ...]
+    data: Data
+    diagram: Diagram
+    fit: PoleFit
+    fit_error: float  # ‖H − fit‖/‖H‖
+    order: int
+
+
+def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | None:
+    """All modes that the lines of `data` carry, None where there is none."""
+    # At least as many lines as half the unknowns of one column need, and once that to spare.
+    top = max(2, min(max_order, data.frequency_hz.size // 3))
+    orders = ladder(top)
+    weight = None if data.variance is None else 1 / np.mean(data.variance, axis=1)
+    sets = plscf(data.frequency_hz, data.response, orders, weight)
+    reach = (data.frequency_hz[0] * 0.95, data.frequency_hz[-1] * 1.05)
+    found = diagram(sets, reach)
+    start = np.array([line.pole for line in stable(found)]) + data.rate_1_s
+    if start.size == 0:
+        start = strongest(data)
+    if start.size == 0:
+        return None
+    fitted = fit(data, start)
+    modes = modes_of_fit(data, fitted, sets)
+    error = np.linalg.norm(data.response - model(data, fitted.refined))
+    relative = float(error / np.linalg.norm(data.response))
+    return PoleIdentification(modes, data, found, fitted, relative, top) if modes else None
+
+
+def ladder(top: int) -> tuple[int, ...]:
+    """Model orders of the diagram: all at first, then every second, then every fourth.
+
+    High orders cost most (their cube) and differ least from their neighbours.
+    """
+    steps = ((2, 20, 1), (20, 40, 2), (40, top, 4))
+    orders = {n for low, high, step in steps for n in range(low, min(high, top) + 1, step)}
+    return tuple(sorted(orders | {top}))
+
+
+def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Mode, ...]:
+    """The poles of a fit that are established, with standard deviations and probabilities."""
+    refined = fitted.refined
+    m = refined.poles.size
+    scale = scales(data, fitted)
+    weak = weakness(data, fitted)
+    errors = data.force_errors(model(data, refined))
+    shared_pole, shared_residue = shared_error(data.lines, fitted.variance, refined, errors)
+    if data.step_s is None:
+        scale = scale * inflation(data, fitted, shared_pole)
+    present = presences(data, refined.poles, refined.residues.residue)
+    modes = []
+    for k in range(m):
+        if weak[k] > 1:
+            continue
+        index = [k, m + k]
+        covariance = scale[k] * refined.pole_covariance[np.ix_(index, index)]
+        covariance = covariance + shared_pole[np.ix_(index, index)]
+        pole = complex(refined.poles[k])
+        frequency, damping, sd = natural(pole, covariance)
+        residue = refined.residues.residue[..., k]
+        variance = scale[k] * np.mean(refined.residue_variance[..., k], axis=-1)
+        variance = variance + np.mean(shared_residue[..., k], axis=-1)
+        supported = support(pole - data.rate_1_s, sets)
+        residue_sd = np.sqrt(np.maximum(variance, 0.0))  # less by rounding alone
+        modes.append(
+            Mode(
+                frequency, float(sd[0]), damping, float(sd[1]), residue, residue_sd,
+                rank_one(residue)[0], probability(float(present[k]), supported, float(weak[k])),
+                support=supported,
+            )
+        )  # fmt: skip
+    return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
+
+
+def natural(pole: complex, covariance: np.ndarray) -> tuple[float, float, np.ndarray]:
+    """Natural frequency (Hz), damping ratio and their standard deviations (linearised)."""
+    slope = natural_slope(pole)
+    sd = np.sqrt(np.maximum(0.0, np.diag(slope @ covariance @ slope.T)))
+    return abs(pole) / (2 * np.pi), -pole.real / abs(pole), sd
+
+
+def natural_slope(pole: complex) -> np.ndarray:
+    """(2, 2) change of natural frequency (Hz) and damping ratio with Re λ and Im λ (rad/s)."""
+    size = abs(pole)
+    by_frequency = [pole.real / size / (2 * np.pi), pole.imag / size / (2 * np.pi)]
+    return np.array([by_frequency, [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3]])
+
+
+def support(pole: complex, sets: tuple[PoleSet, ...]) -> float:
+    """Share of the upper half of the orders with a pole within half a bandwidth or 0.5 %."""
+    upper = sets[len(sets) // 2 :]
+    reach = max(abs(pole.real), 0.005 * abs(pole))
+    near = [np.any(np.abs(entry.poles.imag - pole.imag) < reach) for entry in upper]
+    return float(np.mean(near))
+
+
+def probability(presence: float, support: float, weak: float) -> float:
+    """Logistic in what separates modes from artefacts.
+
+    That is: the share of the response that is the mode's, its support in the diagram, and how
+    far it is from the limits of `weakness`. Coefficients from 200 simulated poses (2-s records,
+    hits that disagree by 0.3 %, a 3 % ripple, short records, weak modes; 1,100 poles).
+    """
+    size = np.log(np.clip(presence, 1e-3, 1.0))
+    score = -0.3 + 1.2 * support - 3.1 * np.log(max(weak, 1e-6)) + 2.1 * size
+    return float(1 / (1 + np.exp(-score)))
+
 
 # Lines beyond the band that are fitted too, so that modes at its edges are met from both sides.
 MARGIN = 0.15
@@ -74,21 +260,13 @@ def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:
     )
 
 
-def _mode(mode: Identified, columns: np.ndarray) -> Mode:
+def _mode(mode: Mode, columns: np.ndarray) -> Mode:
+    """With residues at all three hit axes, NaN where nothing was hit."""
     residue = np.full((3, 3), np.nan + 1j * np.nan)
     residue_sd = np.full((3, 3), np.nan)
     residue[:, columns] = mode.residue
     residue_sd[:, columns] = mode.residue_sd
-    return Mode(
-        mode.frequency_hz,
-        mode.frequency_sd_hz,
-        mode.damping_ratio,
-        mode.damping_sd,
-        residue,
-        residue_sd,
-        rank_one(mode.residue)[0],
-        mode.probability,
-    )
+    return replace(mode, residue=residue, residue_sd=residue_sd)
 
 
 def _remarks(found: PoleIdentification, doubtful: tuple[Mode, ...]) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from planner.errors import RefusedError
 from planner.modal.residues import Lines, laplace
 
 # Chance, in standard normal quantiles, that noise alone passes as a mode somewhere in the band.
@@ -102,3 +103,22 @@ class Data:
         """Fall of χ² that a mode (pole and residues) reaches by chance with negligible odds."""
         k = 2 * self.entries + 2
         return k * (1 - 2 / (9 * k) + QUANTILE * np.sqrt(2 / (9 * k))) ** 3
+
+
+def too_few_lines(
+    usable: np.ndarray, frequency_hz: np.ndarray, band_hz: tuple[float, float]
+) -> RefusedError:
+    """The refusal of FRFs at lines (F,), of which those that are `usable` (F,) are too few."""
+    first, last = float(frequency_hz[0]), float(frequency_hz[-1])
+    band = f"{band_hz[0]:g} to {band_hz[1]:g} Hz"
+    if last < band_hz[0]:
+        off = f"The FRFs end at {last:g} Hz, below the band of {band}"
+    elif first > band_hz[1]:
+        off = f"The FRFs begin at {first:g} Hz, above the band of {band}"
+    else:
+        return RefusedError(
+            f"Only {np.count_nonzero(usable)} usable frequency lines lie in the band of {band}, of "
+            f"FRFs between {first:g} and {last:g} Hz: give another band with --band-hz, "
+            f"record longer or hit with a harder tip."
+        )
+    return RefusedError(f"{off} in which modes are looked for; give another with --band-hz.")

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.errors import InputError, RefusedError
+from planner.modal.estimate_modes import PoleIdentification, identify
+from planner.modal.fit_data import Data
 from planner.modal.mac import mac
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel, Mode
-from planner.modal.pole_identification import Identified, PoleIdentification
 from planner.modal.residues import rank_one
-from planner.modal.ringdown import identify_decays
 from planner.recording.records import Channel, TimeRecord
 
 # A hit stands out of the force channel's own noise by this factor and reaches this share of the
@@ -29,6 +29,8 @@ LONGEST = 8192
 # The decay is taken to last while its blocks hold this much more energy than the record's median.
 BLOCK_S, ALIVE = 1.0, 1.5
 LEAST_PROBABILITY = 0.5
+MAX_ORDER = 30  # higher ones do not help with a handful of channels
+MARGIN, LEAST_LINES = 0.15, 6  # beyond the band that is fitted too; that suffice
 # MAC above which neighbours within a bandwidth are one mode.
 SAME_SHAPE = 0.95
 
@@ -228,20 +230,21 @@ def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarr
 
 def _rescaled(found: PoleIdentification, scale: np.ndarray) -> PoleIdentification:
     factor = scale[:, :, 0]
-    modes = tuple(
-        replace(m, residue=m.residue * factor, residue_sd=m.residue_sd * factor)
-        for m in found.modes
-    )
-    return replace(found, modes=modes)
+    modes = []
+    for mode in found.modes:
+        residue = mode.residue * factor
+        sd, shape = mode.residue_sd * factor, rank_one(residue)[0]
+        modes.append(replace(mode, residue=residue, residue_sd=sd, shape=shape))
+    return replace(found, modes=tuple(modes))
 
 
-def _merge(modes: list[Identified], remarks: list[str]) -> tuple[Mode, ...]:
+def _merge(modes: list[Mode], remarks: list[str]) -> tuple[Mode, ...]:
     """One mode for neighbours within a bandwidth that share their shape.
 
     A mode whose frequency or damping changes as it dies away (friction, play) decays in several
     exponentials; two modes of one structure at one place would differ in shape.
     """
-    groups: list[list[Identified]] = []
+    groups: list[list[Mode]] = []
     for mode in modes:
         last = groups[-1][-1] if groups else None
         if last is not None and _same(last, mode):
@@ -251,14 +254,14 @@ def _merge(modes: list[Identified], remarks: list[str]) -> tuple[Mode, ...]:
     return tuple(_merged(group, remarks) for group in groups)
 
 
-def _same(a: Identified, b: Identified) -> bool:
+def _same(a: Mode, b: Mode) -> bool:
     width = max(a.damping_ratio * a.frequency_hz, b.damping_ratio * b.frequency_hz)
-    return abs(a.frequency_hz - b.frequency_hz) < width and mac(_shape(a), _shape(b)) > SAME_SHAPE
+    return abs(a.frequency_hz - b.frequency_hz) < width and mac(a.shape, b.shape) > SAME_SHAPE
 
 
-def _merged(group: list[Identified], remarks: list[str]) -> Mode:
+def _merged(group: list[Mode], remarks: list[str]) -> Mode:
     energy = [float(np.sum(np.abs(m.residue) ** 2) / -m.pole.real) for m in group]
-    main = _mode(group[int(np.argmax(energy))])
+    main = group[int(np.argmax(energy))].unscaled()
     if len(group) == 1:
         return main
     frequency = np.array([mode.frequency_hz for mode in group])
@@ -275,19 +278,27 @@ def _merged(group: list[Identified], remarks: list[str]) -> Mode:
     )
 
 
-def _shape(mode: Identified) -> np.ndarray:
-    return rank_one(mode.residue)[0]
+def identify_decays(
+    samples: np.ndarray,
+    sampling_rate_hz: float,
+    band_hz: tuple[float, float],
+    max_order: int = MAX_ORDER,
+) -> PoleIdentification | None:
+    """Modes of simultaneous channels over several decays, None where there is none.
 
-
-def _mode(mode: Identified) -> Mode:
-    nothing = np.full((3, 3), np.nan)
-    return Mode(
-        mode.frequency_hz,
-        mode.frequency_sd_hz,
-        mode.damping_ratio,
-        mode.damping_sd,
-        nothing.astype(complex),
-        nothing,
-        _shape(mode),
-        mode.probability,
-    )
+    samples (channels, decays, n). Means are taken off; slower drifts stay below the band.
+    """
+    n = samples.shape[-1]
+    frequency = np.fft.rfftfreq(n, 1 / sampling_rate_hz)
+    low, high = band_hz[0] / (1 + MARGIN), band_hz[1] * (1 + MARGIN)
+    chosen = (frequency >= low) & (frequency <= high) & (frequency > 0)
+    # The highest line of an even DFT is real and holds no phase.
+    chosen &= frequency < 0.499 * sampling_rate_hz
+    if np.count_nonzero(chosen) < LEAST_LINES:
+        return None
+    centred = samples - np.mean(samples, axis=-1, keepdims=True)
+    spectrum = np.fft.rfft(centred, axis=-1)[..., chosen]
+    if not np.any(spectrum):
+        return None
+    data = Data(frequency[chosen], spectrum, None, step_s=1 / sampling_rate_hz)
+    return identify(data, max_order)

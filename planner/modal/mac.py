@@ -62,3 +62,64 @@ def _match_cost(
 def unexpected_cost(mode: Mode) -> float:
     chance = min(max(mode.probability, 1e-3), 1 - 1e-3)
     return SPURIOUS_COST + 2 * math.log(chance / 0.9)
+
+
+def phase_collinearity(shape: np.ndarray) -> float:
+    """Modal phase collinearity (MPC) of a shape (n,), in [0, 1]; 1: all points move in phase.
+
+    The share of variance along the main axis of the points in the complex plane (Pappa et al.,
+    AIAA J. 31, 1993), which is that of the eigenvalues of their scatter.
+    """
+    real, imag = np.real(shape), np.imag(shape)
+    xx, yy, xy = real @ real, imag @ imag, real @ imag
+    total = xx + yy
+    return float(((xx - yy) ** 2 + 4 * xy**2) / total**2) if total > 0 else 0.0
+
+
+def phase_deviation_deg(shape: np.ndarray) -> float:
+    """Mean phase deviation (MPD) of a shape (n,) in degrees, weighted by amplitude: 0 is real.
+
+    Angles between each point and the main axis (Reynders, Houbrechts & De Roeck, Mech. Syst.
+    Signal Process. 29, 2012).
+    """
+    size = np.abs(shape)
+    if not size.any():
+        return 0.0
+    axis = np.linalg.svd(np.stack([np.real(shape), np.imag(shape)], axis=1))[2][0]
+    along = np.abs(np.real(shape) * axis[0] + np.imag(shape) * axis[1])
+    angle = np.arccos(np.clip(along / np.maximum(size, 1e-300), 0.0, 1.0))
+    return float(np.rad2deg(size @ angle / np.sum(size)))
+
+
+def real_normal_modes(poles: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Undamped frequencies (Hz, m) and real shapes (n, m) of complex modes, in their order.
+
+    poles (m,) in rad/s, shapes (n, m), n ≥ m. In the space of the m shapes, M⁻¹K and M⁻¹C are
+    those real matrices that have these poles and shapes (Ibrahim, AIAA J. 21, 1983); the normal
+    modes are the eigenvectors of M⁻¹K. Each is as large as the complex shape that it replaces,
+    where that has been turned as real as can be. With fewer points than modes the shapes' real
+    parts are given.
+    """
+    turned = shapes * np.exp(-0.5j * np.angle(np.sum(shapes**2, axis=0)))
+    points, count = shapes.shape
+    if points < count:
+        return np.abs(poles) / (2 * np.pi), turned.real
+    basis = np.linalg.svd(np.hstack([turned.real, turned.imag]), full_matrices=False)[0][:, :count]
+    inside = basis.T @ turned
+    both = np.hstack([inside, inside.conj()])
+    values = np.concatenate([poles, poles.conj()])
+    state = np.vstack([both, both * values])
+    system = -np.linalg.solve(state.T, (both * values**2).T).T
+    square, vectors = np.linalg.eig(system[:, :count].real)
+    normal = (basis @ vectors).real
+    likeness = np.abs(turned.conj().T @ (normal / np.linalg.norm(normal, axis=0)))
+    taken, hz, real = [], np.abs(poles) / (2 * np.pi), turned.real.copy()
+    for k in np.argsort(-np.max(likeness, axis=1)):
+        free = [j for j in range(count) if j not in taken]
+        best = max(free, key=lambda j: likeness[k, j])
+        taken.append(best)
+        if square[best].real > 0 and np.linalg.norm(normal[:, best]) > 0:
+            hz[k] = np.sqrt(square[best].real) / (2 * np.pi)
+            scale = normal[:, best] @ turned[:, k].real / (normal[:, best] @ normal[:, best])
+            real[:, k] = scale * normal[:, best]
+    return hz, real

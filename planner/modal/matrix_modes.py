@@ -7,17 +7,17 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.frf.matrix import FrfMatrix, by_number
 from planner.modal.consistency import Consistency, check
-from planner.modal.matrix_poles import MatrixPoles, identify_matrix
-from planner.modal.neighbours import expected
-from planner.modal.pole_identification import natural, probability, support
-from planner.modal.rank_one_fit import Entries, FittedShape, fit_shape
-from planner.modal.residues import realign
-from planner.modal.row_gains import FREE_GAIN, row_gain
-from planner.modal.shape_measures import (
+from planner.modal.estimate_modes import natural, probability, support
+from planner.modal.mac import (
     phase_collinearity,
     phase_deviation_deg,
     real_normal_modes,
 )
+from planner.modal.matrix_poles import MatrixPoles, identify_matrix
+from planner.modal.modes import Mode
+from planner.modal.motion_fields import expected
+from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, fit_shape, row_gain
+from planner.modal.residues import realign
 from planner.recording.dof import Dof
 from planner.recording.excited_band import FIRST_LINE
 from planner.recording.geometry import Geometry
@@ -26,43 +26,11 @@ LEFT_OUT = 1e8  # times its variance: of a residue that does not fit the others
 
 
 @dataclass(frozen=True, eq=False)
-class MatrixMode:
-    """A mode over all points.
-
-    `shape` (n,) has unit modal mass (kg^-1/2) where `scaled`, else unit length; `shape_sd` (n,) is
-    the standard deviation of real and imaginary part each. `collinearity` is the MPC, `deviation`
-    the MPD in degrees, `modal_mass_kg` that of the shape with largest component 1 (NaN unscaled).
-    `misfit` is χ² per degree of freedom that one shape leaves in the residues. `scatter_hz` is the
-    sd of the frequency from set to set (of the points that roved), beyond their noise.
-    """
-
-    frequency_hz: float
-    frequency_sd_hz: float
-    damping_ratio: float
-    damping_sd: float
-    shape: np.ndarray
-    shape_sd: np.ndarray
-    scaled: bool
-    probability: float
-    collinearity: float
-    deviation_deg: float
-    modal_mass_kg: float
-    misfit: float
-    scatter_hz: float = 0.0
-
-    @property
-    def pole(self) -> complex:
-        """Pole λ in rad/s."""
-        w = 2 * np.pi * self.frequency_hz
-        return complex(-self.damping_ratio * w, w * np.sqrt(max(0.0, 1 - self.damping_ratio**2)))
-
-
-@dataclass(frozen=True, eq=False)
 class MatrixModes:
     """Modes in increasing frequency; `dofs` name the entries of every shape."""
 
     dofs: tuple[Dof, ...]
-    modes: tuple[MatrixMode, ...]
+    modes: tuple[Mode, ...]
     band_hz: tuple[float, float]
     remarks: tuple[str, ...]
     found: MatrixPoles
@@ -162,9 +130,7 @@ def _shapes(found: MatrixPoles, modes: list[int], entries: Entries) -> list[Fitt
     return [fitted(k, gain, one.shape) for k, one in zip(modes, free, strict=True)]
 
 
-def _mode(
-    found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, scaled: bool
-) -> MatrixMode:
+def _mode(found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, scaled: bool) -> Mode:
     fit, m = found.fit, found.fit.poles.size
     pole = complex(fit.poles[k])
     index = [k, m + k]
@@ -178,12 +144,15 @@ def _mode(
     else:
         size = max(float(np.linalg.norm(shape)), 1e-300)
         shape, shape_sd = shape * realign(shape) / size, shape_sd / size
-    mass = 1 / float(np.max(np.abs(shape)) ** 2) if scaled else float("nan")
     spread = np.sqrt(fit.spread[m + k]) / (2 * np.pi)
-    return MatrixMode(
-        frequency, float(sd[0]), damping, float(sd[1]), shape, shape_sd, scaled,
-        probability(float(found.presence[k]), _support(found, pole), float(found.weak[k])),
-        phase_collinearity(shape), phase_deviation_deg(shape), mass, fitted.misfit, float(spread),
+    likely = probability(
+        float(found.presence[k]), support(pole, found.diagram.sets), float(found.weak[k])
+    )
+    nothing = np.full((3, 3), np.nan)
+    return Mode(
+        frequency, float(sd[0]), damping, float(sd[1]), nothing.astype(complex), nothing, shape,
+        likely, shape_sd, scaled, phase_collinearity(shape), phase_deviation_deg(shape),
+        fitted.misfit, float(spread),
     )  # fmt: skip
 
 
@@ -207,19 +176,14 @@ def _informed(
     ]
 
 
-def _support(found: MatrixPoles, pole: complex) -> float:
-    """Share of the upper model orders that have this pole."""
-    return support(pole, found.diagram.sets)
-
-
 def with_normal_modes(found: MatrixModes) -> MatrixModes:
     """With the real normal modes behind the complex shapes; frequencies and damping stay."""
     poles = np.array([mode.pole for mode in found.modes])
     shapes = np.stack([mode.shape for mode in found.modes], axis=1)
     _, real = real_normal_modes(poles, shapes)
-    modes = []
-    for mode, shape in zip(found.modes, real.T, strict=True):
-        mass = 1 / float(np.max(np.abs(shape)) ** 2) if mode.scaled else float("nan")
-        modes.append(replace(mode, shape=shape.astype(complex), modal_mass_kg=mass))
+    modes = [
+        replace(mode, shape=shape.astype(complex))
+        for mode, shape in zip(found.modes, real.T, strict=True)
+    ]
     remark = "Shapes are real normal modes; MPC and MPD are those of the complex ones."
     return replace(found, modes=tuple(modes), remarks=(*found.remarks, remark))

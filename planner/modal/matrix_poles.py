@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
-from planner.modal.fit_data import Data
-from planner.modal.lines_in_band import too_few_lines
+from planner.modal.estimate_modes import ladder
+from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.matrix_selection import established, first_variance, judged
 from planner.modal.plscf import PoleSet, plscf, row_errors
-from planner.modal.pole_identification import ladder
 from planner.modal.set_poles import SetPoles
 from planner.modal.stabilisation import Diagram, diagram, stable
 

@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from planner.modal.fit_data import Data
-from planner.modal.matched_filter import falls
-from planner.modal.mode_selection import MAX_DAMPING, excess, running_mean
+from planner.modal.mode_selection import MAX_DAMPING, excess, falls, presences, running_mean
 from planner.modal.refine import refine
-from planner.modal.residues import unit
 from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
 from planner.modal.set_search import Places, searched_again
-from planner.modal.split_modes import REACH, around, drifted, explains, thinned, unsplit
+from planner.modal.split_modes import REACH, around, explains, thinned, unsplit
 
 # Share of the response at its frequency that a mode must be: one of the diagram's stable lines,
 # and one that only the fit's error tells of. Chosen on simulated plates and aeroplanes.
@@ -53,7 +51,7 @@ def established(
 ) -> tuple[SetPoles, np.ndarray]:  # fmt: skip
     """Fit with every set's own poles, weak modes left out and missing ones added."""
     fit = _fit(data, sets, variance, poles, rounds=0)
-    fit = _fit(data, sets, variance, fit.poles, drifted(data, sets, fit, variance), ROUGH_ROUNDS)
+    fit = _fit(data, sets, variance, fit.poles, fit.own, ROUGH_ROUNDS)
     searched = False
     for _ in range(PASSES):
         variance = _variance(data, fit.fitted, fit.poles.size)
@@ -150,14 +148,6 @@ def _excess(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
     return excess(data, error, variance[:, None], free)
 
 
-def presences(data: Data, poles: np.ndarray, residue: np.ndarray) -> np.ndarray:
-    """(m,) ‖response of the mode‖/‖response‖ at the line nearest its frequency."""
-    lines = [int(np.argmin(np.abs(data.frequency_hz - p.imag / (2 * np.pi)))) for p in poles]
-    ones = unit(data.lines, poles)[np.arange(poles.size), lines]
-    whole = np.linalg.norm(data.response[:, 0][:, lines], axis=0)
-    return np.linalg.norm(residue * ones, axis=0) / np.maximum(whole, 1e-300)
-
-
 def _missing(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray
 ) -> np.ndarray:
@@ -192,7 +182,7 @@ def _tried(
     start = np.append(fit.poles[near], pole)
     together = np.broadcast_to(variance[:, None, lines], local.response.shape)
     quick = refine(local.lines, local.response, together, start, local.allowed)
-    if presences(local, quick.poles, quick.residues.residue[:, 0])[-1] < PRESENT_ADDED / 2:
+    if presences(local, quick.poles, quick.residues.residue)[-1] < PRESENT_ADDED / 2:
         return None
     known = fit.own[:, near]
     own = np.column_stack([known, np.full(len(known), quick.poles[-1])])

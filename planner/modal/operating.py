@@ -15,10 +15,10 @@ import scipy.linalg
 import scipy.signal
 
 from planner.errors import RefusedError
-from planner.modal.mac import mac
+from planner.modal.mac import mac, phase_collinearity, phase_deviation_deg
+from planner.modal.modes import Mode
 from planner.modal.plscf import PoleSet
 from planner.modal.residues import realign
-from planner.modal.shape_measures import phase_collinearity, phase_deviation_deg
 from planner.modal.stabilisation import Diagram, Line, diagram, stable
 
 MAX_ORDER = 60
@@ -41,28 +41,13 @@ TONE_BAND, TONE_LINES = 0.01, 4  # around a pole: share of its frequency, and at
 
 
 @dataclass(frozen=True, eq=False)
-class OperatingMode:
-    """A mode known from responses alone; `shape` (channels,) of unit length has no scale.
+class OperatingModes:
+    """Modes in increasing frequency, tones that were left out (Hz), and the diagram.
 
-    Standard deviations are the scatter over parts of the record.
+    Shapes (channels,) are of unit length; sds are the scatter over parts of the record.
     """
 
-    frequency_hz: float
-    frequency_sd_hz: float
-    damping_ratio: float
-    damping_sd: float
-    shape: np.ndarray
-    shape_sd: np.ndarray
-    probability: float
-    collinearity: float
-    deviation_deg: float
-
-
-@dataclass(frozen=True, eq=False)
-class OperatingModes:
-    """Modes in increasing frequency, tones that were left out (Hz), and the diagram."""
-
-    modes: tuple[OperatingMode, ...]
+    modes: tuple[Mode, ...]
     band_hz: tuple[float, float]
     tones_hz: tuple[float, ...]
     diagram: Diagram
@@ -99,9 +84,9 @@ def operating_modes(
     )
 
 
-def _once(modes: Iterable[OperatingMode]) -> tuple[OperatingMode, ...]:
+def _once(modes: Iterable[Mode]) -> tuple[Mode, ...]:
     """Without those that a neighbour of the same shape stands for."""
-    kept: list[OperatingMode] = []
+    kept: list[Mode] = []
     for mode in sorted(modes, key=lambda mode: mode.damping_ratio):
         width = 2 * mode.damping_ratio * mode.frequency_hz
         twins = [
@@ -207,7 +192,7 @@ def _of_parts(
     return found
 
 
-def _mode(line: Line, parts: list[tuple[complex, np.ndarray]], size: np.ndarray) -> OperatingMode:
+def _mode(line: Line, parts: list[tuple[complex, np.ndarray]], size: np.ndarray) -> Mode:
     shape = line.participation[-1] * size
     shape = shape * realign(shape) / np.linalg.norm(shape)
     nothing = float("nan")
@@ -223,11 +208,11 @@ def _mode(line: Line, parts: list[tuple[complex, np.ndarray]], size: np.ndarray)
         off = others - shape
         shape_sd = np.sqrt(np.mean(np.abs(off) ** 2, axis=0) / 2) / root
     seen = len(parts) / SEGMENTS
-    return OperatingMode(
-        line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, shape, shape_sd,
-        float(np.clip(0.3 * line.share + 0.7 * seen, 0.0, 1.0)),
-        phase_collinearity(shape), phase_deviation_deg(shape),
-    )  # fmt: skip
+    return Mode(
+        line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, shape[:, None],
+        shape_sd[:, None], shape, float(np.clip(0.3 * line.share + 0.7 * seen, 0.0, 1.0)), shape_sd,
+        collinearity=phase_collinearity(shape), deviation_deg=phase_deviation_deg(shape),
+    ).unscaled()  # fmt: skip
 
 
 def _spectrum(values: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:

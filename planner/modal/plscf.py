@@ -107,44 +107,24 @@ def _normal(
     """
     outputs, inputs, lines = frf.shape
     w = np.ones((outputs, lines)) if weight is None else weight / np.mean(weight)
-    if proportional(w):
-        return _normal_of_one_profile(z, frf * np.sqrt(w[:, :1, None] / w[0, 0]), w[0], order)
+    if proportional(w):  # one numerator's matrix for all outputs
+        frf, w = frf * np.sqrt(w[:, :1, None] / w[0, 0]), w[:1]
     lags = z[None, :] ** np.arange(order + 1)[:, None]
     index = np.arange(order + 1)
     lag = index[None, :] - index[:, None]  # column power minus row power
     total = np.zeros((order + 1, inputs, order + 1, inputs))
     reduced = np.empty((outputs, order + 1, order + 1, inputs))
-    for o in range(outputs):
-        h = frf[o]
-        r = (lags @ w[o]).real
-        s = _two_sided(lags, (w[o] * h).T).real  # (2n+1, i) for lags −n…n
-        products = (w[o] * h.conj()[:, None] * h[None]).reshape(inputs * inputs, lines)
+    for own, profile in zip(np.array_split(np.arange(outputs), len(w)), w, strict=True):
+        h = frf[own]
+        s = _two_sided(lags, (profile * h).reshape(-1, lines).T).real  # for lags −n…n
+        products = np.einsum("oif,ojf->ijf", h.conj(), profile * h).reshape(-1, lines)
         t = _two_sided(lags, products.T).real.reshape(-1, inputs, inputs)
-        factor = _numerator_factor(r, lag)
+        factor = _numerator_factor((lags @ profile).real, lag)
         coupled = -s[lag + order].reshape(order + 1, -1)
-        reduced[o] = np.linalg.solve(factor, coupled).reshape(order + 1, order + 1, inputs)
+        found = np.linalg.solve(factor, coupled).reshape(order + 1, order + 1, -1, inputs)
+        reduced[own] = found.transpose(2, 0, 1, 3)
         total += t[lag + order].transpose(0, 2, 1, 3)
     return total, reduced
-
-
-def _normal_of_one_profile(
-    z: np.ndarray, frf: np.ndarray, weight: np.ndarray, order: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """The same where one weight (F,) holds for all outputs: they share one numerator's matrix."""
-    outputs, inputs, lines = frf.shape
-    lags = z[None, :] ** np.arange(order + 1)[:, None]
-    index = np.arange(order + 1)
-    lag = index[None, :] - index[:, None]
-    r = (lags @ weight).real
-    factor = _numerator_factor(r, lag)
-    weighted = (weight * frf).reshape(-1, lines)
-    s = _two_sided(lags, weighted.T).real.reshape(-1, outputs, inputs)
-    coupled = -s[lag + order].reshape(order + 1, -1)  # rows, then columns × outputs × inputs
-    reduced = np.linalg.solve(factor, coupled)
-    reduced = reduced.reshape(order + 1, order + 1, outputs, inputs).transpose(2, 0, 1, 3)
-    products = np.einsum("oif,ojf->ijf", frf.conj(), weight * frf).reshape(-1, lines)
-    t = _two_sided(lags, products.T).real.reshape(-1, inputs, inputs)
-    return t[lag + order].transpose(0, 2, 1, 3), np.ascontiguousarray(reduced)
 
 
 def _numerator_factor(r: np.ndarray, lag: np.ndarray) -> np.ndarray:

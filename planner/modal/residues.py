@@ -16,6 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.frf.frf import Frf
+
 
 @dataclass(frozen=True, eq=False)
 class Residues:
@@ -124,28 +126,24 @@ def lsfd(
     accelerance: np.ndarray,
     poles: np.ndarray,
     weight: np.ndarray | None = None,
-    residual_terms: bool = True,
-    real_modes: bool = False,
     rate_1_s: float = 0.0,
+    tail_s: float = np.inf,
 ) -> Residues:
     """Residues of given poles.
 
-    frequency_hz (F,); accelerance (outputs, inputs, F) in m/s²/N; poles (m,) in rad/s; weight
-    like accelerance, usually 1/variance. With `real_modes` the residues are purely imaginary,
-    as those of a proportionally damped structure are.
+    frequency_hz (F,); accelerance (…, outputs, inputs, F) in m/s²/N; poles (m,) in rad/s; weight
+    (outputs, inputs, F), usually 1/variance.
     """
-    lines = laplace(frequency_hz, rate_1_s)
-    columns = basis(lines, np.asarray(poles), residual_terms)
-    m = len(poles)
-    free = np.arange(m, columns.shape[0]) if real_modes else np.arange(columns.shape[0])
-    root = np.ones(accelerance.shape) if weight is None else np.sqrt(weight)
-    coefficients = np.zeros((*accelerance.shape[:2], columns.shape[0]))
-    for o, i in np.ndindex(*accelerance.shape[:2]):
-        a = stack(columns[free] * root[o, i]).T
+    columns = basis(laplace(frequency_hz, rate_1_s, tail_s), np.asarray(poles))
+    shape = accelerance.shape[:-1]
+    values = accelerance.reshape(-1, *accelerance.shape[-3:])
+    root = np.ones(values.shape[1:]) if weight is None else np.sqrt(weight)
+    coefficients = np.zeros((*values.shape[:3], columns.shape[0]))
+    for o, i in np.ndindex(*root.shape[:2]):
+        a, b = stack(columns * root[o, i]).T, stack(values[:, o, i] * root[o, i]).T
         norm = np.linalg.norm(a, axis=0)
-        b = stack(accelerance[o, i] * root[o, i])
-        coefficients[o, i, free] = np.linalg.lstsq(a / norm, b, rcond=None)[0] / norm
-    return unpack(coefficients, m)
+        coefficients[:, o, i] = (np.linalg.lstsq(a / norm, b, rcond=None)[0] / norm[:, None]).T
+    return unpack(coefficients.reshape(*shape, -1), len(poles))
 
 
 def stack(values: np.ndarray) -> np.ndarray:
@@ -181,3 +179,35 @@ def realign(shape: np.ndarray) -> complex:
     turned = shape * np.exp(-1j * phase)
     sign = np.sign(turned.real[np.argmax(np.abs(turned))]) or 1.0
     return complex(sign * np.exp(-1j * phase))
+
+
+def residue_changes(
+    frf: Frf,
+    poles: np.ndarray,
+    outside: np.ndarray,
+    band_hz: tuple[float, float],
+    changes: np.ndarray,
+) -> np.ndarray:
+    """Residues (c, m, 3, 3) in m/(N·s) that changes of an FRF add to those of its poles.
+
+    Least squares with the weights of the FRF's own fit, out-of-band terms free.
+
+    Args:
+        frf: The FRF that the residues are of.
+        poles: (m,) in rad/s.
+        outside: Poles (k,) beside the band by which it may change too.
+        band_hz: In which it is compared.
+        changes: (c, 3, 3, F) in m/s²/N at its lines; columns that were never hit do not count.
+    """
+    f, m = frf.frequency_hz, len(poles)
+    chosen = (f >= band_hz[0]) & (f <= min(band_hz[1], frf.usable_band_hz[1]))
+    hit = np.flatnonzero(frf.measured)
+    variance = frf.variance[:, hit][..., chosen]
+    known = np.all(np.isfinite(variance) & (variance > 0), axis=-1, keepdims=True)
+    weight = 1 / np.where(known, variance, 1.0)
+    every = np.concatenate([poles, outside])
+    values = changes[:, :, hit][..., chosen]
+    found = lsfd(f[chosen], values, every, weight, frf.exponential_rate_1_s, frf.tail_s)
+    out = np.zeros((len(changes), m, 3, 3), dtype=complex)
+    out[..., hit] = np.moveaxis(found.residue[..., :m], -1, 1)
+    return out

@@ -1,4 +1,4 @@
-"""Modes that drift between sets: each set's pole is searched for, split modes are made one."""
+"""Modes that drift between sets: poles into which one mode was split are made one."""
 
 from dataclasses import replace
 
@@ -6,8 +6,7 @@ import numpy as np
 
 from planner.modal.fit_data import Data
 from planner.modal.residues import unit
-from planner.modal.set_drift import sought
-from planner.modal.set_poles import FARTHEST, SetPoles, StrayedError, fit_sets
+from planner.modal.set_poles import SetPoles, StrayedError, fit_sets
 from planner.modal.set_search import Places, searched_again
 
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
@@ -40,18 +39,6 @@ def thinned(data: Data, poles: np.ndarray, every: bool = False) -> np.ndarray:
         near = np.abs(f - pole.imag / (2 * np.pi)) < reach * half
         kept |= near & (index % one_in == 0)
     return np.flatnonzero(kept)
-
-
-def drifted(
-    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray
-) -> np.ndarray:
-    """Poles (k, m) of every set, searched for around the common ones, one mode after the other."""
-    error = data.response[:, 0] - fit.fitted
-    own = fit.own.copy()
-    for j, pole in enumerate(fit.poles):
-        rest = error + _made(data, sets, fit, np.array([j]))
-        own[:, j] = sought(data, sets, variance, rest, pole, own[:, j], FARTHEST * pole.imag)
-    return own
 
 
 def _made(data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, modes: np.ndarray) -> np.ndarray:
@@ -164,9 +151,7 @@ def _as_one(
     local, lines, near = around(data, sets, fit, middle)
     if not np.all(near[group]):
         return None
-    rest = data.response[:, 0] - fit.fitted + _made(data, sets, fit, group)
     start = fit.own[:, group] @ share
-    start = sought(data, sets, variance, rest, middle, start, FARTHEST * middle.imag)
     others = near.copy()
     others[group] = False
     own = np.column_stack([fit.own[:, others], start])

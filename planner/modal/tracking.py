@@ -17,8 +17,7 @@ import numpy as np
 
 from planner.inference import triangular
 from planner.inference.assignment import least_cost
-from planner.modal.expected_shapes import mixture
-from planner.modal.label_permutations import name_chances
+from planner.modal.label_permutations import mixture, name_chances
 from planner.modal.mac import match_gain, unexpected_cost
 from planner.modal.mode_matching import best, chances
 from planner.modal.modes import Mode

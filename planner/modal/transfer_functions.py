@@ -10,10 +10,10 @@ import numpy as np
 
 from planner.errors import InputError, RefusedError
 from planner.frf.quantities import DERIVATIVE, convert
-from planner.modal.lines_in_band import too_few_lines
+from planner.modal.estimate_modes import ladder
+from planner.modal.fit_data import too_few_lines
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.plscf import plscf
-from planner.modal.pole_identification import ladder
 from planner.modal.residues import lsfd, rank_one
 from planner.modal.stabilisation import Line, diagram, stable
 from planner.recording.records import FrfRecord
@@ -114,15 +114,14 @@ def _presence(f: np.ndarray, h: np.ndarray, pole: complex, residue: np.ndarray) 
 
 def _mode(line: Line, residue: np.ndarray, certain: float) -> Mode:
     late = line.poles[len(line.poles) // 2 :]
-    nothing = np.full((3, 3), np.nan)
     return Mode(
         line.frequency_hz,
         float(np.std(np.abs(late)) / (2 * np.pi)),
         line.damping_ratio,
         float(np.std(-late.real / np.abs(late))),
-        nothing.astype(complex),
-        nothing,
+        residue,
+        residue.real,
         rank_one(residue)[0],
         # Rough: how often it was there, how still it stood, how much of the response it is.
         float(certain * (1 - line.scatter)),
-    )
+    ).unscaled()

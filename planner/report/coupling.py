@@ -10,9 +10,16 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.errors import InputError
-from planner.milling.coupling import AMPLIFICATION_LIMIT, MOTIONS, CoupledFrf
-from planner.milling.interface import NUMBERS
-from planner.milling.verification import Resonance, VerifyingHit, resonances, verifying_hit
+from planner.milling.coupling import (
+    AMPLIFICATION_LIMIT,
+    MOTIONS,
+    CoupledFrf,
+    Resonance,
+    VerifyingHit,
+    resonances,
+    verifying_hit,
+)
+from planner.milling.tool import NUMBERS
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.coupling_plots import coupling_figures
 from planner.report.plot_files import Pictures

@@ -11,9 +11,9 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.milling.contact_fit import ContactFit, fit_contact
 from planner.milling.coupling import TipReceptance
-from planner.milling.cutter_frf import read_frf
-from planner.milling.simulated_rotations import completed
-from planner.milling.tip_files import MEASURE, TipMotion, read_tip
+from planner.milling.cutter_frf import CutterFrf, read_frf
+from planner.milling.rotations import completed
+from planner.milling.tip_files import MEASURE, read_tip
 from planner.milling.tool import Tool
 from planner.robot.robot import Robot
 
@@ -50,7 +50,7 @@ def tip_of(
             f"{source} does not say the {len(loaded.joint_names)} joint angles of {robot}; write "
             f"it with predict --out."
         )
-    return completed(found, Simulation(loaded), q), found.pose
+    return completed(found, Simulation(loaded), q), found.name
 
 
 def _campaign(directory: Path, pose: str | None) -> tuple[TipReceptance, str]:
@@ -80,7 +80,7 @@ def tip_at(
     if simulation is None:
         raise InputError(f"{campaign.directory} has no simulation for the rotations; {MEASURE}.")
     s2 = (2j * np.pi * lines) ** 2
-    return completed(TipMotion(pose, lines, mean / s2, sd / np.abs(s2), q), simulation, q)
+    return completed(CutterFrf(pose, lines, mean / s2, sd / np.abs(s2)), simulation, q)
 
 
 def within(tip: TipReceptance, band_hz: tuple[float, float] | None, source: Path) -> TipReceptance:

@@ -10,7 +10,7 @@ from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.dataset.store import user_store
 from planner.errors import PlannerError, RefusedError
-from planner.frf.between_points import exported
+from planner.frf.exported import exported
 from planner.frf.matrix import FrfMatrix, matrix_of
 from planner.recording.excited_band import excited_band
 from planner.recording.geometry import read_geometry

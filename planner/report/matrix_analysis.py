@@ -9,7 +9,8 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.frf.matrix import FrfMatrix
-from planner.modal.matrix_modes import MatrixMode, MatrixModes, modes_of_matrix, with_normal_modes
+from planner.modal.matrix_modes import MatrixModes, modes_of_matrix, with_normal_modes
+from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry, read_geometry
 from planner.report.answer import Answer, RefusedFile
@@ -52,7 +53,7 @@ class MatrixShape(ModeOverPoints):
     scatter_hz: float
 
     @classmethod
-    def of(cls, mode: MatrixMode) -> "MatrixShape":
+    def of(cls, mode: Mode) -> "MatrixShape":
         """Of a mode over all points."""
         return cls(
             mode.frequency_hz, mode.frequency_sd_hz, mode.damping_ratio, mode.damping_sd,

@@ -16,9 +16,8 @@ from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.frf.quantities import DERIVATIVE
-from planner.modal.estimate_modes import identification
+from planner.modal.estimate_modes import PoleIdentification, identification
 from planner.modal.modes import ModalModel, Mode
-from planner.modal.pole_identification import PoleIdentification
 from planner.recording.folder import CHANNELS, TABLE, files_in, joint_columns, read_recordings
 from planner.recording.points import ANYWHERE, PointNames
 from planner.recording.read import READERS

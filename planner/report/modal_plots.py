@@ -10,13 +10,13 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from planner.frf.frf import Frf
+from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.mac import mac_matrix
 from planner.modal.matrix_modes import MatrixModes
 from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel
 from planner.modal.operating import OperatingModes
-from planner.modal.pole_identification import PoleIdentification
 from planner.modal.stabilisation import stable
 from planner.report.frf_plots import AXES, MEASURED, MODEL
 from planner.report.plot_marks import (

@@ -10,7 +10,8 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.errors import InputError
-from planner.modal.operating import OperatingMode, OperatingModes, operating_modes
+from planner.modal.modes import Mode
+from planner.modal.operating import OperatingModes, operating_modes
 from planner.recording.dof import Dof
 from planner.recording.filling import lost_samples
 from planner.recording.read import read
@@ -33,7 +34,7 @@ class UnscaledMode(ModeOverPoints):
     """A mode known from responses alone; `shape` is [re, im] per `dofs`, of unit length."""
 
     @classmethod
-    def of(cls, mode: OperatingMode) -> "UnscaledMode":
+    def of(cls, mode: Mode) -> "UnscaledMode":
         """Of an operating mode."""
         return cls(
             mode.frequency_hz, mode.frequency_sd_hz, mode.damping_ratio, mode.damping_sd,

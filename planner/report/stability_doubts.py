@@ -3,8 +3,8 @@
 import numpy as np
 
 from planner.milling.cut import Cut
+from planner.milling.cutter_fit import hidden_below
 from planner.milling.directional import Coefficients, mean_matrix
-from planner.milling.hidden_modes import hidden_below
 from planner.milling.structure import Structure
 from planner.milling.uncertainty import OPEN
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from planner.milling.cut import Cut, load_cut
 from planner.milling.lobes import Loss, losses
-from planner.milling.point import multiplier
+from planner.milling.machine import multiplier
 from planner.milling.structure import Structure, beyond
 from planner.milling.uncertainty import PROBABILITY, SampledLimits, sampled_limits
 from planner.progress import Tell, quietly, within

@@ -10,10 +10,9 @@ import numpy as np
 from planner.campaign.planned import inside, outside_remark
 from planner.campaign.store import is_campaign
 from planner.errors import InputError
-from planner.milling.cut import Cut
+from planner.milling.cut import Cut, cuts_at, no_pose, turned_to
 from planner.milling.cutter_frf import CutterFrf, names_in, of_accelerance, read_frf
-from planner.milling.feed import cuts_at, no_pose, turned_to
-from planner.milling.mode_file import load_mode_file
+from planner.milling.cutter_modes import load_mode_file
 from planner.milling.structure import SAMPLES, OutOfBandError, Structure, of_frf, of_modes
 
 if TYPE_CHECKING:

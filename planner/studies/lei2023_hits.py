@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.modal.estimate_modes import identify
 from planner.modal.fit_data import Data
 from planner.modal.modes import LEAST_PROBABILITY, Mode
-from planner.modal.pole_identification import Identified, identify
 from planner.modal.residues import rank_one
 from planner.modal.tracking import Guide, track
 from planner.progress import Tell
@@ -78,7 +78,7 @@ def _channels(rng: np.random.Generator) -> np.ndarray:
 
 def _analysed(
     truth: Truth, q: np.ndarray, gains: np.ndarray, rng: np.random.Generator
-) -> tuple[Identified, ...]:
+) -> tuple[Mode, ...]:
     hz, h, variance = _frf(truth, q, gains, rng)
     lines = (hz >= BAND_HZ[0]) & (hz <= BAND_HZ[1])
     tail = HAMMER.record_s - HAMMER.pretrigger_s - HAMMER.duration_s / 2
@@ -128,7 +128,7 @@ def _frf(
     return hz, h, variance
 
 
-def _mode(one: Identified) -> Mode:
+def _mode(one: Mode) -> Mode:
     """As tracking wants it: three of the four points make its shape."""
     return Mode(
         one.frequency_hz, one.frequency_sd_hz, one.damping_ratio, one.damping_sd,

@@ -10,8 +10,8 @@ from planner.milling.cutter_modes import real_modes
 from planner.milling.lobes import losses
 from planner.milling.machine import Machine, multipliers
 from planner.milling.period import Discretisation
-from planner.milling.semi_discretisation import semi_monodromy
 from tests.support.milling_cases import MULTIPLIERS, cut, machine, one_mode
+from tests.support.semi_discretisation import semi_growth
 
 RPM, DEPTH_MM = 5000.0, 0.5
 
@@ -25,8 +25,7 @@ def full_error(asked: Machine, degree: int, elements: int) -> float:
 
 def semi_error(asked: Machine, steps: int) -> float:
     """Of |µ|, with so many steps."""
-    size = abs(multipliers([semi_monodromy(asked, RPM, steps, DEPTH_MM * 1e-3)])[0])
-    return abs(size - MULTIPLIERS[DEPTH_MM])
+    return abs(semi_growth(asked, RPM, DEPTH_MM * 1e-3, steps) - MULTIPLIERS[DEPTH_MM])
 
 
 def test_orders_of_convergence():

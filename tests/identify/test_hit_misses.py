@@ -10,8 +10,7 @@ from planner.identification.hit_misses import Known, VisitHits, tell_misses
 from planner.identification.measurement_model import CHAIN_NUMBERS, Tolerances
 from planner.identification.parameters import Priors, parametrise
 from planner.identification.simulated_visit import SimulatedPoses
-from planner.modal.residue_change import residue_changes
-from planner.modal.residues import Residues, laplace, synthesize
+from planner.modal.residues import Residues, laplace, residue_changes, synthesize
 from planner.robot.robot import Robot
 from tests.support.known_robots import KR10
 

@@ -6,9 +6,8 @@ from scipy.signal import find_peaks
 
 from planner.milling.beam import Segment, ToolMaterial
 from planner.milling.coupling import TipReceptance, couple
-from planner.milling.interface import ToolContact
 from planner.milling.rotations import TwoPoints, two_point_receptance
-from planner.milling.tool import Point, Tool, ToolPart
+from planner.milling.tool import Point, Tool, ToolContact, ToolPart
 from tests.milling.assembled import LOSS, NU, RHO, E, frf, machine
 
 FREQUENCY = np.concatenate([np.arange(5.0, 60.0, 0.25), np.arange(60.0, 1600.0, 5.0)])

@@ -6,9 +6,8 @@ import pytest
 from planner.campaign.config import load_campaign_config
 from planner.campaign.decision import Decision
 from planner.errors import InputError
-from planner.milling.decision import decide
 from planner.milling.lobes import losses
-from planner.milling.path import along, by_feed
+from planner.milling.path import along, by_feed, decide
 from planner.milling.spread import ModeSpread
 from planner.milling.structure import Structure
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.milling.feed import cuts_at, no_pose
+from planner.milling.cut import cuts_at, no_pose
 from tests.support.milling_cases import cut
 
 NAMES = ("a", "b", "c")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planner.milling.lobes import losses
-from planner.milling.point import multiplier
+from planner.milling.machine import multiplier
 from planner.milling.zeroth_order import limits
 from tests.support.milling_cases import (
     MULTIPLIERS,
@@ -54,6 +54,6 @@ def test_zeroth_order_of_two_modes_each_way():
     found = machine(two_each_way(), given).floor()
     assert 1e3 * found.floor_m == pytest.approx(0.957, rel=ZEROTH)
     assert found.floor_hz == pytest.approx(1440, rel=1e-3)
-    depth = limits(found, given.speeds_rpm, given.teeth).depth_m
+    depth, _ = limits(found, given.speeds_rpm, given.teeth)
     wanted = [1.086, 1.615, 1.139, 1.456, 0.958, 4.619, 1.040]
     np.testing.assert_allclose(1e3 * depth, wanted, rtol=ZEROTH)

@@ -11,8 +11,8 @@ from planner.dynamics.simulation import Elasticity, Simulation
 from planner.errors import InputError
 from planner.milling.beam import Segment, ToolMaterial
 from planner.milling.coupling import couple
-from planner.milling.simulated_rotations import completed
-from planner.milling.tip_files import TipMotion
+from planner.milling.cutter_frf import CutterFrf
+from planner.milling.rotations import completed
 from planner.milling.tool import Tool, ToolPart
 from planner.report.coupling_source import tip_of
 from planner.robot.config import Payload
@@ -55,7 +55,7 @@ def rods_tip(simulation):
 
 def motion(simulation, noise=0.01):
     h = simulation.accelerance(Q[None], FREQUENCY)[0] / (2j * np.pi * FREQUENCY) ** 2
-    return TipMotion("P1", FREQUENCY, h, noise * np.abs(h), Q)
+    return CutterFrf("P1", FREQUENCY, h, noise * np.abs(h), joints_rad=Q)
 
 
 def test_a_rigid_tool_is_a_payload(simulation):
@@ -96,5 +96,5 @@ def test_an_npz_of_predict_needs_its_joint_angles(simulation, tmp_path):
     tip, pose = tip_of(tmp_path / "with.npz", None, "P1", ROBOT, 0.0)
     assert pose == "P1"
     assert tip.receptance[:, :3, :3].shape == (len(FREQUENCY), 3, 3)
-    with pytest.raises(InputError, match="holds no pose P9"):
+    with pytest.raises(InputError, match="has no pose P9"):
         tip_of(tmp_path / "with.npz", None, "P9", ROBOT, 0.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.modal.neighbours import expected
+from planner.modal.motion_fields import expected
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 from tests.support.struck_structures import dof_of, unit_mass_shapes

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.modal.rank_one_fit import Entries, fit_shape
-from planner.modal.row_gains import FREE_GAIN, row_gain
+from planner.modal.rank_one_fit import FREE_GAIN, Entries, fit_shape, row_gain
 
 DAMPED = 300.0
 COLUMNS = np.array([0, 7, 15])

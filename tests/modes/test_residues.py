@@ -41,16 +41,6 @@ def test_lsfd_recovers_residues_and_rest():
     np.testing.assert_allclose(found.upper, upper, rtol=1e-7)
 
 
-def test_real_modes_have_imaginary_residues():
-    system = random_system(np.random.default_rng(2), 3)
-    found = lsfd(LINES, exact_frf(system, LINES), system.poles, real_modes=True)
-    assert np.all(found.residue.real == 0)
-    assert np.all(found.residue[0, 0].imag < 0)
-    np.testing.assert_allclose(
-        np.moveaxis(found.residue, -1, 0), system.residues, rtol=1e-8, atol=1e-14
-    )
-
-
 def test_weight_ignores_spoiled_lines():
     system = random_system(np.random.default_rng(3), 3)
     h = exact_frf(system, LINES)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.modal.pole_identification import PoleIdentification
-from planner.modal.ringdown import MAX_ORDER, identify_decays
+from planner.modal.estimate_modes import PoleIdentification
+from planner.modal.free_decays import MAX_ORDER, identify_decays
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import scipy.linalg
 
 from planner.frf.matrix import FrfMatrix
 from planner.modal.mac import mac
-from planner.modal.matrix_modes import MatrixMode
 from planner.modal.matrix_poles import MatrixPoles
+from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 from tests.support.struck_structures import dof_of, unit_mass_shapes
@@ -243,7 +243,7 @@ def tellable(case: RoughSet) -> np.ndarray:
     return np.all(case.matrix.measured.astype(int) @ part > 0, axis=0)[case.seen]
 
 
-def told(case: RoughSet, modes: Sequence[MatrixMode], dofs: Sequence[Dof]) -> list[Told | None]:
+def told(case: RoughSet, modes: Sequence[Mode], dofs: Sequence[Dof]) -> list[Told | None]:
     """Every true mode that the references see, None where none was found."""
     names = [dof_of(case.structure, k) for k in range(len(case.structure.nodes))]
     rows = [names.index(dof) for dof in dofs]
