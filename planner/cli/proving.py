@@ -26,8 +26,8 @@ def prove(
     Example: planner prove --cases 20 --out proof
     """
     from planner.cli.progress import counting
-    from planner.prove.report import prove_report
-    from planner.prove.run import diagnose_all, make
+    from planner.proof.report import prove_report
+    from planner.proof.run import diagnose_all, make
 
     folder = out or Path(f"proof-{cases}-{seed}")
     with counting(quiet=as_json) as tell:

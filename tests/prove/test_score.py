@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.prove.curves import share
-from planner.prove.report import write
-from planner.prove.run import Proof, unseal
-from planner.prove.score import calibration_error, score
-from planner.prove.summary import summary
+from planner.proof.curves import share
+from planner.proof.report import write
+from planner.proof.run import Proof, unseal
+from planner.proof.score import calibration_error, score
+from planner.proof.summary import summary
 
 NOTHING = {"frac": 0.9, "frobenius": 0.9}
 MASS, BASE, NOISE_OF = ("added_mass", "link_3"), ("base_compliance", "base"), ("none", None)

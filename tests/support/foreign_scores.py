@@ -15,8 +15,8 @@ from typing import Any
 
 from planner.diagnosis.thresholds import ARTEFACTS
 from planner.program import command
-from planner.prove.curves import share
-from tests.support.foreign_cells.__main__ import main as make
+from planner.proof.curves import share
+from planner.proof.tree.__main__ import main as make
 
 Place = tuple[str, str | None]
 CLEARLY = 20.0  # nats from which an effect is to be named

@@ -10,18 +10,18 @@ import pyuff
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
-from tests.support.foreign_cells import nonlinear
-from tests.support.foreign_cells.__main__ import main
-from tests.support.foreign_cells.adjusted import adjusted, columns, count
-from tests.support.foreign_cells.blueprint import assemble
-from tests.support.foreign_cells.case import make_case, system_of
-from tests.support.foreign_cells.hits import Clock, draw_hits
-from tests.support.foreign_cells.laws import Spring
-from tests.support.foreign_cells.layouts import LAYOUTS
-from tests.support.foreign_cells.march import first_order
-from tests.support.foreign_cells.records import contour, linear_records, marched, shifted
-from tests.support.foreign_cells.spatial import inertia_of
-from tests.support.foreign_cells.stating import Truth, draw_poses, draw_robot, draw_truth
+from planner.proof.tree import nonlinear
+from planner.proof.tree.__main__ import main
+from planner.proof.tree.adjusted import adjusted, columns, count
+from planner.proof.tree.blueprint import assemble
+from planner.proof.tree.case import make_case, system_of
+from planner.proof.tree.hits import Clock, draw_hits
+from planner.proof.tree.laws import Spring
+from planner.proof.tree.layouts import LAYOUTS
+from planner.proof.tree.march import first_order
+from planner.proof.tree.records import contour, linear_records, marched, shifted
+from planner.proof.tree.spatial import inertia_of
+from planner.proof.tree.stating import Truth, draw_poses, draw_robot, draw_truth
 
 
 def _robot(kind: str = "arm6", seed: int = 3) -> tuple[Truth, np.ndarray]:

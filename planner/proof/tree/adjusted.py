@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tests.support.foreign_cells.laws import Spring
-from tests.support.foreign_cells.layouts import Robot
-from tests.support.foreign_cells.spatial import cross_matrix
-from tests.support.foreign_cells.system import System, Tie
-from tests.support.foreign_cells.tree import Body
+from planner.proof.tree.laws import Spring
+from planner.proof.tree.layouts import Robot
+from planner.proof.tree.spatial import cross_matrix
+from planner.proof.tree.system import System, Tie
+from planner.proof.tree.tree import Body
 
 GEAR_SD, SLIGHT_SD, OTHER_SD, DAMPING_SD, LOSS_SD = 0.25, 0.5, 1.0, 0.5, 0.02
 MASS_SD, CENTRE_SD, SECOND_SD = 0.06, 0.03, 0.08

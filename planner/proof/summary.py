@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from planner.diagnosis.thresholds import ARTEFACTS
-from planner.prove.curves import CLEARLY_NATS, MEASURES, clearly, curve, nameable, share
-from planner.prove.score import DETECTABLE, Scored, Shown, calibration_error
+from planner.proof.curves import CLEARLY_NATS, MEASURES, clearly, curve, nameable, share
+from planner.proof.score import DETECTABLE, Scored, Shown, calibration_error
 from planner.report.answer import plain
 
 

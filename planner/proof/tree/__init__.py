@@ -3,5 +3,5 @@
 A case is a robot as stated, recordings of the robot as it truly is, and a sealed answer. SI units
 everywhere (N, m, kg, s, rad); degrees and millimetres where a name says so.
 
-    python -m tests.support.foreign_cells OUT --seed S [--kind NAME]
+    python -m planner.proof.tree OUT --seed S [--kind NAME]
 """

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from planner.prove.curves import CLEARLY_NATS, EDGES_NATS, MEASURES, CurveBin, curve, nameable
-from planner.prove.score import Scored, by_probability
+from planner.proof.curves import CLEARLY_NATS, EDGES_NATS, MEASURES, CurveBin, curve, nameable
+from planner.proof.score import Scored, by_probability
 from planner.report.plot_text import ink
 
 OPEN_DECADES = 10.0  # factor by which the first and last bin are drawn beyond their inner edge

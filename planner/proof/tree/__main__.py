@@ -1,17 +1,17 @@
-"""python -m tests.support.foreign_cells OUT --seed S [--kind NAME]"""
+"""python -m planner.proof.tree OUT --seed S [--kind NAME]"""
 
 import argparse
 import sys
 from pathlib import Path
 
-from tests.support.foreign_cells.case import make_case, write_answer, write_case
-from tests.support.foreign_cells.deck import KINDS
-from tests.support.foreign_cells.sizes import sizes_of
+from planner.proof.tree.case import make_case, write_answer, write_case
+from planner.proof.tree.deck import KINDS
+from planner.proof.tree.sizes import sizes_of
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Write one case and its sealed answer."""
-    parser = argparse.ArgumentParser(prog="tests.support.foreign_cells")
+    parser = argparse.ArgumentParser(prog="planner.proof.tree")
     parser.add_argument("out", type=Path)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--kind", choices=KINDS)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.prove.score import Scored, Shown
+from planner.proof.score import Scored, Shown
 
 EDGES_NATS = (0.0, 5.0, 20.0, 100.0, 1e3, 1e4, 1e5, float("inf"))
 CLEARLY_NATS = 20.0  # from which an effect should be named: odds of 5 · 10⁸

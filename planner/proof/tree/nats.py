@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.support.foreign_cells.adjusted import adjusted, columns
-from tests.support.foreign_cells.layouts import Robot
-from tests.support.foreign_cells.spatial import cross_matrix
-from tests.support.foreign_cells.system import System
+from planner.proof.tree.adjusted import adjusted, columns
+from planner.proof.tree.layouts import Robot
+from planner.proof.tree.spatial import cross_matrix
+from planner.proof.tree.system import System
 
 MODEL_ERROR, NEED_NOT = 0.003, 0.01  # of |H|: what nobody can tell; what need not be explained
 STAGES = (0.5, 0.2, 0.07, 0.02, NEED_NOT, MODEL_ERROR)

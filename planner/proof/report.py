@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from planner.prove.curves import MEASURES
-from planner.prove.pictures import PICTURES
-from planner.prove.run import Proof, told, unseal
-from planner.prove.score import Scored, score
-from planner.prove.summary import summary
+from planner.proof.curves import MEASURES
+from planner.proof.pictures import PICTURES
+from planner.proof.run import Proof, told, unseal
+from planner.proof.score import Scored, score
+from planner.proof.summary import summary
 from planner.report.answer import Answer, plain
 from planner.report.frf_plots import png
 

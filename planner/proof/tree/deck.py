@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from tests.support.foreign_cells import effects as physical
-from tests.support.foreign_cells.chain import ARTEFACTS
-from tests.support.foreign_cells.effects import Effect
-from tests.support.foreign_cells.gears import GEARS
-from tests.support.foreign_cells.outsiders import OUTSIDERS
-from tests.support.foreign_cells.stating import Truth
+from planner.proof.tree import effects as physical
+from planner.proof.tree.chain import ARTEFACTS
+from planner.proof.tree.effects import Effect
+from planner.proof.tree.gears import GEARS
+from planner.proof.tree.outsiders import OUTSIDERS
+from planner.proof.tree.stating import Truth
 
 LINEAR = (
     physical.base_compliance, physical.transverse_compliance, physical.joint_stiffness,

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from tests.support.foreign_cells import files
-from tests.support.foreign_cells.blueprint import assemble
-from tests.support.foreign_cells.chain import Chain, draw_chain, recorded
-from tests.support.foreign_cells.deck import OUTSIDE, draw_effects, kind_of
-from tests.support.foreign_cells.effects import Effect
-from tests.support.foreign_cells.hits import Clock, Hit, draw_clock, draw_hits
-from tests.support.foreign_cells.layouts import LAYOUTS, Robot
-from tests.support.foreign_cells.outsiders import controller, stable
-from tests.support.foreign_cells.records import Motion, contour, linear_records, marched, rumble
-from tests.support.foreign_cells.stating import Truth, draw_poses, draw_robot, draw_truth
-from tests.support.foreign_cells.system import System
+from planner.proof.tree import files
+from planner.proof.tree.blueprint import assemble
+from planner.proof.tree.chain import Chain, draw_chain, recorded
+from planner.proof.tree.deck import OUTSIDE, draw_effects, kind_of
+from planner.proof.tree.effects import Effect
+from planner.proof.tree.hits import Clock, Hit, draw_clock, draw_hits
+from planner.proof.tree.layouts import LAYOUTS, Robot
+from planner.proof.tree.outsiders import controller, stable
+from planner.proof.tree.records import Motion, contour, linear_records, marched, rumble
+from planner.proof.tree.stating import Truth, draw_poses, draw_robot, draw_truth
+from planner.proof.tree.system import System
 
 WANTED = 4  # unseen poses
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from tests.support.foreign_cells.adjusted import gear_moves
-from tests.support.foreign_cells.case import Case, system_of
-from tests.support.foreign_cells.effects import Effect
-from tests.support.foreign_cells.nats import READBACK_SD, Observed, Pose, nats_of
-from tests.support.foreign_cells.records import Motion
-from tests.support.foreign_cells.system import System
+from planner.proof.tree.adjusted import gear_moves
+from planner.proof.tree.case import Case, system_of
+from planner.proof.tree.effects import Effect
+from planner.proof.tree.nats import READBACK_SD, Observed, Pose, nats_of
+from planner.proof.tree.records import Motion
+from planner.proof.tree.system import System
 
 
 def lines_of(case: Case) -> np.ndarray:
