@@ -1,13 +1,12 @@
-"""Concealed cases and their sealed answers.
+"""Concealed cases and their answers.
 
-    python -m planner.proof.make FOLDER --cases 12 --seed 7
+    python -m planner.proof.make FOLDER --cases 12 --seed 7 --number 3
 
-writes FOLDER/case_001/{robot,recordings} …, prints the hash of every answer, and puts the answers
-into FOLDER/answers. Nothing in a case's folder tells what was concealed.
+writes FOLDER/{robot,recordings} of the third of twelve cases, and prints its answer. Nothing in the
+folder tells what was concealed.
 """
 
 import argparse
-import hashlib
 import importlib
 import json
 import secrets
@@ -71,29 +70,21 @@ def make_one(kind: str, engine: str, seed: int, folder: Path, laboratory: bool =
 
 
 def main() -> None:
-    """Make cases of the engines in turn; those that are there already stay."""
+    """Make one case of a proof; print its answer."""
     parser = argparse.ArgumentParser(prog="python -m planner.proof.make", description=__doc__)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--cases", type=int, default=25)
+    parser.add_argument("--cases", type=int, default=25, help="of the proof, engines in turn")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--engine", choices=list(ENGINES), action="append")
+    parser.add_argument("--number", type=int, default=1, help="of the case, from 1 on")
     parser.add_argument("--laboratory", action="store_true", help="no hit and no sensor errs")
     options = parser.parse_args()
-    engines = options.engine or list(ENGINES)
-    (options.folder / "answers").mkdir(parents=True, exist_ok=True)
-    for place, engine in enumerate(engines):
-        module = importlib.import_module(ENGINES[engine])
-        mine = range(place, options.cases, len(engines))
-        kinds = deck(len(mine), module.SINGLES, module.OUTSIDERS, options.seed)
-        for i, (number, kind) in enumerate(zip(mine, kinds, strict=True)):
-            name = f"case_{number + 1:03d}"
-            path = options.folder / "answers" / f"{name}.json"
-            if not path.is_file():
-                seed = 100_000 * options.seed + i
-                text = make_one(kind, engine, seed, options.folder / name, options.laboratory)
-                path.write_text(text, encoding="utf-8")
-            seal = hashlib.sha256(path.read_bytes()).hexdigest()
-            print(f"{name} {seal}", flush=True)
+    engines = list(ENGINES)
+    place, own = (options.number - 1) % len(engines), (options.number - 1) // len(engines)
+    module = importlib.import_module(ENGINES[engines[place]])
+    count = len(range(place, options.cases, len(engines)))
+    kind = deck(count, module.SINGLES, module.OUTSIDERS, options.seed)[own]
+    seed = 100_000 * options.seed + own
+    print(make_one(kind, engines[place], seed, options.folder, options.laboratory), end="")
 
 
 if __name__ == "__main__":
