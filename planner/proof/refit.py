@@ -7,11 +7,12 @@ cross-axis, place and the force's gain; and at each pose misses of hits, and rea
 
     chi2 = |r - D x|² + |x|², in units of noise and of an error of |H|, x in tolerances (1 sd)
 
-The error comes down in stages, so that far modes are found.
+with |H| that of all nine FRFs at a line together. The error comes down in stages, so that far modes are found.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -139,7 +140,8 @@ class Question:
 class Left:
     """`nats`: how much the recordings tell of what is left; `size`: of it at poses set aside.
 
-    Relative to |H|, as `change`, which is without any refit.
+    Relative to |H|, of the stage that foretells these best: a refit can also take up too much.
+    `change` is that without any refit.
     """
 
     nats: float
@@ -152,22 +154,16 @@ def left(question: Question) -> Left:
     first = question.poses[0].robot
     inertia = [(n, c) for n, b in question.bodies.items() for c in b.changes(question.reach_m)]
     moves = np.zeros(3 * len(first.springs) + len(inertia))
-    chain, chi2 = np.zeros(13), np.inf
+    chi2, sizes = np.inf, [_size(question, inertia, moves, np.zeros(13))]
     for error in STAGES:
-
-        def of(at: np.ndarray, error: float = error) -> "_Sums":
-            return _sums(question, inertia, at, error)
-
-        moves, found = _descended(of, moves)
-        chain, chi2 = found.chain, found.chi2
-    nats = max(0.0, chi2 - float(moves @ moves)) / 2
-    nothing = 0.0 * moves, 0.0 * chain
-    return Left(nats, _size(question, inertia, moves, chain), _size(question, inertia, *nothing))
+        moves, found = _descended(partial(_sums, question, inertia, error=error), moves)
+        chi2 = found.chi2 - float(moves @ moves)
+        chain = np.clip(found.chain, -WITHIN, WITHIN)
+        sizes.append(_size(question, inertia, moves, chain))
+    return Left(max(0.0, chi2) / 2, min(sizes), sizes[0])
 
 
-def _size(
-    question: Question, inertia: list, moves: np.ndarray, chain: np.ndarray
-) -> float:
+def _size(question: Question, inertia: list, moves: np.ndarray, chain: np.ndarray) -> float:
     """‖Δ‖/‖H‖ at poses set aside, hits and readback as they should be."""
     pairs = list(question.aside) or [(p.robot, o.frf) for p in question.poses for o in p.sets]
     off = whole = 0.0
@@ -272,7 +268,8 @@ def _at_pose(
     shared = np.concatenate([shared, _chain_columns(frf)])
     rows, local, residual = [], [], []
     for number, seen in enumerate(pose.sets):
-        variance = question.share * (seen.variance + (error * np.abs(seen.frf)) ** 2)
+        size2 = np.mean(np.abs(seen.frf) ** 2, axis=(1, 2), keepdims=True)
+        variance = question.share * (seen.variance + error**2 * size2)
         weight = np.where(seen.hits > 0, 1 / np.sqrt(variance), 0.0)
         misses = _real(_misses(frf, seen.hits), weight)
         blocks = [misses if i == number else 0 * misses for i in range(len(pose.sets))]

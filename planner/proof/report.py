@@ -79,7 +79,12 @@ def _markdown(seal: str, scored: Sequence[Scored], found: Mapping[str, Any]) -> 
     for s in scored:
         if not s.right:
             true = [f"{e.effect} {e.at or ''} ({e.size:.2%}, {e.nats:.3g})" for e in s.shown]
-            cells = ", ".join(true) or "nothing", s.verdict, _places(s.named), _places(s.false_names)
+            cells = (
+                ", ".join(true) or "nothing",
+                s.verdict,
+                _places(s.named),
+                _places(s.false_names),
+            )
             lines.append(f"| {s.name} | {s.robot} | {' | '.join(cells)} | {s.probability:.2f} |")
     return "\n".join([*lines, ""])
 

@@ -78,7 +78,9 @@ def _spread(todo: list[Task], scheduler: str | None, jobs: int) -> Iterator[tupl
 
 def seal(folder: Path) -> str:
     """Hash of the hashes of all sealed answers."""
-    kept = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("case_*.json"))]
+    kept = [
+        json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("case_*.json"))
+    ]
     return hashlib.sha256("\n".join(one["seal"] for one in kept).encode()).hexdigest()
 
 
@@ -115,12 +117,13 @@ def conducted(_: None, task: Task) -> dict[str, Any] | processes.Failure:
             return processes.Failure((made.stderr.strip() or "nothing said").splitlines()[-1])
         answer = made.stdout
         sealed = hashlib.sha256(answer.encode()).hexdigest()
-        told = _diagnosed(folder)
+        told = diagnosed(folder)
         told["frac"] = _frac(json.loads(answer), told)
     return {"seal": sealed, "answer": answer, "told": told}
 
 
-def _diagnosed(case: Path) -> dict[str, Any]:
+def diagnosed(case: Path) -> dict[str, Any]:
+    """What the command says of a folder with recordings and robot; or why it failed."""
     command = program.command(
         "diagnose", str(case / "recordings"), "--robot", str(case / "robot" / "robot.toml"),
         "--predict", str(case / "recordings" / "predict.csv"), "--json",

@@ -155,9 +155,7 @@ def _covered(answer: Mapping[str, Any], told: Mapping[str, Any]) -> tuple[int, i
     return sum(found), len(found)
 
 
-def _pairs(
-    effect: Mapping[str, Any], found: Mapping[str, Any]
-) -> list[tuple[float, float, float]]:
+def _pairs(effect: Mapping[str, Any], found: Mapping[str, Any]) -> list[tuple[float, float, float]]:
     """(true, value, sd) of the parameters that mean the same on both sides."""
     true, kind = effect["parameters"], effect["effect"]
     names = {
@@ -169,7 +167,7 @@ def _pairs(
     out = [(true[a], found[b]) for a, b in names.items() if a in true and b in found]
     stiff = {n: v for n, v in found.items() if n.startswith("stiffness")}
     if kind == "base_compliance":
-        for axis, k in zip("xy", true["stiffness"], strict=False):
+        for axis, k in zip("xy", true.get("stiffness", ()), strict=False):
             out += [(k, v) for n, v in stiff.items() if n.endswith(f"about {axis}")]
     if kind == "joint_stiffness" and len(stiff) == 1:
         out += [(true["stiffness"], v) for v in stiff.values()]

@@ -20,7 +20,7 @@ from planner.truth.load import load_truth
 from planner.truth.mishaps import OUTSIDERS as FEW_OUTSIDERS
 from planner.truth.model import Truth
 from planner.truth.outsiders import MORE_OUTSIDERS
-from planner.truth.questions import Scored, question
+from planner.truth.questions import Scored, lacking, question
 from planner.truth.scene import PULSE_S, Scene
 from planner.truth.secret import Secret, frfs, once, quiet_hits
 from planner.truth.visits import Visits, record
@@ -89,14 +89,19 @@ def make_case(kind: str, robot: str, seed: int, folder: Path, world: World = CLE
     record(folder / "recordings", truth, measured, visits, quiet, hammer, rng)
     held_out = [(f"H{i + 1:02d}", q) for i, q in enumerate(poses[POSES:])]
     write_predict(folder / "recordings", truth.joint_names, held_out, hammer.peak_n)
+    reach_m = sum(float(np.linalg.norm(joint.xyz)) for joint in arm.joints)
     scored = Scored(
-        robot_toml, arm, measured, visits.visits, poses[POSES:], hammer, quiet, again
+        robot_toml, arm.band_hz, reach_m, measured, visits.visits, poses[POSES:], hammer, quiet,
+        again,
     )  # fmt: skip
     before = [plain, *(drawn.secret for drawn in concealed)]
     made = Made(
         robot,
-        [Concealed(d.effect, d.at, {**d.parameters, "size": d.size}, partial(question, scored, b, d))
-         for b, d in zip(before, concealed, strict=False)],
+        [
+            Concealed(d.effect, d.at, {**d.parameters, "size": d.size},
+                      partial(question, scored, lacking(measured, b, d.secret)))
+            for b, d in zip(before, concealed, strict=False)
+        ],
         robot_is.places,
         _held_out(truth, secret, held_out, arm, hammer),
     )  # fmt: skip

@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 
 from planner.proof import refit
-from planner.truth.arms import Arm
 from planner.truth.hits import AXES, Hammer, SimulatedHit, noise_power
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
-from planner.truth.scene import Drawn
 from planner.truth.secret import HitVisit, Secret, quiet_hits
 
 LINES = 100  # about so many are looked at
@@ -25,7 +23,8 @@ class Scored:
     """A case as it was made; `rng` as it was when its noise-free hits `quiet` were made."""
 
     robot_toml: Path
-    arm: Arm
+    band_hz: tuple[float, float]
+    reach_m: float
     measured: Secret
     visits: Sequence[HitVisit]
     wanted: np.ndarray  # (n, dof) rad, set aside
@@ -34,16 +33,17 @@ class Scored:
     rng: np.random.Generator
 
 
-def question(case: Scored, before: Secret, drawn: Drawn) -> refit.Question:
-    """Of one effect, which made `drawn.secret` of `before`."""
-    without = lacking(case.measured, before, drawn.secret)
+def question(case: Scored, without: Secret) -> refit.Question:
+    """Of the effect that `without` lacks."""
     with_it = load_truth(case.robot_toml, case.measured.deviation)
     truth = load_truth(case.robot_toml, without.deviation)
     in_hits = without.ports != case.measured.ports or without.tone != case.measured.tone
     in_time = without.drift != case.measured.drift or without.load != case.measured.load
     n, step_s = case.quiet[0][0].force_n.size, 1 / case.hammer.sampling_rate_hz
-    low, high = case.arm.band_hz
-    lines = np.flatnonzero((np.fft.rfftfreq(n, step_s) >= low) & (np.fft.rfftfreq(n, step_s) <= high))
+    low, high = case.band_hz
+    lines = np.flatnonzero(
+        (np.fft.rfftfreq(n, step_s) >= low) & (np.fft.rfftfreq(n, step_s) <= high)
+    )
     stride = max(1, round(len(lines) / LINES))
     rate = FALL / case.hammer.record_s if in_hits else 0.0
     s = rate + 2j * np.pi * lines[::stride] / (n * step_s)
@@ -69,8 +69,7 @@ def question(case: Scored, before: Secret, drawn: Drawn) -> refit.Question:
         (snapshot(without.at(truth, 0), q, s), _shown(case.measured, with_it, HitVisit(q, ()), s))
         for q in case.wanted
     ]  # fmt: skip
-    reach = float(np.linalg.norm([np.linalg.norm(j.xyz) for j in case.arm.joints]))
-    return refit.Question(s, poses, aside, bodies(truth), reach, 1 / stride)
+    return refit.Question(s, poses, aside, bodies(truth), case.reach_m, 1 / stride)
 
 
 def snapshot(truth: Truth, q: np.ndarray, s: np.ndarray) -> refit.Snapshot:

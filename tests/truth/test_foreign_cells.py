@@ -1,6 +1,5 @@
-"""The second engine of concealed cases (tests/support/foreign_cells) against independent sums."""
+"""The second engine of concealed cases (planner/proof/tree) against independent sums."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +10,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
 from planner.proof.tree import nonlinear
-from planner.proof.tree.__main__ import main
-from planner.proof.tree.adjusted import adjusted, columns, count
 from planner.proof.tree.blueprint import assemble
-from planner.proof.tree.case import make_case, system_of
+from planner.proof.tree.case import make_case
+from planner.proof.tree.engine import make
 from planner.proof.tree.hits import Clock, draw_hits
 from planner.proof.tree.laws import Spring
 from planner.proof.tree.layouts import LAYOUTS
@@ -197,29 +195,12 @@ def test_marching_agrees_with_a_general_solver() -> None:
     assert rate > 0
 
 
-def test_moves_of_springs_and_inertias_are_derivatives() -> None:
-    truth, poses = _robot()
-    system = system_of(truth, [], poses[0])
-    s = 2j * np.pi * np.linspace(5, 80, 12)
-    moves = 0.2 * np.random.default_rng(0).normal(size=count(system, truth.robot))
-    found, _ = columns(adjusted(system, truth.robot, moves), truth.robot, s)
-    for i in range(0, len(moves), 5):
-        unit = 1e-4 * np.eye(len(moves))[i]
-        up, down = (
-            adjusted(system, truth.robot, moves + g * unit).frf(s)[:, :3, :3] for g in (1, -1)
-        )
-        assert np.allclose((up - down) / 2e-4, found[i], atol=1e-5 * np.abs(found[i]).max())
-
-
 def test_a_case_is_written_whole(tmp_path: Path) -> None:
-    assert main([str(tmp_path), "--seed", "7", "--kind", "sensor_gain"]) == 0
-    answer = json.loads((tmp_path / "answer.json").read_text(encoding="utf-8"))
-    assert answer["effects"][0]["effect"] == "sensor_gain"
-    assert not answer["outside_library"]
+    made = make("sensor_gain", 7, tmp_path)
+    assert [c.effect for c in made.concealed] == ["sensor_gain"]
     rows = (tmp_path / "recordings" / "recordings.csv").read_text(encoding="utf-8").splitlines()
-    assert len(rows) == answer["hits"] + 1
     paths = list((tmp_path / "recordings" / "data").glob("*.uff"))
-    assert len(paths) == answer["hits"]
+    assert len(paths) == len(rows) - 1
     sets = pyuff.UFF(str(paths[0])).read_sets()
     assert [s["ordinate_spec_data_type"] for s in sets] == [13, 12, 12, 12]
     assert [s["rsp_dir"] for s in sets[1:]] == [1, 2, 3]

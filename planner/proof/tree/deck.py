@@ -1,4 +1,4 @@
-"""Which kind a seed gets: decks of 40 shuffled kinds, so that all come up; and its effects."""
+"""The effects that a case of a kind conceals."""
 
 from typing import Any
 
@@ -19,17 +19,6 @@ LINEAR = (
 SINGLE = {f.__name__: f for f in (*LINEAR, *GEARS, physical.drift, *ARTEFACTS)}
 OUTSIDE = {f.__name__: f for f in OUTSIDERS}
 KINDS = ("none", "pair", *SINGLE, *OUTSIDE)
-NULLS, PAIRS, DECK = 8, 6, 40
-
-
-def kind_of(seed: int) -> str:
-    """The kind that a seed draws: 20 % none, 15 % pairs, 15 % outsiders, half single effects."""
-    number, place = divmod(seed - 1, DECK)
-    rng = np.random.default_rng([number, 40, 5077])
-    singles = list(SINGLE)
-    more = rng.choice(singles, DECK - NULLS - PAIRS - len(OUTSIDE) - len(singles), replace=False)
-    deck = ["none"] * NULLS + ["pair"] * PAIRS + [*OUTSIDE, *singles, *more.tolist()]
-    return str(rng.permutation(deck)[place])
 
 
 def draw_effects(

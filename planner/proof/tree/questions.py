@@ -80,7 +80,9 @@ def _shown(case: Case, effect: Effect, q: np.ndarray, s: np.ndarray, warmth: flo
     window, length = chain.get("window"), case.clock.samples / case.clock.rate - case.clock.trigger
     faster = -np.log(window["end"]) / length if window else 0.0
     h = system_of(case.truth, case.effects, q, warmth).frf(s + faster)[:, :3, :3]
-    return (chain.get("matrix", np.eye(3)) @ h) * np.exp(-s * chain.get("delay", 0.0))[:, None, None]
+    return (chain.get("matrix", np.eye(3)) @ h) * np.exp(-s * chain.get("delay", 0.0))[
+        :, None, None
+    ]
 
 
 def _levels(case: Case, mine: list[int]) -> list[list[int]]:
