@@ -33,8 +33,8 @@ class Concealed:
 class Made:
     """A case; `imperfections` are places that a diagnosis may name, too small to be asked for.
 
-    `held_out`: names of poses, frequencies (F,) in Hz and true FRFs (real and imaginary parts; pose,
-    response, hit, F), where the engine knows them.
+    `held_out`: names of poses, frequencies (F,) in Hz and true FRFs (real and imaginary parts;
+    pose, response, hit, F), where the engine knows them.
     """
 
     robot: str

@@ -1,13 +1,14 @@
 """What is left of a concealed effect once the best robot without it is fitted, by any engine.
 
 An engine says what a robot without the effect is at each pose (`Snapshot`) and what is seen with
-the effect (`Observed`). The robot is refitted, nonlinearly and within twice its tolerances: springs,
+the effect (`Observed`). The robot is refitted, nonlinearly, within twice its tolerances: springs,
 dampers, loss factors, inertias, those of imperfections and of other effects alike; sensor's gains,
 cross-axis, place and the force's gain; and at each pose misses of hits, and readback.
 
     chi2 = |r - D x|² + |x|², in units of noise and of an error of |H|, x in tolerances (1 sd)
 
-with |H| that of all nine FRFs at a line together. The error comes down in stages, so that far modes are found.
+with |H| that of all nine FRFs at a line together. The error comes down in stages, so that far
+modes are found.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +31,7 @@ RATES = 2 * np.pi * np.geomspace(0.5, 600.0, 6)  # 1/s, branches of which an eve
 
 @dataclass(frozen=True, eq=False)
 class Spring:
-    """A spring that can be moved: row (n,), law without damper (F,), damper, stiffness, sd of ln k."""
+    """A spring that can be moved: row (n,), law without damper (F,), damper, k, sd of ln k."""
 
     row: np.ndarray
     elastic: np.ndarray
@@ -39,7 +40,7 @@ class Spring:
     sd: float = SPRING_SD
 
     def changes(self, s: np.ndarray, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Change (F,) of the law by moves (3,) of stiffness, damper, loss; and its slopes (3, F)."""
+        """Change (F,) of the law by moves (3,) of stiffness, damper, loss; its slopes (3, F)."""
         stiff = np.exp(self.sd * moves[0]) * self.elastic
         taken = self.damping + abs(float(np.mean((self.elastic / s.imag).imag)))
         viscous = np.exp(DAMPING_SD * moves[1]) * taken * s
@@ -89,7 +90,7 @@ def _spatial(mass: float, first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A robot at a pose: Z (F, n, n), springs, what wrenches at the tcp load (n, 6), what is sensed.
+    """A robot at a pose: Z (F, n, n), springs, what wrenches at the tcp load (n, 6), sensors.
 
     `sense` (6, n): accelerations of the sensor, linear first, in its axes; `parts`: Jacobians
     (6, n) of links' frames in their axes.

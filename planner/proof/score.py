@@ -1,7 +1,7 @@
 """Scores of single diagnoses against their unsealed answers.
 
-Of each concealed effect the answer has `size`, what the best robot without it leaves of |H| at poses
-set aside, and `nats`, what the recordings tell of that (see `refit`). With m what matters:
+Of each concealed effect the answer has `size`, what the best robot without it leaves of |H| at
+poses set aside, and `nats`, what the recordings tell of that (see `refit`). With m what matters:
 
 - required: at least ENOUGH_NATS and 1.5 m; it is right if named and placed, or in a set of two;
 - silence is required where nothing has 0.67 m; between, either is right;

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.proof.engine import Concealed, Made, NothingShowsError
+from planner.proof.engine import Concealed, Made
 from planner.truth import conceal
 from planner.truth.arms import ARMS, Arm
 from planner.truth.conceal import EVERYDAY, kinds

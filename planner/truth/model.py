@@ -144,7 +144,7 @@ class Truth:
         return sensor, parts
 
     def pieces(self) -> dict[str, list[tuple[float, np.ndarray, np.ndarray]]]:
-        """Mass, centre (3,) and inertia about it (3, 3) of each link's bodies, in the first's frame."""
+        """Mass, centre (3,), inertia about it (3, 3) of a link's bodies, in the first's frame."""
         model, data = self._posed(np.zeros(len(self._held)))
         found = {}
         for link, numbers in self.links().items():

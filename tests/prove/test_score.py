@@ -182,7 +182,7 @@ BODY = Body(10.0, np.zeros(3), 0.2 * np.eye(3))
 
 
 def question(factor: float, extra_kg: float = 0.0, hose_kg: float = 0.0) -> Question:
-    """A mass on three springs across; with it its springs are `factor` times as stiff, and so on."""
+    """A mass on springs along three axes; what is seen has stiffer ones, or more mass."""
     stiffness, damping = np.array([1e5, 2e5, 4e5]), np.array([30.0, 40.0, 60.0])
     turning = np.eye(3) * 1e4
 

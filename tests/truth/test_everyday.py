@@ -12,9 +12,9 @@ from planner.truth.conceal import EVERYDAY, kinds
 from planner.truth.imperfections import imperfect
 from planner.truth.load import load_truth
 from planner.truth.mishaps import OUTSIDERS
-from planner.truth.questions import lacking
 from planner.truth.nonlinear import StruckPose, respond
 from planner.truth.outsiders import MORE_OUTSIDERS
+from planner.truth.questions import lacking
 from planner.truth.scene import Scene
 from planner.truth.secret import Secret
 from planner.truth.world import CLEAN, REAL
