@@ -1,6 +1,5 @@
 """Proof of the diagnosis on concealed cases (`planner prove`)."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -16,22 +15,24 @@ def prove(
         Path | None, typer.Option(metavar="FOLDER", help="Where all goes; resumed if it is there.")
     ] = None,
     jobs: Annotated[int, typer.Option(min=1, max=64, help="Diagnoses at a time.")] = 1,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Of a Dask cluster that does the cases.")
+    ] = None,
     laboratory: Annotated[
         bool, typer.Option("--laboratory", help="No hit misses, and no sensor errs.")
     ] = False,
     as_json: AsJson = False,
 ) -> int:
-    """Make concealed cases with another engine, seal, diagnose, unseal and score them.
+    """Make concealed cases with other engines, seal, diagnose, unseal and score them.
 
     Example: planner prove --cases 20 --out proof
     """
     from planner.cli.progress import counting
-    from planner.prove.report import prove_report
-    from planner.prove.run import diagnose_all, make
+    from planner.proof.report import write
+    from planner.proof.run import Proof, results
+    from planner.proof.run import seal as sealed
 
     folder = out or Path(f"proof-{cases}-{seed}")
     with counting(quiet=as_json) as tell:
-        proof = make(folder, cases, seed, tell, laboratory)
-        print(f"Sealed answers: {proof.whole}", file=sys.stderr, flush=True)
-        diagnose_all(proof, jobs, tell)
-    return respond(prove_report(proof), as_json)
+        scored = results(Proof(cases, seed, laboratory), folder, jobs, scheduler, tell)
+    return respond(write(folder, sealed(folder), tuple(scored.values())), as_json)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.errors import InputError
+from planner.proof.engine import NothingShowsError
 from planner.truth.detect import clarity
 from planner.truth.effects import LINEAR, NONLINEAR, OTHER
 from planner.truth.everyday_effects import EVERYDAY_EFFECTS
@@ -24,10 +24,6 @@ del EVERYDAY["structural_damping"]
 DRIVES = 2, 4  # how many joints, at least and at most
 ATTEMPTS = 40
 SMALLER = 3.0  # at most: the first of several effects over any other; chosen
-
-
-class NothingShowsError(InputError):
-    """A scene whose noise hides whatever was drawn of an effect."""
 
 
 def kinds(world: World) -> tuple[str, ...]:

@@ -130,6 +130,33 @@ class Truth:
         model, data = self._posed(q, self._sag(q, self._springs(q)))
         return self._site(model, data, self.hit_point)[1]
 
+    def frames(self, q: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Jacobians (6, e), linear first, in their own axes: of the sensor, and of each link."""
+        import mujoco
+
+        model, data = self._posed(q, self._sag(q, self._springs(q)))
+        sensor, parts = np.vstack(self._site(model, data, "sensor")), {}
+        for link, (first, *_) in self.links().items():
+            linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+            mujoco.mj_jacBody(model, data, linear, angular, first)
+            axes = data.xmat[first].reshape(3, 3).T
+            parts[link] = np.vstack([axes @ linear, axes @ angular])[:, self._elastic]
+        return sensor, parts
+
+    def pieces(self) -> dict[str, list[tuple[float, np.ndarray, np.ndarray]]]:
+        """Mass, centre (3,), inertia about it (3, 3) of a link's bodies, in the first's frame."""
+        model, data = self._posed(np.zeros(len(self._held)))
+        found = {}
+        for link, numbers in self.links().items():
+            axes, place = data.xmat[numbers[0]].reshape(3, 3), data.xpos[numbers[0]]
+            found[link] = [
+                (float(model.body_mass[b]), axes.T @ (data.xipos[b] - place),
+                 turn @ np.diag(model.body_inertia[b]) @ turn.T)
+                for b in numbers
+                for turn in [axes.T @ data.ximat[b].reshape(3, 3)]
+            ]  # fmt: skip
+        return found
+
     def _site(self, model: object, data: object, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Linear and angular Jacobian (3, e) of a site, in its own frame."""
         import mujoco

@@ -24,4 +24,4 @@ class World:
 
 CLEAN = World(LABORATORY, Scatter(0.15, 0.15, 0.04, 0.005))
 # Stiffnesses that are off together: see `imperfections.SOFT`.
-REAL = World(EVERYDAY, Scatter(0.15, 0.4, 0.08, 0.01, 0.25), (3e-4, 1.0), True, 8)
+REAL = World(EVERYDAY, Scatter(0.15, 0.4, 0.08, 0.01, 0.25), (0.03, 1.0), True, 8)

@@ -10,7 +10,7 @@ import subprocess
 import pytest
 
 from planner.program import command
-from tests.support.foreign_cells.case import make_case, write_case
+from planner.proof.tree.case import make_case, write_case
 
 NAMED = (
     (417, {("local_resonator", "link_4")}),

@@ -19,7 +19,7 @@ import pytest
 
 from planner.diagnosis.effects import library
 from planner.dynamics.simulation import Simulation
-from planner.prove.curves import Share, share
+from planner.proof.score import Share, share
 from planner.robot.robot import Robot
 from tests.support.arm_with_points import write_arm
 from tests.support.sensor_cases import KINDS, Said, answers, concealed, held

@@ -16,6 +16,7 @@ import numpy as np
 
 from planner.api import diagnose
 from planner.dataset.dataset import Dataset
+from planner.proof.refit import left
 from planner.recording.points import SENSOR
 from planner.report.diagnosis import DiagnosisReport
 from planner.robot.robot import Robot
@@ -29,7 +30,7 @@ from planner.truth.deviation import (
 from planner.truth.handling import EVERYDAY, together
 from planner.truth.hits import Hammer, write_recordings
 from planner.truth.load import load_truth
-from planner.truth.nats import Conditions, Lacking, nats
+from planner.truth.questions import Scored, question
 from planner.truth.scene import log_uniform, some_direction, triple
 from planner.truth.secret import HitVisit, Secret, hit_poses, quiet_hits
 from planner.truth.world import REAL
@@ -47,6 +48,7 @@ from tests.support.arm_with_points import (
 KINDS = "base", "joint", "link", "hose"
 SENSORS = ("sensor", "shoulder", "elbow", "foot")
 POSES, DAMPING_S = 4, 3e-4
+REACH_M = 2.0
 BEARINGS, RIPPLE, MIXED = 200.0, 0.004, 0.3  # a robot with nothing wrong has these
 Place = tuple[str, str | None]
 
@@ -142,7 +144,7 @@ def _with(
 def make(kind: str, seed: int, folder: Path) -> tuple[Place, float]:
     """Write folder/robot and folder/hits; what is concealed, and nats that the tool's tells of it.
 
-    In all poses, with robot, hits and measuring chain refitted (`Nats.nats_open`).
+    In all poses, with robot, hits and measuring chain refitted (`refit.Left.nats`).
     """
     rng = np.random.default_rng([seed, zlib.crc32(kind.encode())])
     toml = write_arm(folder / "robot")
@@ -177,14 +179,12 @@ def _told_by_the_tool(
 ) -> float:
     """Nats of the effect, which the first secret has and the second has not."""
     alone = [replace(visit, sensors=(SENSOR,)) for visit in visits]
-    truths = [load_truth(toml, secret.deviation) for secret in secrets]
-    quiet = [
-        quiet_hits(t, s, alone, hammer, np.random.default_rng(0))
-        for t, s in zip(truths, secrets, strict=True)
-    ]
-    conditions = Conditions(alone, BAND_HZ, REAL.scatter, EVERYDAY, hammer)
-    lacking = Lacking(truths[1], secrets[1], quiet[1])
-    return nats(conditions, truths[0], secrets[0], quiet[0], lacking).nats_open
+    rng = np.random.default_rng(0)
+    truth = load_truth(toml, secrets[0].deviation)
+    quiet = quiet_hits(truth, secrets[0], alone, hammer, np.random.default_rng(0))
+    nowhere = np.empty((0, 4))
+    case = Scored(toml, BAND_HZ, REACH_M, secrets[0], alone, nowhere, hammer, quiet, rng)
+    return left(question(case, secrets[1])).nats
 
 
 def told(folder: Path, sensors: int, count: int) -> tuple[DiagnosisReport, Dataset]:

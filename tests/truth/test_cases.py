@@ -1,7 +1,6 @@
 """Concealed cases: readable by outsiders, sealed, repeatable, solvable, and telling nothing."""
 
 import csv
-import hashlib
 import json
 
 import numpy as np
@@ -107,17 +106,9 @@ def test_the_folder_has_what_a_diagnosis_needs(case):
     assert max(peaks) / min(peaks) > 3  # force levels
 
 
-def test_the_seal_is_the_hash_of_the_answer_and_cannot_be_guessed(case, tmp_path):
-    assert case.seal == hashlib.sha256(case.answer.encode()).hexdigest()
+def test_a_seed_gives_the_same_case_again(case, tmp_path):
     again = make_case("added_mass", "kr210", 3, tmp_path)
-    answers = json.loads(case.answer), json.loads(again.answer)
-    assert case.seal != again.seal
-    assert answers[0].pop("salt") != answers[1].pop("salt")
-    assert answers[0] == answers[1]
-    for name in ("recordings.csv", "data/P04_py_2.uff"):
-        other = name if (case.recordings / name).exists() else name.replace("py", "my")
-        ours, theirs = ((c.recordings / other).read_bytes() for c in (case, again))
-        assert len(ours) == len(theirs)
+    assert case.answer == again.answer
     table = (case.recordings / "recordings.csv").read_bytes()
     assert table == (again.recordings / "recordings.csv").read_bytes()
 
@@ -127,16 +118,6 @@ def test_nothing_in_the_folder_tells_the_answer(case):
     for word in (b"added_mass", b"mass_kg", b"seed", b"MuJoCo"):
         assert word not in text
     assert "answer" not in "".join(str(p) for p in case.recordings.parent.rglob("*"))
-
-
-def test_the_answer_says_how_clearly_the_effect_shows(case):
-    effect = json.loads(case.answer)["effects"][0]
-    assert effect["effect"] == "added_mass"
-    assert effect["size"] == 1
-    assert effect["change"] > 0.05
-    # Nobody can tell more than who knows all else; in the laboratory hits and chain are exact.
-    assert effect["nats_known"] > effect["nats"] > 100
-    assert effect["nats_open"] == pytest.approx(effect["nats"], rel=1e-6)
 
 
 def test_held_out_truth_is_that_of_its_robot(tmp_path):
@@ -164,10 +145,6 @@ def test_every_kind_of_every_robot(tmp_path, kind, robot):
     effects = json.loads(case.answer)["effects"]
     least, most = {"null": (0, 0), "pair": (2, 2), "drives": DRIVES}.get(kind, (1, 1))
     assert least <= len(effects) <= most
-    # A fan's force is 1 to 10 % of a hit's, and shakes at one frequency alone.
-    seen = 0.005 if kind == "tonal_disturbance" else 0.05
-    for effect in effects:
-        assert effect["change"] > seen
 
 
 def test_an_unknown_kind_is_said_in_words(tmp_path):

@@ -1,6 +1,5 @@
-"""The second engine of concealed cases (tests/support/foreign_cells) against independent sums."""
+"""The second engine of concealed cases (planner/proof/tree) against independent sums."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +9,17 @@ import pyuff
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
-from tests.support.foreign_cells import nonlinear
-from tests.support.foreign_cells.__main__ import main
-from tests.support.foreign_cells.adjusted import adjusted, columns, count
-from tests.support.foreign_cells.blueprint import assemble
-from tests.support.foreign_cells.case import make_case, system_of
-from tests.support.foreign_cells.hits import Clock, draw_hits
-from tests.support.foreign_cells.laws import Spring
-from tests.support.foreign_cells.layouts import LAYOUTS
-from tests.support.foreign_cells.march import first_order
-from tests.support.foreign_cells.records import contour, linear_records, marched, shifted
-from tests.support.foreign_cells.spatial import inertia_of
-from tests.support.foreign_cells.stating import Truth, draw_poses, draw_robot, draw_truth
+from planner.proof.tree import nonlinear
+from planner.proof.tree.blueprint import assemble
+from planner.proof.tree.case import make_case
+from planner.proof.tree.engine import make
+from planner.proof.tree.hits import Clock, draw_hits
+from planner.proof.tree.laws import Spring
+from planner.proof.tree.layouts import LAYOUTS
+from planner.proof.tree.march import first_order
+from planner.proof.tree.records import contour, linear_records, marched, shifted
+from planner.proof.tree.spatial import inertia_of
+from planner.proof.tree.stating import Truth, draw_poses, draw_robot, draw_truth
 
 
 def _robot(kind: str = "arm6", seed: int = 3) -> tuple[Truth, np.ndarray]:
@@ -197,29 +195,12 @@ def test_marching_agrees_with_a_general_solver() -> None:
     assert rate > 0
 
 
-def test_moves_of_springs_and_inertias_are_derivatives() -> None:
-    truth, poses = _robot()
-    system = system_of(truth, [], poses[0])
-    s = 2j * np.pi * np.linspace(5, 80, 12)
-    moves = 0.2 * np.random.default_rng(0).normal(size=count(system, truth.robot))
-    found, _ = columns(adjusted(system, truth.robot, moves), truth.robot, s)
-    for i in range(0, len(moves), 5):
-        unit = 1e-4 * np.eye(len(moves))[i]
-        up, down = (
-            adjusted(system, truth.robot, moves + g * unit).frf(s)[:, :3, :3] for g in (1, -1)
-        )
-        assert np.allclose((up - down) / 2e-4, found[i], atol=1e-5 * np.abs(found[i]).max())
-
-
 def test_a_case_is_written_whole(tmp_path: Path) -> None:
-    assert main([str(tmp_path), "--seed", "7", "--kind", "sensor_gain"]) == 0
-    answer = json.loads((tmp_path / "answer.json").read_text(encoding="utf-8"))
-    assert answer["effects"][0]["effect"] == "sensor_gain"
-    assert not answer["outside_library"]
+    made = make("sensor_gain", 7, tmp_path)
+    assert [c.effect for c in made.concealed] == ["sensor_gain"]
     rows = (tmp_path / "recordings" / "recordings.csv").read_text(encoding="utf-8").splitlines()
-    assert len(rows) == answer["hits"] + 1
     paths = list((tmp_path / "recordings" / "data").glob("*.uff"))
-    assert len(paths) == answer["hits"]
+    assert len(paths) == len(rows) - 1
     sets = pyuff.UFF(str(paths[0])).read_sets()
     assert [s["ordinate_spec_data_type"] for s in sets] == [13, 12, 12, 12]
     assert [s["rsp_dir"] for s in sets[1:]] == [1, 2, 3]

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from tests.support.foreign_cells.blueprint import Blueprint, link_way
-from tests.support.foreign_cells.effects import Effect, log_uniform
-from tests.support.foreign_cells.laws import FluidDamper, LateFeedback, Servo, Spring
-from tests.support.foreign_cells.spatial import inertia_of
-from tests.support.foreign_cells.stating import Truth
-from tests.support.foreign_cells.system import Tie
-from tests.support.foreign_cells.tree import Tree
+from planner.proof.tree.blueprint import Blueprint, link_way
+from planner.proof.tree.effects import Effect, log_uniform
+from planner.proof.tree.laws import FluidDamper, LateFeedback, Servo, Spring
+from planner.proof.tree.spatial import inertia_of
+from planner.proof.tree.stating import Truth
+from planner.proof.tree.system import Tie
+from planner.proof.tree.tree import Tree
 
 
 def _unknown(kind: str, parameters: dict, apply) -> Effect:

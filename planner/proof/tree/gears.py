@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from tests.support.foreign_cells import nonlinear as laws
-from tests.support.foreign_cells.effects import Effect, log_uniform
-from tests.support.foreign_cells.stating import Truth
+from planner.proof.tree import nonlinear as laws
+from planner.proof.tree.effects import Effect, log_uniform
+from planner.proof.tree.stating import Truth
 
 
 class Sizing:

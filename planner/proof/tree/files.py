@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pyuff
 
-from tests.support.foreign_cells.hits import Clock, Hit
-from tests.support.foreign_cells.layouts import Robot
-from tests.support.foreign_cells.spatial import inertia_of, to_rpy
-from tests.support.foreign_cells.tree import Body
+from planner.proof.tree.hits import Clock, Hit
+from planner.proof.tree.layouts import Robot
+from planner.proof.tree.spatial import inertia_of, to_rpy
+from planner.proof.tree.tree import Body
 
 
 def _numbers(values) -> str:

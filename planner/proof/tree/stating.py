@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tests.support.foreign_cells.blueprint import Bend, Blueprint, assemble, link_way
-from tests.support.foreign_cells.laws import Spring
-from tests.support.foreign_cells.layouts import DEG, LAYOUTS, Robot, draw_layout
-from tests.support.foreign_cells.spatial import across, random_turn
-from tests.support.foreign_cells.tree import Body
+from planner.proof.tree.blueprint import Bend, Blueprint, assemble, link_way
+from planner.proof.tree.laws import Spring
+from planner.proof.tree.layouts import DEG, LAYOUTS, Robot, draw_layout
+from planner.proof.tree.spatial import across, random_turn
+from planner.proof.tree.tree import Body
 
 LADDER_HZ = ((7, 17), (8, 19), (13, 30), (20, 55), (30, 70), (35, 85))  # of single joints
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.support.foreign_cells.laws import Spring
-from tests.support.foreign_cells.spatial import to_rpy, with_z_along
-from tests.support.foreign_cells.tree import Body
+from planner.proof.tree.laws import Spring
+from planner.proof.tree.spatial import to_rpy, with_z_along
+from planner.proof.tree.tree import Body
 
 X, Y, Z = np.eye(3)
 DEG = np.pi / 180

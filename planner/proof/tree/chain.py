@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from tests.support.foreign_cells.effects import Effect, log_uniform
-from tests.support.foreign_cells.hits import Clock
-from tests.support.foreign_cells.records import Motion, back, contour, shifted
-from tests.support.foreign_cells.spatial import random_turn, turn
+from planner.proof.tree.effects import Effect, log_uniform
+from planner.proof.tree.hits import Clock
+from planner.proof.tree.records import Motion, back, contour, shifted
+from planner.proof.tree.spatial import random_turn, turn
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.signal import firwin, oaconvolve
 
-from tests.support.foreign_cells.hits import OVER, Clock, Hit, pulse
-from tests.support.foreign_cells.march import batch, first_order, march
-from tests.support.foreign_cells.system import System
+from planner.proof.tree.hits import OVER, Clock, Hit, pulse
+from planner.proof.tree.march import batch, first_order, march
+from planner.proof.tree.system import System
 
 FALL = 9.0  # 2 T sigma
 FINE_HZ = 6000.0  # steps a second of nonlinear hits, at least

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from tests.support.foreign_cells.laws import RATES
-from tests.support.foreign_cells.system import System
+from planner.proof.tree.laws import RATES
+from planner.proof.tree.system import System
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tests.support.foreign_cells.spatial import cross_matrix, inertia_of, turn
+from planner.proof.tree.spatial import cross_matrix, inertia_of, turn
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,15 @@
-"""Which kind a seed gets: decks of 40 shuffled kinds, so that all come up; and its effects."""
+"""The effects that a case of a kind conceals."""
 
 from typing import Any
 
 import numpy as np
 
-from tests.support.foreign_cells import effects as physical
-from tests.support.foreign_cells.chain import ARTEFACTS
-from tests.support.foreign_cells.effects import Effect
-from tests.support.foreign_cells.gears import GEARS
-from tests.support.foreign_cells.outsiders import OUTSIDERS
-from tests.support.foreign_cells.stating import Truth
+from planner.proof.tree import effects as physical
+from planner.proof.tree.chain import ARTEFACTS
+from planner.proof.tree.effects import Effect
+from planner.proof.tree.gears import GEARS
+from planner.proof.tree.outsiders import OUTSIDERS
+from planner.proof.tree.stating import Truth
 
 LINEAR = (
     physical.base_compliance, physical.transverse_compliance, physical.joint_stiffness,
@@ -19,17 +19,6 @@ LINEAR = (
 SINGLE = {f.__name__: f for f in (*LINEAR, *GEARS, physical.drift, *ARTEFACTS)}
 OUTSIDE = {f.__name__: f for f in OUTSIDERS}
 KINDS = ("none", "pair", *SINGLE, *OUTSIDE)
-NULLS, PAIRS, DECK = 8, 6, 40
-
-
-def kind_of(seed: int) -> str:
-    """The kind that a seed draws: 20 % none, 15 % pairs, 15 % outsiders, half single effects."""
-    number, place = divmod(seed - 1, DECK)
-    rng = np.random.default_rng([number, 40, 5077])
-    singles = list(SINGLE)
-    more = rng.choice(singles, DECK - NULLS - PAIRS - len(OUTSIDE) - len(singles), replace=False)
-    deck = ["none"] * NULLS + ["pair"] * PAIRS + [*OUTSIDE, *singles, *more.tolist()]
-    return str(rng.permutation(deck)[place])
 
 
 def draw_effects(

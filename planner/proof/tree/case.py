@@ -1,23 +1,22 @@
 """One concealed case from a seed: robot, truth, effects, recordings, answer."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tests.support.foreign_cells import files
-from tests.support.foreign_cells.blueprint import assemble
-from tests.support.foreign_cells.chain import Chain, draw_chain, recorded
-from tests.support.foreign_cells.deck import OUTSIDE, draw_effects, kind_of
-from tests.support.foreign_cells.effects import Effect
-from tests.support.foreign_cells.hits import Clock, Hit, draw_clock, draw_hits
-from tests.support.foreign_cells.layouts import LAYOUTS, Robot
-from tests.support.foreign_cells.outsiders import controller, stable
-from tests.support.foreign_cells.records import Motion, contour, linear_records, marched, rumble
-from tests.support.foreign_cells.stating import Truth, draw_poses, draw_robot, draw_truth
-from tests.support.foreign_cells.system import System
+from planner.proof.tree import files
+from planner.proof.tree.blueprint import assemble
+from planner.proof.tree.chain import Chain, draw_chain, recorded
+from planner.proof.tree.deck import draw_effects
+from planner.proof.tree.effects import Effect
+from planner.proof.tree.hits import Clock, Hit, draw_clock, draw_hits
+from planner.proof.tree.layouts import LAYOUTS, Robot
+from planner.proof.tree.outsiders import controller, stable
+from planner.proof.tree.records import Motion, contour, linear_records, marched, rumble
+from planner.proof.tree.stating import Truth, draw_poses, draw_robot, draw_truth
+from planner.proof.tree.system import System
 
 WANTED = 4  # unseen poses
 
@@ -68,10 +67,9 @@ def _allowed(truth: Truth, effects: list[Effect], poses: np.ndarray) -> bool:
     return upright and (not any(controller(e) for e in effects) or stable(systems))
 
 
-def make_case(seed: int, kind: str | None = None) -> Case:
+def make_case(seed: int, kind: str) -> Case:
     """Draw and simulate a case."""
     rng = np.random.default_rng([seed, 60013])
-    kind = kind or kind_of(seed)
     robot = draw_robot(rng, str(rng.choice(list(LAYOUTS))))
     truth = draw_truth(rng, robot)
     number = int(rng.integers(5, 11))
@@ -133,7 +131,7 @@ def _frfs(case: Case, q: np.ndarray, hits: list[Hit], s: np.ndarray) -> np.ndarr
 
 
 def write_case(case: Case, folder: Path) -> None:
-    """Robot and recordings; fills in the case's noises. The answer is written by `answer`."""
+    """Robot and recordings; fills in the case's noises. The answer is no part of it."""
     rng = np.random.default_rng([case.seed, 811])
     robot_folder, recordings = folder / "robot", folder / "recordings"
     robot_folder.mkdir(parents=True, exist_ok=True)
@@ -160,20 +158,4 @@ def write_case(case: Case, folder: Path) -> None:
             files.write_hit(path, case.hits[i], case.clock, force, answer)
 
 
-def write_answer(case: Case, folder: Path, sizes: list[tuple[float, float, float]]) -> dict:
-    """answer.json; sizes: (change, nats, nats at 1 % of |H|) of each effect."""
-    told = [
-        {"effect": e.effect, "at": e.at, "parameters": e.parameters, "change": round(c, 6),
-         "nats": round(n, 2), "nats_at_1_percent": round(m, 2)}
-        for e, (c, n, m) in zip(case.effects, sizes, strict=True)
-    ]  # fmt: skip
-    answer = {
-        "effects": told, "outside_library": case.kind in OUTSIDE, "robot": case.robot.name,
-        "kind": case.kind, "seed": case.seed, "hits": len(case.hits), "poses": len(case.poses),
-        "sampling_rate_hz": case.clock.rate, "record_s": case.clock.samples / case.clock.rate,
-    }  # fmt: skip
-    (folder / "answer.json").write_text(json.dumps(answer, indent=1), encoding="utf-8")
-    return answer
-
-
-__all__ = ["Case", "make_case", "system_of", "write_answer", "write_case"]
+__all__ = ["Case", "make_case", "system_of", "write_case"]

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from tests.support.foreign_cells.layouts import Robot
-from tests.support.foreign_cells.spatial import across, turn
-from tests.support.foreign_cells.system import System, Tie
-from tests.support.foreign_cells.tree import Body, Tree
+from planner.proof.tree.layouts import Robot
+from planner.proof.tree.spatial import across, turn
+from planner.proof.tree.system import System, Tie
+from planner.proof.tree.tree import Body, Tree
 
 
 @dataclass

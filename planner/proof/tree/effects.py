@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from tests.support.foreign_cells.blueprint import Bend, Blueprint, Hanging, link_way
-from tests.support.foreign_cells.laws import Spring
-from tests.support.foreign_cells.layouts import X, Y, Z
-from tests.support.foreign_cells.spatial import across
-from tests.support.foreign_cells.stating import Truth
-from tests.support.foreign_cells.tree import Body
+from planner.proof.tree.blueprint import Bend, Blueprint, Hanging, link_way
+from planner.proof.tree.laws import Spring
+from planner.proof.tree.layouts import X, Y, Z
+from planner.proof.tree.spatial import across
+from planner.proof.tree.stating import Truth
+from planner.proof.tree.tree import Body
 
 Apply = Callable[[Blueprint, np.ndarray, float], None]
 

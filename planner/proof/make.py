@@ -1,0 +1,91 @@
+"""Concealed cases and their answers.
+
+    python -m planner.proof.make FOLDER --cases 12 --seed 7 --number 3
+
+writes FOLDER/{robot,recordings} of the third of twelve cases, and prints its answer. Nothing in the
+folder tells what was concealed.
+"""
+
+import argparse
+import importlib
+import json
+import secrets
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planner.proof.engine import Made, NothingShowsError
+from planner.proof.refit import left
+
+ENGINES = {"arms": "planner.truth.cases", "tree": "planner.proof.tree.engine"}
+NULLS, OUTSIDERS, PAIRS = 0.15, 0.15, 0.2  # shares of the cases
+SCENES, ANOTHER = 5, 1_000_003  # seeds of which something comes; step to the next one
+
+
+def deck(count: int, singles: Sequence[str], outsiders: Sequence[str], seed: int) -> list[str]:
+    """Shuffled kinds of as many cases; singles and outsiders come up equally often."""
+    rng = np.random.default_rng([seed, 55])
+
+    def some(kinds: Sequence[str], number: int) -> list[str]:
+        rounds = -(-number // len(kinds))
+        return [str(k) for _ in range(rounds) for k in rng.permutation(list(kinds))][:number]
+
+    nulls, outside, pairs = (round(share * count) for share in (NULLS, OUTSIDERS, PAIRS))
+    plain = ["null"] * nulls + ["pair"] * pairs + some(outsiders, outside)
+    kinds = plain + some(singles, count - len(plain))
+    return [str(kind) for kind in rng.permutation(kinds)]
+
+
+def answer(kind: str, engine: str, made: Made) -> str:
+    """What was concealed, and what a refit leaves of it: JSON, with salt against guessing."""
+    effects = [
+        {"effect": c.effect, "at": c.at, "parameters": c.parameters, **asdict(left(c.question()))}
+        for c in made.concealed
+    ]
+    whole: dict[str, Any] = {
+        "kind": kind,
+        "engine": engine,
+        "robot": made.robot,
+        "effects": effects,
+        "imperfections": [{"effect": e, "at": at} for e, at in made.imperfections],
+        "held_out": made.held_out,
+        "salt": secrets.token_hex(16),
+    }
+    return json.dumps(whole, indent=1)
+
+
+def make_one(kind: str, engine: str, seed: int, folder: Path, laboratory: bool = False) -> str:
+    """Write a case of an engine of ENGINES; its answer."""
+    module = importlib.import_module(ENGINES[engine])
+    for attempt in range(SCENES):
+        try:
+            made = module.make(kind, seed + attempt * ANOTHER, folder, laboratory)
+            return answer(kind, engine, made)
+        except NothingShowsError:
+            continue
+    raise SystemExit(f"No {kind} of seed {seed} shows in the noise; take another seed.")
+
+
+def main() -> None:
+    """Make one case of a proof; print its answer."""
+    parser = argparse.ArgumentParser(prog="python -m planner.proof.make", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--cases", type=int, default=25, help="of the proof, engines in turn")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--number", type=int, default=1, help="of the case, from 1 on")
+    parser.add_argument("--laboratory", action="store_true", help="no hit and no sensor errs")
+    options = parser.parse_args()
+    engines = list(ENGINES)
+    place, own = (options.number - 1) % len(engines), (options.number - 1) // len(engines)
+    module = importlib.import_module(ENGINES[engines[place]])
+    count = len(range(place, options.cases, len(engines)))
+    kind = deck(count, module.SINGLES, module.OUTSIDERS, options.seed)[own]
+    seed = 100_000 * options.seed + own
+    print(make_one(kind, engines[place], seed, options.folder, options.laboratory), end="")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,142 @@
+"""The report of a proof: report.json, report.md and two pictures."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from planner.proof.score import Place, Scored, Share, by_probability, figures
+from planner.report.answer import Answer, plain
+from planner.report.frf_plots import png
+from planner.report.plot_text import ink
+
+
+@dataclass(frozen=True)
+class ProofReport(Answer):
+    """Answer of `prove`; `seal` is the hash of all sealed answers, `figures` as in `score`."""
+
+    seal: str
+    cases: int
+    figures: Mapping[str, Any]
+    misses: tuple[Scored, ...]
+    report: str
+
+    def to_json(self) -> dict[str, Any]:
+        """The figures are keys of their own."""
+        found = super().to_json()
+        inner = found.pop("figures")
+        return {"seal": found.pop("seal"), "cases": found.pop("cases"), **inner, **found}
+
+    def text(self) -> str:
+        """The written report."""
+        return Path(self.report).read_text(encoding="utf-8")
+
+
+def write(folder: Path, seal: str, scored: Sequence[Scored]) -> ProofReport:
+    """Write all files into a folder."""
+    found = figures(scored)
+    misses = tuple(s for s in scored if not s.right)
+    answer = ProofReport(seal, len(scored), found, misses, str(folder / "report.md"))
+    text = json.dumps(answer.to_json() | {"scored": plain(scored)}, indent=1)
+    (folder / "report.json").write_text(text, encoding="utf-8")
+    for name, draw in {"confusion": confusion, "calibration": calibration}.items():
+        (folder / f"{name}.png").write_bytes(png(draw(scored), dpi=110))
+    (folder / "report.md").write_text(_markdown(seal, scored, found), encoding="utf-8")
+    return answer
+
+
+def _markdown(seal: str, scored: Sequence[Scored], found: Mapping[str, Any]) -> str:
+    shares = {name.replace("_", " "): of for name, of in found.items() if isinstance(of, Share)}
+    for way, rows in found["by"].items():
+        shares |= {f"by {way}: {name.replace('_', ' ')}": of for name, of in rows.items()}
+    plainly = {k: v for k, v in found.items() if isinstance(v, float)}
+    lines = [
+        f"# Proof on {len(scored)} concealed cases",
+        "",
+        f"Seal of all answers: `{seal}`",
+        "",
+        "An effect is required where the best robot without it, refitted, leaves 1.5 times what",
+        "matters at poses set aside, and the recordings tell it. Wilson's 95 % intervals.",
+        "",
+        "| of | right | share |",
+        "| --- | --- | --- |",
+        *(f"| {name} | {_text(of)} |" for name, of in shares.items()),
+        "",
+        *(f"- {key.replace('_', ' ')}: {value:.3g}" for key, value in plainly.items()),
+        "",
+        "![confusion](confusion.png) ![calibration](calibration.png)",
+        "",
+        "## Misses",
+        "",
+        "| case | robot | concealed (left, nats) | verdict | named | falsely | probability |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for s in scored:
+        if not s.right:
+            true = [f"{e.effect} {e.at or ''} ({e.size:.2%}, {e.nats:.3g})" for e in s.shown]
+            cells = (
+                ", ".join(true) or "nothing",
+                s.verdict,
+                _places(s.named),
+                _places(s.false_names),
+            )
+            lines.append(f"| {s.name} | {s.robot} | {' | '.join(cells)} | {s.probability:.2f} |")
+    return "\n".join([*lines, ""])
+
+
+def _places(places: Sequence[Place]) -> str:
+    return ", ".join(f"{effect} {at or ''}".strip() for effect, at in places)
+
+
+def _text(of: Share) -> str:
+    if of.share is None:
+        return "0/0 | "
+    low, high = of.interval95
+    return f"{of.right}/{of.of} | {of.share:.0%} ({low:.0%}–{high:.0%})"
+
+
+def _name(places: Sequence[Place]) -> str:
+    if len(places) > 1:
+        return "pair"
+    return places[0][0] if places else "none"
+
+
+def confusion(scored: Sequence[Scored]) -> Figure:
+    """What was concealed against what was said first."""
+    true = [_name([(e.effect, e.at) for e in s.shown]) for s in scored]
+    said = [_name(s.said) for s in scored]
+    names = sorted({*true, *said})
+    counts = np.zeros((len(names), len(names)), dtype=int)
+    for one, other in zip(true, said, strict=True):
+        counts[names.index(one), names.index(other)] += 1
+    figure = Figure(figsize=(9, 8), layout="constrained")
+    FigureCanvasAgg(figure)
+    panel = figure.subplots()
+    image = panel.imshow(counts, cmap="Blues")
+    for (i, j), count in np.ndenumerate(counts):
+        if count:
+            panel.text(j, i, str(count), ha="center", va="center", color=ink(image.to_rgba(count)))
+    panel.set_xticks(range(len(names)), names, rotation=90)
+    panel.set_yticks(range(len(names)), names)
+    panel.set_xlabel("said first")
+    panel.set_ylabel("concealed")
+    return figure
+
+
+def calibration(scored: Sequence[Scored]) -> Figure:
+    """How often what was said first is right, over its stated probability."""
+    figure = Figure(figsize=(5, 5), layout="constrained")
+    FigureCanvasAgg(figure)
+    panel = figure.subplots()
+    panel.plot([0, 1], [0, 1], color="black", lw=0.8, ls=":")
+    for p, right in by_probability(scored):
+        panel.plot(p.mean(), right.mean(), "o", ms=3 + np.sqrt(len(p)))
+        panel.annotate(str(len(p)), (p.mean(), right.mean()))
+    panel.set_xlabel("stated probability")
+    panel.set_ylabel("share that is right")
+    return figure
