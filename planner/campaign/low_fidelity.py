@@ -7,13 +7,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.fit_memory import FitMemory, steps
-from planner.campaign.learned import Learned
 from planner.campaign.state import Measurement
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.effects.table import Repertoire
-from planner.fit.identified import as_identification
-from planner.fit.posterior import RobotPosterior
+from planner.fit.learned import Learned
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf import synthesis
@@ -179,6 +177,5 @@ def learn(
                 memory.put(used[:count], known)
             warm = known
         whole = search(len(frfs))
-        posterior = RobotPosterior.of(whole.recalled(warm) if warm else whole.found())
-        structure, identified = as_identification(posterior)
-    return replace(before, learned=Learned(posterior, structure, identified, len(frfs)))
+        learned = Learned.of(whole.recalled(warm) if warm else whole.found())
+    return replace(before, learned=learned)

@@ -7,13 +7,13 @@ import numpy as np
 
 from planner.campaign.hit_habits import HitMiss, Pair, PoseMisses
 from planner.campaign.labels import LabelledPose
-from planner.campaign.learned import Learned
 from planner.campaign.log_conversion import to_mode
 from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.state import Measurement
 from planner.dataset.hit_columns import HitColumns, PoseHits
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
+from planner.fit.learned import Learned
 from planner.frf.frf import Frf
 from planner.identification.hit_misses import (
     Known,

@@ -58,6 +58,7 @@ class Search:
     band_hz: tuple[float, float]
     tolerances: Tolerances
     tell: Callable[[str], None] = lambda _: None
+    extend: bool = True  # where what is stated does not explain them
 
     def data(self, lines: int) -> FrfData:
         """On so many lines a pose."""
@@ -86,7 +87,10 @@ class Search:
     def _found(self, warm: FitRecord | None) -> StructureFit:
         data, dense = self.data(SEARCHED), self.data(SCREENED)
         stated = RobotStructure(self.prior, (), data.sensors)
+        self.tell("as stated")
         plain = converged(self._begun(data, stated))
+        if not self.extend:
+            return self._last(plain)
         if size_of(plain) <= EXPLAINED:  # nothing need be missing
             best = plain
         elif warm is None:
