@@ -210,14 +210,13 @@ class RobotStructure:
         loss = np.where(given[2], np.exp(log_eta[0]), 0.0) if log_eta else np.zeros(len(k))
         return Elasticity(k, damping, loss)
 
-    def spring_slopes(self, by_block: np.ndarray) -> np.ndarray:
-        """(n, P, …) from derivatives (n, kinds · e, …) by ln k, ln c, ln η of each spring."""
-        kinds, e = self.spread.shape[:2]
+    def spring_slopes(self, by_block: np.ndarray, out: np.ndarray) -> None:
+        """Into (n, P, …) from derivatives (n, kinds · e, …) by ln k, ln c, ln η of each spring."""
         turned = self.spread.copy()
         turned[1] += self.spread[0]  # c = k · (c/k)
-        flat = by_block.reshape(len(by_block), kinds * e, -1)
-        out = turned.reshape(kinds * e, -1).T @ flat
-        return out.reshape(len(by_block), -1, *by_block.shape[2:])
+        for number, column in enumerate(turned.reshape(-1, turned.shape[2]).T):
+            rows = np.flatnonzero(column)
+            np.sum(by_block[:, rows], axis=1, out=out[:, number])
 
     def added_inertia(self, x: np.ndarray) -> np.ndarray:
         """(L, 10): what effects add to the bodies."""
