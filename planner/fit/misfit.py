@@ -37,9 +37,7 @@ class At:
     """A misfit at x: χ², half its gradient and the normal of the data (the bodies' barrier in it).
 
     `own` (n, l) are the likeliest numbers of each pose, `volume` what eliminating them costs.
-    `precision` is the prior's. Where they were kept: `white` (n, D + l + 1, N) are all columns, the
-    residual last, `inverses` (n, l, l) of the own numbers' Cholesky factors L, `onto` L⁻¹ times
-    their rows of the Gram matrix.
+    `precision` is the prior's.
     """
 
     x: np.ndarray
@@ -51,14 +49,25 @@ class At:
     value: float
     own: np.ndarray
     motion: Motion
-    inverses: np.ndarray | None = None
-    onto: np.ndarray | None = None
-    white: np.ndarray | None = None
+    eliminated: "Eliminated | None" = None
 
     @cached_property
     def covariance(self) -> np.ndarray:
         """(D, D) of x by Laplace's method."""
         return np.linalg.inv(self.normal + self.precision)
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """All columns (n, D + l + 1, N) in units of the noise, the residual last.
+
+    `inverses` (n, l, l) of the own numbers' Cholesky factors L, `onto` L⁻¹ times their rows of the
+    Gram matrix.
+    """
+
+    white: np.ndarray
+    inverses: np.ndarray
+    onto: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,8 +338,8 @@ class FrfMisfit:
         normal[s.inertial, s.inertial] += curvature
         away = x - s.mean
         value = 0.5 * (chi2 + float(away @ s.precision @ away))
-        kept = {"inverses": inverses, "onto": ontos, "white": white} if keep else {}
-        return At(x, chi2, gradient, normal, s.precision, volume, value, own, motion, **kept)
+        kept = Eliminated(white, inverses, ontos) if keep else None
+        return At(x, chi2, gradient, normal, s.precision, volume, value, own, motion, kept)
 
     # ---------------------------------------------------------------- what follows from it
 
@@ -345,12 +354,12 @@ class FrfMisfit:
     def gain(self, at: At, columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
         """Nats that columns (n, k, r, c, F) of sds (k,) gain beside all else, and their size."""
         s, d = self.structure, self.structure.size
-        assert at.white is not None and at.inverses is not None and at.onto is not None
-        new = self.whitened(columns)
-        both = at.white @ np.swapaxes(new, 1, 2)
-        taken, k = at.inverses @ both[:, d:-1], new.shape[1]
+        kept, new = at.eliminated, self.whitened(columns)
+        assert kept is not None
+        both = kept.white @ np.swapaxes(new, 1, 2)
+        taken, k = kept.inverses @ both[:, d:-1], new.shape[1]
         flat, across = new.transpose(1, 0, 2).reshape(k, -1), taken.reshape(-1, k)
-        onto = at.onto.reshape(len(across), -1)
+        onto = kept.onto.reshape(len(across), -1)
         square = flat @ flat.T - across.T @ across
         cross = both[:, :d].sum(axis=0) - onto[:, :d].T @ across
         pull = both[:, -1].sum(axis=0) - across.T @ onto[:, -1]

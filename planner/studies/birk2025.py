@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
+from planner.fit.identify import identify
 from planner.frf import metrics
 from planner.frf.metrics import Agreement
-from planner.fit.identify import identify
 from planner.identification.measurement_model import EXACT_HITS
 from planner.identification.parameters import CAD_INERTIAS
 from planner.progress import Tell, within

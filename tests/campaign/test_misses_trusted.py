@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planner.campaign.misses import CampaignMisses
-from planner.identification.hit_misses import VisitMisses
+from planner.fit.hit_misses import VisitMisses
 from planner.identification.measurement_model import Tolerances
 
 HAND = Tolerances()
