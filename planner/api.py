@@ -16,11 +16,11 @@ from planner.design.extra_sensor import extra_sensor
 from planner.design.next_hit import next_hit
 from planner.diagnosis.diagnose import explain
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS, Priors
 from planner.errors import InputError, RefusedError
 from planner.fit.held_out import identify_judged
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
-from planner.identification.parameters import CAD_INERTIAS, Priors
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import ModalModel
 from planner.progress import Tell, quietly

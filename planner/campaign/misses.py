@@ -16,7 +16,7 @@ from planner.fit.hit_misses import Misses, SolvedPoses, VisitHits, VisitMisses, 
 from planner.fit.learned import Learned
 from planner.fit.posterior import FOLLOWED
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import ACROSS, HIT_NUMBERS, OF_HIT, Tolerances
+from planner.measurement.nuisances import ACROSS, HIT_NUMBERS, OF_HIT, Tolerances
 from planner.modal.modes import Mode
 from planner.modal.residue_change import residue_changes
 from planner.modal.residues import laplace

@@ -48,7 +48,7 @@ def identify(
     from planner.api import identify as fit
     from planner.campaign.material import material
     from planner.cli.progress import reporting
-    from planner.identification.write_robot import check_target
+    from planner.fit.write_robot import check_target
     from planner.report.modal_analysis import check_options
     from planner.report.plot_files import Pictures
 

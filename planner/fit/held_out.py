@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Priors
 from planner.errors import InputError
 from planner.fit.identify import identify
 from planner.fit.learned import Learned
 from planner.frf.frf import Frf
-from planner.identification.agreement import Similarity, fit_similarity
-from planner.identification.parameters import Priors
+from planner.measurement.agreement import Similarity, fit_similarity
 
 EVERY = 4  # one pose of so many is set aside
 FEWEST = 3  # poses of which one can be spared

@@ -14,7 +14,7 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import solve_poles
 from planner.fit.misfit import At
 from planner.fit.posterior import RobotPosterior
-from planner.identification.measurement_model import OF_HIT, Tolerances, hit_basis
+from planner.measurement.nuisances import OF_HIT, Tolerances, hit_basis
 from planner.modal.residues import Lines, laplace, unit
 from planner.recording.points import TCP
 

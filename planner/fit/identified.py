@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Parametrisation, Priors, parametrise
 from planner.fit.posterior import RobotPosterior
-from planner.identification.agreement import MODEL_ERROR
-from planner.identification.parameters import Parametrisation, Priors, parametrise
-from planner.identification.result import Identification, estimates, undetermined
+from planner.fit.result import Identification, estimates, undetermined
+from planner.measurement.agreement import MODEL_ERROR
 
 
 @dataclass(frozen=True, eq=False)

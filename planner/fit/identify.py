@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS, Priors
 from planner.effects.table import Repertoire
 from planner.errors import InputError
 from planner.fit.fitted import FitRecord
@@ -13,8 +14,7 @@ from planner.fit.learned import Learned
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import CAD_INERTIAS, Priors
+from planner.measurement.nuisances import Tolerances
 
 EXACT = 1e-6  # relative sd of inertias that are taken for exact
 

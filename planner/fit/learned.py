@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
+from planner.effects.parameters import Priors
 from planner.fit.fitted import StructureFit
 from planner.fit.identified import ExtendedModel, as_identification
 from planner.fit.posterior import RobotPosterior
-from planner.identification.parameters import Priors
-from planner.identification.result import Estimate, Identification
+from planner.fit.result import Estimate, Identification
 from planner.words import counted
 
 BEYOND = 2.0  # sds of the gains, from which their deviation is told

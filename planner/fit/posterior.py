@@ -11,8 +11,8 @@ from planner.fit.data import FrfData
 from planner.fit.fitted import StructureFit
 from planner.fit.misfit import SHARE, FrfMisfit
 from planner.fit.structure import RobotStructure, exported
-from planner.identification.measured_frfs import Measured
 from planner.inference.least_squares import inverse
+from planner.measurement.measured_frfs import Measured
 
 # What no structure explains, in shares of |H|, up to which the simulation is followed: of a fit
 # that lacks nothing it is 0.001 to 0.015. Chosen.

@@ -30,8 +30,8 @@ from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import At, FrfMisfit
 from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import Tolerances
-from planner.identification.truncated_decay import completed
+from planner.measurement.nuisances import Tolerances
+from planner.measurement.truncated_decay import completed
 
 SEARCHED, SCREENED, LAST = 28, 64, 44  # lines a pose: while searching, for operators, at the end
 ANNEALED = ((0.5, 6), (0.2, 8), (0.07, 8))  # sizes by which a start comes near, and steps at each

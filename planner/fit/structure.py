@@ -13,11 +13,10 @@ import numpy as np
 
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.effects.effect import Operator
+from planner.effects.parameters import Parameter, Parametrisation, parametrise
 from planner.effects.table import Repertoire
-from planner.fit.inertias import BodyNumbers, body_numbers
-from planner.identification.feasible_inertias import pseudo_inertia
-from planner.identification.measurement_model import OF_HAMMER, OF_SENSOR
-from planner.identification.parameters import Parameter, Parametrisation, parametrise
+from planner.fit.inertias import BodyNumbers, body_numbers, pseudo_inertia
+from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR
 from planner.robot.config import BASE, LOSS_FACTOR_BELOW, Harmonic, Resonator
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.virtual_joints import OUTER

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from planner.dataset.dataset import Dataset
     from planner.dynamics.simulation import Simulation
     from planner.fit.held_out import JudgedIdentification
-    from planner.identification.result import Identification
+    from planner.fit.result import Identification
     from planner.robot.robot import Robot
 
 
@@ -151,8 +151,8 @@ class IdentificationReport(Answer):
         Raises InputError where the files cannot be written.
         """
         from planner.dynamics.simulation import Simulation
-        from planner.identification.agreement import fit_similarity
-        from planner.identification.write_robot import write_robot
+        from planner.fit.write_robot import write_robot
+        from planner.measurement.agreement import fit_similarity
         from planner.robot.robot import Robot
 
         assert self.basis is not None

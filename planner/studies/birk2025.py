@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS
 from planner.fit.identify import identify
 from planner.frf import metrics
 from planner.frf.metrics import Agreement
-from planner.identification.measurement_model import EXACT_HITS
-from planner.identification.parameters import CAD_INERTIAS
+from planner.measurement.nuisances import EXACT_HITS
 from planner.progress import Tell, within
 from planner.robot.robot import Robot
 from planner.studies import drawing

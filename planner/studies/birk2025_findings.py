@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planner.identification.result import Identification
+from planner.fit.result import Identification
 from planner.studies.birk2025_data import PATHS
 from planner.studies.birk2025_design import Design
 from planner.studies.birk2025_tables import IdentifiedModel, percent

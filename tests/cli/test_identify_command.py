@@ -9,7 +9,7 @@ import pytest
 
 from planner.dataset.dataset import Dataset
 from planner.dynamics.simulation import Simulation
-from planner.identification.agreement import fit_similarity
+from planner.measurement.agreement import fit_similarity
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import record_poses

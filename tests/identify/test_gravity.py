@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Priors, parametrise
 from planner.errors import InputError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
-from planner.identification.agreement import fit_similarity
 from planner.identification.effort import QUICK
 from planner.identification.identify import identify
-from planner.identification.measured_frfs import stack
 from planner.identification.objective import Objective, stands
-from planner.identification.parameters import Priors, parametrise
 from planner.identification.staged_problem import StagedProblem
+from planner.measurement.agreement import fit_similarity
+from planner.measurement.measured_frfs import stack
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation

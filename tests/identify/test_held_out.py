@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.fit.held_out import identify_judged, set_aside
-from planner.identification.agreement import fit_similarity
+from planner.measurement.agreement import fit_similarity
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth

@@ -9,7 +9,7 @@ from planner.dynamics.simulation import Simulation
 from planner.fit.hit_misses import VisitHits, tell_misses
 from planner.fit.identify import identify
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import Tolerances, basis
+from planner.measurement.nuisances import Tolerances, basis
 from planner.modal.residue_change import residue_changes
 from planner.modal.residues import Residues, laplace, synthesize
 from planner.robot.robot import Robot

@@ -7,11 +7,11 @@ import pytest
 
 from planner.dynamics.gradient import moved, response_turned
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS
 from planner.identification.identify import identify
 from planner.identification.left_open import LeftOpen
-from planner.identification.measurement_model import CHAIN_NUMBERS, OpenNumbers, Tolerances
-from planner.identification.missed_ports import actual_ports
-from planner.identification.parameters import CAD_INERTIAS
+from planner.measurement.missed_ports import actual_ports
+from planner.measurement.nuisances import CHAIN_NUMBERS, OpenNumbers, Tolerances
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.handling import Aim, Handling

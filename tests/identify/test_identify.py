@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Parametrisation, Priors, parametrise
 from planner.errors import InputError
+from planner.fit.result import _words, undetermined
+from planner.fit.write_robot import updated_toml
 from planner.frf.estimator import estimate
-from planner.identification.agreement import MODEL_ERROR, MOST_LINES, fit_similarity
 from planner.identification.identify import identify
-from planner.identification.measured_frfs import stack
 from planner.identification.objective import Objective
-from planner.identification.parameters import Parametrisation, Priors, parametrise
-from planner.identification.result import _words, undetermined
-from planner.identification.write_robot import updated_toml
+from planner.measurement.agreement import MODEL_ERROR, MOST_LINES, fit_similarity
+from planner.measurement.measured_frfs import stack
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation

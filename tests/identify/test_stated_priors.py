@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Priors, parametrise
 from planner.errors import InputError
 from planner.identification.identify import identify
-from planner.identification.parameters import Priors, parametrise
 from planner.robot.robot import Robot
 from planner.truth.load import load_truth
 from tests.support.known_robots import KR10

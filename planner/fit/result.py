@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import Parametrisation
+from planner.effects.parameters import Parametrisation
 
 # The data have told something of a direction once its sd is half of what it was before.
 TOLD = 0.5

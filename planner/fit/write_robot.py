@@ -8,7 +8,7 @@ import numpy as np
 import tomlkit
 
 from planner.errors import InputError
-from planner.identification.result import Identification
+from planner.fit.result import Identification
 from planner.robot.config import Compliance, entry_of
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.mesh_files import copy_meshes
