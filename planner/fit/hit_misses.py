@@ -14,7 +14,7 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import solve_poles
 from planner.fit.misfit import At
 from planner.fit.posterior import RobotPosterior
-from planner.measurement.nuisances import OF_HIT, Tolerances, hit_basis
+from planner.measurement.nuisances import AIM, OF_HIT, Tolerances, hit_basis
 from planner.modal.residues import Lines, laplace, unit
 from planner.recording.points import TCP
 
@@ -90,22 +90,41 @@ def tell_misses(posterior: RobotPosterior, visits: Sequence[VisitHits]) -> Misse
     solved = SolvedPoses.of(posterior.simulation, np.array([visit.q for visit in visits]))
     first = AXES * misfit.data.measured.layout.hits.index(TCP)
     own = slice(OF_HIT * first, OF_HIT * (first + AXES))
+    poses = [int(np.argmin(np.linalg.norm(misfit.data.q - v.q, axis=1))) for v in visits]
+    counts = np.array([np.bincount(v.columns.axis, minlength=AXES) for v in visits])
+    middle = _middle(at, poses, own, np.repeat(counts, OF_HIT, axis=1))
     t, told = posterior.tolerances, []
     for number, visit in enumerate(visits):
-        pose = int(np.argmin(np.linalg.norm(misfit.data.q - visit.q, axis=1)))
         columns = visit.columns
         lines = laplace(columns.frequency_hz, columns.rate_1_s, columns.tail_s)
         moved = solved.misses(number, lines, t)
-        told.append(_told(columns, _middle(at, pose, own), moved, t, posterior.size))
+        mine = middle[0][number], middle[1][number, :, number]
+        told.append(_told(columns, mine, moved, t, posterior.size))
     return Misses(tuple(told), posterior.simulation, posterior.size)
 
 
-def _middle(at: At, pose: int, own: slice) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (12,) and covariance (12, 12) of what the averages of a pose missed, in sds."""
+def _middle(
+    at: At, poses: Sequence[int], own: slice, counts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (n, 12) and covariance (n, 12, n, 12) of what the averages of poses missed, in sds.
+
+    The fit takes an average's misses for those of one hit. Here they are of as many as there are,
+    `counts` (n, 12), with an aim in common that a hand keeps.
+    """
     assert at.eliminated is not None
-    inverse = at.eliminated.inverses[pose][:, own]
-    by_x = -inverse.T @ at.eliminated.onto[pose][:, : len(at.x)]
-    return at.own[pose, own], inverse.T @ inverse + by_x @ at.covariance @ by_x.T
+    inverse, onto = at.eliminated.inverses[poses][:, :, own], at.eliminated.onto[poses]
+    n, size = counts.shape
+    by_x = -(np.swapaxes(inverse, 1, 2) @ onto[:, :, : len(at.x)]).reshape(n * size, -1)
+    fitted = by_x @ at.covariance @ by_x.T
+    prior = np.kron(np.full((n, n), AIM**2), np.eye(size))
+    prior += np.diag(1 / np.maximum(counts, 1).ravel())
+    for k, one in enumerate(inverse):
+        rows = slice(size * k, size * (k + 1))
+        fitted[rows, rows] += one.T @ one
+    precision = np.linalg.inv(fitted)
+    covariance = np.linalg.inv(precision - np.eye(n * size) + np.linalg.inv(prior))
+    mean = covariance @ (precision @ at.own[poses][:, own].ravel())
+    return mean.reshape(n, size), covariance.reshape(n, size, n, size)
 
 
 def _told(
@@ -122,8 +141,11 @@ def _told(
         group = np.flatnonzero(columns.axis == axis)
         if not len(group):
             continue
-        z, each = _beside(columns, group, moved[axis])
-        apart = np.eye(len(group)) - columns.share[group].mean(axis=1)
+        # As the average that was fitted has them, see `planner.frf.estimator`.
+        strength = np.sum(1 / columns.variance[group], axis=(1, 2))
+        share = strength / strength.sum()
+        z, each = _beside(columns, group, share, moved[axis])
+        apart = np.eye(len(group)) - share
         mean[group] = middle[0].reshape(AXES, OF_HIT)[axis] + apart @ z
         own = np.einsum("kj,lj,jab->kalb", apart, apart, each)
         covariance[np.ix_(group, range(OF_HIT), group, range(OF_HIT))] += own
@@ -135,11 +157,11 @@ def _told(
 
 
 def _beside(
-    columns: HitColumns, group: np.ndarray, moved: np.ndarray
+    columns: HitColumns, group: np.ndarray, share: np.ndarray, moved: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Of hits along an axis, in sds: what each missed beside their average (k, 4), (k, 4, 4)."""
     h = columns.accelerance[group]
-    apart = h - np.sum(columns.share[group][:, None] * h, axis=0)
+    apart = h - np.einsum("k,krf->rf", share, h)
     weight = np.sqrt(2 / (columns.variance[group] + (RELATIVE * np.abs(h)) ** 2))
     rows = (weight[:, None] * moved).reshape(len(group), OF_HIT, -1).view(float)
     left = (weight * apart).reshape(len(group), 1, -1).view(float)
