@@ -45,10 +45,14 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
     covariance += np.diag(np.full(len(covariance), 1e-9))  # of bodies that nothing moves
     misfit, by_pose = posterior.misfits(MODEL_ERROR)
     used = 2 * int(np.count_nonzero(posterior.found.misfit.data.measured.used))
+    before = np.sqrt(np.diagonal(turned @ np.linalg.inv(structure.precision) @ turned.T))
     told = estimates(p, mean[: len(p.parameters)], covariance)
     result = Identification(
         simulation,
-        tuple(replace(one, explained=posterior.explains) for one in told),
+        tuple(
+            replace(one, explained=posterior.explains, prior_log_sd=float(sd))
+            for one, sd in zip(told, before, strict=False)
+        ),
         p.nuisances,
         mean,
         covariance,

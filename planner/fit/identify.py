@@ -11,12 +11,17 @@ from planner.effects.table import Repertoire
 from planner.errors import InputError
 from planner.fit.fitted import FitRecord
 from planner.fit.learned import Learned
+from planner.fit.misfit import FrfMisfit
 from planner.fit.search import Search
-from planner.fit.structure import RobotPrior
+from planner.fit.structure import RobotPrior, RobotStructure
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 
 EXACT = 1e-6  # relative sd of inertias that are taken for exact
+TOO_SOFT = (
+    "The springs of robot.toml are far too soft to carry the robot's weight where it was measured; "
+    "correct their stiffness (N·m/rad), the masses or gravity."
+)
 
 
 def identify(
@@ -36,7 +41,8 @@ def identify(
     Where what robot.toml states does not explain them, and `extend`, the effects that do are looked
     for (`Search`); from those of a `warm` record, if that is given. `band_hz` is robot.toml's
     unless given, `tolerances` what it says of hits, chain and readback. Raises InputError where
-    FRFs and poses do not fit together.
+    FRFs and poses do not fit together,
+    or springs as stated do not carry the weight.
     """
     q, robot = np.atleast_2d(np.asarray(q, dtype=float)), simulation.robot
     dof = len(robot.joint_names)
@@ -50,4 +56,7 @@ def identify(
     tolerances = tolerances or Tolerances.of(robot.config, robot.joints.slides)
     prior, band = RobotPrior(Repertoire.of(simulation, priors)), band_hz or robot.config.band_hz
     search = Search(prior, tuple(frfs), q, band, tolerances, tell, extend)
+    stated = RobotStructure(prior)
+    if not FrfMisfit(stated, search.data(1), tolerances).possible(stated.mean):
+        raise InputError(TOO_SOFT)
     return Learned.of(search.found(warm))

@@ -123,13 +123,16 @@ class RobotPosterior:
         return float(t.gain * own + t.force_gain * chain[-2]), allowed
 
     def misfits(self, least: float) -> tuple[float, np.ndarray]:
-        """Variance that is not explained over that of the noise, of all and by pose (n,).
+        """Square of what is left over the noise's variance, of all and by pose (n,).
 
         `least` is a relative sd that counts as noise.
         """
-        m, size = self.found.misfit.data.measured, self.found.misfit.size
-        noise = m.sd**2 + (least * size) ** 2
-        ratio = np.where(m.used, 1 + (self.size * size) ** 2 / noise, 0.0)
+        misfit, at = self.found.misfit, self.found.at
+        m, columns = misfit.data.measured, misfit.around(at.x, at.own).columns
+        own = columns[:, self.structure.size : -1]
+        left = columns[:, -1] + np.einsum("nl,nlijf->nijf", at.own, own)
+        noise = m.sd**2 + (least * misfit.size) ** 2
+        ratio = np.where(m.used, np.abs(left) ** 2 / noise, 0.0)
         count = np.maximum(m.used.sum(axis=(1, 2, 3)), 1)
         return float(ratio.sum() / count.sum()), ratio.sum(axis=(1, 2, 3)) / count
 
