@@ -26,8 +26,9 @@ from planner.diagnosis.linear.slightness import thinned, without_slight
 from planner.diagnosis.thresholds import SECOND_EFFECT, TIED, UNKNOWN
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
+from planner.fit.identify import TOO_SOFT
 from planner.frf.frf import Frf
-from planner.identification.objective import TOO_SOFT, stands
+from planner.identification.objective import stands
 from planner.measurement.measured_frfs import common_band
 from planner.progress import Tell, quietly
 

@@ -38,7 +38,7 @@ ANNEALED = ((0.5, 6), (0.2, 8), (0.07, 8))  # sizes by which a start comes near,
 LOG_STEPS, TRIED, FURTHER = 15, 6, 3  # steps
 LEAST = 12.0  # nats that one more effect must gain
 SAME = 3.0  # nats that one less may cost
-COMPLETIONS = 6  # rounds at most
+COMPLETIONS = 2  # rounds
 MOST_OPERATORS = 3  # beside springs: more would imitate what the fit lacks
 IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which a few steps are not settled
 OPERATORS, FINALISTS, ENDS = 5, 4, 2  # how many are tried, followed, settled
@@ -73,8 +73,6 @@ class Search:
         for _ in range(COMPLETIONS if any(np.isfinite(f.tail_s) for f in self.frfs) else 0):
             known = best.remembered
             best = self._completed(known)._found(known)
-            if size_of(best) == known.size:
-                break
         return best
 
     def _completed(self, known: FitRecord) -> "Search":

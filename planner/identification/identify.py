@@ -9,11 +9,12 @@ import numpy as np
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import Parametrisation, Priors, parametrise
 from planner.errors import InputError
+from planner.fit.identify import TOO_SOFT
 from planner.fit.result import Identification, estimates, undetermined
 from planner.frf.frf import Frf
 from planner.identification.effort import THOROUGH, Effort
 from planner.identification.feasible_inertias import Barrier
-from planner.identification.objective import TOO_SOFT, Objective
+from planner.identification.objective import Objective
 from planner.identification.staged_problem import Progress, StagedProblem
 from planner.inference.block_diagonal import block_diagonal
 from planner.inference.least_squares import Minimum, inverse

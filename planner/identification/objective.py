@@ -13,7 +13,6 @@ import numpy as np
 from planner.dynamics.gradient import Inertias, motion_slopes, moved
 from planner.dynamics.motion import ActualPorts, Motion, Turned
 from planner.effects.parameters import Parametrisation
-from planner.fit.identify import TOO_SOFT as TOO_SOFT
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.left_open import Integrated, LeftOpen
 from planner.inference.block_diagonal import block_diagonal

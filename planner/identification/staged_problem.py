@@ -8,10 +8,11 @@ import numpy as np
 from planner.dynamics.gradient import Inertias
 from planner.effects.parameters import Parametrisation
 from planner.errors import InputError
+from planner.fit.identify import TOO_SOFT
 from planner.frf.frf import Frf
 from planner.identification.effort import Effort
 from planner.identification.feasible_inertias import Barrier
-from planner.identification.objective import TOO_SOFT, Objective, stands
+from planner.identification.objective import Objective, stands
 from planner.inference.least_squares import Minimum, minimise
 from planner.measurement.agreement import MODEL_ERROR
 from planner.measurement.measured_frfs import matrices_at, stack

@@ -104,7 +104,7 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
     copy = tmp_path / "robot"
     shutil.copytree(robot.parent, copy)
     toml, out = copy / robot.name, copy / "identified.toml"
-    options = ["--starts", 1, "--held-out", 0, "--plot", tmp_path / "plots"]
+    options = ["--held-out", 0, "--plot", tmp_path / "plots"]
     run = planner("identify", folder, "--robot", toml, "--out", out, *options)
     assert "joint_a1" in run.stdout
     assert "N·m/rad" in run.stdout
@@ -122,7 +122,7 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
 def test_two_poses_leave_none_to_judge_by(cell, tmp_path):
     robot, folder, _ = cell
     few = part_of(folder, tmp_path / "few", {"P0", "P1"})
-    answer = planner_json("identify", few, "--robot", robot, "--starts", 1, "--no-inertias")
+    answer = planner_json("identify", few, "--robot", robot, "--no-inertias")
     assert answer["held_out"]["frac"] is None
     assert answer["held_out"]["frobenius"] is None
     assert any("No pose was held out" in remark for remark in answer["remarks"])
@@ -133,7 +133,7 @@ def test_a_refused_hit_is_told_and_the_rest_is_used(cell, tmp_path):
     few = part_of(folder, tmp_path / "few", {"P0", "P1"})
     victim = sorted((few / "data").iterdir())[0]
     victim.write_bytes(b"not a recording")
-    run = planner("identify", few, "--robot", robot, "--starts", 1, "--json", check=False)
+    run = planner("identify", few, "--robot", robot, "--json", check=False)
     assert run.returncode == 3
     assert victim.name in run.stderr
     answer = json.loads(run.stdout)
@@ -208,10 +208,8 @@ def test_compliance_that_the_description_lacks_is_added_where_asked(tmp_path):
     named = [(f"P{i}", row) for i, row in enumerate(q)]
     folder = record_poses(truth, named, tmp_path / "hits", repeats=3, hammer=HAMMER)
     robot, out = make_arm(tmp_path / "stated"), tmp_path / "found" / "robot.toml"
-    plain = planner_json("identify", folder, "--robot", robot, "--starts", 3)
-    wider = planner_json(
-        "identify", folder, "--robot", robot, "--extend", "--out", out, "--starts", 3
-    )
+    plain = planner_json("identify", folder, "--robot", robot)
+    wider = planner_json("identify", folder, "--robot", robot, "--extend", "--out", out)
     assert plain["misfit"] > 10 > 2 > wider["misfit"]
     assert any("--extend" in remark for remark in plain["remarks"])
     assert wider["held_out"]["frac"] > 0.97 > plain["held_out"]["frac"]
