@@ -200,7 +200,7 @@ def assert_one_sentence(run, says: str) -> None:
     assert "Traceback" not in run.stderr
 
 
-def test_compliance_that_the_description_lacks_is_added_where_asked(tmp_path):
+def test_compliance_that_the_description_lacks_is_added_unless_that_is_not_wanted(tmp_path):
     """Truth tilts in every joint; the stated torsion springs alone cannot follow."""
     truth = load_truth(make_arm(tmp_path / "true", transverse=True), Deviation(6, 0.15, 0.15))
     low, high = np.deg2rad(np.array(JOINTS_DEG, dtype=float)).T
@@ -208,10 +208,11 @@ def test_compliance_that_the_description_lacks_is_added_where_asked(tmp_path):
     named = [(f"P{i}", row) for i, row in enumerate(q)]
     folder = record_poses(truth, named, tmp_path / "hits", repeats=3, hammer=HAMMER)
     robot, out = make_arm(tmp_path / "stated"), tmp_path / "found" / "robot.toml"
-    plain = planner_json("identify", folder, "--robot", robot)
-    wider = planner_json("identify", folder, "--robot", robot, "--extend", "--out", out)
+    plain = planner_json("identify", folder, "--robot", robot, "--no-extend")
+    wider = planner_json("identify", folder, "--robot", robot, "--out", out)
     assert plain["misfit"] > 10 > 2 > wider["misfit"]
-    assert any("--extend" in remark for remark in plain["remarks"])
+    assert any("no spring counts as known" in remark for remark in plain["remarks"])
+    assert not any(entry["identifiable"] for entry in plain["parameters"])
     assert wider["held_out"]["frac"] > 0.97 > plain["held_out"]["frac"]
     assert len(wider["parameters"]) == 6 + wider["added"] == len(Robot.load(out).config.compliance)
     assert wider["written"]["frac"] > 0.97
