@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -17,13 +16,11 @@ from planner.design.extra_sensor import extra_sensor
 from planner.design.next_hit import next_hit
 from planner.diagnosis.diagnose import explain
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS, Priors
 from planner.errors import InputError, RefusedError
+from planner.fit.held_out import identify_judged
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
-from planner.identification.extended_structure import ExtendedModel, extended
-from planner.identification.held_out import identify_judged
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import CAD_INERTIAS, Priors
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import ModalModel
 from planner.progress import Tell, quietly
@@ -36,9 +33,6 @@ from planner.report.identification import (
 )
 from planner.report.modal_analysis import DEFAULT_BAND_HZ, check_options, sources_of
 from planner.robot.robot import Robot
-
-if TYPE_CHECKING:
-    from planner.identification.staged_problem import Progress
 
 
 def analyse(
@@ -102,10 +96,8 @@ def identify(
     *,
     band_hz: tuple[float, float] | None = None,
     inertias: bool = True,
-    extend: bool = False,
+    extend: bool = True,
     held_out: int | None = None,
-    starts: int = 8,
-    seed: int = 0,
     progress: Callable[[str], None] = lambda text: None,
 ) -> IdentificationReport:
     """Fit the elastic parameters of a robot's simulation to recorded FRFs of several poses.
@@ -118,10 +110,9 @@ def identify(
         robot: The robot whose [[compliance]] blocks are fitted.
         band_hz: Which part of the FRFs is fitted; by default robot.toml's.
         inertias: Whether masses and inertias may err by 8 %, centres of mass by 1 cm.
-        extend: Whether tilts of joints and floor that robot.toml leaves out are added.
+        extend: Whether what robot.toml leaves out (a floor or bearings that give way, links that
+            bend, masses, resonators) is looked for where its springs do not explain the FRFs.
         held_out: How many poses to judge by; by default one of four.
-        starts: Starting points at most.
-        seed: Of the starting points.
         progress: Is told what is being done.
 
     Returns:
@@ -136,22 +127,19 @@ def identify(
     check_options(band_hz)
     nominal, priors = Simulation(robot), CAD_INERTIAS if inertias else Priors()
     with threadpool_limits(1):
-        fitted = extended(nominal, priors) if extend else ExtendedModel(nominal, priors)
         judged = identify_judged(
             dataset.one_hit_frfs,
             dataset.q,
-            fitted.simulation,
-            fitted.priors,
+            nominal,
+            priors,
             held_out,
             dataset.frfs,
-            tolerances=Tolerances.of(robot.config, robot.joints.slides),
             band_hz=band,
-            starts=starts,
-            seed=seed,
-            progress=_told(progress),
+            extend=extend,
+            tell=progress,
         )
-        basis = IdentificationBasis(dataset, judged, nominal, fitted.simulation)
-        made = identification_report(basis, band, inertias, fitted.added)
+        basis = IdentificationBasis(dataset, judged, nominal)
+        made = identification_report(basis, band, inertias)
     return replace(made, seconds=time.perf_counter() - started)
 
 
@@ -205,11 +193,3 @@ def _frf_of(dataset: Dataset, pose: str | None) -> Frf:
         known = ", ".join(dataset.poses)
         raise InputError(f"Pose {pose} is not among those of the dataset; name one of {known}.")
     return dataset.frfs[dataset.poses.index(pose)]
-
-
-def _told(progress: Callable[[str], None]) -> "Callable[[Progress], None]":
-    def tell(at: "Progress") -> None:
-        where = f"start {at.start}, " if at.start else ""
-        progress(f"{where}{at.stage}, step {at.iteration}, misfit {at.misfit:.3g}")
-
-    return tell

@@ -9,7 +9,7 @@ from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
 from planner.design.propose import WORKSPACE_POSES
 from planner.dynamics.vibration import SimulatedModes
-from planner.identification.parameters import parametrise
+from planner.effects.parameters import parametrise
 from planner.inference.block_diagonal import block_diagonal
 from planner.surrogate.modal_surrogate import Surrogate
 

@@ -17,7 +17,7 @@ from planner.design.propose import check_name
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
-from planner.identification.measurement_model import Tolerances
+from planner.measurement.nuisances import Tolerances
 from planner.milling.cut import Cut, load_cut
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import singularity

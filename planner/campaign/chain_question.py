@@ -18,7 +18,7 @@ from planner.campaign.model import Model
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import solve_poles
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import Tolerances
+from planner.measurement.nuisances import Tolerances
 
 DRAWS, SEED = 400, 53
 SPRINGS, DAMPING = np.log(1.6), np.log(2.0)  # sds of logarithms: of each spring, and of damping

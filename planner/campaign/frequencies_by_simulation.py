@@ -15,9 +15,9 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf import synthesis
 from planner.frf.frf import Frf
-from planner.identification.measured_frfs import Measured, matrices_at, stack
-from planner.identification.measurement_model import Tolerances, basis, real_rows
-from planner.identification.truncated_decay import cut_off
+from planner.measurement.measured_frfs import Measured, matrices_at, stack
+from planner.measurement.nuisances import Tolerances, basis, real_rows
+from planner.measurement.truncated_decay import cut_off
 from planner.surrogate.modal_surrogate import ModalObservations
 
 LINES, LEAST, MOST = 600, 40, 120  # of all poses together, and of one at least and at most

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.fit.posterior import RobotPosterior
-from planner.identification.measured_frfs import Measured
+from planner.measurement.measured_frfs import Measured
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
 
 Moments = tuple[np.ndarray, np.ndarray]  # mean and sd (n, 3, 3, F) of FRFs in m/s²/N

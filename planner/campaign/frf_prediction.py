@@ -6,7 +6,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.frf_model import FrfModel, frf_model
-from planner.identification.measured_frfs import common_band, stack
+from planner.measurement.measured_frfs import common_band, stack
 from planner.surrogate.frf_bands import ModalPrediction
 from planner.surrogate.left_out_modes import left_out_modes
 

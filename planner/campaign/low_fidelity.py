@@ -7,21 +7,19 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.fit_memory import FitMemory, steps
-from planner.campaign.learned import Learned
 from planner.campaign.state import Measurement
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
+from planner.effects.parameters import CAD_INERTIAS, Priors
 from planner.effects.table import Repertoire
-from planner.fit.identified import as_identification
-from planner.fit.posterior import RobotPosterior
+from planner.fit.frequency_uncertainty import frequency_sd
+from planner.fit.learned import Learned
+from planner.fit.result import Identification
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf import synthesis
 from planner.frf.frf import Frf
-from planner.identification.frequency_uncertainty import frequency_sd
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import CAD_INERTIAS, Priors
-from planner.identification.result import Identification
+from planner.measurement.nuisances import Tolerances
 from planner.surrogate.hedged import PRIOR_BELIEF
 
 BELIEVED = 0.99  # in a simulation that fits the recordings
@@ -179,6 +177,5 @@ def learn(
                 memory.put(used[:count], known)
             warm = known
         whole = search(len(frfs))
-        posterior = RobotPosterior.of(whole.recalled(warm) if warm else whole.found())
-        structure, identified = as_identification(posterior)
-    return replace(before, learned=Learned(posterior, structure, identified, len(frfs)))
+        learned = Learned.of(whole.recalled(warm) if warm else whole.found())
+    return replace(before, learned=learned)

@@ -7,34 +7,21 @@ import numpy as np
 
 from planner.campaign.hit_habits import HitMiss, Pair, PoseMisses
 from planner.campaign.labels import LabelledPose
-from planner.campaign.learned import Learned
 from planner.campaign.log_conversion import to_mode
 from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.state import Measurement
 from planner.dataset.hit_columns import HitColumns, PoseHits
 from planner.dynamics.simulation import Simulation
-from planner.errors import InputError
+from planner.fit.hit_misses import Misses, SolvedPoses, VisitHits, VisitMisses, tell_misses
+from planner.fit.learned import Learned
+from planner.fit.posterior import FOLLOWED
 from planner.frf.frf import Frf
-from planner.identification.hit_misses import (
-    Known,
-    Misses,
-    VisitHits,
-    VisitMisses,
-    tell_misses,
-)
-from planner.identification.measurement_model import ACROSS, Tolerances
-from planner.identification.parameters import parametrise
-from planner.identification.simulated_visit import SolvedPoses
-from planner.identification.visit_equations import AIMED, OWN
+from planner.measurement.nuisances import ACROSS, HIT_NUMBERS, OF_HIT, Tolerances
 from planner.modal.modes import Mode
 from planner.modal.residues import laplace, residue_changes
 from planner.recording.joints import JointUnits
 from planner.recording.records import AXES
 
-TELL_BY = 8  # poses, the last ones, that tell what is common to all: nobody waits between hits
-# Relative size of what the simulation gets wrong, from which it tells no hit and corrects no
-# residue; chosen.
-TOO_WRONG = 0.1
 # Root mean square of the misses, in their sds before any data, from which they are not a hand's but
 # what the simulation lacks: on an arm whose floor gave way unknown to it, it was 8 to 12; chosen.
 NO_HAND = 4.0
@@ -68,7 +55,7 @@ class CampaignMisses:
     @property
     def trusted(self) -> bool:
         """Whether the simulation is right enough to tell how hits missed."""
-        if self.told is None or self.told.discrepancy > TOO_WRONG:
+        if self.told is None or self.told.discrepancy > FOLLOWED:
             return False
         sd = np.repeat([self.tolerances.angle_rad, self.tolerances.offset_m], 2)
         away = np.concatenate([visit.mean / sd for visit in self.told.visits])
@@ -132,12 +119,8 @@ def tell(
     those = tuple(one for one in visited if len(one.columns.axis))
     if learned is None or not those:
         return CampaignMisses((), None, t, band_hz)
-    simulation = learned.structure.simulation
-    known = Known(simulation, parametrise(simulation, learned.priors), learned.identified.mean)
-    try:
-        told = tell_misses([VisitHits(one.q, one.columns) for one in those], known, t, TELL_BY)
-    except InputError:  # it would not stand at a pose that it was not identified from
-        return CampaignMisses((), None, t, band_hz)
+    visits = [VisitHits(one.q, one.columns) for one in those]
+    told = tell_misses(learned.posterior, visits)
     return CampaignMisses(those, told, t, band_hz)
 
 
@@ -175,7 +158,7 @@ def visits_of(
 
 def _pose(visited: Visited, told: VisitMisses) -> PoseMisses:
     columns = visited.columns
-    sd = np.sqrt(np.diagonal(told.covariance)).reshape(-1, OWN)
+    sd = np.sqrt(np.diagonal(told.covariance)).reshape(-1, OF_HIT)
     hits = []
     for i, (axis, sign) in enumerate(zip(columns.axis, columns.sign, strict=True)):
         # A hit along −axis: the response is over the force along +axis, and so is its direction.
@@ -201,16 +184,16 @@ def _changes(
 ) -> np.ndarray:
     """(1 + 12, 3, 3, F): what the mean misses add to the FRF, and one sd of each unsure part."""
     share = columns.shared_at(frequency_hz)
-    out = np.zeros((1 + AIMED, 3, 3, len(frequency_hz)), dtype=complex)
-    whole = np.zeros((AIMED, told.mean.size))
+    out = np.zeros((1 + HIT_NUMBERS, 3, 3, len(frequency_hz)), dtype=complex)
+    whole = np.zeros((HIT_NUMBERS, told.mean.size))
     for i, axis in enumerate(columns.axis):
         out[0, :, axis] += np.einsum("k,kif,f->if", told.mean[i], basis[axis], share[i])
-        at = OWN * axis + np.arange(OWN)
-        whole[at, OWN * i + np.arange(OWN)] = np.mean(share[i])
+        at = OF_HIT * axis + np.arange(OF_HIT)
+        whole[at, OF_HIT * i + np.arange(OF_HIT)] = np.mean(share[i])
     values, vectors = np.linalg.eigh(whole @ told.covariance @ whole.T)
     roots = vectors * np.sqrt(np.maximum(values, 0.0))
     for axis in range(3):
-        part = roots[OWN * axis : OWN * axis + OWN]
+        part = roots[OF_HIT * axis : OF_HIT * axis + OF_HIT]
         out[1:, :, axis] = np.einsum("kj,kif->jif", part, basis[axis])
     return out
 

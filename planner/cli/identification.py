@@ -21,13 +21,11 @@ def identify(
     ] = True,
     extend: Annotated[
         bool,
-        typer.Option(help="Add the tilts of joints and floor that robot.toml leaves out."),
-    ] = False,
+        typer.Option(help="Look for what robot.toml leaves out where its springs are not enough."),
+    ] = True,
     held_out: Annotated[
         int | None, typer.Option(min=0, metavar="N", help="Poses to judge by (default: 1 of 4).")
     ] = None,
-    starts: Annotated[int, typer.Option(min=1, max=100, help="Starting points at most.")] = 8,
-    seed: Annotated[int, typer.Option(min=0, help="Of the starting points.")] = 0,
     band_hz: Annotated[
         tuple[float, float] | None,
         typer.Option(metavar="LOW HIGH", help="Band in Hz, instead of robot.toml's."),
@@ -50,7 +48,7 @@ def identify(
     from planner.api import identify as fit
     from planner.campaign.material import material
     from planner.cli.progress import reporting
-    from planner.identification.write_robot import check_target
+    from planner.fit.write_robot import check_target
     from planner.report.modal_analysis import check_options
     from planner.report.plot_files import Pictures
 
@@ -70,8 +68,6 @@ def identify(
             inertias=inertias,
             extend=extend,
             held_out=held_out,
-            starts=starts,
-            seed=seed,
             progress=progress,
         )
     answer = answer.with_pictures(pictures)

@@ -21,9 +21,9 @@ from planner.diagnosis.linear.fit import Fit, carried_on
 from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.linear.problem import FINE, Problem, tolerances_of
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import OpenNumbers, basis
 from planner.inference.block_diagonal import block_diagonal
 from planner.inference.parallel import side_by_side
+from planner.measurement.nuisances import OpenNumbers, basis
 from planner.recording.points import TOOL, Layout
 
 FRF_LINES = 96  # lines over the band at which FRFs are compared, evenly spaced

@@ -12,11 +12,11 @@ from planner.design.frequency_posterior import AXES, Poses
 from planner.dynamics.gradient import laplace, response_gradient
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
+from planner.effects.parameters import Parametrisation
+from planner.fit.frequency_uncertainty import log_frequency_slope
 from planner.frf.frf import Frf
-from planner.identification.agreement import MODEL_ERROR
-from planner.identification.frequency_uncertainty import log_frequency_slope
-from planner.identification.measured_frfs import ASSUMED_FLOOR, ASSUMED_RELATIVE, noise_sd
-from planner.identification.parameters import Parametrisation
+from planner.measurement.agreement import MODEL_ERROR
+from planner.measurement.measured_frfs import ASSUMED_FLOOR, ASSUMED_RELATIVE, noise_sd
 from planner.recording.points import TCP, TOOL, Layout
 
 # Lines around each mode at which the information is summed up, in half-widths of its resonance.

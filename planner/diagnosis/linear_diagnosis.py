@@ -26,9 +26,10 @@ from planner.diagnosis.linear.slightness import thinned, without_slight
 from planner.diagnosis.thresholds import SECOND_EFFECT, TIED, UNKNOWN
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
+from planner.fit.identify import TOO_SOFT
 from planner.frf.frf import Frf
-from planner.identification.measured_frfs import common_band
-from planner.identification.objective import TOO_SOFT, stands
+from planner.identification.objective import stands
+from planner.measurement.measured_frfs import common_band
 from planner.progress import Tell, quietly
 
 Place = tuple[str, str | None]  # an effect and where it is

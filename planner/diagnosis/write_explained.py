@@ -13,9 +13,9 @@ from planner.diagnosis.effects.slight_bearings import is_slight
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import KINDS
 from planner.errors import InputError
-from planner.identification.parameters import KINDS
-from planner.identification.write_robot import drop_stated_inertias
+from planner.fit.write_robot import drop_stated_inertias
 from planner.robot.config import BASE, EffectTable, entry_of, without_effects
 from planner.robot.massless_base import massless_base
 from planner.robot.mesh_files import copy_meshes

@@ -14,11 +14,11 @@ from planner.dynamics.simulation import Simulation
 from planner.effects.added_mass import PointMass
 from planner.effects.angle_spring import AngleSpring
 from planner.effects.effect import Number, Operator
+from planner.effects.parameters import Priors, place_name
 from planner.effects.resonator import LinkResonator
 from planner.effects.springs import BendingLink, ShiftingBase, SoftBase, Tilt
 from planner.effects.structural_damping import LossFactors
 from planner.errors import InputError
-from planner.identification.parameters import Priors, place_name
 from planner.robot.config import BASE, Compliance
 from planner.robot.massless_base import massless_base
 from planner.robot.robot import Robot

@@ -8,7 +8,7 @@ import numpy as np
 from planner.effects.effect import PosedBodies
 from planner.fit.structure import RobotPrior, RobotStructure
 from planner.frf.frf import Frf
-from planner.identification.measured_frfs import Measured, common_band, matrices_at, stack
+from planner.measurement.measured_frfs import Measured, common_band, matrices_at, stack
 from planner.robot.angle_slopes import AngleSlopes
 from planner.robot.elastic_model import Matrices
 

@@ -14,6 +14,7 @@ from planner.fit.structure import RobotStructure
 SIZES = (0.004, 0.008, 0.015, 0.03, 0.06, 0.12, 0.3)  # of the discrepancy: no robot is linear
 USUAL, SPREAD = 0.02, 1.5  # its prior: log-normal
 SETTLED = 8  # steps
+RESTED = 1.0  # nats that a step may still promise
 MATTERS = 0.01  # share of |H| that an effect must change: nothing wrong changes up to 0.7 %
 
 
@@ -41,6 +42,13 @@ class StructureFit:
         """What is worth keeping of it."""
         s = self.structure
         return FitRecord(s.effects, s.names, self.at.x, self.at.own, size_of(self), self.shares)
+
+    @property
+    def settled(self) -> bool:
+        """Whether one more step would gain next to nothing."""
+        s, at = self.structure, self.at
+        downhill = at.gradient + s.precision @ (at.x - s.mean)
+        return float(downhill @ np.linalg.solve(at.normal + s.precision, downhill)) < 2 * RESTED
 
     @property
     def structure(self) -> RobotStructure:

@@ -1,20 +1,33 @@
 """What was found, as an identification: a simulation, its parameters and their covariance."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Parametrisation, Priors, parametrise
 from planner.fit.posterior import RobotPosterior
-from planner.identification.agreement import MODEL_ERROR
-from planner.identification.extended_structure import ExtendedModel
-from planner.identification.parameters import Parametrisation, parametrise
-from planner.identification.result import Identification, estimates, undetermined
+from planner.fit.result import Identification, estimates, undetermined
+from planner.measurement.agreement import MODEL_ERROR
+
+
+@dataclass(frozen=True, eq=False)
+class ExtendedModel:
+    """A simulation whose parameters were identified, and what was known of them before.
+
+    Its last `added` springs are not in robot.toml.
+    """
+
+    simulation: Simulation
+    priors: Priors
+    added: int = 0
 
 
 def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identification]:
     """The structure with what was known of it before, and what the FRFs made of it.
 
     Effects' own numbers are held where they were found; what else is known is as unsure as they
-    make it.
+    make it. Where nothing explains the FRFs, no parameter counts as known.
     """
     structure, repertoire = posterior.structure, posterior.structure.prior.repertoire
     simulation = posterior.simulation
@@ -32,10 +45,25 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
     covariance += np.diag(np.full(len(covariance), 1e-9))  # of bodies that nothing moves
     misfit, by_pose = posterior.misfits(MODEL_ERROR)
     used = 2 * int(np.count_nonzero(posterior.found.misfit.data.measured.used))
+    before = np.sqrt(np.diagonal(turned @ np.linalg.inv(structure.precision) @ turned.T))
+    told = estimates(p, mean[: len(p.parameters)], covariance)
     result = Identification(
-        simulation, estimates(p, mean[: len(p.parameters)], covariance), p.nuisances, mean,
-        covariance, misfit, used, by_pose, undetermined(p, covariance), (), True, 0.0,
-    )  # fmt: skip
+        simulation,
+        tuple(
+            replace(one, explained=posterior.explains, prior_log_sd=float(sd))
+            for one, sd in zip(told, before, strict=False)
+        ),
+        p.nuisances,
+        mean,
+        covariance,
+        misfit,
+        used,
+        by_pose,
+        undetermined(p, covariance),
+        (),
+        posterior.found.settled,
+        0.0,
+    )
     return model, result
 
 

@@ -13,13 +13,21 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.identification.feasible_inertias import pseudo_inertia
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import OUTER, halves_moved, inertia_basis
 
 HALVES = float(np.sqrt(2.0))  # independent halves scatter by more than their sum
 # Of halves: sd of their centres' distance, of the share of mass that is moved, of moments.
 APART, SPLIT, MOMENTS = 0.5, 0.2, 0.25
+
+
+def pseudo_inertia(inertia: np.ndarray) -> np.ndarray:
+    """(..., 4, 4) of (m, m·c, moments xx xy yy xz yz zz) (..., 10) about the frame's origin."""
+    m, x, y, z, xx, xy, yy, xz, yz, zz = np.moveaxis(inertia, -1, 0)
+    half = (xx + yy + zz) / 2
+    rows = [[half - xx, -xy, -xz, x], [-xy, half - yy, -yz, y], [-xz, -yz, half - zz, z],
+            [x, y, z, m]]  # fmt: skip
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,8 @@ from planner.effects.effect import Motions
 from planner.fit.data import FrfData, among
 from planner.fit.inertias import spatial
 from planner.fit.structure import REACH, RobotStructure
-from planner.identification.measurement_model import OpenNumbers, Tolerances, basis
-from planner.identification.missed_ports import actual_ports
+from planner.measurement.missed_ports import actual_ports
+from planner.measurement.nuisances import OpenNumbers, Tolerances, basis
 from planner.robot.elastic_model import Matrices
 from planner.robot.virtual_joints import inertia_basis
 
@@ -37,20 +37,37 @@ class At:
     """A misfit at x: χ², half its gradient and the normal of the data (the bodies' barrier in it).
 
     `own` (n, l) are the likeliest numbers of each pose, `volume` what eliminating them costs.
-    `white` (n, D + l + 1, N) are all columns, the residual last, where they were kept.
+    `precision` is the prior's.
     """
 
     x: np.ndarray
     chi2: float
     gradient: np.ndarray
     normal: np.ndarray
+    precision: np.ndarray
     volume: float
     value: float
     own: np.ndarray
     motion: Motion
-    factors: tuple[np.ndarray, ...] = ()
-    onto: tuple[np.ndarray, ...] = ()
-    white: np.ndarray | None = None
+    eliminated: "Eliminated | None" = None
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """(D, D) of x by Laplace's method."""
+        return np.linalg.inv(self.normal + self.precision)
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """All columns (n, D + l + 1, N) in units of the noise, the residual last.
+
+    `inverses` (n, l, l) of the own numbers' Cholesky factors L, `onto` L⁻¹ times their rows of the
+    Gram matrix.
+    """
+
+    white: np.ndarray
+    inverses: np.ndarray
+    onto: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,8 +201,13 @@ class FrfMisfit:
         elasticity = self.structure.elasticity(x)
         return moved(m, elasticity, s, mass, self.impedances(x), ports)
 
-    def slopes(self, motion: Motion, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives (n, D − chain, r, c, F) by x, and (n, e, r, c, F) by ln k of each spring."""
+    def slopes(
+        self, motion: Motion, x: np.ndarray, out: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives (n, D − chain, r, c, F) by x, and (n, e, r, c, F) by ln k of each spring.
+
+        The former into `out`, where it is given.
+        """
         structure, elasticity = self.structure, self.structure.elasticity(x)
         kinds, e = structure.spread.shape[:2]
         numbers = structure.bodies.slopes(x[structure.inertial])
@@ -193,37 +215,38 @@ class FrfMisfit:
         every = Inertias(self.jacobians, np.broadcast_to(inertia_basis(), (bodies, 10, 6, 6)))
         raw = motion_slopes(motion, elasticity, every, added)
         springs = (3 if elasticity.loss_factor.any() else 2) * e
-        by_block = raw[:, : kinds * e]
-        out = np.empty((len(raw), structure.chain.start, *raw.shape[2:]), dtype=complex)
-        out[:, : len(structure.parameters)] = structure.spring_slopes(by_block)
+        by_block, n, shape = raw[:, : kinds * e], len(raw), raw.shape[2:]
+        if out is None:
+            out = np.empty((n, structure.chain.start, *shape), dtype=complex)
+        structure.spring_slopes(by_block, out[:, : len(structure.parameters)])
         out[:, structure.inertial] = 0.0
         for b, (mine, one) in enumerate(zip(structure.bodies.mine, numbers, strict=True)):
-            own = raw[:, springs + 10 * b : springs + 10 * (b + 1)].reshape(len(raw), 10, -1)
+            own = raw[:, springs + 10 * b : springs + 10 * (b + 1)].reshape(n, 10, -1)
             moved = (one @ own.view(float)).view(complex)
             at = structure.inertial.start + mine
-            out[:, at] += moved.reshape(len(raw), len(mine), *raw.shape[2:])
+            out[:, at] += moved.reshape(n, len(mine), *shape)
         out[:, structure.inertial.stop :] = raw[:, springs + 10 * bodies :]
         visits = by_block[:, :e] + by_block[:, e : 2 * e]  # dampers scatter with their springs
         return out, visits
 
     def columns(self, x: np.ndarray, eta: np.ndarray) -> tuple[np.ndarray, np.ndarray, Motion]:
-        """Accelerance (n, r, c, F), columns (n, D + l, r, c, F) by x and own numbers, and motion.
+        """Accelerance (n, r, c, F), columns (n, D + l + 1, r, c, F) by x and own numbers, motion.
 
-        `eta` (n, all numbers that a pose leaves open) is what they are linearised about.
+        `eta` (n, all numbers that a pose leaves open) is what they are linearised about; the last
+        column is for the residual.
         """
-        motion = self.motion(x, eta)
+        motion, s = self.motion(x, eta), self.structure
         h, turned = motion.accelerance, Turned((motion,))
         open_ = basis(h, turned, self.data.measured.s, self.tolerances)
-        slopes, visits = self.slopes(motion, x)
-        numbers = OpenNumbers.of(h)
-        parts = (
-            slopes,
-            open_[:, numbers.hits : numbers.known],
-            open_[:, : numbers.hits],
-            open_[:, numbers.known :],
-            self.tolerances.visit_stiffness * visits,
-        )
-        return h, np.concatenate(parts, axis=1), motion
+        numbers, joints = self.open_numbers
+        own = s.size + numbers.hits + joints
+        out = np.empty((len(h), own + len(s.springs) + 1, *h.shape[1:]), dtype=complex)
+        _, visits = self.slopes(motion, x, out[:, : s.chain.start])
+        out[:, s.chain] = open_[:, numbers.hits : numbers.known]
+        out[:, s.size : s.size + numbers.hits] = open_[:, : numbers.hits]
+        out[:, s.size + numbers.hits : own] = open_[:, numbers.known :]
+        np.multiply(visits, self.tolerances.visit_stiffness, out=out[:, own:-1])
+        return h, out, motion
 
     @cached_property
     def open_numbers(self) -> tuple[OpenNumbers, int]:
@@ -262,7 +285,8 @@ class FrfMisfit:
             off = h * np.log(np.where(self._told(h), h / m.accelerance, 1.0)) - there
         else:
             off = np.where(m.used, h - m.accelerance, 0.0) - there
-        return Around(x, np.concatenate([columns, off[:, None]], axis=1), motion)
+        columns[:, -1] = off
+        return Around(x, columns, motion)
 
     def weighed(self, around: "Around", keep: bool = False) -> At:
         """By noise and discrepancy."""
@@ -285,39 +309,37 @@ class FrfMisfit:
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
         """The same of plain residuals."""
-        n, k = columns.shape[:2]
-        turned = np.ascontiguousarray(np.moveaxis(columns, 1, -1))
-        flat = turned.view(float).reshape(*turned.shape[:-1], 2 * k)
-        out = (self.whitening @ flat).view(complex)
-        return np.ascontiguousarray(np.moveaxis(out, -1, 1)).reshape(n, k, -1).view(float)
+        n, k, rows, sides, lines = columns.shape
+        out = np.empty((n, k, 2, rows, sides, lines))
+        turned = np.swapaxes(self.whitening, -1, -2)
+        for part, values in enumerate((columns.real, columns.imag)):
+            given = np.moveaxis(np.ascontiguousarray(values), 1, 3)
+            np.matmul(given, turned, out=np.moveaxis(out[:, :, part], 1, 3))
+        return out.reshape(n, k, -1)
 
     def _eliminated(self, x: np.ndarray, white: np.ndarray, keep: bool, motion: Motion) -> At:
         s, d = self.structure, self.structure.size
         count = white.shape[1] - d - 1
         mine = slice(d, d + count)
-        normal, gradient = np.zeros((d, d)), np.zeros(d)
-        chi2 = volume = 0.0
-        own = np.empty((len(white), count))
-        factors, ontos = [], []
-        for p, rows in enumerate(white):
-            gram = rows @ rows.T
-            factor = np.linalg.cholesky(gram[mine, mine] + np.eye(count))
-            onto = np.linalg.solve(factor, gram[mine])
-            normal += gram[:d, :d] - onto[:, :d].T @ onto[:, :d]
-            gradient += gram[:d, -1] - onto[:, :d].T @ onto[:, -1]
-            chi2 += gram[-1, -1] - onto[:, -1] @ onto[:, -1]
-            volume += 2 * float(np.sum(np.log(np.diag(factor))))
-            own[p] = -np.linalg.solve(factor.T, onto[:, -1])
-            factors.append(factor)
-            ontos.append(onto)
+        gram = white @ np.swapaxes(white, 1, 2)
+        factors = np.linalg.cholesky(gram[:, mine, mine] + np.eye(count))
+        inverses = np.linalg.inv(factors)
+        ontos = inverses @ gram[:, mine]
+        flat = ontos.reshape(-1, gram.shape[2])
+        whole = gram.sum(axis=0)
+        normal = whole[:d, :d] - flat[:, :d].T @ flat[:, :d]
+        gradient = whole[:d, -1] - flat[:, :d].T @ flat[:, -1]
+        chi2 = float(whole[-1, -1] - flat[:, -1] @ flat[:, -1])
+        volume = 2 * float(np.sum(np.log(np.einsum("pii->pi", factors))))
+        own = -np.einsum("pji,pj->pi", inverses, ontos[:, :, -1])
         beyond, pull, curvature = s.bodies.barrier(x[s.inertial])
         chi2 += 2 * beyond
         gradient[s.inertial] += pull
         normal[s.inertial, s.inertial] += curvature
         away = x - s.mean
         value = 0.5 * (chi2 + float(away @ s.precision @ away))
-        kept = {"factors": tuple(factors), "onto": tuple(ontos), "white": white} if keep else {}
-        return At(x, chi2, gradient, normal, volume, value, own, motion, **kept)
+        kept = Eliminated(white, inverses, ontos) if keep else None
+        return At(x, chi2, gradient, normal, s.precision, volume, value, own, motion, kept)
 
     # ---------------------------------------------------------------- what follows from it
 
@@ -332,21 +354,19 @@ class FrfMisfit:
     def gain(self, at: At, columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
         """Nats that columns (n, k, r, c, F) of sds (k,) gain beside all else, and their size."""
         s, d = self.structure, self.structure.size
-        assert at.white is not None
-        new = self.whitened(columns)
-        k = new.shape[1]
-        square, cross, pull = np.zeros((k, k)), np.zeros((d, k)), np.zeros(k)
-        for p, mine in enumerate(new):
-            rows, factor, onto = at.white[p], at.factors[p], at.onto[p]
-            both = rows @ mine.T
-            taken = np.linalg.solve(factor, both[d:-1])
-            square += mine @ mine.T - taken.T @ taken
-            cross += both[:d] - onto[:, :d].T @ taken
-            pull += both[-1] - taken.T @ onto[:, -1]
+        kept, new = at.eliminated, self.whitened(columns)
+        assert kept is not None
+        both = kept.white @ np.swapaxes(new, 1, 2)
+        taken, k = kept.inverses @ both[:, d:-1], new.shape[1]
+        flat, across = new.transpose(1, 0, 2).reshape(k, -1), taken.reshape(-1, k)
+        onto = kept.onto.reshape(len(across), -1)
+        square = flat @ flat.T - across.T @ across
+        cross = both[:, :d].sum(axis=0) - onto[:, :d].T @ across
+        pull = both[:, -1].sum(axis=0) - across.T @ onto[:, -1]
         slope = at.gradient + s.precision @ (at.x - s.mean)
-        solved = np.linalg.solve(at.normal + s.precision, np.column_stack([cross, slope]))
-        square -= cross.T @ solved[:, :-1]
-        pull -= cross.T @ solved[:, -1]
+        moved = at.covariance @ cross
+        square -= cross.T @ moved
+        pull -= moved.T @ slope
         inner = square * np.outer(sd, sd) + np.eye(k)
         z = -np.linalg.solve(inner, pull * sd)
         nats = 0.5 * float(z @ inner @ z) - 0.5 * float(np.linalg.slogdet(inner)[1])

@@ -30,8 +30,8 @@ from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import At, FrfMisfit
 from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import Tolerances
-from planner.identification.truncated_decay import completed
+from planner.measurement.nuisances import Tolerances
+from planner.measurement.truncated_decay import completed
 
 SEARCHED, SCREENED, LAST = 28, 64, 44  # lines a pose: while searching, for operators, at the end
 ANNEALED = ((0.5, 6), (0.2, 8), (0.07, 8))  # sizes by which a start comes near, and steps at each
@@ -58,6 +58,7 @@ class Search:
     band_hz: tuple[float, float]
     tolerances: Tolerances
     tell: Callable[[str], None] = lambda _: None
+    extend: bool = True  # where what is stated does not explain them
 
     def data(self, lines: int) -> FrfData:
         """On so many lines a pose."""
@@ -86,7 +87,10 @@ class Search:
     def _found(self, warm: FitRecord | None) -> StructureFit:
         data, dense = self.data(SEARCHED), self.data(SCREENED)
         stated = RobotStructure(self.prior, (), data.sensors)
+        self.tell("as stated")
         plain = converged(self._begun(data, stated))
+        if not self.extend:
+            return self._last(plain)
         if size_of(plain) <= EXPLAINED:  # nothing need be missing
             best = plain
         elif warm is None:

@@ -13,11 +13,10 @@ import numpy as np
 
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.effects.effect import Operator
+from planner.effects.parameters import Parameter, Parametrisation, parametrise
 from planner.effects.table import Repertoire
-from planner.fit.inertias import BodyNumbers, body_numbers
-from planner.identification.feasible_inertias import pseudo_inertia
-from planner.identification.measurement_model import OF_HAMMER, OF_SENSOR
-from planner.identification.parameters import Parameter, Parametrisation, parametrise
+from planner.fit.inertias import BodyNumbers, body_numbers, pseudo_inertia
+from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR
 from planner.robot.config import BASE, LOSS_FACTOR_BELOW, Harmonic, Resonator
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.virtual_joints import OUTER
@@ -210,14 +209,13 @@ class RobotStructure:
         loss = np.where(given[2], np.exp(log_eta[0]), 0.0) if log_eta else np.zeros(len(k))
         return Elasticity(k, damping, loss)
 
-    def spring_slopes(self, by_block: np.ndarray) -> np.ndarray:
-        """(n, P, …) from derivatives (n, kinds · e, …) by ln k, ln c, ln η of each spring."""
-        kinds, e = self.spread.shape[:2]
+    def spring_slopes(self, by_block: np.ndarray, out: np.ndarray) -> None:
+        """Into (n, P, …) from derivatives (n, kinds · e, …) by ln k, ln c, ln η of each spring."""
         turned = self.spread.copy()
         turned[1] += self.spread[0]  # c = k · (c/k)
-        flat = by_block.reshape(len(by_block), kinds * e, -1)
-        out = turned.reshape(kinds * e, -1).T @ flat
-        return out.reshape(len(by_block), -1, *by_block.shape[2:])
+        for number, column in enumerate(turned.reshape(-1, turned.shape[2]).T):
+            rows = np.flatnonzero(column)
+            np.sum(by_block[:, rows], axis=1, out=out[:, number])
 
     def added_inertia(self, x: np.ndarray) -> np.ndarray:
         """(L, 10): what effects add to the bodies."""

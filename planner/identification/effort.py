@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from planner.identification.agreement import MOST_LINES
+from planner.measurement.agreement import MOST_LINES
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
 

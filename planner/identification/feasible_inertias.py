@@ -10,16 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.identification.parameters import Parametrisation
-
-
-def pseudo_inertia(inertia: np.ndarray) -> np.ndarray:
-    """(..., 4, 4) of (m, m·c, moments xx xy yy xz yz zz) (..., 10) about the frame's origin."""
-    m, x, y, z, xx, xy, yy, xz, yz, zz = np.moveaxis(inertia, -1, 0)
-    half = (xx + yy + zz) / 2
-    rows = [[half - xx, -xy, -xz, x], [-xy, half - yy, -yz, y], [-xz, -yz, half - zz, z],
-            [x, y, z, m]]  # fmt: skip
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+from planner.effects.parameters import Parametrisation
+from planner.fit.inertias import pseudo_inertia
 
 
 @dataclass(frozen=True, eq=False)

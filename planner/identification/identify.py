@@ -7,18 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Parametrisation, Priors, parametrise
 from planner.errors import InputError
+from planner.fit.identify import TOO_SOFT
+from planner.fit.result import Identification, estimates, undetermined
 from planner.frf.frf import Frf
 from planner.identification.effort import THOROUGH, Effort
 from planner.identification.feasible_inertias import Barrier
-from planner.identification.measured_frfs import common_band, matrices_at
-from planner.identification.measurement_model import Tolerances
-from planner.identification.objective import TOO_SOFT, Objective
-from planner.identification.parameters import Parametrisation, Priors, parametrise
-from planner.identification.result import Identification, estimates, undetermined
+from planner.identification.objective import Objective
 from planner.identification.staged_problem import Progress, StagedProblem
 from planner.inference.block_diagonal import block_diagonal
 from planner.inference.least_squares import Minimum, inverse
+from planner.measurement.measured_frfs import common_band, matrices_at
+from planner.measurement.nuisances import Tolerances
 
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 SAME = 1e-3  # relative difference of two starts that found the same minimum

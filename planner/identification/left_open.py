@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.motion import ActualPorts, Turned
-from planner.identification.measurement_model import OpenNumbers, Tolerances, basis, real_rows
+from planner.measurement.nuisances import OpenNumbers, Tolerances, basis, real_rows
 
 
 @dataclass(frozen=True, eq=False)

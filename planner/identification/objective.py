@@ -12,15 +12,15 @@ import numpy as np
 
 from planner.dynamics.gradient import Inertias, motion_slopes, moved
 from planner.dynamics.motion import ActualPorts, Motion, Turned
+from planner.effects.parameters import Parametrisation
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.left_open import Integrated, LeftOpen
-from planner.identification.measured_frfs import Measured
-from planner.identification.measurement_model import Tolerances
-from planner.identification.missed_ports import actual_ports, guess
-from planner.identification.parameters import Parametrisation
-from planner.identification.truncated_decay import Completion, completion
 from planner.inference.block_diagonal import block_diagonal
 from planner.inference.least_squares import Quadratic
+from planner.measurement.measured_frfs import Measured
+from planner.measurement.missed_ports import actual_ports, guess
+from planner.measurement.nuisances import Tolerances
+from planner.measurement.truncated_decay import Completion, completion
 from planner.robot.elastic_model import Matrices
 
 LOG_FLOOR = 0.3  # relative sd that no logarithmic residual falls below: far-off models err by more
@@ -29,10 +29,6 @@ NEARLY = 0.999  # of these, where a parameter stays that goes as far as it may
 # Far from the truth the data err by bias, not noise, and neighbouring lines alike: the prior counts
 # for more. Without this, dampers that lock a joint where a spring should give are traps.
 LOG_PRIOR = 10.0
-TOO_SOFT = (
-    "The springs of robot.toml are far too soft to carry the robot's weight where it was measured; "
-    "correct their stiffness (N·m/rad), the masses or gravity."
-)
 LOG_DROP = 0.3  # relative noise above which a value has no logarithm worth fitting
 
 

@@ -6,16 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.dynamics.gradient import Inertias
+from planner.effects.parameters import Parametrisation
 from planner.errors import InputError
+from planner.fit.identify import TOO_SOFT
 from planner.frf.frf import Frf
-from planner.identification.agreement import MODEL_ERROR
 from planner.identification.effort import Effort
 from planner.identification.feasible_inertias import Barrier
-from planner.identification.measured_frfs import matrices_at, stack
-from planner.identification.measurement_model import Tolerances
-from planner.identification.objective import TOO_SOFT, Objective, stands
-from planner.identification.parameters import Parametrisation
+from planner.identification.objective import Objective, stands
 from planner.inference.least_squares import Minimum, minimise
+from planner.measurement.agreement import MODEL_ERROR
+from planner.measurement.measured_frfs import matrices_at, stack
+from planner.measurement.nuisances import Tolerances
 from planner.robot.elastic_model import ElasticModel, Matrices
 
 LOG_TOLERANCE = 1e-4

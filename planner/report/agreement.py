@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from planner.diagnosis.linear.predict import Agreement
-    from planner.identification.agreement import Similarity
+    from planner.measurement.agreement import Similarity
 
 
 @dataclass(frozen=True)

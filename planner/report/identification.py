@@ -18,11 +18,9 @@ from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, tabl
 if TYPE_CHECKING:
     from planner.dataset.dataset import Dataset
     from planner.dynamics.simulation import Simulation
-    from planner.identification.held_out import Judged
-    from planner.identification.result import Identification
+    from planner.fit.held_out import JudgedIdentification
+    from planner.fit.result import Identification
     from planner.robot.robot import Robot
-
-LARGE = 2.0  # misfit that noise and calibration do not explain
 
 
 @dataclass(frozen=True)
@@ -71,12 +69,16 @@ class IdentifiedSpring:
 
 @dataclass(frozen=True, eq=False)
 class IdentificationBasis:
-    """What an identification was made of, and all that it found; `structure` is what was fitted."""
+    """What an identification was made of, and all that it found."""
 
     dataset: "Dataset"
-    judged: "Judged"
+    judged: "JudgedIdentification"
     nominal: "Simulation"
-    structure: "Simulation"
+
+    @property
+    def fitted(self) -> "Robot":
+        """The robot with everything that was fitted, as stated."""
+        return self.judged.final.structure.simulation.robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +113,7 @@ class IdentificationReport(Answer):
     def simulation(self) -> "Simulation":
         """The identified simulation."""
         assert self.basis is not None
-        return self.basis.judged.final.simulation
+        return self.basis.judged.final.identified.simulation
 
     def with_pictures(self, pictures: Pictures) -> "IdentificationReport":
         """The same once FRFs before and after are drawn, where that is wanted."""
@@ -130,7 +132,7 @@ class IdentificationReport(Answer):
             shown = judged.trial if aside and judged.trial else judged.final
             frf = dataset.frfs[i].of_tool
             if frf is not None:  # pictures show the tool's FRFs
-                poses.append(ShownPose(name, dataset.q[i], frf, shown.simulation, aside))
+                poses.append(ShownPose(name, dataset.q[i], frf, shown.identified.simulation, aside))
         mark = SIMULATED_TITLE if self.simulated else ""
         nominal = self.basis.nominal
         figures = identification_figures(poses, nominal, self.band_hz, mark)
@@ -150,13 +152,13 @@ class IdentificationReport(Answer):
         Raises InputError where the files cannot be written.
         """
         from planner.dynamics.simulation import Simulation
-        from planner.identification.agreement import fit_similarity
-        from planner.identification.write_robot import write_robot
+        from planner.fit.write_robot import write_robot
+        from planner.measurement.agreement import fit_similarity
         from planner.robot.robot import Robot
 
         assert self.basis is not None
         basis = self.basis
-        made = write_robot(robot_toml, basis.structure.robot, basis.judged.final)
+        made = write_robot(robot_toml, basis.fitted, basis.judged.final.identified)
         again = Simulation(Robot.load(made.robot_toml))
         fit = fit_similarity(again, basis.dataset.frfs, basis.dataset.q, self.band_hz)
         return replace(
@@ -203,11 +205,11 @@ class IdentificationReport(Answer):
 
 
 def identification_report(
-    basis: IdentificationBasis, band_hz: tuple[float, float], inertias: bool, added: int
+    basis: IdentificationBasis, band_hz: tuple[float, float], inertias: bool
 ) -> IdentificationReport:
     """Of an identification that was judged at poses held out."""
     dataset, judged = basis.dataset, basis.judged
-    final, names = judged.final, dataset.poses
+    final, names = judged.final.identified, dataset.poses
     after, aside = FrfSimilarity.of(judged.after), FrfSimilarity.of(judged.held_out_after)
     held_out = HeldOutChange(
         aside.frac,
@@ -216,7 +218,7 @@ def identification_report(
         tuple(names[i] for i in judged.held_out),
     )
     return IdentificationReport(
-        parameters=identified_springs(basis.structure.robot, final),
+        parameters=identified_springs(basis.fitted, final),
         fit=SimilarityChange(after.frac, after.frobenius, FrfSimilarity.of(judged.before)),
         held_out=held_out,
         undetermined=tuple(direction.text for direction in final.undetermined),
@@ -224,24 +226,25 @@ def identification_report(
         misfit_by_pose=dict(zip(names, final.misfit_by_pose, strict=True)),
         converged=final.converged,
         refused=tuple(RefusedFile(*entry) for entry in dataset.refused),
-        remarks=(*dataset.remarks, *final.remarks, *_doubts(judged)),
+        remarks=(*dataset.remarks, *_doubts(judged)),
         simulated=dataset.simulated,
         band_hz=band_hz,
         inertias=inertias,
-        added=added,
+        added=judged.final.structure.added,
         basis=basis,
     )
 
 
-def _doubts(judged: "Judged") -> list[str]:
-    final, said = judged.final, []
-    if final.misfit > LARGE:
+def _doubts(judged: "JudgedIdentification") -> list[str]:
+    final = judged.final
+    said = [text for text in (final.words, final.scale) if text]
+    if not final.fits:
         said.append(
-            f"The misfit is {final.misfit:.1f}, where noise alone would leave 1: something that is "
-            f"no spring is missing in the simulation and distorts the springs; try --extend."
+            f"Nothing that was tried explains the recordings: {100 * final.posterior.size:.0f} % "
+            f"of the FRFs are left. So no spring counts as known; ask `planner diagnose`."
         )
-    if not final.converged:
-        said.append("The last fit had not come to rest; try more --starts.")
+    if not final.identified.converged:
+        said.append("The last fit had not come to rest.")
     if not judged.held_out:
         said.append(
             "No pose was held out, so nothing says how good the simulation is elsewhere; record "

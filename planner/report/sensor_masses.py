@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.dataset.measure import MeasuredPose, of_tool
 from planner.dynamics.simulation import Simulation
-from planner.identification.sensor_loading import DOUBT, Unloaded, unloaded
+from planner.measurement.sensor_loading import DOUBT, Unloaded, unloaded
 from planner.modal.modes import Mode
 
 

@@ -17,9 +17,9 @@ from planner.dataset.screened_files import Source, in_parts
 from planner.dynamics.simulation import Simulation
 from planner.errors import RefusedError
 from planner.frf.frf import Frf
-from planner.identification.measured_frfs import common_band
-from planner.identification.measurement_model import Tolerances
-from planner.identification.point_places import misplaced, questions
+from planner.measurement.measured_frfs import common_band
+from planner.measurement.nuisances import Tolerances
+from planner.measurement.point_places import misplaced, questions
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
 from planner.recording.folder import joint_columns, read_recordings

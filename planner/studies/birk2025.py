@@ -4,8 +4,8 @@ The paper's models (`campaigns/kr10_birk2025`) are fitted to hits on a robot of 
 (`birk2025_data`), with the bounds of its Tables 1 and 2 for a prior, by this program's least
 squares instead of the paper's genetic algorithm, which takes days; figures are the paper's, Global
 FRAC and Frobenius similarity of magnitudes (appendix B). Beside them 24P as this program identifies
-it: inertias within 8 %, what hits and chain leave open integrated out. The paper's outlook asks
-where to measure: D-optimal points answer.
+it: inertias within 8 %, what hits and chain leave open integrated out, what 24 parameters do not
+explain looked for. The paper's outlook asks where to measure: D-optimal points answer.
 """
 
 import numpy as np
@@ -13,12 +13,11 @@ from matplotlib.figure import Figure
 
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS
+from planner.fit.identify import identify
 from planner.frf import metrics
 from planner.frf.metrics import Agreement
-from planner.identification.effort import QUICK, THOROUGH
-from planner.identification.identify import identify
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import CAD_INERTIAS
+from planner.measurement.nuisances import EXACT_HITS
 from planner.progress import Tell, within
 from planner.robot.robot import Robot
 from planner.studies import drawing
@@ -37,7 +36,6 @@ from planner.studies.birk2025_tables import (
 from planner.studies.report import Report, Table
 
 FILES = {"12P": "robot_12p.toml", "24P": "robot_24p.toml", "24P, ours": "robot_24p.toml"}
-STARTS = 3
 FEW = 3  # points, of which it is asked how far they suffice
 
 
@@ -48,9 +46,9 @@ def study(progress: Tell, small: bool = False) -> Report:
     models: dict[str, IdentifiedModel] = {}
     for i, name in enumerate(FILES):
         progress(f"{name}: identification from nine poses", 0.25 + 0.15 * i)
-        models[name] = _model(hits, nine, name, small)
+        models[name] = _model(hits, nine, name)
     progress("where to measure", 0.7)
-    designs = _designs(hits, models["24P"], small, within(progress, 0.7, 0.95))
+    designs = _designs(hits, models["24P"], within(progress, 0.7, 0.95))
     whole, paths, directions = table_4(models), table_5(hits, models), direction_table(hits, models)
     where = design_table(hits, designs)
     return Report(
@@ -72,7 +70,7 @@ def _simulation(name: str) -> Simulation:
     return Simulation(Robot.load(shipped("kr10_birk2025") / "robot" / FILES[name]))
 
 
-def _model(hits: PathHits, which: np.ndarray, name: str, small: bool) -> IdentifiedModel:
+def _model(hits: PathHits, which: np.ndarray, name: str) -> IdentifiedModel:
     nominal, ours = _simulation(name), name.endswith("ours")
     frfs = hits.struck.frfs
     found = identify(
@@ -81,10 +79,9 @@ def _model(hits: PathHits, which: np.ndarray, name: str, small: bool) -> Identif
         nominal,
         CAD_INERTIAS if ours else paper_priors(nominal),
         band_hz=BAND_HZ,
-        starts=1 if small else STARTS,
-        effort=QUICK if small else THOROUGH,
-        tolerances=Tolerances.of(nominal.robot.config) if ours else None,
-    )
+        tolerances=None if ours else EXACT_HITS,
+        extend=ours,
+    ).identified
     limited, full = (_agreement(hits, found.simulation, band) for band in (BAND_HZ, FULL_HZ))
     return IdentifiedModel(found.simulation, found, limited, full, _above(hits))
 
@@ -109,7 +106,7 @@ def _above(hits: PathHits) -> float:
     return above / whole
 
 
-def _designs(hits: PathHits, model: IdentifiedModel, small: bool, progress: Tell) -> list[Design]:
+def _designs(hits: PathHits, model: IdentifiedModel, progress: Tell) -> list[Design]:
     """The paper's nine points, as many of the planner's, fewer of these, and one path's.
 
     Without identification also the nine with hits along one axis.
@@ -130,7 +127,7 @@ def _designs(hits: PathHits, model: IdentifiedModel, small: bool, progress: Tell
     designs = []
     for i, (name, rows) in enumerate(wanted.items()):
         progress(name, i / len(wanted))
-        fitted = model if rows is nine else _model(hits, rows, "24P", small)
+        fitted = model if rows is nine else _model(hits, rows, "24P")
         others = np.setdiff1d(np.arange(len(q)), rows)
         frac, _ = percent(fitted.limited[others])
         designs.append(Design(name, rows, informative.determined(rows), frac))

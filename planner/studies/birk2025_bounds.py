@@ -3,7 +3,7 @@
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import Priors, parametrise
+from planner.effects.parameters import Priors, parametrise
 
 DEGREE = 180 / np.pi
 TORSION_BOUNDS = ((500, 5000), (500, 5000), (250, 3000), (100, 1500), (30, 1000), (30, 1000))

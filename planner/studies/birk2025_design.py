@@ -12,9 +12,9 @@ import numpy as np
 
 from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Priors, parametrise
+from planner.fit.result import TOLD
 from planner.frf.frf import Frf
-from planner.identification.parameters import Priors, parametrise
-from planner.identification.result import TOLD
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
+from planner.fit.result import Identification
 from planner.frf import metrics
 from planner.frf.metrics import Agreement
-from planner.identification.result import Identification
 from planner.studies.birk2025_data import PATHS, PathHits
 from planner.studies.birk2025_design import Design
 from planner.studies.report import Table

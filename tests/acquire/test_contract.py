@@ -22,8 +22,8 @@ from planner.design.repeats import repeat_gain
 from planner.design.stopping import forecast, left_out, mean_squares
 from planner.design.variance_reduction import reduction
 from planner.dynamics.simulation import Simulation
-from planner.identification.frequency_uncertainty import log_frequency_slope
-from planner.identification.parameters import Priors, parametrise
+from planner.effects.parameters import Priors, parametrise
+from planner.fit.frequency_uncertainty import log_frequency_slope
 from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm

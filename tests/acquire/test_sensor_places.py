@@ -11,7 +11,7 @@ from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
 from planner.design.sensor_places import better_places
 from planner.design.stopping import forecast
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import Priors, parametrise
+from planner.effects.parameters import Priors, parametrise
 from planner.recording.points import Layout
 from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import fit_surrogate

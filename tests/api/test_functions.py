@@ -76,8 +76,8 @@ def test_what_cannot_be_analysed_is_said(recorded, dataset, tmp_path):
 
 def test_identify_says_what_the_command_says_and_more(recorded, dataset, capsys):
     folder, robot_toml, robot = recorded
-    found = identify(dataset, robot, starts=1)
-    command = ["identify", str(folder), "--robot", str(robot_toml), "--starts", "1", "--json"]
+    found = identify(dataset, robot)
+    command = ["identify", str(folder), "--robot", str(robot_toml), "--json"]
     assert run(command) == 0
     told = json.loads(capsys.readouterr().out)
     mine = json.loads(json.dumps(found.to_json()))

@@ -6,9 +6,9 @@ from scipy.optimize import least_squares
 
 from planner.dynamics.gradient import Inertias, laplace, response, response_gradient
 from planner.dynamics.simulation import Elasticity, Simulation
+from planner.effects.parameters import Priors, parametrise
 from planner.identification.identify import identify
-from planner.identification.measured_frfs import stack
-from planner.identification.parameters import Priors, parametrise
+from planner.measurement.measured_frfs import stack
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import inertia_basis
 from planner.truth.load import load_truth

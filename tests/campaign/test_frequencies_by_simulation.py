@@ -6,7 +6,7 @@ import pytest
 from planner.campaign.frequencies_by_simulation import tuned_frequencies
 from planner.dynamics.simulation import Simulation
 from planner.frf.estimator import estimate
-from planner.identification.measurement_model import Tolerances
+from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer

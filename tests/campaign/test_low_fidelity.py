@@ -8,15 +8,15 @@ import pytest
 from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
-from planner.frf.frf import Frf
-from planner.identification.feasible_inertias import pseudo_inertia
-from planner.identification.frequency_uncertainty import (
+from planner.effects.parameters import CAD_INERTIAS, parametrise
+from planner.fit.frequency_uncertainty import (
     frequency_sd,
     frequency_sensitivity,
     log_frequency_slope,
 )
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import CAD_INERTIAS, parametrise
+from planner.fit.inertias import pseudo_inertia
+from planner.frf.frf import Frf
+from planner.measurement.nuisances import Tolerances
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import AttachedResonator, Deviation

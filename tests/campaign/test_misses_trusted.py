@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from planner.campaign.misses import CampaignMisses
-from planner.identification.hit_misses import VisitMisses
-from planner.identification.measurement_model import Tolerances
+from planner.fit.hit_misses import VisitMisses
+from planner.measurement.nuisances import Tolerances
 
 HAND = Tolerances()
 

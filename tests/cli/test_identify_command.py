@@ -9,7 +9,7 @@ import pytest
 
 from planner.dataset.dataset import Dataset
 from planner.dynamics.simulation import Simulation
-from planner.identification.agreement import fit_similarity
+from planner.measurement.agreement import fit_similarity
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import record_poses
@@ -105,7 +105,7 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
     copy = tmp_path / "robot"
     shutil.copytree(robot.parent, copy)
     toml, out = copy / robot.name, copy / "identified.toml"
-    options = ["--starts", 1, "--held-out", 0, "--plot", tmp_path / "plots"]
+    options = ["--held-out", 0, "--plot", tmp_path / "plots"]
     options += ["--rrd", tmp_path / "found.rrd"]
     run = planner("identify", folder, "--robot", toml, "--out", out, *options)
     assert "joint_a1" in run.stdout
@@ -127,7 +127,7 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
 def test_two_poses_leave_none_to_judge_by(cell, tmp_path):
     robot, folder, _ = cell
     few = part_of(folder, tmp_path / "few", {"P0", "P1"})
-    answer = planner_json("identify", few, "--robot", robot, "--starts", 1, "--no-inertias")
+    answer = planner_json("identify", few, "--robot", robot, "--no-inertias")
     assert answer["held_out"]["frac"] is None
     assert answer["held_out"]["frobenius"] is None
     assert any("No pose was held out" in remark for remark in answer["remarks"])
@@ -138,7 +138,7 @@ def test_a_refused_hit_is_told_and_the_rest_is_used(cell, tmp_path):
     few = part_of(folder, tmp_path / "few", {"P0", "P1"})
     victim = sorted((few / "data").iterdir())[0]
     victim.write_bytes(b"not a recording")
-    run = planner("identify", few, "--robot", robot, "--starts", 1, "--json", check=False)
+    run = planner("identify", few, "--robot", robot, "--json", check=False)
     assert run.returncode == 3
     assert victim.name in run.stderr
     answer = json.loads(run.stdout)
@@ -205,7 +205,7 @@ def assert_one_sentence(run, says: str) -> None:
     assert "Traceback" not in run.stderr
 
 
-def test_compliance_that_the_description_lacks_is_added_where_asked(tmp_path):
+def test_compliance_that_the_description_lacks_is_added_unless_that_is_not_wanted(tmp_path):
     """Truth tilts in every joint; the stated torsion springs alone cannot follow."""
     truth = load_truth(make_arm(tmp_path / "true", transverse=True), Deviation(6, 0.15, 0.15))
     low, high = np.deg2rad(np.array(JOINTS_DEG, dtype=float)).T
@@ -213,12 +213,11 @@ def test_compliance_that_the_description_lacks_is_added_where_asked(tmp_path):
     named = [(f"P{i}", row) for i, row in enumerate(q)]
     folder = record_poses(truth, named, tmp_path / "hits", repeats=3, hammer=HAMMER)
     robot, out = make_arm(tmp_path / "stated"), tmp_path / "found" / "robot.toml"
-    plain = planner_json("identify", folder, "--robot", robot, "--starts", 3)
-    wider = planner_json(
-        "identify", folder, "--robot", robot, "--extend", "--out", out, "--starts", 3
-    )
+    plain = planner_json("identify", folder, "--robot", robot, "--no-extend")
+    wider = planner_json("identify", folder, "--robot", robot, "--out", out)
     assert plain["misfit"] > 10 > 2 > wider["misfit"]
-    assert any("--extend" in remark for remark in plain["remarks"])
+    assert any("no spring counts as known" in remark for remark in plain["remarks"])
+    assert not any(entry["identifiable"] for entry in plain["parameters"])
     assert wider["held_out"]["frac"] > 0.97 > plain["held_out"]["frac"]
     assert len(wider["parameters"]) == 6 + wider["added"] == len(Robot.load(out).config.compliance)
     assert wider["written"]["frac"] > 0.97

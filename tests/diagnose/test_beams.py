@@ -8,7 +8,7 @@ from planner.diagnosis.linear.beams import as_beams
 from planner.diagnosis.linear.fit import carried_on, fit, settle
 from planner.diagnosis.linear.problem import Problem
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import place_name
+from planner.effects.parameters import place_name
 from planner.robot.robot import Robot
 from planner.truth.deviation import BentLink
 from tests.support.concealed import hidden

@@ -13,7 +13,7 @@ from planner.diagnosis.linear_diagnosis import Diagnosis, diagnose
 from planner.diagnosis.write_explained import explained_simulation
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
-from planner.identification.truncated_decay import cut_off
+from planner.measurement.truncated_decay import cut_off
 from planner.robot.config import LOSS_FACTOR_BELOW
 from planner.robot.robot import Robot
 from tests.support.known_robots import KR10

@@ -5,7 +5,7 @@ import pytest
 
 from planner.diagnosis.screens.artefacts import Chain, _delay
 from planner.diagnosis.thresholds import CLEAR
-from planner.identification.measurement_model import Tolerances
+from planner.measurement.nuisances import Tolerances
 
 
 def chain(sensor: str, delay_s: float, sd_s: float) -> Chain:

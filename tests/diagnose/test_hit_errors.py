@@ -17,7 +17,7 @@ from planner.diagnosis.screens.hit_errors import beyond_any_hand, taken_out
 from planner.diagnosis.screens.screen import screen
 from planner.dynamics.gradient import response_turned
 from planner.dynamics.simulation import Simulation
-from planner.identification.measurement_model import (
+from planner.measurement.nuisances import (
     OPEN,
     Tolerances,
     basis,

@@ -12,8 +12,8 @@ from planner.diagnosis.linear.fit import Fit, settle
 from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import basis
-from planner.identification.missed_ports import actual_ports
+from planner.measurement.missed_ports import actual_ports
+from planner.measurement.nuisances import basis
 from planner.robot.robot import Robot
 from tests.support.known_robots import kr210_folder
 

@@ -15,8 +15,8 @@ from planner.diagnosis.effects.transverse_compliance import TransverseCompliance
 from planner.diagnosis.laws.equivalent_stiffness import own_springs
 from planner.diagnosis.laws.torque_laws import LAWS
 from planner.dynamics.simulation import Simulation
-from planner.identification.extended_structure import extended
-from planner.identification.parameters import Priors, parametrise
+from planner.effects.parameters import Priors, parametrise
+from planner.fit.identified import extended
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation, ScaledJoint
 from planner.truth.hits import Hammer, record_poses

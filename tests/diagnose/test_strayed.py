@@ -8,7 +8,7 @@ import numpy as np
 from planner.diagnosis.linear.problem import PRIORS
 from planner.diagnosis.screens.implausible_springs import strayed
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import parametrise
+from planner.effects.parameters import parametrise
 from planner.robot.robot import Robot
 from tests.support.known_robots import KR210
 

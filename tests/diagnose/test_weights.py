@@ -13,9 +13,9 @@ from scipy.stats import multivariate_normal
 from planner.diagnosis.linear.discrepancy import InnerProducts, Worth
 from planner.diagnosis.linear.evidence import shares_of
 from planner.diagnosis.thresholds import ALIKE, DISCREPANCIES, NOISE_OVERSTATED
-from planner.identification.measurement_model import OpenNumbers
 from planner.identification.objective import FARTHEST
 from planner.inference.evidence import shared_noise, temper
+from planner.measurement.nuisances import OpenNumbers
 
 POSES = 9
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
 from planner.fit.data import FrfData
 from planner.fit.gauss_newton import minimised
@@ -13,8 +14,7 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior, RobotStructure, exported
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import CAD_INERTIAS
+from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
 from tests.support.fitted_cases import Case, Judged, everyday
 

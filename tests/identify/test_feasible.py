@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from planner.dynamics.simulation import Simulation
-from planner.identification.feasible_inertias import Barrier, pseudo_inertia
-from planner.identification.parameters import Priors, parametrise
+from planner.effects.parameters import Priors, parametrise
+from planner.fit.inertias import pseudo_inertia
+from planner.identification.feasible_inertias import Barrier
 from planner.robot.robot import Robot
 from tests.support.known_robots import kr10_folder
 

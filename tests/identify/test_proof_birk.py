@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from planner.dynamics.simulation import Simulation
-from planner.identification.agreement import fit_similarity
+from planner.effects.parameters import Priors, parametrise
 from planner.identification.identify import identify
-from planner.identification.parameters import Priors, parametrise
+from planner.measurement.agreement import fit_similarity
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth

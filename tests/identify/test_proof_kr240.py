@@ -13,9 +13,9 @@ import pytest
 from planner.dataset.dataset import Dataset
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
-from planner.identification.agreement import fit_similarity
+from planner.effects.parameters import Priors
 from planner.identification.identify import identify
-from planner.identification.parameters import Priors
+from planner.measurement.agreement import fit_similarity
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import record_poses

@@ -14,9 +14,9 @@ from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
 from planner.demo import Pool, shipped
 from planner.dynamics.simulation import Simulation
-from planner.identification.agreement import fit_similarity
+from planner.effects.parameters import Priors
 from planner.identification.identify import identify
-from planner.identification.parameters import Priors
+from planner.measurement.agreement import fit_similarity
 from planner.robot.robot import Robot
 
 pytestmark = pytest.mark.slow

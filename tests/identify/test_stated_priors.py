@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Priors, parametrise
 from planner.errors import InputError
-from planner.identification.identify import identify
-from planner.identification.parameters import Priors, parametrise
+from planner.fit.identify import identify
+from planner.measurement.nuisances import EXACT_HITS
 from planner.robot.robot import Robot
 from planner.truth.load import load_truth
 from tests.support.known_robots import KR10
@@ -69,7 +70,9 @@ def test_a_spring_that_was_not_seen_follows_the_others_where_they_share_a_bias(
     path.write_text(f"stiffness_sd_percent = 10\n{bias}\n{text}")
     simulation, q = Simulation(Robot.load(path)), KR10.poses(3, seed=2)
     frfs = measured_frfs(load_truth(path).changed(0.6), q, np.linspace(5.0, 60.0, 60), 0.05)
-    found = identify(frfs, q, simulation, band_hz=(5.0, 60.0), starts=1)
+    found = identify(
+        frfs, q, simulation, Priors(), band_hz=(5.0, 60.0), tolerances=EXACT_HITS, extend=False
+    ).identified
     spring = found.estimate("stiffness of joint_6 about z")
     assert spring.value / spring.prior_median == pytest.approx(expected, rel=0.1)
     seen = found.estimate("stiffness of joint_2 about z")

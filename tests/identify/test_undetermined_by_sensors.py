@@ -16,11 +16,11 @@ import pytest
 from planner.dataset.dataset import Dataset
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS
+from planner.fit.result import Identification
 from planner.identification.effort import QUICK
 from planner.identification.identify import identify
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import CAD_INERTIAS
-from planner.identification.result import Identification
+from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
 from planner.studies.birk2025_data import HAMMER
 from planner.truth.deviation import Deviation

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.identification.measurement_model import Tolerances
+from planner.measurement.nuisances import Tolerances
 from planner.milling.coupling import TipReceptance, couple
 from planner.milling.tool_file import load_tool
 from planner.report.coupling_source import tip_at

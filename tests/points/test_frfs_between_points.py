@@ -13,8 +13,8 @@ from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.identification.effort import QUICK
 from planner.identification.identify import identify
-from planner.identification.measured_frfs import matrices_at
-from planner.identification.measurement_model import (
+from planner.measurement.measured_frfs import matrices_at
+from planner.measurement.nuisances import (
     Part,
     Tolerances,
     basis,

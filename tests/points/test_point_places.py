@@ -7,7 +7,7 @@ import pytest
 
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
-from planner.identification.point_places import misplaced, questions
+from planner.measurement.point_places import misplaced, questions
 from planner.recording.points import Layout
 from planner.robot.robot import Robot
 from planner.truth.load import load_truth

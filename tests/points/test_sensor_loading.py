@@ -10,7 +10,7 @@ import pytest
 
 from planner.cli.run import run
 from planner.dynamics.simulation import Simulation
-from planner.identification.sensor_loading import unloaded
+from planner.measurement.sensor_loading import unloaded
 from planner.modal.modes import Mode
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation

@@ -7,10 +7,10 @@ import pytest
 
 from planner.campaign.from_urdf import StatedMasses, guess
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS, INERTIAL, Priors, parametrise
 from planner.errors import InputError
-from planner.identification.parameters import CAD_INERTIAS, INERTIAL, Priors, parametrise
-from planner.identification.result import Identification
-from planner.identification.write_robot import write_robot
+from planner.fit.result import Identification
+from planner.fit.write_robot import write_robot
 from planner.robot.link_bodies import guessed_masses, link_bodies
 from planner.robot.robot import Robot
 from planner.robot.solids import hull_solid

@@ -5,7 +5,7 @@ import pytest
 
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import parametrise
+from planner.effects.parameters import parametrise
 from planner.robot.robot import Robot
 from planner.studies.birk2025_bounds import paper_priors
 from planner.studies.birk2025_design import Informative

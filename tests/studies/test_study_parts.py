@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from planner.effects.parameters import Priors
 from planner.errors import InputError
-from planner.identification.parameters import Priors
 from planner.studies import (
     birk2025,
     birk2025_data,

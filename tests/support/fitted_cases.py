@@ -8,13 +8,13 @@ import numpy as np
 
 from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import CAD_INERTIAS
+from planner.measurement.nuisances import Tolerances
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import Spring

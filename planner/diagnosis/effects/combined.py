@@ -9,7 +9,7 @@ from planner.diagnosis.effects.effect import Effect, Setting, Transfer
 from planner.diagnosis.thresholds import ODDS_OF_NOTHING, SECOND_EFFECT
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import Priors
+from planner.effects.parameters import Priors
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ import numpy as np
 from planner.diagnosis.thresholds import ODDS_OF_NOTHING
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import Priors
+from planner.effects.parameters import Priors
+from planner.measurement.nuisances import Tolerances
 from planner.recording.points import TOOL, Layout
 
 

@@ -10,7 +10,7 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.places import damping_time, movable, with_blocks
 from planner.diagnosis.thresholds import FURTHER_DAMPING_FACTOR, LOSS_FACTOR_FACTOR
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import KINDS, Priors, place_name
+from planner.effects.parameters import KINDS, Priors, place_name
 from planner.robot.config import BASE, Compliance, Payload
 from planner.robot.massless_base import massless_base
 

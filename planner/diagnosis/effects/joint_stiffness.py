@@ -7,7 +7,7 @@ from planner.diagnosis.effects.places import joint_of, joints
 from planner.diagnosis.effects.slight_bearings import is_slight
 from planner.diagnosis.thresholds import FAR_SPRING_FACTOR
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import Priors, place_name
+from planner.effects.parameters import Priors, place_name
 from planner.robot.config import Compliance
 
 

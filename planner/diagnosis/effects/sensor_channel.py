@@ -7,7 +7,7 @@ import numpy as np
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
 from planner.diagnosis.thresholds import ALONE_DELAY_SD_S, ALONE_GAIN_LOG_SD, USUAL
 from planner.dynamics.simulation import Simulation
-from planner.identification.measurement_model import Tolerances
+from planner.measurement.nuisances import Tolerances
 from planner.recording.points import SENSOR
 
 AXES = "xyz"

@@ -7,7 +7,7 @@ import numpy as np
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
 from planner.diagnosis.thresholds import SENSOR_ROTATION_SD_DEG, USUAL
 from planner.dynamics.simulation import Simulation
-from planner.identification.measurement_model import Tolerances
+from planner.measurement.nuisances import Tolerances
 from planner.recording.points import SENSOR
 
 

@@ -13,8 +13,8 @@ from planner.diagnosis.effects.places import damping_time, joint_of, movable, st
 from planner.diagnosis.effects.transverse_compliance import TransverseCompliance
 from planner.diagnosis.thresholds import FURTHER_DAMPING_FACTOR, SLIGHTLY_ACROSS
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Priors, place_name
 from planner.errors import InputError
-from planner.identification.parameters import Priors, place_name
 from planner.robot.config import Compliance
 
 BEARING = "bearing of "

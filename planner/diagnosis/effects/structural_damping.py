@@ -8,7 +8,7 @@ import numpy as np
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.thresholds import STRUCTURAL_SHARE
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import place_name
+from planner.effects.parameters import place_name
 from planner.robot.config import Compliance
 from planner.robot.robot import Robot
 

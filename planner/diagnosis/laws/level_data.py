@@ -13,7 +13,7 @@ from planner.diagnosis.laws.open_misses import OpenMisses, Whitening, whitening
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.thresholds import LAW_DIFFERENCE_ERROR, LAW_MODEL_ERROR
 from planner.dynamics.gradient import Impedance, response_gradient
-from planner.identification.measurement_model import real_rows
+from planner.measurement.nuisances import real_rows
 
 LINES = 64
 LAID = 4.0  # rate (1/s) of the window: so that 1.3 s of each hit are enough

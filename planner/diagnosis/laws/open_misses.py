@@ -16,7 +16,7 @@ from planner.dataset.dataset import LAID, Dataset
 from planner.dataset.level_columns import Column, column
 from planner.diagnosis.linear.fit import Fit
 from planner.dynamics.gradient import response_turned
-from planner.identification.measurement_model import (
+from planner.measurement.nuisances import (
     ACROSS,
     Tolerances,
     chain_basis,

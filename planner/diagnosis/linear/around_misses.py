@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.motion import Turned
-from planner.identification.measurement_model import (
+from planner.measurement.nuisances import (
     Block,
     Marginal,
     Part,

@@ -13,7 +13,7 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.discrepancy import Worth
 from planner.diagnosis.linear.fit import LAST_STEPS, Fit, carried_on
 from planner.diagnosis.linear.problem import Problem
-from planner.identification.measurement_model import OpenNumbers
+from planner.measurement.nuisances import OpenNumbers
 
 BEYOND = 3.0  # sds of a tolerance: of 14 numbers one is there by chance once in 26 diagnoses
 

@@ -25,10 +25,10 @@ from planner.diagnosis.thresholds import (
     DISCREPANCY_UNKNOWN,
     DISCREPANCY_USUAL,
 )
-from planner.identification.measurement_model import OpenNumbers, real_rows
-from planner.identification.missed_ports import guess
 from planner.inference.least_squares import Damping, Limits, accept, begin, propose
 from planner.inference.log_space import log_sum
+from planner.measurement.missed_ports import guess
+from planner.measurement.nuisances import OpenNumbers, real_rows
 
 MOST_STEPS, NOTHING_GAINED = 16, 0.5  # to where a fit is best; nats that a step is not worth
 STILL = 0.25  # nats within which log evidences are the same: a fit is then followed no farther

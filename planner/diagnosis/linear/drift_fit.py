@@ -13,7 +13,7 @@ from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.gradient import Inertias, motion_slopes, moved
 from planner.dynamics.motion import ActualPorts, Turned
 from planner.dynamics.simulation import Simulation
-from planner.identification.measured_frfs import common_band
+from planner.measurement.measured_frfs import common_band
 
 
 @dataclass(frozen=True, eq=False)

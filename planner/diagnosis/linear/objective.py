@@ -9,9 +9,7 @@ from planner.diagnosis.effects.effect import Effect, Setting
 from planner.diagnosis.linear.around_misses import AroundMisses
 from planner.dynamics.gradient import Impedance, Inertias, motion_slopes, moved
 from planner.dynamics.motion import ActualPorts, Motion, Turned, recorded
-from planner.identification.measured_frfs import Measured
-from planner.identification.measurement_model import Tolerances
-from planner.identification.missed_ports import actual_ports, guess
+from planner.effects.parameters import Parametrisation
 from planner.identification.objective import (
     FARTHEST,
     LOG_PRIOR,
@@ -19,8 +17,10 @@ from planner.identification.objective import (
     stands,
     weight_of,
 )
-from planner.identification.parameters import Parametrisation
 from planner.inference.least_squares import LONGEST, Quadratic
+from planner.measurement.measured_frfs import Measured
+from planner.measurement.missed_ports import actual_ports, guess
+from planner.measurement.nuisances import Tolerances
 from planner.robot.elastic_model import Matrices
 
 # Lines at least by which misses are guessed, around which all lines are taken then: misses are few

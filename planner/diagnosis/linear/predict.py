@@ -9,9 +9,9 @@ from planner.diagnosis.linear.fit import Fit, fit, settle
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.gradient import laplace
-from planner.identification.agreement import Similarity, similarity_of
-from planner.identification.held_out import set_aside
-from planner.identification.measured_frfs import Measured
+from planner.fit.held_out import set_aside
+from planner.measurement.agreement import Similarity, similarity_of
+from planner.measurement.measured_frfs import Measured
 from planner.recording.points import TOOL, Layout
 
 ALL = Grade(256)

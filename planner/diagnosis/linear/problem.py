@@ -20,11 +20,11 @@ from planner.diagnosis.thresholds import (
 )
 from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS, Parametrisation, Priors, parametrise
 from planner.errors import InputError
 from planner.frf.frf import Frf
-from planner.identification.measured_frfs import Measured, layout_of, matrices_at, stack
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import CAD_INERTIAS, Parametrisation, Priors, parametrise
+from planner.measurement.measured_frfs import Measured, layout_of, matrices_at, stack
+from planner.measurement.nuisances import Tolerances
 from planner.recording.points import Layout
 from planner.robot.elastic_model import Matrices
 

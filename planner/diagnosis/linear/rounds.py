@@ -23,7 +23,7 @@ from planner.diagnosis.linear.found import Found
 from planner.diagnosis.linear.other_places import inertias_bent
 from planner.diagnosis.linear.problem import CLOSE, FINE, Grade, Problem
 from planner.diagnosis.thresholds import CLEARLY_WRONG
-from planner.identification.held_out import farthest_first
+from planner.fit.held_out import farthest_first
 from planner.inference.parallel import side_by_side
 from planner.progress import Tell
 

@@ -13,7 +13,7 @@ from planner.diagnosis.effects.two_hanging_resonators import TwoHangingResonator
 from planner.diagnosis.linear.fit import Fit, placed
 from planner.diagnosis.linear.problem import COARSE, Problem
 from planner.diagnosis.linear.three_axis_resonators import FEW, begun, jumped
-from planner.identification.held_out import farthest_first
+from planner.fit.held_out import farthest_first
 from planner.inference.parallel import side_by_side
 
 PLACES = 2  # links at which a second one is looked for

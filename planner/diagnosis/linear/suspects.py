@@ -18,7 +18,7 @@ from planner.diagnosis.effects.extra_compliance import ExtraCompliance
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.fit import Fit, approached, points
 from planner.diagnosis.linear.problem import GLANCE, Problem
-from planner.identification.held_out import farthest_first
+from planner.fit.held_out import farthest_first
 from planner.inference.parallel import side_by_side
 
 ROUGH = replace(GLANCE, lines=24, inertial=False)

@@ -15,7 +15,7 @@ from planner.diagnosis.linear.evidence import best_of
 from planner.diagnosis.linear.fit import Fit, approached, points, settle
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import CLOSE, COARSE, Problem
-from planner.identification.held_out import farthest_first
+from planner.fit.held_out import farthest_first
 from planner.inference.parallel import side_by_side
 
 FIRST, STEPS = 10, 24  # of all starts, and of the best

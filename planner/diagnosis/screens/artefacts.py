@@ -33,9 +33,9 @@ from planner.diagnosis.thresholds import (
     READ_SCALE_SD,
 )
 from planner.dynamics.simulation import Simulation
-from planner.identification.measured_frfs import common_band
-from planner.identification.measurement_model import Tolerances
 from planner.inference.evidence import laplace, savage_dickey, temper
+from planner.measurement.measured_frfs import common_band
+from planner.measurement.nuisances import Tolerances
 from planner.recording.points import SENSOR
 from planner.recording.records import AXES, Hit
 

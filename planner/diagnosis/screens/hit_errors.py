@@ -20,7 +20,7 @@ from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.thresholds import BEYOND_ANY_HAND
 from planner.dynamics.gradient import response_turned
 from planner.dynamics.simulation import Simulation
-from planner.identification.measurement_model import Tolerances, hit_basis
+from planner.measurement.nuisances import Tolerances, hit_basis
 from planner.recording.records import Hit
 
 LINES = 96  # at most, of each hit

@@ -1,16 +1,14 @@
-"""What recordings taught a campaign's simulation: a structure, and its parameters."""
+"""What recordings taught a simulation: a structure, and its parameters."""
 
 from dataclasses import dataclass
 
+from planner.effects.parameters import Priors
+from planner.fit.fitted import StructureFit
+from planner.fit.identified import ExtendedModel, as_identification
 from planner.fit.posterior import RobotPosterior
-from planner.identification.extended_structure import ExtendedModel
-from planner.identification.parameters import Priors
-from planner.identification.result import Estimate, Identification
+from planner.fit.result import Estimate, Identification
 from planner.words import counted
 
-# What no structure explains, in shares of |H|, up to which the simulation is followed: of a fit
-# that lacks nothing it is 0.001 to 0.015. Chosen.
-FOLLOWED = 0.06
 BEYOND = 2.0  # sds of the gains, from which their deviation is told
 KNOWN = 0.3  # sd of ln k to which a spring not stated is known when it is told of
 # PosedBodies from which a place is told as found: from one, neighbours imitate each other.
@@ -27,10 +25,16 @@ class Learned:
     identified: Identification
     poses: int = PLACED
 
+    @classmethod
+    def of(cls, found: StructureFit) -> "Learned":
+        """From the structure that was found."""
+        posterior = RobotPosterior.of(found)
+        return cls(posterior, *as_identification(posterior), len(found.misfit.data.q))
+
     @property
     def fits(self) -> bool:
         """Whether it explains the recordings."""
-        return self.posterior.size <= FOLLOWED
+        return self.posterior.explains
 
     @property
     def priors(self) -> Priors:

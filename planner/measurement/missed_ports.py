@@ -3,7 +3,7 @@
 import numpy as np
 
 from planner.dynamics.motion import ActualPorts
-from planner.identification.measurement_model import (
+from planner.measurement.nuisances import (
     ACROSS,
     OF_HAMMER,
     OF_HIT,

@@ -11,8 +11,8 @@ import numpy as np
 
 from planner.dynamics.mode_families import undamped_modes
 from planner.dynamics.simulation import Simulation
-from planner.identification.measured_frfs import with_sensors
 from planner.inference.assignment import least_cost
+from planner.measurement.measured_frfs import with_sensors
 from planner.modal.mac import mac_matrix
 from planner.modal.modes import Mode
 from planner.recording.points import SENSOR, TCP, Layout

@@ -12,7 +12,7 @@ import numpy as np
 from planner.dynamics.gradient import response
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
-from planner.identification.measured_frfs import Measured, stack
+from planner.measurement.measured_frfs import Measured, stack
 from planner.recording.points import SENSOR, TCP, Layout
 
 MOST_LINES = 200  # of a pose, that are compared

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import Parametrisation
+from planner.effects.parameters import Parametrisation
 
 # The data have told something of a direction once its sd is half of what it was before.
 TOLD = 0.5
@@ -18,7 +18,7 @@ class Estimate:
     """One parameter: value, the sd of its logarithm, and what was known before.
 
     `blocks` are the [[compliance]] blocks that share it, from 0. `identifiable`: the data at
-    least halved the sd of its logarithm.
+    least halved the sd of its logarithm, and what was fitted is `explained` by the simulation.
     """
 
     name: str
@@ -29,6 +29,7 @@ class Estimate:
     prior_median: float
     prior_log_sd: float
     unit: str = ""
+    explained: bool = True
 
     @property
     def sd(self) -> float:
@@ -38,7 +39,7 @@ class Estimate:
     @property
     def identifiable(self) -> bool:
         """Whether the data say more than the prior did."""
-        return self.log_sd < TOLD * self.prior_log_sd
+        return self.explained and self.log_sd < TOLD * self.prior_log_sd
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,9 @@ class Tolerances:
         return float(np.hypot(self.cross_axis, self.mounting_rad))
 
 
+# Of FRFs that are computed, or taken for exact.
+EXACT_HITS = Tolerances(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
 OF_HIT, OF_SENSOR, OF_HAMMER = 4, 12, 2  # numbers of each hit axis, each sensor, and of all
 
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
-from planner.identification.parameters import Parametrisation, Priors, parametrise
-from planner.identification.result import Identification
+from planner.effects.parameters import Parametrisation, Priors, parametrise
+from planner.fit.result import Identification
 
 # A pole is told by inverse iteration from so far beside it, relative to itself, in so many rounds.
 BESIDE, ROUNDS = 1e-7, 2

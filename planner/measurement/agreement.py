@@ -9,8 +9,8 @@ from planner.dynamics.gradient import response
 from planner.dynamics.simulation import Simulation
 from planner.frf import metrics
 from planner.frf.frf import Frf
-from planner.identification.measured_frfs import Measured, common_band, stack
-from planner.identification.truncated_decay import cut_off
+from planner.measurement.measured_frfs import Measured, common_band, stack
+from planner.measurement.truncated_decay import cut_off
 
 MODEL_ERROR = 0.003  # relative sd of all that no simulation follows: calibration, angles
 MOST_LINES = 512  # a pose

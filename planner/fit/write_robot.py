@@ -4,11 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import tomlkit
 
 from planner.errors import InputError
-from planner.identification.result import Identification
+from planner.fit.result import Identification
 from planner.robot.config import Compliance, entry_of
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.mesh_files import copy_meshes
@@ -16,6 +17,7 @@ from planner.robot.robot import Robot
 from planner.robot.urdf_inertias import urdf_with_inertias
 
 INERTIAL_ENTRIES = "mass_kg", "centre_m", "inertia_kg_m2"  # of [[link]]
+FOUND = "resonator", "harmonic"  # blocks that an identification may add
 DIGITS = 6  # significant ones: more than any identification knows
 
 
@@ -25,7 +27,8 @@ def updated_toml(
     """The robot.toml `text` with the [[compliance]] blocks' numbers (and its urdf) replaced.
 
     A new `urdf` is one of `urdf_with_inertias`, which has what [[link]] states in it.
-    `added` blocks, which the identification counts last, follow those in the text.
+    `added` blocks, which the identification counts last, follow those in the text, and so do
+    resonators and harmonics that it found.
     """
     document = tomlkit.parse(text)
     listed = document["compliance"]
@@ -42,6 +45,13 @@ def updated_toml(
         for number in estimate.blocks:
             at = entry_of(estimate.kind, blocks[number])
             blocks[number][at] = float(f"{estimate.value:.{DIGITS}g}")
+    for kind in FOUND:
+        stated = len(document.get(kind, ()))
+        stated += sum(len(e.get(kind, ())) for e in document.get("effects", ()))
+        for block in getattr(result.simulation.robot.config, kind)[stated:]:
+            table = tomlkit.table()
+            table.update(msgspec.to_builtins(block))
+            document.setdefault(kind, tomlkit.aot()).append(table)
     if urdf is not None:
         document["urdf"] = urdf
         drop_stated_inertias(document)

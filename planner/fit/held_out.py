@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Priors
 from planner.errors import InputError
+from planner.fit.identify import identify
+from planner.fit.learned import Learned
 from planner.frf.frf import Frf
-from planner.identification.agreement import Similarity, fit_similarity
-from planner.identification.identify import identify
-from planner.identification.parameters import Priors
-from planner.identification.result import Identification
+from planner.measurement.agreement import Similarity, fit_similarity
 
 EVERY = 4  # one pose of so many is set aside
 FEWEST = 3  # poses of which one can be spared
@@ -26,8 +26,8 @@ class JudgedIdentification:
     lacked; where there are none, trial and similarities are None.
     """
 
-    final: Identification
-    trial: Identification | None
+    final: Learned
+    trial: Learned | None
     before: Similarity
     after: Similarity
     held_out: tuple[int, ...]
@@ -70,24 +70,27 @@ def identify_judged(
     frfs: Sequence[Frf],
     q: np.ndarray,
     simulation: Simulation,
-    priors: Priors | None = None,
+    priors: Priors,
     held_out: int | None = None,
     shown: Sequence[Frf] | None = None,
     **options: Any,
 ) -> JudgedIdentification:
-    """Identify without the held-out poses, judge there, then refine on all poses.
+    """Identify without the held-out poses, judge there, then go on with all poses.
 
     Arguments as `identify`, whose other options are passed on; `held_out` is how many. Judged is
     by the FRFs `shown` of the same poses, where they are others than those that are fitted.
     """
     aside, band = set_aside(q, held_out), options.get("band_hz")
     shown = frfs if shown is None else shown
-    before, warm, judged = fit_similarity(simulation, shown, q, band), None, (None, None)
+    before = fit_similarity(simulation, shown, q, band)
+    trial, warm, judged = None, None, (None, None)
     if aside:
         kept = [i for i in range(len(q)) if i not in aside]
-        warm = identify([frfs[i] for i in kept], q[kept], simulation, priors, **options)
+        trial = identify([frfs[i] for i in kept], q[kept], simulation, priors, **options)
+        warm = trial.posterior.found.remembered
         there = [shown[i] for i in aside], q[list(aside)], band
-        judged = fit_similarity(simulation, *there), fit_similarity(warm.simulation, *there)
+        found = trial.identified.simulation
+        judged = fit_similarity(simulation, *there), fit_similarity(found, *there)
     final = identify(frfs, q, simulation, priors, warm=warm, **options)
-    after = fit_similarity(final.simulation, shown, q, band)
-    return JudgedIdentification(final, warm, before, after, aside, *judged)
+    after = fit_similarity(final.identified.simulation, shown, q, band)
+    return JudgedIdentification(final, trial, before, after, aside, *judged)
