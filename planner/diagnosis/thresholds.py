@@ -206,7 +206,7 @@ DRIFT_SWEPT = 0.9  # correlation of an angle with time from which a sweep is one
 DRIFT_STILL = 2.0  # χ² per value: a pose that answers alike when visited again has not drifted
 
 # The measuring chain
-USUAL = 2.5  # sds of a tolerance (see identification.measurement_model): within, it is no artefact
+USUAL = 2.5  # sds of a tolerance (see measurement.nuisances): within, it is no artefact
 # What left-out physics pulls the matrix's entries and the delay (s) away by, where the simulation
 # fits to within noise and where χ² per value is CHAIN_MISFIT; it grows with its root. On 216
 # concealed cases of seeds 19001 to 22001 without artefacts (χ² up to 30000), delays were 0.06 ms

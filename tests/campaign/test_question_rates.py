@@ -10,14 +10,14 @@ from threadpoolctl import threadpool_limits
 from planner.campaign.chain_faults import TURNED
 from planner.campaign.question import Mistake, StatedHits, scaled
 from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
 from planner.fit.expected import ExpectedFrfs
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import CAD_INERTIAS
+from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
 from tests.support.fitted_cases import ARMS, Case, everyday, harder
 

@@ -2,7 +2,7 @@
 
 No two hits along an axis miss alike, so that FRFs of two levels differ even where the structure is
 linear: by B η, B being the simulation's responses to forces across the axis and to moments, and η
-four numbers with normal priors (see `identification.measurement_model`). Integrating over η takes
+four numbers with normal priors (see `measurement.nuisances`). Integrating over η takes
 the directions B out of what is compared as far as the prior lets them be taken. What B is wrong by
 is counted as an error besides.
 """
