@@ -6,9 +6,9 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.stats import multivariate_normal
 
 from planner.errors import InputError
-from planner.studies.models.icm import Coregionalisation, fit_icm, log_density, solve
-from planner.studies.models.multitask import fit_multitask, normalised
 from planner.surrogate.kernels import parse
+from planner.surrogate.models.icm import Coregionalisation, fit_icm, log_density, solve
+from planner.surrogate.models.multitask import fit_multitask, normalised
 
 
 def related(n, m, seed=0, noise=0.05):

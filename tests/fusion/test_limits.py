@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from planner.studies.models.fidelity_levels import Exact, Samples
-from planner.studies.models.multitask import fit_multitask
-from planner.studies.models.quadrature_mfdgp import fit_quadrature_mfdgp
-from planner.studies.models.sparse_gp import fit_sparse
 from planner.surrogate import gp, marginal
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
 from planner.surrogate.hedged import fit_hedged
 from planner.surrogate.kernel_average import fit_shapes
 from planner.surrogate.kernels import parse
+from planner.surrogate.models.fidelity_levels import Exact, Samples
+from planner.surrogate.models.multitask import fit_multitask
+from planner.surrogate.models.quadrature_mfdgp import fit_quadrature_mfdgp
+from planner.surrogate.models.sparse_gp import fit_sparse
 from planner.surrogate.training_data import TrainingData
 
 GRID = np.random.default_rng(8).random((30, 2))

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from planner.errors import InputError
-from planner.studies.models.multitask import (
+from planner.surrogate.models.multitask import (
     Hyperparameters,
     Tasks,
     fit_multitask,

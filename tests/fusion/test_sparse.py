@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.studies.models.fidelity_levels import Exact, Samples
-from planner.studies.models.quadrature_mfdgp import fit_quadrature_mfdgp
-from planner.studies.models.sparse_gp import PRIOR, bound, choose_inducing, fit_sparse
 from planner.surrogate.kernels import parse
+from planner.surrogate.models.fidelity_levels import Exact, Samples
+from planner.surrogate.models.quadrature_mfdgp import fit_quadrature_mfdgp
+from planner.surrogate.models.sparse_gp import PRIOR, bound, choose_inducing, fit_sparse
 
 GRID = np.random.default_rng(8).random((50, 2))
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.studies.models import frf_surface
-from planner.studies.models.frf_surface import SURFACES, Grid, fit_surface
+from planner.surrogate.models import frf_surface
+from planner.surrogate.models.frf_surface import SURFACES, Grid, fit_surface
 
 LINES, POSES = np.linspace(5, 30, 40), np.linspace(0, 1, 9)
 
