@@ -98,9 +98,12 @@ def maps(
     """Amplitudes (F, n) in m/s²/N over (n,) and lines (F,) in Hz, one scale as of the first."""
     level = {name: 20 * np.log10(np.maximum(z, 1e-9)) for name, (_, _, z) in surfaces.items()}
     top = next(iter(level.values())).max()
-    for panel, (name, (x, y, _)) in zip(panels, surfaces.items(), strict=True):
-        image = panel.pcolormesh(
+    images = [
+        panel.pcolormesh(
             x, y, level[name], vmin=top - reach_db, vmax=top, cmap="viridis", rasterized=True
         )
+        for panel, (name, (x, y, _)) in zip(panels, surfaces.items(), strict=True)
+    ]
+    for panel, name in zip(panels, surfaces, strict=True):
         panel.set_title(name, fontsize=9)
-    figure.colorbar(image, ax=list(panels), label="dB re 1 m/s²/N", pad=0.01)
+    figure.colorbar(images[-1], ax=list(panels), label="dB re 1 m/s²/N", pad=0.01)
