@@ -17,8 +17,7 @@ from planner.studies.claims import Bound, ClaimRule, judge
 from planner.studies.report import Paper, Report, Table
 from planner.surrogate.frf_bands import frf_moments
 from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
-from planner.surrogate.models.frf_surface import Grid, fit_surface
-from planner.surrogate.models.published_surface import PUBLISHED, fit_published
+from planner.surrogate.models.frf_surface import SURFACES, Grid, fit_surface
 
 from .data import ACROSS, BAND_HZ, BEYOND_DEG, SWEEP_DEG, Sweep, poses, sweep
 from .pictures import (
@@ -42,7 +41,7 @@ PAPER = Paper(
     "Probabilistic information fusion to model the pose-dependent dynamics of milling robots",
     "Production Engineering 14, 435–444",
 )  # fmt: skip
-LOGARITHMIC = ("log sparse NARGP", "log quadrature MFDGP")
+LOGARITHMIC = ("NARGP", "MFDGP")
 EVERY = (1, 2, 3, 4)  # every n-th experiment is trained with
 FEWEST_STEP = 3  # every third experiment: 9 of 26 in the paper
 ROBOTS = (11, 12, 13)  # seeds; ours was written with robots 1 and 2
@@ -144,7 +143,7 @@ def figures(run: dict[int, BeyondPrediction], seen: Sweep) -> dict[str, float]:
     step = next(iter(run))
     main, there = run[step], seen.every(step)
     found = {"least R² of fused modes over all steps": min(each[FUSED] for each in r2.values())}
-    for name in r2[step].keys() & PUBLISHED.keys():
+    for name in r2[step].keys() & SURFACES.keys():
         found[f"R² of {name} over both"] = everywhere(name, main, there)
         grown = main.beyond_sd[name][:, -1].mean() / main.trained_sd[name].mean()
         found[f"{name}'s sd at 120° over that in the training"] = float(grown)
@@ -205,20 +204,21 @@ def _predict(
     low = Grid(lines[kept[0]], angles[kept[1]], seen.simulated[kept])
     measured = Grid(seen.lines_hz, seen.angles_deg, seen.amplitude)
     at, count = (seen.lines_hz, BEYOND_DEG), len(seen.angles_deg)
-    surface, said, named = fit_published(low, low, "GP"), "", 0
+    surface, said, named = fit_surface(low, low, "GP"), "", 0
     predicted = {"simulation": surface.predict(*at)[0]}
     trained = {"simulation": surface.predict(seen.lines_hz, seen.angles_deg)[0]}
     trained_sd: dict[str, np.ndarray] = {}
     beyond_sd: dict[str, np.ndarray] = {}
-    published = tuple(PUBLISHED) if everything else tuple(n for n in PUBLISHED if n in THIN)
+    published = tuple(SURFACES) if everything else tuple(n for n in SURFACES if n in THIN)
     for i, model in enumerate(published):
         progress(f"{model} as published, {count} experiments", 0.3 * i)
-        surface = fit_published(measured, low, model)
+        surface = fit_surface(measured, low, model)
         predicted[model], beyond_sd[model] = surface.predict(*at)
         trained[model], trained_sd[model] = surface.predict(seen.lines_hz, seen.angles_deg)
     for model in LOGARITHMIC if everything and ours else ():
         progress(f"{model}, {count} experiments", 0.7)
-        predicted[model] = fit_surface(measured, low, model).predict(*at)[0]
+        log = fit_surface(measured, low, model, logarithm=True)
+        predicted[f"log {model}"] = log.predict(*at)[0]
     progress(f"fused modes, {count} experiments", 0.8)
     fused = _fused(seen)
     predicted |= fused.amplitude

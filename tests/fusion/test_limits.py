@@ -8,10 +8,7 @@ from planner.surrogate.ar1 import OutputPrior, fit_ar1
 from planner.surrogate.hedged import fit_hedged
 from planner.surrogate.kernel_average import fit_shapes
 from planner.surrogate.kernels import parse
-from planner.surrogate.models.fidelity_levels import Exact, Samples
 from planner.surrogate.models.multitask import fit_multitask
-from planner.surrogate.models.quadrature_mfdgp import fit_quadrature_mfdgp
-from planner.surrogate.models.sparse_gp import fit_sparse
 from planner.surrogate.training_data import TrainingData
 
 GRID = np.random.default_rng(8).random((30, 2))
@@ -85,14 +82,6 @@ def test_without_a_simulation_the_hedge_is_a_gp():
     hedged = fit_hedged(data, (PRIOR,), (PRIOR,), nothing).predict(GRID, low)
     plain = fit_ar1(data, (PRIOR,), (PRIOR,), nothing).predict(GRID, low)
     np.testing.assert_allclose(hedged, plain, atol=1e-12)
-
-
-def test_a_deep_gp_that_does_not_look_below_is_a_sparse_gp():
-    x, y = samples(12)
-    s = Samples.of(x, y[:, 0], 0.02)
-    deep = fit_quadrature_mfdgp(s, Exact(lambda x: x[:, 0]), kernel="rbf[0:2]")
-    plain = fit_sparse(s, "rbf")
-    np.testing.assert_allclose(deep.predict(GRID), plain.predict(GRID), atol=0.01)
 
 
 def test_one_task_is_a_gp_at_its_hyperparameters():

@@ -12,11 +12,10 @@ both layers, all q(u_l), kernels and noises move together, by Adam (Kingma & Ba 
 et al. 2020 (Table 1) noises and the q(u_l)'s covariances are held in a first stage. Here q(u_l) is
 written for L⁻¹u (the same model in other coordinates), inducing inputs are data and stay, and a
 prediction integrates over f_1(x) by quadrature, where the paper draws samples of it.
-A bound whose best q(u) is put in, with layer 1 fitted first, is in `quadrature_mfdgp`.
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -29,7 +28,6 @@ from planner.surrogate.kernels import linear, parse, rbf
 from planner.surrogate.models.fidelity_levels import Samples
 from planner.surrogate.models.likelihood_gp import Normalisation
 from planner.surrogate.models.nargp import NODES, WEIGHTS
-from planner.surrogate.models.sparse_gp import Covarying, choose_inducing
 
 JITTER = 1e-6  # of the inducing points' covariance, relative to the prior variance
 LENGTH = 0.15  # of x at the start, times √d; x is scaled to about [0, 1]
@@ -39,6 +37,18 @@ START_SPREAD = 0.1  # of q(L⁻¹u) at the start, held in the first stage
 MOST_TO_BEGIN = 1500  # points from which q(u) begins
 DRAWS, MOST_DRAWN = 256, 20_000  # of f_1 in the bound that is told: at a point, and in all
 DECAY_1, DECAY_2, SMALL = 0.9, 0.999, 1e-8  # of Adam
+
+
+class Covarying(Protocol):
+    """What kernels are asked for here; see `planner.surrogate.kernels.Kernel`."""
+
+    def covariance(self, xp: Any, theta: Any, xa: Any, xb: Any) -> Any:
+        """(a, b) of xa (a, d), xb (b, d)."""
+        ...
+
+    def variance(self, xp: Any, theta: Any, x: Any) -> Any:
+        """Its diagonal (a,)."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -155,6 +165,26 @@ def fit_mfdgp(
     draws = max(1, min(DRAWS, MOST_DRAWN // len(y_high)))
     value = float(bound(layers, data, 3 * seed + 2, draws))
     return MFDGP(layers, data, high_units, value)
+
+
+def choose_inducing(k: Covarying, theta: np.ndarray, x: np.ndarray, count: int) -> np.ndarray:
+    """`count` rows of x at most, each where those before leave most variance unexplained.
+
+    See Burt et al. 2020.
+    """
+    left = k.variance(np, theta, x).astype(float)
+    whole = float(left.max())
+    rows: list[int] = []
+    factor = np.zeros((min(count, len(x)), len(x)))
+    for i in range(len(factor)):
+        pick = int(np.argmax(left))
+        if left[pick] < 1e-6 * whole:
+            break
+        column = k.covariance(np, theta, x[pick : pick + 1], x)[0]
+        factor[i] = (column - factor[:i, pick] @ factor[:i]) / np.sqrt(left[pick])
+        left = np.maximum(left - factor[i] ** 2, 0.0)
+        rows.append(pick)
+    return x[rows]
 
 
 def _at_the_data(
