@@ -19,8 +19,7 @@ from scipy.linalg import cho_factor, cho_solve
 from planner.studies import drawing
 from planner.studies.report import Table
 from planner.surrogate.kernels import parse
-from planner.surrogate.models.icm import fit_icm, solve
-from planner.surrogate.models.multitask import MultiTaskGP, fit_multitask
+from planner.surrogate.models.multitask import RANK, MultiTaskGP, fit_multitask
 
 from .data import LEFT, RIGHT
 
@@ -73,14 +72,14 @@ def _others_known(model: MultiTaskGP, x: np.ndarray, y: np.ndarray, test: np.nda
     k = parse(model.tasks.kernel, x.shape[1]).covariance(np, h.theta, x, x)
     noiseless = np.kron(h.task_covariance, k)
     noisy = noiseless + np.kron(np.diag(h.noise), np.eye(n))
-    scaled = ((y - model.centre) / model.scale).T.ravel()
+    scaled = ((y - model.tasks.centre) / model.tasks.scale).T.ravel()
     told = np.empty((int(test.sum()), y.shape[1]))
     for task in range(y.shape[1]):
         asked = task * n + np.flatnonzero(test)
         known = np.setdiff1d(np.arange(len(scaled)), asked)
         alpha = cho_solve(cho_factor(noisy[np.ix_(known, known)]), scaled[known])
         told[:, task] = noiseless[np.ix_(asked, known)] @ alpha
-    return model.centre + model.scale * told
+    return model.tasks.centre + model.tasks.scale * told
 
 
 COUNTS, FEW_COUNTS = (1, 2, 3, 4, 5, 9, 36, 72, 144), (1, 3, 9, 144)
@@ -97,23 +96,23 @@ def cost_table(small: bool = False) -> Table:
     rows = []
     for m in FEW_COUNTS if small else COUNTS:
         y = smooth @ rng.standard_normal((3, m)) + 0.1 * rng.standard_normal((POSTURES, m))
-        fit_icm(x[:8], y[:8])  # compiles
+        fit_multitask(x[:8], y[:8], rank=min(m, RANK))  # compiles
         start = time.process_time()
-        fitted = fit_icm(x, y)
+        fitted = fit_multitask(x, y, rank=min(m, RANK))
         seconds = time.process_time() - start
+        h = fitted.hyperparameters
         direct, differs = float("nan"), float("nan")
         if m <= MOST_DIRECT:
             start = time.process_time()
-            k = parse("rbf", 3).covariance(np, fitted.found.theta, x, x)
+            k = parse("rbf", 3).covariance(np, h.theta, x, x)
             k = k + 1e-9 * np.mean(np.diag(k)) * np.eye(POSTURES)
-            noise = np.diag(np.exp(2 * fitted.found.log_noise))
-            whole = np.kron(fitted.found.task_covariance, k) + np.kron(noise, np.eye(POSTURES))
+            noise = np.diag(h.noise)
+            whole = np.kron(h.task_covariance, k) + np.kron(noise, np.eye(POSTURES))
             root = cho_factor(whole, lower=True)[0]
             direct = time.process_time() - start
-            white = np.linalg.solve(np.tril(root), fitted.data.y.T.ravel())
+            white = np.linalg.solve(np.tril(root), fitted.tasks.y.T.ravel())
             size = np.log(np.diag(root)).sum() + 0.5 * len(whole) * np.log(2 * np.pi)
-            told = solve(fitted.data, "rbf", fitted.found).value
-            differs = abs(float(-0.5 * white @ white - size) - told)
+            differs = abs(float(-0.5 * white @ white - size) - fitted.solved.value)
         rows.append((f"{m}", seconds, direct, differs, PAPER_S.get(m, float("nan"))))
     columns = ("m", "training, s", "one direct Cholesky, s", "log-likelihoods differ by",
                "paper: training, s")  # fmt: skip

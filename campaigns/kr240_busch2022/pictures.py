@@ -21,8 +21,8 @@ from planner.studies.report import r_squared
 from planner.surrogate.frf_bands import frf_moments
 from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
 from planner.surrogate.models.fidelity_levels import Exact, FidelityLevel, Samples
-from planner.surrogate.models.kennedy_ohagan import fit_kennedy_ohagan
 from planner.surrogate.models.likelihood_gp import Normalisation, fit_likelihood
+from planner.surrogate.models.nargp import fit_nargp, kennedy_ohagan
 
 from .data import COMPARED, FREQUENCY_MODELS, KERNELS, AnalysedPoses, nearest, split
 
@@ -221,7 +221,13 @@ def _moments(seen: AnalysedPoses, train: np.ndarray, target: int) -> tuple[np.nd
 
         frequency = Samples.of(x[train], modes.frequency_hz[train, k])
         models: list[FidelityLevel] = [
-            fit_kennedy_ohagan(frequency, Exact(nearest(x, low)), Normalisation.of(low), True),
+            fit_nargp(
+                frequency,
+                Exact(nearest(x, low)),
+                Normalisation.of(low),
+                isotropic=True,
+                kernel=kennedy_ohagan,
+            ),
             fit_likelihood(
                 Samples.of(x[train], modes.damping_ratio[train, k]), "cubic", isotropic=True
             ),

@@ -14,9 +14,8 @@ from planner.studies.claims import Bound, ClaimRule, judge
 from planner.studies.report import Paper, Report, Table, r_squared
 from planner.surrogate.models.ar1_nargp import fit_ar1_nargp
 from planner.surrogate.models.fidelity_levels import Exact, Samples
-from planner.surrogate.models.kennedy_ohagan import fit_kennedy_ohagan
 from planner.surrogate.models.likelihood_gp import Normalisation, fit_likelihood
-from planner.surrogate.models.nargp import fit_nargp
+from planner.surrogate.models.nargp import fit_nargp, kennedy_ohagan
 from planner.surrogate.models.recursive_ar1 import fit_recursive
 from planner.surrogate.models.single_output_gp import fit_gp
 
@@ -233,7 +232,7 @@ def _frequency(seen: AnalysedPoses, k: int) -> Output:
     low = seen.modes.simulated.frequency_hz[:, k]
     exact, units = Exact(nearest(seen.x, low)), Normalisation.of(low)
     fits = _kernels(KERNELS[1:]) | {
-        "AR1": lambda s: fit_kennedy_ohagan(s, exact, units, True).predict,
+        "AR1": lambda s: fit_nargp(s, exact, units, isotropic=True, kernel=kennedy_ohagan).predict,
         "NARGP": lambda s: fit_nargp(s, exact, units, isotropic=True).predict,
         "averaged RBF": lambda s: fit_gp(s, "rbf").predict,
         "averaged AR1": lambda s: fit_recursive(s, exact, units.scale, kernel="rbf").predict,

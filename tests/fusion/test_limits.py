@@ -91,12 +91,15 @@ def test_one_task_is_a_gp_at_its_hyperparameters():
     b = h.task_covariance[0, 0]
     k = b * kernel.covariance(np, h.theta, x, x) + h.noise[0] * np.eye(10)
     cross = b * kernel.covariance(np, h.theta, x, GRID)
-    scaled = (y[:, 0] - fitted.centre[0]) / fitted.scale[0]
-    mean = fitted.centre[0] + fitted.scale[0] * cross.T @ np.linalg.solve(k, scaled)
+    scaled = (y[:, 0] - fitted.tasks.centre[0]) / fitted.tasks.scale[0]
+    mean = fitted.tasks.centre[0] + fitted.tasks.scale[0] * cross.T @ np.linalg.solve(k, scaled)
     variance = b * kernel.variance(np, h.theta, GRID) - np.sum(
         cross * np.linalg.solve(k, cross), axis=0
     )
     np.testing.assert_allclose(fitted.predict(GRID)[0][:, 0], mean, atol=1e-5)
     np.testing.assert_allclose(
-        fitted.predict(GRID)[1][:, 0], fitted.scale[0] * np.sqrt(variance), rtol=1e-3, atol=1e-6
+        fitted.predict(GRID)[1][:, 0],
+        fitted.tasks.scale[0] * np.sqrt(variance),
+        rtol=1e-3,
+        atol=1e-6,
     )

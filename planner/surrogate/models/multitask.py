@@ -1,9 +1,11 @@
 """Multi-task GP: t outputs share what they learn about poses (Lei et al. 2023, section 4.4.2).
 
-cov(f_a(x), f_b(x')) = B_ab k(x, x') (intrinsic coregionalisation, Bonilla et al. 2008), with
-B = L Lᵀ free and a noise per task. Every output is observed at every pose, so that K is
-B ⊗ K_x + D and two small eigendecompositions do what one large Cholesky factor would (Rakitsch et
-al. 2013). Hyperparameters: the most probable ones, or the likeliest.
+cov(f_a(x), f_b(x')) = B_ab k(x, x') (intrinsic coregionalisation, Bonilla et al. 2008) with a noise
+per task. B is free, L Lᵀ, for groups of a kind as published, or of a low rank, W Wᵀ + diag(κ), for
+any number of tasks at once. Every output is observed at every pose, so that K is B ⊗ K_x + D and
+two small eigendecompositions do what one large Cholesky factor would, O(n³ + t³) in place of
+O(n³ t³) (Rakitsch et al. 2013). Hyperparameters: the most probable ones, or the likeliest, begun at
+the outputs' own covariance, poses' kernel and noises first.
 """
 
 from dataclasses import dataclass
@@ -19,45 +21,54 @@ from planner.errors import InputError
 from planner.inference.quasi_newton import maximise
 from planner.surrogate.kernels import parse
 
+RANK = 3  # columns of W: chosen on robots 1 and 2 of the study of Lei et al. 2023
 NOISE, NOISE_SPREAD = 0.1, 1.5  # median sd of a task's noise over its scale, its log-sd
-LENGTH, LENGTH_SPREAD = 0.8, 1.0  # of k's scales, times √d
+LENGTH = 0.8  # of k's scales, times √d
+FREE_SPREAD, LOW_RANK_SPREAD = 1.0, 0.5  # log-sd of k's scales; the second chosen as RANK
+OWN, OWN_SPREAD = 0.1, 1.5  # κ's square root over the output's sd: median, log-sd
+WEIGHT_SD = 1.0  # of L's or W's entries around those of the data's own covariance
 REACH = 6.0  # sds of the prior beyond which nothing is looked for
-FTOL = 1e-5  # of the log density: less changes no prediction
-TASK_SD = 1.0  # of L's entries around those of the data's own covariance
+FIRST_STEPS, FTOL = 40, 1e-6
 RELATIVE_JITTER = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Normalised:
+class Tasks:
     """Outputs y (n, t) at x (n, d), each over its own mean and sd, `centre` and `scale` (t,)."""
 
     x: np.ndarray
     y: np.ndarray
+    kernel: str
     centre: np.ndarray
     scale: np.ndarray
 
-
-@dataclass(frozen=True, eq=False)
-class Tasks:
-    """What is to be fitted: x (n, d), y (n, t) scaled, kernel expression."""
-
-    x: np.ndarray
-    y: np.ndarray
-    kernel: str
+    @classmethod
+    def of(cls, x: np.ndarray, y: np.ndarray, kernel: str = "rbf") -> "Tasks":
+        """Of y (n, t) at x (n, d); InputError where a value is missing."""
+        if not np.isfinite(y).all():
+            which = int(np.argmin(np.isfinite(y).all(axis=0))) + 1
+            raise InputError(f"Output {which} has no value at some pose: leave it or the pose out.")
+        centre, scale = y.mean(axis=0), y.std(axis=0)
+        scale = np.where(scale > 1e-12 * np.maximum(np.abs(centre), 1e-300), scale, 1.0)
+        return cls(x, (y - centre) / scale, kernel, centre, scale)
 
 
 @dataclass(frozen=True, eq=False)
 class Hyperparameters:
-    """L (t, t) lower triangular, log of the noise sds (t,), θ (p,) of the kernel over poses."""
+    """W (t, r), log √κ (t,), log noise sds (t,), θ (p,) of the kernel over poses.
 
-    root: np.ndarray
+    A free B has r = t, W lower triangular and no κ (−∞).
+    """
+
+    weights: np.ndarray
+    log_own: np.ndarray
     log_noise: np.ndarray
     theta: np.ndarray
 
     @property
     def task_covariance(self) -> np.ndarray:
         """B (t, t)."""
-        return self.root @ self.root.T
+        return self.weights @ self.weights.T + np.diag(np.exp(2 * self.log_own))
 
     @property
     def noise(self) -> np.ndarray:
@@ -66,15 +77,13 @@ class Hyperparameters:
 
     def flat(self) -> np.ndarray:
         """As one vector."""
-        return np.concatenate([self.root[_lower(self.root)], self.log_noise, self.theta])
+        return np.concatenate([self.weights.ravel(), self.log_own, self.log_noise, self.theta])
 
     def like(self, vector: np.ndarray) -> "Hyperparameters":
         """The ones in `vector`, shaped like these."""
-        t = len(self.root)
-        split = np.split(vector, [t * (t + 1) // 2, t * (t + 1) // 2 + t])
-        root = np.zeros((t, t))
-        root[_lower(root)] = split[0]
-        return Hyperparameters(root, split[1], split[2])
+        t, r = self.weights.shape
+        split = np.split(vector, [t * r, t * r + t, t * r + 2 * t])
+        return Hyperparameters(split[0].reshape(t, r), *split[1:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,22 +93,19 @@ class MultiTaskGP:
     tasks: Tasks
     hyperparameters: Hyperparameters
     solved: "KroneckerSolution"
-    centre: np.ndarray
-    scale: np.ndarray
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, t) of the noise-free outputs at x (q, d)."""
-        h, kernel = self.hyperparameters, parse(self.tasks.kernel, x.shape[1])
-        cross = kernel.covariance(np, h.theta, x, self.tasks.x)
-        b = h.task_covariance
-        explained = self.solved.explained(cross, b)
+        h, tasks = self.hyperparameters, self.tasks
+        kernel, b = parse(tasks.kernel, x.shape[1]), h.task_covariance
+        cross = kernel.covariance(np, h.theta, x, tasks.x)
         own = kernel.variance(np, h.theta, x)[:, None] * np.diag(b)[None, :]
-        sd = np.sqrt(np.maximum(own - explained, 0.0))
-        return self.centre + self.scale * (cross @ self.solved.alpha @ b), self.scale * sd
+        sd = np.sqrt(np.maximum(own - self.solved.explained(cross, b), 0.0))
+        return tasks.centre + tasks.scale * (cross @ self.solved.alpha @ b), tasks.scale * sd
 
     @property
     def correlation(self) -> np.ndarray:
-        """Correlation (t, t) of the outputs, as learned."""
+        """Correlation (t, t) of the outputs, as identified."""
         b = self.hyperparameters.task_covariance
         sd = np.sqrt(np.maximum(np.diag(b), 1e-300))
         return b / np.outer(sd, sd)
@@ -159,54 +165,41 @@ def solve_kronecker(
 
 
 def fit_multitask(
-    x: np.ndarray, y: np.ndarray, kernel: str = "rbf", iterations: int = 200, prior: bool = True
-) -> MultiTaskGP:
+    x: np.ndarray, y: np.ndarray, kernel: str = "rbf", iterations: int = 200, prior: bool = True,
+    rank: int | None = None,
+) -> MultiTaskGP:  # fmt: skip
     """Fit y (n, t) at x (n, d) scaled to about [0, 1], of at most `iterations` steps.
 
-    Without `prior` it is the greatest likelihood, as published.
+    `rank` of W; None: B is free. Without `prior` it is the greatest likelihood, as published.
     InputError where a value is missing.
     """
-    data = normalised(x, y)
-    tasks = Tasks(x, data.y, kernel)
-    guess = first_guess(tasks)
-    middle, width = guess.flat(), prior_sds(guess)
+    tasks = Tasks.of(x, y, kernel)
+    guess = first_guess(tasks, rank)
+    middle, width = guess.flat(), prior_sds(guess, rank)
 
-    # In units of the prior's sds: what is held fast (1e-6) would spoil the steps of all others.
+    # In units of the prior's sds: what is held fast (0) would spoil the steps of all others.
     def posterior(z: np.ndarray) -> tuple[float, np.ndarray]:
         value, slope = log_density(tasks, guess.like(middle + width * z))
         believed = float(prior) * z
         return value - 0.5 * float(believed @ z), width * slope - believed
 
-    def climb(z: np.ndarray, reach: float | np.ndarray, steps: int) -> np.ndarray:
-        return maximise(posterior, [z], -reach, reach, steps, FTOL).x
-
-    z = climb(np.zeros(len(middle)), REACH, iterations)
-    if np.any(guess.like(middle + width * z).noise > 1):
-        # More noise than the output varies at all: a long first step has ended where an output
-        # is given up. So first the poses' kernel and the noise, then the rest.
-        others = np.arange(len(middle)) >= len(_lower(guess.root)[0])
-        z = climb(climb(np.zeros(len(middle)), REACH * others, 20), REACH, iterations)
+    # B last: a long first step would end where an output is given up as noise.
+    z = np.zeros(len(middle))
+    others = np.arange(len(z)) >= guess.weights.size + guess.log_own.size
+    for free, steps in ((others, FIRST_STEPS), (np.ones(len(z)), iterations)):
+        z = maximise(posterior, [z], -REACH * free, REACH * free, steps, FTOL).x
     h = guess.like(middle + width * z)
-    return MultiTaskGP(tasks, h, solve(tasks, h), data.centre, data.scale)
-
-
-def normalised(x: np.ndarray, y: np.ndarray) -> Normalised:
-    """Of y (n, t) at x (n, d); InputError where a value is missing."""
-    if not np.isfinite(y).all():
-        which = int(np.argmin(np.isfinite(y).all(axis=0))) + 1
-        raise InputError(f"Output {which} has no value at some pose: leave it or the pose out.")
-    centre, scale = y.mean(axis=0), y.std(axis=0)
-    scale = np.where(scale > 1e-12 * np.maximum(np.abs(centre), 1e-300), scale, 1.0)
-    return Normalised(x, (y - centre) / scale, centre, scale)
+    return MultiTaskGP(tasks, h, solve(tasks, h))
 
 
 def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:
     """Log marginal likelihood and its slope in `h.flat()`."""
     solved = solve(tasks, h)
-    slope_root = (solved.slope_b + solved.slope_b.T) @ h.root
+    slope_weights = (solved.slope_b + solved.slope_b.T) @ h.weights
+    slope_own = 2 * np.diag(solved.slope_b) * np.exp(2 * h.log_own)
     slope_theta = np.array(pull(tasks.kernel, h.theta, tasks.x, solved.slope_k))
     return solved.value, np.concatenate(
-        [slope_root[_lower(h.root)], solved.slope_log_noise, slope_theta]
+        [slope_weights.ravel(), slope_own, solved.slope_log_noise, slope_theta]
     )
 
 
@@ -224,22 +217,31 @@ def pull(kernel: str, theta: Array, x: Array, slope: Array) -> Array:
     return jax.grad(lambda t: jnp.sum(k.covariance(jnp, t, x, x) * slope))(theta)
 
 
-def first_guess(tasks: Tasks) -> Hyperparameters:
-    """Hyperparameters to start from: B is the outputs' own covariance, made positive definite."""
+def first_guess(tasks: Tasks, rank: int | None) -> Hyperparameters:
+    """Hyperparameters to start from: B is the outputs' own covariance, or its first components."""
     n, t = tasks.y.shape
-    covariance = tasks.y.T @ tasks.y / n + 0.1 * np.eye(t)
+    covariance = tasks.y.T @ tasks.y / n
+    if rank is None:
+        weights, own = np.linalg.cholesky(covariance + 0.1 * np.eye(t)), np.full(t, -np.inf)
+    else:
+        values, vectors = np.linalg.eigh(covariance)
+        weights = (vectors * np.sqrt(np.maximum(values, 0.0)))[:, ::-1][:, :rank]
+        own = np.full(t, np.log(OWN))
     theta, _ = parse(tasks.kernel, tasks.x.shape[1]).prior(1.0, NOISE, LENGTH, 0.0, 1.0)
-    return Hyperparameters(np.linalg.cholesky(covariance), np.full(t, np.log(NOISE)), theta)
+    return Hyperparameters(weights, own, np.full(t, np.log(NOISE)), theta)
 
 
-def prior_sds(h: Hyperparameters) -> np.ndarray:
-    """Prior sds of `h.flat()`; k's first amplitude and its nugget stay, for B and D hold them."""
-    theta = np.full(len(h.theta), LENGTH_SPREAD)
-    theta[:2] = 1e-6
+def prior_sds(h: Hyperparameters, rank: int | None) -> np.ndarray:
+    """Prior sds of `h.flat()`, 0 of what stays.
+
+    So do k's first amplitude and its nugget, for B and D hold them.
+    """
+    weights = np.full_like(h.weights, WEIGHT_SD)
+    theta = np.full(len(h.theta), FREE_SPREAD if rank is None else LOW_RANK_SPREAD)
+    theta[:2] = 0.0
     return Hyperparameters(
-        np.full_like(h.root, TASK_SD), np.full_like(h.log_noise, NOISE_SPREAD), theta
+        np.tril(weights) if rank is None else weights,
+        np.full_like(h.log_own, 0.0 if rank is None else OWN_SPREAD),
+        np.full_like(h.log_noise, NOISE_SPREAD),
+        theta,
     ).flat()
-
-
-def _lower(root: np.ndarray) -> tuple[np.ndarray, ...]:
-    return np.tril_indices(len(root))

@@ -5,9 +5,12 @@ front; all kernels RBF with a length scale per coordinate. Each level's hyperpar
 of the greatest likelihood, level after level, g_t trained at the posterior mean of the level below.
 A prediction is the integral over the level below, by Gauss–Hermite quadrature with its mean and
 variance, where the paper and emukit use Monte Carlo: the same integral without its noise.
+AR1 as published (Kennedy & O'Hagan 2000), y = ρ·l(x) + δ(x), is the same with another kernel: ρ is
+integrated over a normal prior whose width is climbed, which with a linear kernel in l is one GP.
 AR1 in front, and averaged hyperparameters, are in `ar1_nargp`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +51,11 @@ def perdikaris(d: int, shape: str = "rbf") -> str:
     return f"{shape}[0:{d}]*{shape}[{d}:{d + 1}]+{shape}[0:{d}]"
 
 
+def kennedy_ohagan(d: int) -> str:
+    """Kernel expression σ² l l' + k_δ(x) over the same columns: AR1."""
+    return f"linear[{d}:{d + 1}]+rbf[0:{d}]"
+
+
 def fit_nargp(
     measured: Samples,
     low: FidelityLevel,
@@ -57,6 +65,7 @@ def fit_nargp(
     starts: int = STARTS,
     seed: int = 0,
     isotropic: bool = False,
+    kernel: Callable[[int], str] = perdikaris,
 ) -> NARGP:
     """NARGP of the measured samples over a cheap level, which is fitted already or exact.
 
@@ -65,11 +74,12 @@ def fit_nargp(
         low: the cheap level.
         low_units: by what the cheap level's value is normalised as an input.
         noise, units, starts, seed, isotropic: as of `fit_likelihood`.
+        kernel: `perdikaris`, or `kennedy_ohagan` for AR1.
     """
     below, _ = low.predict(measured.x)
     wide = Samples(widened(measured.x, below, low_units), measured.y, measured.sd)
-    kernel = perdikaris(measured.x.shape[1])
-    high = fit_likelihood(wide, kernel, noise, units, starts, seed, isotropic=isotropic)
+    expression = kernel(measured.x.shape[1])
+    high = fit_likelihood(wide, expression, noise, units, starts, seed, isotropic=isotropic)
     return NARGP(low, high, low_units)
 
 
