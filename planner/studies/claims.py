@@ -127,7 +127,7 @@ def _reason(bound: Bound, verdict: str, values: Sequence[float]) -> str:
     worst = min(values) if bound.below is None else max(values)
     said = f"{bound.figure}: {worst:.3g} on the worst seed"
     if bound.full is None or verdict == NOT:
-        return f"{said}, false {bound.false_if.removeprefix(bound.figure).strip()}"
+        return f"{said}, false if {bound.false_if.removeprefix(bound.figure).strip()}"
     sign = "≥" if bound.below is None else "≤"
     only = "" if verdict == HOLDS else "only "
     return f"{said}, in full {only}from {sign} {bound.full:g}"
