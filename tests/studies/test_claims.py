@@ -62,7 +62,7 @@ TOO_KIND = {
         "inside their 95 % interval, %": 90,
     },
     "overfits damping less": {
-        "RBF's RMSE at new over trained poses, over cubic's": 0.9,
+        "RBF's rise of RMSE from trained to new poses over cubic's": 0.9,
         "RBF's median RMSE of damping over cubic's": 1.2,
     },
 }
