@@ -11,9 +11,16 @@ from planner.errors import InputError
 from planner.progress import Tell, within
 from planner.report.answer import encoded
 from planner.studies import registry
-from planner.studies.answer import StudiesAnswer, StudyAnswer
+from planner.studies.claims import COLUMNS
 from planner.studies.page import index_page, study_page, write_page
-from planner.studies.report import Table, check_folder, write, write_table
+from planner.studies.report import (
+    StudiesAnswer,
+    StudyAnswer,
+    Table,
+    check_folder,
+    write,
+    write_table,
+)
 
 FINISHED = "study.json"  # written last: a folder that has it holds a whole study
 # What decides a study's figures; another command line or page does not.
@@ -32,14 +39,18 @@ class Finished(msgspec.Struct, frozen=True):
 
 def conduct(name: str, folder: Path | None, small: bool, progress: Tell) -> StudyAnswer:
     """One study; its tables, pictures and page go to `folder`."""
-    made = registry.find(name)
+    name = registry.named(name)
     check_folder(folder)
     start = time.perf_counter()
-    report = made(progress, small)
-    files = write(report, folder)
-    answer = StudyAnswer.of(report, files, time.perf_counter() - start, small)
+    told = registry.load(name).study(progress, small)
+    files: list[str] = []
+    answer = StudyAnswer(
+        name, told.data, told.tables, told.findings, files, time.perf_counter() - start,
+        told.paper.citation, small, told.paper.short,
+    )  # fmt: skip
+    files += write(answer, told.figures, folder)
     if folder is not None:
-        files.append(write_page(study_page(answer), folder / f"{answer.study}.html"))
+        files.append(write_page(study_page(answer), folder / f"{name}.html"))
     return answer
 
 
@@ -50,47 +61,44 @@ def conduct_all(folder: Path | None, small: bool, progress: Tell) -> StudiesAnsw
     """
     if folder is None:
         raise InputError("All studies take long and are kept; name a folder with --out.")
+    registry.named(registry.ALL)
     check_folder(folder)
     start, done, taken, damaged = time.perf_counter(), [], [], []
     count = len(registry.NAMES)
     for i, name in enumerate(registry.NAMES):
         there, tell = folder / name, within(progress, i / count, (i + 1) / count)
-        before = _finished(there, small)
+        before = _finished(name, there, small)
         if before is None:
             file = there / FINISHED
             damaged += [name] if file.exists() and not read_checked(file, Finished) else []
             before = conduct(name, there, small, lambda text, share, n=name, t=tell: t(
                 f"{n}: {text}", share))  # fmt: skip
-            _keep(before, there, small)
+            data = {"key": _key(name, small), "answer": msgspec.json.decode(encoded(before))}
+            write_checked(there / FINISHED, data)
         else:
             taken.append(name)
         done.append(before)
-    claims = [(a.study, *row) for a in done for row in a.claims.rows]
-    columns = "study", "claim", "holds here?", "computed here", "why not"
-    files = [
-        write_page(index_page(done), folder / "index.html"),
-        write_table(Table("claims", "Claims of all papers", columns, tuple(claims)), folder),
-    ]
+    claims = tuple((a.study, *row) for a in done for row in a.claims.rows)
+    whole = Table("claims", "Claims of all papers", ("study", "claim", *COLUMNS), claims)
+    files = [write_page(index_page(done), folder / "index.html"), write_table(whole, folder)]
     seconds = time.perf_counter() - start
     return StudiesAnswer(tuple(done), tuple(taken), files, seconds, tuple(damaged))
 
 
-def _key(small: bool) -> str:
-    return content_hash.digest(content_hash.program(*COMPUTING), "small" if small else "full")
+def _key(name: str, small: bool) -> str:
+    own = sorted(registry.folder_of(name).glob("*.py"))
+    texts = [path.read_text("utf-8") for path in own]
+    program = content_hash.program(*COMPUTING)
+    return content_hash.digest(program, *texts, "small" if small else "full")
 
 
-def _finished(folder: Path, small: bool) -> StudyAnswer | None:
+def _finished(name: str, folder: Path, small: bool) -> StudyAnswer | None:
     """The study that is there whole, computed by this program in this size."""
     try:
         kept = read_checked(folder / FINISHED, Finished)
-        if kept is None or kept.key != _key(small):
+        if kept is None or kept.key != _key(name, small):
             return None
         answer = StudyAnswer.from_json(kept.answer)
     except (msgspec.MsgspecError, KeyError, TypeError):
         return None
     return answer if all(Path(file).exists() for file in answer.files) else None
-
-
-def _keep(answer: StudyAnswer, folder: Path, small: bool) -> None:
-    data = {"key": _key(small), "answer": msgspec.json.decode(encoded(answer))}
-    write_checked(folder / FINISHED, data)

@@ -1,6 +1,6 @@
 """Pictures that the studies share: groups of bars, curves, maps over (frequency, pose)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -63,21 +63,25 @@ def legend(figure: Figure, panel: Axes) -> None:
     )
 
 
+def band(
+    panel: Axes, x: np.ndarray, predicted: np.ndarray, ends: Sequence[np.ndarray],
+    label: str = "95 % band",
+) -> None:  # fmt: skip
+    """A prediction (n,) over x (n,), and its interval's lower and upper ends (n,)."""
+    panel.fill_between(x, *ends, color="tab:red", alpha=0.25, lw=0, label=label)
+    panel.plot(x, predicted, color="tab:red", lw=1.4, label="predicted")
+    panel.grid(True, alpha=0.25)
+
+
 def frf(
     panel: Axes, frequency_hz: np.ndarray, predicted: np.ndarray,
-    band: tuple[np.ndarray, np.ndarray] | np.ndarray, title: str,
+    ends: tuple[np.ndarray, np.ndarray] | np.ndarray, title: str,
 ) -> None:  # fmt: skip
     """A predicted amplitude (F,) and its 95 % band, lower and upper (F,), in m/s²/N."""
-    lower, upper = band
-    panel.fill_between(
-        frequency_hz, np.maximum(lower, 0), upper, color="tab:red", alpha=0.25, lw=0,
-        label="95 % band",
-    )  # fmt: skip
-    panel.plot(frequency_hz, predicted, color="tab:red", lw=1.4, label="predicted")
+    band(panel, frequency_hz, predicted, (np.maximum(ends[0], 0), ends[1]))
     panel.set_title(title, fontsize=10)
     panel.set_xlim(frequency_hz[0], frequency_hz[-1])
     panel.set_ylim(bottom=0)
-    panel.grid(True, alpha=0.25)
 
 
 def curves(panel: Axes, x: np.ndarray, names: Sequence[str], values: np.ndarray) -> None:
@@ -85,3 +89,21 @@ def curves(panel: Axes, x: np.ndarray, names: Sequence[str], values: np.ndarray)
     for i, name in enumerate(names):
         panel.plot(x, values[:, i], "o-", ms=4, lw=1.4, color=COLOURS[name], label=name)
     panel.grid(True, alpha=0.25)
+
+
+def maps(
+    figure: Figure, panels: Sequence[Axes],
+    surfaces: Mapping[str, tuple[np.ndarray, np.ndarray, np.ndarray]], reach_db: float,
+) -> None:  # fmt: skip
+    """Amplitudes (F, n) in m/s²/N over (n,) and lines (F,) in Hz, one scale as of the first."""
+    level = {name: 20 * np.log10(np.maximum(z, 1e-9)) for name, (_, _, z) in surfaces.items()}
+    top = next(iter(level.values())).max()
+    images = [
+        panel.pcolormesh(
+            x, y, level[name], vmin=top - reach_db, vmax=top, cmap="viridis", rasterized=True
+        )
+        for panel, (name, (x, y, _)) in zip(panels, surfaces.items(), strict=True)
+    ]
+    for panel, name in zip(panels, surfaces, strict=True):
+        panel.set_title(name, fontsize=9)
+    figure.colorbar(images[-1], ax=list(panels), label="dB re 1 m/s²/N", pad=0.01)

@@ -6,51 +6,46 @@ from html import escape
 from pathlib import Path
 
 from planner.errors import InputError
-from planner.studies.answer import StudyAnswer
-from planner.studies.papers import PAPERS
-from planner.studies.report import Cell, Table
+from planner.studies.claims import HOLDS, IN_KIND, NOT, UNTESTED
+from planner.studies.report import Cell, StudyAnswer, Table, shown_cell
 
 STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; margin: 2em auto; max-width: 70em; padding: 0 1em;
+body { font: 15px/1.5 system-ui, sans-serif; margin: 2em auto; max-width: 84em; padding: 0 1em;
        color: #222; background: #fff; }
 h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin-top: 2em; }
 table { border-collapse: collapse; font-size: 0.92em; margin: 0.6em 0; }
 th, td { border-bottom: 1px solid #ccc; padding: 0.25em 0.7em; text-align: left;
          vertical-align: top; }
 td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-td.yes { color: #116611; font-weight: 600; } td.no { color: #aa1111; font-weight: 600; }
+td.verdict { font-weight: 600; color: #555; white-space: nowrap; }
+td.holds { color: #116611; } td.kind { color: #8a6100; } td.not { color: #aa1111; }
 img { max-width: 100%; } .simulated { color: #a0209a; font-weight: 600; }
 .wide { overflow-x: auto; }
 """
+CLASSES = {HOLDS: "verdict holds", IN_KIND: "verdict kind", NOT: "verdict not", UNTESTED: "verdict"}
 
 
 def study_page(answer: StudyAnswer) -> str:
     """The whole page: whose paper, what stands in for its data, claims, tables, pictures."""
-    paper = PAPERS[answer.study]
     parts = [
-        f"<h1>{escape(paper.short)}, done again</h1>",
-        f"<p>{escape(paper.citation)}</p>",
+        f"<h1>{escape(answer.short)}, done again</h1>",
+        f"<p>{escape(answer.paper)}</p>",
         f'<p class="simulated">{escape(answer.data)}</p>',
+        f"<p>{escape(_counted(answer))}</p>",
         _table(answer.claims),
         *(_table(table) for table in answer.tables),
         *(_picture(Path(file)) for file in answer.files if file.endswith(".png")),
         f"<p>Computed in {answer.seconds:.0f} s.</p>",
     ]
-    return _document(f"{paper.short}, done again", parts)
+    return _document(f"{answer.short}, done again", parts)
 
 
 def index_page(answers: Sequence[StudyAnswer]) -> str:
     """What holds, study by study, with a link to each one's page and all claims below."""
     rows = tuple(
-        (
-            answer.study,
-            PAPERS[answer.study].citation,
-            f"{sum(f.holds for f in answer.findings)} of {len(answer.findings)}",
-            answer.seconds,
-        )
-        for answer in answers
+        (a.study, a.paper, *(float(_count(a, v)) for v in CLASSES), a.seconds) for a in answers
     )
-    listed = Table("studies", "Studies", ("study", "paper", "claims that hold", "seconds"), rows)
+    listed = Table("studies", "Studies", ("study", "paper", *CLASSES, "seconds"), rows)
     links = {a.study: f"{a.study}/{a.study}.html" for a in answers}
     parts = [
         "<h1>Papers on pose-dependent robot dynamics, done again</h1>",
@@ -59,6 +54,16 @@ def index_page(answers: Sequence[StudyAnswer]) -> str:
         *(_table(answer.claims) for answer in answers),
     ]
     return _document("Papers done again", parts)
+
+
+def _count(answer: StudyAnswer, verdict: str) -> int:
+    return sum(claim.verdict == verdict for claim in answer.findings)
+
+
+def _counted(answer: StudyAnswer) -> str:
+    """How many claims have each verdict."""
+    each = ", ".join(f"{_count(answer, v)} {v}" for v in CLASSES)
+    return f"Of {len(answer.findings)} claims: {each}."
 
 
 def write_page(text: str, path: Path) -> str:
@@ -90,13 +95,12 @@ def _table(table: Table, links: dict[str, str] | None = None) -> str:
 
 
 def _cell(value: Cell, links: dict[str, str]) -> str:
+    text = escape(shown_cell(value))
     if not isinstance(value, str):
-        shown = "–" if value != value else f"{value:.4g}"
-        return f'<td class="number">{shown}</td>'
-    text = escape(value)
+        return f'<td class="number">{text}</td>'
     if value in links:
         text = f'<a href="{escape(links[value])}">{text}</a>'
-    kind = f' class="{value}"' if value in ("yes", "no") else ""
+    kind = f' class="{CLASSES[value]}"' if value in CLASSES else ""
     return f"<td{kind}>{text}</td>"
 
 

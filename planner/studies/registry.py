@@ -1,22 +1,62 @@
-"""The studies by name: first author and year of the paper."""
+"""The studies by name, first author and year of the paper: `study.py` beside the paper's robot."""
 
-from collections.abc import Callable
+import importlib.util
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
 
+from planner.demo import NAME as SHIPPED
+from planner.demo import shipped
 from planner.errors import InputError
-from planner.progress import Tell
-from planner.studies.report import Report
 
-NAMES = ("busch2022", "busch2020", "seyedhosseini2025", "lei2023", "birk2025")
+FOLDERS = {
+    "busch2022": "kr240_busch2022",
+    "busch2020": "kr240_busch2020",
+    "seyedhosseini2025": "kr210_seyedhosseini2025",
+    "lei2023": "irb6660_lei2023",
+    "birk2025": "kr10_birk2025",
+}
+NAMES = tuple(FOLDERS)
 ALL = "all"
 ALIASES = {f"seed-00{i}": name for i, name in enumerate(NAMES)}  # what they were called before
-Study = Callable[[Tell, bool], Report]  # progress, and whether the small version is wanted
+NEEDED = "mujoco"  # makes the recordings, as `planner.truth` has it
 
 
-def find(name: str) -> Study:
-    """The study of that name; InputError if there is none."""
-    from importlib import import_module
-
+def named(name: str) -> str:
+    """The study's own name; InputError if there is none, or what it needs is not installed."""
     name = ALIASES.get(name, name)
-    if name not in NAMES:
+    if name not in (*NAMES, ALL):
         raise InputError(f"There is no study {name}; choose one of {', '.join(NAMES)} or all.")
-    return import_module(f"planner.studies.{name}").study
+    if importlib.util.find_spec(NEEDED) is None:
+        raise InputError(
+            "Studies make their recordings with MuJoCo, which is not installed; install it with "
+            "pip install 'planner[truth]'."
+        )
+    return name
+
+
+def folder_of(name: str) -> Path:
+    """Where the study's files lie."""
+    return shipped(SHIPPED).parent / FOLDERS[name]
+
+
+def load(name: str) -> ModuleType:
+    """`study.py` as a package, so that it imports the files beside it, wherever campaigns lie.
+
+    It has RULES, and `study(progress, small)`, which gives a `Report`.
+    """
+    package, folder = f"planner_study_{name}", folder_of(name)
+    if package not in sys.modules:
+        spec = spec_from_file_location(
+            package, folder / "study.py", submodule_search_locations=[str(folder)]
+        )
+        assert spec is not None
+        assert spec.loader is not None
+        sys.modules[package] = module_from_spec(spec)
+        try:
+            spec.loader.exec_module(sys.modules[package])
+        except BaseException:
+            del sys.modules[package]
+            raise
+    return sys.modules[package]

@@ -1,20 +1,46 @@
-"""What a study answers: tables, pictures, and the paper's findings with whether they hold here."""
+"""What a study answers: tables, pictures and judged claims; its answer as JSON, text and files."""
 
 import csv
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
+from rich.console import Group, RenderableType
+from rich.text import Text
 
 from planner.errors import InputError
+from planner.report.answer import Answer
 from planner.report.plot_files import Pictures
-from planner.studies.papers import PAPERS
+from planner.report.text import table
+from planner.studies.claims import COLUMNS, HOLDS, IN_KIND, NOT, UNTESTED, PaperClaim
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Cell = str | float
+COLOURS = {HOLDS: "bold green", IN_KIND: "bold yellow", NOT: "bold red", UNTESTED: "bold"}
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Where a study's claims come from."""
+
+    authors: str
+    year: int
+    title: str
+    published: str
+
+    @property
+    def short(self) -> str:
+        """Such as "Busch et al. 2022"."""
+        return f"{self.authors.split(',')[0]} et al. {self.year}"
+
+    @property
+    def citation(self) -> str:
+        """Authors, year, title and journal in one line."""
+        return f"{self.authors} ({self.year}). {self.title}. {self.published}."
 
 
 @dataclass(frozen=True)
@@ -27,60 +53,92 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
 
 
-@dataclass(frozen=True)
-class PaperClaim:
-    """A sentence of the paper, the figures found here, and whether they bear it out.
-
-    `why_not`, of what was computed too: what makes it fail here; empty where nothing tells.
-    `ours`: it is no claim of the paper, but what is claimed for this program beside it.
-    """
-
-    paper: str
-    here: str
-    holds: bool
-    why_not: str = ""
-    ours: bool = False
-
-
 @dataclass(frozen=True, eq=False)
 class Report:
-    """A study's answer; `data` says what stands in for the paper's recordings."""
+    """What a study found; `data` says what stands in for the paper's recordings."""
 
-    study: str
+    paper: Paper
     data: str
     tables: tuple[Table, ...]
     findings: tuple[PaperClaim, ...]
     figures: "dict[str, Figure]" = field(default_factory=dict)
 
-    def table(self, name: str) -> Table:
-        """The table of that name; KeyError if there is none."""
-        return {t.name: t for t in self.tables}[name]
+
+@dataclass(frozen=True)
+class StudyAnswer(Answer):
+    """Answer of `study NAME`; `files` are absolute paths, `small` a version cut down for tests."""
+
+    study: str
+    data: str
+    tables: tuple[Table, ...]
+    findings: tuple[PaperClaim, ...]
+    files: list[str] = field(default_factory=list)
+    seconds: float = 0.0
+    paper: str = ""
+    small: bool = False
+    short: str = ""
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> "StudyAnswer":
+        """What `to_json` gave; missing numbers (null) are NaN again."""
+        tables = [
+            {**t, "rows": [[float("nan") if v is None else v for v in row] for row in t["rows"]]}
+            for t in data["tables"]
+        ]
+        return msgspec.convert({**data, "tables": tables}, cls, strict=False)
 
     @property
     def claims(self) -> Table:
-        """Claim by claim: whether it holds here, what was computed, and why not."""
-        return claims_table(self.study, self.findings)
+        """Claim by claim: verdict, the paper's figures and those here, rule and reason."""
+        columns = f"claim of {self.short}", *COLUMNS
+        rows = tuple(claim.row for claim in self.findings)
+        return Table(f"{self.study}_claims", f"Claims of {self.short}", columns, rows)
+
+    def text(self) -> Group:
+        """All tables, then the claims."""
+        parts: list[RenderableType] = [Text(self.data, style="bold magenta")]
+        parts += [_shown(entry) for entry in self.tables]
+        parts += _claims(self)
+        if self.files:
+            parts.append(f"{len(self.files)} files in {Path(self.files[0]).parent}")
+        return Group(*parts)
 
 
-def claims_table(study: str, findings: "tuple[PaperClaim, ...]") -> Table:
-    """The claims of a study's paper, and those made for this program beside it."""
-    paper = PAPERS[study].short
-    rows = tuple(
-        (
-            f"(this program) {claim.paper}" if claim.ours else claim.paper,
-            "yes" if claim.holds else "no",
-            claim.here,
-            "" if claim.holds else claim.why_not or "what was computed contradicts it",
-        )
-        for claim in findings
-    )
-    columns = f"claim of {paper}", "holds here?", "computed here", "why not"
-    return Table(f"{study}_claims", f"Claims of {paper}", columns, rows)
+@dataclass(frozen=True)
+class StudiesAnswer(Answer):
+    """Answer of `study all`; `taken` names those that were finished before and not run again.
+
+    `damaged` names those that were run again because what was kept of them was damaged.
+    """
+
+    studies: tuple[StudyAnswer, ...]
+    taken: tuple[str, ...]
+    files: list[str]
+    seconds: float
+    damaged: tuple[str, ...] = ()
+
+    def text(self) -> Group:
+        """The claims of all studies, and where the rest is."""
+        parts: list[RenderableType] = [p for study in self.studies for p in _claims(study)]
+        if self.taken:
+            parts.append(f"finished before, and not run again: {', '.join(self.taken)}")
+        if self.damaged:
+            parts.append(f"kept before, but damaged, and run again: {', '.join(self.damaged)}")
+        parts.append(f"all pages: {self.files[0]}")
+        return Group(*parts)
+
+
+def shown_cell(value: Cell) -> str:
+    """A table's entry as text and page have it."""
+    if isinstance(value, str):
+        return value
+    return "–" if value != value else f"{value:.4g}"
 
 
 def r_squared(predicted: np.ndarray, measured: np.ndarray, axis: int | None = None) -> np.ndarray:
-    """Coefficient of determination R² over an axis (all entries if None)."""
-    return 1 - np.mean((predicted - measured) ** 2, axis=axis) / np.var(measured, axis=axis)
+    """Coefficient of determination R² over an axis (all if None); NaN was not measured."""
+    off = np.nanmean((predicted - measured) ** 2, axis=axis)
+    return 1 - off / np.nanvar(measured, axis=axis)
 
 
 def check_folder(folder: Path | None) -> None:
@@ -95,22 +153,41 @@ def check_folder(folder: Path | None) -> None:
         ) from None
 
 
-def write(report: Report, folder: Path | None) -> list[str]:
+def write(answer: StudyAnswer, figures: "dict[str, Figure]", folder: Path | None) -> list[str]:
     """Tables as CSV and pictures as PNG; absolute paths of all files."""
     if folder is None:
         return []
-    files = [write_table(table, folder) for table in (*report.tables, report.claims)]
-    return files + Pictures(folder).write(report.figures, report.study)["plots"]
+    files = [write_table(each, folder) for each in (*answer.tables, answer.claims)]
+    return files + Pictures(folder).write(figures, answer.study)["plots"]
 
 
-def write_table(table: Table, folder: Path) -> str:
+def write_table(made: Table, folder: Path) -> str:
     """One table as CSV; the file's absolute path."""
-    path = folder.absolute() / f"{table.name}.csv"
+    path = folder.absolute() / f"{made.name}.csv"
     try:
         with path.open("w", newline="", encoding="utf-8") as out:
-            csv.writer(out).writerows([table.columns, *table.rows])
+            csv.writer(out).writerows([made.columns, *made.rows])
     except OSError as error:
         raise InputError(
             f"{path} cannot be written ({error.strerror}); name another folder."
         ) from None
     return str(path)
+
+
+def _shown(entry: Table) -> RenderableType:
+    made = table(entry.title, *entry.columns)
+    for row in entry.rows:
+        made.add_row(*map(shown_cell, row))
+    return made
+
+
+def _claims(answer: StudyAnswer) -> list[RenderableType]:
+    """Claim by claim, a few lines each: seven columns are too many for a screen."""
+    parts: list[RenderableType] = [Text(f"\nClaims of {answer.short}", style="italic")]
+    for claim in answer.findings:
+        sentence, verdict, paper, *rest = claim.row
+        parts.append(Text.assemble((f"{verdict}: ", COLOURS[verdict]), (sentence, "bold")))
+        labels = "here", "spread over seeds", "false if, on any seed", "reason"
+        told = {"the paper": paper} | dict(zip(labels, rest, strict=True))
+        parts += [Text(f"    {label}: {value}") for label, value in told.items()]
+    return parts

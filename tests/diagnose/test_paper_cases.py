@@ -16,15 +16,6 @@ from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from planner.studies.busch2020_data import (
-    ACROSS,
-    BAND_HZ,
-    BEYOND_DEG,
-    DRESS_PACK,
-    poses,
-    sweep,
-    true_robot,
-)
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.hits import Hammer
 from planner.truth.laws import Hardening
@@ -35,6 +26,13 @@ from planner.truth.scene import Scene, across, triple
 from planner.truth.secret import HitVisit, Secret, hit_poses
 from tests.support.known_robots import KR10
 from tests.support.measured_frfs import birk_folder, measured_frfs
+from tests.support.studied import part
+
+SWEPT = part("busch2020", "data")
+ACROSS, BAND_HZ, BEYOND_DEG, DRESS_PACK = (
+    getattr(SWEPT, name) for name in ("ACROSS", "BAND_HZ", "BEYOND_DEG", "DRESS_PACK")
+)
+poses, sweep, true_robot = SWEPT.poses, SWEPT.sweep, SWEPT.true_robot
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 

@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from planner.studies.models.grid_gp import fit_grid
 from planner.surrogate.kernels import parse
+from planner.surrogate.models.grid_gp import fit_grid
 
 
 def surface(a, b):

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.studies.models.fidelity_levels import FidelityLevel, Samples
-from planner.studies.models.recursive_ar1 import RecursiveAR1
-from planner.studies.models.single_output_gp import SingleGP
 from planner.surrogate.ar1 import AR1
 from planner.surrogate.gp import Posterior, Prior
 from planner.surrogate.gp import fit as fit_posterior
+from planner.surrogate.models.fidelity_levels import FidelityLevel, Samples
+from planner.surrogate.models.recursive_ar1 import RecursiveAR1
+from planner.surrogate.models.single_output_gp import SingleGP
 from planner.surrogate.training_data import TrainingData, pad
 from tests.support.joint_ar1 import Hyperparameters, condition_joint
 

@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 
-from planner.studies.models.fidelity_levels import Exact, Samples
-from planner.studies.models.multitask import fit_multitask
-from planner.studies.models.quadrature_mfdgp import fit_quadrature_mfdgp
-from planner.studies.models.sparse_gp import fit_sparse
 from planner.surrogate import gp, marginal
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
 from planner.surrogate.hedged import fit_hedged
 from planner.surrogate.kernel_average import fit_shapes
 from planner.surrogate.kernels import parse
+from planner.surrogate.models.multitask import fit_multitask
 from planner.surrogate.training_data import TrainingData
 
 GRID = np.random.default_rng(8).random((30, 2))
@@ -87,14 +84,6 @@ def test_without_a_simulation_the_hedge_is_a_gp():
     np.testing.assert_allclose(hedged, plain, atol=1e-12)
 
 
-def test_a_deep_gp_that_does_not_look_below_is_a_sparse_gp():
-    x, y = samples(12)
-    s = Samples.of(x, y[:, 0], 0.02)
-    deep = fit_quadrature_mfdgp(s, Exact(lambda x: x[:, 0]), kernel="rbf[0:2]")
-    plain = fit_sparse(s, "rbf")
-    np.testing.assert_allclose(deep.predict(GRID), plain.predict(GRID), atol=0.01)
-
-
 def test_one_task_is_a_gp_at_its_hyperparameters():
     x, y = samples(10)
     fitted = fit_multitask(x, y)
@@ -102,12 +91,15 @@ def test_one_task_is_a_gp_at_its_hyperparameters():
     b = h.task_covariance[0, 0]
     k = b * kernel.covariance(np, h.theta, x, x) + h.noise[0] * np.eye(10)
     cross = b * kernel.covariance(np, h.theta, x, GRID)
-    scaled = (y[:, 0] - fitted.centre[0]) / fitted.scale[0]
-    mean = fitted.centre[0] + fitted.scale[0] * cross.T @ np.linalg.solve(k, scaled)
+    scaled = (y[:, 0] - fitted.tasks.centre[0]) / fitted.tasks.scale[0]
+    mean = fitted.tasks.centre[0] + fitted.tasks.scale[0] * cross.T @ np.linalg.solve(k, scaled)
     variance = b * kernel.variance(np, h.theta, GRID) - np.sum(
         cross * np.linalg.solve(k, cross), axis=0
     )
     np.testing.assert_allclose(fitted.predict(GRID)[0][:, 0], mean, atol=1e-5)
     np.testing.assert_allclose(
-        fitted.predict(GRID)[1][:, 0], fitted.scale[0] * np.sqrt(variance), rtol=1e-3, atol=1e-6
+        fitted.predict(GRID)[1][:, 0],
+        fitted.tasks.scale[0] * np.sqrt(variance),
+        rtol=1e-3,
+        atol=1e-6,
     )

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from planner.studies.models.fidelity_levels import Samples
-from planner.studies.models.mfdgp import CutajarKernel, Training, bound, fit_mfdgp
 from planner.surrogate.kernels import parse
+from planner.surrogate.models.fidelity_levels import Samples
+from planner.surrogate.models.mfdgp import CutajarKernel, Training, bound, fit_mfdgp
 
 # Data and inducing points of one size throughout, so that it is compiled once.
 HOW = Training(held_steps=400, free_steps=600, inducing=8)

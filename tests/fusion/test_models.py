@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.studies.models.ar1_nargp import fit_ar1_nargp
-from planner.studies.models.fidelity_levels import Exact, Samples
-from planner.studies.models.recursive_ar1 import PRIOR, fit_recursive
-from planner.studies.models.single_output_gp import fit_gp
+from planner.surrogate.models.ar1_nargp import fit_ar1_nargp
+from planner.surrogate.models.fidelity_levels import Exact, Samples
+from planner.surrogate.models.recursive_ar1 import PRIOR, fit_recursive
+from planner.surrogate.models.single_output_gp import fit_gp
 from tests.support.compilations import compilations
 from tests.support.fused import GRID_PRIOR, fit_fused
 from tests.support.mixture import mix

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from planner.errors import InputError
-from planner.studies.models.multitask import (
+from planner.surrogate.models.multitask import (
     Hyperparameters,
     Tasks,
     fit_multitask,
@@ -20,10 +20,10 @@ def problem(n=12, t=3, d=2, seed=0):
     rng = np.random.default_rng(seed)
     x = rng.random((n, d))
     y = rng.standard_normal((n, t))
-    h = Hyperparameters(
-        np.tril(rng.standard_normal((t, t))), 0.3 * rng.standard_normal(t) - 1, np.full(2 + d, -0.2)
-    )
-    return Tasks(x, y, "rbf"), h
+    noise = 0.3 * rng.standard_normal(t) - 1
+    root = np.tril(rng.standard_normal((t, t)))
+    h = Hyperparameters(root, np.full(t, -np.inf), noise, np.full(2 + d, -0.2))
+    return Tasks(x, y, "rbf", np.zeros(t), np.ones(t)), h
 
 
 def gram(x, seed=1):
@@ -48,17 +48,16 @@ def test_kronecker_is_dense():
 def test_slopes_agree_with_finite_differences():
     tasks, h = problem()
     _, slope = log_density(tasks, h)
-    vector = h.flat()
-    rng = np.random.default_rng(3)
+    vector, rng = h.flat(), np.random.default_rng(3)
     for _ in range(4):
-        direction = rng.standard_normal(len(vector))
+        direction = np.where(np.isfinite(vector), rng.standard_normal(len(vector)), 0.0)
         ends = [log_density(tasks, h.like(vector + s * direction))[0] for s in (1e-5, -1e-5)]
         np.testing.assert_allclose(slope @ direction, (ends[0] - ends[1]) / 2e-5, rtol=1e-5)
 
 
 def test_unrelated_tasks_are_separate_gps():
     tasks, h = problem()
-    h = Hyperparameters(np.diag([1.0, 0.5, 2.0]), h.log_noise, h.theta)
+    h = Hyperparameters(np.diag([1.0, 0.5, 2.0]), h.log_own, h.log_noise, h.theta)
     k = gram(tasks.x)
     solved = solve_kronecker(tasks.y, k, h.task_covariance, h.noise)
     for j, b in enumerate((1.0, 0.25, 4.0)):

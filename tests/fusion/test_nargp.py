@@ -3,15 +3,15 @@
 import numpy as np
 from scipy.stats import multivariate_normal
 
-from planner.studies.models.fidelity_levels import Exact, Samples
-from planner.studies.models.likelihood_gp import (
+from planner.surrogate.kernels import parse
+from planner.surrogate.models.fidelity_levels import Exact, Samples
+from planner.surrogate.models.likelihood_gp import (
     Normalisation,
     at_hyperparameters,
     fit_growing,
     fit_likelihood,
 )
-from planner.studies.models.nargp import fit_nargp
-from planner.surrogate.kernels import parse
+from planner.surrogate.models.nargp import fit_nargp
 from tests.support.nargp_levels import fit_low
 
 

@@ -22,13 +22,15 @@ from planner.identification.effort import QUICK
 from planner.identification.identify import identify
 from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
-from planner.studies.birk2025_data import HAMMER
 from planner.truth.deviation import Deviation
 from planner.truth.handling import EVERYDAY
 from planner.truth.hits import write_recordings
 from planner.truth.load import load_truth
 from planner.truth.secret import HitVisit, Secret, hit_poses
 from tests.support.known_robots import KR10
+from tests.support.studied import part
+
+HAMMER = part("birk2025", "data").HAMMER
 
 ALONG = (
     ("foot", "base_link", (0.15, 0.0, 0.05), 11),

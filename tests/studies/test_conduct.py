@@ -3,15 +3,24 @@
 import csv
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from planner.errors import InputError
 from planner.progress import quietly
 from planner.studies import conduct, registry
-from planner.studies.answer import StudyAnswer
+from planner.studies.claims import Bound, ClaimRule, judge
 from planner.studies.drawing import new
-from planner.studies.report import PaperClaim, Report, Table
+from planner.studies.report import Paper, Report, StudyAnswer, Table
+
+AUTHORS = {"busch2022": "Busch, Zaeh", "lei2023": "Lei, Hou, Ding"}
+RULES = (
+    ClaimRule.of("It is <so>.", Bound("a", above=0.4)),
+    ClaimRule.of("It is not.", Bound("b", above=0.4, full=0.5)),
+    ClaimRule.of("Ours is better.", Bound("c", below=1, full=0.5), ours=True),
+    ClaimRule.of("Nobody knows.", Bound("d", above=0)),
+)
 
 
 @pytest.fixture
@@ -19,23 +28,21 @@ def ran(monkeypatch):
     """Two quick studies stand for all; what ran, in order."""
     ran = []
 
-    def find(name):
+    def load(name):
         def study(progress, small):
             ran.append((name, small))
             progress("all of it", 0.5)
-            figure = new((3, 2), "empty")
-            claims = (
-                PaperClaim("It is <so>.", "R² 0.5", True),
-                PaperClaim("It is not.", "R² 0.1", False, "the data are too few: 3"),
-                PaperClaim("Ours is better.", "R² 0.9", True, ours=True),
-            )
+            values = {"a": [0.5, 0.6], "b": [0.5, 0.4], "c": [0.7]}
+            claims = judge(RULES, values, {"b": "the data are too few: 3"})
             table = Table(f"{name}_t", "T", ("a", "b"), (("x", float("nan")), ("y", 2.5)))
-            return Report(name, "SIMULATED: nothing", (table,), claims, {f"{name}_f": figure})
+            paper = Paper(AUTHORS[name], 2023, "T", "J")
+            figures = {f"{name}_f": new((3, 2), "empty")}
+            return Report(paper, "SIMULATED: nothing", (table,), claims, figures)
 
-        return study
+        return SimpleNamespace(study=study)
 
     monkeypatch.setattr(registry, "NAMES", ("busch2022", "lei2023"))
-    monkeypatch.setattr(registry, "find", find)
+    monkeypatch.setattr(registry, "load", load)
     return ran
 
 
@@ -44,7 +51,7 @@ def test_all_studies_leave_an_index_a_page_each_and_one_table_of_claims(ran, tmp
     assert ran == [("busch2022", False), ("lei2023", False)]
     assert told.taken == ()
     index = (tmp_path / "index.html").read_text()
-    for name, authors in (("busch2022", "Busch, Zaeh (2022)"), ("lei2023", "Lei, Hou, Ding")):
+    for name, authors in AUTHORS.items():
         page = (tmp_path / name / f"{name}.html").read_text()
         assert f'href="{name}/{name}.html"' in index
         assert authors in index
@@ -56,10 +63,12 @@ def test_all_studies_leave_an_index_a_page_each_and_one_table_of_claims(ran, tmp
         assert not re.search(r'(src|href)="(?!data:)', page)
     with (tmp_path / "claims.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == 6
-    assert [row["holds here?"] for row in rows[:3]] == ["yes", "no", "yes"]
-    assert rows[1]["why not"] == "the data are too few: 3"
+    verdicts = ["holds", "does not hold", "holds in kind", "not testable here"]
+    assert [row["verdict"] for row in rows] == 2 * verdicts
+    assert all(row["reason"] for row in rows)
+    assert rows[1]["reason"] == "b: 0.4 on the worst seed, false if ≤ 0.4; the data are too few: 3"
     assert rows[2]["claim"] == "(this program) Ours is better."
+    assert "Of 4 claims: 1 holds, 1 holds in kind, 1 does not hold, 1 not testable here." in page
 
 
 def test_what_is_finished_is_not_run_again(ran, tmp_path):

@@ -8,8 +8,9 @@ import pytest
 from planner.frf import synthesis
 from planner.frf.frf import Frf
 from planner.modal.modes import Mode
-from planner.studies.four_steps import check
+from tests.support.studied import part
 
+check = part("seyedhosseini2025", "four_steps").check
 HZ = np.arange(4.0, 40.0, 0.25)
 
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.studies.models import recursive_ar1, single_output_gp
-from planner.studies.models.ar1_nargp import fit_ar1_nargp
-from planner.studies.models.fidelity_levels import AveragedModel, FidelityLevel, Samples
-from planner.studies.models.recursive_ar1 import fit_recursive, scales
-from planner.studies.models.single_output_gp import fit_gp
 from planner.surrogate.ar1 import OutputPrior
+from planner.surrogate.models import recursive_ar1, single_output_gp
+from planner.surrogate.models.ar1_nargp import fit_ar1_nargp
+from planner.surrogate.models.fidelity_levels import AveragedModel, FidelityLevel, Samples
+from planner.surrogate.models.recursive_ar1 import fit_recursive, scales
+from planner.surrogate.models.single_output_gp import fit_gp
 from tests.support.mixture import Mixture, mix
 
 # A simulation's grid: no noise, but perhaps what the kernel cannot follow, and enough points to

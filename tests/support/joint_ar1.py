@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from planner.studies.models.fidelity_levels import Samples
 from planner.surrogate.kernels import parse
+from planner.surrogate.models.fidelity_levels import Samples
 
 
 @dataclass(frozen=True)

@@ -5,14 +5,12 @@ from pathlib import Path
 import numpy as np
 
 from planner.frf.frf import Frf
-from planner.studies.birk2025_bounds import (
-    DAMPING_BOUNDS,
-    DEGREE,
-    TORSION_BOUNDS,
-    TRANSVERSE_BOUNDS,
-)
 from planner.truth.model import Truth
 from tests.support.known_robots import KR10
+from tests.support.studied import part
+
+FITS = part("birk2025", "fits")
+DEGREE = FITS.DEGREE
 
 # Birk et al. 2025, Table 7: N·m/°, N·m/(°/s).
 TORSION = (881.7, 1503.8, 896.7, 600.8, 208.8, 409.6)
@@ -48,11 +46,11 @@ def birk_bounds(transverse: bool = True) -> dict[str, tuple[float, float]]:
     """Table 2 in N·m/rad and N·m·s/rad, by parameter."""
     bounds = {}
     for i in range(6):
-        places = [(f"joint_{i + 1} about z", TORSION_BOUNDS[i])]
-        places += [(f"transverse_{i + 1}", TRANSVERSE_BOUNDS[i])] if transverse else []
+        places = [(f"joint_{i + 1} about z", FITS.TORSION_BOUNDS[i])]
+        places += [(f"transverse_{i + 1}", FITS.TRANSVERSE_BOUNDS[i])] if transverse else []
         for place, (low, high) in places:
             bounds[f"stiffness of {place}"] = (low * DEGREE, high * DEGREE)
-            bounds[f"damping of {place}"] = tuple(DEGREE * b for b in DAMPING_BOUNDS)
+            bounds[f"damping of {place}"] = tuple(DEGREE * b for b in FITS.DAMPING_BOUNDS)
     return bounds
 
 

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from planner.errors import InputError
-from planner.studies.models.fidelity_levels import AveragedModel
+from planner.surrogate.models.fidelity_levels import AveragedModel
 from planner.surrogate.predictive import Predictive
 
 NEGLIGIBLE = 1e-4  # weight below which a model is not asked

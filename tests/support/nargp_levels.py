@@ -1,7 +1,7 @@
 """The cheap level of NARGP, fitted to samples as emukit does."""
 
-from planner.studies.models.fidelity_levels import Samples
-from planner.studies.models.likelihood_gp import STARTS, LikelihoodGP, fit_likelihood
+from planner.surrogate.models.fidelity_levels import Samples
+from planner.surrogate.models.likelihood_gp import STARTS, LikelihoodGP, fit_likelihood
 
 
 def fit_low(

@@ -1,0 +1,168 @@
+"""Scores and pictures of Busch et al. 2020: Table 2, maps (Figures 5, 8), FRFs, Figure 10."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from planner.studies import drawing
+from planner.studies.report import Table, r_squared
+
+from .data import BEYOND_DEG, TRAINED_DEG, Sweep
+
+PAPER_R2 = {"simulation": 0.353, "GP": 0.785, "MFDGP": 0.758, "NARGP": 0.982}  # Table 2, test
+PAPER_ALL = {"simulation": 0.345, "GP": 0.943, "MFDGP": 0.932, "NARGP": 0.992}  # and training
+FUSED, DIAGNOSED = "fused modes", "diagnosed"
+THIN = ("GP", "NARGP", FUSED)  # with every number of experiments; MFDGP and diagnosis once
+
+
+@dataclass(frozen=True, eq=False)
+class BeyondPrediction:
+    """Amplitude (f, p) at BEYOND_DEG by name, the sd of the fused one, what diagnosis
+    said, and how many effects it `named`.
+
+    Of models as published also the amplitude at the measured angles, and sd there and beyond.
+    """
+
+    amplitude: dict[str, np.ndarray]
+    sd: np.ndarray
+    said: str = ""
+    trained: dict[str, np.ndarray] = field(default_factory=dict)
+    trained_sd: dict[str, np.ndarray] = field(default_factory=dict)
+    beyond_sd: dict[str, np.ndarray] = field(default_factory=dict)
+    named: int = 0
+
+
+def scores(amplitude: np.ndarray, seen: Sweep) -> tuple[float, float]:
+    """R² and RMSE in m/s²/N against the truth without noise."""
+    rmse = np.sqrt(np.mean((amplitude - seen.truth) ** 2))
+    return float(r_squared(amplitude, seen.truth)), float(rmse)
+
+
+def inside(predicted: BeyondPrediction, seen: Sweep) -> float:
+    """Share of the truth within 1.96 sd of the fused modes' FRF."""
+    return float(np.mean(np.abs(predicted.amplitude[FUSED] - seen.truth) < 1.96 * predicted.sd))
+
+
+def everywhere(name: str, predicted: BeyondPrediction, seen: Sweep) -> float:
+    """R² over measured angles (against what was measured) and those beyond (against the truth)."""
+    if name not in predicted.trained:
+        return float("nan")
+    told = np.hstack([predicted.trained[name], predicted.amplitude[name]])
+    return float(r_squared(told, np.hstack([seen.amplitude, seen.truth])))
+
+
+def score_table(predicted: BeyondPrediction, seen: Sweep) -> Table:
+    """R² and RMSE of every model beside the paper's."""
+    nan = float("nan")
+    rows = [
+        (
+            name,
+            *scores(amplitude, seen),
+            PAPER_R2.get(name, nan),
+            everywhere(name, predicted, seen),
+            PAPER_ALL.get(name, nan),
+        )
+        for name, amplitude in predicted.amplitude.items()
+    ]
+    title = f"Table 2: R² and RMSE beyond {TRAINED_DEG:.0f}°, trained below; R² over both"
+    columns = ("model", "R²", "RMSE m/s²/N", "R² in the paper", "R² over both", "in the paper")
+    return Table("busch2020_r2", title, columns, tuple(rows))
+
+
+def thin_table(predicted: dict[int, BeyondPrediction], seen: Sweep) -> Table:
+    """R² with every n-th experiment (Figure 10)."""
+    rows = [
+        (
+            f"every {step}: {len(seen.every(step).angles_deg)} experiments",
+            *(scores(each.amplitude[name], seen)[0] for name in THIN),
+        )
+        for step, each in predicted.items()
+    ]
+    return Table("busch2020_experiments", "R² with fewer experiments", ("trained with", *THIN),
+                 tuple(rows))  # fmt: skip
+
+
+SHOWN_DEG = (106.0, 113.0, 120.0)
+
+
+def sd_maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
+    """Sd of the models as published over the whole sweep (Figures 8d to 8f)."""
+    names = list(predicted.beyond_sd)
+    figure = drawing.new((11.0, 3.6), f"Sd of models as published, trained to {TRAINED_DEG:.0f}°")
+    panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
+    angles = np.concatenate([seen.angles_deg, BEYOND_DEG])
+    for panel, name in zip(panels, names, strict=True):
+        sd = np.hstack([predicted.trained_sd[name], predicted.beyond_sd[name]])
+        image = panel.pcolormesh(angles, seen.lines_hz, sd, cmap="magma", vmin=0, rasterized=True)
+        panel.axvline(TRAINED_DEG, color="w", ls="--", lw=1)
+        panel.set_title(name, fontsize=9)
+        panel.set_xlabel("joint 3 (°)")
+        figure.colorbar(image, ax=panel, label="sd (m/s²/N)")
+    panels[0].set_ylabel("frequency (Hz)")
+    return figure
+
+
+def maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
+    """What is measured, the truth beyond, and what each model predicts there, one colour scale."""
+    figure = drawing.new((11.0, 6.2), f"Driving-point accelerance, measured to {TRAINED_DEG:.0f}°")
+    surfaces = {"measured": (seen.angles_deg, seen.lines_hz, seen.amplitude)}
+    surfaces["truth (MuJoCo)"] = BEYOND_DEG, seen.lines_hz, seen.truth
+    for name, amplitude in predicted.amplitude.items():
+        r2 = scores(amplitude, seen)[0]
+        surfaces[f"{name}, R² {r2:.3f}"] = BEYOND_DEG, seen.lines_hz, amplitude
+    grid = figure.subplots(2, -(-len(surfaces) // 2), sharey=True, squeeze=False)
+    drawing.maps(figure, list(grid.ravel()[: len(surfaces)]), surfaces, 40)
+    for panel in grid[1]:
+        panel.set_xlabel("joint 3 (°)")
+    for panel in grid[:, 0]:
+        panel.set_ylabel("frequency (Hz)")
+    return figure
+
+
+def overlays(predicted: BeyondPrediction, seen: Sweep) -> Figure:
+    """FRFs at three angles beyond the training."""
+    figure = drawing.new((9.0, 8.0), "FRFs beyond the training, at three angles")
+    panels = figure.subplots(len(SHOWN_DEG), 1, sharex=True)
+    colours = drawing.COLOURS
+    for panel, angle in zip(panels, SHOWN_DEG, strict=True):
+        i = int(np.flatnonzero(angle == BEYOND_DEG)[0])
+        for name in (n for n in predicted.amplitude if n in PAPER_R2):
+            panel.plot(
+                seen.lines_hz,
+                predicted.amplitude[name][:, i],
+                color=colours[name],
+                lw=1.1,
+                label=name,
+            )
+        mean, sd = predicted.amplitude[FUSED][:, i], predicted.sd[:, i]
+        panel.fill_between(
+            seen.lines_hz, np.maximum(mean - 1.96 * sd, 0), mean + 1.96 * sd,
+            color=colours[FUSED], alpha=0.25, lw=0,
+        )  # fmt: skip
+        panel.plot(
+            seen.lines_hz, mean, color=colours[FUSED], lw=1.6, label="fused modes, 95 % band"
+        )
+        panel.plot(seen.lines_hz, seen.truth[:, i], "k--", lw=1.2, label="truth (MuJoCo)")
+        panel.set_title(f"joint 3 at {angle:.0f}°", fontsize=9)
+        panel.set_ylabel("|H| (m/s²/N)")
+        panel.set_xlim(seen.lines_hz[0], seen.lines_hz[-1])
+        panel.set_ylim(0, 1.6 * seen.truth[:, i].max())
+        panel.grid(True, alpha=0.25)
+    panels[-1].set_xlabel("frequency (Hz)")
+    drawing.legend(figure, panels[0])
+    return figure
+
+
+def experiments(thin: Table, steps: tuple[int, ...]) -> Figure:
+    """R² with fewer experiments (Figure 10)."""
+    figure = drawing.new((7.0, 4.2), f"R² beyond {TRAINED_DEG:.0f}° with every n-th experiment")
+    panel = figure.subplots()
+    values = np.array([row[1:] for row in thin.rows], dtype=float)
+    drawing.curves(panel, np.array(steps), thin.columns[1:], values)
+    panel.set_xlabel("every … experiment")
+    panel.set_ylabel("R²")
+    panel.set_xticks(steps)
+    panel.set_ylim(min(0.5, float(values.min()) - 0.05), 1.02)
+    panel.legend(fontsize=9, loc="lower left")
+    return figure

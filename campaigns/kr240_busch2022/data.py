@@ -1,0 +1,123 @@
+"""Data for Busch et al. 2022: the KR240 of the shipped campaign, hit at its 35 positions.
+
+Damping does not follow the stiffness (C = βK) here: every gear has its own, partly viscous, partly
+a loss factor, joints rub, and brakes engage anew at each visit (`everyday_hits`).
+"""
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from planner.campaign.cell import Cell
+from planner.campaign.config import load_campaign_config
+from planner.campaign.labels import label, observations
+from planner.campaign.log_conversion import from_mode
+from planner.campaign.state import Measurement
+from planner.demo import NAME, shipped
+from planner.frf.frf import Frf
+from planner.progress import Tell, within
+from planner.studies.hits import everyday, strike
+from planner.surrogate.modal_surrogate import ModalObservations
+from planner.truth.deviation import Deviation, Spring
+from planner.truth.hits import Hammer
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
+
+KERNELS = ("bias", "linear", "quadratic", "cubic", "rbf")
+FUSIONS = ("rbf", "AR1", "NARGP")  # as published
+OURS = ("averaged RBF", "averaged AR1", "AR1-NARGP")  # hyperparameters averaged
+COMPARED = (*FUSIONS, *OURS)
+FREQUENCY_MODELS = (*KERNELS[1:], *FUSIONS[1:], *OURS)
+COUNTS = tuple(range(3, 16))  # training sets B_3 … B_15 of the paper
+FEW_COUNTS = (3, 7, 15)  # of the small version
+RESIDUES = tuple(f"{d} {part}" for d in ("xx", "yy") for part in ("real", "imaginary"))
+TRAINED = 15
+HAMMER = Hammer(oversampling=8)
+FLAT = 0.01  # m: a coordinate that varies less (the height, by the readback) is none
+TRIED_DESIGNS = 200  # Latin hypercubes; that with the largest least distance is taken
+
+
+@dataclass(frozen=True, eq=False)
+class AnalysedPoses:
+    """35 poses at x (35, d) in [0, 1], their labelled modes and their FRFs, and the simulation."""
+
+    poses: tuple[str, ...]
+    x: np.ndarray
+    modes: ModalObservations
+    frfs: tuple[Frf, ...]
+
+
+def true_robot(seed: int) -> Truth:
+    """The robot that is hit: other springs, inertias, a soft base, each gear's own damping."""
+    base = tuple(
+        Spring("base", axis, k, 8.2e-4 * k)
+        for axis, k in (((1.0, 0.0, 0.0), 2.2e7), ((0.0, 1.0, 0.0), 1.9e7))
+    )
+    deviation = Deviation(seed, 0.12, 0.5, 0.04, 0.005, base, mixed=1.0)
+    return load_truth(shipped(NAME) / "robot" / "robot.toml", deviation)
+
+
+def places() -> dict[str, np.ndarray]:
+    """Joint angles (rad) of the 35 positions of Table A1, by name, as the shipped campaign's."""
+    with (shipped(NAME) / "recordings" / "recordings.csv").open(encoding="utf-8") as file:
+        rows = {row["pose"]: row for row in csv.DictReader(file)}
+    names = [f"joint_{k}_deg" for k in range(1, 7)]
+    return {pose: np.deg2rad([float(row[n]) for n in names]) for pose, row in rows.items()}
+
+
+def load(seed: int, progress: Tell) -> AnalysedPoses:
+    """Hits at all poses, modal analysis, labels by the simulation as in a campaign."""
+    source, truth, wanted = shipped(NAME), true_robot(seed), places()
+    config = load_campaign_config(source / "campaign.toml")
+    cell = Cell.load(source / "robot" / "robot.toml", config)
+    band_hz, q = config.modes.band_hz, np.array(list(wanted.values()))
+    struck = strike(
+        truth, everyday(truth, seed), q, HAMMER, band_hz, seed, within(progress, 0.0, 0.75)
+    )
+    found = tuple(
+        Measurement(
+            pose,
+            tuple(float(angle) for angle in np.rad2deg(there)),
+            (),
+            tuple(from_mode(mode) for mode in modes),
+        )
+        for pose, there, modes in zip(
+            wanted, struck.q, struck.modes(band_hz, within(progress, 0.75, 1.0)), strict=True
+        )
+    )
+    modes = observations(cell, label(cell, found))
+    x = modes.x[:, np.ptp(modes.x, axis=0) > FLAT]
+    x = (x - x.min(axis=0)) / np.ptp(x, axis=0)
+    return AnalysedPoses(tuple(wanted), x, modes, struck.frfs)
+
+
+def split(x: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Strategy A: 15 poses (in a random order, whose first N are B_N) and the 20 left over.
+
+    The poses nearest to a maximin Latin hypercube (section 2.2).
+    """
+    rng = np.random.default_rng(seed)
+    designs = [
+        qmc.LatinHypercube(x.shape[1], rng=rng).random(TRAINED) for _ in range(TRIED_DESIGNS)
+    ]
+    points = max(designs, key=_least_distance)
+    chosen: list[int] = []
+    for point in points:
+        distance = np.linalg.norm(x - point, axis=1)
+        distance[chosen] = np.inf
+        chosen.append(int(np.argmin(distance)))
+    train = rng.permutation(chosen)
+    return train, np.setdiff1d(np.arange(len(x)), train)
+
+
+def _least_distance(points: np.ndarray) -> float:
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+    return float(apart[np.triu_indices(len(points), 1)].min())
+
+
+def nearest(x: np.ndarray, values: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """What is known at x (n, d), values (n,), as a function of any of these poses (q, d)."""
+    return lambda at: values[np.argmin(np.linalg.norm(x[None] - at[:, None], axis=-1), axis=1)]

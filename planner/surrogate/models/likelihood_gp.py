@@ -1,0 +1,251 @@
+"""GP of one output as it is usually published: hyperparameters of the greatest likelihood.
+
+y ~ N(0, K + τ² I); log p(y | θ) = −½ yᵀ(K + τ²I)⁻¹y − ½ log|K + τ²I| − (n/2) log 2π (Rasmussen &
+Williams 2006, eq. 5.8) is climbed from several starts, the best taken; no prior, no averaging.
+Predictions are eqs. 2.23 and 2.24 there. With few points this is over-confident (`single_output_gp`
+averages instead): it is here because the papers do so.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_solve, solve_triangular
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
+
+from planner.inference.quasi_newton import RELATIVE_TOLERANCE, Peak, maximise
+from planner.surrogate.kernels import parse
+from planner.surrogate.models.fidelity_levels import Samples, spread
+from planner.surrogate.models.multitask import pull
+from planner.surrogate.training_data import capacity
+
+# Of log θ: amplitudes and length scales from 1e-3 to 1e5 in units of y's and x's own scale.
+LOWEST, HIGHEST = float(np.log(1e-3)), float(np.log(1e5))
+LENGTH = 0.4  # length scales from which a climb begins, times √d; x is scaled to about [0, 1]
+LEAST_NOISE = 1e-4  # sd over y's scale, where the noise is fitted
+JITTER = 1e-8  # variance over y's scale squared, as GPy adds it
+# Noise that is known and small leaves K + τ²I so ill-conditioned far from the peak that a first
+# step ends where every point stands alone: most climbs begin with more noise, then with less.
+# Too much of it at first leads them all to one peak: so each start begins one level further on.
+NOISES = (0.5, 0.1, 0.01)
+# Steps, and the relative gain after which a climb ends: of every start at first; the LAST likeliest
+# of them go on to the end.
+ROUGHLY, LAST = (60, 1e-5), 2
+MOST_STEPS, FEW_STEPS = 200, 60  # of a climb to the end; of one that begins at fewer points' peak
+FTOL = 1e-7  # of the latter: less of the log-likelihood changes no prediction
+# Log-densities further apart are those of different peaks; so many are followed to more points.
+SAME_PEAK, MOST_PEAKS = 0.5, 4
+STARTS = 5  # "five optimization runs" (Busch et al. 2022, section 2.3.1)
+
+
+@dataclass(frozen=True, eq=False)
+class Normalisation:
+    """y is modelled as (y − centre) / scale."""
+
+    centre: float
+    scale: float
+
+    @classmethod
+    def of(cls, y: np.ndarray) -> "Normalisation":
+        """Mean and sd of y."""
+        return cls(float(np.mean(y)), spread(y))
+
+
+@dataclass(frozen=True, eq=False)
+class LikelihoodGP:
+    """Fitted at x (n, d); `theta` as `planner.surrogate.kernels` lays it out, log τ included."""
+
+    kernel: str
+    theta: np.ndarray
+    x: np.ndarray
+    root: np.ndarray  # (n, n) Cholesky factor of K + τ²I
+    alpha: np.ndarray  # (n,)
+    units: Normalisation
+    log_likelihood: float  # of y in its own unit
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q,) of the noise-free output at x (q, d)."""
+        kernel = parse(self.kernel, x.shape[1])
+        cross = kernel.covariance(np, self.theta, self.x, x)
+        explained = np.sum(solve_triangular(self.root, cross, lower=True) ** 2, axis=0)
+        sd = np.sqrt(np.maximum(kernel.variance(np, self.theta, x) - explained, 0.0))
+        units = self.units
+        return units.centre + units.scale * (self.alpha @ cross), units.scale * sd
+
+
+def fit_likelihood(
+    samples: Samples,
+    kernel: str = "rbf",
+    noise: float | None = None,
+    units: Normalisation | None = None,
+    starts: int = STARTS,
+    seed: int = 0,
+    isotropic: bool = False,
+) -> LikelihoodGP:
+    """Maximum-likelihood GP of `samples`.
+
+    Args:
+        samples: x (n, d) scaled to about [0, 1] and y (n,); sds are not looked at.
+        kernel: an expression over the columns of x.
+        noise: τ over y's scale, where it is known; None: it is fitted.
+        units: by what y is normalised; None: its own mean and sd.
+        starts: how many; the first is in the middle, the others random around it.
+        seed: of the random starts.
+        isotropic: one length scale for all columns of a factor (Busch et al. 2022, eqs. 4 to 7).
+    """
+    units = units or Normalisation.of(samples.y)
+    hill = _Hill.of(samples, kernel, noise, units, isotropic)
+    ends = sorted(hill.roughly(starts, seed, noise), key=lambda peak: -peak.log_density)[:LAST]
+    best = max((hill.climb(e.x) for e in ends), key=lambda peak: peak.log_density)
+    return at_hyperparameters(samples, kernel, best.x[hill.own], units)
+
+
+def fit_growing(
+    samples: Samples, counts: Sequence[int], kernel: str = "rbf", starts: int = STARTS
+) -> LikelihoodGP:
+    """Maximum-likelihood GP of many samples, over all of which a climb from afar takes minutes.
+
+    Climbs begin with some of the points, which costs next to nothing; every peak found there leads
+    to one of more points, for the likeliest of few need not lead to the likeliest of all.
+
+    Args:
+        samples: as of `fit_likelihood`.
+        counts: so many points, drawn at random, before all of them.
+        kernel: an expression over the columns of x.
+        starts: of the climbs over the first.
+    """
+    order, units = np.random.default_rng(0).permutation(len(samples.y)), Normalisation.of(samples.y)
+    peaks: list[Peak] = []
+    for count in (*counts, len(order)):
+        some = order[:count]
+        part = Samples(samples.x[some], samples.y[some], samples.sd[some])
+        hill = _Hill.of(part, kernel, None, units, isotropic=False)
+        if not peaks:
+            ends = hill.roughly(starts, seed=0)
+        else:
+            ends = [hill.climb(peak.x, FEW_STEPS, FTOL) for peak in peaks[:MOST_PEAKS]]
+        peaks = _likeliest(ends)
+    return at_hyperparameters(samples, kernel, peaks[0].x, units)
+
+
+def _likeliest(ends: Sequence[Peak]) -> list[Peak]:
+    """Those of different density, the likeliest first."""
+    found: list[Peak] = []
+    for end in sorted(ends, key=lambda peak: -peak.log_density):
+        if not found or found[-1].log_density - end.log_density > SAME_PEAK:
+            found.append(end)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Hill:
+    """A log-likelihood over the parameters z that are climbed: θ = z[own], z = θ[kept]."""
+
+    kernel: str
+    padded: np.ndarray
+    y: np.ndarray
+    own: np.ndarray
+    kept: np.ndarray
+    middle: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+    @classmethod
+    def of(
+        cls, samples: Samples, kernel: str, noise: float | None, units: Normalisation,
+        isotropic: bool,
+    ) -> "_Hill":  # fmt: skip
+        x, y = samples.x, (samples.y - units.centre) / units.scale
+        own = _free(kernel, x.shape[1], isotropic)
+        kept = np.unique(own, return_index=True)[1]
+        middle = parse(kernel, x.shape[1]).prior(1.0, NOISES[0], LENGTH, 0.0, 0.0)[0][kept]
+        lower, upper = np.full(len(kept), LOWEST), np.full(len(kept), HIGHEST)
+        lower[1] = np.log(LEAST_NOISE if noise is None else noise)
+        upper[1] = 0.0 if noise is None else lower[1]
+        return cls(kernel, _padded(x), y, own, kept, middle, lower, upper)
+
+    def starts(self, count: int, seed: int) -> np.ndarray:
+        """The middle, and normal around it (count, …)."""
+        normal = np.random.default_rng(seed).standard_normal((count - 1, len(self.kept)))
+        return self.middle + np.vstack([np.zeros(len(self.kept)), normal])
+
+    def roughly(self, starts: int, seed: int, noise: float | None = None) -> list[Peak]:
+        """Where climbs from several starts end roughly."""
+        levels = NOISES[:1] if noise is None else [level for level in NOISES if level > noise]
+        ends = []
+        for i, z in enumerate(self.starts(starts, seed)):
+            for held in levels[i % (len(levels) + 1) :]:
+                z = self.climb(z, *ROUGHLY, held).x
+            ends.append(self.climb(z, *ROUGHLY))
+        return ends
+
+    def density(self, z: np.ndarray) -> tuple[float, np.ndarray]:
+        """log p(y) and its slope in z."""
+        value, slope = _log_likelihood(self.kernel, z[self.own], self.padded, self.y)
+        return value, np.bincount(self.own, slope)
+
+    def climb(
+        self, z: np.ndarray, steps: int = MOST_STEPS, ftol: float = RELATIVE_TOLERANCE,
+        noise: float | None = None,
+    ) -> Peak:  # fmt: skip
+        """Where L-BFGS ends from z; with `noise` held there."""
+        lower, upper = self.lower.copy(), self.upper.copy()
+        if noise is not None:
+            lower[1] = upper[1] = np.log(noise)
+        return maximise(self.density, [np.clip(z, lower, upper)], lower, upper, steps, ftol)
+
+
+def at_hyperparameters(
+    samples: Samples, kernel: str, theta: np.ndarray, units: Normalisation
+) -> LikelihoodGP:
+    """The GP of `samples` with given hyperparameters (p,), log τ in their second place."""
+    y = (samples.y - units.centre) / units.scale
+    root = np.linalg.cholesky(_covariance(kernel, theta, samples.x))
+    white = solve_triangular(root, y, lower=True)
+    size = np.sum(np.log(np.diag(root))) + len(y) * (0.5 * np.log(2 * np.pi) + np.log(units.scale))
+    value = float(-0.5 * white @ white - size)
+    return LikelihoodGP(kernel, theta, samples.x, root, cho_solve((root, True), y), units, value)
+
+
+def _free(kernel: str, d: int, isotropic: bool) -> np.ndarray:
+    """Which parameter that is climbed each of θ (p,) is."""
+    parsed = parse(kernel, d)
+    first = np.arange(parsed.size)
+    for factor in (f for term in parsed.terms for f in term):
+        if isotropic and factor.scales.stop > factor.scales.start:
+            first[factor.scales] = factor.scales.start
+    return np.unique(first, return_inverse=True)[1]
+
+
+def _covariance(kernel: str, theta: np.ndarray, x: np.ndarray) -> np.ndarray:
+    k = parse(kernel, x.shape[1]).covariance(np, theta, x, x)
+    noise = np.exp(2 * theta[1]) + JITTER
+    return k + noise * np.eye(len(x))
+
+
+def _log_likelihood(
+    kernel: str, theta: np.ndarray, padded: np.ndarray, y: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """log p(y | θ) and its slope (p,), by ∂/∂K = ½ (α αᵀ − K⁻¹) (Rasmussen & Williams, eq. 5.9).
+
+    −∞ where the covariance is no longer positive definite. The first len(y) rows of `padded` are x.
+    """
+    n, size = len(y), len(padded)
+    root, failed = dpotrf(_covariance(kernel, theta, padded[:n]), lower=1, overwrite_a=1)
+    if failed:
+        return -np.inf, np.zeros(len(theta))
+    alpha = dpotrs(root, y, lower=1)[0]
+    value = -0.5 * y @ alpha - np.log(root.diagonal()).sum() - 0.5 * n * np.log(2 * np.pi)
+    inverse = dpotri(root, lower=1)[0]  # its lower triangle, beside zeros
+    slope_k = np.zeros((size, size))
+    slope_k[:n, :n] = -np.tril(inverse)  # k is symmetric: twice the lower triangle will do
+    slope_k[:n, :n].flat[:: n + 1] *= 0.5
+    slope_k[:n, :n] += 0.5 * alpha[:, None] * alpha
+    slope = np.array(pull(kernel, theta, padded, slope_k))
+    slope[1] += 2 * np.exp(2 * theta[1]) * slope_k.trace()
+    return float(value), slope
+
+
+def _padded(x: np.ndarray) -> np.ndarray:
+    """x (c, d) with zeros below, so that few sizes are compiled."""
+    return np.concatenate([x, np.zeros((capacity(len(x)) - len(x), x.shape[1]))])
