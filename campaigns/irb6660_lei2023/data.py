@@ -13,11 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-<<<<<<< HEAD:planner/studies/lei2023_hits.py
-from planner.modal.estimate_modes import identify
-=======
 from planner.errors import InputError
->>>>>>> studies:campaigns/irb6660_lei2023/data.py
+from planner.modal.estimate_modes import identify
 from planner.modal.fit_data import Data
 from planner.modal.modes import LEAST_PROBABILITY, Mode
 from planner.modal.residues import rank_one
