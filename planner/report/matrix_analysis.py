@@ -8,12 +8,12 @@ from typing import Any
 from rich.console import Group
 from rich.text import Text
 
+from planner.dataset.frf_set import FrfSet
 from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_modes import MatrixMode, MatrixModes, modes_of_matrix, with_normal_modes
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry, read_geometry
 from planner.report.answer import Answer, RefusedFile
-from planner.report.frf_set import FrfSet
 from planner.report.modal_analysis import LONGEST_NAME, NOT_DRAWN
 from planner.report.plot_files import Pictures
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
@@ -165,7 +165,7 @@ def _export(
     """Write files for other programs, where wanted; where they are."""
     if folder is None:
         return ()
-    from planner.report.matrix_files import Exported, export
+    from planner.export.matrix_files import Exported, export
 
     what = Exported(matrix, found, geometry, real)
     return tuple(str(path) for path in export(what, folder.absolute()))

@@ -11,7 +11,7 @@ from rich.console import Group
 
 from planner.campaign.events import Amplitude
 from planner.campaign.log_conversion import from_homogeneity
-from planner.dataset.measure import measure
+from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
@@ -26,7 +26,6 @@ from planner.report.answer import Answer, RefusedFile
 from planner.report.plot_files import Pictures
 from planner.report.text import SIMULATED, drawn, remarks, table, with_sd
 
-DEFAULT_BAND_HZ = (4.0, 60.0)
 ESTIMATORS = ("h1", "h2", "hv")
 LONGEST_NAME = 40  # characters of a file's name in a title
 NO_PICTURES = Pictures()

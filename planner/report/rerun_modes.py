@@ -10,12 +10,7 @@ import rerun.blueprint as rrb
 from matplotlib import colormaps
 
 from planner.campaign.labels import LabelledPose
-from planner.campaign.model import Model
-from planner.dataset.measure import MeasuredPose
-from planner.recording.points import Layout
-from planner.report.rerun_chart import BRIGHT, GROUND
-from planner.report.rerun_modal import draw_mac, mac_view
-from planner.report.robot_motion import (
+from planner.campaign.mode_motion import (
     PointShapes,
     agreement,
     alone,
@@ -23,6 +18,11 @@ from planner.report.robot_motion import (
     measured_shapes,
     simulated_shapes,
 )
+from planner.campaign.model import Model
+from planner.dataset.measure import MeasuredPose
+from planner.recording.points import Layout
+from planner.report.rerun_chart import BRIGHT, GROUND
+from planner.report.rerun_modal import draw_mac, mac_view
 from planner.robot.skeleton import Skeleton, skeleton
 
 VIBRATION = "vibration"

@@ -10,6 +10,7 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.cut_source import Asked, ToolChange, at_poses_in_band
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.path import at_speed, best_speed_of
@@ -17,7 +18,6 @@ from planner.milling.structure import OutOfBandError, Structure
 from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.plot_files import Pictures
-from planner.report.stability_source import Asked, ToolChange, at_poses_in_band
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, number, remarks, table
 
 if TYPE_CHECKING:

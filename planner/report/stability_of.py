@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.campaign.cut_source import Asked, structure_of
 from planner.milling.cut import Cut, load_cut
+from planner.milling.doubts import doubts
 from planner.milling.lobes import Loss, losses
 from planner.milling.point import multiplier
 from planner.milling.structure import Structure, beyond
@@ -13,8 +15,6 @@ from planner.milling.uncertainty import PROBABILITY, SampledLimits, sampled_limi
 from planner.progress import Tell, quietly, within
 from planner.report.plot_files import Pictures
 from planner.report.stability import StabilityReport
-from planner.report.stability_doubts import doubts
-from planner.report.stability_source import Asked, structure_of
 from planner.report.text import SIMULATED_TITLE
 
 LOBES_SHARE = 0.2  # of the time, where samples follow

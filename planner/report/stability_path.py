@@ -8,16 +8,15 @@ import numpy as np
 from rich.console import Group
 from rich.text import Text
 
+from planner.campaign.cut_source import Asked, outside, structures_of_file
+from planner.campaign.toolpath_poses import Travelled, TurnAdvice, Way, turn_advice
 from planner.milling.cut import Cut
+from planner.milling.doubts import doubts
 from planner.milling.path import TURNS_DEG, PathLimits, along, by_feed
 from planner.milling.structure import Structure, beyond
 from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
-from planner.report.path_poses import Travelled, Way
 from planner.report.plot_files import Pictures
-from planner.report.stability_doubts import doubts
-from planner.report.stability_source import Asked, outside, structures_of_file
-from planner.report.stability_turns import TurnAdvice, turn_advice, turns_figure
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, number, remarks, table
 
 if TYPE_CHECKING:
@@ -221,4 +220,31 @@ def _figure(limits: PathLimits, answer: PathReport, cut: Cut, mark: str) -> "Fig
     lower.set_ylabel("depth (mm)")
     for panel in (upper, lower):
         panel.grid(True, alpha=0.3)
+    return figure
+
+
+def turns_figure(advice: TurnAdvice, poses: tuple[str, ...], rpm: float, mark: str) -> "Figure":
+    """Depth over poses and angles."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.colors import LogNorm
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 4.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    panel = figure.subplots()
+    depth = 1e3 * np.array(advice.depth_m)
+    shown = np.ma.masked_invalid(depth.T)
+    image = panel.imshow(shown, aspect="auto", origin="lower", cmap="viridis", norm=LogNorm())
+    for i, best in enumerate(advice.best_deg):
+        panel.plot(i, advice.turn_deg.index(best), "o", mfc="none", mec="white", ms=9, mew=1.6)
+    panel.axhline(advice.turn_deg.index(advice.common_deg), color="tab:red", lw=1, ls="--")
+    panel.set_xticks(range(len(poses)), poses, rotation=45, ha="right", fontsize=8)
+    panel.set_yticks(range(len(advice.turn_deg)), [f"{a:g}" for a in advice.turn_deg])
+    panel.set_ylabel("turned about the tool's axis (°)")
+    panel.set_facecolor("lightgrey")
+    panel.set_title(
+        f"{mark}Depth limit at {rpm:.0f} rpm (ring: best of a pose, dashed: best for all, "
+        f"grey: cannot stand)", fontsize=10,
+    )  # fmt: skip
+    figure.colorbar(image, ax=panel, label="depth limit (mm)")
     return figure

@@ -10,14 +10,14 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.decision_status import DecisionStatus
 from planner.campaign.events import Proposal
+from planner.campaign.left_out import LeftOutValues, found_without, left_out
 from planner.campaign.state import Measurement
 from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain
-from planner.report.decision_status import DecisionStatus
 from planner.report.imports import AskedOfPose
 from planner.report.kept_diagnosis import diagnosis_of, read_diagnosis, two_answers
-from planner.report.leave_one_out import LeftOutValues, found_without, left_out
 from planner.report.plot_files import Pictures
 from planner.report.proposals import forecast_json, target_sentence
 from planner.report.refitted_springs import (

@@ -2,12 +2,12 @@
 
 from typing import Any
 
+from planner.dataset.frf_set import FrfSet
 from planner.errors import InputError
 from planner.frf.labelled import joined
 from planner.modal.modes import ModalModel
 from planner.modal.transfer_functions import modes_from_transfer_functions
 from planner.recording.records import FrfRecord
-from planner.report.frf_set import FrfSet
 from planner.report.modal_analysis import LONGEST_NAME, NOT_DRAWN, ModalReport
 from planner.report.plot_files import Pictures
 from planner.report.text import SIMULATED_TITLE

@@ -5,11 +5,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from planner.campaign.config import CampaignConfig
+from planner.campaign.log_words import act
 from planner.campaign.state import Measurement, taken_back
 from planner.check.remark import CheckRemark
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP
-from planner.report.log_words import act
 from planner.report.page.facts import Facts
 from planner.report.page.html import (
     Markup,

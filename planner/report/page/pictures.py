@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from planner.campaign.left_out import found_without
 from planner.recording.joints import SCALES
 from planner.report.frf_plots import png
 from planner.report.frf_sheet import frf_sheet
-from planner.report.leave_one_out import found_without
 from planner.report.leave_one_out_plots import left_out_figure
 from planner.report.page.chapters import forecast, mode_rows, remarks
 from planner.report.page.facts import Facts

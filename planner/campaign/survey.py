@@ -1,0 +1,182 @@
+"""Modes of a recordings folder with several poses: which of them are the same."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from planner.campaign.low_fidelity import LowFidelity, learn
+from planner.campaign.misses import CampaignMisses, Visited, told_by
+from planner.dataset.hit_columns import hits_of
+from planner.dataset.measure import DEFAULT_BAND_HZ, MeasuredPose, measure
+from planner.dataset.screened_files import Source, in_parts
+from planner.dynamics.simulation import Simulation
+from planner.errors import RefusedError, RefusedFile
+from planner.frf.frf import Frf
+from planner.identification.measured_frfs import common_band
+from planner.identification.measurement_model import Tolerances
+from planner.identification.point_places import misplaced, questions
+from planner.identification.sensor_masses import WithoutSensors, without_sensors
+from planner.modal.modes import Mode
+from planner.modal.tracking import Guide, Tracks, track
+from planner.recording.folder import joint_columns, read_recordings
+from planner.recording.records import PoseRow, RecordingsFolder
+from planner.robot.robot import Robot
+
+ABOVE = 2  # labels of the simulation above the modes of the pose that has most
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """Labelled modes of named poses in a band (Hz); `bare` holds what sensors had lowered.
+
+    `simulated_hz` (n, k) are the labels' simulated frequencies, None without a robot; `misses` how
+    hits departed from their points and axes.
+    """
+
+    poses: tuple[str, ...]
+    tracks: Tracks
+    bare: WithoutSensors
+    misses: CampaignMisses
+    band_hz: tuple[float, float]
+    refused: tuple[RefusedFile, ...]
+    remarks: tuple[str, ...]
+    simulated: bool
+    simulated_hz: np.ndarray | None
+
+
+def survey(
+    folder: Path,
+    band_hz: tuple[float, float] | None,
+    robot_toml: Path | None,
+    estimator: str,
+    window_rate_1_s: float,
+    progress: Callable[[str], None],
+) -> Survey:
+    """Analyse each pose; labels follow the simulation's families if a robot is named.
+
+    Raises RefusedError where no pose gives a mode.
+    """
+    band = band_hz or DEFAULT_BAND_HZ
+    table = _table(folder, robot_toml)
+    names = tuple(dict.fromkeys(row.pose for row in table.rows))
+    found, every, refused, simulated = [], [], [], False
+    visited: list[tuple[Visited, Frf]] = []
+    for number, name in enumerate(names):
+        progress(f"pose {name}, {number} of {len(names)} done")
+        rows = [row for row in table.rows if row.pose == name]
+        measured = measure(in_parts(_sources(rows)), band, estimator, window_rate_1_s)
+        refused += [
+            RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted
+        ]
+        simulated |= any(v.simulated for v in measured.verdicts)
+        found.append(measured.modal.modes if measured.modal else ())
+        every.append(measured)
+        if robot_toml is not None and measured.frf is not None:
+            q = table.joints.internal(rows[0].joints_deg)
+            visited.append(_visited(name, q, measured))
+    if not any(found):
+        reasons = [file.reason for file in refused] + [
+            told for one in every for told in one.remarks
+        ]
+        raise RefusedError(
+            f"{folder}: no pose gives a mode between {band[0]:g} and {band[1]:g} Hz: {reasons[0]}"
+        )
+    first = {row.pose: row for row in reversed(table.rows)}
+    q = table.joints.internal([first[name].joints_deg for name in names])
+    misses = _misses(visited, robot_toml, band)
+    found = [tuple(misses.without_misses(*one)) for one in zip(names, found, strict=True)]
+    simulations = _simulations(misses, robot_toml)
+    doubts = _doubts(names, simulations, q, every, band)
+    bare = without_sensors(names, found, simulations, q, every)
+    tracks, expected = _labelled(bare.modes, q, robot_toml)
+    return Survey(
+        names, tracks, bare, misses, band, tuple(refused), (*doubts, *bare.remarks), simulated,
+        expected,
+    )  # fmt: skip
+
+
+def _table(folder: Path, robot_toml: Path | None) -> RecordingsFolder:
+    if robot_toml is None:
+        return read_recordings(folder, joint_columns(folder))
+    robot = Robot.load(robot_toml)
+    return read_recordings(folder, robot.joints, robot.points)
+
+
+def _sources(rows: list[PoseRow]) -> tuple[Source, ...]:
+    return tuple(Source.of(r) for r in rows if r.file)
+
+
+def _visited(pose: str, q: np.ndarray, measured: MeasuredPose) -> tuple[Visited, Frf]:
+    """A pose whose FRF is known, with what each accepted hit says; its FRFs at all points."""
+    sources = tuple(v.source for v in measured.verdicts if v.accepted)
+    hits = hits_of(sources, measured.band_hz, measured.window_rate_1_s)
+    assert measured.frf is not None
+    files = tuple(source.name for source in sources)
+    return Visited(pose, files, q, hits.columns, measured.frf), hits.whole
+
+
+def _misses(
+    visited: list[tuple[Visited, Frf]], robot_toml: Path | None, band: tuple[float, float]
+) -> CampaignMisses:
+    """By the robot's simulation, identified from these recordings; none without a robot."""
+    if robot_toml is None or not visited:
+        return CampaignMisses((), None, Tolerances(), band)
+    robot = Robot.load(robot_toml)
+    visits, whole = zip(*visited, strict=True)
+    return told_by(Simulation(robot), visits, whole, _tolerances(robot), band)
+
+
+def _tolerances(robot: Robot) -> Tolerances:
+    return Tolerances.of(robot.config, robot.joints.slides)
+
+
+def _simulations(misses: CampaignMisses, robot_toml: Path | None) -> list[Simulation]:
+    """As stated, and as identified from the recordings where that was done."""
+    if robot_toml is None:
+        return []
+    told = [misses.told.simulation] if misses.told is not None and misses.trusted else []
+    return [Simulation(Robot.load(robot_toml)), *told]
+
+
+def _doubts(
+    names: Sequence[str],
+    simulations: Sequence[Simulation],
+    q: np.ndarray,
+    measured: Sequence[MeasuredPose],
+    band: tuple[float, float],
+) -> tuple[str, ...]:
+    """Questions about points whose FRFs a simulation describes far better elsewhere."""
+    index = [i for i, one in enumerate(measured) if one.whole is not None]
+    frfs = [one.whole for one in measured if one.whole is not None]
+    if not simulations or not frfs:
+        return ()
+    usable = common_band(frfs, band)
+    found = misplaced(simulations, q[index], frfs, usable)
+    tool = [(i, frf.of_tool) for i, frf in zip(index, frfs, strict=True)]
+    known = [(i, frf) for i, frf in tool if frf is not None]
+    if found and known:
+        # What was identified from wrongly named points too is spoiled: from the tool's alone.
+        nominal = LowFidelity(1, simulations[0], _tolerances(simulations[0].robot))
+        learned = learn(nominal, [frf for _, frf in known], q[[i for i, _ in known]], band).learned
+        if learned is not None:
+            tried = [*simulations, learned.identified.simulation]
+            found = misplaced(tried, q[index], frfs, usable)
+    return questions(found, [names[i] for i in index])
+
+
+def _labelled(
+    found: Sequence[tuple[Mode, ...]], q: np.ndarray, robot_toml: Path | None
+) -> tuple[Tracks, np.ndarray | None]:
+    span = np.ptp(q, axis=0)
+    x = ((q - q.min(axis=0)) / np.where(span > 0, span, 1.0))[:, span > 0]
+    labels = max(map(len, found))
+    if robot_toml is None:
+        return track(found, Guide.by_example(found), x), None
+    simulation = Simulation(Robot.load(robot_toml))
+    middle = int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))
+    count = min(labels + ABOVE, simulation.elastic.size)
+    modes = simulation.followed(q, count, simulation.families(q[middle], q))
+    tracks = track(found, Guide(modes.frequency_hz, modes.shape, middle), x)
+    return tracks, modes.frequency_hz
