@@ -60,10 +60,14 @@ def modes(
     from planner.cli.progress import reporting
     from planner.dataset.frf_set import frf_set
     from planner.recording.folder import several_poses
-    from planner.report.matrix_analysis import matrix_report
-    from planner.report.modal_analysis import check_options, modal_report, sources_of
+    from planner.report.modal_analysis import (
+        check_options,
+        matrix_report,
+        modal_report,
+        sources_of,
+        unlabelled_report,
+    )
     from planner.report.plot_files import Pictures
-    from planner.report.unlabelled_analysis import unlabelled_report
 
     check_options(band_hz, estimator, quantity, window_rate_1_s)
     pictures = Pictures(plot, format_, rrd)
@@ -74,7 +78,7 @@ def modes(
     ]
     if several_poses(paths, least=1 if robot else 2):
         from planner.campaign.survey import survey
-        from planner.report.survey import survey_report
+        from planner.report.modes import survey_report
 
         if for_points:
             raise InputError(f"{paths[0]} holds several poses; leave {for_points[0]} out.")
@@ -84,7 +88,7 @@ def modes(
             answer = answer.with_pictures(pictures, paths[0].name)
         return respond(answer, as_json, refusals(answer.refused))
     if operating:
-        from planner.report.operating_analysis import operating_report
+        from planner.report.modal_analysis import operating_report
 
         return respond(operating_report(paths, band_hz, pictures), as_json)
     sources = sources_of(paths, from_names)
