@@ -91,7 +91,7 @@ def stability(
 
             way = Way(path, origin, poses or WAY_POSES, turns)
             return respond(path_report(asked, way, load_cut(cut), pictures, tell), as_json)
-        from planner.report.stability_of import stability_of
+        from planner.report.stability_lobes import stability_of
 
         return respond(stability_of(asked, pictures, tell), as_json)
 

@@ -5,9 +5,9 @@ from dataclasses import astuple
 from pathlib import Path
 
 from planner.campaign.example import EXAMPLE
+from planner.campaign.file_entries import FILES, tables_of
 from planner.errors import InputError
 from planner.report.page import rendered
-from planner.report.schema import FILES, schema
 
 
 def manual(commands: Sequence[tuple[str, str]]) -> str:
@@ -17,7 +17,7 @@ def manual(commands: Sequence[tuple[str, str]]) -> str:
         tables = [
             {"name": one.name, "about": one.about, "entries": list(map(astuple, one.entries)),
              "choices": list(map(astuple, one.choices))}
-            for one in schema(name).tables
+            for one in tables_of(FILES[name])
         ]  # fmt: skip
         files[name] = next(EXAMPLE.rglob(f"{name}.toml")).read_text("utf-8"), tables
     told = []

@@ -173,9 +173,7 @@ def _measured(campaign: Campaign, state: CampaignState, now: StatusReport) -> di
         "measured": [_pose(m, m.pose in state.starred) for m in state.measured],
         "joints": campaign.cell.robot.joints.headings,
         "stood": stood,
-        "stood_says": said
-        if setpoints < len(stood)
-        else "Joints as proposed: nothing was read back",
+        "stood_says": said,
         "refused": [(r.pose, r.file, r.reason) for r in now.refused],
         "held": [(h.measured.pose, h.question.question.text) for h in now.held],
         "skipped": [(s.pose, s.reason or "–") for s in now.skipped],

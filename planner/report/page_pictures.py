@@ -10,10 +10,8 @@ from matplotlib.figure import Figure
 from planner.campaign.campaign import Campaign
 from planner.campaign.left_out import found_without
 from planner.recording.joints import SCALES
+from planner.report.campaign_plots import frf_sheet, left_out_figure, workspace_map
 from planner.report.frf_plots import png
-from planner.report.frf_sheet import frf_sheet
-from planner.report.leave_one_out_plots import left_out_figure
-from planner.report.workspace_map import workspace_map
 
 SHOWN_FRFS = 6  # poses whose FRFs are drawn: the ones furthest off, then the first
 SHOWN_MAPS = 8  # modes whose maps are drawn

@@ -157,12 +157,10 @@ def _coordinates(campaign: Campaign) -> tuple[str, ...]:
 
 def _figure(answer: MapReport, features: np.ndarray, names: tuple[str, ...], cut: Cut) -> "Figure":
     """From above and from the side, and over what of the pose the limit hangs on most."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13.0, 4.6), layout="constrained")
-    FigureCanvasAgg(figure)
     panels = figure.subplots(1, 3)
     top = 1e3 * cut.depth_m[1]
     shown = np.minimum(1e3 * answer.depth_limit_m_at_95, top)

@@ -195,11 +195,9 @@ def _answer(poses: list[tuple[str, Structure]], limits: PathLimits, cut: Cut) ->
 
 
 def _figure(limits: PathLimits, answer: PathReport, cut: Cut, mark: str) -> "Figure":
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 6.5), layout="constrained")
-    FigureCanvasAgg(figure)
     upper, lower = figure.subplots(2, 1, height_ratios=(3, 1))
     rpm, top = cut.speeds_rpm, 1e3 * cut.depth_m[1]
     robust = np.minimum(1e3 * limits.robust_m, 2 * top)
@@ -225,12 +223,10 @@ def _figure(limits: PathLimits, answer: PathReport, cut: Cut, mark: str) -> "Fig
 
 def turns_figure(advice: TurnAdvice, poses: tuple[str, ...], rpm: float, mark: str) -> "Figure":
     """Depth over poses and angles."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 4.8), layout="constrained")
-    FigureCanvasAgg(figure)
     panel = figure.subplots()
     depth = 1e3 * np.array(advice.depth_m)
     shown = np.ma.masked_invalid(depth.T)

@@ -187,7 +187,7 @@ class StatusReport(Answer):
         """The same once each pose is drawn as predicted without it, where that is wanted."""
         if not pictures.wanted or not self.leave_one_out.values or self.model is None:
             return self
-        from planner.report.leave_one_out_plots import left_out_figure
+        from planner.report.campaign_plots import left_out_figure
 
         mark = SIMULATED_TITLE if self.simulated else ""
         title = f"{mark}Each measured pose, predicted without it"
