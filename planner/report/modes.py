@@ -3,8 +3,9 @@
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import msgspec
 import numpy as np
+from msgspec import UNSET
+from msgspec import UnsetType as Unset
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
@@ -20,7 +21,6 @@ from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
 from planner.words import counted
 
-UNSET, Unset = msgspec.UNSET, msgspec.UnsetType
 SURE = 0.9  # probability of a label below which the text marks it as doubtful
 COMMON = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd", "probability"
 
