@@ -63,7 +63,7 @@ class ModeAnswer:
         pairs = np.array(mode.shape)
         pairs = np.stack([pairs.real, pairs.imag], -1) if np.iscomplexobj(pairs) else pairs
         own["shape"] = tuple((float(re), float(im)) for re, im in pairs)
-        if hasattr(mode, "residue"):
+        if hasattr(mode, "residue_sd"):
             both = zip(np.ravel(mode.residue), np.ravel(mode.residue_sd), strict=True)
             own["residue"] = tuple((float(r.real), float(r.imag), float(sd)) for r, sd in both)
         if hasattr(mode, "shape_sd"):
