@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from planner.campaign.material import Material
 from planner.dataset.dataset import Dataset
-from planner.dataset.measure import measure
+from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import in_parts
 from planner.design.extra_sensor import extra_sensor
 from planner.design.next_hit import next_hit
@@ -31,7 +31,7 @@ from planner.report.identification import (
     IdentificationReport,
     identification_report,
 )
-from planner.report.modal_analysis import DEFAULT_BAND_HZ, check_options, sources_of
+from planner.report.modal_analysis import check_options, sources_of
 from planner.robot.robot import Robot
 
 

@@ -1,5 +1,7 @@
 """Errors that reach the user: one plain sentence each, and the exit code that goes with it."""
 
+from dataclasses import dataclass
+
 
 class PlannerError(Exception):
     """Base of every error whose message is meant for the engineer's eyes."""
@@ -37,3 +39,11 @@ class JournalError(PlannerError):
     """The campaign's log is damaged beyond the tail that can be repaired."""
 
     exit_code = 5
+
+
+@dataclass(frozen=True)
+class RefusedFile:
+    """A recording that could not be used, and why."""
+
+    file: str
+    reason: str

@@ -12,7 +12,7 @@ from planner.cli.comparison import compare
 from planner.cli.couple import couple
 from planner.cli.diagnosis import diagnose
 from planner.cli.documentation import manual, schema
-from planner.cli.handing_on import export, report
+from planner.cli.exports import export, report
 from planner.cli.identification import identify
 from planner.cli.modes import modes
 from planner.cli.new import new

@@ -52,10 +52,10 @@ def couple(
 
     Example: planner couple predictions/poses.npz --tool long.toml --out long.npz
     """
+    from planner.campaign.tip_source import fitted_contact, tip_of, within
     from planner.milling.coupling import couple as coupling
     from planner.milling.tool_file import load_tool
     from planner.report.coupling import coupling_report
-    from planner.report.coupling_source import fitted_contact, tip_of, within
     from planner.report.plot_files import Pictures
 
     pictures = Pictures(plot, format_, rrd)

@@ -49,7 +49,7 @@ def manual(
 
     Example: planner manual --out manual.html
     """
-    from planner.report.manual.build import write_manual
+    from planner.report.manual_page import write_manual
 
     assert context.parent is not None
     commands = getattr(context.parent.command, "commands", {})

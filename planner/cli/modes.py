@@ -58,12 +58,16 @@ def modes(
     Example: planner modes exports/P001/*.uff --plot pictures
     """
     from planner.cli.progress import reporting
+    from planner.dataset.frf_set import frf_set
     from planner.recording.folder import several_poses
-    from planner.report.frf_set import frf_set
-    from planner.report.matrix_analysis import matrix_report
-    from planner.report.modal_analysis import check_options, modal_report, sources_of
+    from planner.report.modal_analysis import (
+        check_options,
+        matrix_report,
+        modal_report,
+        sources_of,
+        unlabelled_report,
+    )
     from planner.report.plot_files import Pictures
-    from planner.report.unlabelled_analysis import unlabelled_report
 
     check_options(band_hz, estimator, quantity, window_rate_1_s)
     pictures = Pictures(plot, format_, rrd)
@@ -73,16 +77,18 @@ def modes(
         if given
     ]
     if several_poses(paths, least=1 if robot else 2):
-        from planner.report.survey import survey
+        from planner.campaign.survey import survey
+        from planner.report.modes import survey_report
 
         if for_points:
             raise InputError(f"{paths[0]} holds several poses; leave {for_points[0]} out.")
         given = paths[0], band_hz, robot, estimator, window_rate_1_s
         with reporting("identifying", quiet=as_json) as progress:
-            answer = survey(*given, progress).with_pictures(pictures, paths[0].name)
+            answer = survey_report(survey(*given, progress))
+            answer = answer.with_pictures(pictures, paths[0].name)
         return respond(answer, as_json, refusals(answer.refused))
     if operating:
-        from planner.report.operating_analysis import operating_report
+        from planner.report.modal_analysis import operating_report
 
         return respond(operating_report(paths, band_hz, pictures), as_json)
     sources = sources_of(paths, from_names)

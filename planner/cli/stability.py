@@ -68,10 +68,10 @@ def stability(
 
     Example: planner stability cell7 --pose P001 --cut cut.toml --plot pictures
     """
+    from planner.campaign.cut_source import Asked
     from planner.cli.progress import counting
     from planner.milling.cut import load_cut
     from planner.report.plot_files import Pictures
-    from planner.report.stability_source import Asked
 
     asked = Asked(
         source, cut, pose, point, samples, tool, reference, robot, noise / 100, from_names
@@ -86,12 +86,12 @@ def stability(
                 map_report(asked, poses or MAP_POSES, load_cut(cut), pictures, tell), as_json
             )
         if path is not None or pose == "all":
-            from planner.report.path_poses import Way
+            from planner.campaign.toolpath_poses import Way
             from planner.report.stability_path import path_report
 
             way = Way(path, origin, poses or WAY_POSES, turns)
             return respond(path_report(asked, way, load_cut(cut), pictures, tell), as_json)
-        from planner.report.stability_of import stability_of
+        from planner.report.stability_lobes import stability_of
 
         return respond(stability_of(asked, pictures, tell), as_json)
 

@@ -73,3 +73,38 @@ def _to_goal(run: Run) -> str:
     if curve.to_goal is None:
         return f"more than {run.n[-1]}"
     return f"{curve.to_goal} ({curve.minutes_to_goal:.0f} min of robot time)"
+
+
+@dataclass(frozen=True)
+class LearningRun:
+    """One order of the measured poses: RMSE and robot time after n measurements each."""
+
+    poses: tuple[str, ...]
+    n: tuple[int, ...]
+    frequency_rmse_percent: tuple[float, ...]
+    minutes: tuple[float, ...]
+
+    @classmethod
+    def of(cls, run: Run) -> "LearningRun":
+        """Of a run of a comparison."""
+        return cls(run.poses, run.n, run.frequency_rmse_percent, run.minutes)
+
+
+@dataclass(frozen=True)
+class OtherAcquisition:
+    """What another acquisition would have saved among the poses measured; `runs` by name."""
+
+    acquisition: str
+    text: str
+    runs: dict[str, LearningRun]
+
+    @classmethod
+    def of(cls, campaign: Campaign, acquisition: str) -> "OtherAcquisition | None":
+        """None with too few measured poses to tell."""
+        found = otherwise(campaign, acquisition)
+        if found is None:
+            return None
+        runs = {"campaign": found.measured, found.acquisition: found.instead}
+        return cls(
+            found.acquisition, found.text, {name: LearningRun.of(r) for name, r in runs.items()}
+        )

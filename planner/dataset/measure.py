@@ -17,6 +17,7 @@ from planner.modal.modes import ModalModel
 from planner.recording.points import SENSOR, TCP, TOOL
 from planner.recording.records import FrfRecord, Hit
 
+DEFAULT_BAND_HZ = (4.0, 60.0)  # in which modes of a pose are looked for
 OVER = 7.5  # e^−OVER, 0.06 %, of a decay that does not damp is left where the record ends
 PACKAGES = "recording", "frf", "modal", "dataset", "inference"  # that results here depend on
 

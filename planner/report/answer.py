@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from planner.errors import RefusedFile
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+__all__ = ["NOT_IN_JSON", "Answer", "RefusedFile", "encoded", "plain"]
 
 # Metadata of a field for what an answer was made of; None where it came from another process.
 NOT_IN_JSON = {"json": False}
@@ -56,11 +59,3 @@ def plain(value: Any) -> Any:
 def encoded(answer: Answer) -> bytes:
     """The JSON document, indented."""
     return msgspec.json.format(msgspec.json.encode(answer.to_json()), indent=2)
-
-
-@dataclasses.dataclass(frozen=True)
-class RefusedFile:
-    """A recording that could not be used, and why."""
-
-    file: str
-    reason: str

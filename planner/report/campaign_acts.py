@@ -13,9 +13,9 @@ from rich.text import Text
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Entry
 from planner.campaign.from_urdf import Guess, Guessed
+from planner.campaign.log_words import act
 from planner.check.remark import CheckRemark
 from planner.report.answer import Answer
-from planner.report.log_words import act
 from planner.report.text import command_line, table
 from planner.words import significant
 

@@ -34,7 +34,7 @@ def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -
     cannot be written.
     """
     from planner.report.kept_diagnosis import diagnosis_of
-    from planner.report.page.build import page
+    from planner.report.page import page
 
     started = time.perf_counter()
     kept = diagnosis_of(campaign.directory, diagnosis)

@@ -10,7 +10,13 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.compare.bench import Bench
-from planner.compare.curves import Curves, Paired, baseline_of, paired
+from planner.compare.curves import (
+    Curves,
+    StrategyCurve,
+    StrategyDifference,
+    baseline_of,
+    paired,
+)
 from planner.compare.pool import PoolPose
 from planner.compare.processes import Failure
 from planner.compare.tasks import Run, Study, Task
@@ -23,65 +29,6 @@ if TYPE_CHECKING:
 
 PICTURE, TABLE = "learning_curves.png", "comparison.json"
 SHOWN = 8  # columns of measurements that fit
-
-
-@dataclass(frozen=True, eq=False)
-class StrategyCurve:
-    """Medians over runs, on poses not used, after n (t,) measurements; quartiles (2, t).
-
-    `minutes` (t,) of robot time; the seconds are of all runs together.
-    """
-
-    n: np.ndarray
-    frequency_rmse_percent: np.ndarray
-    frequency_rmse_percent_quartiles: np.ndarray
-    frequency_rmse_percent_worst: np.ndarray
-    r2: np.ndarray
-    coverage95: np.ndarray
-    coverage95_mean: np.ndarray
-    minutes: np.ndarray
-    wall_seconds: float
-    process_seconds: float
-    runs: int
-
-    @classmethod
-    def of(cls, curve: Curves) -> "StrategyCurve":
-        """Of one strategy's runs."""
-        rmse = curve.frequency_rmse_percent
-        low, middle, high = np.percentile(rmse, (25, 50, 75), axis=0)
-        return cls(
-            n=curve.n,
-            frequency_rmse_percent=middle,
-            frequency_rmse_percent_quartiles=np.array([low, high]),
-            frequency_rmse_percent_worst=rmse.max(axis=0),
-            r2=np.median(curve.r2, axis=0),
-            coverage95=np.median(curve.coverage95, axis=0),
-            coverage95_mean=np.mean(curve.coverage95, axis=0),
-            minutes=np.median(curve.minutes, axis=0),
-            wall_seconds=float(curve.wall_seconds.sum()),
-            process_seconds=float(curve.process_seconds.sum()),
-            runs=len(curve.seeds),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class StrategyDifference:
-    """A strategy less the baseline over the seeds of both; see `compare.curves.Paired`."""
-
-    seeds: int
-    difference_percent: np.ndarray
-    difference_percent_interval95: np.ndarray
-    measurements_to_one_percent: float
-    measurements_to_one_percent_interval95: np.ndarray
-
-    @classmethod
-    def of(cls, found: Paired | None) -> "StrategyDifference | None":
-        """None where the two share no seed."""
-        if found is None:
-            return None
-        return cls(
-            found.seeds, found.difference, found.interval, found.to_goal, found.to_goal_interval
-        )
 
 
 @dataclass(frozen=True)

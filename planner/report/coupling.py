@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group
 from rich.text import Text
 
+from planner.export.npz import save_coupled
 from planner.errors import InputError
 from planner.milling.coupling import (
     AMPLIFICATION_LIMIT,
@@ -157,23 +158,3 @@ def coupling_report(
         remarks=tuple(said),
         before=before, coupled=coupled,
     )  # fmt: skip
-
-
-def save_coupled(path: Path, coupled: CoupledFrf, pose: str) -> None:
-    """Write as `predict` does, and all six motions beside.
-
-    `frf6_mean`, `frf6_sd` (1, 6, 6, F) are accelerances of (x, y, z, θx, θy, θz), `motions` says
-    which of them are known, `amplification` (F,) how errors grew. InputError if that cannot be.
-    """
-    mean, sd = coupled.accelerance[None], coupled.accelerance_sd[None]
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(path, "wb") as file:
-            np.savez_compressed(
-                file, allow_pickle=False, frequency_hz=coupled.frequency_hz,
-                frf_mean=mean[:, :3, :3], frf_sd=sd[:, :3, :3], pose=np.array([pose]),
-                frf6_mean=mean, frf6_sd=sd, motions=np.array(coupled.kept),
-                amplification=coupled.amplification,
-            )  # fmt: skip
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}); name another.") from None

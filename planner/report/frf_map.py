@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
@@ -63,7 +62,6 @@ def frf_map(
 
 def _panels(count: int) -> tuple[Figure, np.ndarray]:
     figure = Figure(figsize=(3.6 * count + 1.2, 4.2), layout="constrained")
-    FigureCanvasAgg(figure)
     return figure, np.atleast_1d(figure.subplots(1, count, sharey=True))
 
 

@@ -11,6 +11,7 @@ from rich.text import Text
 from planner.campaign.events import Amplitude, MeasuredMode, Question
 from planner.campaign.hit_habits import HitMiss, habits
 from planner.report.answer import Answer, RefusedFile, plain
+from planner.report.modes import ModeAnswer
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, remarks, table, with_sd
 from planner.words import command, counted, significant
@@ -22,43 +23,16 @@ if TYPE_CHECKING:
     from planner.campaign.model import Model
 
 
-@dataclass(frozen=True)
-class ImportedMode:
-    """A measured mode; `label` counts the modelled ones from 1, None if it is none of them.
-
-    `shape` is [re, im] per response, `expected` what the model said before the import.
-    """
-
-    label: int | None
-    label_probability: float | None
-    frequency_hz: float
-    frequency_sd_hz: float
-    damping_ratio: float
-    damping_sd: float
-    shape: tuple[tuple[float, float], ...]
-    probability: float
-    expected: ExpectedMode | None
-
-    @classmethod
-    def of(
-        cls, mode: MeasuredMode, k: int | None, sure: float | None, expected: ExpectedMode | None
-    ) -> "ImportedMode":
-        """`k` is the index of its label among the modelled modes."""
-        return cls(
-            None if k is None else k + 1, sure, mode.frequency_hz, mode.frequency_sd_hz,
-            mode.damping_ratio, mode.damping_sd, mode.shape, mode.probability, expected,
-        )  # fmt: skip
-
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """A row of the table."""
-        expected = self.expected
-        return (
-            "other" if self.label is None else str(self.label),
-            with_sd(self.frequency_hz, self.frequency_sd_hz, ".3f"),
-            with_sd(expected.frequency_hz, expected.sd_hz) if expected else with_sd(None, None),
-            with_sd(100 * self.damping_ratio, 100 * self.damping_sd),
-        )
+def _cells(mode: ModeAnswer) -> tuple[str, ...]:
+    """A row of the table."""
+    expected = mode.expected
+    known = isinstance(expected, ExpectedMode)
+    return (
+        "other" if mode.label is None else str(mode.label),
+        with_sd(mode.frequency_hz, mode.frequency_sd_hz, ".3f"),
+        with_sd(expected.frequency_hz, expected.sd_hz) if known else with_sd(None, None),
+        with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd),
+    )
 
 
 @dataclass(frozen=True)
@@ -91,7 +65,7 @@ class PoseImport(Answer):
     accepted: tuple[str, ...]
     refused: tuple[RefusedFile, ...]
     already_imported: tuple[str, ...]
-    modes: tuple[ImportedMode, ...]
+    modes: tuple[ModeAnswer, ...]
     refit_seconds: float
     frequency_sd_percent_before: np.ndarray
     frequency_sd_percent: np.ndarray
@@ -135,7 +109,7 @@ class PoseImport(Answer):
             *("mode", "frequency (Hz)", "expected (Hz)", "damping (%)"),
         )
         for mode in self.modes:
-            made.add_row(*mode.cells)
+            made.add_row(*_cells(mode))
         both = zip(self.frequency_sd_percent_before, self.frequency_sd_percent, strict=True)
         change = ", ".join(
             f"{significant(before)} → {significant(after)} %" for before, after in both
@@ -238,7 +212,13 @@ def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
     )
 
 
-def _labelled_modes(report: "ImportReport") -> tuple[ImportedMode, ...]:
+def _answer(
+    mode: MeasuredMode, label: int | None, sure: float | None, expected: ExpectedMode | None
+) -> ModeAnswer:
+    return ModeAnswer.of(mode, label=label, label_probability=sure, expected=expected)
+
+
+def _labelled_modes(report: "ImportReport") -> tuple[ModeAnswer, ...]:
     """Modes of the pose with their label and expectation; unlikely ones only where labelled."""
     if report.measurement is None:
         return ()
@@ -252,7 +232,7 @@ def _labelled_modes(report: "ImportReport") -> tuple[ImportedMode, ...]:
     for mode in report.measurement.modes:
         k = labels.get(mode.frequency_hz)
         if k is not None:
-            found.append(ImportedMode.of(mode, k, float(sure[k]), expected[k]))
+            found.append(_answer(mode, k + 1, float(sure[k]), expected[k]))
         elif mode.likely:
-            found.append(ImportedMode.of(mode, None, None, None))
+            found.append(_answer(mode, None, None, None))
     return tuple(found)

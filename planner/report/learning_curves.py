@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
@@ -39,7 +38,6 @@ class Learning:
 def learning_figure(strategies: Mapping[str, Learning], title: str = "") -> Figure:
     """Medians with quartiles over repeats; RMSE on a logarithmic axis with the 1 % line."""
     figure = Figure(figsize=(11.0, 4.6), layout="constrained")
-    FigureCanvasAgg(figure)
     panels = figure.subplot_mosaic([["rmse", "r2"], ["rmse", "coverage"]], width_ratios=(1.5, 1))
     for i, (name, curve) in enumerate(strategies.items()):
         style = {"color": f"C{i % 10}", "marker": MARKS[i % len(MARKS)], "label": name}

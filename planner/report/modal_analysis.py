@@ -1,123 +1,49 @@
-"""Answer of `modes` for the recordings of one pose, which belong to no campaign."""
+"""From recordings to the answer of `modes`: one pose, any points, unlabelled FRFs, responses."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import msgspec
 import numpy as np
-from rich.console import Group
 
-from planner.campaign.events import Amplitude
 from planner.campaign.log_conversion import from_homogeneity
-from planner.dataset.measure import measure
+from planner.dataset.frf_set import FrfSet
+from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import Source, in_parts, told_of_files
-from planner.errors import InputError, RefusedError
+from planner.errors import InputError, RefusedError, RefusedFile
 from planner.frf.frf import Frf
+from planner.frf.labelled import joined
 from planner.frf.quantities import DERIVATIVE
 from planner.modal.estimate_modes import PoleIdentification, identification
-from planner.modal.modes import ModalModel, Mode
+from planner.modal.matrix_modes import modes_of_matrix, with_normal_modes
+from planner.modal.modes import ModalModel
+from planner.modal.operating import operating_modes
+from planner.modal.transfer_functions import modes_from_transfer_functions
+from planner.recording.dof import Dof
+from planner.recording.filling import lost_samples
 from planner.recording.folder import CHANNELS, TABLE, files_in, joint_columns, read_recordings
+from planner.recording.geometry import read_geometry
 from planner.recording.points import ANYWHERE, PointNames
-from planner.recording.read import READERS
-from planner.report.answer import Answer, RefusedFile
+from planner.recording.read import READERS, read
+from planner.recording.records import Channel, TimeRecord
+from planner.report.modes import ModeAnswer, ModesReport, named
 from planner.report.plot_files import Pictures
-from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
+from planner.report.text import SIMULATED_TITLE
 
-DEFAULT_BAND_HZ = (4.0, 60.0)
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from planner.report.rerun.figures import More
+
 ESTIMATORS = ("h1", "h2", "hv")
 LONGEST_NAME = 40  # characters of a file's name in a title
 NO_PICTURES = Pictures()
-NOT_DRAWN: dict[str, Any] = {"plots": (), "rrd": None}
-UNSET = msgspec.UNSET
-
-
-@dataclass(frozen=True)
-class IdentifiedMode:
-    """A mode with its sds; `shape` is [re, im] per response, `probability` that it is physical.
-
-    `residue` is [re, im, sd] in m/(N·s) of each response to each hit, row by row.
-    """
-
-    frequency_hz: float
-    frequency_sd_hz: float
-    damping_ratio: float
-    damping_sd: float
-    shape: tuple[tuple[float, float], ...]
-    probability: float
-    residue: tuple[tuple[float, float, float], ...]
-
-    @classmethod
-    def of(cls, mode: Mode) -> "IdentifiedMode":
-        """Of a mode of a modal model."""
-        shape = tuple((float(s.real), float(s.imag)) for s in mode.shape)
-        both = zip(np.ravel(mode.residue), np.ravel(mode.residue_sd), strict=True)
-        residue = tuple((float(r.real), float(r.imag), float(sd)) for r, sd in both)
-        return cls(
-            mode.frequency_hz, mode.frequency_sd_hz, mode.damping_ratio, mode.damping_sd, shape,
-            mode.probability, residue,
-        )  # fmt: skip
-
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """A row of the table."""
-        parts = [f"{re:+.2f}{im:+.2f}i" for re, im in self.shape]
-        more = f"  and {len(parts) - 3} more" if len(parts) > 4 else ""
-        return (
-            with_sd(self.frequency_hz, self.frequency_sd_hz, ".3f"),
-            with_sd(100 * self.damping_ratio, 100 * self.damping_sd),
-            "  ".join(parts[:3] if more else parts) + more,
-            f"{100 * self.probability:.0f}",
-        )
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ModalReport(Answer):
-    """Answer of `modes`; `hits` are how many were averaged per axis.
-
-    `fit_error` is ‖H − fit‖/‖H‖, None where the modes were fitted to unscaled FRFs.
-    """
-
-    modes: tuple[IdentifiedMode, ...]
-    band_hz: tuple[float, float]
-    fit_error: float | None
-    order: int
-    refused: tuple[RefusedFile, ...]
-    accepted: tuple[str, ...]
-    hits: tuple[int, int, int] | msgspec.UnsetType = UNSET
-    usable_band_hz: tuple[float, float] | msgspec.UnsetType = UNSET
-    remarks: tuple[str, ...]
-    amplitude: Amplitude | msgspec.UnsetType | None = UNSET
-    simulated: bool
-    plots: tuple[str, ...] = ()
-    rrd: str | None = None
-
-    @classmethod
-    def of(cls, modal: ModalModel, **others: Any) -> "ModalReport":
-        """Of a modal model and the other fields."""
-        own = {
-            "band_hz": modal.band_hz,
-            "fit_error": modal.fit_error,
-            "order": modal.order,
-            "refused": (),
-            "remarks": modal.remarks,
-        }
-        return cls(modes=tuple(map(IdentifiedMode.of, modal.modes)), **(own | others))
-
-    def text(self) -> Group:
-        """The modes as a table."""
-        low, high = self.band_hz
-        error = self.fit_error
-        fitted = "" if error is None else f" (fit error {100 * error:.1f} %)"
-        made = table(
-            f"Modes between {low:g} and {high:g} Hz{fitted}",
-            *("mode", "frequency (Hz)", "damping (%)", "shape x, y, z", "physical (%)"),
-        )
-        for k, mode in enumerate(self.modes):
-            made.add_row(str(k + 1), *mode.cells)
-        parts = [made, *remarks(self.remarks), *drawn(self.plots, self.rrd)]
-        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+RESPONSES = ("acceleration", "velocity", "displacement", "voltage", "unknown")
+UNSCALED = (
+    "UNSCALED: modes are from responses alone; their shapes have no scale and give no FRFs or "
+    "modal masses."
+)
 
 
 def check_options(
@@ -135,44 +61,6 @@ def check_options(
         raise InputError(f"--window-rate {window_rate_1_s:g}: give a rate in 1/s, 0 for none.")
     if band_hz is not None and not 0 <= band_hz[0] < band_hz[1]:
         raise InputError(f"--band-hz {band_hz[0]} {band_hz[1]}: give a lower and a higher Hz.")
-
-
-def modal_report(
-    sources: tuple[Source, ...],
-    band_hz: tuple[float, float] | None = None,
-    force: str | None = None,
-    estimator: str = "h1",
-    pictures: Pictures = NO_PICTURES,
-    window_rate_1_s: float = 0.0,
-) -> ModalReport:
-    """Analyse files of one pose.
-
-    `force` names the force channel of a long record whose channels are not labelled. Raises
-    RefusedError if no file could be used.
-    """
-    if force is not None:
-        return _by_channel(sources, band_hz, force, pictures)
-    band = band_hz or DEFAULT_BAND_HZ
-    measured = measure(in_parts(sources), band, estimator, window_rate_1_s)
-    refused = [RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted]
-    if measured.modal is None:
-        reasons = [file.reason for file in refused] or list(measured.remarks)
-        raise RefusedError(f"No modes could be identified: {reasons[0]}")
-    assert measured.frf is not None
-    simulated = any(v.simulated for v in measured.verdicts)
-    accepted = tuple(v.source.name for v in measured.verdicts if v.accepted)
-    found = identification(measured.frf, band) if pictures.wanted else None
-    return ModalReport.of(
-        measured.modal,
-        refused=tuple(refused),
-        accepted=accepted,
-        hits=measured.frf.hits,
-        usable_band_hz=measured.frf.usable_band_hz,
-        remarks=(*told_of_files(measured.verdicts), *measured.remarks),
-        amplitude=from_homogeneity(measured.homogeneity),
-        simulated=simulated,
-        **_draw(pictures, measured.frf, found, measured.modal, accepted, simulated),
-    )
 
 
 def sources_of(paths: Sequence[Path], from_names: bool = False) -> tuple[Source, ...]:
@@ -201,21 +89,81 @@ def _of_no_robot(source: Source) -> Source:
 
 def _draw(
     pictures: Pictures,
-    frf: Frf | None,
-    found: PoleIdentification | None,
-    modal: ModalModel,
-    accepted: Sequence[str],
-    simulated: bool,
+    files: Sequence[str],
+    figures: Callable[[str], "dict[str, Figure]"],
+    note: str = "",
+    more: "More | None" = None,
 ) -> dict[str, Any]:
-    """Draw what is wanted; where it is."""
-    if found is None or not pictures.wanted:
-        return NOT_DRAWN
-    from planner.report.modal_plots import modal_figures
+    """Draw what is wanted under the files' name; `note` and `more` as `Pictures.write` has them."""
+    if not pictures.wanted:
+        return {}
+    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+    name = f"{Path(files[0]).name[-LONGEST_NAME:]}{more}"
+    return pictures.write(figures(name), name, note, more)
 
-    more = f" and {len(accepted) - 1} more" if len(accepted) > 1 else ""
-    name = f"{Path(accepted[0]).name[-LONGEST_NAME:]}{more}"
-    mark = SIMULATED_TITLE if simulated else ""
-    return pictures.write(modal_figures(frf, found, modal, name, simulated), name, mark)
+
+def _of_model(modal: ModalModel, **others: Any) -> ModesReport:
+    own: dict[str, Any] = {
+        "band_hz": modal.band_hz,
+        "fit_error": modal.fit_error,
+        "order": modal.order,
+        "remarks": modal.remarks,
+    }
+    return ModesReport(modes=tuple(map(ModeAnswer.of, modal.modes)), **(own | others))
+
+
+def modal_report(
+    sources: tuple[Source, ...],
+    band_hz: tuple[float, float] | None = None,
+    force: str | None = None,
+    estimator: str = "h1",
+    pictures: Pictures = NO_PICTURES,
+    window_rate_1_s: float = 0.0,
+) -> ModesReport:
+    """Analyse files of one pose.
+
+    `force` names the force channel of a long record whose channels are not labelled. Raises
+    RefusedError if no file could be used.
+    """
+    if force is not None:
+        return _by_channel(sources, band_hz, force, pictures)
+    band = band_hz or DEFAULT_BAND_HZ
+    measured = measure(in_parts(sources), band, estimator, window_rate_1_s)
+    refused = [RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted]
+    if measured.modal is None:
+        reasons = [file.reason for file in refused] or list(measured.remarks)
+        raise RefusedError(f"No modes could be identified: {reasons[0]}")
+    assert measured.frf is not None
+    simulated = any(v.simulated for v in measured.verdicts)
+    accepted = tuple(v.source.name for v in measured.verdicts if v.accepted)
+    found = identification(measured.frf, band) if pictures.wanted else None
+    drawn = _draw_pose(pictures, measured.frf, found, measured.modal, accepted, simulated)
+    return _of_model(
+        measured.modal,
+        refused=tuple(refused),
+        accepted=accepted,
+        hits=measured.frf.hits,
+        usable_band_hz=measured.frf.usable_band_hz,
+        remarks=(*told_of_files(measured.verdicts), *measured.remarks),
+        amplitude=from_homogeneity(measured.homogeneity),
+        simulated=simulated,
+        **drawn,
+    )
+
+
+def _draw_pose(
+    pictures: Pictures, frf: Frf | None, found: PoleIdentification | None, modal: ModalModel,
+    accepted: Sequence[str], simulated: bool,
+) -> dict[str, Any]:  # fmt: skip
+    if found is None:
+        return {}
+
+    def figures(name: str) -> "dict[str, Figure]":
+        from planner.report.modal_plots import modal_figures
+
+        return modal_figures(frf, found, modal, name, simulated)
+
+    return _draw(pictures, accepted, figures, SIMULATED_TITLE if simulated else "")
 
 
 def _by_channel(
@@ -223,11 +171,9 @@ def _by_channel(
     band_hz: tuple[float, float] | None,
     force: str,
     pictures: Pictures,
-) -> ModalReport:
+) -> ModesReport:
     """Long records with unlabelled channels: the user names the force channel."""
     from planner.modal.free_decays import analyse_record
-    from planner.recording.read import read
-    from planner.recording.records import TimeRecord
 
     if len(sources) != 1:
         raise InputError("--force analyses one long record at a time; name one file.")
@@ -236,5 +182,143 @@ def _by_channel(
         raise InputError(f"{sources[0].name} holds no time histories; leave out --force.")
     modal, found = analyse_record(records[0], force_channel=force, band_hz=band_hz)
     accepted, simulated = (sources[0].name,), records[0].simulated
-    plots = _draw(pictures, None, found, modal, accepted, simulated)
-    return ModalReport.of(modal, accepted=accepted, simulated=simulated, **plots)
+    drawn = _draw_pose(pictures, None, found, modal, accepted, simulated)
+    return _of_model(modal, accepted=accepted, simulated=simulated, **drawn)
+
+
+def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -> ModesReport:
+    """Of FRFs without nodes and directions: poles and unscaled shapes, an entry per FRF.
+
+    In the order of the files. Raises InputError or RefusedError in one sentence.
+    """
+    if given.exponential_rate_1_s:
+        raise InputError("--window-rate is for hits, and for FRFs that state their directions.")
+    record = joined(given.records)
+    modal = modes_from_transfer_functions(record, quantity, given.band_hz)
+
+    def figures(name: str) -> "dict[str, Figure]":
+        from planner.report.modal_plots import cmif_figure, mac_figure
+
+        mark = SIMULATED_TITLE if record.simulated else ""
+        return {
+            "cmif": cmif_figure(record.frequency_hz, record.values, modal, f"{mark}CMIF · {name}"),
+            "mac": mac_figure(modal, f"{mark}AutoMAC · {name}"),
+        }
+
+    files = (record.source.name, *given.accepted[1:])
+    return _of_model(
+        modal, fit_error=None, accepted=given.accepted, refused=given.refused,
+        simulated=record.simulated, **_draw(pictures, files, figures),
+    )  # fmt: skip
+
+
+def matrix_report(
+    given: FrfSet,
+    quantity: str | None,
+    pictures: Pictures,
+    real: bool = False,
+    files_to: Path | None = None,
+) -> ModesReport:
+    """Analyse FRFs between any points.
+
+    With `real` the shapes are the real normal modes behind the complex ones; `files_to` is a folder
+    for universal files and tables. Raises InputError or RefusedError in one sentence.
+    """
+    matrix, geometry = given.matrix(quantity), read_geometry(given.files)
+    found = modes_of_matrix(matrix, given.band_hz, geometry)
+    found = with_normal_modes(found) if real else found
+    exports: tuple[str, ...] = ()
+    if files_to is not None:
+        from planner.export.matrix_files import Exported, export
+
+        paths = export(Exported(matrix, found, geometry, real), files_to.absolute())
+        exports = tuple(map(str, paths))
+
+    def figures(name: str) -> "dict[str, Figure]":
+        from planner.report.matrix_plots import matrix_figures
+
+        return matrix_figures(matrix, found, geometry, name)
+
+    mark, more = SIMULATED_TITLE if matrix.simulated else "", None
+    if geometry is not None and pictures.rrd is not None:
+        from planner.report.rerun.modes import moving_shapes
+
+        more = moving_shapes(found, geometry)
+    note = f"{mark}On the timeline shapes move, exaggerated; grey: at rest." if more else mark
+    drawn = _draw(pictures, [file.name for file in given.files], figures, note, more)
+    if geometry is not None and pictures.folder is not None:
+        from planner.report.shape_motion import animate
+
+        moving = animate(found, geometry, pictures.folder.absolute(), mark)
+        drawn["plots"] = [*drawn["plots"], *map(str, moving)]
+    return ModesReport(
+        modes=tuple(map(ModeAnswer.of, found.modes)),
+        dofs=tuple(named(dof) for dof in found.dofs),
+        references=tuple(named(dof) for dof in matrix.references),
+        frfs=matrix.count,
+        band_hz=found.band_hz,
+        fit_error=found.found.fit_error,
+        order=found.found.order,
+        refused=given.refused,
+        accepted=given.accepted,
+        remarks=(*given.remarks, *found.remarks),
+        simulated=matrix.simulated,
+        exports=exports,
+        **drawn,
+    )
+
+
+def operating_report(
+    paths: Sequence[Path], band_hz: tuple[float, float] | None, pictures: Pictures
+) -> ModesReport:
+    """Analyse the responses of one record. Raises InputError where a file holds none."""
+    check_options(band_hz)
+    sources = sources_of(paths)
+    if len(sources) != 1:
+        raise InputError("--operating analyses one record at a time; name one file.")
+    record, channels = _responses(sources[0].path)
+    samples = np.array([channel.samples for channel in channels])
+    dofs = tuple(_dof(channel) for channel in channels)
+    sign = np.array([dof.sign for dof in dofs])
+    found = operating_modes(sign[:, None] * samples, record.sampling_rate_hz, band_hz)
+    told = [*record.remarks, *(fault.text for fault in lost_samples(record)), UNSCALED]
+    if found.tones_hz:
+        tones = ", ".join(f"{hz:.4g}" for hz in found.tones_hz)
+        told.append(f"Tones, not modes, at {tones} Hz: what turns or hums there was left out.")
+    mark = SIMULATED_TITLE if record.simulated else ""
+
+    def figures(name: str) -> "dict[str, Figure]":
+        from planner.report.modal_plots import mac_figure, operating_figure
+
+        said = f"{mark}Stabilisation diagram, responses alone (unscaled) · {name}"
+        mac = mac_figure(found, f"{mark}AutoMAC, unscaled · {name}")
+        return {"stabilisation": operating_figure(found, said), "mac": mac}
+
+    note = f"{mark}Responses alone give no scale: neither FRFs nor modal masses follow."
+    return ModesReport(
+        modes=tuple(map(ModeAnswer.of, found.modes)),
+        dofs=tuple(named(dof.positive) for dof in dofs),
+        scaled=False,
+        band_hz=found.band_hz,
+        tones_hz=found.tones_hz,
+        accepted=(sources[0].name,),
+        remarks=tuple(told),
+        simulated=record.simulated,
+        **_draw(pictures, [sources[0].path.name], figures, note),
+    )
+
+
+def _responses(path: Path) -> tuple[TimeRecord, list[Channel]]:
+    """The record and its channels that move; those that stand still are left out."""
+    records = [record for record in read(path) if isinstance(record, TimeRecord)]
+    if not records:
+        raise InputError(f"{path} holds no time histories; --operating needs records of responses.")
+    channels = [c for c in records[0].channels if c.quantity in RESPONSES and np.ptp(c.samples) > 0]
+    if not channels:
+        raise InputError(f"{path} holds no response that moves; export accelerations.")
+    return records[0], channels
+
+
+def _dof(channel: Channel) -> Dof:
+    stated = channel.node not in ("", "0")
+    return Dof.of_uff(channel.node if stated else channel.name, channel.direction)

@@ -11,8 +11,7 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.planned import inside, outside_remark
-from planner.errors import InputError
-from planner.recording.joints import JointUnits
+from planner.export.npz import save_frfs
 from planner.report.answer import Answer
 from planner.report.text import table, with_sd
 from planner.words import counted
@@ -98,26 +97,3 @@ def predictions(
         for i, name in enumerate(names)
     )
     return PredictionReport(tuple(poses), str(npz.resolve()), len(campaign.state.used))
-
-
-def save_frfs(
-    path: Path, frequency_hz: np.ndarray, mean: np.ndarray, sd: np.ndarray,
-    poses: Sequence[str], joints: JointUnits, q: np.ndarray, outside: np.ndarray | None = None,
-) -> None:  # fmt: skip
-    """Write FRFs (n, 3, 3, F) in m/s²/N at lines (F,) and poses q (n, dof) to exactly this file.
-
-    With which of them lie `outside` (n,) the workspace, where there is one.
-
-    Raises InputError where that cannot be done.
-    """
-    more = {"joint_units": np.array(joints.units)} if any(joints.slides) else {}
-    more |= {} if outside is None else {"outside": outside}
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(path, "wb") as file:
-            np.savez_compressed(
-                file, allow_pickle=False, frequency_hz=frequency_hz, frf_mean=mean, frf_sd=sd,
-                pose=np.array(poses), joints_deg=joints.shown(q), **more,
-            )  # fmt: skip
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}); name another.") from None

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
+from planner.campaign.repeated_pose import RepeatedPose
 from planner.design.stopping import Forecast
 from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer, plain
@@ -17,7 +18,6 @@ from planner.report.predictions import ExpectedMode
 from planner.report.text import command_line, table
 
 if TYPE_CHECKING:
-    from planner.campaign.model import Model
     from planner.design.sensor_places import BetterPlaces
 
 
@@ -48,31 +48,6 @@ class ProposedPose(Answer):
         ways = ", ".join(f"+{axis} {way}" for axis, way in zip("xyz", self.room, strict=False))
         seen = [Text(f"There, seen from the base: {ways}")] if ways else []
         return [angles, Text(place), *seen, expected]
-
-
-@dataclass(frozen=True)
-class RepeatedPose:
-    """The measured pose whose repetition gains more than any new one.
-
-    Gains are reductions of the mean relative variance.
-    """
-
-    pose: str
-    gain: float
-    gain_of_a_new_pose: float
-    text: str
-
-    @classmethod
-    def of(cls, model: "Model") -> "RepeatedPose | None":
-        """None where a new pose gains more."""
-        found = model.repeat()
-        if found is None or found[1] <= found[2]:
-            return None
-        return cls(
-            *found,
-            f"Better than a new pose: hit {found[0]} again, with as many hits as before. That "
-            f"lowers the uncertainty more, as the noise of its hits is now the largest part of it.",
-        )
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.compare.counterfactual import otherwise
-from planner.compare.tasks import Run
+from planner.compare.counterfactual import OtherAcquisition
 from planner.recording.joints import JointUnits
 from planner.replay import Step, replay
 from planner.report.answer import Answer
@@ -50,41 +49,6 @@ class ReplayedStep:
             step.detail, len(step.model.labelled), step.model.frequency_sd_percent,
             tuple(OtherPose(p.joints_deg, p.position_m, p.hits) for p in step.instead),
         )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class LearningRun:
-    """One order of the measured poses: RMSE and robot time after n measurements each."""
-
-    poses: tuple[str, ...]
-    n: tuple[int, ...]
-    frequency_rmse_percent: tuple[float, ...]
-    minutes: tuple[float, ...]
-
-    @classmethod
-    def of(cls, run: Run) -> "LearningRun":
-        """Of a run of a comparison."""
-        return cls(run.poses, run.n, run.frequency_rmse_percent, run.minutes)
-
-
-@dataclass(frozen=True)
-class OtherAcquisition:
-    """What another acquisition would have saved among the poses measured; `runs` by name."""
-
-    acquisition: str
-    text: str
-    runs: dict[str, LearningRun]
-
-    @classmethod
-    def of(cls, campaign: Campaign, acquisition: str) -> "OtherAcquisition | None":
-        """None with too few measured poses to tell."""
-        found = otherwise(campaign, acquisition)
-        if found is None:
-            return None
-        runs = {"campaign": found.measured, found.acquisition: found.instead}
-        return cls(
-            found.acquisition, found.text, {name: LearningRun.of(r) for name, r in runs.items()}
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,10 +4,17 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import msgspec
-import numpy as np
 from rich.console import Group
 from rich.text import Text
 
+from planner.check.checked import (
+    CheckedJoint,
+    CheckedLink,
+    CheckedPose,
+    checked_joints,
+    checked_links,
+    checked_poses,
+)
 from planner.check.examine import Examination
 from planner.check.remark import SEVERITIES, CheckRemark
 from planner.recording.joints import JointUnits
@@ -18,46 +25,6 @@ from planner.words import counted
 
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
 SHOWN_TO = 2.0  # times the end of the band; the others stand in the JSON
-
-
-@dataclass(frozen=True)
-class CheckedLink:
-    """A link: what turns it (null: nothing), mass, centre of mass and principal moments.
-
-    `guessed` masses have an sd, `mass_sd_kg`, as others may that robot.toml states.
-    """
-
-    link: str
-    joint: str | None
-    mass_kg: float
-    com_m: tuple[float, ...]
-    moments_kg_m2: tuple[float, ...]
-    inertial: bool
-    collision_shapes: int
-    guessed: bool = False
-    mass_sd_kg: float | None = None
-
-
-@dataclass(frozen=True)
-class CheckedJoint:
-    """A joint's limits and its speed, in degrees and degrees a second; a slide's in mm and mm/s."""
-
-    joint: str
-    lower_deg: float
-    upper_deg: float
-    speed_deg_s: float
-    unit: str | msgspec.UnsetType = msgspec.UNSET  # "mm" of a joint that slides
-
-
-@dataclass(frozen=True)
-class CheckedPose:
-    """What the simulation says at a pose: frequencies and damping ratios, from the lowest."""
-
-    pose: str
-    joints_deg: tuple[float, ...]
-    position_m: tuple[float, ...]
-    frequency_hz: tuple[float, ...]
-    damping_ratio: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -84,15 +51,6 @@ class RobotCheckReport(Answer):
     def of(cls, found: Examination) -> "RobotCheckReport":
         """Of what was found."""
         robot = found.robot
-        links = tuple(
-            CheckedLink(
-                b.name, b.joint or None, b.mass, tuple(b.com_m.tolist()),
-                tuple(b.moments.tolist()), b.stated, b.shapes, b.guessed,
-                None if b.sd_percent is None else b.mass * b.sd_percent / 100,
-            )
-            for b in found.links
-        )  # fmt: skip
-        limits = robot.joints.shown([robot.lower_rad, robot.upper_rad, robot.velocity_rad_s]).T
         return cls(
             robot=robot.name,
             robot_toml=str(robot.path.absolute()),
@@ -102,12 +60,9 @@ class RobotCheckReport(Answer):
             moving_mass_kg=sum(b.mass for b in found.links if b.joint),
             reach_m=robot.reach_m,
             band_hz=robot.config.band_hz,
-            links=links,
-            joints=tuple(
-                CheckedJoint(name, *row, unit="mm" if robot.slides(name) else msgspec.UNSET)
-                for name, row in zip(robot.joint_names, limits.tolist(), strict=True)
-            ),
-            poses=_poses(found),
+            links=checked_links(found),
+            joints=checked_joints(found),
+            poses=checked_poses(found),
             joint_units=robot.joints.declared,
             found=found,
         )
@@ -155,25 +110,6 @@ class RobotCheckReport(Answer):
         carried = self.found.robot.config.payload if self.found else ()
         mass = sum(body.mass for body in carried)
         return f", and {mass:.4g} kg of [[payload]]" if mass else ""
-
-
-def _poses(found: Examination) -> tuple[CheckedPose, ...]:
-    if not found.frequency_hz.size:
-        return ()
-    places = found.robot.forward_batch(found.q)[1]
-    made = []
-    for i, name in enumerate(found.poses):
-        known = np.isfinite(found.frequency_hz[i])
-        made.append(
-            CheckedPose(
-                name,
-                tuple(found.robot.joints.shown(found.q[i]).round(4).tolist()),
-                tuple(places[i].tolist()),
-                tuple(found.frequency_hz[i][known].tolist()),
-                tuple(found.damping_ratio[i][known].tolist()),
-            )
-        )
-    return tuple(made)
 
 
 def _cell(pose: CheckedPose, most_hz: float) -> str:

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from planner.report.plot_text import plain_text
@@ -24,7 +23,6 @@ def robot_figure(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Fi
     """The robot at q (dof,) in rad: from the side, from above, and in space."""
     lines = _close(robot_lines(robot, q, links), robot.shoulder_m, robot.reach_m)
     figure = Figure(figsize=(15.0, 6.0), layout="constrained")
-    FigureCanvasAgg(figure)
     stands = robot.joints.listed(robot.joints.shown(q), 0)
     title = f"{plain_text(robot.name)} at joint angles ({stands})"
     figure.suptitle(title, fontsize=12)

@@ -9,6 +9,7 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.cut_source import Asked, ToolChange, at_poses_in_band
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.path import at_speed, best_speed_of
@@ -16,7 +17,6 @@ from planner.milling.structure import OutOfBandError, Structure
 from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.plot_files import Pictures
-from planner.report.stability_source import Asked, ToolChange, at_poses_in_band
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, number, remarks, table
 
 if TYPE_CHECKING:
@@ -145,12 +145,10 @@ def _coordinates(campaign: Campaign) -> tuple[str, ...]:
 
 def _figure(answer: MapReport, features: np.ndarray, names: tuple[str, ...], cut: Cut) -> "Figure":
     """From above and from the side, and over what of the pose the limit hangs on most."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13.0, 4.6), layout="constrained")
-    FigureCanvasAgg(figure)
     panels = figure.subplots(1, 3)
     top = 1e3 * cut.depth_m[1]
     shown = np.minimum(1e3 * answer.depth_limit_m_at_95, top)

@@ -7,61 +7,22 @@ import numpy as np
 from rich.console import Group
 from rich.text import Text
 
+from planner.campaign.cut_advice import FeedAdvice, TurnAdvice, turn_advice
+from planner.campaign.cut_source import Asked, outside, structures_of_file
+from planner.campaign.toolpath_poses import Travelled, Way
 from planner.milling.cut import Cut
+from planner.milling.doubts import doubts
 from planner.milling.path import TURNS_DEG, PathLimits, along, by_feed
 from planner.milling.structure import Structure, beyond
 from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
-from planner.report.path_poses import Travelled, Way
 from planner.report.plot_files import Pictures
-from planner.report.stability_doubts import doubts
-from planner.report.stability_source import Asked, outside, structures_of_file
-from planner.report.stability_turns import TurnAdvice, turn_advice, turns_figure
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, number, remarks, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_ROWS = 24
-WORTH_PERCENT = 5.0  # more depth from a turned feed: less is not worth a change of the program
-
-
-@dataclass(frozen=True)
-class FeedAdvice:
-    """What turning the feed about the tool's axis would allow at the best speed.
-
-    Angles in degrees from the feed as it is towards axis × feed, depths in m that all poses allow.
-    `direction_base` is the best feed in the robot's base frame, where that is one for all poses.
-    """
-
-    turn_deg: tuple[float, ...]
-    depth_m: tuple[float, ...]
-    direction_base: tuple[float, float, float] | None = None
-
-    @property
-    def best(self) -> int:
-        """Number of the best angle."""
-        return int(np.argmax(self.depth_m))
-
-    @property
-    def text(self) -> str:
-        """One sentence."""
-        if not np.isfinite(self.depth_m[0]):
-            return ""
-        gain = 100 * (self.depth_m[self.best] / self.depth_m[0] - 1)
-        if not gain > WORTH_PERCENT:
-            return "Another feed direction gains less than 5 % of depth."
-        if not np.isfinite(gain):
-            return f"Turned by {self.turn_deg[self.best]:g}° the feed allows every depth asked for."
-        base = ""
-        if self.direction_base is not None:
-            base = (
-                " (along [" + ", ".join(f"{v:.2f}" for v in self.direction_base) + "] of the base)"
-            )
-        return (
-            f"Turned by {self.turn_deg[self.best]:g}° about the tool's axis{base}, the feed allows "
-            f"{gain:.0f} % more depth."
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +106,9 @@ def path_report(
     mark = SIMULATED_TITLE if answer.simulated else ""
     figures = {"path": _figure(limits, answer, cut, mark)}
     if answer.turn is not None:
-        figures["turns"] = turns_figure(answer.turn, answer.poses, answer.best_spindle_rpm, mark)
+        figures["turns"] = turns_figure(
+            answer.turn, answer.poses, answer.best_spindle_rpm, mark, cut.depth_m[1]
+        )
     note = f"{mark}Depths that are stable with 95 % probability at all poses, and at each."
     written = pictures.write(figures, asked.source.name, note)
     return replace(answer, plots=tuple(written["plots"]), rrd=written["rrd"])
@@ -184,11 +147,9 @@ def _answer(poses: list[tuple[str, Structure]], limits: PathLimits, cut: Cut) ->
 
 
 def _figure(limits: PathLimits, answer: PathReport, cut: Cut, mark: str) -> "Figure":
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 6.5), layout="constrained")
-    FigureCanvasAgg(figure)
     upper, lower = figure.subplots(2, 1, height_ratios=(3, 1))
     rpm, top = cut.speeds_rpm, 1e3 * cut.depth_m[1]
     robust = np.minimum(1e3 * limits.robust_m, 2 * top)
@@ -209,4 +170,31 @@ def _figure(limits: PathLimits, answer: PathReport, cut: Cut, mark: str) -> "Fig
     lower.set_ylabel("depth (mm)")
     for panel in (upper, lower):
         panel.grid(True, alpha=0.3)
+    return figure
+
+
+def turns_figure(
+    advice: TurnAdvice, poses: tuple[str, ...], rpm: float, mark: str, deepest_m: float
+) -> "Figure":
+    """Depth over poses and angles."""
+    from matplotlib.colors import LogNorm
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 4.8), layout="constrained")
+    panel = figure.subplots()
+    # What is stable up to the largest depth asked for is drawn as that, not as unreachable.
+    shown = np.ma.masked_invalid(1e3 * np.minimum(np.array(advice.depth_m), deepest_m).T)
+    image = panel.imshow(shown, aspect="auto", origin="lower", cmap="viridis", norm=LogNorm())
+    for i, best in enumerate(advice.best_deg):
+        panel.plot(i, advice.turn_deg.index(best), "o", mfc="none", mec="white", ms=9, mew=1.6)
+    panel.axhline(advice.turn_deg.index(advice.common_deg), color="tab:red", lw=1, ls="--")
+    panel.set_xticks(range(len(poses)), poses, rotation=45, ha="right", fontsize=8)
+    panel.set_yticks(range(len(advice.turn_deg)), [f"{a:g}" for a in advice.turn_deg])
+    panel.set_ylabel("turned about the tool's axis (°)")
+    panel.set_facecolor("lightgrey")
+    panel.set_title(
+        f"{mark}Depth limit at {rpm:.0f} rpm (ring: best of a pose, dashed: best for all, "
+        f"grey: cannot stand)", fontsize=10,
+    )  # fmt: skip
+    figure.colorbar(image, ax=panel, label="depth limit (mm)")
     return figure

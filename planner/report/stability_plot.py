@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from planner.milling.cut import Cut
@@ -23,7 +22,6 @@ def lobes_figure(
     """Depth limits in mm over speeds in rpm, with probabilities; below it the chatter frequency."""
     rpm, depth = cut.speeds_rpm, 1e3 * np.array([loss.depth_m for loss in found])
     figure = Figure(figsize=(9.0, 6.5), layout="constrained")
-    FigureCanvasAgg(figure)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     highest = np.nanmax(depth) if np.any(np.isfinite(depth)) else 1e3 * cut.depth_m[1]
     top = min(1e3 * cut.depth_m[1], ROOM * max(highest, 1e3 * point[1] if point else 0.0))

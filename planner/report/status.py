@@ -10,14 +10,14 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.decision_status import DecisionStatus
 from planner.campaign.events import Proposal
+from planner.campaign.left_out import LeftOutValues, found_without, left_out
 from planner.campaign.state import Measurement
 from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain
-from planner.report.decision_status import DecisionStatus
 from planner.report.imports import AskedOfPose
 from planner.report.kept_diagnosis import diagnosis_of, read_diagnosis, two_answers
-from planner.report.leave_one_out import LeftOutValues, found_without, left_out
 from planner.report.plot_files import Pictures
 from planner.report.proposals import forecast_json, target_sentence
 from planner.report.refitted_springs import (
@@ -187,7 +187,7 @@ class StatusReport(Answer):
         """The same once each pose is drawn as predicted without it, where that is wanted."""
         if not pictures.wanted or not self.leave_one_out.values or self.model is None:
             return self
-        from planner.report.leave_one_out_plots import left_out_figure
+        from planner.report.campaign_plots import left_out_figure
 
         mark = SIMULATED_TITLE if self.simulated else ""
         title = f"{mark}Each measured pose, predicted without it"

@@ -23,8 +23,8 @@ from planner.campaign.state import fold
 from planner.campaign.taking_back import last_acts
 from planner.dataset.screened_files import Source
 from planner.errors import NoPoseLeftError, PlannerError
-from planner.report import session_text
 from planner.report.campaign_acts import RedoneAct, UndoneAct
+from planner.session import session_text
 from planner.session.course import BAD, Course, PoseInProgress
 from planner.session.page import TakingBack, page_with_hits, page_without_hits
 from planner.session.skipping import ask_why, on_reason_key

@@ -9,9 +9,9 @@ import numpy as np
 from planner.campaign.events import Proposal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
-from planner.report import session_text
-from planner.report.pose_screen import PosePage
+from planner.session import session_text
 from planner.session.hit_verdicts import HitVerdict, Part, PoseBefore
+from planner.session.pose_screen import PosePage
 from planner.words import significant
 
 BAD = ("repeat", "unsure", "unstated")

@@ -8,10 +8,10 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.campaign.taking_back import last_acts, last_undone
 from planner.dataset.screened_files import when
-from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do
 from planner.robot.room_directions import axes_in_the_room
 from planner.session.course import BAD, Course
 from planner.session.hit_verdicts import HitVerdict
+from planner.session.pose_screen import JudgedHit, PosePage, keys_that_do
 from planner.words import counted, short_name
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from planner.report import session_text
+from planner.session import session_text
 from planner.session.course import Course, PoseInProgress
 from planner.session.station import Station
 

@@ -12,9 +12,9 @@ from rich.text import Text
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError, PlannerError
 from planner.replay import replay
-from planner.report import session_text
 from planner.report.answer import Answer
 from planner.report.rerun.story import Story
+from planner.session import session_text
 from planner.session.acts import (
     answer,
     arrive,

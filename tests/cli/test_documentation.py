@@ -18,7 +18,7 @@ from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESIGNS, TOLD
 from planner.milling.cut import Cut, load_cut
 from planner.milling.tool_file import ToolTable, load_tool
-from planner.report.manual.words import TUTORIAL
+from planner.report.manual_page import manual
 from planner.robot.config import RobotConfig
 
 COMMANDS = typer.main.get_command(app).commands  # pyright: ignore[reportAttributeAccessIssue]
@@ -41,7 +41,10 @@ def test_every_command_has_an_example_that_it_takes(name):
 
 
 def test_the_tutorials_commands_are_taken():
-    lines = [line for _, commands, _ in TUTORIAL for line in commands.splitlines()]
+    told = re.search(r'<section id="tutorial">(.*?)</section>', manual([]), re.DOTALL)
+    assert told
+    blocks = re.findall(r"<pre>(.*?)</pre>", told[1], re.DOTALL)
+    lines = [line for block in blocks for line in html.unescape(block).splitlines()]
     assert len(lines) > 8
     for line in lines:
         parsed(line)

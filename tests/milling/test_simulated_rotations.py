@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from planner.campaign.tip_source import tip_of
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.errors import InputError
 from planner.milling.beam import Segment, ToolMaterial
@@ -14,7 +15,6 @@ from planner.milling.coupling import couple
 from planner.milling.cutter_frf import CutterFrf
 from planner.milling.rotations import completed
 from planner.milling.tool import Tool, ToolPart
-from planner.report.coupling_source import tip_of
 from planner.robot.config import Payload
 from planner.robot.robot import Robot
 

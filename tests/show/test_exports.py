@@ -15,9 +15,9 @@ from planner.errors import InputError
 from planner.recording.folder import read_poses
 from planner.recording.records import FrfRecord
 from planner.recording.uff import read_uff
-from planner.report.handing_on.controller import PoseToDrive, program
-from planner.report.handing_on.export import KINDS, export
+from planner.report.exports import KINDS, export
 from planner.report.predictions import predictions
+from planner.robot.controller_program import PoseToDrive, program
 from planner.robot.robot import Robot
 from tests.support.named_campaign import SCRIPT
 from tests.support.robots import make_arm

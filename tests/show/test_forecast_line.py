@@ -5,7 +5,7 @@ import pytest
 
 from planner.design.stopping import percent
 from planner.report.predictions import ExpectedMode
-from planner.report.session_text import MOST_TOLD, poses_to_go, progress_line
+from planner.session.session_text import MOST_TOLD, poses_to_go, progress_line
 
 
 def test_a_steady_fall_is_followed_to_the_target():

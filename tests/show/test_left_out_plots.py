@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planner.report.leave_one_out_plots import left_out_figure
+from planner.report.campaign_plots import left_out_figure
 from planner.surrogate.leave_one_out import LeaveOneOut
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planner.frf.frf import Frf
-from planner.report.frf_sheet import frf_sheet
+from planner.report.campaign_plots import frf_sheet
 from planner.report.text import with_sd
 
 

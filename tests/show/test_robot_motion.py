@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from planner.campaign import mode_motion
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import accelerance
 from planner.frf.frf import Frf
 from planner.recording.points import Layout
-from planner.report import robot_motion
 from planner.robot.robot import Robot
 from planner.robot.skeleton import skeleton
 from tests.support.arm_with_points import poses, write_arm
@@ -48,34 +48,32 @@ def recorded(simulation, q, missing=()) -> tuple[Any, Any]:
 def test_shapes_measured_at_several_sensors_are_those_of_the_simulation(arm):
     robot, simulation, q = arm
     measured, pose = recorded(simulation, q)
-    seen = robot_motion.measured_shapes(robot, pose, measured)
+    seen = mode_motion.measured_shapes(robot, pose, measured)
     drawn = skeleton(robot, q)
     layout = Layout(sensors=seen.names)
-    _, there = robot_motion.simulated_shapes(simulation, q, drawn, layout, COUNT)
-    mac = robot_motion.agreement(seen, there)
+    _, there = mode_motion.simulated_shapes(simulation, q, drawn, layout, COUNT)
+    mac = mode_motion.agreement(seen, there)
     assert np.all(np.diag(mac)[:2] > 0.9999)
     assert np.all(np.isnan(mac[2]))  # the third mode was not found
-    assert np.allclose(robot_motion.matched(seen, there).motion[:2], there.motion[:2], atol=0.02)
+    assert np.allclose(mode_motion.matched(seen, there).motion[:2], there.motion[:2], atol=0.02)
 
 
 def test_a_direction_that_was_not_heard_is_left_out(arm):
     robot, simulation, q = arm
     measured, pose = recorded(simulation, q, missing=(3, 4, 5))
-    seen = robot_motion.measured_shapes(robot, pose, measured)
+    seen = mode_motion.measured_shapes(robot, pose, measured)
     assert seen.names == ("sensor", "shoulder", "elbow")
     assert np.all(np.isnan(seen.motion[:, 1]))
     drawn = skeleton(robot, q)
-    _, there = robot_motion.simulated_shapes(
-        simulation, q, drawn, Layout(sensors=seen.names), COUNT
-    )
-    assert np.all(np.diag(robot_motion.agreement(seen, there))[:2] > 0.9999)
+    _, there = mode_motion.simulated_shapes(simulation, q, drawn, Layout(sensors=seen.names), COUNT)
+    assert np.all(np.diag(mode_motion.agreement(seen, there))[:2] > 0.9999)
 
 
 def test_links_move_as_rigid_bodies(arm):
     """To first order the distance of two points of a link stays; links stand sagged, by 1e-4."""
     robot, simulation, q = arm
     drawn = skeleton(robot, q)
-    whole, there = robot_motion.simulated_shapes(simulation, q, drawn, Layout(), COUNT)
+    whole, there = mode_motion.simulated_shapes(simulation, q, drawn, Layout(), COUNT)
     assert np.allclose(np.max(np.linalg.norm(np.abs(whole.motion), axis=2), axis=1), 1.0)
     ends = [(drawn.place_m[a], drawn.place_m[b], whole.motion[:, a], whole.motion[:, b])
             for a, b in drawn.lines]  # fmt: skip
@@ -88,6 +86,6 @@ def test_links_move_as_rigid_bodies(arm):
 def test_without_a_simulation_the_largest_measured_motion_is_one(arm):
     robot, simulation, q = arm
     measured, pose = recorded(simulation, q)
-    seen = robot_motion.alone(robot_motion.measured_shapes(robot, pose, measured))
+    seen = mode_motion.alone(mode_motion.measured_shapes(robot, pose, measured))
     assert np.allclose(np.max(np.abs(seen.motion[:2]), axis=(1, 2)), 1.0)
     assert np.all(np.isnan(seen.motion[2]))

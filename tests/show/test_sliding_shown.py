@@ -16,10 +16,11 @@ from planner.campaign.config import load_campaign_config
 from planner.campaign.events import Proposal
 from planner.check.examine import examine
 from planner.errors import InputError
-from planner.report.handing_on.controller import PoseToDrive, program
-from planner.report.pose_screen import PosePage
 from planner.report.rerun.campaign import RerunView
+from planner.robot.controller_program import PoseToDrive, program
+from planner.session.pose_screen import PosePage
 from planner.robot.robot import Robot
+from planner.session.pose_screen import PosePage
 from tests.support.rails import GANTRY, GANTRY_BOX, make_sliding, sliding_campaign
 from tests.support.rerun_frames import Frames
 

@@ -15,11 +15,12 @@ from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
 from planner.modal.matrix_modes import MatrixModes
+from planner.modal.shape_motion import motions, moved
 from planner.recording.geometry import Geometry
 from planner.recording.points import Layout
 from planner.report.plot_text import plain_text, write_values
 from planner.report.rerun.figures import More, draw, figure_view
-from planner.report.robot_motion import (
+from planner.campaign.mode_motion import (
     PointShapes,
     agreement,
     alone,
@@ -27,7 +28,6 @@ from planner.report.robot_motion import (
     measured_shapes,
     simulated_shapes,
 )
-from planner.report.shape_motion import motions, moved
 from planner.robot.skeleton import Skeleton, skeleton
 
 VIBRATION = "vibration"

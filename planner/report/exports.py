@@ -11,12 +11,15 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError
+from planner.export import uff
+from planner.export.collected import Collected, collect
+from planner.export.model_file import LOADER, model_arrays
+from planner.export.tables import frfs_csv, mat_arrays, modes_csv
 from planner.recording.folder import read_poses
 from planner.recording.records import PoseRow
 from planner.report.answer import Answer
-from planner.report.handing_on import uff
-from planner.report.handing_on.collected import Collected, collect
-from planner.report.handing_on.controller import (
+from planner.robot.collision import Collisions
+from planner.robot.controller_program import (
     PROGRAMS,
     SUFFIXES,
     PoseToDrive,
@@ -24,9 +27,6 @@ from planner.report.handing_on.controller import (
     program,
     unique,
 )
-from planner.report.handing_on.model_file import LOADER, model_arrays
-from planner.report.handing_on.tables import frfs_csv, mat_arrays, modes_csv
-from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
 
 DATA = ("uff", "mat", "csv", "model")

@@ -5,8 +5,8 @@ from scipy.interpolate import RBFInterpolator
 
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError
+from planner.export.collected import Collected
 from planner.recording.joints import SCALES
-from planner.report.handing_on.collected import Collected
 
 # Points of a workspace of up to two coordinates, and of more: 3 and 9 s, 0.1 and 0.6 MB.
 FEW_POINTS, MANY_POINTS = 1000, 3000

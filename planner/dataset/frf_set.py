@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.dataset.measure import MeasuredPose
+from planner.dataset.measure import DEFAULT_BAND_HZ, MeasuredPose
 from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.dataset.store import user_store
-from planner.errors import PlannerError, RefusedError
+from planner.errors import PlannerError, RefusedError, RefusedFile
 from planner.frf.exported import exported
 from planner.frf.matrix import FrfMatrix, matrix_of
 from planner.recording.excited_band import excited_band
@@ -17,8 +17,6 @@ from planner.recording.geometry import read_geometry
 from planner.recording.points import ANYWHERE
 from planner.recording.read import read
 from planner.recording.records import FrfRecord, Hit, Record, TimeRecord
-from planner.report.answer import RefusedFile
-from planner.report.modal_analysis import DEFAULT_BAND_HZ
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ from planner.campaign.hit_habits import habits
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.modal.modes import Mode
-from planner.report.pose_screen import PosePage, remedy_first
 from planner.report.text import SIMULATED, with_sd
+from planner.session.pose_screen import PosePage, remedy_first
 from planner.words import counted, short_name, significant
 
 HELP = """\

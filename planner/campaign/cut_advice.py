@@ -1,19 +1,53 @@
-"""How far a turn about the tool's axis, which milling leaves free, deepens a cut, pose by pose."""
+"""What another feed or another turn of the robot about the tool would allow along a path."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planner.campaign.toolpath_poses import TURNS_DEG, Travelled
 from planner.milling.cut import Cut
 from planner.milling.path import limit_at
 from planner.progress import Tell, quietly
-from planner.report.path_poses import TURNS_DEG, Travelled
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+WORTH_PERCENT = 5.0  # more depth: less is not worth a change of the program
 
-WORTH_PERCENT = 5.0  # more depth from another turn: less is not worth a change of the program
+
+@dataclass(frozen=True)
+class FeedAdvice:
+    """What turning the feed about the tool's axis would allow at the best speed.
+
+    Angles in degrees from the feed as it is towards axis × feed, depths in m that all poses allow.
+    `direction_base` is the best feed in the robot's base frame, where that is one for all poses.
+    """
+
+    turn_deg: tuple[float, ...]
+    depth_m: tuple[float, ...]
+    direction_base: tuple[float, float, float] | None = None
+
+    @property
+    def best(self) -> int:
+        """Number of the best angle."""
+        return int(np.argmax(self.depth_m))
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        if not np.isfinite(self.depth_m[0]):
+            return ""
+        gain = 100 * (self.depth_m[self.best] / self.depth_m[0] - 1)
+        if not gain > WORTH_PERCENT:
+            return "Another feed direction gains less than 5 % of depth."
+        if not np.isfinite(gain):
+            return f"Turned by {self.turn_deg[self.best]:g}° the feed allows every depth asked for."
+        base = ""
+        if self.direction_base is not None:
+            base = (
+                " (along [" + ", ".join(f"{v:.2f}" for v in self.direction_base) + "] of the base)"
+            )
+        return (
+            f"Turned by {self.turn_deg[self.best]:g}° about the tool's axis{base}, the feed allows "
+            f"{gain:.0f} % more depth."
+        )
 
 
 @dataclass(frozen=True)
@@ -72,30 +106,3 @@ def turn_advice(travelled: Travelled, cut: Cut, rpm: float, tell: Tell = quietly
         depth[i, int(np.argmin(np.abs(TURNS_DEG - turn)))] = limit_at(structure, cut, rpm)
         tell("turns", (k + 1) / len(found))
     return TurnAdvice.of(depth)
-
-
-def turns_figure(advice: TurnAdvice, poses: tuple[str, ...], rpm: float, mark: str) -> "Figure":
-    """Depth over poses and angles."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.colors import LogNorm
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 4.8), layout="constrained")
-    FigureCanvasAgg(figure)
-    panel = figure.subplots()
-    depth = 1e3 * np.array(advice.depth_m)
-    shown = np.ma.masked_invalid(depth.T)
-    image = panel.imshow(shown, aspect="auto", origin="lower", cmap="viridis", norm=LogNorm())
-    for i, best in enumerate(advice.best_deg):
-        panel.plot(i, advice.turn_deg.index(best), "o", mfc="none", mec="white", ms=9, mew=1.6)
-    panel.axhline(advice.turn_deg.index(advice.common_deg), color="tab:red", lw=1, ls="--")
-    panel.set_xticks(range(len(poses)), poses, rotation=45, ha="right", fontsize=8)
-    panel.set_yticks(range(len(advice.turn_deg)), [f"{a:g}" for a in advice.turn_deg])
-    panel.set_ylabel("turned about the tool's axis (°)")
-    panel.set_facecolor("lightgrey")
-    panel.set_title(
-        f"{mark}Depth limit at {rpm:.0f} rpm (ring: best of a pose, dashed: best for all, "
-        f"grey: cannot stand)", fontsize=10,
-    )  # fmt: skip
-    figure.colorbar(image, ax=panel, label="depth limit (mm)")
-    return figure

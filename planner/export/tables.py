@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.report.handing_on.collected import Collected
+from planner.export.collected import Collected
 
 AXES = "xyz"
 

@@ -62,6 +62,6 @@ def export(
     Example: planner export cell7 krl --out usb
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.handing_on.export import export as write
+    from planner.report.exports import export as write
 
     return respond(write(Campaign(directory), kind, out, poses), as_json)

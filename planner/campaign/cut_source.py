@@ -151,7 +151,7 @@ def structures_of_file(asked: Asked, cut: Cut) -> list[tuple[str, Structure]]:
 
 
 def _coupled(asked: Asked, change: ToolChange, pose: str | None, cut: Cut) -> Structure:
-    from planner.report.coupling_source import tip_of
+    from planner.campaign.tip_source import tip_of
 
     tip, name = tip_of(
         asked.source, change.tested, pose, asked.robot, asked.noise, asked.from_names
@@ -211,7 +211,7 @@ def at_poses_in_band(
         if change is None:
             frf = of_accelerance(where, lines, mean[i], sd[i])
         else:
-            from planner.report.coupling_source import tip_at
+            from planner.campaign.tip_source import tip_at
 
             tip = tip_at(campaign, name, q[i], lines, mean[i], sd[i])
             frf, remarks = change.coupled(tip, where)

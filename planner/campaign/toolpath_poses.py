@@ -7,12 +7,12 @@ import msgspec
 import numpy as np
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.cut_source import Asked, ToolChange, at_poses
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.structure import Structure
 from planner.milling.toolpath import is_toolpath, read_toolpath
 from planner.recording.folder import read_poses
-from planner.report.stability_source import Asked, ToolChange, at_poses
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import solve
 from planner.robot.robot import Robot

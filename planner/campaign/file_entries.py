@@ -1,0 +1,138 @@
+"""Every entry of the TOML files that a user writes, told by the types that read them."""
+
+import inspect
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import msgspec
+from msgspec import inspect as types
+
+from planner.campaign.config import AcquisitionTable, CampaignConfig
+from planner.milling.cut import Cut
+from planner.milling.tool_file import ToolTable
+from planner.robot.config import RobotConfig
+
+FILES: dict[str, type[msgspec.Struct]] = {
+    "robot": RobotConfig, "campaign": CampaignConfig, "cut": Cut, "tool": ToolTable,
+}  # fmt: skip
+REQUIRED = "required"
+
+
+@dataclass(frozen=True)
+class SchemaEntry:
+    """One entry: what it takes, and what holds where it is left out."""
+
+    name: str
+    takes: str
+    default: str
+
+
+@dataclass(frozen=True)
+class SchemaChoice:
+    """A name that an entry takes, and what it stands for."""
+
+    name: str
+    about: str
+
+
+@dataclass(frozen=True)
+class SchemaTable:
+    """A table of a file; "" for what stands at its top. `about` may have several sentences.
+
+    `choices` are what its `name` may be, where that is one of several.
+    """
+
+    name: str
+    about: str
+    entries: tuple[SchemaEntry, ...]
+    choices: tuple[SchemaChoice, ...] = ()
+
+
+def tables_of(kind: type[msgspec.Struct], name: str = "") -> Iterator[SchemaTable]:
+    """The table of a type, then those of its entries that are tables themselves."""
+    info = types.type_info(kind)
+    assert isinstance(info, types.StructType)
+    entries, inner = [], []
+    for field in info.fields:
+        struct, form = _struct(field.type)
+        if struct is None:
+            entries.append(SchemaEntry(field.encode_name, _takes(field.type), _default(field)))
+        else:
+            path = f"{name.strip('[]')}.{field.encode_name}".strip(".")
+            inner.append((struct, form.format(path)))
+    yield SchemaTable(name, _about(kind), tuple(entries), _choices(kind))
+    for struct, path in inner:
+        yield from tables_of(struct, path)
+
+
+def _choices(kind: type[msgspec.Struct]) -> tuple[SchemaChoice, ...]:
+    """Acquisitions, where the table names one."""
+    if kind is not AcquisitionTable:
+        return ()
+    from planner.design.propose import ACQUISITIONS, DESIGNS, TOLD
+
+    return tuple(SchemaChoice(name, TOLD[name]) for name in (*ACQUISITIONS, *DESIGNS))
+
+
+def _about(kind: type) -> str:
+    paragraphs = (inspect.getdoc(kind) or "").split("\n\n")
+    return " ".join(" ".join(p.split()) for p in paragraphs)
+
+
+def _struct(given: types.Type) -> tuple[type[msgspec.Struct] | None, str]:
+    """The type of a table, of those in a list or by name, and how its head is written."""
+    for one in _alternatives(given):
+        if isinstance(one, types.StructType):
+            return one.cls, "[{}]"
+        inner: object = getattr(one, "item_type", getattr(one, "value_type", None))
+        if isinstance(inner, types.StructType):
+            return inner.cls, "[{}.NAME]" if isinstance(one, types.DictType) else "[[{}]]"
+    return None, ""
+
+
+def _alternatives(given: types.Type) -> tuple[types.Type, ...]:
+    return given.types if isinstance(given, types.UnionType) else (given,)
+
+
+_WORDS: dict[type, str] = {
+    types.StrType: "text", types.IntType: "whole number", types.FloatType: "number",
+    types.BoolType: "true or false",
+}  # fmt: skip
+
+
+def _takes(given: types.Type) -> str:
+    """What an entry takes, in words."""
+    known = [
+        t for t in _alternatives(given) if not isinstance(t, types.NoneType)
+        and type(t).__name__ != "UnsetType"
+    ]  # fmt: skip
+    return " or ".join(_word(t) for t in known)
+
+
+def _word(given: types.Type) -> str:
+    if isinstance(given, types.LiteralType):
+        return " or ".join(f'"{v}"' if isinstance(v, str) else str(v) for v in given.values)
+    if isinstance(given, types.TupleType):
+        return f"[{', '.join(_takes(t) for t in given.item_types)}]"
+    if isinstance(given, types.VarTupleType | types.ListType):
+        return f"list of {_takes(given.item_type)}"
+    if isinstance(given, types.DictType):
+        return "table"
+    return _WORDS.get(type(given), "value")
+
+
+def _default(field: types.Field) -> str:
+    if field.required:
+        return REQUIRED
+    value = field.default
+    if value is msgspec.NODEFAULT:
+        value = field.default_factory() if callable(field.default_factory) else None
+        if value is msgspec.UNSET:
+            return REQUIRED  # unless the same is stated in another unit
+    if value is None or value is msgspec.UNSET:
+        return "not used"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple | list | dict):
+        return "[" + ", ".join(str(v) for v in value) + "]" if value else "none"
+    return f'"{value}"' if isinstance(value, str) else f"{value:g}"

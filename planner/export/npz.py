@@ -1,0 +1,48 @@
+"""FRFs as npz files, which `couple` and `stability` take."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.milling.coupling import CoupledFrf
+from planner.recording.joints import JointUnits
+
+
+def save_frfs(
+    path: Path, frequency_hz: np.ndarray, mean: np.ndarray, sd: np.ndarray,
+    poses: Sequence[str], joints: JointUnits, q: np.ndarray, outside: np.ndarray | None = None,
+) -> None:  # fmt: skip
+    """Write FRFs (n, 3, 3, F) in m/s²/N at lines (F,) and poses q (n, dof) to exactly this file.
+
+    With which of them lie `outside` (n,) the workspace, where there is one.
+
+    Raises InputError where that cannot be done.
+    """
+    more = {"joint_units": np.array(joints.units)} if any(joints.slides) else {}
+    more |= {} if outside is None else {"outside": outside}
+    _save(path, frequency_hz=frequency_hz, frf_mean=mean, frf_sd=sd, pose=np.array(poses),
+          joints_deg=joints.shown(q), **more)  # fmt: skip
+
+
+def save_coupled(path: Path, coupled: CoupledFrf, pose: str) -> None:
+    """Write as `predict` does, and all six motions beside.
+
+    `frf6_mean`, `frf6_sd` (1, 6, 6, F) are accelerances of (x, y, z, θx, θy, θz), `motions` says
+    which of them are known, `amplification` (F,) how errors grew. InputError if that cannot be.
+    """
+    mean, sd = coupled.accelerance[None], coupled.accelerance_sd[None]
+    _save(path, frequency_hz=coupled.frequency_hz, frf_mean=mean[:, :3, :3], frf_sd=sd[:, :3, :3],
+          pose=np.array([pose]), frf6_mean=mean, frf6_sd=sd, motions=np.array(coupled.kept),
+          amplification=coupled.amplification)  # fmt: skip
+
+
+def _save(path: Path, **arrays: Any) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); name another.") from None

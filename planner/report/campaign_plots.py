@@ -1,0 +1,195 @@
+"""Pictures of a campaign: poses left out one by one, maps over the workspace, FRFs of a pose."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
+from scipy.stats import binom
+
+from planner.frf.frf import Frf
+from planner.report.frf_plots import AXES, MEASURED, MODEL
+from planner.report.plot_text import plain_text
+from planner.surrogate.leave_one_out import LeaveOneOut
+
+SHARES = np.linspace(0.02, 0.98, 49)
+CHANCE = 0.9  # of a calibrated model's points that lie inside the grey band
+NAMED = 3  # poses that are named
+
+
+def left_out_figure(found: LeaveOneOut, poses: tuple[str, ...], title: str = "") -> Figure:
+    """Coverage against nominal level (left), errors by pose in what was expected (right)."""
+    figure = Figure(figsize=(11.0, 4.8), layout="constrained")
+    figure.suptitle(plain_text(title), fontsize=11)
+    left, right = figure.subplots(1, 2, width_ratios=(1, 1.8))
+    _coverage(left, found)
+    _errors(right, found, poses)
+    return figure
+
+
+def _coverage(panel: Axes, found: LeaveOneOut) -> None:
+    known = found.rank[np.isfinite(found.rank)]
+    percent = 100 * SHARES
+    # Errors at one pose belong together, so that poses count, not values.
+    count = max(int(np.isfinite(found.rank).any(axis=1).sum()), 1)
+    low, high = (binom.ppf((1 + s * CHANCE) / 2, count, SHARES) / count for s in (-1, 1))
+    panel.fill_between(percent, 100 * low, 100 * high, color="0.85", lw=0, label="by chance (90 %)")
+    panel.plot([0, 100], [0, 100], color="black", lw=0.8, ls=":")
+    if len(known):
+        inside = found.coverage(tuple(SHARES.tolist()))
+        panel.plot(percent, 100 * inside, color="tab:red", lw=1.6, label=f"{len(known)} values")
+    panel.set(xlim=(0, 100), ylim=(0, 102), xlabel="interval claims to hold (%)")
+    panel.set_ylabel("measured values inside (%)")
+    panel.legend(fontsize=8, loc="lower right")
+    panel.grid(True, alpha=0.25)
+
+
+def _errors(panel: Axes, found: LeaveOneOut, poses: tuple[str, ...]) -> None:
+    score = found.error / found.sd
+    place = np.arange(len(poses))
+    panel.axhspan(-1.96, 1.96, color="tab:green", alpha=0.1, lw=0)
+    panel.axhline(0, color="black", lw=0.8, ls=":")
+    for k in range(score.shape[1]):
+        panel.plot(place, score[:, k], ls="", marker="o", ms=4, color=f"C{k % 10}",
+                   label=f"mode {k + 1}")  # fmt: skip
+    for i in found.worst(NAMED).tolist():
+        k = int(np.nanargmax(np.abs(score[i]))) if np.isfinite(score[i]).any() else 0
+        if abs(score[i, k]) > 1.96:
+            text = f"{plain_text(poses[i])}, mode {k + 1}: {100 * found.error[i, k]:+.1f} %"
+            right = i > len(poses) / 2  # a name there would run out of the axes
+            panel.annotate(text, (i, score[i, k]), xytext=(-4 if right else 4, 4), fontsize=8,
+                           textcoords="offset points", ha="right" if right else "left")  # fmt: skip
+    panel.set_xticks(
+        place,
+        [plain_text(pose) for pose in poses],
+        rotation=90,
+        fontsize=7 if len(poses) < 40 else 5,
+    )
+    panel.set_ylabel("measured − predicted frequency, in expected sds")
+    panel.margins(x=0.02, y=0.12)
+    panel.legend(fontsize=8, ncols=min(score.shape[1], 4))
+    panel.grid(True, alpha=0.25)
+
+
+BINS = 14  # across, where several poses lie at one place
+
+
+def workspace_map(
+    x: np.ndarray,
+    names: tuple[str, str],
+    frequency_hz: np.ndarray,
+    sd_percent: np.ndarray,
+    measured: np.ndarray,
+    poses: tuple[str, ...],
+    mode: int,
+    flat: bool,
+) -> Figure:
+    """One mode over two coordinates: frequency (left), its standard deviation (right).
+
+    x (n, 2) with axes `names`; frequency_hz, sd_percent (n,); measured (m, 2) are the poses
+    measured. `flat`: each place has one pose, and contours are drawn; else means by cell.
+    """
+    figure = Figure(figsize=(11.0, 4.4))
+    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    figure.subplots_adjust(0.07, 0.12, 0.97, 0.97, wspace=0.1)
+    _fill(figure, left, x, frequency_hz, "viridis", f"natural frequency of mode {mode} (Hz)", flat)
+    _fill(figure, right, x, sd_percent, "magma_r", f"sd of mode {mode}'s frequency (%)", flat)
+    for panel in (left, right):
+        for i in range(len(measured)):
+            panel.plot(*measured[i], "o", ms=5, mfc="white", mec="black", mew=1.2)
+        panel.set_xlabel(names[0])
+    left.set_ylabel(names[1])
+    for place, pose in zip(measured, poses, strict=True):
+        left.annotate(
+            plain_text(pose), (place[0], place[1]), xytext=(4, 4), textcoords="offset points",
+            fontsize=7, bbox={"facecolor": "white", "alpha": 0.7, "pad": 0.6, "lw": 0},
+        )  # fmt: skip
+    return figure
+
+
+def _fill(
+    figure: Figure, panel: Axes, x: np.ndarray, values: np.ndarray, colours: str, label: str,
+    flat: bool,
+) -> None:  # fmt: skip
+    if flat:
+        # Neighbours are found in shares of the ranges: millimetres and degrees make slivers.
+        shares = (x - x.min(axis=0)) / np.maximum(np.ptp(x, axis=0), 1e-12)
+        triangles = Triangulation(shares[:, 0], shares[:, 1]).triangles
+        both = Triangulation(x[:, 0], x[:, 1], triangles)
+        image = panel.tricontourf(both, values, levels=14, cmap=colours)
+    else:
+        image = panel.hexbin(x[:, 0], x[:, 1], values, gridsize=BINS, cmap=colours, mincnt=1)
+    figure.colorbar(image, ax=panel, label=label, pad=0.02)
+    panel.margins(0.04)
+
+
+FAINTEST = 1e-3  # of the largest magnitude: what is smaller is not shown
+
+
+def frf_sheet(
+    frequency_hz: np.ndarray,
+    mean: np.ndarray,
+    sd: np.ndarray,
+    measured: Frf,
+    modes_hz: np.ndarray,
+) -> Figure:
+    """Columns xx, yy, zz: the model, mean (3, 3, F) ± 2 sd in m/s²/N, over what was measured.
+
+    `modes_hz` (k,) are the predicted natural frequencies, drawn as dotted lines; above them the
+    ground is grey. Coherence is left out where it is known of no column: it takes two hits.
+    """
+    coherent = bool(np.any(np.isfinite(measured.coherence)))
+    # Placed by hand: a layout that places itself takes more time than all the drawing.
+    figure = Figure(figsize=(11.0, 4.8 if coherent else 4.1))
+    heights = (3.2, 1.3, 0.8)[: 3 if coherent else 2]
+    panels = figure.subplots(len(heights), 3, sharex=True, height_ratios=heights)
+    figure.subplots_adjust(0.065, 0.155 if coherent else 0.19, 0.99, 0.94, wspace=0.16, hspace=0.12)
+    low, high = frequency_hz[[0, -1]]
+    inside = (measured.frequency_hz >= low) & (measured.frequency_hz <= high)
+    lines = measured.frequency_hz[inside]
+    for i, axis in enumerate(AXES):
+        one, h = measured.accelerance[i, i, inside], mean[i, i]
+        _magnitude(panels[0, i], frequency_hz, h, sd[i, i], lines, one)
+        _phase(panels[1, i], frequency_hz, h, sd[i, i], lines, one)
+        if coherent:
+            panels[2, i].plot(lines, measured.coherence[i, i, inside], color="tab:blue", lw=0.8)
+            panels[2, i].set(ylim=(0, 1.05))
+        panels[-1, i].set(xlim=(low, high), xlabel="frequency (Hz)")
+        panels[0, i].set_title(f"hit along {axis}, response along {axis}", fontsize=9)
+        for panel in panels[:, i]:
+            for mode in modes_hz:
+                panel.axvline(mode, color="0.45", lw=0.7, ls=":")
+            panel.axvspan(
+                min(float(np.nanmax(modes_hz, initial=low)), high), high, color="0.92", lw=0,
+                zorder=0, label="above the counted modes" if panel is panels[0, 0] else None,
+            )  # fmt: skip
+            panel.grid(True, alpha=0.25)
+            panel.tick_params(labelsize=8)
+    names = ("accelerance (m/s²/N)", "phase (°)", "coherence")
+    for panel, name in zip(panels[:, 0], names, strict=False):
+        panel.set_ylabel(name, fontsize=8)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", ncols=4, fontsize=8)
+    return figure
+
+
+def _magnitude(panel, lines, mean, sd, measured_hz, measured) -> None:
+    size = np.abs(mean)
+    least = FAINTEST * float(size.max())
+    band = np.maximum(size - 2 * sd, least), size + 2 * sd
+    panel.fill_between(lines, *band, color=MODEL, alpha=0.25, lw=0, label="± 2 sd")
+    panel.semilogy(measured_hz, np.abs(measured), color=MEASURED, lw=1.0, label="measured")
+    panel.semilogy(lines, size, color=MODEL, lw=1.0, label="model")
+
+
+def _phase(panel, lines, mean, sd, measured_hz, measured) -> None:
+    """Phase in °; its band is the widest angle under which a circle of 2 sd is seen."""
+    angle = np.rad2deg(np.angle(mean))
+    half = np.rad2deg(np.arcsin(np.minimum(2 * sd / np.maximum(np.abs(mean), 1e-300), 1.0)))
+    # Drawn on the turn of the circle where the model is, so that ±180° do not jump back and forth.
+    seen = np.rad2deg(np.angle(measured))
+    near = np.interp(measured_hz, lines, np.rad2deg(np.unwrap(np.angle(mean))))
+    seen = seen + 360 * np.round((near - seen) / 360)
+    smooth = np.rad2deg(np.unwrap(np.deg2rad(angle)))
+    panel.fill_between(lines, smooth - half, smooth + half, color=MODEL, alpha=0.25, lw=0)
+    panel.plot(measured_hz, seen, color=MEASURED, lw=1.0)
+    panel.plot(lines, smooth, color=MODEL, lw=1.0)

@@ -1,1 +1,0 @@
-"""The manual as one HTML file: a tutorial, the files, the commands, the numbers."""

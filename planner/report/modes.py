@@ -1,0 +1,232 @@
+"""Answer of `modes`: modes of one pose, of any points, of responses alone, of many poses."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from msgspec import UNSET
+from msgspec import UnsetType as Unset
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from planner.campaign.events import Amplitude
+from planner.campaign.hit_habits import HitMiss, habits
+from planner.campaign.survey import Survey
+from planner.errors import RefusedFile
+from planner.recording.dof import Dof
+from planner.report.answer import NOT_IN_JSON, Answer
+from planner.report.plot_files import Pictures
+from planner.report.predictions import ExpectedMode
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
+from planner.words import counted
+
+SURE = 0.9  # probability of a label below which the text marks it as doubtful
+COMMON = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd", "probability"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModeAnswer:
+    """A mode with its sds; `probability`: that it is physical. What is not known of it is UNSET.
+
+    `label` counts the modelled modes from 1, None: it is none of them. `shape` is [re, im] per
+    response, in kg^-1/2 (unit modal mass) where `scaled`, else of unit length; `shape_sd` is of
+    real and imaginary part each; `modal_mass_kg` belongs to the shape with largest component 1.
+    `residue` is [re, im, sd] in m/(N·s) of each response to each hit, row by row. `scatter_hz`: how
+    the frequency differs from set to set (sd). `sensors_lowered_percent`: what the sensors' masses
+    had lowered the frequency by, which is given without them; None where the simulation has no
+    such mode. `expected`: what the model said before an import.
+    """
+
+    label: int | Unset | None = UNSET
+    label_probability: float | Unset | None = UNSET
+    frequency_hz: float
+    frequency_sd_hz: float
+    damping_ratio: float
+    damping_sd: float
+    shape: tuple[tuple[float, float], ...]
+    shape_sd: tuple[float, ...] | Unset = UNSET
+    scaled: bool | Unset = UNSET
+    probability: float
+    mpc: float | Unset = UNSET
+    mpd_deg: float | Unset = UNSET
+    modal_mass_kg: float | Unset = UNSET
+    scatter_hz: float | Unset = UNSET
+    residue: tuple[tuple[float, float, float], ...] | Unset = UNSET
+    sensors_lowered_percent: float | Unset | None = UNSET
+    expected: ExpectedMode | Unset | None = UNSET
+
+    @classmethod
+    def of(cls, mode: Any, **more: Any) -> "ModeAnswer":
+        """Of a mode of any modal analysis, with other fields where they are known."""
+        own: dict[str, Any] = {name: getattr(mode, name) for name in COMMON}
+        pairs = np.array(mode.shape)
+        pairs = np.stack([pairs.real, pairs.imag], -1) if np.iscomplexobj(pairs) else pairs
+        own["shape"] = tuple((float(re), float(im)) for re, im in pairs)
+        if hasattr(mode, "residue_sd"):
+            both = zip(np.ravel(mode.residue), np.ravel(mode.residue_sd), strict=True)
+            own["residue"] = tuple((float(r.real), float(r.imag), float(sd)) for r, sd in both)
+        if hasattr(mode, "shape_sd"):
+            own |= {
+                "shape_sd": tuple(map(float, mode.shape_sd)),
+                "scaled": getattr(mode, "scaled", False),
+                "mpc": mode.collinearity,
+                "mpd_deg": mode.deviation_deg,
+                "modal_mass_kg": getattr(mode, "modal_mass_kg", UNSET),
+                "scatter_hz": getattr(mode, "scatter_hz", UNSET),
+            }
+        return cls(**(own | more))
+
+    def cells(self, dofs: "tuple[tuple[int | str, str], ...] | Unset") -> tuple[str, ...]:
+        """A row of the table: a shape of few responses, or where one of many is largest."""
+        first = with_sd(self.frequency_hz, self.frequency_sd_hz, ".3f")
+        physical = f"{100 * self.probability:.0f}"
+        if isinstance(dofs, Unset):
+            damping = with_sd(100 * self.damping_ratio, 100 * self.damping_sd)
+            parts = [f"{re:+.2f}{im:+.2f}i" for re, im in self.shape]
+            more = f"  and {len(parts) - 3} more" if len(parts) > 4 else ""
+            return first, damping, "  ".join(parts[:3] if more else parts) + more, physical
+        sizes = [abs(complex(*value)) for value in self.shape]
+        at = " ".join(map(str, dofs[sizes.index(max(sizes))])).strip()
+        mass = f"{self.modal_mass_kg:.3g}" if self.scaled is True else "not scaled"
+        damping = with_sd(100 * self.damping_ratio, 100 * self.damping_sd, ".3f")
+        return first, damping, f"{self.mpc:.3f}", f"{self.mpd_deg:.1f}", mass, at, physical
+
+    @property
+    def short(self) -> str:
+        """Frequency (Hz), marked where its label is in doubt."""
+        sure = self.label_probability
+        return f"{self.frequency_hz:.2f}{' ?' if isinstance(sure, float) and sure < SURE else ''}"
+
+
+@dataclass(frozen=True)
+class SurveyedPose:
+    """The modes of a pose, by label, and those without."""
+
+    pose: str
+    modes: tuple[ModeAnswer, ...]
+    unlabelled: tuple[ModeAnswer, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ModesReport(Answer):
+    """Answer of `modes`; what an analysis does not have is UNSET.
+
+    `poses` of a folder with several, `modes` are then those of the first. `dofs` are [node,
+    direction] of every entry of a shape, `frfs` how many FRFs there were, `hits` how many were
+    averaged per axis. `fit_error` is ‖H − fit‖/‖H‖ in the band, None for unscaled FRFs; `tones_hz`
+    are a machine's, not the structure's.
+    """
+
+    poses: tuple[SurveyedPose, ...] | Unset = UNSET
+    modes: tuple[ModeAnswer, ...]
+    dofs: tuple[tuple[int | str, str], ...] | Unset = UNSET
+    references: tuple[tuple[int | str, str], ...] | Unset = UNSET
+    frfs: int | Unset = UNSET
+    scaled: bool | Unset = UNSET
+    band_hz: tuple[float, float]
+    tones_hz: tuple[float, ...] | Unset = UNSET
+    fit_error: float | Unset | None = UNSET
+    order: int | Unset = UNSET
+    refused: tuple[RefusedFile, ...] = ()
+    accepted: tuple[str, ...] | Unset = UNSET
+    hits: tuple[int, int, int] | Unset = UNSET
+    usable_band_hz: tuple[float, float] | Unset = UNSET
+    remarks: tuple[str, ...] = ()
+    amplitude: Amplitude | Unset | None = UNSET
+    simulated: bool
+    exports: tuple[str, ...] | Unset = UNSET
+    plots: tuple[str, ...] = ()
+    rrd: str | None = None
+    hit_errors: tuple[HitMiss, ...] | Unset = UNSET
+    habits: tuple[str, ...] | Unset = UNSET
+    survey: Survey | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
+
+    def with_pictures(self, pictures: Pictures, name: str) -> "ModesReport":
+        """The same once frequencies are drawn pose by pose, where that is wanted."""
+        if not pictures.wanted or self.survey is None:
+            return self
+        from planner.report.modal_plots import frequency_figure
+
+        tracks, expected = self.survey.tracks, self.survey.simulated_hz
+        rows = [[m.frequency_sd_hz if m else np.nan for m in row] for row in tracks.modes]
+        sd = np.array(rows, dtype=float).reshape(tracks.probability.shape)
+        seen = np.any(np.isfinite(tracks.frequency_hz), axis=0)
+        figure = frequency_figure(
+            self.survey.poses,
+            tracks.frequency_hz[:, seen],
+            sd[:, seen],
+            None if expected is None else expected[:, seen],
+            title=f"{SIMULATED_TITLE if self.simulated else ''}Campbell diagram · {name}",
+        )
+        return replace(self, **pictures.write({"campbell": figure}, name))
+
+    def text(self) -> Group:
+        """The modes as a table."""
+        parts: list[Any] = [self._table() if isinstance(self.poses, Unset) else self._by_pose()]
+        if isinstance(self.habits, tuple):
+            parts.append(Text("  ?: the label is less than 90 % sure."))
+            parts += [Text(f"  {habit}") for habit in self.habits]
+        parts += [*remarks(self.remarks), *drawn(self.plots, self.rrd)]
+        if isinstance(self.exports, tuple) and self.exports:
+            parts.append(Text("\n  ".join(["Files:", *self.exports])))
+        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+
+    def _table(self) -> Table:
+        what = "Modes" if isinstance(self.tones_hz, Unset) else "Operating modes"
+        title = f"{what} between {self.band_hz[0]:g} and {self.band_hz[1]:g} Hz"
+        title += " (unscaled)" if self.scaled is False else ""
+        if isinstance(self.frfs, int) and isinstance(self.dofs, tuple):
+            points = counted(len(self.dofs), "degree of freedom", "degrees of freedom")
+            title += f" from {counted(self.frfs, 'FRF')}, {points}"
+        if isinstance(self.fit_error, float):
+            title += f" (fit error {100 * self.fit_error:.1f} %)"
+        many = "MPC", "MPD (°)", "modal mass (kg)", "largest at"
+        shape = ("shape x, y, z",) if isinstance(self.dofs, Unset) else many
+        made = table(title, "mode", "frequency (Hz)", "damping (%)", *shape, "physical (%)")
+        for k, mode in enumerate(self.modes, 1):
+            made.add_row(str(k), *mode.cells(self.dofs))
+        return made
+
+    def _by_pose(self) -> Table:
+        poses = self.poses if isinstance(self.poses, tuple) else ()
+        labels = sorted({m.label for p in poses for m in p.modes if isinstance(m.label, int)})
+        low, high = self.band_hz
+        made = table(
+            f"Modes of {counted(len(poses), 'pose')} between {low:g} and {high:g} Hz",
+            *("pose", *(f"mode {label} (Hz)" for label in labels), "without label (Hz)"),
+        )
+        for pose in poses:
+            by_label = {mode.label: mode.short for mode in pose.modes}
+            others = "  ".join(mode.short for mode in pose.unlabelled)
+            made.add_row(pose.pose, *(by_label.get(label, "–") for label in labels), others)
+        return made
+
+
+def named(dof: Dof) -> tuple[int | str, str]:
+    """Node (a number where it is one) and direction, as answers name a degree of freedom."""
+    return (int(dof.node) if dof.node.lstrip("-").isdigit() else dof.node), dof.direction
+
+
+def survey_report(found: Survey) -> ModesReport:
+    """Of the labelled modes of all poses."""
+    tracks, bare, poses = found.tracks, found.bare, []
+    for i, name in enumerate(found.poses):
+
+        def answer(mode: Any, label: int | None, sure: float | None, i: int = i) -> ModeAnswer:
+            known = {"label": label, "label_probability": sure}
+            return ModeAnswer.of(mode, **known, sensors_lowered_percent=bare.of(i, mode))
+
+        modes = tuple(
+            answer(mode, k + 1, float(tracks.probability[i, k]))
+            for k, mode in enumerate(tracks.modes[i])
+            if mode is not None
+        )
+        others = tuple(answer(mode, None, None) for mode in tracks.unexpected[i])
+        poses.append(SurveyedPose(name, modes, others))
+    hits = tuple(hit for pose in found.misses.poses for hit in pose.hits)
+    return ModesReport(
+        poses=tuple(poses), modes=poses[0].modes, band_hz=found.band_hz, refused=found.refused,
+        remarks=found.remarks, simulated=found.simulated, hit_errors=hits, habits=habits(hits),
+        survey=found,
+    )  # fmt: skip

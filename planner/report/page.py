@@ -1,0 +1,260 @@
+"""The report of a campaign and the manual: one HTML file each, from the templates beside."""
+
+import base64
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import jinja2
+import numpy as np
+
+from planner.campaign.campaign import Campaign
+from planner.campaign.config import CampaignConfig
+from planner.campaign.log_words import act
+from planner.campaign.state import CampaignState, Measurement, taken_back
+from planner.design.stopping import percent
+from planner.recording.joints import JointUnits
+from planner.recording.points import SENSOR, TCP
+from planner.report.kept_diagnosis import read_diagnosis, two_answers
+from planner.report.page_pictures import frf_pictures, left_out_picture, map_pictures
+from planner.report.proposals import target_sentence
+from planner.report.refitted_springs import COLUMNS, NOT_KNOWN, RefittedSpring
+from planner.report.status import StatusReport, status
+from planner.report.text import SIMULATED, number, with_sd
+from planner.robot.link_bodies import guessed_masses
+from planner.version import __version__
+from planner.words import command, local_time, significant
+
+if TYPE_CHECKING:
+    from planner.campaign.cell import Cell
+
+Rows = list[Sequence[object]]
+# Links to chapters of the report, by the chapters' ids.
+CHAPTERS = {
+    "asked": "asked", "measured": "measured", "quality": "quality", "maps": "maps",
+    "frfs": "FRFs", "learned": "simulation", "diagnosis": "diagnosis", "log": "log",
+    "again": "reproduce", "meaning": "reading",
+}  # fmt: skip
+LEAST_SHOWN = 5e-4  # of a probability in the table: 0.05 %
+MOST_PICTURES = 4  # of a diagnosis
+CLASSES = {"error": "error", "warning": "warn"}
+
+
+def rendered(template: str, **values: object) -> str:
+    """A template filled in; whatever a value holds is text there, no markup."""
+    loader = jinja2.PackageLoader("planner.report", "templates")
+    made = jinja2.Environment(
+        loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    return made.get_template(template).render(version=__version__, **values)
+
+
+def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
+    """The report; `kept_diagnosis` is the answer of a diagnosis in JSON."""
+    state, now, cell = campaign.state, status(campaign), campaign.cell
+    found = diagnosis(kept_diagnosis, now.springs) if kept_diagnosis else None
+    without = {"diagnosis"} if found is None else set()
+    without |= set() if now.springs else {"learned"}
+    folder = campaign.directory
+    reached = target_sentence(now.waits_for)
+    nothing = "Nothing is measured yet: all that is said is the simulation's."
+    return rendered(
+        "report.html",
+        title=f"{folder.name}: report",
+        name=folder.name,
+        now=datetime.now(UTC).isoformat(timespec="minutes")[:16].replace("T", " "),
+        status=now,
+        simulated=SIMULATED.plain,
+        cards=_cards(state, now),
+        chapters=[(id_, text) for id_, text in CHAPTERS.items() if id_ not in without],
+        asked=_asked(cell, state),
+        findings=[(CLASSES[r.severity], r.sentence) for r in cell.examined.remarks
+                  if r.severity in CLASSES],
+        **_measured(campaign, state, now),
+        forecast=f"{now.forecast.text} {reached}" if state.used else nothing,
+        modes=_mode_rows(campaign),
+        left_out=left_out_picture(campaign) if now.leave_one_out.values else None,
+        errors=_errors(now),
+        **map_pictures(campaign),
+        **frf_pictures(campaign, now.leave_one_out.worst),
+        springs=[spring.cells for spring in now.springs],
+        spring_columns=COLUMNS,
+        springs_say=NOT_KNOWN,
+        diagnosis=found,
+        log=_log(campaign),
+        folder=command(folder.name),
+        config=(folder / "campaign.toml").read_text("utf-8", "replace"),
+        files=_files(state),
+    )  # fmt: skip
+
+
+def _cards(state: CampaignState, now: StatusReport) -> Rows:
+    lacks = f"; what lacks: {now.waits_for}" if now.waits_for else ""
+    target = f"target of {now.target_frequency_sd_percent:g} %{lacks}"
+    known = now.forecast
+    rmse = percent(known.rmse_percent) if known.measurements else "–"
+    return [
+        (len(state.used), "poses measured and used"),
+        (sum(len(m.accepted) for m in state.used), "hits used"),
+        (len(now.refused), "recordings refused"),
+        (rmse, "expected RMSE of frequencies over the workspace"),
+        ("reached" if now.done else "not reached", target),
+    ]
+
+
+def _asked(cell: "Cell", state: CampaignState) -> Rows:
+    """Robot, workspace, modes, target."""
+    config, robot, links = cell.config, cell.robot, cell.examined.links
+    mass = sum(link.mass for link in links if link.joint)
+    hits = [hit for m in state.recorded for hit in m.hits]
+    points = dict.fromkeys(
+        name for hit in hits for name in (hit.hit_point, *hit.response_points)
+        if name and name not in (TCP, SENSOR)
+    )  # fmt: skip
+    s = config.stop
+    target = (
+        f"frequencies over the workspace to {s.frequency_sd_percent:g} % (RMSE) with "
+        f"{100 * s.probability:g} % probability, after {s.measurements_min} to "
+        f"{s.measurements_max} poses"
+    )
+    rows = [
+        ("Robot", f"{robot.name}: {len(robot.joint_names)} joints, {mass:.4g} kg move"),
+        ("Masses", guessed_masses(links)),
+        ("Simulation", _simulation(config, len(robot.config.compliance))),
+        ("Hit point and sensor", f"{robot.config.tcp_frame}, {robot.config.sensor_frame}"),
+        ("Other points", ", ".join(points)),
+        ("Workspace", _workspace(config, robot.joints)),
+        ("Modes", f"the {config.modes.count} lowest in {_range(config.modes.band_hz)} Hz"),
+        ("Poses chosen by", config.acquisition.name),
+        ("Target", target),
+    ]
+    return [row for row in rows if row[1]]
+
+
+def _range(values: Iterable[float]) -> str:
+    return " to ".join(f"{v:g}" for v in values)
+
+
+def _simulation(config: CampaignConfig, springs: int) -> str:
+    kind = config.fidelity.simulation
+    said = {
+        "updated": "identified again from the recordings as they come",
+        "frozen": "as robot.toml states it",
+        "none": "not used",
+    }[kind]
+    return said if kind == "none" else f"{springs} elastic degrees of freedom, {said}"
+
+
+def _workspace(config: CampaignConfig, joints: JointUnits) -> str:
+    w = config.workspace
+    if w.joints_deg is not None:
+        rows = zip(joints.names, w.joints_deg, joints.slides, strict=True)
+        return "; ".join(f"{name} {_range(r)}{' mm' if slide else '°'}" for name, r, slide in rows)
+    axes = ", ".join(f"{v:g}" for v in w.tool_axis or ())
+    pairs = zip("xyz", w.position_m or [], strict=True)
+    place = "; ".join(f"{name} {_range(r)} m" for name, r in pairs)
+    turn = f", turned by {_range(w.rotation_deg)}° about it" if w.rotation_deg else ""
+    return f"{place}; tool axis ({axes}){turn}"
+
+
+def _measured(campaign: Campaign, state: CampaignState, now: StatusReport) -> dict[str, Any]:
+    """What was measured and refused, and why; where the robot stood."""
+    stood, setpoints = [], 0
+    for m in state.measured:
+        setpoint = m.pose in state.proposals and state.proposals[m.pose].joints_deg == m.joints_deg
+        setpoints += setpoint
+        source = "setpoint" if setpoint else "readback"
+        stood.append((m.pose, *(f"{v:.2f}" for v in m.joints_deg), source))
+    said = "Joints as read back; where nothing was read back, the setpoint of the proposal"
+    if setpoints == len(stood):
+        said = "Joints as proposed: nothing was read back"
+    return {
+        "measured": [_pose(m, m.pose in state.starred) for m in state.measured],
+        "joints": campaign.cell.robot.joints.headings,
+        "stood": stood,
+        "stood_says": said,
+        "refused": [(r.pose, r.file, r.reason) for r in now.refused],
+        "held": [(h.measured.pose, h.question.question.text) for h in now.held],
+        "skipped": [(s.pose, s.reason or "–") for s in now.skipped],
+        "remarks": [(m.pose, text) for m in state.recorded for text in m.remarks],
+    }
+
+
+def _pose(m: Measurement, starred: bool) -> list[object]:
+    modes = [mode for mode in m.modes if mode.likely]
+    mark = (" ★" if starred else "") + (" (withdrawn)" if m.withdrawn else "")
+    return [
+        m.pose + mark, len(m.accepted), len(m.hits) - len(m.accepted),
+        [with_sd(x.frequency_hz, x.frequency_sd_hz, ".3f") for x in modes],
+        [number(100 * x.damping_ratio) for x in modes],
+        local_time(m.time),
+    ]  # fmt: skip
+
+
+def _mode_rows(campaign: Campaign) -> Rows:
+    """Mode by mode over the workspace: range of frequencies, sd now."""
+    found = campaign.model.workspace_prediction
+    percents = 100 * found.frequency_sd_hz / found.frequency_hz
+    return [
+        (f"mode {k}", f"{f.min():.2f} to {f.max():.2f}", significant(np.sqrt(np.mean(sd**2))),
+         significant(sd.max()), f"{z.min():.2f} to {z.max():.2f}")
+        for k, (f, sd, z) in enumerate(
+            zip(found.frequency_hz.T, percents.T, 100 * found.damping_ratio.T, strict=True), 1
+        )
+    ]  # fmt: skip
+
+
+def _errors(now: StatusReport) -> Rows:
+    return [
+        (f.pose, f.mode, f"{f.measured_hz:.3f}", f"{f.predicted_hz:.3f} ± {f.sd_hz:.3f}",
+         f"{100 * (f.measured_hz / f.predicted_hz - 1):+.2f}")
+        for f in now.leave_one_out.frequencies
+    ]  # fmt: skip
+
+
+def _log(campaign: Campaign) -> Rows:
+    undone = taken_back(campaign.entries)
+    return [
+        (e.seq, local_time(e.time), act(e) + (" (taken back)" if e.seq in undone else ""))
+        for e in campaign.entries
+    ]
+
+
+def _files(state: CampaignState) -> Rows:
+    robot = sorted(state.configured.robot.items()) if state.configured else []
+    rows: Rows = [(f"robot/{name}", digest) for name, digest in robot]
+    return rows + [(f"{m.pose}: {h.file}", h.sha256) for m in state.recorded for h in m.hits]
+
+
+def diagnosis(file: Path, springs: Sequence[RefittedSpring]) -> dict[str, Any]:
+    """Verdict, findings, what else was considered, agreement; beside the model's `springs`."""
+    found = read_diagnosis(file)
+    parts = (("fit", "poses used"), ("held_out", "poses held out"))
+    sides = [
+        (f"{name}, {side}", found.get(where, {}).get(side) or {})
+        for where, name in parts for side in ("nominal", "refitted", "explained")
+    ]  # fmt: skip
+    pictures = [Path(p) for p in found.get("plots", ())[:MOST_PICTURES]]
+    return {
+        "verdict": found.get("verdict_text", found["verdict"]),
+        "findings": [
+            (one["text"], [(name, f"{v['value']:.4g} ± {v['sd']:.2g}", v["unit"])
+                           for name, v in one["parameters"].items()])
+            for one in found["findings"]
+        ],
+        "two_answers": two_answers(springs, found),
+        "candidates": [
+            (c["effect"].replace("_", " "), c["at"] or "–", f"{100 * c['probability']:.1f}")
+            for c in found["candidates"] if c["probability"] >= LEAST_SHOWN
+        ],
+        "agreement": [
+            (name, f"{one['frac']:.4f}", f"{one['frobenius']:.4f}")
+            for name, one in sides if one.get("frac") is not None
+        ],
+        "remarks": found.get("remarks", ()),
+        "pictures": [
+            (base64.b64encode(p.read_bytes()).decode(), p.stem.replace("_", " "))
+            for p in pictures if p.is_file() and p.suffix == ".png"
+        ],
+    }  # fmt: skip
