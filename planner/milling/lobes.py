@@ -14,6 +14,7 @@ import numpy as np
 from planner.inference.parallel import side_by_side
 from planner.milling.machine import Machine, Monodromies, check_structure, multipliers
 from planner.milling.period import Period
+from planner.milling.semi_discretisation import semi_monodromies
 from planner.milling.zeroth_order import limits
 from planner.progress import Tell, quietly
 
@@ -121,6 +122,7 @@ DEPTH_ERROR = 3e-4  # relative, up to which points per period are added
 FINER = 1.5  # factor on the points, for the check
 MANY, BLOCK = 60, 10  # speeds from which two processes share them, in blocks of so many
 ROUNDS = 5  # of adding points
+SEMI_FINER = 2.0  # factor on the steps of a semi-discretisation, whose error falls with the square
 
 
 @dataclass(frozen=True)
@@ -143,13 +145,14 @@ def losses(machine: Machine, tell: Tell = quietly) -> tuple[Loss, ...]:
     cut = machine.cut
     if cut.method == "zeroth_order":
         return zeroth_losses(machine)
+    one = full_loss if cut.method == "full_discretisation" else semi_loss
     scan = scanned_depths(machine.floor().floor_m, cut.depth_m[1])
     speeds = [float(rpm) for rpm in cut.speeds_rpm]
     if len(speeds) < MANY:
-        return tuple(full_loss(machine, rpm, scan) for rpm in speeds)
+        return tuple(one(machine, rpm, scan) for rpm in speeds)
     blocks = [speeds[i : i + BLOCK] for i in range(0, len(speeds), BLOCK)]
     found = side_by_side(
-        lambda block: [full_loss(machine, rpm, scan) for rpm in block],
+        lambda block: [one(machine, rpm, scan) for rpm in block],
         blocks,
         lambda number, count: tell("lobes", count / len(blocks)),
     )
@@ -195,6 +198,21 @@ def _again(
         return found
     bracket = first_unstable(at, scan)
     return None if bracket is None else refined(at, *bracket)
+
+
+def semi_loss(machine: Machine, rpm: float, scan: np.ndarray) -> Loss:
+    """By semi-discretisation, extrapolated from two numbers of steps to infinitely many."""
+    at = semi_monodromies(machine, rpm)
+    bracket = first_unstable(at, scan)
+    if bracket is None:
+        return NO_LOSS
+    depth, slope = refined(at, *bracket)
+    found = _again(semi_monodromies(machine, rpm, SEMI_FINER), depth, slope, scan)
+    if found is None:
+        return NO_LOSS
+    more = (found[0] - depth) / (SEMI_FINER**2 - 1)
+    told = _told(machine, rpm, 1.0, found[0] + more, abs(more) / depth)
+    return told
 
 
 def _told(machine: Machine, rpm: float, factor: float, depth: float, error: float) -> Loss:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from planner.diagnosis.linear.predict import Agreement
+    from planner.diagnosis.linear.predict import ThreefoldSimilarity
     from planner.measurement.agreement import Similarity
 
 
@@ -49,7 +49,7 @@ class ThreeSimilarities:
     explained: FrfSimilarity
 
     @classmethod
-    def of(cls, found: "Agreement | None") -> "ThreeSimilarities":
+    def of(cls, found: "ThreefoldSimilarity | None") -> "ThreeSimilarities":
         """None where there is no pose to compare at."""
         if found is None:
             return cls(*(FrfSimilarity(None, None),) * 3)
@@ -67,6 +67,6 @@ class HeldOutSimilarities:
     explained: FrfSimilarity
 
     @classmethod
-    def at(cls, poses: tuple[str, ...], found: "Agreement | None") -> "HeldOutSimilarities":
+    def at(cls, poses: tuple[str, ...], found: "ThreefoldSimilarity | None") -> "HeldOutSimilarities":
         """Of what was judged there."""
         return cls(poses, **vars(ThreeSimilarities.of(found)))

@@ -10,7 +10,6 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.export.npz import save_coupled
-from planner.errors import InputError
 from planner.milling.coupling import (
     AMPLIFICATION_LIMIT,
     MOTIONS,

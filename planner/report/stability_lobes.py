@@ -1,7 +1,6 @@
 """Answer of `stability` at one pose: to which depth a cut is stable at each spindle speed."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import msgspec

@@ -18,7 +18,6 @@ from planner.check.examine import examine
 from planner.errors import InputError
 from planner.report.rerun.campaign import RerunView
 from planner.robot.controller_program import PoseToDrive, program
-from planner.session.pose_screen import PosePage
 from planner.robot.robot import Robot
 from planner.session.pose_screen import PosePage
 from tests.support.rails import GANTRY, GANTRY_BOX, make_sliding, sliding_campaign

@@ -12,14 +12,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from planner.campaign.labels import LabelledPose
-from planner.campaign.model import Model
-from planner.dataset.measure import MeasuredPose
-from planner.modal.matrix_modes import MatrixModes
-from planner.modal.shape_motion import motions, moved
-from planner.recording.geometry import Geometry
-from planner.recording.points import Layout
-from planner.report.plot_text import plain_text, write_values
-from planner.report.rerun.figures import More, draw, figure_view
 from planner.campaign.mode_motion import (
     PointShapes,
     agreement,
@@ -28,6 +20,14 @@ from planner.campaign.mode_motion import (
     measured_shapes,
     simulated_shapes,
 )
+from planner.campaign.model import Model
+from planner.dataset.measure import MeasuredPose
+from planner.modal.matrix_modes import MatrixModes
+from planner.modal.shape_motion import motions, moved
+from planner.recording.geometry import Geometry
+from planner.recording.points import Layout
+from planner.report.plot_text import plain_text, write_values
+from planner.report.rerun.figures import More, draw, figure_view
 from planner.robot.skeleton import Skeleton, skeleton
 
 VIBRATION = "vibration"
