@@ -67,6 +67,8 @@ class HeldOutSimilarities:
     explained: FrfSimilarity
 
     @classmethod
-    def at(cls, poses: tuple[str, ...], found: "ThreefoldSimilarity | None") -> "HeldOutSimilarities":
+    def at(
+        cls, poses: tuple[str, ...], found: "ThreefoldSimilarity | None"
+    ) -> "HeldOutSimilarities":
         """Of what was judged there."""
         return cls(poses, **vars(ThreeSimilarities.of(found)))

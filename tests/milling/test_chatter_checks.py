@@ -8,7 +8,6 @@ from planner.milling.cutter_modes import CutterModes
 from planner.milling.lobes import losses
 from planner.milling.machine import Machine, multiplier
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way, two_equal
-from tests.support.semi_discretisation import semi_growth
 from tests.support.time_domain import simulate
 
 BAND = 0.03  # about the limit, within which a simulation of finite length need not tell
