@@ -7,16 +7,16 @@ from planner.campaign.events import Question
 from planner.campaign.model import Model
 from planner.campaign.question import question
 from planner.campaign.state import CampaignState
-from planner.frf.frf import Frf
+from planner.dataset.measure import MeasuredPose
 
 
 @dataclass(frozen=True, eq=False)
 class NewHits:
-    """Hits that are said to be of a pose: the tool's FRF by them alone."""
+    """Hits that are said to be of a pose: what they give alone."""
 
     pose: str
     joints_deg: tuple[float, ...]
-    frf: Frf | None
+    measured: MeasuredPose
 
 
 def asked_of(model: Model, state: CampaignState, new: NewHits) -> Question | None:
@@ -28,5 +28,5 @@ def asked_of(model: Model, state: CampaignState, new: NewHits) -> Question | Non
     if known is not None and known.question is not None:  # answered
         return None
     if not model.labelled:
-        return chain_question(model, new.pose, new.joints_deg, new.frf)
-    return question(model, state, new.pose, new.joints_deg, new.frf)
+        return chain_question(model, new.pose, new.joints_deg, new.measured.frf)
+    return question(model, state, new.pose, new.joints_deg, new.measured.one_hit_frf)

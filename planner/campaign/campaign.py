@@ -325,7 +325,7 @@ class Campaign(CampaignReads):
         if old and not judged.superseded:
             alone = measure_files((), fresh, table)[1]
         modes, new_modes = from_modal(measured.modal), from_modal(alone.modal)
-        new = NewHits(pose, joints_deg, alone.frf)
+        new = NewHits(pose, joints_deg, alone)
         asked = contradiction(pose, measured, len(old)) or asked_of(before, state, new)
         drift = None if asked else suspected(before, state, pose, joints_deg, new_modes)
         event = Imported(

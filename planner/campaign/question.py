@@ -19,6 +19,7 @@ from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.fit.expected import LINES, SIZES, ExpectedFrfs, turned
 from planner.frf.frf import Frf
+from planner.recording.points import TOOL
 
 LOG_ODDS = np.log(1000.0)  # against a mistake, before anything is measured
 BETTER = 3.0  # times less is left by a mistake that explains them
@@ -27,13 +28,17 @@ FOLLOWED = 3  # mistakes that are fitted, those that seem likeliest at once
 
 @dataclass(frozen=True, eq=False)
 class Mistake:
-    """Where the robot may be, q (dof,) in rad, and what the chain may show, instead; in words."""
+    """Where the robot may be, q (dof,) in rad, and what the chain may show, instead; in words.
+
+    A `rival` is likelier beforehand than others: it need not leave less than what is stated.
+    """
 
     q: np.ndarray
     what: str
     pose: str = ""
     about: str = ""
     fault: ChainFault = NONE
+    rival: bool = False
 
 
 def question(
@@ -45,17 +50,18 @@ def question(
 ) -> Question | None:
     """What to ask the engineer before new hits of a pose are believed; None: nothing.
 
-    `frf` is the tool's by the new hits alone; `model` and `state` are those before the import.
+    `frf` is by the new hits alone, each column as if of one hit; `model` and `state` are those
+    before the import.
     """
     learned = model.low.learned or model.low.suspect
     if frf is None or learned is None:
         return None
     expected = ExpectedFrfs(learned.posterior, model.cell.config.modes.band_hz)
     q = model.cell.robot.joints.internal([joints_deg])[0]
-    stated = StatedHits(expected, q, frf)
-    if not stated.doubted:
+    stated, typed = StatedHits(expected, q, frf), _setpoint(model, state, pose, joints_deg)
+    if not stated.doubted and not stated.instead(typed):
         return None
-    mistakes = [*_poses(model, state, pose, joints_deg), *_chains(state, expected, q, frf)]
+    mistakes = [*typed, *_poses(model, state, pose, joints_deg), *_chains(state, expected, q, frf)]
     fits = stated.instead(mistakes)
     if fits is None and not stated.impossible:
         return None
@@ -107,7 +113,7 @@ class StatedHits:
         for one in sorted(mistakes, key=glanced, reverse=True)[:FOLLOWED]:
             frf, volume = shown(one)
             its, left = self.expected.density(one.q, frf)
-            gain, better = its + volume - value, BETTER * left <= size
+            gain, better = its + volume - value, (1 if one.rival else BETTER) * left <= size
             if gain > LOG_ODDS and (better or its + volume > self.strange > value):
                 found.append((gain, one))
         return max(found, key=lambda pair: pair[0], default=(0.0, None))[1]
@@ -124,17 +130,24 @@ def _poses(
     for name, there in known.items():
         what = f"repeat those of {name}" if state.hit_at(name) else f"fit {name} far better"
         yield Mistake(joints.internal([there])[0], what, name)
-    sent = state.proposals[pose].joints_deg if pose in state.proposals else joints_deg
-    typed = np.flatnonzero(np.abs(np.subtract(sent, joints_deg)) > joints.same()).tolist()
-    if typed:
-        which = ", ".join(_either(joints, i, sent[i], joints_deg[i]) for i in typed)
-        what = f"fit the setpoint of {pose} better than its readback: is {which}?"
-        yield Mistake(joints.internal([sent])[0], what, about="readback")
     for i, angle in enumerate(joints_deg):
         other = tuple(-a if k == i else a for k, a in enumerate(joints_deg))
         if abs(angle) > joints.same()[i]:
             what = f"fit the other sign of an angle: is {_either(joints, i, -angle, angle)}?"
             yield Mistake(joints.internal([other])[0], what, about="readback")
+
+
+def _setpoint(
+    model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...]
+) -> list[Mistake]:
+    """Where the robot was sent, where that is not what is stated."""
+    joints = model.cell.robot.joints
+    sent = state.proposals[pose].joints_deg if pose in state.proposals else joints_deg
+    typed = np.flatnonzero(np.abs(np.subtract(sent, joints_deg)) > joints.same()).tolist()
+    which = ", ".join(_either(joints, i, sent[i], joints_deg[i]) for i in typed)
+    what = f"fit the setpoint of {pose} better than its readback: is {which}?"
+    there = joints.internal([sent])[0]
+    return [Mistake(there, what, about="readback", rival=True)] if typed else []
 
 
 def _either(joints, number: int, one: float, other: float) -> str:
@@ -146,8 +159,10 @@ def _either(joints, number: int, one: float, other: float) -> str:
 def _chains(
     state: CampaignState, expected: ExpectedFrfs, q: np.ndarray, frf: Frf
 ) -> Iterator[Mistake]:
-    """What the chain may show instead; nothing once the engineer has said that it is right."""
+    """What the tool's chain may show instead; nothing once the engineer called it right."""
     earlier = state.measurements.values()
+    if frf.layout.sensors != TOOL.sensors:
+        return
     if any(m.question is not None and m.question.about == "chain" for m in earlier):
         return
     for fault in (*TURNED, *scaled(expected.ratio(q, frf))):

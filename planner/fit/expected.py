@@ -15,6 +15,8 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
 from planner.fit.structure import RobotStructure
 from planner.frf.frf import Frf
+from planner.inference.least_squares import inverse
+from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR
 
 LINES, STEPS = 44, 5
 SIZES = (0.2, 0.06, 0.015, 0.004)  # of the pose's own discrepancy, if it is what it is said to be
@@ -46,25 +48,43 @@ class ExpectedFrfs:
     band_hz: tuple[float, float]
 
     @cached_property
-    def _structure(self) -> _Informed:
+    def _structures(self) -> dict[tuple[str, ...], _Informed]:
+        return {}
+
+    def _structure(self, sensors: tuple[str, ...]) -> _Informed:
+        """As these sensors hear it; of one that is new, what is known of any."""
+        if sensors in self._structures:
+            return self._structures[sensors]
         p, s = self.posterior, self.posterior.structure
-        known = p.found.at.normal + s.precision
-        return _Informed(s.prior, s.effects, s.sensors, p.x, known)
+        known = p.found.misfit.data.measured.layout.sensors
+        rows = [*range(s.chain.start)]
+        for name in sensors:
+            first = s.chain.start + OF_SENSOR * known.index(name) if name in known else None
+            rows += [-1] * OF_SENSOR if first is None else range(first, first + OF_SENSOR)
+        rows += range(s.chain.stop - OF_HAMMER, s.chain.stop)
+        at = np.array(rows)
+        both = (at[:, None] >= 0) & (at >= 0)
+        covariance = np.where(both, p.covariance[np.ix_(at, at)], np.eye(len(at)))
+        x = np.where(at >= 0, p.x[at], 0.0)
+        made = _Informed(s.prior, s.effects, len(sensors), x, inverse(covariance))
+        self._structures[sensors] = made
+        return made
 
     def _misfit(self, q: np.ndarray, frf: Frf, size: float) -> FrfMisfit:
-        data = FrfData.of(self._structure.prior, (frf,), q[None], self.band_hz, LINES)
-        return FrfMisfit(self._structure, data, self.posterior.tolerances, size)
+        structure = self._structure(frf.layout.sensors)
+        data = FrfData.of(structure.prior, (frf,), q[None], self.band_hz, LINES)
+        return FrfMisfit(structure, data, self.posterior.tolerances, size)
 
     def strange(self, q: np.ndarray, frf: Frf) -> float:
         """Log density of an FRF measured at q (dof,) in rad if it is hardly what is expected."""
         misfit = self._misfit(q, frf, STRANGE)
-        return misfit.evidence(misfit(self.posterior.x))
+        return misfit.evidence(misfit(misfit.structure.mean))
 
     def density(self, q: np.ndarray, frf: Frf) -> tuple[float, float]:
         """The same if it is, but for a discrepancy like that of the poses before; its size."""
         misfit = self._misfit(q, frf, SIZES[0])
         usual, each = np.log(max(self.posterior.size, SIZES[-1])), []
-        x, own = self.posterior.x, None
+        x, own = misfit.structure.mean, None
         for size in SIZES:
             misfit = misfit.with_rho(size)
             at = minimised(misfit, x, STEPS, own=own)
@@ -78,14 +98,14 @@ class ExpectedFrfs:
     def off(self, q: np.ndarray, frf: Frf) -> float:
         """By what share of the FRFs these differ from the expected ones."""
         misfit = self._misfit(q, frf, STRANGE)
-        m, h = misfit.data.measured, misfit.motion(self.posterior.x, None).accelerance
+        m, h = misfit.data.measured, misfit.motion(misfit.structure.mean, None).accelerance
         away = np.where(m.used, m.accelerance - h, 0.0)
         return float(np.linalg.norm(away) / np.linalg.norm(np.where(m.used, h, 0.0)))
 
     def ratio(self, q: np.ndarray, frf: Frf) -> np.ndarray:
         """(r,): by what factor a channel's FRFs are larger than expected (median of lines)."""
         misfit = self._misfit(q, frf, STRANGE)
-        m, h = misfit.data.measured, misfit.motion(self.posterior.x, None).accelerance
+        m, h = misfit.data.measured, misfit.motion(misfit.structure.mean, None).accelerance
         off = np.where(m.used, np.log(np.abs(m.accelerance / h)), np.nan)[0]
         return np.exp(np.nanmedian(off, axis=(1, 2)))
 

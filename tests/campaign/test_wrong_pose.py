@@ -46,7 +46,7 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path, poses):
 
     def asked(at: int, one: MeasuredPose):
         angles = tuple(np.rad2deg(q[at]).tolist())
-        new = NewHits("X", angles, one.frf)
+        new = NewHits("X", angles, one)
         return asked_of(campaign.model, campaign.state, new)
 
     assert not any(asked(i, found[i]) for i in range(6))
