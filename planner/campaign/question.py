@@ -23,6 +23,7 @@ from planner.recording.points import TOOL
 
 LOG_ODDS = np.log(1000.0)  # against a mistake, before anything is measured
 BETTER = 3.0  # times less is left by a mistake that explains them
+SURE = 2  # measured poses before which another structure may explain what nothing known fits
 FOLLOWED = 3  # mistakes that are fitted, those that seem likeliest at once
 
 
@@ -63,7 +64,7 @@ def question(
         return None
     mistakes = [*typed, *_poses(model, state, pose, joints_deg), *_chains(state, expected, q, frf)]
     fits = stated.instead(mistakes)
-    if fits is None and not stated.impossible:
+    if fits is None and not (stated.impossible and learned.poses >= SURE):
         return None
     return _asked(pose, 100 * expected.off(q, frf), fits)
 

@@ -8,7 +8,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.chain_faults import TURNED
-from planner.campaign.question import Mistake, StatedHits, scaled
+from planner.campaign.question import SURE, Mistake, StatedHits, scaled
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
@@ -46,7 +46,9 @@ def opposite(q: np.ndarray, joint: int) -> np.ndarray:
     return np.where(np.arange(len(q)) == joint, -q, q)
 
 
-def asked(expected: ExpectedFrfs, q: np.ndarray, frf: Frf, others: dict[str, np.ndarray]) -> str:
+def asked(
+    expected: ExpectedFrfs, q: np.ndarray, frf: Frf, others: dict[str, np.ndarray], sure: bool
+) -> str:
     """What is asked about: a pose, "sign", "chain", "?" where nothing fits; "" where nothing is."""
     stated = StatedHits(expected, q, frf)
     if not stated.doubted:
@@ -57,7 +59,7 @@ def asked(expected: ExpectedFrfs, q: np.ndarray, frf: Frf, others: dict[str, np.
     mistakes += [Mistake(q, "", about="chain", fault=fault) for fault in faults]
     found = stated.instead(mistakes)
     if found is None:
-        return "?" if stated.impossible else ""
+        return "?" if stated.impossible and sure else ""
     return found.pose or found.about
 
 
@@ -76,13 +78,13 @@ def answers(case: Case, rng: np.random.Generator) -> list[dict[str, tuple[str, s
         unlisted = {name: there for name, there in others.items() if name != true}
         typed = opposite(q, int(rng.integers(1, len(q))))
         one = {
-            "right": (asked(expected, q, frf, others), ""),
-            "another pose": (asked(expected, q, strange, others), true),
-            "unlisted pose": (asked(expected, q, strange, unlisted), "?"),
-            "sign of an angle": (asked(expected, typed, frf, others), "sign"),
+            "right": (asked(expected, q, frf, others, n >= SURE), ""),
+            "another pose": (asked(expected, q, strange, others, n >= SURE), true),
+            "unlisted pose": (asked(expected, q, strange, unlisted, n >= SURE), "?"),
+            "sign of an angle": (asked(expected, typed, frf, others, n >= SURE), "sign"),
         }
         for name, matrix in CHAINS.items():
-            one[name] = asked(expected, q, shown(frf, matrix), others), "chain"
+            one[name] = asked(expected, q, shown(frf, matrix), others, n >= SURE), "chain"
         out.append(one)
     return out
 
@@ -105,7 +107,8 @@ def test_how_often_is_asked(tmp_path):
     for name in found[0][0]:
         each = np.array([[bool(one[name][0]) for one in robot] for robot in found])
         named = np.array([[one[name][0] == one[name][1] for one in robot] for robot in found])
-        rate[name] = float(each.mean())
+        # From one pose another structure may explain what fits nothing that is known.
+        rate[name] = float(each[:, SURE - 1 if name == "unlisted pose" else 0 :].mean())
         both = zip(100 * each.mean(axis=0), 100 * named.mean(axis=0), strict=True)
         print(f"{name:>17} " + "  ".join(f"{a:5.1f} % ({b:5.1f} %)" for a, b in both))
     assert rate["right"] <= 0.01
