@@ -195,6 +195,7 @@ def _shapes_table(found: MatrixModes, path: Path) -> None:
     rows = [
         (k + 1, dof.node, dof.direction, float(value.real), float(value.imag), float(sd))
         for k, mode in enumerate(found.modes)
+        if mode.shape_sd is not None
         for dof, value, sd in zip(found.dofs, mode.shape, mode.shape_sd, strict=True)
     ]
     _table(path, names, rows)

@@ -2,13 +2,15 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from planner.errors import InputError
-from planner.milling.coupling import CoupledFrf
 from planner.recording.joints import JointUnits
+
+if TYPE_CHECKING:
+    from planner.milling.coupling import CoupledFrf
 
 
 def save_frfs(
@@ -27,7 +29,7 @@ def save_frfs(
           joints_deg=joints.shown(q), **more)  # fmt: skip
 
 
-def save_coupled(path: Path, coupled: CoupledFrf, pose: str) -> None:
+def save_coupled(path: Path, coupled: "CoupledFrf", pose: str) -> None:
     """Write as `predict` does, and all six motions beside.
 
     `frf6_mean`, `frf6_sd` (1, 6, 6, F) are accelerances of (x, y, z, θx, θy, θz), `motions` says

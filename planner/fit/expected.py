@@ -31,11 +31,11 @@ class _Informed(RobotStructure):
     x: np.ndarray = None  # pyright: ignore[reportAssignmentType]
     known: np.ndarray = None  # pyright: ignore[reportAssignmentType]
 
-    @property
+    @cached_property
     def mean(self) -> np.ndarray:
         return self.x
 
-    @property
+    @cached_property
     def precision(self) -> np.ndarray:
         return self.known
 

@@ -148,7 +148,8 @@ def _told(
         apart = np.eye(len(group)) - share
         mean[group] = middle[0].reshape(AXES, OF_HIT)[axis] + apart @ z
         own = np.einsum("kj,lj,jab->kalb", apart, apart, each)
-        covariance[np.ix_(group, range(OF_HIT), group, range(OF_HIT))] += own
+        numbers = np.arange(OF_HIT)
+        covariance[np.ix_(group, numbers, group, numbers)] += own
     covariance += of_axis[columns.axis][:, :, columns.axis]
     scale = np.tile(np.repeat([t.angle_rad, t.offset_m], 2), count)
     # What a miss does is simulated too, and as wrong as the rest of the simulation.

@@ -133,6 +133,7 @@ def completed(motion: CutterFrf, simulation: Simulation, q: np.ndarray) -> TipRe
     spread = relative[:, None, None] * np.abs(g)
     apart = np.abs(g[:, :3, :3] - seen[:, :, :3])  # sensor and tcp are not at the same place
     spread[:, :3, :3] = off[:, None, None] * apart
+    assert motion.sd is not None
     return TipReceptance(
         motion.frequency_hz,
         tuple(range(6)),

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from msgspec import UNSET
 
 from planner.campaign.log_conversion import from_homogeneity
 from planner.dataset.frf_set import FrfSet
@@ -97,8 +98,8 @@ def _draw(
     """Draw what is wanted under the files' name; `note` and `more` as `Pictures.write` has them."""
     if not pictures.wanted:
         return {}
-    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
-    name = f"{Path(files[0]).name[-LONGEST_NAME:]}{more}"
+    others = f" and {len(files) - 1} more" if len(files) > 1 else ""
+    name = f"{Path(files[0]).name[-LONGEST_NAME:]}{others}"
     return pictures.write(figures(name), name, note, more)
 
 
@@ -296,7 +297,7 @@ def operating_report(
 
     note = f"{mark}Responses alone give no scale: neither FRFs nor modal masses follow."
     return ModesReport(
-        modes=tuple(map(ModeAnswer.of, found.modes)),
+        modes=tuple(ModeAnswer.of(m, modal_mass_kg=UNSET, scatter_hz=UNSET) for m in found.modes),
         dofs=tuple(named(dof.positive) for dof in dofs),
         scaled=False,
         band_hz=found.band_hz,

@@ -1,7 +1,7 @@
 """Answer of `modes`: modes of one pose, of any points, of responses alone, of many poses."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import UNSET
@@ -12,7 +12,6 @@ from rich.text import Text
 
 from planner.campaign.events import Amplitude
 from planner.campaign.hit_habits import HitMiss, habits
-from planner.campaign.survey import Survey
 from planner.errors import RefusedFile
 from planner.recording.dof import Dof
 from planner.report.answer import NOT_IN_JSON, Answer
@@ -20,6 +19,9 @@ from planner.report.plot_files import Pictures
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
 from planner.words import counted
+
+if TYPE_CHECKING:
+    from planner.campaign.survey import Survey
 
 SURE = 0.9  # probability of a label below which the text marks it as doubtful
 COMMON = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd", "probability"
@@ -63,10 +65,11 @@ class ModeAnswer:
         pairs = np.array(mode.shape)
         pairs = np.stack([pairs.real, pairs.imag], -1) if np.iscomplexobj(pairs) else pairs
         own["shape"] = tuple((float(re), float(im)) for re, im in pairs)
-        if hasattr(mode, "residue_sd"):
+        over_points = getattr(mode, "shape_sd", None) is not None
+        if hasattr(mode, "residue_sd") and not over_points:
             both = zip(np.ravel(mode.residue), np.ravel(mode.residue_sd), strict=True)
             own["residue"] = tuple((float(r.real), float(r.imag), float(sd)) for r, sd in both)
-        if hasattr(mode, "shape_sd"):
+        if over_points:
             own |= {
                 "shape_sd": tuple(map(float, mode.shape_sd)),
                 "scaled": getattr(mode, "scaled", False),
@@ -140,7 +143,7 @@ class ModesReport(Answer):
     rrd: str | None = None
     hit_errors: tuple[HitMiss, ...] | Unset = UNSET
     habits: tuple[str, ...] | Unset = UNSET
-    survey: Survey | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
+    survey: "Survey | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def with_pictures(self, pictures: Pictures, name: str) -> "ModesReport":
         """The same once frequencies are drawn pose by pose, where that is wanted."""
@@ -208,7 +211,7 @@ def named(dof: Dof) -> tuple[int | str, str]:
     return (int(dof.node) if dof.node.lstrip("-").isdigit() else dof.node), dof.direction
 
 
-def survey_report(found: Survey) -> ModesReport:
+def survey_report(found: "Survey") -> ModesReport:
     """Of the labelled modes of all poses."""
     tracks, bare, poses = found.tracks, found.bare, []
     for i, name in enumerate(found.poses):
