@@ -41,7 +41,7 @@ TRANSVERSE_BOUNDS = (
 DAMPING_BOUNDS = (0.0001, 0.7)
 LOW_DAMPING = 1 / 8  # of the range, in which first guesses of dampings lie (section 2.3)
 GUESSES, BEST, LINES = 64, 3, 60  # of the Latin hypercube; followed; lines that are compared
-STEPS, FEW_STEPS = 30, 3  # of either climb; of the small version
+STEPS, FEW_STEPS = 30, 15  # of either climb; of the small version
 AT_BOUND = 0.01  # of a bound's logarithmic width: nearer to it, a parameter is at its bound
 
 
