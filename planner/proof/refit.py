@@ -248,7 +248,7 @@ class _Sums:
 
 def _sums(question: Question, inertia: list, moves: np.ndarray, error: float) -> _Sums:
     parts = [_at_pose(pose, question, inertia, moves, error) for pose in question.poses]
-    square, vector, plain = (np.sum([p[i] for p in parts], axis=0) for i in range(3))
+    square, vector, plain = (np.sum(np.array(of), axis=0) for of in zip(*parts, strict=True))
     n = len(moves)
     inner = np.eye(len(vector) - n) + square[n:, n:]
     chain = np.linalg.solve(inner, vector[n:])

@@ -217,7 +217,8 @@ def bars_figure(found: MatrixModes, title: str = "") -> Figure:
     for k, (panel, mode) in enumerate(zip(axes, shown, strict=True)):
         x = np.arange(len(names))
         style = {"fmt": ".", "ms": 3, "lw": 0.8, "color": MEASURED}
-        panel.errorbar(x, np.real(mode.shape), 2 * mode.shape_sd, **style)
+        sd = None if mode.shape_sd is None else 2 * mode.shape_sd
+        panel.errorbar(x, np.real(mode.shape), sd, **style)
         panel.axhline(0, color="0.7", lw=0.6)
         step = max(1, len(names) // 6)
         panel.set_xticks(x[::step], names[::step], rotation=90, fontsize=6)

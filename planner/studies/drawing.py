@@ -68,7 +68,8 @@ def band(
     label: str = "95 % band",
 ) -> None:  # fmt: skip
     """A prediction (n,) over x (n,), and its interval's lower and upper ends (n,)."""
-    panel.fill_between(x, *ends, color="tab:red", alpha=0.25, lw=0, label=label)
+    low, high = ends
+    panel.fill_between(x, low, high, color="tab:red", alpha=0.25, lw=0, label=label)
     panel.plot(x, predicted, color="tab:red", lw=1.4, label="predicted")
     panel.grid(True, alpha=0.25)
 

@@ -96,7 +96,7 @@ def bodies(truth: Truth) -> dict[str, refit.Body]:
     found = {}
     for link, pieces in truth.pieces().items():
         mass = sum(m for m, _, _ in pieces)
-        centre = sum(m * c for m, c, _ in pieces) / mass
+        centre = np.sum([m * c for m, c, _ in pieces], axis=0) / mass
         second = sum(
             np.trace(i) / 2 * np.eye(3) - i + m * np.outer(c - centre, c - centre)
             for m, c, i in pieces

@@ -20,7 +20,7 @@ class Bend:
     """
 
     count: int
-    springs: tuple[Any, Any]
+    springs: tuple[Any, ...]
 
 
 @dataclass

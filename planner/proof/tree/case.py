@@ -79,6 +79,7 @@ def make_case(seed: int, kind: str) -> Case:
         0.5 * rng.normal(size=len(robot.joints)) + rng.normal(size=(number, len(robot.joints)))
     )
     poses = np.radians(np.round(np.degrees(stated_at[:number]), 4)) + error
+    effects: list[Effect] = []
     for _ in range(60):
         effects = draw_effects(rng, kind, truth, poses)
         if _allowed(truth, effects, stated_at):

@@ -33,6 +33,7 @@ def draw_effects(
     makers: list[Any] = [LINEAR[first], LINEAR[second]]
     if rng.random() < 0.3:
         makers[1] = GEARS[rng.integers(len(GEARS))]
+    drawn: list[Effect] = []
     for _ in range(50):
         drawn = [maker(rng, truth, poses) for maker in makers]
         if len({e.at for e in drawn}) == 2 or drawn[1].law is None:

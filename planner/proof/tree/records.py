@@ -32,7 +32,7 @@ class Motion:
 
 def sampled(fine: np.ndarray, over: int) -> np.ndarray:
     """Anti-aliased (flat to 0.38 of the sampling rate, 100 dB down at 0.5) and decimated."""
-    taps = firwin(80 * over + 1, 0.88 / over, window=("kaiser", 10.06))
+    taps = firwin(80 * over + 1, 0.88 / over, window=("kaiser", 10.06))  # pyright: ignore[reportArgumentType]
     padded = oaconvolve(fine, taps.reshape((1,) * (fine.ndim - 1) + (-1,)), axes=-1)
     half = 40 * over
     return padded[..., half : half + fine.shape[-1] : over]

@@ -1,6 +1,7 @@
 """Rotations and second moments of mass: plain 3x3 arrays, angles in rad."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 def cross_matrix(v: np.ndarray) -> np.ndarray:
@@ -8,7 +9,7 @@ def cross_matrix(v: np.ndarray) -> np.ndarray:
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 
-def turn(axis: np.ndarray, angle: float) -> np.ndarray:
+def turn(axis: ArrayLike, angle: float) -> np.ndarray:
     """Rotation by `angle` (rad) about the unit vector `axis` (Rodrigues)."""
     k = cross_matrix(np.asarray(axis, float))
     return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k

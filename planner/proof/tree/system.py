@@ -6,7 +6,6 @@ B: wrench at the tcp in tcp axes (N, N m); C: acceleration and angular accelerat
 of the sensor frame in its own axes. So H is (6, 6) at every s.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,7 +23,7 @@ class Tie:
     name: str
     left: np.ndarray
     right: np.ndarray
-    law: Callable[[np.ndarray], np.ndarray] | Any
+    law: Any
 
     @property
     def mutual(self) -> bool:

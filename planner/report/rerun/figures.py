@@ -107,9 +107,10 @@ def _strips(figure: Figure, panel: Axes, line: Line2D) -> list[np.ndarray]:
     low, high = panel.bbox.get_points()
     path = line.get_transform().transform_path(line.get_path())
     inside = path.cleaned(remove_nans=True, clip=(*low, *high), simplify=False)
-    drawn = inside.codes != Path2D.STOP
-    starts = np.flatnonzero(inside.codes[drawn] == Path2D.MOVETO)
-    x, y = inside.vertices[drawn].T
+    codes, vertices = np.asarray(inside.codes), np.asarray(inside.vertices)
+    drawn = codes != Path2D.STOP
+    starts = np.flatnonzero(codes[drawn] == Path2D.MOVETO)
+    x, y = vertices[drawn].T
     places = np.stack([x, figure.bbox.height - y], axis=1) * DPI / figure.dpi
     return [part for part in np.split(places, starts) if len(part) > 1]
 
