@@ -132,7 +132,7 @@ def test_ctrl_c_keeps_what_is_finished(pool, tmp_path):
     os.kill(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert said.count("\n") == 1
+    assert said.splitlines()[-1].startswith("Stopped")  # after progress, on a slow machine
     assert "kept" in said
     done = list((tmp_path / "runs").glob("*.json"))
     assert 2 <= len(done) < 500
