@@ -17,8 +17,8 @@ from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.hit_columns import PoseHits
 from planner.design.parameter_sensitivity import FrfNoise
 from planner.frf.frf import Frf
+from planner.surrogate.average import Average
 from planner.surrogate.gp import STAGES
-from planner.surrogate.hedged import HedgedAR1
 from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, fit_surrogate
 
 # Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
@@ -107,7 +107,7 @@ class _Guided:
     used: tuple[Measurement, ...]
     labelled: tuple[LabelledPose, ...]
     seen: ModalObservations
-    primary: HedgedAR1
+    primary: Average
 
     @classmethod
     def by(

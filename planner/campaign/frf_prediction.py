@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 from planner.campaign.frf_model import FrfModel, frf_model
 from planner.measurement.measured_frfs import common_band, stack
 from planner.surrogate.frf_bands import ModalPrediction
-from planner.surrogate.left_out_modes import left_out_modes
+from planner.surrogate.leave_one_out import left_out_modes
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model

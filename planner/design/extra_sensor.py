@@ -7,8 +7,7 @@ import msgspec
 import numpy as np
 
 from planner.design.discrimination import MOST_CANDIDATES, separation
-from planner.design.next_hit import in_words
-from planner.design.odds import as_ratio
+from planner.design.next_hit import as_ratio, in_words
 from planner.diagnosis.diagnose import Explained
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout

@@ -8,11 +8,12 @@ import numpy as np
 
 from planner.design.discrimination import Telling, most_telling
 from planner.design.law_discrimination import most_telling_forces, undecided
-from planner.design.odds import as_ratio
 from planner.diagnosis.diagnose import Explained
 from planner.diagnosis.laws.law_at_joints import Laws
 from planner.recording.joints import JointUnits
 from planner.words import probable
+
+MOST_ODDS = 1e4  # what is said of a robot is never surer
 
 
 @dataclass(frozen=True)
@@ -120,3 +121,10 @@ def in_words(places: Sequence[tuple[str, str | None]], probability: float) -> st
         for name, at in places
     ]
     return f"{' and '.join(said)} ({probable(probability)})"
+
+
+def as_ratio(log_odds: float) -> str:
+    """Natural logarithm of odds as "30 : 1", as an engineer reads them."""
+    if log_odds > np.log(MOST_ODDS):
+        return f"more than {MOST_ODDS:g} : 1"
+    return f"about {float(f'{np.exp(max(log_odds, 0.0)):.2g}'):g} : 1"

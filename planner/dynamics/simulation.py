@@ -19,8 +19,8 @@ from planner.dynamics.vibration import (
 )
 from planner.robot.config import EffectTable, without_effects
 from planner.robot.elastic_model import ElasticModel, Matrices
-from planner.robot.link_inertias import without_stated_inertias
 from planner.robot.robot import Robot
+from planner.robot.urdf_elements import without_stated_inertias
 from planner.robot.urdf_inertias import urdf_with_inertias
 
 

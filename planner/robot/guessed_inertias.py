@@ -7,10 +7,10 @@ import numpy as np
 import pinocchio as pin
 
 from planner.robot.config import LinkTable
-from planner.robot.link_inertias import link_inertia
 from planner.robot.robot import Robot
 from planner.robot.skeleton import BodyShape, bodies
 from planner.robot.solids import link_solids
+from planner.robot.urdf_elements import link_inertia
 
 # Small parts are denser, gears and bearings to their covers: mass goes with volume to this power.
 # Fitted to 82 published robots whose makers state inertias (6 to 7 joints, 3 to 1,700 kg), by whose

@@ -12,10 +12,14 @@ import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
+from planner.surrogate.average import (
+    PRIOR_BELIEF,
+    Average,
+    fit_hedged,
+    fit_plain_or_free,
+    fit_shapes,
+)
 from planner.surrogate.frf_bands import ModalPrediction
-from planner.surrogate.hedged import PRIOR_BELIEF, HedgedAR1, fit_hedged
-from planner.surrogate.kernel_average import KernelAverage, either, fit_shapes
-from planner.surrogate.plain_discrepancy import fit_plain_or_free
 from planner.surrogate.training_data import TrainingData
 
 # Stiffnesses off by ±30 % move frequencies by 15 %; EMA repeats a frequency to about 0.1 %.
@@ -58,9 +62,9 @@ class ModalObservations:
 class Surrogate:
     """The fitted models; immutable."""
 
-    primary: HedgedAR1  # log f of every label
-    damping: KernelAverage  # log ζ of every label
-    residue: HedgedAR1 | None  # real and imaginary parts, scaled; None: they were not asked for
+    primary: Average  # log f of every label
+    damping: Average  # log ζ of every label
+    residue: Average | None  # real and imaginary parts, scaled; None: they were not asked for
     scale: np.ndarray  # (k,) m/(N·s)
     visits: bool = True  # whether the scatter from visit to visit is learned
 
@@ -84,7 +88,8 @@ class Surrogate:
     @property
     def frequency_trust(self) -> np.ndarray:
         """(k,) weight of the simulation in each label's frequency."""
-        return np.where(self.primary.uses_low, self.primary.weight, 1 - self.primary.weight)
+        fused = self.primary.models[0]
+        return np.where(fused.uses_low, self.primary.weights[0], 0.0)
 
     def with_residues(self, seen: ModalObservations, taught: bool = False) -> "Surrogate":
         """The same with the residues fitted too, which may be exacter than those it has `seen`."""
@@ -93,7 +98,7 @@ class Surrogate:
 
     def frequency_inputs(self, simulated: SimulatedModes) -> np.ndarray:
         """Centred low fidelity (q, k) of the frequency outputs."""
-        return self.primary.split(_log(simulated.frequency_hz))[1]
+        return self.primary.likeliest.split(_log(simulated.frequency_hz))[1]
 
     def predict(
         self, x: np.ndarray, simulated: SimulatedModes, visit: bool = True
@@ -160,7 +165,7 @@ def fit_primary(
     discrepancy: np.ndarray | None = None,
     belief: float = PRIOR_BELIEF,
     visits: bool = True,
-) -> HedgedAR1:
+) -> Average:
     """Fit ln f of every label.
 
     Args:
@@ -189,29 +194,27 @@ def fit_primary(
     )
 
 
-def fit_damping(seen: ModalObservations, taught: bool = False) -> KernelAverage:
+def fit_damping(seen: ModalObservations, taught: bool = False) -> Average:
     """Fit log ζ of every label: no simulation knows it that was not `taught`.
 
     A simulation that was is believed as far as the measured damping ratios bear it out, beside
     what they say alone: brakes and friction leave nothing of C = βK in some robots.
     """
     y = _log(seen.damping_ratio)
-    count = y.shape[1]
     low = _log(seen.simulated.damping_ratio) if taught else np.full_like(y, np.nan)
-    data = TrainingData(seen.x, y, seen.damping_sd / np.exp(y), low)
-    centre = _centre(low, np.full(count, np.nan))
-    with_low, without_low = (DAMPING_PRIOR_TAUGHT,) * count, (DAMPING_PRIOR,) * count
-    fitted = fit_shapes(data, with_low, without_low, centre, DAMPING_KERNELS)
-    if not taught or not np.isfinite(y).any():  # nothing measured is no reason to doubt
-        return fitted
-    nothing = np.full(count, np.nan)
-    alone = replace(data, low=np.full_like(y, np.nan))
-    return either(fitted, fit_shapes(alone, with_low, without_low, nothing, DAMPING_KERNELS))
+    return fit_shapes(
+        TrainingData(seen.x, y, seen.damping_sd / np.exp(y), low),
+        (DAMPING_PRIOR_TAUGHT,) * y.shape[1],
+        (DAMPING_PRIOR,) * y.shape[1],
+        _centre(low, np.full(y.shape[1], np.nan)),
+        DAMPING_KERNELS,
+        blind=taught and bool(np.isfinite(y).any()),  # nothing measured is no reason to doubt
+    )
 
 
 def fit_surrogate(
     seen: ModalObservations,
-    primary: HedgedAR1 | None = None,
+    primary: Average | None = None,
     residues: bool = True,
     taught: bool = False,
     visits: bool = True,
@@ -233,7 +236,7 @@ def fit_surrogate(
     return Surrogate(primary, fit_damping(seen, taught), residue, scale, visits)
 
 
-def _fit_residues(seen: ModalObservations, scale: np.ndarray, taught: bool) -> HedgedAR1:
+def _fit_residues(seen: ModalObservations, scale: np.ndarray, taught: bool) -> Average:
     """Fit the real and imaginary parts of every label's residues, in units of `scale`."""
     k, wide = len(scale), np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)

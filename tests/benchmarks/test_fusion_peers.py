@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.surrogate.models.averaged import fit_recursive
 from planner.surrogate.models.fidelity_levels import Samples
-from planner.surrogate.models.recursive_ar1 import fit_recursive
 from planner.surrogate.predictive import Predictive
 from tests.support import fusion_peers
 from tests.support.fused import fit_fused, fit_low

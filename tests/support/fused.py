@@ -5,16 +5,20 @@ from dataclasses import replace
 import numpy as np
 
 from planner.surrogate.ar1 import OutputPrior
-from planner.surrogate.models import recursive_ar1, single_output_gp
-from planner.surrogate.models.ar1_nargp import fit_ar1_nargp
-from planner.surrogate.models.fidelity_levels import AveragedModel, FidelityLevel, Samples
-from planner.surrogate.models.recursive_ar1 import fit_recursive, scales
-from planner.surrogate.models.single_output_gp import fit_gp
+from planner.surrogate.models import averaged
+from planner.surrogate.models.averaged import (
+    AveragedModel,
+    fit_ar1_nargp,
+    fit_gp,
+    fit_recursive,
+    scales,
+)
+from planner.surrogate.models.fidelity_levels import FidelityLevel, Samples
 from tests.support.mixture import Mixture, mix
 
 # A simulation's grid: no noise, but perhaps what the kernel cannot follow, and enough points to
 # tell an input that hardly matters. The spread is the likeliest on the development problems.
-GRID_PRIOR = replace(single_output_gp.PRIOR, nugget=1e-5, length=1.0, length_spread=2.0, spread=3.0)
+GRID_PRIOR = replace(averaged.GP_PRIOR, nugget=1e-5, length=1.0, length_spread=2.0, spread=3.0)
 SHAPES = ("rbf", "matern52")
 GRID_SHAPES = (*SHAPES, "rbf+linear", "rbf+quadratic")  # many samples can tell a trend
 SOME = 64
@@ -49,9 +53,7 @@ def fit_fused(
     `low_spread` is the sd of the low level over the workspace, `nugget` the median prior of noise
     beyond the samples' sds, over the scale of the output: 1e-6 for values known to be exact.
     """
-    fused, alone = (
-        replace(p, nugget=nugget) for p in (recursive_ar1.PRIOR, single_output_gp.PRIOR)
-    )
+    fused, alone = (replace(p, nugget=nugget) for p in (averaged.AR1_PRIOR, averaged.GP_PRIOR))
     _, scale = scales(measured.y, low.predict(measured.x)[0], low_spread)
     families: dict[str, dict[str, AveragedModel]] = {
         "AR1": {

@@ -12,17 +12,17 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from planner.errors import InputError
-from planner.surrogate.models.fidelity_levels import AveragedModel
+from planner.surrogate.models.averaged import AveragedModel
 from planner.surrogate.predictive import Predictive
 
 NEGLIGIBLE = 1e-4  # weight below which a model is not asked
 
 
 @dataclass(frozen=True, eq=False)
-class Mixture(AveragedModel):
+class Mixture:
     """Models by name and their weights, which sum to one."""
 
-    models: Mapping[str, AveragedModel]
+    models: "Mapping[str, AveragedModel | Mixture]"
     weights: Mapping[str, float]
     log_evidence: float
 
@@ -31,6 +31,11 @@ class Mixture(AveragedModel):
         asked = [name for name, w in self.weights.items() if w > NEGLIGIBLE]
         w = np.array([self.weights[name] for name in asked])
         return together([self.models[name].predictive(x) for name in asked], w / w.sum())
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Median and sd (q,) of the noise-free output at x (q, d)."""
+        mixture = self.predictive(x)
+        return mixture.median, mixture.sd
 
 
 def mix(models: Mapping[str, AveragedModel], prior: Mapping[str, float] | None = None) -> Mixture:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.design.integrated_variance import integrated_variance
+from planner.design.acquisitions import integrated_variance
 from planner.design.propose import ACQUISITIONS, propose
 from planner.design.space_filling import DESIGNS
 from planner.errors import InputError

@@ -3,11 +3,9 @@
 import pickle
 
 import numpy as np
-import pytest
 
 from planner.surrogate import gp
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
-from planner.surrogate.data_covariance import data_covariance, lower_half
 from planner.surrogate.training_data import TrainingData, pad, thinned
 
 PRIOR = OutputPrior(bias_sd=0.2, slope_sd=0.3, amplitude=0.1, nugget=0.01)
@@ -76,14 +74,3 @@ def test_large_matrices_are_worked_out_again_with_the_same_digits():
     assert len(data) < 1_000_000
     for a, b in zip(said, pickle.loads(data).predict(x, low(x)), strict=True):
         np.testing.assert_array_equal(a, b)
-
-
-def test_covariances_by_blocks_are_those_at_once():
-    rng, count, samples = np.random.default_rng(3), 300, 3
-    x, low = rng.random((count, 2)), rng.standard_normal(count)
-    mask = (rng.random(count) > 0.1).astype(float)
-    theta, slope = 0.3 * rng.standard_normal((samples, 4)), rng.random(samples)
-    own = x, low, mask, np.full(count, 1e-3), 0.2
-    blocks = lower_half("matern52", *own, slope, 1e-10, theta)
-    whole = data_covariance(np, "matern52", *own, slope[:, None, None], 1e-10, theta)
-    assert np.tril(blocks) == pytest.approx(np.tril(whole), abs=1e-14)

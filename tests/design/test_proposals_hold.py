@@ -1,6 +1,6 @@
 """10,000 proposals on four robots, checked by MuJoCo: limits, collisions, place; and none missed.
 
-`pytest -m slow -s tests/acquire/test_proposals_hold.py` prints the counts.
+`pytest -m slow -s tests/design/test_proposals_hold.py` prints the counts.
 """
 
 import numpy as np

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from planner.surrogate import gp, marginal
+from planner.surrogate import gp, likelihood
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
-from planner.surrogate.hedged import fit_hedged
-from planner.surrogate.kernel_average import fit_shapes
+from planner.surrogate.average import fit_hedged, fit_shapes
 from planner.surrogate.kernels import parse
 from planner.surrogate.models.multitask import fit_multitask
 from planner.surrogate.training_data import TrainingData
@@ -28,17 +27,16 @@ def training(n, seed=0):
 
 @pytest.mark.parametrize("kernel", ["matern52", "rbf+quadratic", "rbf[0:1]*rbf[1:2]+linear"])
 def test_slope_of_the_posterior_of_the_hyperparameters_agrees_with_finite_differences(kernel):
-    """The density that `most_probable` climbs, with gaps, noise and a marginalised slope."""
+    """The density that `laplace` climbs, with gaps, noise and a marginalised slope."""
     rng = np.random.default_rng(0)
     p, n = parse(kernel, 2).size, 9
     low = rng.standard_normal(n)
     mask = (np.arange(n) != 4).astype(float)
-    fixed = 0.2 + 0.5 * np.outer(low, low)
-    data = (rng.random((n, 2)), mask, np.full(n, 0.01), fixed, np.full(p, -0.5), np.ones(p))
-    y, z = rng.standard_normal(n) * mask, 0.3 * rng.standard_normal(p)
-    _, slope = marginal._objective(kernel, y, z, *data)
+    x, y, z = rng.random((n, 2)), rng.standard_normal(n) * mask, 0.3 * rng.standard_normal(p)
+    data = np.full(p, -0.5), np.ones(p), x, y, low, mask, np.full(n, 0.01), 0.4, 0.7
+    _, slope = likelihood.log_density(kernel, z, *data)
     for i, unit in enumerate(1e-5 * np.eye(p)):
-        ends = [float(marginal._objective(kernel, y, z + s * unit, *data)[0]) for s in (1, -1)]
+        ends = [float(likelihood.log_density(kernel, z + s * unit, *data)[0]) for s in (1, -1)]
         assert float(slope[i]) == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4, abs=1e-5)
 
 
@@ -69,7 +67,7 @@ def test_what_the_kernels_are_averaged_over_follows_the_data():
 
 def test_of_one_kernel_the_average_is_that_fit():
     data, nothing = training(7), np.full(1, np.nan)
-    one = fit_shapes(data, (PRIOR,), (PRIOR,), nothing, ("matern52",), 64, 16)
+    one = fit_shapes(data, (PRIOR,), (PRIOR,), nothing, ("matern52",))
     plain = fit_ar1(data, (PRIOR,), (PRIOR,), nothing, 64, 16, "matern52")
     low = np.full((30, 1), np.nan)
     np.testing.assert_allclose(one.predict(GRID, low), plain.predict(GRID, low), atol=1e-12)

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.surrogate.models.ar1_nargp import fit_ar1_nargp
+from planner.surrogate.models.averaged import AR1_PRIOR as PRIOR
+from planner.surrogate.models.averaged import fit_ar1_nargp, fit_gp, fit_recursive
 from planner.surrogate.models.fidelity_levels import Exact, Samples
-from planner.surrogate.models.recursive_ar1 import PRIOR, fit_recursive
-from planner.surrogate.models.single_output_gp import fit_gp
 from tests.support.compilations import compilations
 from tests.support.fused import GRID_PRIOR, fit_fused
 from tests.support.mixture import mix

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planner.surrogate.ar1 import fit_ar1
-from planner.surrogate.hedged import fit_hedged
+from planner.surrogate.average import fit_hedged
 from planner.surrogate.modal_surrogate import FREQUENCY_PRIOR, FREQUENCY_PRIOR_ALONE
 from planner.surrogate.training_data import TrainingData
 from tests.support.fusion_problems import arm_hz
@@ -76,8 +76,8 @@ def test_outputs_are_weighed_one_by_one():
     fitted = fit_hedged(
         data, (FREQUENCY_PRIOR,) * 2, (FREQUENCY_PRIOR_ALONE,) * 2, low.mean(axis=0)
     )
-    assert fitted.uses_low.tolist() == [True, False]
-    assert (fitted.weight > 0.9).all()
+    assert fitted.likeliest.uses_low.tolist() == [True, False]
+    assert (fitted.weights.max(axis=0) > 0.9).all()
 
 
 def test_before_a_measurement_the_simulation_is_believed():

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from planner.surrogate.ar1 import AR1
-from planner.surrogate.gp import Posterior, Prior
+from planner.surrogate.gp import Posterior
 from planner.surrogate.gp import fit as fit_posterior
+from planner.surrogate.models.averaged import AveragedModel
 from planner.surrogate.models.fidelity_levels import FidelityLevel, Samples
-from planner.surrogate.models.recursive_ar1 import RecursiveAR1
-from planner.surrogate.models.single_output_gp import SingleGP
-from planner.surrogate.training_data import TrainingData, pad
+from planner.surrogate.training_data import Prior, TrainingData, pad
 from tests.support.joint_ar1 import Hyperparameters, condition_joint
 
 RNG = np.random.default_rng(4)
@@ -39,16 +38,17 @@ def pinned(x, y, theta, kernel, base, slope_sd, bias_sd):
     return fit_posterior(pad(data, np.array([base is not None])), prior, 16, 2, kernel)
 
 
-def recursive(h: Hyperparameters) -> RecursiveAR1:
+def recursive(h: Hyperparameters) -> AveragedModel:
     y = low(LOW)
-    below = SingleGP(
-        pinned(LOW, y, h.low_theta, h.low_kernel, None, 0.0, h.low_bias_sd), 0.0, 1.0, 0.0
-    )
+    one = np.zeros(1)
+    own = pinned(LOW, y, h.low_theta, h.low_kernel, None, 0.0, h.low_bias_sd)
+    alone = AR1(own, np.array([False]), one, one)
+    below = AveragedModel(None, alone, 0.0, 1.0, 0.0, 1.0, 0.0)
     x = LOW[:HIGH]
     rest = high(x) - h.slope * y[:HIGH]
     posterior = pinned(x, rest, h.delta_theta, h.delta_kernel, 0 * rest, 0.0, h.bias_sd)
-    model = AR1(posterior, np.array([True]), np.zeros(1), np.zeros(1))
-    return RecursiveAR1(Scaled(below, h.slope), model, 0.0, 1.0, 0.0, 1.0, 0.0)
+    model = AR1(posterior, np.array([True]), one, one)
+    return AveragedModel(Scaled(below, h.slope), model, 0.0, 1.0, 0.0, 1.0, 0.0)
 
 
 class Scaled(FidelityLevel):
