@@ -73,7 +73,7 @@ def build(
         best.seen,
         primary=best.primary,
         residues=False,
-        taught=best.low.taught,
+        identified=best.low.taught,
     )
     if hits_of is not None:
         frf_of = _OfOneHit(frf_of, hits_of)

@@ -33,7 +33,7 @@ REFIT_STEPS = 20  # least-squares steps of each refit
 
 
 @dataclass(frozen=True)
-class Telling:
+class DiscriminatingHit:
     """A hit at the pose with this number along tcp axis 0, 1 or 2 (x, y, z).
 
     `log_odds` is the natural logarithm of the odds it is expected to give.
@@ -44,13 +44,13 @@ class Telling:
     log_odds: float
 
 
-def most_telling(
+def best_hit(
     problem: Problem,
     fits: Sequence[Fit],
     probability: Sequence[float],
     q: np.ndarray,
     temper: float,
-) -> Telling:
+) -> DiscriminatingHit:
     """The hit that best separates two or more fits, at one of q (n, dof) in rad.
 
     `probability` of each fit; χ² counts 1/`temper`. Only the MOST_CANDIDATES are looked at.
@@ -64,7 +64,7 @@ def most_telling(
     settled = side_by_side(partial(_to_the_end, problem), fits)
     hits = [(pose, int(axes[pose])) for pose in promising]
     odds = side_by_side(partial(_tried, problem, settled, share, q, temper), hits)
-    return max(map(Telling, *zip(*hits, strict=True), odds), key=lambda t: t.log_odds)
+    return max(map(DiscriminatingHit, *zip(*hits, strict=True), odds), key=lambda t: t.log_odds)
 
 
 def _to_the_end(problem: Problem, fit: Fit) -> Fit:

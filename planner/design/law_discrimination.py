@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.design.discrimination import Telling, expected_log_odds
+from planner.design.discrimination import DiscriminatingHit, expected_log_odds
 from planner.design.frequency_posterior import AXES
 from planner.diagnosis.laws.equivalent_stiffness import Receptances, receptances, system_of, waves
 from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit, Laws
@@ -28,10 +28,10 @@ LEAST_SWING_RAD = 1e-15  # a swing as small as none
 
 
 @dataclass(frozen=True)
-class TellingForces:
+class DiscriminatingForces:
     """A pose and an axis to hit, once or more with each of two peak forces (N)."""
 
-    hit: Telling
+    hit: DiscriminatingHit
     force_n: tuple[float, float]
 
 
@@ -49,9 +49,9 @@ def undecided(laws: Laws) -> Laws:
     )
 
 
-def most_telling_forces(
+def best_forces(
     laws: Laws, weakest_n: float, hardest_n: float, q: np.ndarray
-) -> TellingForces:
+) -> DiscriminatingForces:
     """The hits that best separate laws, at one of MOST_POSES of q (n, dof) in rad.
 
     `weakest_n` and `hardest_n` are the peaks (N) of the hits so far: no harder ones are asked for,
@@ -63,8 +63,8 @@ def most_telling_forces(
     gain = np.nan_to_num(law_separation(laws, q[looked_at], force))
     gain[:, :, force[:-1] > hardest_n / FORCE_RATIO] = 0.0
     row, axis, level = (int(i) for i in np.unravel_index(int(np.argmax(gain)), gain.shape))
-    best = Telling(int(looked_at[row]), axis, float(gain[row, axis, level]))
-    return TellingForces(best, (float(force[level]), float(force[-1])))
+    best = DiscriminatingHit(int(looked_at[row]), axis, float(gain[row, axis, level]))
+    return DiscriminatingForces(best, (float(force[level]), float(force[-1])))
 
 
 def forces_n(weakest_n: float, hardest_n: float) -> np.ndarray:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from planner.design.discrimination import Telling, most_telling
-from planner.design.law_discrimination import most_telling_forces, undecided
+from planner.design.discrimination import DiscriminatingHit, best_hit
+from planner.design.law_discrimination import best_forces, undecided
 from planner.diagnosis.diagnose import Explained
 from planner.diagnosis.laws.law_at_joints import Laws
 from planner.recording.joints import JointUnits
@@ -61,7 +61,7 @@ def next_hit(explained: Explained, offered: Mapping[str, np.ndarray]) -> NextHit
     if len(tied) < 2:
         return None
     fits, shares = [f for f, _ in tied], [p for _, p in tied]
-    best = most_telling(found.problem, fits, shares, _angles(offered), found.temper)
+    best = best_hit(found.problem, fits, shares, _angles(offered), found.temper)
     # Linear candidates answer in proportion: the harder, the less noise.
     hardest = [float(recorded.level_n[-1])] if recorded.visits else []
     names = [in_words(c.places, c.probability) for c in found.undecided if c.fit is not None]
@@ -74,7 +74,7 @@ def _of_laws(
     level_n: np.ndarray,
     offered: Mapping[str, np.ndarray],
 ) -> NextHit:
-    best = most_telling_forces(laws, float(level_n[0]), float(level_n[-1]), _angles(offered))
+    best = best_forces(laws, float(level_n[0]), float(level_n[-1]), _angles(offered))
     both = zip(laws.candidates, laws.probability, strict=True)
     names = [in_words([(c.law.effect, at)], p) for c, p in both]
     joints = laws.problem.simulation.robot.joints
@@ -86,7 +86,7 @@ def _angles(offered: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def _at(
-    best: Telling,
+    best: DiscriminatingHit,
     force_n: list[float],
     offered: Mapping[str, np.ndarray],
     between: list[str],

@@ -71,7 +71,7 @@ class Travel:
 
 
 # In words, for who chooses one.
-TOLD = {
+DESCRIPTIONS = {
     "variance": "the pose whose frequencies are least sure",
     "integrated_variance": "the pose that makes all of the workspace surest",
     "mutual_information": "the pose that tells most of all the others",

@@ -17,7 +17,7 @@ def driving_point(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
 
     The sensor has to be near the point that is hit; only hits at the tcp are judged.
     """
-    own = hit.heard_by(SENSOR)
+    own = hit.channels_of(SENSOR)
     if own is None or hit.hit_point != TCP or positive_share(own, band_hz) > TURNED:
         return ()
     axis = AXES[hit.axis_index]

@@ -12,11 +12,15 @@ from planner.errors import InputError
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout, PointNames
 from planner.robot.config import Compliance, PointTable, RobotConfig
-from planner.robot.config_file import check_own_springs, load_config, with_effects
+from planner.robot.config_file import (
+    check_entries,
+    check_own_springs,
+    load_config,
+    with_effects,
+)
 from planner.robot.controller_axes import with_axes
 from planner.robot.linkage import Linkage
 from planner.robot.points import PREFIX, check_points, names_of, with_points
-from planner.robot.robot_entries import check_entries
 from planner.robot.shapes import UnusableShape, leave_out_unusable
 from planner.robot.urdf import build_model, parse_urdf, read_urdf
 from planner.robot.urdf_elements import state_inertias

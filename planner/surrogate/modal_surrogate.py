@@ -32,8 +32,8 @@ LARGEST_LOG_SD = 10.0  # of a logarithm: exponentials of larger ones overflow
 RESIDUE_PRIOR = OutputPrior(bias_sd=0.2, slope_sd=0.5, amplitude=0.2, nugget=0.02)
 RESIDUE_PRIOR_ALONE = OutputPrior(bias_sd=0.7, slope_sd=0.0, amplitude=0.5, nugget=0.02)
 # Beside a simulation that was identified from these very recordings and fits them.
-DAMPING_PRIOR_TAUGHT = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nugget=0.02)
-RESIDUE_PRIOR_TAUGHT = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
+DAMPING_PRIOR_IDENTIFIED = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nugget=0.02)
+RESIDUE_PRIOR_IDENTIFIED = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
 TYPICAL_RESIDUE = 1e-5  # m/(N·s), a robot's, where neither data nor simulation say anything
 FITTED_NUGGET = 1e-3  # of ln f beside an identified simulation
 # Visits to a pose scatter by 0 to 1 % of ln f (temperature, clamping, readback) beyond what EMA
@@ -91,10 +91,10 @@ class Surrogate:
         fused = self.primary.models[0]
         return np.where(fused.uses_low, self.primary.weights[0], 0.0)
 
-    def with_residues(self, seen: ModalObservations, taught: bool = False) -> "Surrogate":
+    def with_residues(self, seen: ModalObservations, identified: bool = False) -> "Surrogate":
         """The same with the residues fitted too, which may be exacter than those it has `seen`."""
         scale = _scale(seen)
-        return replace(self, residue=_fit_residues(seen, scale, taught), scale=scale)
+        return replace(self, residue=_fit_residues(seen, scale, identified), scale=scale)
 
     def frequency_inputs(self, simulated: SimulatedModes) -> np.ndarray:
         """Centred low fidelity (q, k) of the frequency outputs."""
@@ -194,21 +194,21 @@ def fit_primary(
     )
 
 
-def fit_damping(seen: ModalObservations, taught: bool = False) -> Average:
-    """Fit log ζ of every label: no simulation knows it that was not `taught`.
+def fit_damping(seen: ModalObservations, identified: bool = False) -> Average:
+    """Fit log ζ of every label: no simulation knows it that was not `identified`.
 
     A simulation that was is believed as far as the measured damping ratios bear it out, beside
     what they say alone: brakes and friction leave nothing of C = βK in some robots.
     """
     y = _log(seen.damping_ratio)
-    low = _log(seen.simulated.damping_ratio) if taught else np.full_like(y, np.nan)
+    low = _log(seen.simulated.damping_ratio) if identified else np.full_like(y, np.nan)
     return fit_shapes(
         TrainingData(seen.x, y, seen.damping_sd / np.exp(y), low),
-        (DAMPING_PRIOR_TAUGHT,) * y.shape[1],
+        (DAMPING_PRIOR_IDENTIFIED,) * y.shape[1],
         (DAMPING_PRIOR,) * y.shape[1],
         _centre(low, np.full(y.shape[1], np.nan)),
         DAMPING_KERNELS,
-        blind=taught and bool(np.isfinite(y).any()),  # nothing measured is no reason to doubt
+        blind=identified and bool(np.isfinite(y).any()),  # nothing measured is no reason to doubt
     )
 
 
@@ -216,7 +216,7 @@ def fit_surrogate(
     seen: ModalObservations,
     primary: Average | None = None,
     residues: bool = True,
-    taught: bool = False,
+    identified: bool = False,
     visits: bool = True,
 ) -> Surrogate:
     """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
@@ -225,25 +225,25 @@ def fit_surrogate(
         seen: modes by label at n poses, and the simulation's there.
         primary: what `fit_primary` gave, where it was called already.
         residues: whether residues are fitted too, which takes two thirds of the time.
-        taught: whether the simulation was identified from these measurements' own FRFs and fits
+        identified: whether the simulation was identified from these measurements' own FRFs and fits
             them, so that damping and residues are nearly its own.
         visits: as of `fit_primary`.
     """
     if primary is None:
         primary = fit_primary(seen, visits=visits)
     scale = _scale(seen)
-    residue = _fit_residues(seen, scale, taught) if residues else None
-    return Surrogate(primary, fit_damping(seen, taught), residue, scale, visits)
+    residue = _fit_residues(seen, scale, identified) if residues else None
+    return Surrogate(primary, fit_damping(seen, identified), residue, scale, visits)
 
 
-def _fit_residues(seen: ModalObservations, scale: np.ndarray, taught: bool) -> Average:
+def _fit_residues(seen: ModalObservations, scale: np.ndarray, identified: bool) -> Average:
     """Fit the real and imaginary parts of every label's residues, in units of `scale`."""
     k, wide = len(scale), np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
     low = _parts(seen.simulated.residue) / wide
     return fit_hedged(
         TrainingData(seen.x, _parts(seen.residue) / wide, parts_sd / wide, low),
-        (RESIDUE_PRIOR_TAUGHT if taught else RESIDUE_PRIOR,) * (18 * k),
+        (RESIDUE_PRIOR_IDENTIFIED if identified else RESIDUE_PRIOR,) * (18 * k),
         (RESIDUE_PRIOR_ALONE,) * (18 * k),
         np.zeros(18 * k),
         RESIDUE_SAMPLES,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.design.discrimination import most_telling, separation
+from planner.design.discrimination import best_hit, separation
 from planner.diagnosis.effects import library
 from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
 from planner.diagnosis.linear.predict import misfit_at
@@ -111,7 +111,7 @@ def test_what_is_tried_is_what_happens_without_noise(tied, rate):
     true = replace(heavy, x=np.concatenate([heavy.x[:-1], heavy.x[-1:] + 1.0]))
     poses = KR210.poses(12, 9)
     before = [carried_on(problem, f, f.effect) for f in (true, light)]
-    best = most_telling(problem, before, [1 - 1e-9, 1e-9], poses, 1.0)
+    best = best_hit(problem, before, [1 - 1e-9, 1e-9], poses, 1.0)
     h = misfit_at(problem, true.effect, poses[best.pose][None], LINES, rate)
     h = h.response(before[0].x)[0][0]
     columns = np.arange(3) == best.axis
@@ -126,5 +126,5 @@ def test_what_is_tried_is_what_happens_without_noise(tied, rate):
 
 def test_the_same_candidate_twice_is_not_told_apart_by_trying(tied):
     problem, (light, _) = tied
-    same = most_telling(problem, [light, light], [0.5, 0.5], KR210.poses(2, 9), 1.0)
+    same = best_hit(problem, [light, light], [0.5, 0.5], KR210.poses(2, 9), 1.0)
     assert abs(same.log_odds) < 1e-6

@@ -97,7 +97,7 @@ def test_four_sensors_leave_fewer_parameters_open(tmp_path: Path, capsys) -> Non
     open_: dict[tuple[int, int], int] = {}
     for poses in POSES:
         found = None
-        for heard in (all_, all_.heard_by("sensor")):
+        for heard in (all_, all_.channels_of("sensor")):
             # The tool's sensor starts where all led: what counts is what it tells, not the search.
             found = told(robot, heard, poses, found)
             count = len(heard.sensors)

@@ -18,8 +18,8 @@ from planner.campaign.config import config_from_builtins
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.dataset import Dataset, Visit
-from planner.design.discrimination import most_telling
-from planner.design.law_discrimination import most_telling_forces, undecided
+from planner.design.discrimination import best_hit
+from planner.design.law_discrimination import best_forces, undecided
 from planner.diagnosis.effects import library
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.linear.fit import Fit
@@ -133,7 +133,7 @@ class OfEffects(Campaign):
 
     def separating(self) -> Next:
         offered = self.case.cell.candidates.q
-        best = most_telling(self.found.problem, *self.fits, offered, self.found.temper)
+        best = best_hit(self.found.problem, *self.fits, offered, self.found.temper)
         return offered[best.pose], best.axis, ()
 
 
@@ -191,7 +191,7 @@ class OfLaws(Campaign):
         assert self.found.laws is not None
         level_n, offered = self.recorded.level_n, self.case.cell.candidates.q
         weakest, hardest = float(level_n[0]), float(level_n[-1])
-        best = most_telling_forces(undecided(self.found.laws), weakest, hardest, offered)
+        best = best_forces(undecided(self.found.laws), weakest, hardest, offered)
         return offered[best.hit.pose], best.hit.axis, best.force_n
 
 

@@ -29,7 +29,7 @@ def predicted(x, simulated, zeta):
     seen = ModalObservations(
         x[:n], f, 0.01 * f, zeta[:n], 0.02 * zeta[:n], residue.astype(complex), residue, modes
     )
-    return fit_damping(seen, taught=True).predict(x[n:], np.log(simulated[n:]))
+    return fit_damping(seen, identified=True).predict(x[n:], np.log(simulated[n:]))
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

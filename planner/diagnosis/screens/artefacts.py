@@ -116,13 +116,13 @@ def _triaxial(recorded: Dataset) -> list[str]:
     """Sensors with all three axes, by which one alone tells a matrix."""
     hits = [hit for visit in recorded.visits for hit in visit.hits]
     return [
-        name for name in recorded.sensors if any(hit.heard_by(name) is not None for hit in hits)
+        name for name in recorded.sensors if any(hit.channels_of(name) is not None for hit in hits)
     ]
 
 
 def measure_chain(recorded: Dataset, nominal: Simulation, sensor: str = SENSOR) -> Chain:
     """Fit A and delay of a sensor together with springs and inertias, to what it alone heard."""
-    recorded = recorded if recorded.sensors == (sensor,) else recorded.heard_by(sensor)
+    recorded = recorded if recorded.sensors == (sensor,) else recorded.channels_of(sensor)
     band = common_band(recorded.visit_frfs, recorded.band_hz)
     # Tolerances of the chain would hide what is looked for: they count when it is told.
     problem = Problem(recorded.visit_frfs, recorded.visit_q, nominal, band, exact=True)
