@@ -101,7 +101,8 @@ def _most_probable(kernel: str, data: _Data, mean: np.ndarray, sd: np.ndarray) -
 
     def climb(data: _Data, starts: list[np.ndarray], steps: int = 200) -> np.ndarray:
         def density(z: np.ndarray) -> tuple[float, np.ndarray]:
-            return log_density(kernel, z, mean, sd, *data)
+            value, slope = log_likelihood(kernel, mean + sd * z, JITTER, *data)
+            return float(value) - 0.5 * float(z @ z), sd * slope - z
 
         return maximise(density, starts, -REACH, REACH, steps).x
 
@@ -115,16 +116,15 @@ def _most_probable(kernel: str, data: _Data, mean: np.ndarray, sd: np.ndarray) -
 
 
 @jax_setup.compiled(static_argnums=0)
-def log_density(
-    kernel: str, z: Array, mean: Array, sd: Array, x: Array, y: Array, *rest: Array
+def log_likelihood(
+    kernel: str, theta: Array, jitter: float, x: Array, y: Array, *rest: Array
 ) -> tuple[Array, Array]:
-    """log of prior × likelihood at θ = mean + sd·z (p,), and its slope in z."""
+    """Of one output's data at θ (p,), without the constant, and its slope in θ."""
 
-    def density(z: Array) -> Array:
-        k = data_covariance(jnp, kernel, mean + sd * z, JITTER, x, *rest)
-        return log_marginal(k, y) - 0.5 * jnp.sum(z**2)
+    def likelihood(theta: Array) -> Array:
+        return log_marginal(data_covariance(jnp, kernel, theta, jitter, x, *rest), y)
 
-    return jax.value_and_grad(density)(z)
+    return jax.value_and_grad(likelihood)(theta)
 
 
 @jax_setup.compiled(static_argnums=0)
