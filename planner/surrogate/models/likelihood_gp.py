@@ -2,7 +2,7 @@
 
 y ~ N(0, K + τ² I); log p(y | θ) = −½ yᵀ(K + τ²I)⁻¹y − ½ log|K + τ²I| − (n/2) log 2π (Rasmussen &
 Williams 2006, eq. 5.8) is climbed from several starts, the best taken; no prior, no averaging.
-Predictions are eqs. 2.23 and 2.24 there. With few points this is over-confident (`single_output_gp`
+Predictions are eqs. 2.23 and 2.24 there. With few points this is over-confident (`averaged`
 averages instead): it is here because the papers do so.
 """
 
