@@ -13,8 +13,9 @@ from planner.recording.filling import without_filling
 from planner.recording.hdf5 import read_hdf5
 from planner.recording.lvm import read_lvm
 from planner.recording.mat5 import is_version_5, read_mat5
+from planner.recording.named_columns import Named, to_records
 from planner.recording.read_files import ReadFile, ReadFiles
-from planner.recording.records import FrfRecord, Record, TimeRecord
+from planner.recording.records import Record, TimeRecord
 from planner.recording.stream import cut_into_hits
 from planner.recording.tdms import read_tdms
 from planner.recording.text_tables import read_text
@@ -33,7 +34,7 @@ def read_mat(path: Path) -> tuple[Record, ...]:
     visible = {name: v for name, v in entries.items() if name and not name.startswith("__")}
     arrays = {name for name, value in visible.items() if isinstance(value, np.ndarray)}
     if {"yspec", "npts", "freq", "tfun"} <= arrays:
-        return (_logged_spectra(path, visible),)
+        return to_records(path, _logged_spectra(path, visible))
     return records_of(path, tree_of(visible))
 
 
@@ -56,7 +57,7 @@ def _older(path: Path) -> dict[str, object] | None:
         ) from None
 
 
-def _logged_spectra(path: Path, entries: dict[str, object]) -> FrfRecord:
+def _logged_spectra(path: Path, entries: dict[str, object]) -> Named:
     """Transfer functions as the Cambridge data logger (now pydvma) saves them.
 
     `yspec` (lines, channels) is the half spectrum of `npts` samples at `freq` Hz; `tfun` tells
@@ -79,18 +80,10 @@ def _logged_spectra(path: Path, entries: dict[str, object]) -> FrfRecord:
             f"{path} holds spectra of {values.shape[1]} lines that are not the transfer functions "
             f"of {samples:g} samples at {rate_hz:g} Hz; export transfer functions."
         )
-    unknown = (0,) * len(values)
-    return FrfRecord(
-        path,
-        np.arange(values.shape[1]) * rate_hz / samples,
-        values,
-        unknown,
-        unknown,
-        "unknown",
-        "",
-        np.full(values.shape, np.nan),
-        ("The file states no units, directions or coherence.",),
-    )
+    lines = np.arange(values.shape[1]) * rate_hz / samples
+    columns = {f"channel {number}": row for number, row in enumerate(values, 1)}
+    remarks = ("The file states no units, directions or coherence.",)
+    return Named({"frequency_hz": lines, **columns}, remarks=remarks)
 
 
 def _read_txt(path: Path) -> tuple[Record, ...]:

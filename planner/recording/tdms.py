@@ -40,7 +40,7 @@ def read_tdms(path: Path) -> tuple[Record, ...]:
 def _root(path: Path) -> EntryTree:
     from nptdms import TdmsFile
 
-    with TdmsFile.open(path, raw_timestamps=True) as file:
+    with open(path, "rb") as opened, TdmsFile.open(opened, raw_timestamps=True) as file:
         groups = file.groups()
         check_size(path, sum(8 * len(c) for group in groups for c in group.channels()))
         found = {
