@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planner.dataset.dataset import Dataset
-from planner.dynamics.gradient import laplace, response, response_parts
+from planner.dynamics.gradient import laplace, motion_slopes, moved, response, response_turned
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
@@ -91,7 +91,8 @@ def test_a_sensor_weighs_where_it_is(tmp_path: Path) -> None:
 def test_blocks_leave_open_what_the_whole_does(toml: Path) -> None:
     simulation, s, rng = Simulation(Robot.load(toml)), laplace(HZ[None, ::5]), _rng()
     matrices = simulation.elastic.with_slopes(poses(1), WIDE)
-    h, slope, turned = response_parts(matrices, simulation.elasticity, s)
+    h, turned = response_turned(matrices, simulation.elasticity, s)
+    slope = motion_slopes(moved(matrices, simulation.elasticity, s), simulation.elasticity)
     whole = real_rows(basis(h, turned, s, Tolerances())[0])
     residual = rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape)
     dense = marginal(real_rows(residual)[0], real_rows(slope[0]), whole)
@@ -114,9 +115,8 @@ def test_slopes_by_joint_angles_hold_between_points(toml: Path) -> None:
         matrices = simulation.elastic.matrices(q + off, layout=WIDE)
         return response(matrices, simulation.elasticity, s)
 
-    by_angle = response_parts(simulation.elastic.with_slopes(q, WIDE), simulation.elasticity, s)[
-        2
-    ].by_angle
+    turned = response_turned(simulation.elastic.with_slopes(q, WIDE), simulation.elasticity, s)[1]
+    by_angle = turned.by_angle
     assert by_angle is not None
     for joint, unit in list(enumerate(np.eye(4)))[1:]:  # turning about the vertical changes nothing
         measured = (h(step * unit) - h(-step * unit)) / (2 * step)
