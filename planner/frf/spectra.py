@@ -13,7 +13,7 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.recording.points import TOOL, Layout
 from planner.recording.records import Hit
-from planner.recording.sampling_rates import same_rate
+from planner.recording.sampling import same_rate
 
 MARGIN = 1.3  # lines beyond the band, so that modes at its edge are met from both sides
 NYQUIST_SHARE = 0.45  # beyond it anti-alias filters act

@@ -21,7 +21,7 @@ from planner.milling.cutter_frf import CutterFrf, read_npz, row_of
 from planner.milling.rotations import TwoPoints, two_point_receptance
 from planner.milling.smoothing import smoothed
 from planner.milling.tool import Tool
-from planner.recording.frf_files import read_frfs
+from planner.recording.file_names import read_frfs
 from planner.recording.joints import JointUnits
 from planner.recording.records import AXES, FrfRecord
 from planner.toml_file import load_toml

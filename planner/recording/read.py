@@ -1,7 +1,10 @@
 """Reading a recording, whatever its format: one reader per format, chosen by the file's name."""
 
-from collections.abc import Callable
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 
@@ -14,8 +17,7 @@ from planner.recording.hdf5 import read_hdf5
 from planner.recording.lvm import read_lvm
 from planner.recording.mat5 import is_version_5, read_mat5
 from planner.recording.named_columns import Named, to_records
-from planner.recording.read_files import ReadFile, ReadFiles
-from planner.recording.records import Record, TimeRecord
+from planner.recording.records import FrfRecord, Record, TimeRecord
 from planner.recording.stream import cut_into_hits
 from planner.recording.tdms import read_tdms
 from planner.recording.text_tables import read_text
@@ -23,6 +25,52 @@ from planner.recording.uff import read_uff
 from planner.recording.wav import WAV, read_wav, scales_beside, self_contained
 
 MAX_BYTES = 512 * 1024 * 1024
+
+
+@dataclass(frozen=True, eq=False)
+class ReadFile:
+    """The records of a file as they are, and cut into hits."""
+
+    whole: tuple[Record, ...]
+    hits: tuple[Record, ...]
+
+    @property
+    def nbytes(self) -> int:
+        """What its numbers take up."""
+        arrays = {id(a): a.nbytes for r in (*self.whole, *self.hits) for a in _arrays(r)}
+        return sum(arrays.values())
+
+
+class ReadFiles:
+    """The files read last, as many as `most_bytes` hold, the last one in any case."""
+
+    def __init__(self, most_bytes: int):
+        self._most_bytes, self._lock = most_bytes, Lock()
+        self._files: OrderedDict[Hashable, ReadFile] = OrderedDict()
+
+    def get(self, key: Hashable) -> ReadFile | None:
+        """What was read under a key; None where it is not remembered."""
+        with self._lock:
+            if key in self._files:
+                self._files.move_to_end(key)
+            return self._files.get(key)
+
+    def put(self, key: Hashable, file: ReadFile) -> None:
+        """Remember a file, and forget those that were asked for longest ago."""
+        with self._lock:
+            self._files[key] = file
+            while sum(f.nbytes for f in self._files.values()) > self._most_bytes:
+                if len(self._files) == 1:
+                    return
+                self._files.popitem(last=False)
+
+
+def _arrays(record: Record) -> list[np.ndarray]:
+    if isinstance(record, FrfRecord):
+        return [record.frequency_hz, record.values, record.coherence]
+    return [channel.samples for channel in record.channels]
+
+
 REMEMBERED = ReadFiles(256 * 1024 * 1024)  # a file of many hits is read once, not once a hit
 
 

@@ -118,10 +118,9 @@ def fit_hedged(
     nothing = np.full(len(centre), np.nan)
     alone = fit_ar1(_blind(data), with_low, without_low, nothing, samples, kept)
     evidence = np.array([m.posterior.log_evidence for m in (fused, alone)])
+    odds = evidence + np.log([[belief], [1 - belief]])
     # Without a measurement there is nothing to doubt the simulation by.
-    asked = fused.uses_low & fused.posterior.mask.any(axis=1)
-    prior = np.log(np.where(asked, [[belief], [1 - belief]], [[1.0], [1e-300]]))
-    odds = np.where(asked, evidence, 0.0) + prior
+    odds[1, ~(fused.uses_low & fused.posterior.mask.any(axis=1))] = -np.inf
     return Average((fused, alone), shares(odds, axis=0), log_sum(evidence, axis=0))
 
 
