@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 
 from planner.surrogate.kernels import parse
 from planner.surrogate.models.fidelity_levels import Samples
-from planner.surrogate.models.mfdgp import CutajarKernel, Training, bound, fit_mfdgp
+from planner.surrogate.models.mfdgp import TiedKernel, Training, bound, fit_mfdgp
 
 # Data and inducing points of one size throughout, so that it is compiled once.
 HOW = Training(held_steps=400, free_steps=600, inducing=8)
@@ -65,7 +65,7 @@ def second_moments(trained, x, f):
     """Mean and variance (k, q) of layer 2 at x (q, 1) and values f (k, q) of layer 1."""
     second, z = trained.layers[1], trained.data.z_high
     wide = np.column_stack([np.tile(x, (len(f), 1)), f.reshape(-1)])
-    parts = [moments(CutajarKernel(1), second, z, part) for part in np.array_split(wide, 100)]
+    parts = [moments(TiedKernel.cutajar(1), second, z, part) for part in np.array_split(wide, 100)]
     mean = np.concatenate([p[0] for p in parts]).reshape(f.shape)
     return mean, np.concatenate([np.diag(p[1]) for p in parts]).reshape(f.shape), parts[0][2:]
 
@@ -101,7 +101,7 @@ def test_the_bound_stays_below_the_evidence_and_comes_near_it():
     evidence = 0.0
     for kernel, theta, at, y in (
         (parse("rbf", 1), first.theta, data.x_low, data.y_low),
-        (CutajarKernel(1), blind, np.column_stack([data.x_high, data.y_high]), data.y_high),
+        (TiedKernel.cutajar(1), blind, np.column_stack([data.x_high, data.y_high]), data.y_high),
     ):
         k = kernel.covariance(np, theta, at, at) + np.exp(2 * theta[1]) * np.eye(len(at))
         evidence += multivariate_normal(np.zeros(len(at)), k).logpdf(y)
