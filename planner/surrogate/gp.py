@@ -113,8 +113,8 @@ class Posterior:
         from scipy.linalg import cho_solve
 
         known = self.known(j)
-        own = (values[j, known] for values in (self.low, self.mask, self.variance))
-        data = jitter, self.x[known], *own, self.prior.bias_sd[j]
+        low, mask, variance = (v[j, known] for v in (self.low, self.mask, self.variance))
+        data = jitter, self.x[known], low, mask, variance, self.prior.bias_sd[j]
         factor = np.array(
             [
                 np.linalg.cholesky(data_covariance(np, self.kernel, theta, *data, slope_sd))

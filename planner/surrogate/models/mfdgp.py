@@ -271,7 +271,7 @@ def _climbed(
 
     begun, updated, layers_of = adam(rate)
 
-    def step(i: Array, state: Any) -> Any:
+    def step(i: Any, state: Any) -> Any:
         slope = jax.grad(negative)(layers_of(state), jax.random.fold_in(key, i))
         return updated(i, jax.tree.map(jnp.multiply, slope, moving), state)
 
