@@ -59,7 +59,7 @@ def analyse_record(
     an unknown force channel and RefusedError where no mode can be found. Returned beside the modes
     is all that led to them (stabilisation diagram, fit).
     """
-    remarks = list(record.remarks)
+    remarks = [*record.remarks, *(fault.text for fault in record.faults)]
     force = _force(record, force_channel)
     decays = _decays(record, force, remarks)
     band = band_hz or _band(decays)

@@ -55,7 +55,8 @@ def _cut(record: TimeRecord, first: int, last: int, which: str) -> TimeRecord:
         f"filled in and are left out."
     )
     channels = (replace(c, samples=c.samples[first:end].copy()) for c in record.channels)
-    return replace(record, channels=tuple(channels), remarks=(*record.remarks, text))
+    faults = (*record.faults, Fault("filled", text, refuse=False))
+    return replace(record, channels=tuple(channels), faults=faults)
 
 
 def lost_samples(record: TimeRecord) -> tuple[Fault, ...]:

@@ -283,7 +283,8 @@ def operating_report(
     dofs = tuple(_dof(channel) for channel in channels)
     sign = np.array([dof.sign for dof in dofs])
     found = operating_modes(sign[:, None] * samples, record.sampling_rate_hz, band_hz)
-    told = [*record.remarks, *(fault.text for fault in lost_samples(record)), UNSCALED]
+    faults = (*record.faults, *lost_samples(record))
+    told = [*record.remarks, *(fault.text for fault in faults), UNSCALED]
     if unlabelled := without_unit(record):
         told.append(f"Of no known unit: {unlabelled}.")
     if found.tones_hz:

@@ -163,8 +163,10 @@ REFUSED = {
     "LVM: cut before the rows": (
         ".lvm", cut_after("Comment", 2), "within a header"),
     "LVM: cut within a special block": (
-        ".lvm", lambda path: path.write_text(lvm(HITS[:1]) + "\n" + SPECIAL[:40]), "within a header"),
-    "LVM: a header alone": (".lvm", lambda path: path.write_text(lvm(HITS)[:300]), "within a header"),
+        ".lvm", lambda path: path.write_text(f"{lvm(HITS[:1])}\n{SPECIAL[:40]}"),
+        "within a header"),
+    "LVM: a header alone": (
+        ".lvm", lambda path: path.write_text(lvm(HITS)[:300]), "within a header"),
 }  # fmt: skip
 
 
