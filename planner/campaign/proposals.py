@@ -76,11 +76,16 @@ def _new_poses(
 
 
 def _names(state: CampaignState, angles: list[tuple[float, ...]]) -> list[str]:
-    """Names of proposed poses: the one that a pose was proposed under before, else a new one."""
+    """Names of proposed poses: the one that a pose was proposed under before, else a new one.
+
+    A new one is of no other pose, also of none that was measured without a proposal.
+    """
     taken = {*(m.pose for m in state.over), *state.held}
     known = {p.joints_deg: name for name, p in state.proposals.items() if name not in taken}
-    new = counted(state.proposals_made + 1)
-    return [known.get(joints_deg) or f"P{next(new):03d}" for joints_deg in angles]
+    every = (f"P{number:03d}" for number in counted(state.proposals_made + 1))
+    given = {*state.proposals, *state.measurements, *state.held}
+    new = (name for name in every if name not in given)
+    return [known.get(joints_deg) or next(new) for joints_deg in angles]
 
 
 def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
