@@ -365,7 +365,7 @@ class Campaign(CampaignReads):
                 *taken_after_all(state, fresh),
                 *displacement(self.cell.robot.joints, state, delivery, stood),
                 *lacking(state, measurement),
-                *model.remarks,
+                *(() if event.question else model.remarks),
             ),
             left_out=left_out,
             question=event.question,

@@ -67,7 +67,8 @@ def habits(hits: Sequence[HitMiss]) -> tuple[str, ...]:
         if tilts := _sure(*tilt, group[0].across, "°"):
             said.append(f"tilt by {tilts}")
         if said:
-            found.append(f"Your {name.removeprefix('+')} hits {' and '.join(said)}.")
+            axis = name.removeprefix("+").replace("-", "−")
+            found.append(f"Your {axis} hits {' and '.join(said)}.")
     return tuple(found)
 
 

@@ -65,7 +65,8 @@ class CampaignState:
     proposals: dict[str, Proposal] = field(default_factory=dict)  # all ever made, undone ones too
     open: tuple[str, ...] = ()  # proposed and not yet measured, skipped or superseded
     proposed_by: str = ""  # acquisition that made the open proposals
-    stale: bool = True  # the model changed since the open proposals were made
+    # The model changed since the open proposals were made, by more than late hits of a pose before.
+    stale: bool = True
     measurements: dict[str, Measurement] = field(default_factory=dict)
     held: dict[str, Measurement] = field(default_factory=dict)  # until their question is answered
     refused: dict[str, tuple[str, HitRecord]] = field(default_factory=dict)  # by sha256: pose, hit
@@ -128,7 +129,7 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
             )
         if isinstance(entry.event, Undone):
             if not state.unchanged_by(_act_of(entries, entry.event)):
-                state = replace(state, stale=True, model_version=entry.seq)
+                state = replace(state, model_version=entry.seq)
         elif entry.seq not in undone:
             state = _apply(state, entry.event, entry)
         state = replace(state, events=entry.seq)
@@ -224,7 +225,11 @@ def _imported(
     if state.unchanged_by(event):
         return replace(state, refused=refused, measurements=measurements)
     doubt = (event.again, event.pose) if event.again else _doubt(state, event.pose)
-    return replace(changed, open=left, refused=refused, measurements=measurements, doubt=doubt)
+    late = state.hit_at(event.pose) is not None and event.pose not in state.open
+    stale = state.stale if late and doubt == state.doubt else True
+    return replace(
+        changed, open=left, refused=refused, measurements=measurements, doubt=doubt, stale=stale
+    )
 
 
 def without(known: Measurement | None, replaced: Sequence[tuple[str, str]]) -> Measurement | None:

@@ -100,6 +100,8 @@ def _run(station: Station) -> SessionSummary:
     try:
         for remark in campaign.cell.remarks:
             station.say(remark, "yellow")
+        with station.screen.working("fitting the model to what was measured"):
+            _ = campaign.model
         say_last_import(station)
         while not course.stop:
             course = _step(station, course)
