@@ -31,6 +31,7 @@ class PointMass(Operator):
     size_m: float = 1.0  # sd of its place
 
     kind = "added_mass"
+    absorbed = True
 
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """m s² Jₚᵀ Jₚ at the place p."""
@@ -43,13 +44,8 @@ class PointMass(Operator):
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """By the columns of the mass and of its first moments."""
-        poses = motions.poses
-        one = self.impedance(poses, np.array([1.0, 0, 0, 0]))
-        minus = -(poses.s**2)[:, None, None]
-        shape = (len(poses.q), 4, motions.x_sensor.shape[2], motions.x_hit.shape[2], minus.shape[3])
-        columns = np.empty(shape, dtype=complex)
-        one.gradient(motions.x_hit * minus, motions.x_sensor, columns)
-        nats, psi = gain(columns, np.array([1.0, 0.7, 0.7, 0.7]))
+        one = self.impedance(motions.poses, np.array([1.0, 0, 0, 0]))
+        nats, psi = gain(motions.changed_by(one), np.array([1.0, 0.7, 0.7, 0.7]))
         mass = float(np.clip(psi[0], -FARTHEST, FARTHEST))
         if abs(mass) < LEAST:
             mass = LEAST

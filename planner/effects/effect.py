@@ -37,7 +37,8 @@ class Number:
 class PosedBodies:
     """PosedBodies q (n, dof) in rad at s (n, F), and how e springs move bodies, (n, B, 6, e).
 
-    `springs` (e,) are the numbers of the springs among all that the robot may have.
+    `springs` (e,) are the numbers of the springs among all that the robot may have; `order` (n,) is
+    how much of the campaign was over, 0 to 1, when each pose was hit.
     """
 
     q: np.ndarray
@@ -45,6 +46,7 @@ class PosedBodies:
     jacobians: np.ndarray
     bodies: tuple[str, ...]
     springs: tuple[int, ...]
+    order: np.ndarray
 
     def body(self, joint: str) -> np.ndarray:
         """(n, 6, e): how the springs move what turns with a joint, linear part first."""
@@ -62,11 +64,16 @@ ACROSS = np.array([np.cross(np.eye(3), e).T for e in np.eye(3)])
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """How hits (n, e, c, F) and sensors (n, e, r, F) move the springs, per unit of force."""
+    """How hits (n, e, c, F) and sensors (n, e, r, F) move the springs, per unit of force.
+
+    `accelerance` (n, r, c, F) is what the fit so far has, `measured` what was recorded.
+    """
 
     poses: PosedBodies
     x_hit: np.ndarray
     x_sensor: np.ndarray
+    accelerance: np.ndarray
+    measured: np.ndarray
 
     def at(self, ports: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Motions (n, p, c, F) and (n, p, r, F) of ports (n, p, e)."""
@@ -75,6 +82,14 @@ class Motions:
             for x in (self.x_hit, self.x_sensor)
         )
         return hit, sensor
+
+    def changed_by(self, added: Impedance) -> np.ndarray:
+        """(n, p, r, c, F): how accelerances change with each number of what is added to Z."""
+        minus = -(self.poses.s**2)[:, None, None]
+        shape = (len(minus), len(added.slope), self.x_sensor.shape[2], self.x_hit.shape[2])
+        columns = np.empty((*shape, minus.shape[3]), dtype=complex)
+        added.gradient(self.x_hit * minus, self.x_sensor, columns)
+        return columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +102,16 @@ class Start:
 
 
 @dataclass(frozen=True)
+class SpringPrior:
+    """Of ln k: normal `shift` above the usual median, with sd `log_sd`; not below `least`, which
+    counts from that median too."""
+
+    shift: float
+    log_sd: float
+    least: float = -np.inf
+
+
+@dataclass(frozen=True)
 class Operator(ABC):
     """One thing that the simulation may lack, at a place ("base", "joint_2", "link_3")."""
 
@@ -95,11 +120,21 @@ class Operator(ABC):
     numbers: tuple[Number, ...] = ()
 
     kind: ClassVar[str] = ""
+    effect: ClassVar[str] = ""  # by which name diagnoses tell of it, where that is not its kind
+    # Whether refitting the robot takes its place, so that it counts by evidence and not by size.
+    absorbed: ClassVar[bool] = False
+    # Of the measuring chain: no physics, and prediction does without it.
+    artefact: ClassVar[bool] = False
 
     @property
     def label(self) -> str:
         """ "local_resonator at link_3"."""
         return f"{self.kind} at {self.at}"
+
+    @property
+    def name(self) -> tuple[str, str]:
+        """What it is called, and where: ("base_compliance", "base")."""
+        return self.effect or self.kind, self.at.split("#")[0]
 
     @property
     def mean(self) -> np.ndarray:
@@ -114,6 +149,18 @@ class Operator(ABC):
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance | None:
         """What it adds to the dynamic stiffness beside its springs, with slopes by ψ."""
         return None
+
+    def chain(self, s: np.ndarray, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Factor (n or 1, 3, 3, F or 1) of what each sensor hears, and its slopes (p, …) by ψ."""
+        return None
+
+    @property
+    def spring_priors(self) -> Mapping[int, SpringPrior]:
+        """What is known of springs where this effect is, other than without it, by their numbers.
+
+        Of effects on the same spring the last counts.
+        """
+        return {}
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """Where fits with it begin, by its first-order columns; springs are tried as they are."""

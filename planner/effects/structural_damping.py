@@ -40,11 +40,8 @@ class LossFactors(Operator):
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """By the columns of all loss factors."""
-        poses, usual = motions.poses, np.exp(self.mean)
-        one, minus = self.impedance(poses, self.mean), -(poses.s**2)[:, None, None]
-        shape = (len(poses.q), len(usual), motions.x_sensor.shape[2], motions.x_hit.shape[2])
-        columns = np.empty((*shape, minus.shape[3]), dtype=complex)
-        one.gradient(motions.x_hit * minus, motions.x_sensor, columns)
+        usual = np.exp(self.mean)
+        columns = motions.changed_by(self.impedance(motions.poses, self.mean))
         nats, share = gain(columns, np.ones(len(usual)))
         return (Start(self, np.log(np.clip(share * usual, LEAST, MOST)), nats),)
 

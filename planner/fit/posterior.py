@@ -88,7 +88,8 @@ class RobotPosterior:
         measured = Measured(
             lines, 2j * np.pi * lines, ones.astype(complex), ones, np.full(len(q), np.inf)
         )
-        return FrfData(q, measured, elastic.matrices(q), elastic.body_jacobians(q))
+        early = np.zeros(len(q))
+        return FrfData(q, measured, elastic.matrices(q), elastic.body_jacobians(q), early)
 
     @cached_property
     def _carried(self):

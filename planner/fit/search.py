@@ -59,10 +59,12 @@ class Search:
     tolerances: Tolerances
     tell: Callable[[str], None] = lambda _: None
     extend: bool = True  # where what is stated does not explain them
+    order: np.ndarray | None = None  # as in `FrfData.of`
+    floor: float = 0.0  # as in `FrfMisfit`
 
     def data(self, lines: int) -> FrfData:
         """On so many lines a pose."""
-        return FrfData.of(self.prior, self.frfs, self.q, self.band_hz, lines)
+        return FrfData.of(self.prior, self.frfs, self.q, self.band_hz, lines, self.order)
 
     def found(self, warm: FitRecord | None = None) -> StructureFit:
         """The structure that explains them best; from what was found before, if that is given.
@@ -116,7 +118,7 @@ class Search:
         numbers = dict(zip(known.names, known.x, strict=True))
         pairs = zip(structure.names, structure.mean, strict=True)
         x = np.array([numbers.get(name, mean) for name, mean in pairs])
-        return FrfMisfit(structure, data, self.tolerances, size), x
+        return FrfMisfit(structure, data, self.tolerances, size, self.floor), x
 
     def recalled(self, known: FitRecord) -> StructureFit:
         """What was found of these FRFs before, as it was."""
@@ -130,7 +132,7 @@ class Search:
         self, data: FrfData, structure: RobotStructure, x: np.ndarray | None = None
     ) -> StructureFit:
         """From x (the prior's mean): logarithms first, then FRFs that count more and more."""
-        misfit = FrfMisfit(structure, data, self.tolerances, None)
+        misfit = FrfMisfit(structure, data, self.tolerances, None, self.floor)
         at = minimised(misfit, structure.mean if x is None else x, LOG_STEPS)
         own = None
         for size, steps in ANNEALED:
@@ -288,7 +290,7 @@ class Search:
     def _last(self, best: StructureFit) -> StructureFit:
         """On all lines, and at last along what the data leave open."""
         misfit = FrfMisfit(
-            best.structure, self.data(LAST), self.tolerances, max(size_of(best), 0.01)
+            best.structure, self.data(LAST), self.tolerances, max(size_of(best), 0.01), self.floor
         )
         at = minimised(misfit, best.at.x, 10, own=best.at.own)
         best = settled(misfit, at, rounds=2, steps=15)

@@ -1,0 +1,208 @@
+"""Which effects explain the recordings: all compete at all places, one more at a time.
+
+Where little is left, few steps from the fit so far tell them apart; where much is, each is fitted
+from afar by logarithms first. What is settled is kept: the posterior is over all of it.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.effects.effect import Operator, Start
+from planner.fit.data import FrfData
+from planner.fit.fitted import (
+    StructureFit,
+    converged,
+    evidence_of,
+    removal_costs,
+    settled,
+    size_of,
+    stepped,
+    without,
+)
+from planner.fit.gauss_newton import minimised
+from planner.fit.misfit import FrfMisfit
+from planner.fit.search import Search, _placed
+from planner.fit.structure import RobotStructure, effects_free
+
+FITTED, SCREENED, AFAR = 28, 64, 14  # lines a pose
+LEAST = 12.0  # nats that one more effect must gain
+CLOSE = 0.03  # of |H|, from which effects are fitted from afar too
+FOLLOWED, SETTLED, FARTHEST = 8, 5, 6  # how many are followed, settled, come from afar
+LOG_STEPS, PLAIN_STEPS, FEW, FURTHER = 8, 4, 4, 4
+KEPT = 6  # operators by first order beside the best of each kind
+ROUNDS = 5
+
+Key = frozenset[tuple[str, str]]
+
+
+def key_of(found: StructureFit) -> Key:
+    """What it consists of."""
+    return frozenset(e.name for e in added(found))
+
+
+def added(found: StructureFit) -> tuple[Operator, ...]:
+    """Effects beside those that every robot has."""
+    built = {e.label for e in found.structure.prior.repertoire.as_built()}
+    return tuple(e for e in found.structure.effects if e.label not in built)
+
+
+@dataclass(frozen=True, eq=False)
+class Explored:
+    """The robot as stated, the likeliest explanation, and everything that was settled."""
+
+    plain: StructureFit
+    best: StructureFit
+    settled: tuple[StructureFit, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Explorer:
+    """Explains FRFs by the effects of a search's repertoire."""
+
+    search: Search
+
+    def explored(self) -> Explored:
+        """From the robot as stated on."""
+        search = self.search
+        data, dense = search.data(FITTED), search.data(SCREENED)
+        built = search.prior.repertoire.as_built()
+        stated = RobotStructure(search.prior, built, data.sensors)
+        plain = best = converged(search._begun(data, stated))
+        pool: dict[Key, StructureFit] = {key_of(plain): plain}
+        for _ in range(ROUNDS):
+            ends = self._further(best, dense)
+            _keep(pool, ends)
+            if not ends or ends[0].evidence < best.evidence + LEAST:
+                break
+            search.tell(f"+ {ends[0].structure.effects[-1].label}")
+            best = self._pruned(converged(ends[0]))
+            _keep(pool, [best])
+        best = self._exchanged(best, dense, pool)
+        return Explored(plain, best, tuple(pool.values()))
+
+    def _exchanged(
+        self, best: StructureFit, dense: FrfData, pool: dict[Key, StructureFit]
+    ) -> StructureFit:
+        """Each of several effects against all others in its place."""
+        for effect in added(best) if len(added(best)) > 1 else ():
+            if effect not in best.structure.effects:
+                continue
+            fewer = without(best, [effect])
+            if fewer is None:
+                continue
+            fewer = settled(fewer.misfit, fewer.at)
+            ends = self._further(fewer, dense)
+            _keep(pool, [fewer, *ends])
+            if ends and ends[0].evidence > best.evidence + LEAST / 4:
+                self.search.tell(f"{effect.label} → {ends[0].structure.effects[-1].label}")
+                best = self._pruned(converged(ends[0]))
+                _keep(pool, [best])
+        return best
+
+    def _pruned(self, best: StructureFit) -> StructureFit:
+        """Without what the others make superfluous."""
+        costs = removal_costs(best)
+        for effect in sorted(added(best), key=lambda e: costs[e]):
+            if costs[effect] > 100 or len(added(best)) < 2:
+                break
+            fewer = without(best, [effect])
+            if fewer is None:
+                continue
+            fewer = settled(fewer.misfit, fewer.at)
+            if fewer.evidence > best.evidence - LEAST / 2:
+                self.search.tell(f"− {effect.label}")
+                best = fewer
+        return best
+
+    def _further(self, base: StructureFit, dense: FrfData) -> list[StructureFit]:
+        """With one effect more, settled, likeliest first."""
+        starts = self._starts(base, dense)
+        pool = [f for s in _leaders(starts) if (f := self._few(base, s)) is not None]
+        if size_of(base) >= CLOSE:
+            pool += self._from_afar(base, starts)
+        pool = _best_of_each(pool)[:FOLLOWED]
+        pool = _best_of_each([stepped(p, FURTHER) for p in pool])
+        ends = [settled(p.misfit, p.at) for p in pool[:SETTLED]]
+        return sorted(ends, key=evidence_of, reverse=True)
+
+    def _starts(self, base: StructureFit, dense: FrfData) -> list[Start]:
+        misfit = replace(base.misfit, data=dense)
+        at = misfit(base.at.x, base.at.own)
+        at = misfit(base.at.x, at.own, keep=True)
+        motions = misfit.motions(at)
+
+        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
+            return misfit.gain(at, columns, sd)
+
+        there = {e.name for e in base.structure.effects}
+        free = [e for e in effects_free(base.structure) if e.springs or e.name not in there]
+        return [s for e in free for s in e.starts(motions, gain)]
+
+    def _few(self, base: StructureFit, start: Start) -> StructureFit | None:
+        structure = base.structure.with_effect(start.effect)
+        misfit = replace(base.misfit, structure=structure)
+        ends = []
+        for x, _ in _placed(base, start):
+            if misfit.possible(x):
+                at = minimised(misfit, x, FEW, 1.0, base.at.own)
+                ends.append(StructureFit(misfit, at, misfit.evidence(at)))
+        return max(ends, key=evidence_of, default=None)
+
+    def _from_afar(self, base: StructureFit, starts: Sequence[Start]) -> list[StructureFit]:
+        """Each effect from what is stated, by logarithms on few lines; the best go on."""
+        search, rough, found = self.search, self.search.data(AFAR), []
+        for start in starts:
+            structure = base.structure.with_effect(start.effect)
+            misfit = FrfMisfit(structure, rough, search.tolerances, None, search.floor)
+            for x in _afar(structure, start):
+                if not misfit.possible(x):
+                    continue
+                at = minimised(misfit, x, LOG_STEPS)
+                at = minimised(misfit.with_rho(0.3), at.x, PLAIN_STEPS)
+                found.append((at.value, structure, at.x))
+        found.sort(key=lambda one: one[0])
+        data = base.misfit.data
+        return [search._begun(data, s, x) for _, s, x in found[:FARTHEST]]
+
+
+def _afar(structure: RobotStructure, start: Start) -> Iterable[np.ndarray]:
+    """Where a fit from afar begins: as stated, new springs as expected and softer."""
+    effect, x = structure.effects[-1], structure.mean.copy()
+    if not effect.springs:
+        x[structure.own[-1]] = start.psi
+        return (x,)
+    new = [i for i in range(structure.stiffnesses) if not structure.parameters[i].stated]
+    mine = [i for i in new if set(structure.parameters[i].blocks) & set(effect.springs)]
+    softer = x.copy()
+    softer[mine] -= 1.2 * structure.sd[mine]
+    return x, softer
+
+
+def _leaders(starts: Sequence[Start]) -> list[Start]:
+    """Springs, which the first order says little of, the first operators, the best of each kind."""
+    kept: list[Start] = []
+    kinds: set[str] = set()
+    operators = 0
+    for start in sorted(starts, key=lambda s: -s.nats):
+        effect: Operator = start.effect
+        new = effect.kind not in kinds
+        if np.isinf(start.nats) or (start.nats > 0 and (operators < KEPT or new)):
+            kept.append(start)
+            kinds.add(effect.kind)
+            operators += not np.isinf(start.nats)
+    return kept
+
+
+def _best_of_each(pool: Iterable[StructureFit]) -> list[StructureFit]:
+    best: dict[Key, StructureFit] = {}
+    _keep(best, pool)
+    return sorted(best.values(), key=evidence_of, reverse=True)
+
+
+def _keep(pool: dict[Key, StructureFit], more: Iterable[StructureFit]) -> None:
+    for one in more:
+        known = pool.get(key_of(one))
+        if known is None or one.evidence > known.evidence:
+            pool[key_of(one)] = one
