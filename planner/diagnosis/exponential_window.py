@@ -12,10 +12,12 @@ from scipy.optimize import minimize_scalar, root_scalar
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.thresholds import WINDOW_FASTEST_1_S, WINDOW_LEAST_1_S, WINDOW_RATE_WIDTH_1_S
 from planner.recording.records import Hit
 
 LEAST_SAMPLES = 64
+WINDOW_RATE_WIDTH_1_S = 5.0  # prior width of the rate
+WINDOW_FASTEST_1_S = 50.0  # windows that fall faster leave nothing to look at
+WINDOW_LEAST_1_S = 0.05  # slower ones change no damping that matters
 # Of accelerations: samples before the pulse and hits at least, and the end of the record, by when
 # what is fast has rung down; relative sd of the rate, as analysers begin their windows differently.
 BEFORE, LEAST_HITS, END, UNSURE = 24, 4, 0.8, 0.03

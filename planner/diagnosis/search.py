@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.effects.effect import Operator, Start
+from planner.effects.resonator import LinkResonator
+from planner.effects.springs import ShiftingBase
 from planner.fit.data import FrfData
 from planner.fit.fitted import (
     StructureFit,
@@ -26,13 +28,16 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.search import Search, _placed
 from planner.fit.structure import RobotStructure, effects_free
 
-FITTED, SCREENED, AFAR = 28, 64, 14  # lines a pose
+FITTED, SCREENED, AFAR = 24, 48, 12  # lines a pose
 LEAST = 12.0  # nats that one more effect must gain
 CLOSE = 0.03  # of |H|, from which effects are fitted from afar too
 FOLLOWED, SETTLED, FARTHEST = 8, 5, 6  # how many are followed, settled, come from afar
-LOG_STEPS, PLAIN_STEPS, FEW, FURTHER = 8, 4, 4, 4
+LOG_STEPS, FEW, FURTHER = 6, 3, 4
 KEPT = 6  # operators by first order beside the best of each kind
+PULLED = 1.5  # prior sds, from which another prior may pay
 ROUNDS = 5
+
+HUNG = LinkResonator, ShiftingBase  # of which there may be several at one place
 
 Key = frozenset[tuple[str, str]]
 
@@ -72,13 +77,15 @@ class Explorer:
         plain = best = converged(search._begun(data, stated))
         pool: dict[Key, StructureFit] = {key_of(plain): plain}
         for _ in range(ROUNDS):
-            ends = self._further(best, dense)
+            ends = self._further(best, dense, afar=True)
             _keep(pool, ends)
             if not ends or ends[0].evidence < best.evidence + LEAST:
                 break
             search.tell(f"+ {ends[0].structure.effects[-1].label}")
-            best = self._pruned(converged(ends[0]))
+            before, best = best, self._pruned(converged(ends[0]))
             _keep(pool, [best])
+            if _change(before, best) < search.floor:
+                break  # what is smaller yet does not matter
         best = self._exchanged(best, dense, pool)
         return Explored(plain, best, tuple(pool.values()))
 
@@ -116,11 +123,13 @@ class Explorer:
                 best = fewer
         return best
 
-    def _further(self, base: StructureFit, dense: FrfData) -> list[StructureFit]:
+    def _further(
+        self, base: StructureFit, dense: FrfData, afar: bool = False
+    ) -> list[StructureFit]:
         """With one effect more, settled, likeliest first."""
         starts = self._starts(base, dense)
-        pool = [f for s in _leaders(starts) if (f := self._few(base, s)) is not None]
-        if size_of(base) >= CLOSE:
+        pool = [f for s in starts if (f := self._few(base, s)) is not None]
+        if afar and size_of(base) >= CLOSE:
             pool += self._from_afar(base, starts)
         pool = _best_of_each(pool)[:FOLLOWED]
         pool = _best_of_each([stepped(p, FURTHER) for p in pool])
@@ -137,8 +146,11 @@ class Explorer:
             return misfit.gain(at, columns, sd)
 
         there = {e.name for e in base.structure.effects}
-        free = [e for e in effects_free(base.structure) if e.springs or e.name not in there]
-        return [s for e in free for s in e.starts(motions, gain)]
+        every, free = base.structure.prior.repertoire.effects, effects_free(base.structure)
+        free = [e for e in every if e in free and e.name not in there or isinstance(e, HUNG)]
+        far = size_of(base) >= CLOSE
+        starts = (e.starts(motions, gain) for e in free if far or _pulled(base, e))
+        return _leaders([one for several in starts for one in several])
 
     def _few(self, base: StructureFit, start: Start) -> StructureFit | None:
         structure = base.structure.with_effect(start.effect)
@@ -160,11 +172,18 @@ class Explorer:
                 if not misfit.possible(x):
                     continue
                 at = minimised(misfit, x, LOG_STEPS)
-                at = minimised(misfit.with_rho(0.3), at.x, PLAIN_STEPS)
                 found.append((at.value, structure, at.x))
         found.sort(key=lambda one: one[0])
         data = base.misfit.data
         return [search._begun(data, s, x) for _, s, x in found[:FARTHEST]]
+
+
+def _pulled(base: StructureFit, effect: Operator) -> bool:
+    """Whether anything is gained where springs that are there need not be as they are expected."""
+    s, known = base.structure, effect.spring_priors
+    there = [i for i in range(s.stiffnesses) if known.keys() & set(s.parameters[i].blocks)]
+    away = np.abs((base.at.x - s.mean) / s.sd)[there]
+    return not there or bool(np.any(away > PULLED))
 
 
 def _afar(structure: RobotStructure, start: Start) -> Iterable[np.ndarray]:
@@ -180,6 +199,12 @@ def _afar(structure: RobotStructure, start: Start) -> Iterable[np.ndarray]:
     return x, softer
 
 
+def _change(before: StructureFit, after: StructureFit) -> float:
+    """By how much of |H| at the measured poses both differ."""
+    one, other = (np.abs(f.at.motion.accelerance) for f in (before, after))
+    return float(np.linalg.norm(other - one) / np.linalg.norm(other))
+
+
 def _leaders(starts: Sequence[Start]) -> list[Start]:
     """Springs, which the first order says little of, the first operators, the best of each kind."""
     kept: list[Start] = []
@@ -188,7 +213,8 @@ def _leaders(starts: Sequence[Start]) -> list[Start]:
     for start in sorted(starts, key=lambda s: -s.nats):
         effect: Operator = start.effect
         new = effect.kind not in kinds
-        if np.isinf(start.nats) or (start.nats > 0 and (operators < KEPT or new)):
+        told = np.isinf(start.nats) or effect.artefact
+        if told or (start.nats > 0 and (operators < KEPT or new)):
             kept.append(start)
             kinds.add(effect.kind)
             operators += not np.isinf(start.nats)

@@ -127,3 +127,9 @@ class ChannelDelay(Operator):
             f"The accelerations come {late:.3g} ± {sd:.1g} ms after the force: check filters and "
             "the trigger of both channels."
         )
+
+
+ARTEFACTS = frozenset(
+    {one.kind for one in (SensorGain, Polarity, SensorRotation, ChannelDelay)}
+    | {"exponential_window"}
+)

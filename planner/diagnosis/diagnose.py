@@ -1,0 +1,172 @@
+"""The whole diagnosis: window and tone by signals, effects by FRFs, laws by force levels."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.dataset.dataset import Dataset
+from planner.diagnosis.exponential_window import screen_window
+from planner.diagnosis.finding import Finding
+from planner.diagnosis.search import FITTED, Explored, Explorer
+from planner.diagnosis.verdict import Verdict, judged
+from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS
+from planner.effects.table import Repertoire, diagnosed
+from planner.errors import InputError
+from planner.fit.fitted import StructureFit, settled
+from planner.fit.held_out import set_aside
+from planner.fit.identify import TOO_SOFT
+from planner.fit.misfit import FrfMisfit
+from planner.fit.search import Search
+from planner.fit.structure import RobotPrior, RobotStructure
+from planner.frf.frf import Frf
+from planner.measurement.agreement import Similarity, similarity_of
+from planner.measurement.nuisances import Tolerances
+from planner.progress import Tell, quietly
+
+# Stated springs are known as well as datasheets have them (a fifth), dampers to a factor of two;
+# masses lie elsewhere by 8 % of a body's radius of gyration: cables, oil, covers.
+PRIORS = replace(CAD_INERTIAS, stiffness_factor=1.2, damping_factor=2.0, elsewhere=0.08)
+MOST_BETWEEN = 8  # poses between measured ones, at which sizes are told
+
+
+@dataclass(frozen=True)
+class ThreefoldSimilarity:
+    """Of the simulation as stated, refitted, and with what explains the recordings."""
+
+    nominal: Similarity
+    refitted: Similarity
+    explained: Similarity
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What was `recorded` (as it was used), the fits, the verdict, and agreement with FRFs.
+
+    `screened` is what signals tell without any model. `aside` are numbers of poses that the fits
+    behind `held_out` did not see.
+    """
+
+    recorded: Dataset
+    search: Search
+    explored: Explored
+    verdict: Verdict
+    screened: tuple[Finding, ...]
+    fitted: ThreefoldSimilarity
+    aside: tuple[int, ...]
+    held_out: ThreefoldSimilarity | None
+
+    @property
+    def refitted(self) -> StructureFit:
+        """The robot as stated, refitted."""
+        return self.explored.plain
+
+    @property
+    def best(self) -> StructureFit:
+        """With what explains the recordings."""
+        return self.verdict.best
+
+
+def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> Diagnosis:
+    """What `simulation` lacks, by recordings.
+
+    Raises InputError where nothing of the FRFs lies in robot.toml's band, or where the robot would
+    not stand at their poses.
+    """
+    tell("looking at the signals", 0.02)
+    window = None if recorded.window_rate_1_s else screen_window(recorded)
+    if window is not None:
+        recorded = recorded.corrected(recorded.visits, window.parameters["rate"][0])
+    robot = simulation.robot
+    search = searching(recorded.ended_frfs, recorded.q, simulation, _order(recorded))
+    stated = RobotStructure(search.prior)
+    if not FrfMisfit(stated, search.data(1), search.tolerances).possible(stated.mean):
+        raise InputError(TOO_SOFT)
+    steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
+    explored = Explorer(steps).explored()
+    tell("judging", 0.9)
+    verdict = judged(explored, robot.config.diagnose.matters, between(recorded.q))
+    aside = set_aside(recorded.q)
+    fits = explored.plain, verdict.best
+    return Diagnosis(
+        recorded,
+        search,
+        explored,
+        verdict,
+        () if window is None else (window,),
+        _agreement(fits, fits),
+        aside,
+        _held_out(search, fits, aside) if aside else None,
+    )
+
+
+def searching(
+    frfs: Sequence[Frf], q: np.ndarray, simulation: Simulation, order: np.ndarray | None = None
+) -> Search:
+    """A search of the whole library, in which nothing is told that does not matter."""
+    robot = simulation.robot
+    prior = RobotPrior(Repertoire.of(simulation, PRIORS, diagnosed(simulation)))
+    return Search(
+        prior,
+        tuple(frfs),
+        np.atleast_2d(q),
+        robot.config.band_hz,
+        Tolerances.of(robot.config, robot.joints.slides),
+        order=order,
+        floor=robot.config.diagnose.matters,
+    )
+
+
+def _order(recorded: Dataset) -> np.ndarray:
+    """How much of the campaign was over, 0 to 1, when each pose was hit first."""
+    first: dict[str, int] = {}
+    for visit in recorded.visits:
+        first.setdefault(visit.pose, visit.order)
+    order = np.array([first.get(pose, 0) for pose in recorded.poses], dtype=float)
+    return (order - order.min()) / max(float(np.ptp(order)), 1.0)
+
+
+def between(q: np.ndarray) -> np.ndarray:
+    """Poses half-way between each of q (n, dof) in rad and the one nearest to it."""
+    if len(q) < 2:
+        return q
+    span = np.maximum(np.ptp(q, axis=0), 1e-9)
+    apart = np.linalg.norm((q[:, None] - q[None]) / span, axis=2) + 1e9 * np.eye(len(q))
+    pairs = {tuple(sorted((i, int(k)))) for i, k in enumerate(np.argmin(apart, axis=1))}
+    made = [(q[i] + q[k]) / 2 for i, k in sorted(pairs)]
+    return np.array(made)[:MOST_BETWEEN]
+
+
+def _agreement(
+    seen: tuple[StructureFit, StructureFit], there: tuple[StructureFit, StructureFit]
+) -> ThreefoldSimilarity:
+    """At the data of `there`, of the structures as fitted in `seen`, and as stated."""
+    data = there[0].misfit.data
+    plain = FrfMisfit(RobotStructure(seen[0].structure.prior, (), data.sensors), data,
+                      seen[0].misfit.tolerances)  # fmt: skip
+    found = [similarity_of(data.measured, plain.motion(plain.structure.mean, None).accelerance)]
+    for fit in seen:
+        misfit = replace(fit.misfit, data=data)
+        for name in ("matrices", "jacobians", "poses"):
+            vars(misfit).pop(name, None)
+        h = misfit.heard(fit.at.x, misfit.motion(fit.at.x, None).accelerance)
+        found.append(similarity_of(data.measured, h))
+    return ThreefoldSimilarity(*found)
+
+
+def _held_out(
+    search: Search, fits: tuple[StructureFit, StructureFit], aside: tuple[int, ...]
+) -> ThreefoldSimilarity:
+    """Of fits that never saw the poses set aside; the structure was chosen with all."""
+    data = search.data(FITTED)
+    kept = np.array([i for i in range(len(data.q)) if i not in aside])
+    again = []
+    for fit in fits:
+        misfit = FrfMisfit(
+            fit.structure, data.at(kept), search.tolerances, fit.misfit.rho, search.floor
+        )
+        again.append(settled(misfit, misfit(fit.at.x, fit.at.own[kept])))
+    there = replace(again[0].misfit, data=data.at(np.array(aside)))
+    shown = StructureFit(there, again[0].at, 0.0)
+    return _agreement((again[0], again[1]), (shown, shown))

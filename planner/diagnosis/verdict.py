@@ -1,0 +1,164 @@
+"""One verdict over everything that was settled; nothing rewrites it.
+
+Physics that robot.toml leaves out counts by size: how much of |H| at poses set aside changes when
+it is dropped and the rest refitted. What refitting takes the place of (a stated spring, a mass, the
+chain) counts by evidence beyond its stated tolerance.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import norm
+
+from planner.diagnosis.search import LEAST, Explored, added, key_of
+from planner.effects.effect import Operator
+from planner.fit.fitted import StructureFit, settled, size_of, without
+from planner.fit.posterior import RobotPosterior
+
+RARE = 5.0  # nats: prior odds of one effect at one place, of some 70, as likely as none
+SURE = 0.9  # probability from which an effect's size counts as beyond what matters
+EXPLAINS = 2.0  # times what matters: a discrepancy up to which nothing else is wanted
+VAGUE = 3.0  # times what matters, from which effects count that have no name of their own
+LINES = 40  # of the band, on which sizes are told
+Place = tuple[str, str | None]
+UNKNOWN, NONE = ("unknown", None), ("none", None)
+NAMELESS = "frequency_dependent_joint", "between_links", "ground_contact"
+
+
+@dataclass(frozen=True, eq=False)
+class NamedEffect:
+    """An effect of the explanation: `nats` that it gains, share of |H| that it changes, and the
+    probability that it is there."""
+
+    operator: Operator
+    nats: float
+    change: float
+    probability: float
+    counts: bool
+
+    @property
+    def place(self) -> Place:
+        """Its name, and where it is."""
+        return self.operator.name
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Effects that are there together, and how probable that is."""
+
+    places: tuple[Place, ...]
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """`candidates` sum to 1, most probable first; of `effects` those that count are findings."""
+
+    verdict: str
+    effects: tuple[NamedEffect, ...]
+    candidates: tuple[Candidate, ...]
+    sets: tuple[tuple[Place, ...], ...]
+    best: StructureFit
+
+    @property
+    def findings(self) -> tuple[NamedEffect, ...]:
+        """What is there and matters; nothing where it does not explain the recordings."""
+        told = self.verdict == "explained"
+        return tuple(e for e in self.effects if e.counts and (told or e.operator.artefact))
+
+
+def judged(explored: Explored, matters: float, q: np.ndarray) -> Verdict:
+    """Of what was explored; sizes are told at q (n, dof) in rad, poses that were not measured."""
+    weights = _weights(explored.settled)
+    best = max(explored.settled, key=lambda f: weights[key_of(f)])
+    effects = _weighed(best, weights, matters, q)
+    left = size_of(best) > EXPLAINS * matters
+    named = [e for e in effects if e.counts]
+    unknown = left or any(e.place[0] in NAMELESS for e in named)
+    verdict = "unexplained" if unknown else "explained" if named else "consistent"
+    candidates = _candidates(weights, effects, left)
+    return Verdict(verdict, tuple(effects), candidates, _sets(named, weights), best)
+
+
+def _weights(fits: Sequence[StructureFit]) -> dict[frozenset[Place], float]:
+    """Probability of each set of effects, among all that were settled."""
+    logs = {key_of(f): f.evidence - RARE * len(key_of(f)) for f in fits}
+    total = float(logsumexp(list(logs.values())))
+    return {key: float(np.exp(log - total)) for key, log in logs.items()}
+
+
+def _weighed(
+    best: StructureFit,
+    weights: dict[frozenset[Place], float],
+    matters: float,
+    q: np.ndarray,
+) -> list[NamedEffect]:
+    lines = np.linspace(*_band(best), LINES)
+    whole = RobotPosterior.of(best)
+    h = _physics(whole, q, lines)
+    found = []
+    for effect in added(best):
+        fewer = without(best, [effect])
+        if fewer is None:
+            nats, change = np.inf, 1.0
+        else:
+            fewer = settled(fewer.misfit, fewer.at, rounds=2)
+            nats = best.evidence - fewer.evidence
+            other = _physics(RobotPosterior.of(fewer), q, lines)
+            change = float(np.linalg.norm(np.abs(h) - np.abs(other)) / np.linalg.norm(h))
+        probability = sum(w for key, w in weights.items() if effect.name in key)
+        # Its size is as well known as its amplitude is.
+        least = matters * (VAGUE if effect.name[0] in NAMELESS else 1.0)
+        sure = norm.cdf((change - least) / (change / np.sqrt(2 * max(nats, 1.0)) + 1e-12))
+        there = effect in added(best) and nats > LEAST
+        counts = there and (effect.absorbed or sure >= SURE)
+        found.append(NamedEffect(effect, float(nats), change, float(probability), bool(counts)))
+    return sorted(found, key=lambda e: -e.change)
+
+
+def _band(best: StructureFit) -> tuple[float, float]:
+    lines = best.misfit.data.measured.frequency_hz
+    return float(lines.min()), float(lines.max())
+
+
+def _physics(posterior: RobotPosterior, q: np.ndarray, lines: np.ndarray) -> np.ndarray:
+    """FRFs (n, 3, 3, F) of the robot itself, in m/s²/N."""
+    misfit = replace(posterior.found.misfit, data=posterior._at(q, np.tile(lines, (len(q), 1))))
+    return misfit.motion(posterior.x, None).accelerance
+
+
+def _candidates(
+    weights: dict[frozenset[Place], float], effects: Sequence[NamedEffect], left: bool
+) -> tuple[Candidate, ...]:
+    """Sets by what of them counts; what no name explains is "unknown"."""
+    counts = {e.place for e in effects if e.counts}
+    idle = {e.place for e in effects} - counts
+    shares: dict[tuple[Place, ...], float] = {}
+    for key, weight in weights.items():
+        rest = tuple(sorted(p for p in key if p not in idle))
+        nameless = [p for p in rest if p[0] in NAMELESS]
+        places = (UNKNOWN,) if left or nameless else rest or (NONE,)
+        shares[places] = shares.get(places, 0.0) + weight
+    shares.setdefault((UNKNOWN,), 0.0)
+    ranked = sorted(shares.items(), key=lambda item: -item[1])
+    return tuple(Candidate(places, share) for places, share in ranked)
+
+
+def _sets(
+    named: Sequence[NamedEffect], weights: dict[frozenset[Place], float]
+) -> tuple[tuple[Place, ...], ...]:
+    """For each finding what may stand in its place, where that is not much less likely."""
+    out = []
+    best = max(weights, key=lambda key: weights[key])
+    for effect in named:
+        rest = best - {effect.place}
+        others = [
+            next(iter(key - rest))
+            for key, weight in weights.items()
+            if weight > 0.05 and key != best and rest <= key and len(key) == len(best)
+        ]
+        if others and effect.place in best:
+            out.append((effect.place, *others))
+    return tuple(out)
