@@ -1,15 +1,16 @@
 """The whole diagnosis: window and tone by signals, effects by FRFs, laws by force levels."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.exponential_window import screen_window
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.search import FITTED, Explored, Explorer
-from planner.diagnosis.verdict import Verdict, judged
+from planner.diagnosis.search import FITTED, LEAST, Explored, Explorer
+from planner.diagnosis.verdict import NamedEffect, Verdict, judged
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire, diagnosed
@@ -18,6 +19,7 @@ from planner.fit.fitted import StructureFit, settled
 from planner.fit.held_out import set_aside
 from planner.fit.identify import TOO_SOFT
 from planner.fit.misfit import FrfMisfit
+from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior, RobotStructure
 from planner.frf.frf import Frf
@@ -38,6 +40,20 @@ class ThreefoldSimilarity:
     nominal: Similarity
     refitted: Similarity
     explained: Similarity
+
+
+@dataclass(frozen=True)
+class Established:
+    """An effect that is there and matters: its place, how sure that is, by which share of |H| FRFs
+    change when it is left out (None: of the signals alone), parameters (value, sd, unit) by name,
+    and what to do."""
+
+    effect: str
+    at: str | None
+    probability: float
+    change: float | None
+    parameters: Mapping[str, tuple[float, float, str]]
+    text: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +82,36 @@ class Diagnosis:
     def best(self) -> StructureFit:
         """With what explains the recordings."""
         return self.verdict.best
+
+    @cached_property
+    def robot(self) -> RobotPosterior:
+        """What is believed of the robot with what explains the recordings."""
+        return RobotPosterior.of(self.best)
+
+    @cached_property
+    def findings(self) -> tuple[Established, ...]:
+        """Of signals first, then of the fits, what changes most first."""
+        heard = [
+            Established(f.effect, f.at, 1.0, None, f.parameters, f.text) for f in self.screened
+        ]
+        return *heard, *(self._established(e, e.probability) for e in self.verdict.findings)
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """What is there and too small to matter, in words."""
+        told = [e for e in self.verdict.effects if not e.counts and e.nats > LEAST]
+        return tuple(
+            f"Too small to matter ({100 * e.change:.2g} % of |H|): "
+            f"{self._established(e, e.probability).text}"
+            for e in told
+        )
+
+    def _established(self, named: NamedEffect, probability: float) -> Established:
+        effect = named.operator
+        values = self.robot.values(effect)
+        text = effect.words(values).replace(effect.at, effect.at.split("#")[0])
+        parameters = effect.parameters(values)
+        return Established(*effect.name, probability, named.change, parameters, text)
 
 
 def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> Diagnosis:

@@ -61,6 +61,17 @@ class PointMass(Operator):
         """See `Operator.vanishing`."""
         return -psi[:1]
 
+    def parameters(
+        self, values: Mapping[str, tuple[float, float]]
+    ) -> dict[str, tuple[float, float, str]]:
+        """See `Operator.parameters`."""
+        mass, sd = values["mass"]
+        out = {"mass": (self.mass_kg * mass, self.mass_kg * sd, "kg")}
+        for axis, centre in zip("xyz", self.centre_m, strict=True):
+            at, sd = values[f"position_{axis}"]
+            out[f"position_{axis}"] = centre + self.size_m * at, self.size_m * sd, "m"
+        return out
+
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
         mass, sd = values["mass"]

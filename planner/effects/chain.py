@@ -40,7 +40,7 @@ class SensorGain(Operator):
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
-        factor, sd = values["factor"]
+        factor, sd = values["gain"]
         return (
             f"Channel {self.at[-1]} of the sensor reads {factor:.3g} ± {sd:.1g} times what is "
             "right: check its sensitivity and range."
@@ -100,15 +100,15 @@ class SensorRotation(Operator):
 
 @dataclass(frozen=True)
 class ChannelDelay(Operator):
-    """The accelerations come ψ ms late."""
+    """The accelerations come ψ s late."""
 
     kind = "channel_delay"
     absorbed = artefact = True
 
     def chain(self, s: np.ndarray, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Operator.chain`."""
-        late = np.exp(-1e-3 * s * psi[0])[:, None, None] * np.eye(3)[..., None]
-        return late, (-1e-3 * s[:, None, None] * late)[None]
+        late = np.exp(-s * psi[0])[:, None, None] * np.eye(3)[..., None]
+        return late, (-s[:, None, None] * late)[None]
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """By the delay that brings the phases closest."""
@@ -116,13 +116,13 @@ class ChannelDelay(Operator):
         cross /= np.maximum(np.abs(cross), 1e-300)
         s = motions.poses.s[:, None, None]
         fits = [float(np.sum(cross * np.exp(s * delay)).real) for delay in DELAYS_S]
-        column = (-1e-3 * s * motions.accelerance)[:, None]
-        psi = np.array([1e3 * DELAYS_S[int(np.argmax(fits))]])
+        column = (-s * motions.accelerance)[:, None]
+        psi = np.array([DELAYS_S[int(np.argmax(fits))]])
         return (Start(self, psi, gain(column, self.sd)[0]),)
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
-        late, sd = values["delay"]
+        late, sd = (1e3 * v for v in values["delay"])
         return (
             f"The accelerations come {late:.3g} ± {sd:.1g} ms after the force: check filters and "
             "the trigger of both channels."

@@ -178,6 +178,14 @@ class Operator(ABC):
         """Loss factors that it gives springs, by their numbers."""
         return {}
 
+    def parameters(
+        self, values: Mapping[str, tuple[float, float]]
+    ) -> dict[str, tuple[float, float, str]]:
+        """Values, sds and units of its springs and numbers, by name."""
+        units = {n.name: n.unit for n in self.numbers}
+        spring = {True: "N/m", False: "N·m/rad"}
+        return {n: (*v, units.get(n) or spring[" along " in n]) for n, v in values.items()}
+
     @abstractmethod
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """What it is, for whoever stands at the robot; values and sds by name."""

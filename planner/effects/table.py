@@ -41,9 +41,9 @@ ADDED_MASS, ADDED_PLACE = 0.22, 0.35  # sds: of the links' mean mass, of the lon
 RESONATOR_MASS, RESONATOR_DAMPING = 0.05, 0.03  # medians: of the links' mean mass; ratio
 LOSS_FACTOR = 0.02  # median, with a factor of e as its sd
 ANGLE_SHARE = 0.3  # sd of a joint's stiffness that goes with its angle
-# Sds of what a diagnosis looks for: gain of a channel (logarithm), angles (rad), delay (ms), far-off
+# Sds of what a diagnosis looks for: gain of a channel (logarithm), angles (rad), delay (s), far-off
 # spring (logarithm), shares of stiffness that go with frequency and time.
-GAIN, TURNED_RAD, DELAY_MS, FAR_OFF, HAT, DRIFT = 0.5, 0.5, 2.0, 1.2, 0.3, 0.2
+GAIN, TURNED_RAD, DELAY_S, FAR_OFF, HAT, DRIFT = 0.5, 0.5, 5e-4, 1.2, 0.3, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,12 +228,12 @@ def _own(robot: Robot) -> list[tuple[int, int, Compliance]]:
 def diagnosed(simulation: Simulation) -> list[Operator]:
     """What only a diagnosis looks for: the chain, time, and what has no name of its own."""
     robot, elastic = simulation.robot, simulation.elastic
-    gain, turn = Number("factor", "1", 0.0, GAIN, True), "xyz"
+    gain, turn = Number("gain", "1", 0.0, GAIN, True), "xyz"
     angles = tuple(Number(f"angle_{a}", "rad", 0.0, TURNED_RAD) for a in turn)
     found: list[Operator] = [SensorGain(f"sensor_{a}", (), (gain,)) for a in turn]
     found += [Polarity(f"sensor_{a}") for a in turn]
     found.append(SensorRotation("sensor", (), angles))
-    found.append(ChannelDelay("sensor", (), (Number("delay", "ms", 0.0, DELAY_MS),)))
+    found.append(ChannelDelay("sensor", (), (Number("delay", "s", 0.0, DELAY_S),)))
     own = _own(robot)
     for number, spring, block in own:
         at, mine = f"joint_{number + 1}", ((spring,), (block.stiffness,))

@@ -142,7 +142,7 @@ class RobotPosterior:
         s, sd = self.structure, np.sqrt(np.diagonal(self.covariance))
         out = {}
         for i, p in enumerate(s.parameters[: s.stiffnesses]):
-            if set(p.blocks) <= set(effect.springs):
+            if set(p.blocks) <= {*effect.springs, *effect.spring_priors}:
                 out[p.name] = float(np.exp(self.x[i])), float(np.exp(self.x[i]) * sd[i])
         own = s.own[s.effects.index(effect)]
         for number, value, spread in zip(effect.numbers, self.x[own], sd[own], strict=True):
