@@ -132,7 +132,9 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
     steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
     explored = Explorer(steps).explored()
     tell("judging", 0.9)
-    verdict = judged(explored, robot.config.diagnose.matters, between(recorded.q))
+    heard = [] if window is None else [(window.effect, window.at)]
+    matters = robot.config.diagnose.matters
+    verdict = judged(explored, matters, between(recorded.q), heard)
     aside = set_aside(recorded.q)
     fits = explored.plain, verdict.best
     return Diagnosis(

@@ -11,7 +11,6 @@ import numpy as np
 
 from planner.effects.effect import Operator, Start
 from planner.effects.resonator import LinkResonator
-from planner.effects.springs import ShiftingBase
 from planner.fit.data import FrfData
 from planner.fit.fitted import (
     StructureFit,
@@ -35,9 +34,7 @@ FOLLOWED, SETTLED, FARTHEST = 8, 5, 6  # how many are followed, settled, come fr
 LOG_STEPS, FEW, FURTHER = 6, 3, 4
 KEPT = 6  # operators by first order beside the best of each kind
 PULLED = 1.5  # prior sds, from which another prior may pay
-ROUNDS = 5
-
-HUNG = LinkResonator, ShiftingBase  # of which there may be several at one place
+ROUNDS, FROM_AFAR = 4, 2
 
 Key = frozenset[tuple[str, str]]
 
@@ -76,8 +73,8 @@ class Explorer:
         stated = RobotStructure(search.prior, built, data.sensors)
         plain = best = converged(search._begun(data, stated))
         pool: dict[Key, StructureFit] = {key_of(plain): plain}
-        for _ in range(ROUNDS):
-            ends = self._further(best, dense, afar=True)
+        for number in range(ROUNDS):
+            ends = self._further(best, dense, afar=number < FROM_AFAR)
             _keep(pool, ends)
             if not ends or ends[0].evidence < best.evidence + LEAST:
                 break
@@ -145,11 +142,11 @@ class Explorer:
         def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
             return misfit.gain(at, columns, sd)
 
-        there = {e.name for e in base.structure.effects}
-        every, free = base.structure.prior.repertoire.effects, effects_free(base.structure)
-        free = [e for e in every if e in free and e.name not in there or isinstance(e, HUNG)]
+        free, every = effects_free(base.structure), base.structure.prior.repertoire.effects
+        again = (e for e in every if isinstance(e, LinkResonator) and e not in free)
         far = size_of(base) >= CLOSE
-        starts = (e.starts(motions, gain) for e in free if far or _pulled(base, e))
+        tried = (e for e in (*free, *again) if far or _pulled(base, e))
+        starts = (e.starts(motions, gain) for e in tried)
         return _leaders([one for several in starts for one in several])
 
     def _few(self, base: StructureFit, start: Start) -> StructureFit | None:

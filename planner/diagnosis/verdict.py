@@ -66,19 +66,25 @@ class Verdict:
     def findings(self) -> tuple[NamedEffect, ...]:
         """What is there and matters; nothing where it does not explain the recordings."""
         told = self.verdict == "explained"
-        return tuple(e for e in self.effects if e.counts and (told or e.operator.artefact))
+        counted = (e for e in self.effects if e.counts and (told or e.operator.artefact))
+        return tuple({e.place: e for e in reversed(tuple(counted))}.values())[::-1]
 
 
-def judged(explored: Explored, matters: float, q: np.ndarray) -> Verdict:
-    """Of what was explored; sizes are told at q (n, dof) in rad, poses that were not measured."""
+def judged(
+    explored: Explored, matters: float, q: np.ndarray, heard: Sequence[Place] = ()
+) -> Verdict:
+    """Of what was explored, and of effects that were `heard` in the signals.
+
+    Sizes are told at q (n, dof) in rad, poses that were not measured.
+    """
     weights = _weights(explored.settled)
     best = max(explored.settled, key=lambda f: weights[key_of(f)])
     effects = _weighed(best, weights, matters, q)
     left = size_of(best) > EXPLAINS * matters
     named = [e for e in effects if e.counts]
     unknown = left or any(e.place[0] in NAMELESS for e in named)
-    verdict = "unexplained" if unknown else "explained" if named else "consistent"
-    candidates = _candidates(weights, effects, left)
+    verdict = "unexplained" if unknown else "explained" if named or heard else "consistent"
+    candidates = _candidates(weights, effects, left, tuple(heard))
     return Verdict(verdict, tuple(effects), candidates, _sets(named, weights), best)
 
 
@@ -130,14 +136,17 @@ def _physics(posterior: RobotPosterior, q: np.ndarray, lines: np.ndarray) -> np.
 
 
 def _candidates(
-    weights: dict[frozenset[Place], float], effects: Sequence[NamedEffect], left: bool
+    weights: dict[frozenset[Place], float],
+    effects: Sequence[NamedEffect],
+    left: bool,
+    heard: tuple[Place, ...],
 ) -> tuple[Candidate, ...]:
     """Sets by what of them counts; what no name explains is "unknown"."""
     counts = {e.place for e in effects if e.counts}
     idle = {e.place for e in effects} - counts
     shares: dict[tuple[Place, ...], float] = {}
     for key, weight in weights.items():
-        rest = tuple(sorted(p for p in key if p not in idle))
+        rest = (*heard, *sorted(p for p in key if p not in idle))
         nameless = [p for p in rest if p[0] in NAMELESS]
         places = (UNKNOWN,) if left or nameless else rest or (NONE,)
         shares[places] = shares.get(places, 0.0) + weight

@@ -13,7 +13,6 @@ SHAPES = np.array([
     np.outer(np.eye(3)[i], np.eye(3)[k]) + (i != k) * np.outer(np.eye(3)[k], np.eye(3)[i])
     for i, k in PAIRS
 ])  # fmt: skip
-FARTHEST = 3.0  # sds of a start
 
 
 @dataclass(frozen=True)
@@ -45,10 +44,9 @@ class LinkSpring(Operator):
         return Impedance(self.port(poses), SHAPES, values, slope)
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
-        """By its columns."""
+        """By its columns; a fit begins without it, as FRFs are linear in it."""
         columns = motions.changed_by(self.impedance(motions.poses, np.zeros(len(SHAPES))))
-        nats, psi = gain(columns, self.sd)
-        return (Start(self, np.clip(psi, -FARTHEST, FARTHEST), nats),)
+        return (Start(self, self.mean, gain(columns, self.sd)[0]),)
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """See `Operator.vanishing`."""

@@ -13,8 +13,6 @@ import numpy as np
 from planner.dynamics.gradient import Impedance
 from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
 
-FARTHEST = 0.5  # share of the stiffness, of a start
-
 
 @dataclass(frozen=True)
 class VaryingSpring(Operator):
@@ -45,10 +43,9 @@ class VaryingSpring(Operator):
         return Impedance(ports, shapes, values, tuple(map(tuple, terms)))
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
-        """By its columns."""
+        """By its columns; a fit begins without it, as FRFs are linear in it."""
         columns = motions.changed_by(self.impedance(motions.poses, np.zeros(len(self.numbers))))
-        nats, psi = gain(columns, self.sd)
-        return (Start(self, np.clip(psi, -FARTHEST, FARTHEST), nats),)
+        return (Start(self, self.mean, gain(columns, self.sd)[0]),)
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """See `Operator.vanishing`."""
