@@ -5,11 +5,11 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from planner.diagnosis.effects import library
+from planner.diagnosis.linear.fit import FINE, Fit, Problem, fit, settle
 
 from planner.design.discrimination import separation
 from planner.design.extra_sensor import WORTH, extra_sensor
-from planner.diagnosis.effects import library
-from planner.diagnosis.linear.fit import FINE, Fit, Problem, fit, settle
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.recording.points import Layout

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from planner.design.discrimination import most_telling, separation
 from planner.diagnosis.effects import library
 from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
 from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.linear.problem import FINE
 from planner.diagnosis.linear_diagnosis import Problem
+
+from planner.design.discrimination import most_telling, separation
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot

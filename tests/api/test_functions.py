@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from planner.diagnosis.effects import library
 
 from planner import Dataset, Robot, analyse, diagnose, identify
 from planner.cli.run import run
 from planner.diagnosis import linear_diagnosis
-from planner.diagnosis.effects import library
 from planner.errors import InputError, RefusedError
 from planner.modal.modes import ModalModel
 from planner.recording.hits import hits_from
@@ -114,7 +114,7 @@ def test_a_diagnosis_is_typed_predicts_and_travels_without_its_fits(diagnosed, d
     assert mean.shape == sd.shape == (2, 3, 3, 3)
     assert np.iscomplexobj(mean)
     assert (sd >= 0).all()
-    light = pickle.loads(pickle.dumps(replace(diagnosed, explained=None)))
+    light = pickle.loads(pickle.dumps(replace(diagnosed, diagnosis=None)))
     assert light.to_json() == diagnosed.to_json()
     assert "explained" not in diagnosed.to_json()
 

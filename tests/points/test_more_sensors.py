@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from planner.diagnosis.effects import library
+
 from planner.dynamics.simulation import Simulation
 from planner.proof.score import Share, share
 from planner.robot.robot import Robot

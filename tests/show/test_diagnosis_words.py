@@ -6,10 +6,10 @@ from io import StringIO
 import numpy as np
 import pytest
 from matplotlib.colors import LogNorm, to_rgb
+from planner.diagnosis.residual_location import Where
 from rich.console import Console
 
 from planner.diagnosis.odd_pose import OddPose
-from planner.diagnosis.residual_location import Where
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.diagnosis import DiagnosisReport, RankedExplanation
 from planner.report.diagnosis_plots import _overlay, _residuals
