@@ -152,7 +152,8 @@ class DiagnosisReport(Answer):
         found = self.found
         robot = found.search.prior.repertoire.stiff.robot
         _make_room(folder, robot)
-        made = write_robot(folder / "robot.toml", robot, as_identification(found.robot)[1])
+        model, result = as_identification(found.robot)
+        made = write_robot(folder / "robot.toml", model.simulation.robot, result)
         mark = SIMULATED_TITLE if self.simulated else ""
         figures = diagnosis_figures(found, mark)
         plots = Pictures(folder).write(figures, robot.name)["plots"]
