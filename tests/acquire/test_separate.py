@@ -32,7 +32,7 @@ PLACES = {"soft_base at base": ("base_compliance", "base"),
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """An arm on a floor that gives way a little: alike from the tool is a first joint that tilts."""
+    """An arm on a floor that gives way: alike from the tool is a first joint that tilts."""
 
     truth: Any
     search: Search
