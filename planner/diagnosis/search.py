@@ -31,7 +31,7 @@ FITTED, SCREENED, AFAR = 24, 48, 12  # lines a pose
 LEAST = 12.0  # nats that one more effect must gain
 CLOSE = 0.03  # of |H|, from which effects are fitted from afar too
 FOLLOWED, SETTLED, FARTHEST = 8, 5, 6  # how many are followed, settled, come from afar
-LOG_STEPS, FEW, FURTHER = 6, 3, 4
+LOG_STEPS, FEW, FURTHER = 6, 6, 4
 KEPT = 6  # operators by first order beside the best of each kind
 PULLED = 1.5  # prior sds, from which another prior may pay
 ROUNDS, FROM_AFAR = 4, 2
@@ -139,7 +139,7 @@ class Explorer:
         at = misfit(base.at.x, at.own, keep=True)
         motions = misfit.motions(at)
 
-        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
+        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
             return misfit.gain(at, columns, sd)
 
         free, every = effects_free(base.structure), base.structure.prior.repertoire.effects
