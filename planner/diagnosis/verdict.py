@@ -20,7 +20,9 @@ from planner.fit.posterior import RobotPosterior
 RARE = 5.0  # nats: prior odds of one effect at one place, of some 70, as likely as none
 SURE = 0.9  # probability from which an effect's size counts as beyond what matters
 EXPLAINS = 2.0  # times what matters: a discrepancy up to which nothing else is wanted
-VAGUE = 3.0  # times what matters, from which effects count that have no name of their own
+# Effects without a name of their own imitate what a named one's shape lacks: they count from so
+# many times what matters on, and so much of all that is gained.
+VAGUE, OF_ALL = 3.0, 0.05
 LINES = 40  # of the band, on which sizes are told
 Place = tuple[str, str | None]
 UNKNOWN, NONE = ("unknown", None), ("none", None)
@@ -79,7 +81,7 @@ def judged(
     """
     weights = _weights(explored.settled)
     best = max(explored.settled, key=lambda f: weights[key_of(f)])
-    effects = _weighed(best, weights, matters, q)
+    effects = _weighed(explored, best, weights, matters, q)
     left = size_of(best) > EXPLAINS * matters
     named = [e for e in effects if e.counts]
     unknown = left or any(e.place[0] in NAMELESS for e in named)
@@ -96,11 +98,13 @@ def _weights(fits: Sequence[StructureFit]) -> dict[frozenset[Place], float]:
 
 
 def _weighed(
+    explored: Explored,
     best: StructureFit,
     weights: dict[frozenset[Place], float],
     matters: float,
     q: np.ndarray,
 ) -> list[NamedEffect]:
+    gained = best.evidence - explored.plain.evidence
     lines = np.linspace(*_band(best), LINES)
     whole = RobotPosterior.of(best)
     h = _physics(whole, q, lines)
@@ -116,9 +120,10 @@ def _weighed(
             change = float(np.linalg.norm(np.abs(h) - np.abs(other)) / np.linalg.norm(h))
         probability = sum(w for key, w in weights.items() if effect.name in key)
         # Its size is as well known as its amplitude is.
-        least = matters * (VAGUE if effect.name[0] in NAMELESS else 1.0)
+        vague = effect.name[0] in NAMELESS
+        least = matters * (VAGUE if vague else 1.0)
         sure = norm.cdf((change - least) / (change / np.sqrt(2 * max(nats, 1.0)) + 1e-12))
-        there = effect in added(best) and nats > LEAST
+        there = nats > max(LEAST, OF_ALL * gained if vague else 0.0)
         counts = there and (effect.absorbed or sure >= SURE)
         found.append(NamedEffect(effect, float(nats), change, float(probability), bool(counts)))
     return sorted(found, key=lambda e: -e.change)
