@@ -14,7 +14,7 @@ from scipy.stats import norm
 
 from planner.diagnosis.search import LEAST, Explored, added, key_of
 from planner.effects.effect import Operator
-from planner.fit.fitted import StructureFit, settled, size_of, without
+from planner.fit.fitted import StructureFit, evidence_of, settled, size_of, without
 from planner.fit.posterior import RobotPosterior
 
 RARE = 5.0  # nats: prior odds of one effect at one place, of some 70, as likely as none
@@ -110,11 +110,10 @@ def _weighed(
     h = _physics(whole, q, lines)
     found = []
     for effect in added(best):
-        fewer = without(best, [effect])
+        fewer = _without(explored, best, effect)
         if fewer is None:
             nats, change = np.inf, 1.0
         else:
-            fewer = settled(fewer.misfit, fewer.at, rounds=2)
             nats = best.evidence - fewer.evidence
             other = _physics(RobotPosterior.of(fewer), q, lines)
             change = float(np.linalg.norm(np.abs(h) - np.abs(other)) / np.linalg.norm(h))
@@ -127,6 +126,16 @@ def _weighed(
         counts = there and (effect.absorbed or sure >= SURE)
         found.append(NamedEffect(effect, float(nats), change, float(probability), bool(counts)))
     return sorted(found, key=lambda e: -e.change)
+
+
+def _without(explored: Explored, best: StructureFit, effect: Operator) -> StructureFit | None:
+    """The best that there is without an effect: refitted from here, or as the search came by."""
+    rest = key_of(best) - {effect.name}
+    met = [f for f in explored.settled if key_of(f) == rest and len(added(f)) < len(added(best))]
+    fewer = without(best, [effect])
+    if fewer is not None:
+        met.append(settled(fewer.misfit, fewer.at, rounds=2))
+    return max(met, key=evidence_of, default=None)
 
 
 def _band(best: StructureFit) -> tuple[float, float]:
