@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
+from planner.diagnosis.levels import Levels
 from planner.diagnosis.search import LEAST, Explored, added, key_of
 from planner.effects.effect import Operator
 from planner.fit.fitted import StructureFit, evidence_of, settled, size_of, without
@@ -23,6 +24,7 @@ EXPLAINS = 2.0  # times what matters: a discrepancy up to which nothing else is 
 # Effects without a name of their own imitate what a named one's shape lacks: they count from so
 # many times what matters on, and so much of all that is gained.
 VAGUE, OF_ALL = 3.0, 0.05
+BENT = 2.0  # times what levels differ by, from which a linear effect beside a law is told
 LINES = 40  # of the band, on which sizes are told
 Place = tuple[str, str | None]
 UNKNOWN, NONE = ("unknown", None), ("none", None)
@@ -73,20 +75,34 @@ class Verdict:
 
 
 def judged(
-    explored: Explored, matters: float, q: np.ndarray, heard: Sequence[Place] = ()
+    explored: Explored,
+    matters: float,
+    q: np.ndarray,
+    heard: Sequence[Place] = (),
+    levels: Levels | None = None,
 ) -> Verdict:
-    """Of what was explored, and of effects that were `heard` in the signals.
+    """Of what was explored, of effects `heard` in the signals, and of laws of force `levels`.
 
-    Sizes are told at q (n, dof) in rad, poses that were not measured.
+    Sizes are told at q (n, dof) in rad, poses that were not measured. Averages over levels are bent
+    by a joint's law: beside one only what changes FRFs by more than levels do is told.
     """
     weights = _weights(explored.settled)
     best = max(explored.settled, key=lambda f: weights[key_of(f)])
     effects = _weighed(explored, best, weights, matters, q)
-    left = size_of(best) > EXPLAINS * matters
+    laws = levels.laws if levels else ()
+    if levels and laws:
+        bent = BENT * levels.seen.size
+        effects = [replace(e, counts=e.counts and (e.operator.artefact or e.change > bent))
+                   for e in effects]  # fmt: skip
     named = [e for e in effects if e.counts]
-    unknown = left or any(e.place[0] in NAMELESS for e in named)
-    verdict = "unexplained" if unknown else "explained" if named or heard else "consistent"
-    candidates = _candidates(weights, effects, left, tuple(heard))
+    nameless = any(e.place[0] in NAMELESS for e in named)
+    left = (size_of(best) > EXPLAINS * matters or nameless) and not laws
+    unknown = left or bool(levels and levels.unexplained)
+    there = named or heard or laws
+    verdict = "unexplained" if unknown else "explained" if there else "consistent"
+    candidates = _candidates(weights, effects, unknown, tuple(heard))
+    if levels and laws and not unknown:
+        candidates = _with_laws(candidates, levels)
     return Verdict(verdict, tuple(effects), candidates, _sets(named, weights), best)
 
 
@@ -152,7 +168,7 @@ def _physics(posterior: RobotPosterior, q: np.ndarray, lines: np.ndarray) -> np.
 def _candidates(
     weights: dict[frozenset[Place], float],
     effects: Sequence[NamedEffect],
-    left: bool,
+    unknown: bool,
     heard: tuple[Place, ...],
 ) -> tuple[Candidate, ...]:
     """Sets by what of them counts; what no name explains is "unknown"."""
@@ -161,12 +177,22 @@ def _candidates(
     shares: dict[tuple[Place, ...], float] = {}
     for key, weight in weights.items():
         rest = (*heard, *sorted(p for p in key if p not in idle))
-        nameless = [p for p in rest if p[0] in NAMELESS]
-        places = (UNKNOWN,) if left or nameless else rest or (NONE,)
+        places = (UNKNOWN,) if unknown else rest or (NONE,)
         shares[places] = shares.get(places, 0.0) + weight
     shares.setdefault((UNKNOWN,), 0.0)
     ranked = sorted(shares.items(), key=lambda item: -item[1])
     return tuple(Candidate(places, share) for places, share in ranked)
+
+
+def _with_laws(candidates: Sequence[Candidate], levels: Levels) -> tuple[Candidate, ...]:
+    """The likeliest set of linear effects, with each law that was weighed at a joint."""
+    first = tuple(p for p in candidates[0].places if p != NONE)
+    further = tuple((law.effect, law.at) for law in levels.laws[1:])
+    found = [
+        Candidate((*first, (effect, at), *further), share)
+        for effect, at, share in levels.candidates
+    ]
+    return *sorted(found, key=lambda c: -c.probability), Candidate((UNKNOWN,), 0.0)
 
 
 def _sets(
