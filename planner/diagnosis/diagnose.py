@@ -98,7 +98,9 @@ class Diagnosis:
         ]
         told = self.verdict.verdict == "explained" and self.levels
         laws = [
-            Established(law.effect, law.at, self._share(law), law.share, law.parameters, law.text)
+            Established(
+                law.effect, law.at, self._share(law), law.share, law.parameters, _words(law)
+            )
             for law in (told.laws if told else ())
         ]
         return *heard, *laws, *(self._established(e, e.probability) for e in self.verdict.findings)
@@ -162,6 +164,17 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
         aside,
         _held_out(search, fits, aside) if aside else None,
     )
+
+
+def _words(law: JointLaw) -> str:
+    """What to do about a joint's law."""
+    said = {
+        "friction": f"{law.at} rubs: check its lubrication, seals and brake.",
+        "backlash": f"{law.at} has play: check its gear and bearings.",
+        "nonlinear_stiffness": f"The stiffness of {law.at} goes with how far it swings: check the "
+        "gear's preload and what it is mounted on.",
+    }
+    return f"{said[law.effect]} Hits of different force differ by {100 * law.share:.2g} % of |H|."
 
 
 def searching(
