@@ -9,13 +9,14 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.exponential_window import screen_window
 from planner.diagnosis.finding import Finding
+from planner.diagnosis.levels import JointLaw, Levels, level_laws
 from planner.diagnosis.search import FITTED, LEAST, Explored, Explorer
 from planner.diagnosis.verdict import NamedEffect, Verdict, judged
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire, diagnosed
 from planner.errors import InputError
-from planner.fit.fitted import StructureFit, settled
+from planner.fit.fitted import StructureFit, evidence_of, settled
 from planner.fit.held_out import set_aside
 from planner.fit.identify import TOO_SOFT
 from planner.fit.misfit import FrfMisfit
@@ -69,6 +70,7 @@ class Diagnosis:
     explored: Explored
     verdict: Verdict
     screened: tuple[Finding, ...]
+    levels: Levels | None
     fitted: ThreefoldSimilarity
     aside: tuple[int, ...]
     held_out: ThreefoldSimilarity | None
@@ -94,7 +96,18 @@ class Diagnosis:
         heard = [
             Established(f.effect, f.at, 1.0, None, f.parameters, f.text) for f in self.screened
         ]
-        return *heard, *(self._established(e, e.probability) for e in self.verdict.findings)
+        told = self.verdict.verdict == "explained" and self.levels
+        laws = [
+            Established(
+                law.effect, law.at, self._share(law), law.share, law.parameters, _words(law)
+            )
+            for law in (told.laws if told else ())
+        ]
+        return *heard, *laws, *(self._established(e, e.probability) for e in self.verdict.findings)
+
+    def _share(self, law: JointLaw) -> float:
+        place = law.effect, law.at
+        return sum(c.probability for c in self.verdict.candidates if place in c.places)
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
@@ -131,10 +144,13 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
         raise InputError(TOO_SOFT)
     steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
     explored = Explorer(steps).explored()
-    tell("judging", 0.9)
     heard = [] if window is None else [(window.effect, window.at)]
     matters = robot.config.diagnose.matters
-    verdict = judged(explored, matters, between(recorded.q), heard)
+    tell("comparing hits of different force", 0.85)
+    likeliest = max(explored.settled, key=evidence_of)
+    levels = level_laws(recorded, likeliest) if recorded.visits else None
+    tell("judging", 0.9)
+    verdict = judged(explored, matters, between(recorded.q), heard, levels)
     aside = set_aside(recorded.q)
     fits = explored.plain, verdict.best
     return Diagnosis(
@@ -143,10 +159,22 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
         explored,
         verdict,
         () if window is None else (window,),
+        levels,
         _agreement(fits, fits),
         aside,
         _held_out(search, fits, aside) if aside else None,
     )
+
+
+def _words(law: JointLaw) -> str:
+    """What to do about a joint's law."""
+    said = {
+        "friction": f"{law.at} rubs: check its lubrication, seals and brake.",
+        "backlash": f"{law.at} has play: check its gear and bearings.",
+        "nonlinear_stiffness": f"The stiffness of {law.at} goes with how far it swings: check the "
+        "gear's preload and what it is mounted on.",
+    }
+    return f"{said[law.effect]} Hits of different force differ by {100 * law.share:.2g} % of |H|."
 
 
 def searching(

@@ -27,12 +27,14 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.search import Search, _placed
 from planner.fit.structure import RobotStructure, effects_free
 
-FITTED, SCREENED, AFAR = 24, 48, 12  # lines a pose
+FITTED, SCREENED, ROUGH, AFAR = 24, 48, 14, 12  # lines a pose
 LEAST = 12.0  # nats that one more effect must gain
 CLOSE = 0.03  # of |H|, from which effects are fitted from afar too
-FOLLOWED, SETTLED, FARTHEST = 8, 5, 6  # how many are followed, settled, come from afar
-LOG_STEPS, FEW, FURTHER = 6, 3, 4
+FOLLOWED, SETTLED, FARTHEST = 6, 4, 5  # how many are followed, settled, come from afar
+LOG_STEPS, FEW, FURTHER = 6, 6, 4
 KEPT = 6  # operators by first order beside the best of each kind
+FAR = 100.0  # nats below what was there, from which nothing is followed
+HOPELESS = 4.0  # nats, below which a further step is not worth it while many are tried
 PULLED = 1.5  # prior sds, from which another prior may pay
 ROUNDS, FROM_AFAR = 4, 2
 
@@ -124,14 +126,23 @@ class Explorer:
         self, base: StructureFit, dense: FrfData, afar: bool = False
     ) -> list[StructureFit]:
         """With one effect more, settled, likeliest first."""
-        starts = self._starts(base, dense)
-        pool = [f for s in starts if (f := self._few(base, s)) is not None]
+        starts, rough = self._starts(base, dense), self._on(base, self.search.data(ROUGH))
+        pool = [f for s in starts if (f := self._few(rough, s)) is not None]
         if afar and size_of(base) >= CLOSE:
-            pool += self._from_afar(base, starts)
-        pool = _best_of_each(pool)[:FOLLOWED]
-        pool = _best_of_each([stepped(p, FURTHER) for p in pool])
-        ends = [settled(p.misfit, p.at) for p in pool[:SETTLED]]
+            pool += self._from_afar(rough, starts)
+        near = [p for p in pool if p.evidence > rough.evidence - FAR]
+        followed = [self._on(p, base.misfit.data) for p in _best_of_each(near)[:FOLLOWED]]
+        followed = _best_of_each([stepped(p, FURTHER) for p in followed])
+        ends = [settled(p.misfit, p.at) for p in followed[:SETTLED]]
         return sorted(ends, key=evidence_of, reverse=True)
+
+    def _on(self, found: StructureFit, data: FrfData) -> StructureFit:
+        """The same on other lines."""
+        misfit = FrfMisfit(
+            found.structure, data, self.search.tolerances, found.misfit.rho, self.search.floor
+        )
+        at = misfit(found.at.x, found.at.own)
+        return StructureFit(misfit, at, misfit.evidence(at))
 
     def _starts(self, base: StructureFit, dense: FrfData) -> list[Start]:
         misfit = replace(base.misfit, data=dense)
@@ -139,7 +150,7 @@ class Explorer:
         at = misfit(base.at.x, at.own, keep=True)
         motions = misfit.motions(at)
 
-        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
+        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
             return misfit.gain(at, columns, sd)
 
         free, every = effects_free(base.structure), base.structure.prior.repertoire.effects
@@ -155,7 +166,7 @@ class Explorer:
         ends = []
         for x, _ in _placed(base, start):
             if misfit.possible(x):
-                at = minimised(misfit, x, FEW, 1.0, base.at.own)
+                at = minimised(misfit, x, FEW, HOPELESS, base.at.own)
                 ends.append(StructureFit(misfit, at, misfit.evidence(at)))
         return max(ends, key=evidence_of, default=None)
 

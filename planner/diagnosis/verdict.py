@@ -12,15 +12,19 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
+from planner.diagnosis.levels import Levels
 from planner.diagnosis.search import LEAST, Explored, added, key_of
 from planner.effects.effect import Operator
-from planner.fit.fitted import StructureFit, settled, size_of, without
+from planner.fit.fitted import StructureFit, evidence_of, settled, size_of, without
 from planner.fit.posterior import RobotPosterior
 
 RARE = 5.0  # nats: prior odds of one effect at one place, of some 70, as likely as none
 SURE = 0.9  # probability from which an effect's size counts as beyond what matters
 EXPLAINS = 2.0  # times what matters: a discrepancy up to which nothing else is wanted
-VAGUE = 3.0  # times what matters, from which effects count that have no name of their own
+# Effects without a name of their own imitate what a named one's shape lacks: they count from so
+# many times what matters on, and so much of all that is gained.
+VAGUE, OF_ALL = 3.0, 0.05
+BENT = 2.0  # times what levels differ by, from which a linear effect beside a law is told
 LINES = 40  # of the band, on which sizes are told
 Place = tuple[str, str | None]
 UNKNOWN, NONE = ("unknown", None), ("none", None)
@@ -71,20 +75,34 @@ class Verdict:
 
 
 def judged(
-    explored: Explored, matters: float, q: np.ndarray, heard: Sequence[Place] = ()
+    explored: Explored,
+    matters: float,
+    q: np.ndarray,
+    heard: Sequence[Place] = (),
+    levels: Levels | None = None,
 ) -> Verdict:
-    """Of what was explored, and of effects that were `heard` in the signals.
+    """Of what was explored, of effects `heard` in the signals, and of laws of force `levels`.
 
-    Sizes are told at q (n, dof) in rad, poses that were not measured.
+    Sizes are told at q (n, dof) in rad, poses that were not measured. Averages over levels are bent
+    by a joint's law: beside one only what changes FRFs by more than levels do is told.
     """
     weights = probabilities(explored.settled)
     best = max(explored.settled, key=lambda f: weights[key_of(f)])
-    effects = _weighed(best, weights, matters, q)
-    left = size_of(best) > EXPLAINS * matters
+    effects = _weighed(explored, best, weights, matters, q)
+    laws = levels.laws if levels else ()
+    if levels and laws:
+        bent = BENT * levels.seen.size
+        effects = [replace(e, counts=e.counts and (e.operator.artefact or e.change > bent))
+                   for e in effects]  # fmt: skip
     named = [e for e in effects if e.counts]
-    unknown = left or any(e.place[0] in NAMELESS for e in named)
-    verdict = "unexplained" if unknown else "explained" if named or heard else "consistent"
-    candidates = _candidates(weights, effects, left, tuple(heard))
+    nameless = any(e.place[0] in NAMELESS for e in named)
+    left = (size_of(best) > EXPLAINS * matters or nameless) and not laws
+    unknown = left or bool(levels and levels.unexplained)
+    there = named or heard or laws
+    verdict = "unexplained" if unknown else "explained" if there else "consistent"
+    candidates = _candidates(weights, effects, unknown, tuple(heard))
+    if levels and laws and not unknown:
+        candidates = _with_laws(candidates, levels)
     return Verdict(verdict, tuple(effects), candidates, _sets(named, weights), best)
 
 
@@ -96,32 +114,44 @@ def probabilities(fits: Sequence[StructureFit]) -> dict[frozenset[Place], float]
 
 
 def _weighed(
+    explored: Explored,
     best: StructureFit,
     weights: dict[frozenset[Place], float],
     matters: float,
     q: np.ndarray,
 ) -> list[NamedEffect]:
+    gained = best.evidence - explored.plain.evidence
     lines = np.linspace(*_band(best), LINES)
     whole = RobotPosterior.of(best)
     h = _physics(whole, q, lines)
     found = []
     for effect in added(best):
-        fewer = without(best, [effect])
+        fewer = _without(explored, best, effect)
         if fewer is None:
             nats, change = np.inf, 1.0
         else:
-            fewer = settled(fewer.misfit, fewer.at, rounds=2)
             nats = best.evidence - fewer.evidence
             other = _physics(RobotPosterior.of(fewer), q, lines)
             change = float(np.linalg.norm(np.abs(h) - np.abs(other)) / np.linalg.norm(h))
         probability = sum(w for key, w in weights.items() if effect.name in key)
         # Its size is as well known as its amplitude is.
-        least = matters * (VAGUE if effect.name[0] in NAMELESS else 1.0)
+        vague = effect.name[0] in NAMELESS
+        least = matters * (VAGUE if vague else 1.0)
         sure = norm.cdf((change - least) / (change / np.sqrt(2 * max(nats, 1.0)) + 1e-12))
-        there = effect in added(best) and nats > LEAST
+        there = nats > max(LEAST, OF_ALL * gained if vague else 0.0)
         counts = there and (effect.absorbed or sure >= SURE)
         found.append(NamedEffect(effect, float(nats), change, float(probability), bool(counts)))
     return sorted(found, key=lambda e: -e.change)
+
+
+def _without(explored: Explored, best: StructureFit, effect: Operator) -> StructureFit | None:
+    """The best that there is without an effect: refitted from here, or as the search came by."""
+    rest = key_of(best) - {effect.name}
+    met = [f for f in explored.settled if key_of(f) == rest and len(added(f)) < len(added(best))]
+    fewer = without(best, [effect])
+    if fewer is not None:
+        met.append(settled(fewer.misfit, fewer.at, rounds=2))
+    return max(met, key=evidence_of, default=None)
 
 
 def _band(best: StructureFit) -> tuple[float, float]:
@@ -138,7 +168,7 @@ def _physics(posterior: RobotPosterior, q: np.ndarray, lines: np.ndarray) -> np.
 def _candidates(
     weights: dict[frozenset[Place], float],
     effects: Sequence[NamedEffect],
-    left: bool,
+    unknown: bool,
     heard: tuple[Place, ...],
 ) -> tuple[Candidate, ...]:
     """Sets by what of them counts; what no name explains is "unknown"."""
@@ -147,12 +177,22 @@ def _candidates(
     shares: dict[tuple[Place, ...], float] = {}
     for key, weight in weights.items():
         rest = (*heard, *sorted(p for p in key if p not in idle))
-        nameless = [p for p in rest if p[0] in NAMELESS]
-        places = (UNKNOWN,) if left or nameless else rest or (NONE,)
+        places = (UNKNOWN,) if unknown else rest or (NONE,)
         shares[places] = shares.get(places, 0.0) + weight
     shares.setdefault((UNKNOWN,), 0.0)
     ranked = sorted(shares.items(), key=lambda item: -item[1])
     return tuple(Candidate(places, share) for places, share in ranked)
+
+
+def _with_laws(candidates: Sequence[Candidate], levels: Levels) -> tuple[Candidate, ...]:
+    """The likeliest set of linear effects, with each law that was weighed at a joint."""
+    first = tuple(p for p in candidates[0].places if p != NONE)
+    further = tuple((law.effect, law.at) for law in levels.laws[1:])
+    found = [
+        Candidate((*first, (effect, at), *further), share)
+        for effect, at, share in levels.candidates
+    ]
+    return *sorted(found, key=lambda c: -c.probability), Candidate((UNKNOWN,), 0.0)
 
 
 def _sets(

@@ -89,7 +89,7 @@ class SensorRotation(Operator):
         psi = Rotation.from_matrix(turned).as_rotvec()
         shape = (len(h), h.shape[1] // 3, 3, *h.shape[2:])
         columns = [np.einsum("ij,nmjcf->nmicf", a.T, h.reshape(shape)) for a in ACROSS]
-        nats, small = gain(np.stack([c.reshape(h.shape) for c in columns], 1), self.sd)
+        nats, small, _ = gain(np.stack([c.reshape(h.shape) for c in columns], 1), self.sd)
         return Start(self, psi, nats), Start(self, small, nats)
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:

@@ -14,8 +14,9 @@ import numpy as np
 
 from planner.dynamics.gradient import Impedance
 
-# (columns (n, k, r, c, F) of changes of H, their prior sds (k,)) → nats gained, likeliest ψ (k,).
-Gain = Callable[[np.ndarray, np.ndarray], tuple[float, np.ndarray]]
+# (columns (n, k, r, c, F) of changes of H, their prior sds (k,)) → nats gained, likeliest ψ (k,),
+# and by how much all other numbers (D,) of the fit move with it.
+Gain = Callable[[np.ndarray, np.ndarray], tuple[float, np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -94,11 +95,18 @@ class Motions:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """An effect, where a fit begins with it (ψ), and the nats that the first order promises."""
+    """An effect, where a fit begins with it (ψ, and by how much the other numbers move, if they
+    do), and the nats that the first order promises."""
 
     effect: "Operator"
     psi: np.ndarray
     nats: float
+    moved: np.ndarray | None = None
+
+
+def nats_of(start: Start) -> float:
+    """What the first order promises."""
+    return start.nats
 
 
 @dataclass(frozen=True)

@@ -44,9 +44,10 @@ class LinkSpring(Operator):
         return Impedance(self.port(poses), SHAPES, values, slope)
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
-        """By its columns; a fit begins without it, as FRFs are linear in it."""
+        """By its columns"""
         columns = motions.changed_by(self.impedance(motions.poses, np.zeros(len(SHAPES))))
-        return (Start(self, self.mean, gain(columns, self.sd)[0]),)
+        nats, psi, moved = gain(columns, self.sd)
+        return (Start(self, psi, nats, moved),)
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """See `Operator.vanishing`."""

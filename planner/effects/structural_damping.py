@@ -42,8 +42,8 @@ class LossFactors(Operator):
         """By the columns of all loss factors."""
         usual = np.exp(self.mean)
         columns = motions.changed_by(self.impedance(motions.poses, self.mean))
-        nats, share = gain(columns, np.ones(len(usual)))
-        return (Start(self, np.log(np.clip(share * usual, LEAST, MOST)), nats),)
+        nats, share, moved = gain(columns, np.ones(len(usual)))
+        return (Start(self, np.log(np.clip(share * usual, LEAST, MOST)), nats, moved),)
 
     def losses(self, psi: np.ndarray) -> dict[int, float]:
         """See `Operator.losses`."""

@@ -43,9 +43,10 @@ class VaryingSpring(Operator):
         return Impedance(ports, shapes, values, tuple(map(tuple, terms)))
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
-        """By its columns; a fit begins without it, as FRFs are linear in it."""
+        """By its columns"""
         columns = motions.changed_by(self.impedance(motions.poses, np.zeros(len(self.numbers))))
-        return (Start(self, self.mean, gain(columns, self.sd)[0]),)
+        nats, psi, moved = gain(columns, self.sd)
+        return (Start(self, psi, nats, moved),)
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """See `Operator.vanishing`."""

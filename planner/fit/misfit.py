@@ -375,8 +375,10 @@ class FrfMisfit:
         spent = np.linalg.slogdet(at.normal + s.precision)[1] - np.linalg.slogdet(s.precision)[1]
         return -0.5 * (at.chi2 + prior + at.volume + self.noise_volume + float(spent))
 
-    def gain(self, at: At, columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
-        """Nats that columns (n, k, r, c, F) of sds (k,) gain beside all else, and their size."""
+    def gain(
+        self, at: At, columns: np.ndarray, sd: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        """See `Gain`, of columns (n, k, r, c, F) of sds (k,)."""
         s, d = self.structure, self.structure.size
         kept, new = at.eliminated, self.whitened(columns)
         assert kept is not None
@@ -394,7 +396,7 @@ class FrfMisfit:
         inner = square * np.outer(sd, sd) + np.eye(k)
         z = -np.linalg.solve(inner, pull * sd)
         nats = 0.5 * float(z @ inner @ z) - 0.5 * float(np.linalg.slogdet(inner)[1])
-        return nats, z * sd
+        return nats, z * sd, -at.covariance @ (slope + cross @ (z * sd))
 
     def motions(self, at: At) -> Motions:
         """How hits and sensors move the springs, as effects' first-order columns need it."""

@@ -28,7 +28,7 @@ from planner.fit.fitted import (
 )
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import At, FrfMisfit
-from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
+from planner.fit.structure import REACH, RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.measurement.truncated_decay import completed
@@ -175,7 +175,7 @@ class Search:
         at = misfit(best.at.x, at.own, keep=True)
         motions = misfit.motions(at)
 
-        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
+        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
             return misfit.gain(at, columns, sd)
 
         free = effects_free(best.structure)
@@ -251,7 +251,7 @@ class Search:
 
             def gain(
                 columns: np.ndarray, sd: np.ndarray, base: StructureFit = base, at: At = at
-            ) -> tuple[float, np.ndarray]:
+            ) -> tuple[float, np.ndarray, np.ndarray]:
                 return base.misfit.gain(at, columns, sd)
 
             psi = best.at.x[best.structure.own[best.structure.effects.index(effect)]]
@@ -304,7 +304,10 @@ def _placed(base: StructureFit, start: Start) -> list[tuple[np.ndarray, int]]:
     x = structure.carried(base.structure, base.at.x)
     effect = structure.effects[-1]
     if not effect.springs:
+        if start.moved is not None:
+            x = structure.carried(base.structure, base.at.x + start.moved)
         x[structure.own[-1]] = start.psi
+        x = np.clip(x, structure.least, structure.mean + REACH * structure.sd)
         if not isinstance(effect, LinkResonator):
             return [(x, 4)]
         light = x.copy()
