@@ -174,7 +174,7 @@ def diagnose(
         found = explain(dataset, Simulation(robot), progress)
         left, poses = tied(found), offered or {}
         hit, sensor = next_hit(found, left, poses), extra_sensor(found, left, poses)
-        made = diagnosis_report(found, left, odd_pose(found))
+        made = diagnosis_report(found, odd_pose(found))
     return replace(made, next=hit, next_sensor=sensor, seconds=time.perf_counter() - started)
 
 

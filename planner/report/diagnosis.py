@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planner.design.discrimination import LIKELY
 from planner.design.extra_sensor import ExtraSensor
 from planner.design.next_hit import NextHit, in_words
 from planner.effects.effect import Operator
@@ -30,7 +31,6 @@ from planner.report.text import (
 from planner.words import probable
 
 if TYPE_CHECKING:
-    from planner.design.discrimination import Tied
     from planner.diagnosis.diagnose import Diagnosis
     from planner.diagnosis.odd_pose import OddPose
     from planner.robot.robot import Robot
@@ -263,22 +263,21 @@ def _unwritten(found: "Diagnosis") -> tuple[str, ...]:
     )
 
 
-def diagnosis_report(
-    found: "Diagnosis", tied: "Sequence[Tied]", odd: "OddPose | None" = None
-) -> DiagnosisReport:
-    """Of a diagnosis, and what it leaves `tied`."""
+def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> DiagnosisReport:
+    """Of a diagnosis."""
     recorded, verdict = found.recorded, found.verdict
     robot = found.search.prior.repertoire.stiff.robot
     matters, names = robot.config.diagnose.matters, place_names(robot)
     place = Residuals.of(found.refitted, found.search.band_hz, matters)
     sides = (RobotPosterior.of(f).misfits(matters)[0] for f in (found.refitted, found.best))
     aside = tuple(recorded.poses[i] for i in found.aside)
+    undecided = [c for c in verdict.candidates if c.probability > LIKELY]
     return DiagnosisReport(
         verdict=verdict.verdict,
-        findings=established_effects(found, tied, names),
+        findings=established_effects(found, undecided, names),
         place_names=names,
         candidates=tuple(RankedExplanation.of(c.places, c.probability) for c in verdict.candidates),
-        undecided=tuple(t.places for t in tied) if len(tied) > 1 else (),
+        undecided=tuple(c.places for c in undecided) if len(undecided) > 1 else (),
         sets=tuple(tuple(EffectAtPlace(*one) for one in members) for members in verdict.sets),
         where=MismatchPlaces.of(place, recorded.poses),
         fit=ThreeSimilarities.of(found.fitted),

@@ -9,8 +9,8 @@ from planner.report.place_names import with_names
 from planner.words import probable
 
 if TYPE_CHECKING:
-    from planner.design.discrimination import Tied
     from planner.diagnosis.diagnose import Diagnosis, Established
+    from planner.diagnosis.verdict import Candidate
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,10 @@ class EstablishedEffect:
 
 
 def established_effects(
-    found: "Diagnosis", tied: "Sequence[Tied]", names: Mapping[str, str]
+    found: "Diagnosis", undecided: "Sequence[Candidate]", names: Mapping[str, str]
 ) -> tuple[EstablishedEffect, ...]:
     """Those of signals and of fits; `names` are the robot's own of places, see `place_names`."""
-    others = "; ".join(in_words(t.places, t.probability) for t in tied[1:])
+    others = "; ".join(in_words(c.places, c.probability) for c in undecided[1:])
     rest = f" These recordings cannot tell it from: {others}." if others else ""
     return tuple(_of(e, "" if e.change is None else rest, names) for e in found.findings)
 
