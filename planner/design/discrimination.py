@@ -20,7 +20,7 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
 from planner.inference.block_diagonal import block_diagonal
 from planner.measurement.nuisances import OF_HAMMER
-from planner.recording.points import TOOL, Layout
+from planner.recording.points import TCP, Layout
 
 LIKELY = 0.05  # probability from which an explanation counts as tied with the likeliest
 MOST_TIED = 4  # compared: the likeliest
@@ -55,16 +55,17 @@ def tied(found: Diagnosis) -> tuple[Tied, ...]:
     )
 
 
-def separation(candidates: Sequence[Tied], q: np.ndarray, layout: Layout = TOOL) -> np.ndarray:
+def separation(candidates: Sequence[Tied], q: np.ndarray, more: tuple[str, ...] = ()) -> np.ndarray:
     """Expected logarithm of the odds (n, 3) that a hit along each tcp axis gives at q (n, dof).
 
-    q in rad; the sensors of `layout` listen. The odds are those of the true candidate to each other
-    one, averaged with their probabilities; 0 where there are fewer than two.
+    q in rad; sensors at the points `more` listen beside those of the recordings. The odds are those
+    of the true candidate to each other one, averaged with their probabilities; 0 where there are
+    fewer than two.
     """
     gain = np.zeros((len(q), AXES))
     share = np.array([c.probability for c in candidates])
     for place, row in enumerate(np.atleast_2d(q) if len(candidates) > 1 else ()):
-        seen = [_Predicted.of(RobotPosterior.of(c.fit), row, layout) for c in candidates]
+        seen = [_Predicted.of(RobotPosterior.of(c.fit), row, more) for c in candidates]
         for true, other in permutations(range(len(candidates)), 2):
             weight = share[true] * share[other] / (1 - share[true])
             gain[place] += weight * seen[other].left_of(seen[true]) / 2
@@ -82,18 +83,17 @@ class _Predicted:
     misfit: FrfMisfit
 
     @classmethod
-    def of(cls, posterior: RobotPosterior, q: np.ndarray, layout: Layout) -> "_Predicted":
+    def of(cls, posterior: RobotPosterior, q: np.ndarray, more: tuple[str, ...]) -> "_Predicted":
         """At q (dof,) in rad; what hits, readback and visits leave open moves it too."""
         found, measured = posterior.found, posterior.found.misfit.data.measured
         lines = np.linspace(measured.frequency_hz.min(), measured.frequency_hz.max(), LINES)
+        layout = Layout((TCP,), (*measured.layout.sensors, *more))
         structure = replace(posterior.structure, sensors=len(layout.sensors))
-        data = posterior.at(q[None], lines, layout)
         sloped = structure.prior.carried.with_slopes(q, layout)
-        data = replace(data, matrices=sloped)
+        data = replace(posterior.at(q[None], lines, layout), matrices=sloped)
         misfit = FrfMisfit(structure, data, posterior.tolerances, posterior.size)
         # Of a sensor that is new nothing is known but its tolerances.
-        known = posterior.structure.chain.stop - OF_HAMMER
-        same = [*range(min(known, structure.size - OF_HAMMER)), -2, -1]
+        same = [*range(posterior.structure.size - OF_HAMMER), -2, -1]
         x, precision = structure.mean.copy(), structure.precision.copy()
         x[same] = found.at.x[same]
         precision[np.ix_(same, same)] = (found.at.normal + found.at.precision)[np.ix_(same, same)]

@@ -11,7 +11,7 @@ from planner.design.next_hit import evenly, in_words
 from planner.design.odds import as_ratio
 from planner.diagnosis.diagnose import Diagnosis
 from planner.recording.joints import JointUnits
-from planner.recording.points import SENSOR, TCP, Layout
+from planner.recording.points import SENSOR, TCP
 
 MOST_POSES = 12  # at which the points are compared, evenly taken from those there are
 # A sensor is only worth being moved where it tells so much more than the same hit without it;
@@ -64,12 +64,8 @@ def extra_sensor(
         return None
     measured = dict(zip(recorded.poses, recorded.q, strict=True))
     names, q = evenly({**measured, **offered}, MOST_POSES)
-
-    def told(sensors: tuple[str, ...]) -> np.ndarray:
-        return separation(tied, q, Layout((TCP,), sensors))
-
-    without = float(told(there).max())
-    each = {place: told((*there, place)) for place in sorted(places)}
+    without = float(separation(tied, q).max())
+    each = {place: separation(tied, q, (place,)) for place in sorted(places)}
     best = max(each, key=lambda place: each[place].max())
     most = float(each[best].max())
     if most < without + WORTH:

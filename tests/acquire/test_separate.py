@@ -18,7 +18,6 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.search import Search
 from planner.fit.structure import RobotStructure
 from planner.frf.frf import Frf
-from planner.recording.points import Layout
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.load import load_truth
@@ -122,7 +121,7 @@ def test_a_sensor_at_the_foot_parts_floor_and_first_joint(
     assert found.log_odds > found.log_odds_without + WORTH
     assert "A sensor at foot would tell base compliance at base" in found.sentence
     row = cell.search.q[["P1", "P2"].index(found.pose)]
-    alone = separation(tied, row[None], Layout(("tcp",), ("sensor", "foot")))
+    alone = separation(tied, row[None], ("foot",))
     assert alone[0]["xyz".index(found.hit)] == pytest.approx(found.log_odds)
     assert extra_sensor(cell.found(tied), tied[:1], {}) is None
     assert extra_sensor(cell.found(tied), (tied[0], tied[0]), {}) is None
