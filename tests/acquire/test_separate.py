@@ -48,12 +48,12 @@ class Cell:
         """Both explanations, settled."""
         data, prior = self.search.data(FITTED), self.search.prior
         found, built = [], prior.repertoire.as_built()
-        for effect in prior.repertoire.effects:
-            if effect.label in PLACES:
-                structure = RobotStructure(prior, (*built, effect), data.sensors)
-                misfit = FrfMisfit(structure, data, self.search.tolerances)
-                fit = converged(settled(misfit, misfit(structure.mean), rounds=3))
-                found.append(Tied((PLACES[effect.label],), 0.5, fit))
+        every = {effect.label: effect for effect in prior.repertoire.effects}
+        for label, place in PLACES.items():
+            structure = RobotStructure(prior, (*built, every[label]), data.sensors)
+            misfit = FrfMisfit(structure, data, self.search.tolerances)
+            fit = converged(settled(misfit, misfit(structure.mean), rounds=3))
+            found.append(Tied((place,), 0.5, fit))
         return tuple(found)
 
     def found(self, tied: tuple[Tied, ...]) -> Any:
