@@ -88,8 +88,7 @@ class RobotPosterior:
         measured = Measured(
             lines, 2j * np.pi * lines, ones.astype(complex), ones, np.full(len(q), np.inf)
         )
-        early = np.zeros(len(q))
-        return FrfData(q, measured, elastic.matrices(q), elastic.body_jacobians(q), early)
+        return FrfData(q, measured, elastic.matrices(q), elastic.body_jacobians(q))
 
     @cached_property
     def _carried(self):
