@@ -5,14 +5,12 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.thresholds import (
-    TONE_BESIDE_HZ,
-    TONE_CONCENTRATED,
-    TONE_LEAST,
-    TONE_SOUNDS_ON,
-    TONE_STANDS_OUT,
-    TONE_WIDTH_HZ,
-)
+
+WIDTH_HZ = 1.0  # half of what a tone takes up under the window
+CONCENTRATED = 0.6  # share of the levels' differences that lies there, at all poses together
+LEAST = 10.0  # χ² per value there: below it levels hardly differ
+SOUNDS_ON = 0.7  # of its size in the third quarter of a record that a tone has in the last
+STANDS_OUT, BESIDE_HZ = 3.0, 1.5  # power there over that beside it
 
 
 def screen_tone(recorded: Dataset) -> Finding | None:
@@ -35,12 +33,12 @@ def screen_tone(recorded: Dataset) -> Finding | None:
         noise += np.where(used, (variance * np.abs(weak.force) ** 2).sum(axis=0) / scale, 0.0)
     over = np.maximum(excess - noise, 0.0)
     line = int(np.argmax(over))
-    near = np.abs(frequency - frequency[line]) <= TONE_WIDTH_HZ
+    near = np.abs(frequency - frequency[line]) <= WIDTH_HZ
     share = float(over[near].sum() / max(over.sum(), 1e-300))
-    if excess[near].sum() < TONE_LEAST * noise[near].sum() or share < TONE_CONCENTRATED:
+    if excess[near].sum() < LEAST * noise[near].sum() or share < CONCENTRATED:
         return None
     hz = float(np.sum(frequency[near] * over[near]) / over[near].sum())
-    if _kept(recorded, hz) < TONE_SOUNDS_ON:
+    if _kept(recorded, hz) < SOUNDS_ON:
         return None  # a resonance that hardly moves with the pose: it dies away
     spacing = float(frequency[1] - frequency[0])
     text = (
@@ -56,7 +54,7 @@ def _kept(recorded: Dataset, hz: float) -> float:
 
     0 where it does not stand out from what lies beside it there.
     """
-    beside = np.array([0.0, -3.0, -2.0, 2.0, 3.0]) * TONE_BESIDE_HZ + hz
+    beside = np.array([0.0, -3.0, -2.0, 2.0, 3.0]) * BESIDE_HZ + hz
     power = np.zeros((2, len(beside)))
     for hit in (h for visit in recorded.visits for h in visit.hits if not recorded.level(h)):
         n = len(hit.force_n)
@@ -66,7 +64,7 @@ def _kept(recorded: Dataset, hz: float) -> float:
             power[number] += np.sum(np.abs(hit.acceleration_m_s2[:, first:last] @ waves.T) ** 2, 0)
     noise = np.median(power[:, 1:], axis=1)
     before, after = np.maximum(power[:, 0] - noise, 0.0)
-    if after < TONE_STANDS_OUT * noise[1] or before == 0:
+    if after < STANDS_OUT * noise[1] or before == 0:
         return 0.0
     return float(np.sqrt(after / before))
 

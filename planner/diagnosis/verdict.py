@@ -85,7 +85,7 @@ def judged(
     Sizes are told at q (n, dof) in rad, poses that were not measured. Averages over levels are bent
     by a joint's law: beside one only what changes FRFs by more than levels do is told.
     """
-    weights = _weights(explored.settled)
+    weights = probabilities(explored.settled)
     best = max(explored.settled, key=lambda f: weights[key_of(f)])
     effects = _weighed(explored, best, weights, matters, q)
     laws = levels.laws if levels else ()
@@ -108,7 +108,7 @@ def judged(
     return Verdict(verdict, tuple(effects), candidates, _sets(named, weights), best)
 
 
-def _weights(fits: Sequence[StructureFit]) -> dict[frozenset[Place], float]:
+def probabilities(fits: Sequence[StructureFit]) -> dict[frozenset[Place], float]:
     """Probability of each set of effects, among all that were settled."""
     logs = {key_of(f): f.evidence - RARE * len(key_of(f)) for f in fits}
     total = float(logsumexp(list(logs.values())))
@@ -163,7 +163,7 @@ def _band(best: StructureFit) -> tuple[float, float]:
 
 def _physics(posterior: RobotPosterior, q: np.ndarray, lines: np.ndarray) -> np.ndarray:
     """FRFs (n, 3, 3, F) of the robot itself, in m/s²/N."""
-    misfit = replace(posterior.found.misfit, data=posterior._at(q, np.tile(lines, (len(q), 1))))
+    misfit = replace(posterior.found.misfit, data=posterior.at(q, lines))
     return misfit.motion(posterior.x, None).accelerance
 
 

@@ -284,7 +284,7 @@ class FrfMisfit:
         numbers, joints = self.open_numbers
         return np.zeros((len(self.data.q), numbers.hits + joints + len(self.structure.springs)))
 
-    def _about(self, own: np.ndarray, x: np.ndarray) -> np.ndarray:
+    def about(self, own: np.ndarray, x: np.ndarray) -> np.ndarray:
         """(n, hits + chain + joints), from own numbers and the chain as x has it."""
         numbers, joints = self.open_numbers
         chain = np.tile(x[self.structure.chain], (len(own), 1))
@@ -303,7 +303,7 @@ class FrfMisfit:
         if own is not None:
             given[:, :size] = np.clip(own[:, :size], -FARTHEST, FARTHEST)
         m, d = self.data.measured, self.structure.size
-        h, columns, motion = self.columns(x, self._about(given, x))
+        h, columns, motion = self.columns(x, self.about(given, x))
         there = np.einsum("nl,nlijf->nijf", given[:, :size], columns[:, d : d + size])
         if self.rho is None:
             off = h * np.log(np.where(self._told(h), h / m.accelerance, 1.0)) - there

@@ -9,12 +9,11 @@ from matplotlib.colors import LogNorm, to_rgb
 from rich.console import Console
 
 from planner.diagnosis.odd_pose import OddPose
-from planner.diagnosis.residual_location import Where
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.diagnosis import DiagnosisReport, RankedExplanation
 from planner.report.diagnosis_plots import _overlay, _residuals
 from planner.report.kept_diagnosis import two_answers
-from planner.report.mismatch import MismatchShares
+from planner.report.mismatch import MismatchShares, Residuals
 from planner.report.place_names import place_names, with_names
 from planner.report.plot_text import ink
 from planner.report.refitted_springs import RefittedSpring
@@ -123,7 +122,7 @@ class _Said:
 def test_residuals_by_direction_share_a_scale_that_is_shown():
     rng = np.random.default_rng(0)
     places = [
-        Where(np.linspace(4, 60, 9), *(s * rng.uniform(1, 30, n) for n in (8, 3, (3, 3))))
+        Residuals(np.linspace(4, 60, 9), *(s * rng.uniform(1, 30, n) for n in (8, 3, (3, 3))))
         for s in (1.0, 0.05)
     ]
     figure = _residuals(*places, ["A$1$", "B", "C"], "")
@@ -143,7 +142,7 @@ def test_a_refit_that_is_farther_off_is_explained():
 def test_curves_that_agree_are_all_seen(picture):
     """By the colours on the picture: none is covered by one that is drawn later."""
     lines, curve = np.linspace(4.0, 60.0, 100), 10 ** np.linspace(-3.0, 1.0, 100)
-    place = Where(np.linspace(4, 60, 9), np.full(8, 3.0), np.full(3, 2.0), np.ones((3, 3)))
+    place = Residuals(np.linspace(4, 60, 9), np.full(8, 3.0), np.full(3, 2.0), np.ones((3, 3)))
     if picture == "residuals":
         figure, colours = _residuals(place, place, ["A", "B", "C"], ""), ("tab:orange", "tab:red")
     else:
