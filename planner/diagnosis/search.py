@@ -28,7 +28,8 @@ from planner.fit.search import Search, _placed
 from planner.fit.structure import RobotStructure, effects_free
 
 FITTED, SCREENED, ROUGH, AFAR = 24, 48, 14, 12  # lines a pose
-LEAST = 12.0  # nats that one more effect must gain
+RARE = 5.0  # nats: one effect at one place, of some 70, is so much rarer than none
+LEAST = RARE + float(np.log(9.0))  # nats that one more effect must gain: it is 9 times as likely
 CLOSE = 0.03  # of |H|, from which effects are fitted from afar too
 FOLLOWED, SETTLED, FARTHEST = 6, 4, 5  # how many are followed, settled, come from afar
 LOG_STEPS, FEW, FURTHER = 6, 6, 4

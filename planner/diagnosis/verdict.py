@@ -13,12 +13,11 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from planner.diagnosis.levels import Levels
-from planner.diagnosis.search import LEAST, Explored, added, key_of
+from planner.diagnosis.search import LEAST, RARE, Explored, added, key_of
 from planner.effects.effect import Operator
 from planner.fit.fitted import StructureFit, evidence_of, settled, size_of, without
 from planner.fit.posterior import RobotPosterior
 
-RARE = 5.0  # nats: prior odds of one effect at one place, of some 70, as likely as none
 SURE = 0.9  # probability from which an effect's size counts as beyond what matters
 EXPLAINS = 2.0  # times what matters: a discrepancy up to which nothing else is wanted
 # Effects without a name of their own imitate what a named one's shape lacks: they count from so
@@ -92,8 +91,11 @@ def judged(
     laws = levels.laws if levels else ()
     if levels and laws:
         bent = BENT * levels.seen.size
-        effects = [replace(e, counts=e.counts and (e.operator.artefact or e.change > bent))
-                   for e in effects]  # fmt: skip
+        bends = {law.at for law in laws}
+        beside = [e.operator.artefact or (e.change > bent and e.place[1] not in bends)
+                  for e in effects]  # fmt: skip
+        pairs = zip(effects, beside, strict=True)
+        effects = [replace(e, counts=e.counts and apart) for e, apart in pairs]
     named = [e for e in effects if e.counts]
     nameless = any(e.place[0] in NAMELESS for e in named)
     left = (size_of(best) > EXPLAINS * matters or nameless) and not laws
@@ -128,7 +130,7 @@ def _weighed(
     for effect in added(best):
         fewer = _without(explored, best, effect)
         if fewer is None:
-            nats, change = np.inf, 1.0
+            nats, change = gained, 1.0
         else:
             nats = best.evidence - fewer.evidence
             other = _physics(RobotPosterior.of(fewer), q, lines)

@@ -23,7 +23,7 @@ class FrfData:
     measured: Measured
     matrices: Matrices
     jacobians: np.ndarray
-    order: np.ndarray
+    order: np.ndarray | None = None  # nothing changes in the course of time
 
     @classmethod
     def of(
@@ -43,7 +43,6 @@ class FrfData:
         measured = stack(frfs, seen, lines, SMALLEST, geometric=True)
         elastic = prior.carried
         matrices = matrices_at(elastic, q, frfs, sloped=True)
-        order = np.zeros(len(q)) if order is None else order
         return cls(q, measured, matrices, elastic.body_jacobians(q), order)
 
     @property
@@ -56,9 +55,8 @@ class FrfData:
         springs = list(structure.springs)
         bodies = structure.prior.repertoire.simulation.elastic.bodies
         jacobians = self.jacobians[..., springs]
-        return PosedBodies(
-            self.q, self.measured.s, jacobians, bodies, structure.springs, self.order
-        )
+        order = np.zeros(len(self.q)) if self.order is None else self.order
+        return PosedBodies(self.q, self.measured.s, jacobians, bodies, structure.springs, order)
 
     def at(self, poses: np.ndarray) -> "FrfData":
         """Of some of the poses, by their numbers."""
@@ -67,7 +65,7 @@ class FrfData:
             self.measured.at(poses),
             self.matrices.at(poses),
             self.jacobians[poses],
-            self.order[poses],
+            None if self.order is None else self.order[poses],
         )
 
 

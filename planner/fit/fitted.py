@@ -156,7 +156,7 @@ def without(best: StructureFit, effects: Sequence[Operator], steps: int = 5) -> 
     for effect in effects:
         structure = structure.without(effect)
     misfit = replace(best.misfit, structure=structure)
-    x = structure.carried(best.structure, best.at.x)
+    x = np.maximum(structure.carried(best.structure, best.at.x), structure.least)
     if not misfit.possible(x):
         return None
     at = minimised(misfit, x, steps, 1.0, best.at.own)

@@ -89,8 +89,8 @@ class RobotPosterior:
         measured = Measured(
             lines, 2j * np.pi * lines, ones.astype(complex), ones, np.full(len(q), np.inf), layout
         )
-        matrices, early = elastic.matrices(q, layout=layout), np.zeros(len(q))
-        return FrfData(q, measured, matrices, elastic.body_jacobians(q), early)
+        matrices = elastic.matrices(q, layout=layout)
+        return FrfData(q, measured, matrices, elastic.body_jacobians(q))
 
     @cached_property
     def _carried(self):
