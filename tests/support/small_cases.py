@@ -32,7 +32,7 @@ SOFT = tuple(
     for axis, k in BASE.items()
 )
 TURNED = Rotation.from_euler("zyx", [15.0, -10.0, 5.0], degrees=True).as_matrix()
-GAIN, WINDOW_S, HOSE_HZ, HOSE_KG, MASS_KG = 0.7, 0.5, 21.0, 3.0, 9.0
+GAIN, WINDOW_S, HOSE_HZ, HOSE_KG, MASS_KG = 0.7, 0.5, 21.0, 3.0, 25.0
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,10 @@ CONCEALED = {
     "nothing": Concealed(),
     "soft base": Concealed((("base_compliance", "base"),), {"extra": SOFT}),
     "bending link": Concealed(
-        (("link_flexibility", "link_2"),), {"beams": (BentLink("l2", (7e5, 9e5), 7e5, 3e-4),)}
+        (("link_flexibility", "link_2"),), {"beams": (BentLink("l2", (1.6e6, 2e6), 1.6e6, 3e-4),)}
     ),
     "added mass": Concealed(
-        (("added_mass", "link_3"),), {"added": (AttachedMass("l3", (0.1, 0.1, 0.1), MASS_KG),)}
+        (("added_mass", "link_3"),), {"added": (AttachedMass("l3", (0.2, 0.15, 0.1), MASS_KG),)}
     ),
     "hose": Concealed(
         (("local_resonator", "link_3"),),
