@@ -11,8 +11,8 @@ from planner.truth.deviation import (
     AttachedMass,
     AttachedResonator,
     BentLink,
-    Bridge,
     Deviation,
+    Feedback,
     Spring,
     StiffnessRipple,
 )
@@ -78,10 +78,9 @@ CONCEALED = {
         (("angle_dependent_stiffness", "joint_2"),),
         {"harmonics": (StiffnessRipple("a2", 2, 0.35, 0.2),)},
     ),
+    # A controller that breaks reciprocity: nothing that only holds or weighs does.
     "outsider": Concealed(
-        (("unknown", ""),),
-        {"bridges": (Bridge(("floor", "l3"), ((0.9, 0.3, 0.6), (0.1, 0.1, 0)), (0.6, 0, 0.8), 3e5,
-                            60.0),)},
+        (("unknown", ""),), {"feedback": (Feedback(driven="a2", sensed="a3", gain=2e5),)}
     ),
 }  # fmt: skip
 CONCEALED["base and gain"] = CONCEALED["soft base"] | CONCEALED["gain"]
