@@ -11,7 +11,7 @@ from rich.text import Text
 
 from planner.design.discrimination import LIKELY
 from planner.design.extra_sensor import ExtraSensor
-from planner.design.next_hit import NextHit, in_words
+from planner.design.next_hit import NextHit
 from planner.effects.effect import Operator
 from planner.errors import InputError
 from planner.fit.posterior import RobotPosterior
@@ -77,8 +77,8 @@ class DiagnosisReport(Answer):
 
     `undecided` are those that the recordings cannot tell apart; `sets` name, for what was found,
     the effects any one of which may stand in its place; `next_sensor` is where one more sensor
-    would part what is tied, `odd_pose` is the one at odds with all others. `diagnosis` holds the
-    fits.
+    would part what is tied, `odd_pose` is the one at odds with all others. `closest` are the
+    effects of the best fit, `diagnosis` holds all of them.
     """
 
     verdict: str
@@ -100,6 +100,7 @@ class DiagnosisReport(Answer):
     urdf: Path | None = field(default=None, metadata=NOT_IN_JSON)
     campaign_robot: Path | None = field(default=None, metadata=NOT_IN_JSON)
     plots: tuple[str, ...] = ()
+    closest: tuple[EffectAtPlace, ...] = field(default=(), metadata=NOT_IN_JSON)
     next: NextHit | None = None
     next_sensor: ExtraSensor | None = None
     odd_pose: "OddPose | None" = None
@@ -193,11 +194,10 @@ class DiagnosisReport(Answer):
     @property
     def verdict_text(self) -> str:
         """The verdict in words; where nothing describes it all, what comes nearest too."""
-        known = [c for c in self.candidates if c.effect not in ("unknown", "none")]
         first = self.candidates[0] if self.candidates else None
-        if self.verdict != "unexplained" or not known or first is None:
+        if self.verdict != "unexplained" or not self.closest or first is None:
             return VERDICTS[self.verdict]
-        near = in_words([(e.effect, e.at) for e in known[0].effects], known[0].probability)
+        near = " and ".join(f"{e.effect.replace('_', ' ')} at {e.at}" for e in self.closest)
         near = with_names(near, self.place_names)
         agrees = self.fit.explained.frac
         return (
@@ -288,5 +288,6 @@ def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> Diagno
         remarks=(*recorded.remarks, *found.remarks),
         simulated=recorded.simulated,
         odd_pose=odd,
+        closest=tuple(EffectAtPlace(*e.place) for e in verdict.effects if e.counts),
         diagnosis=found,
     )

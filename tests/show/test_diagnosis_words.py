@@ -10,7 +10,7 @@ from rich.console import Console
 
 from planner.diagnosis.odd_pose import OddPose
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
-from planner.report.diagnosis import DiagnosisReport, RankedExplanation
+from planner.report.diagnosis import DiagnosisReport, EffectAtPlace, RankedExplanation
 from planner.report.diagnosis_plots import _overlay, _residuals
 from planner.report.kept_diagnosis import two_answers
 from planner.report.mismatch import MismatchShares, Residuals
@@ -33,6 +33,7 @@ def report(verdict: str, *ranked) -> DiagnosisReport:
         "verdict": verdict, "findings": (), "remarks": (), "plots": (), "simulated": False,
         "candidates": tuple(RankedExplanation.of(p, q) for p, q in ranked),
         "fit": ThreeSimilarities(*sides), "place_names": {},
+        "closest": tuple(EffectAtPlace(*one) for p, _ in ranked for one in p if one[1]),
     }  # fmt: skip
     return DiagnosisReport(**(empty | given))
 
@@ -41,7 +42,7 @@ def test_what_comes_nearest_is_named_beside_the_unknown():
     said = report("unexplained", (UNKNOWN, 0.92), (BASE, 0.08)).verdict_text
     assert said.startswith("None of the effects that planner knows explains")
     assert "(probability 92 %)" in said
-    assert "base compliance at base and transverse compliance at joint_1 (8 %)" in said
+    assert "base compliance at base and transverse compliance at joint_1:" in said
     assert "0.9999" in said
 
 
