@@ -49,8 +49,14 @@ def key_of(found: StructureFit) -> Key:
 
 def added(found: StructureFit) -> tuple[Operator, ...]:
     """Effects beside those that every robot has."""
-    built = {e.label for e in found.structure.prior.repertoire.as_built()}
-    return tuple(e for e in found.structure.effects if e.label not in built)
+    there = {e.label for e in built(found)}
+    return tuple(e for e in found.structure.effects if e.label not in there)
+
+
+def built(found: StructureFit) -> tuple[Operator, ...]:
+    """Those that every robot has."""
+    there = {e.label for e in found.structure.prior.repertoire.as_built()}
+    return tuple(e for e in found.structure.effects if e.label in there)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import expit, logsumexp
 from scipy.stats import norm
 
 from planner.diagnosis.levels import Levels
-from planner.diagnosis.search import LEAST, RARE, Explored, added, key_of
+from planner.diagnosis.search import LEAST, RARE, Explored, added, built, key_of
 from planner.effects.effect import Operator
 from planner.fit.fitted import StructureFit, evidence_of, settled, size_of, without
 from planner.fit.posterior import RobotPosterior
@@ -127,7 +127,7 @@ def _weighed(
     whole = RobotPosterior.of(best)
     h = _physics(whole, q, lines)
     found = []
-    for effect in added(best):
+    for effect in (*added(best), *_beyond(best)):
         fewer = _without(explored, best, effect)
         if fewer is None:
             nats, change = gained, 1.0
@@ -136,6 +136,8 @@ def _weighed(
             other = _physics(RobotPosterior.of(fewer), q, lines)
             change = float(np.linalg.norm(np.abs(h) - np.abs(other)) / np.linalg.norm(h))
         probability = sum(w for key, w in weights.items() if effect.name in key)
+        if effect in built(best):
+            probability = float(expit(nats - RARE))
         # Its size is as well known as its amplitude is.
         vague = effect.name[0] in NAMELESS
         least = matters * (VAGUE if vague else 1.0)
@@ -144,6 +146,15 @@ def _weighed(
         counts = there and (effect.absorbed or sure >= SURE)
         found.append(NamedEffect(effect, float(nats), change, float(probability), bool(counts)))
     return sorted(found, key=lambda e: -e.change)
+
+
+def _beyond(best: StructureFit) -> list[Operator]:
+    """What every robot has, where it is so much that it is worth a word."""
+    structure, x = best.structure, best.at.x
+    e, omega = structure.elasticity(x), 2 * np.pi * float(np.sqrt(np.prod(_band(best))))
+    viscous = dict(zip(structure.springs, omega * e.damping / e.stiffness, strict=True))
+    own = zip(structure.effects, structure.own, strict=True)
+    return [f for f, at in own if f in built(best) and f.beyond(x[at], viscous)]
 
 
 def _without(explored: Explored, best: StructureFit, effect: Operator) -> StructureFit | None:
@@ -176,6 +187,7 @@ def _candidates(
     """Sets by what of them counts; what no name explains is "unknown"."""
     counts = {e.place for e in effects if e.counts}
     idle = {e.place for e in effects} - counts
+    heard = (*heard, *sorted(p for p in counts if not any(p in key for key in weights)))
     shares: dict[tuple[Place, ...], float] = {}
     for key, weight in weights.items():
         rest = (*heard, *sorted(p for p in key if p not in idle))

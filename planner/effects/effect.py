@@ -182,6 +182,13 @@ class Operator(ABC):
         """The body whose inertia (10,) it changes, where it is nothing else, and by what."""
         return None
 
+    def beyond(self, psi: np.ndarray, viscous: Mapping[int, float]) -> bool:
+        """Whether what every robot has is so much that it is worth a word.
+
+        `viscous` are the loss factors of springs' dampers in the middle of the band, by number.
+        """
+        return False
+
     def losses(self, psi: np.ndarray) -> dict[int, float]:
         """Loss factors that it gives springs, by their numbers."""
         return {}

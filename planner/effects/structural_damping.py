@@ -9,6 +9,7 @@ from planner.dynamics.gradient import Impedance
 from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
 
 LEAST, MOST = 0.002, 0.3  # of a start
+INSTEAD = 0.8  # share of the dissipation, from which loss factors take the place of dampers
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,11 @@ class LossFactors(Operator):
         columns = motions.changed_by(self.impedance(motions.poses, self.mean))
         nats, share, moved = gain(columns, np.ones(len(usual)))
         return (Start(self, np.log(np.clip(share * usual, LEAST, MOST)), nats, moved),)
+
+    def beyond(self, psi: np.ndarray, viscous: Mapping[int, float]) -> bool:
+        """Whether most springs dissipate so instead of by their dampers."""
+        shares = [eta / (eta + viscous[spring]) for spring, eta in self.losses(psi).items()]
+        return float(np.median(shares)) > INSTEAD
 
     def losses(self, psi: np.ndarray) -> dict[int, float]:
         """See `Operator.losses`."""
