@@ -9,7 +9,7 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.exponential_window import screen_window
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.levels import JointLaw, Levels, level_laws
+from planner.diagnosis.levels import LevelLaw, Levels, level_laws
 from planner.diagnosis.search import FITTED, LEAST, Explored, Explorer
 from planner.diagnosis.verdict import NamedEffect, Verdict, judged
 from planner.dynamics.simulation import Simulation
@@ -105,7 +105,7 @@ class Diagnosis:
         ]
         return *heard, *laws, *(self._established(e, e.probability) for e in self.verdict.findings)
 
-    def _share(self, law: JointLaw) -> float:
+    def _share(self, law: LevelLaw) -> float:
         place = law.effect, law.at
         return sum(c.probability for c in self.verdict.candidates if place in c.places)
 
@@ -166,7 +166,7 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
     )
 
 
-def _words(law: JointLaw) -> str:
+def _words(law: LevelLaw) -> str:
     """What to do about a joint's law."""
     said = {
         "friction": f"{law.at} rubs: check its lubrication, seals and brake.",

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from planner.dataset.dataset import Dataset
-from planner.diagnosis.levels_hits import HitGroup, Port, hit_groups, own_ports
+from planner.diagnosis.levels_hits import HitGroup, JointPort, hit_groups, own_ports
 from planner.diagnosis.levels_laws import SHAPES, JointMotions, numbers_of
 from planner.diagnosis.levels_weighing import Differences, Values, Weighing, differences, share_of
 from planner.fit.fitted import StructureFit
@@ -33,7 +33,7 @@ MOST = 2  # joints
 
 
 @dataclass(frozen=True)
-class JointLaw:
+class LevelLaw:
     """An effect at a joint: nats over a linear one, numbers with sds and units.
 
     `share` of |H| is by how much hits of different force differ by it.
@@ -57,7 +57,7 @@ class Levels:
 
     seen: Differences
     left: Differences
-    laws: tuple[JointLaw, ...] = ()
+    laws: tuple[LevelLaw, ...] = ()
     free: dict[str, float] = field(default_factory=dict)
     candidates: tuple[tuple[str, str, float], ...] = ()
     unexplained: bool = False
@@ -78,7 +78,7 @@ def level_laws(recorded: Dataset, found: StructureFit) -> Levels:
     return laws_of(groups, ports, config.diagnose.matters)
 
 
-def laws_of(groups: Sequence[HitGroup], ports: Sequence[Port], matters: float) -> Levels:
+def laws_of(groups: Sequence[HitGroup], ports: Sequence[JointPort], matters: float) -> Levels:
     """The same of groups of hits; what changes less than `matters` of |H| is no law."""
     if not groups or not ports:
         return Levels(Differences(0.0, 1.0), Differences(0.0, 1.0))
@@ -102,7 +102,7 @@ def laws_of(groups: Sequence[HitGroup], ports: Sequence[Port], matters: float) -
             found = replace(found, free=gains, candidates=_candidates(fits, at, gains))
         if fit.nats - null < LEAST or size < matters:
             break
-        law = JointLaw(effect, at, fit.nats - null, fit.parameters(port.slides), size)
+        law = LevelLaw(effect, at, fit.nats - null, fit.parameters(port.slides), size)
         found = replace(found, laws=(*found.laws, law))
         left = [v - c for v, c in zip(left, fit.changes, strict=True)]
         null, rho = search.likeliest(lambda w, left=left: w.evidence(left), fit.rho)

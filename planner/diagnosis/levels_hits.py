@@ -21,7 +21,7 @@ FADED = 0.05  # of the window's weight, below which nothing is told of a motion
 
 
 @dataclass(frozen=True)
-class Port:
+class JointPort:
     """A joint's spring about (along) its own axis: "joint_2", N·m/rad (N/m)."""
 
     at: str
@@ -97,16 +97,16 @@ class Clock:
         return whole[..., 1 : self.lines + 1] * (self.samples / self.count)
 
 
-def own_ports(found: StructureFit) -> tuple[tuple[Port, ...], list[int]]:
+def own_ports(found: StructureFit) -> tuple[tuple[JointPort, ...], list[int]]:
     """The joints with a spring of their own, and its numbers among the structure's springs."""
     s = found.structure
     robot, stiffness = s.prior.repertoire.simulation.robot, s.elasticity(found.at.x).stiffness
-    ports: dict[str, tuple[Port, int]] = {}
+    ports: dict[str, tuple[JointPort, int]] = {}
     for own, spring in enumerate(s.springs):
         block = robot.config.compliance[spring]
         if robot.is_own(block):
             at = f"joint_{robot.joint_names.index(block.joint) + 1}"
-            ports.setdefault(at, (Port(at, float(stiffness[own]), bool(block.slide)), own))
+            ports.setdefault(at, (JointPort(at, float(stiffness[own]), bool(block.slide)), own))
     return tuple(p for p, _ in ports.values()), [own for _, own in ports.values()]
 
 
