@@ -12,9 +12,11 @@ from planner.campaign.material import Material
 from planner.dataset.dataset import Dataset
 from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import in_parts
+from planner.design.discrimination import tied
 from planner.design.extra_sensor import extra_sensor
 from planner.design.next_hit import next_hit
 from planner.diagnosis.diagnose import explain
+from planner.diagnosis.odd_pose import odd_pose
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS, Priors
 from planner.errors import InputError, RefusedError
@@ -169,9 +171,10 @@ def diagnose(
     """
     started = time.perf_counter()
     with threadpool_limits(1):
-        explained = explain(dataset, Simulation(robot), progress)
-        hit, sensor = next_hit(explained, offered or {}), extra_sensor(explained, offered or {})
-        made = diagnosis_report(explained)
+        found = explain(dataset, Simulation(robot), progress)
+        left, poses = tied(found), offered or {}
+        hit, sensor = next_hit(found, left, poses), extra_sensor(found, left, poses)
+        made = diagnosis_report(found, odd_pose(found))
     return replace(made, next=hit, next_sensor=sensor, seconds=time.perf_counter() - started)
 
 

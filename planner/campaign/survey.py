@@ -14,10 +14,10 @@ from planner.dataset.screened_files import Source, in_parts
 from planner.dynamics.simulation import Simulation
 from planner.errors import RefusedError, RefusedFile
 from planner.frf.frf import Frf
-from planner.identification.sensor_masses import WithoutSensors, without_sensors
 from planner.measurement.measured_frfs import common_band
 from planner.measurement.nuisances import Tolerances
 from planner.measurement.point_places import misplaced, questions
+from planner.measurement.sensor_masses import WithoutSensors, without_sensors
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
 from planner.recording.folder import joint_columns, read_recordings

@@ -28,7 +28,7 @@ from planner.fit.fitted import (
 )
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import At, FrfMisfit
-from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
+from planner.fit.structure import REACH, RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.measurement.truncated_decay import completed
@@ -59,10 +59,12 @@ class Search:
     tolerances: Tolerances
     tell: Callable[[str], None] = lambda _: None
     extend: bool = True  # where what is stated does not explain them
+    order: np.ndarray | None = None  # as in `FrfData.of`
+    floor: float = 0.0  # as in `FrfMisfit`
 
     def data(self, lines: int) -> FrfData:
         """On so many lines a pose."""
-        return FrfData.of(self.prior, self.frfs, self.q, self.band_hz, lines)
+        return FrfData.of(self.prior, self.frfs, self.q, self.band_hz, lines, self.order)
 
     def found(self, warm: FitRecord | None = None) -> StructureFit:
         """The structure that explains them best; from what was found before, if that is given.
@@ -116,7 +118,7 @@ class Search:
         numbers = dict(zip(known.names, known.x, strict=True))
         pairs = zip(structure.names, structure.mean, strict=True)
         x = np.array([numbers.get(name, mean) for name, mean in pairs])
-        return FrfMisfit(structure, data, self.tolerances, size), x
+        return FrfMisfit(structure, data, self.tolerances, size, self.floor), x
 
     def recalled(self, known: FitRecord) -> StructureFit:
         """What was found of these FRFs before, as it was."""
@@ -130,7 +132,7 @@ class Search:
         self, data: FrfData, structure: RobotStructure, x: np.ndarray | None = None
     ) -> StructureFit:
         """From x (the prior's mean): logarithms first, then FRFs that count more and more."""
-        misfit = FrfMisfit(structure, data, self.tolerances, None)
+        misfit = FrfMisfit(structure, data, self.tolerances, None, self.floor)
         at = minimised(misfit, structure.mean if x is None else x, LOG_STEPS)
         own = None
         for size, steps in ANNEALED:
@@ -173,7 +175,7 @@ class Search:
         at = misfit(best.at.x, at.own, keep=True)
         motions = misfit.motions(at)
 
-        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
+        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
             return misfit.gain(at, columns, sd)
 
         free = effects_free(best.structure)
@@ -249,7 +251,7 @@ class Search:
 
             def gain(
                 columns: np.ndarray, sd: np.ndarray, base: StructureFit = base, at: At = at
-            ) -> tuple[float, np.ndarray]:
+            ) -> tuple[float, np.ndarray, np.ndarray]:
                 return base.misfit.gain(at, columns, sd)
 
             psi = best.at.x[best.structure.own[best.structure.effects.index(effect)]]
@@ -288,7 +290,7 @@ class Search:
     def _last(self, best: StructureFit) -> StructureFit:
         """On all lines, and at last along what the data leave open."""
         misfit = FrfMisfit(
-            best.structure, self.data(LAST), self.tolerances, max(size_of(best), 0.01)
+            best.structure, self.data(LAST), self.tolerances, max(size_of(best), 0.01), self.floor
         )
         at = minimised(misfit, best.at.x, 10, own=best.at.own)
         best = settled(misfit, at, rounds=2, steps=15)
@@ -302,7 +304,10 @@ def _placed(base: StructureFit, start: Start) -> list[tuple[np.ndarray, int]]:
     x = structure.carried(base.structure, base.at.x)
     effect = structure.effects[-1]
     if not effect.springs:
+        if start.moved is not None:
+            x = structure.carried(base.structure, base.at.x + start.moved)
         x[structure.own[-1]] = start.psi
+        x = np.clip(x, structure.least, structure.mean + REACH * structure.sd)
         if not isinstance(effect, LinkResonator):
             return [(x, 4)]
         light = x.copy()

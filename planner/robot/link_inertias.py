@@ -3,11 +3,10 @@
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 
-import msgspec
 import numpy as np
 import pinocchio as pin
 
-from planner.robot.config import LinkTable, RobotConfig
+from planner.robot.config import LinkTable
 
 ENTRIES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 
@@ -61,9 +60,3 @@ def stated_inertia(table: LinkTable) -> pin.Inertia:
     xx, xy, xz, yy, yz, zz = table.inertia_kg_m2 or (0.0,) * 6
     moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return pin.Inertia(table.mass_kg or 0.0, np.array(table.centre_m or (0.0,) * 3), moments)
-
-
-def without_stated_inertias(config: RobotConfig) -> RobotConfig:
-    """The config for a URDF that has the stated inertias in it: of [[link]] the sds stay."""
-    tables = (LinkTable(t.link, sd_percent=t.sd_percent, guessed=t.guessed) for t in config.link)
-    return msgspec.structs.replace(config, link=tuple(tables))

@@ -84,7 +84,7 @@ def diagnose_measured(directory: Path) -> DiagnosisReport:
     from planner.api import diagnose_material
     from planner.campaign.material import material
 
-    return replace(diagnose_material(material(directory, None, 0.0)), explained=None)
+    return replace(diagnose_material(material(directory, None, 0.0)), diagnosis=None)
 
 
 def _begin() -> None:
