@@ -29,7 +29,7 @@ from planner.inference.log_space import shares
 
 SIZES = (0.0015, 0.004, 0.01, 0.03, 0.08, 0.2, 0.5)  # of the discrepancy, in shares of |H|
 LEAST = 20.0  # nats that a joint must gain: chance gave linear robots up to 14
-BY_CHANCE = 0.02  # that levels differ so much, for it to be told where no joint explains it
+BY_CHANCE = 0.05  # that levels differ so much, for it to be told where no joint explains it
 EXPLAINS = 0.3  # of the differences' square, that laws have to take away
 # Prior means and sds: of ln of k in the joint's stiffness, of ln of a in its swing, and of what the
 # linear fit has of the law's average otherwise, in the joint's stiffness. Chosen wide.
@@ -38,8 +38,8 @@ FREE = 0.5  # prior sd of a free stiffness, in the joint's
 NODES = np.log(np.geomspace(0.05, 2.0, 5))  # of its course over the swing
 BENDS = np.geomspace(0.03, 2.5, 8)  # a in the joint's swing, where fits begin; ln k, ln a besides
 STARTS = np.array([[k, a, 0.0, 0.0] for k, a in ((0, 0), (1, 0), (1, 1), (2, 1))])
-# Of a fit: most steps, shares of them that are tried, nats that end it; step of differences.
-STEPS, TRIED, RESTED, SLOPE = 8, (1.0, 0.4, 0.1), 0.5, 0.05
+# Of a fit: most steps, shares of them that are tried, gain of χ² that ends it; of differences.
+STEPS, TRIED, RESTED, SLOPE = 8, (1.0, 0.4, 0.1), 3e-4, 0.05
 MOST = 2  # joints
 
 
@@ -147,7 +147,8 @@ def _candidates(
     fits: Sequence[_Fit], gains: dict[str, float]
 ) -> tuple[tuple[str, str, float], ...]:
     """Kinds at the best joint by their nats; at others, less by what these gain less."""
-    laws = [(f.law, joint) for joint in gains for f in fits]
+    kinds = {f.law.effect: f.law for f in sorted(fits, key=lambda f: f.law.nats)}
+    laws = [(law, joint) for joint in gains for law in kinds.values()]
     nats = np.array([law.nats + gains[joint] - gains[law.at] for law, joint in laws])
     each = zip(laws, shares(nats, 0).tolist(), strict=True)
     return tuple(sorted(((law.effect, at, p) for (law, at), p in each), key=lambda c: -c[2]))
@@ -257,7 +258,7 @@ class _Search:
             step /= max(1.0, float(np.max(np.abs(step) / SD)))
             new = best_of(best.p + np.outer(TRIED, step))
             gained, best = new.value - best.value, max(new, best, key=lambda one: one.value)
-            if gained < RESTED:
+            if gained < RESTED * abs(best.value):
                 break
         return best
 

@@ -131,7 +131,7 @@ def differences(weighed: Weighed, left: Values) -> Differences:
         each = np.concatenate([course[None], course[orders]])
         share = np.sum((each @ flat @ flat.T) * each, axis=1) / np.sum(flat**2)
         told -= n / 2 * np.log(np.maximum(1 - share, 1e-12))
-    chance = (1 + np.count_nonzero(told[1:] >= told[0] - 1e-9)) / (1 + DRAWS)
+    chance = (1 + int(np.count_nonzero(told[1:] >= told[0] - 1e-9))) / (1 + DRAWS)
     share = max(courses, 0.0) / power([w.group for w in weighed])
     return Differences(float(np.sqrt(share)), chance)
 
