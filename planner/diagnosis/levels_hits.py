@@ -8,13 +8,13 @@ from scipy.fft import next_fast_len
 from planner.dataset.dataset import LAID, Dataset
 from planner.dataset.visits import Visit
 from planner.dynamics.gradient import moved
-from planner.dynamics.motion import Motion, Turned
+from planner.dynamics.motion import Motion
 from planner.fit.data import FrfData
 from planner.fit.fitted import StructureFit
 from planner.fit.misfit import ELL, SHARE, FrfMisfit
 from planner.frf.spectra import Spectra, Windows, transform
 from planner.measurement.measured_frfs import Measured
-from planner.measurement.nuisances import ACROSS, Tolerances, hit_basis
+from planner.measurement.nuisances import hit_basis
 from planner.recording.force_levels import peak_n
 
 FADED = 0.1  # of the window's weight, below which nothing is told of a motion
@@ -124,7 +124,9 @@ def _groups(
 ) -> list[HitGroup]:  # fmt: skip
     f, rate = spectra.frequency_hz, LAID + recorded.window_rate_1_s
     f = f[f <= recorded.band_hz[1]]
-    s, lines = 2j * np.pi * f + rate, _spread(f, recorded.band_hz)
+    s = 2j * np.pi * f + rate
+    apart = np.arange(np.log(recorded.band_hz[0]), np.log(f[-1]), np.log1p(ELL))
+    lines = np.unique(np.searchsorted(f, np.exp(apart)))  # so far apart that each errs by itself
     force = np.array([h.force for h in spectra.hits])[:, : len(f)]
     h = np.array([h.response for h in spectra.hits])[..., lines] / force[:, None, lines]
     noise = np.array([h.noise for h in spectra.hits])[:, :, None]
@@ -135,7 +137,11 @@ def _groups(
     peaks = np.array([peak_n(hit) for hit in visit.hits])
     means = {int(a): h[axes == a].mean(axis=0) for a in np.unique(axes)}
     rms = np.sqrt(np.mean([np.abs(m) ** 2 for m in means.values()], axis=(0, 1)))
-    basis = _misses(motion, lines, means, found.misfit.tolerances)
+    answered = motion.accelerance[:, :, :3][..., lines]
+    for axis, mean in means.items():
+        answered[0, :, axis] = mean  # what tilts do, hits along other axes tell where there are any
+    moment = motion.shown_of(motion.matrices.hit_turn)[..., lines]
+    basis = hit_basis(answered, moment, found.misfit.tolerances)[0]
     clock = Clock(length, len(f), 1 / visit.hits[0].sampling_rate_hz, rate)
     force *= np.exp(-rate * spectra.peak_s)  # windows begin with the record now
     answers = motion.x_hit[0][own, 3:][range(len(own)), range(len(own))]
@@ -151,16 +157,6 @@ def _groups(
     return out
 
 
-def _spread(frequency_hz: np.ndarray, band_hz: tuple[float, float]) -> np.ndarray:
-    """Numbers of lines in the band that lie so far apart that each errs by itself."""
-    chosen, last = [], 0.0
-    for number, f in enumerate(frequency_hz):
-        if band_hz[0] <= f <= band_hz[1] and f >= last * (1 + ELL):
-            chosen.append(number)
-            last = float(f)
-    return np.array(chosen)
-
-
 def _motion(
     found: StructureFit, own: list[int], q: np.ndarray, f: np.ndarray, s: np.ndarray
 ) -> Motion:
@@ -174,18 +170,3 @@ def _motion(
     wider = replace(m, hit=np.concatenate([m.hit, ports], axis=1))
     springs = found.structure.elasticity(x)
     return moved(wider, springs, s[None], misfit.mass(x), misfit.impedances(x))
-
-
-def _misses(
-    motion: Motion, lines: np.ndarray, means: dict[int, np.ndarray], t: Tolerances
-) -> np.ndarray:
-    """(3, 4, 3, L) of a hit along each axis; what tilts do as hits along other axes tell it."""
-    some = replace(motion, x_hit=motion.x_hit[:, :, :3][..., lines],
-                   x_sensor=motion.x_sensor[..., lines], s=motion.s[:, lines],
-                   matrices=replace(motion.matrices, hit=motion.matrices.hit[:, :3]))  # fmt: skip
-    basis = hit_basis(some.accelerance, Turned((some,)).moment, t)[0]
-    for axis in range(3):
-        for tilt, across in enumerate(ACROSS[axis]):
-            if across in means:
-                basis[axis, tilt] = t.angle_rad * means[across]
-    return basis
