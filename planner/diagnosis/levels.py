@@ -12,7 +12,14 @@ import numpy as np
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.levels_hits import HitGroup, Port, hit_groups, own_ports
-from planner.diagnosis.levels_laws import SHAPES, JointMotions, Step, numbers_of, stiffening
+from planner.diagnosis.levels_laws import (
+    SHAPES,
+    UNKNOWN,
+    JointMotions,
+    Step,
+    numbers_of,
+    stiffening,
+)
 from planner.diagnosis.levels_weighing import (
     Differences,
     Values,
@@ -30,7 +37,9 @@ from planner.inference.log_space import shares
 SIZES = (0.0015, 0.004, 0.01, 0.03, 0.08, 0.2, 0.5)  # of the discrepancy, in shares of |H|
 LEAST = 20.0  # nats that a joint must gain: chance gave linear robots up to 14
 BY_CHANCE = 0.05  # that levels differ so much, for it to be told where no joint explains it
-EXPLAINS = 0.3  # of the differences' square, that laws have to take away
+# Of the differences' square, that laws have to take away; of the first law's nats, that a second
+# has to gain: averages that a law has bent left up to 0.14 of them elsewhere.
+EXPLAINS = 0.3
 # Prior means and sds: of ln of k in the joint's stiffness, of ln of a in its swing, and of what the
 # linear fit has of the law's average otherwise, in the joint's stiffness. Chosen wide.
 MEAN, SD = np.array([-1.5, -1.2, 0.0, 0.0]), np.array([1.5, 1.2, 0.1, 0.1])
@@ -110,7 +119,8 @@ def laws_of(groups: Sequence[HitGroup], ports: Sequence[Port], matters: float) -
         best = max(fits, key=lambda f: f.law.nats)
         if not found.laws:
             found = replace(found, free=gains, candidates=_candidates(fits, gains))
-        if best.law.nats < LEAST or best.law.share < matters:
+        least = max([LEAST, *(EXPLAINS * law.nats for law in found.laws)])
+        if best.law.effect == UNKNOWN or best.law.nats < least or best.law.share < matters:
             break
         left = [v - c for v, c in zip(left, best.changes, strict=True)]
         null, rho = search.likeliest(lambda w, left=left: evidence(w, left), best.rho)

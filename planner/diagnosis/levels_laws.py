@@ -14,6 +14,7 @@ from scipy.signal import hilbert
 
 from planner.diagnosis.levels_hits import HitGroup
 
+UNKNOWN = "unknown"
 NEARLY = 1 - 1e-12
 FARTHEST = 5.0  # of the linear swing: a joint that goes farther is no robot's
 Step = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
@@ -45,6 +46,11 @@ def bouc_wen(state: np.ndarray, before: np.ndarray, now: np.ndarray, a: np.ndarr
     return np.sign(way) * a * np.tanh(np.arctanh(begun) + (np.abs(way) - straight) / a)
 
 
+def fluid(state: np.ndarray, before: np.ndarray, now: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """With the square of the speed, as oil has it: no effect that is named, but what else it is."""
+    return (now - before) * np.abs(now - before) / a
+
+
 # An effect's torque for k = 1 after a motion from one angle to another, and its two numbers: k, and
 # a or k a; named for joints that turn and that slide.
 SHAPES: tuple[tuple[str, Step], ...] = (
@@ -52,11 +58,13 @@ SHAPES: tuple[tuple[str, Step], ...] = (
     ("friction", dahl),
     ("friction", bouc_wen),
     ("backlash", dead_zone),
+    (UNKNOWN, fluid),
 )
 NUMBERS = {
     "nonlinear_stiffness": ("stiffness_change", ("angle", "shift"), False),
     "friction": ("presliding_stiffness", ("coulomb_torque", "coulomb_force"), True),
     "backlash": ("lost_stiffness", ("half_gap", "half_gap"), False),
+    UNKNOWN: ("damping", ("angle", "shift"), False),
 }
 UNITS = {False: ("N·m/rad", "rad", "N·m"), True: ("N/m", "m", "N")}
 # Relative sd of both: what a linear fit that a law has bent leaves wrong. Of 20 concealed joints.
