@@ -12,14 +12,34 @@ import numpy as np
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.levels_hits import HitGroup, JointPort, hit_groups, own_ports
-from planner.diagnosis.levels_laws import SHAPES, JointMotions, numbers_of
-from planner.diagnosis.levels_weighing import Differences, Values, Weighing, differences, share_of
+from planner.diagnosis.levels_laws import (
+    SHAPES,
+    UNKNOWN,
+    JointMotions,
+    Step,
+    numbers_of,
+    stiffening,
+)
+from planner.diagnosis.levels_weighing import (
+    Differences,
+    Values,
+    Weighed,
+    WeighedGroup,
+    coloured,
+    differences,
+    evidence,
+    gram_of,
+    share_of,
+)
 from planner.fit.fitted import StructureFit
 from planner.inference.log_space import shares
 
 SIZES = (0.0015, 0.004, 0.01, 0.03, 0.08, 0.2, 0.5)  # of the discrepancy, in shares of |H|
 LEAST = 20.0  # nats that a joint must gain: chance gave linear robots up to 14
-BY_CHANCE = 0.02  # that levels differ so much, for it to be told where no joint explains it
+BY_CHANCE = 0.05  # that levels differ so much, for it to be told where no joint explains it
+# Of the differences' square, that laws have to take away; of the first law's nats, that a second
+# has to gain: averages that a law has bent left up to 0.14 of them elsewhere.
+EXPLAINS = 0.3
 # Prior means and sds: of ln of k in the joint's stiffness, of ln of a in its swing, and of what the
 # linear fit has of the law's average otherwise, in the joint's stiffness. Chosen wide.
 MEAN, SD = np.array([-1.5, -1.2, 0.0, 0.0]), np.array([1.5, 1.2, 0.1, 0.1])
@@ -27,8 +47,8 @@ FREE = 0.5  # prior sd of a free stiffness, in the joint's
 NODES = np.log(np.geomspace(0.05, 2.0, 5))  # of its course over the swing
 BENDS = np.geomspace(0.03, 2.5, 8)  # a in the joint's swing, where fits begin; ln k, ln a besides
 STARTS = np.array([[k, a, 0.0, 0.0] for k, a in ((0, 0), (1, 0), (1, 1), (2, 1))])
-# Of a fit: most steps, shares of them that are tried, nats that end it; step of differences.
-STEPS, SHARES, RESTED, SLOPE = 8, (1.0, 0.4, 0.1), 0.5, 0.05
+# Of a fit: most steps, shares of them that are tried, gain of χ² that ends it; of differences.
+STEPS, TRIED, RESTED, SLOPE = 8, (1.0, 0.4, 0.1), 3e-4, 0.05
 MOST = 2  # joints
 
 
@@ -51,8 +71,8 @@ class Levels:
     """How hits of different force differ (`seen`), by which laws, and what these leave (`left`).
 
     `free` are the nats of a stiffness that goes freely with its swing, by joint; `candidates`
-    (effect, joint, probability) are all that were weighed for the first law. `laws` have evidence
-    and matter; `unexplained` says that what they leave matters and is not chance.
+    (effect, joint, probability) are all that were weighed for the first law. `laws` have evidence,
+    matter and explain; `unexplained` says that they do not, and levels matter and are not chance.
     """
 
     seen: Differences
@@ -74,7 +94,7 @@ def level_laws(recorded: Dataset, found: StructureFit) -> Levels:
     Of several sensors and hit points, the ones most heard tell.
     """
     config = found.structure.prior.repertoire.simulation.robot.config
-    groups, ports = hit_groups(recorded.most_heard, found), own_ports(found)[0]
+    groups, ports = hit_groups(recorded.most_heard, found), own_ports(found)
     return laws_of(groups, ports, config.diagnose.matters)
 
 
@@ -82,33 +102,42 @@ def laws_of(groups: Sequence[HitGroup], ports: Sequence[JointPort], matters: flo
     """The same of groups of hits; what changes less than `matters` of |H| is no law."""
     if not groups or not ports:
         return Levels(Differences(0.0, 1.0), Differences(0.0, 1.0))
+    groups = coloured(groups)
     search, left = _Search(groups, {}), [g.accelerance for g in groups]
-    null, rho = search.likeliest(lambda w: w.evidence(left))
-    seen = after = differences(search.at(rho), left)
+    null, rho = search.likeliest(lambda w: evidence(w, left))
+    seen = differences(search.at(rho), left)
     found = Levels(seen, seen)
     joints = {p.at: (p, JointMotions.of(groups, j, p.stiffness)) for j, p in enumerate(ports)}
-    while len(found.laws) < MOST and after.size >= matters and joints:
+    while len(found.laws) < MOST and found.left.size >= matters and joints:
         columns = {at: _columns(motions) for at, (_, motions) in joints.items()}
-        gains = {at: search.gain(search.at(rho), c, left) for at, c in columns.items()}
+        gains = {at: gain(search.at(rho), c, left) for at, c in columns.items()}
         at = max(gains, key=lambda at: gains[at])
         worth, lower = search.free(columns[at], left, rho)
         if worth - null < LEAST:
             break
-        port, motions = joints.pop(at)
-        fits = {e: f for e in SHAPES if (f := search.fitted(lower, motions, e, left)) is not None}
-        effect = max(fits, key=lambda e: fits[e].nats)
-        fit, size = fits[effect], share_of(groups, fits[effect].changes)
+        fits = search.fits(lower, *joints.pop(at), left, null)
+        best = max(fits, key=lambda f: f.law.nats)
         if not found.laws:
-            found = replace(found, free=gains, candidates=_candidates(fits, at, gains))
-        if fit.nats - null < LEAST or size < matters:
+            found = replace(found, free=gains, candidates=_candidates(fits, gains))
+        least = max([LEAST, *(EXPLAINS * law.nats for law in found.laws)])
+        if best.law.effect == UNKNOWN or best.law.nats < least or best.law.share < matters:
             break
-        law = LevelLaw(effect, at, fit.nats - null, fit.parameters(port.slides), size)
-        found = replace(found, laws=(*found.laws, law))
-        left = [v - c for v, c in zip(left, fit.changes, strict=True)]
-        null, rho = search.likeliest(lambda w, left=left: w.evidence(left), fit.rho)
+        left = [v - c for v, c in zip(left, best.changes, strict=True)]
+        null, rho = search.likeliest(lambda w, left=left: evidence(w, left), best.rho)
         after = differences(search.at(rho), left)
-    unexplained = after.size >= matters and after.chance <= BY_CHANCE
-    return replace(found, left=after, unexplained=unexplained)
+        found = replace(found, laws=(*found.laws, best.law), left=after)
+    if found.explained >= EXPLAINS:
+        return found
+    return replace(found, laws=(), left=seen, unexplained=seen.matter(matters, BY_CHANCE))
+
+
+def gain(weighed: Weighed, columns: Values, left: Values) -> float:
+    """Nats that columns of prior sd 1 gain together."""
+    both = zip(columns, left, strict=True)
+    gram = gram_of(weighed, [np.append(c, v[None], 0) for c, v in both])
+    inner = np.eye(len(gram) - 1) + gram[:-1, :-1]
+    gained = gram[:-1, -1] @ np.linalg.solve(inner, gram[:-1, -1])
+    return 0.5 * float(gained - np.linalg.slogdet(inner)[1])
 
 
 def _columns(motions: JointMotions) -> list[np.ndarray]:
@@ -117,31 +146,22 @@ def _columns(motions: JointMotions) -> list[np.ndarray]:
     return [FREE * motions.stiffness * c for c in motions.free(nodes)]
 
 
-def _candidates(
-    fits: dict[str, "_Fit"], at: str, gains: dict[str, float]
-) -> tuple[tuple[str, str, float], ...]:
-    """Kinds at the best joint by their nats; at others, less by what these gain less."""
-    pairs = [(e, joint) for joint in gains for e in fits]
-    nats = np.array([fits[e].nats + gains[joint] - gains[at] for e, joint in pairs])
-    each = zip(pairs, shares(nats, 0).tolist(), strict=True)
-    return tuple(sorted(((e, j, p) for (e, j), p in each), key=lambda c: -c[2]))
-
-
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A law with logarithms of |k| and a first of its numbers, and the FRFs' changes by it."""
-
-    effect: str
-    nats: float
-    rho: float
-    sign: float
-    numbers: np.ndarray
-    covariance: np.ndarray
+    law: LevelLaw
     changes: list[np.ndarray]
+    rho: float
 
-    def parameters(self, slides: bool) -> dict[str, tuple[float, float, str]]:
-        """By name."""
-        return numbers_of(self.effect, slides, self.numbers[:2], self.covariance[:2, :2], self.sign)
+
+def _candidates(
+    fits: Sequence[_Fit], gains: dict[str, float]
+) -> tuple[tuple[str, str, float], ...]:
+    """Kinds at the best joint by their nats; at others, less by what these gain less."""
+    kinds = {f.law.effect: f.law for f in sorted(fits, key=lambda f: f.law.nats)}
+    laws = [(law, joint) for joint in gains for law in kinds.values()]
+    nats = np.array([law.nats + gains[joint] - gains[law.at] for law, joint in laws])
+    each = zip(laws, shares(nats, 0).tolist(), strict=True)
+    return tuple(sorted(((law.effect, at, p) for (law, at), p in each), key=lambda c: -c[2]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,14 +178,16 @@ class _Point:
 @dataclass(frozen=True, eq=False)
 class _Search:
     groups: Sequence[HitGroup]
-    known: dict[float, Weighing]
+    known: dict[float, Weighed]
 
-    def at(self, rho: float) -> Weighing:
+    def at(self, rho: float) -> Weighed:
         """All groups at one size of the discrepancy."""
-        return self.known.setdefault(rho, Weighing(self.groups, rho))
+        if rho not in self.known:
+            self.known[rho] = [WeighedGroup(g, rho) for g in self.groups]
+        return self.known[rho]
 
     def likeliest(
-        self, worth: Callable[[Weighing], float], rho: float = 0.01
+        self, worth: Callable[[Weighed], float], rho: float = 0.01
     ) -> tuple[float, float]:
         """The largest value, uphill from one of SIZES, and its size."""
         known: dict[int, float] = {}
@@ -181,54 +203,53 @@ class _Search:
                 return of(k), SIZES[k]
             k = best
 
-    def gain(self, weighing: Weighing, columns: Values, left: Values) -> float:
-        """Nats that columns of prior sd 1 gain together."""
-        gram = weighing.gram([np.append(c, v[None], 0) for c, v in zip(columns, left, strict=True)])
-        inner = np.eye(len(gram) - 1) + gram[:-1, :-1]
-        gain = gram[:-1, -1] @ np.linalg.solve(inner, gram[:-1, -1])
-        return 0.5 * float(gain - np.linalg.slogdet(inner)[1])
-
     def free(self, columns: Values, left: Values, rho: float) -> tuple[float, float]:
         """Evidence of a free stiffness, and the discrepancy beside it."""
-        return self.likeliest(lambda w: w.evidence(left) + self.gain(w, columns, left), rho)
+        return self.likeliest(lambda w: evidence(w, left) + gain(w, columns, left), rho)
 
-    def fitted(self, rho: float, motions: JointMotions, effect: str, left: Values) -> _Fit | None:
-        """A law at a joint; with a smaller discrepancy once more, as long as that is likelier."""
-        begun = self._begun(self.at(rho), motions, effect, left)
-        if begun is None:
-            return None
-        sign, points = begun
-        while True:
-            best = self._descended(self.at(rho), motions, effect, sign, points, left)
-            cost = 0.5 * float(np.linalg.slogdet(best.normal)[1] + 2 * np.log(SD).sum())
-            cost += 0.5 * float(np.sum(((best.p - MEAN) / SD) ** 2))
-            after = [v - c for v, c in zip(left, best.changes, strict=True)]
-            nats, lower = self.likeliest(lambda w, a=after: w.evidence(a), rho)
-            if lower >= rho:
-                break
-            rho, points = lower, best.p[None]
-        numbers = best.p + np.log([motions.stiffness, motions.size, 1.0, 1.0])
-        covariance = np.linalg.inv(best.normal)
-        return _Fit(effect, nats - cost, lower, sign, numbers, covariance, best.changes)
+    def fits(
+        self, rho: float, port: JointPort, motions: JointMotions, left: Values, null: float
+    ) -> list[_Fit]:
+        """Every law at a joint; with a smaller discrepancy once more, as long as that is likelier.
+
+        `null` is the evidence of a linear one.
+        """
+        found = []
+        for effect, shape in SHAPES:
+            sign, points = self._begun(rho, motions, shape, left)
+            now = rho
+            while True:
+                best = self._descended(self.at(now), motions, shape, sign, points, left)
+                after = [v - c for v, c in zip(left, best.changes, strict=True)]
+                nats, lower = self.likeliest(lambda w, after=after: evidence(w, after), now)
+                if lower >= now:
+                    break
+                now, points = lower, best.p[None]
+            cost = np.linalg.slogdet(best.normal)[1] + np.sum(((best.p - MEAN) / SD) ** 2)
+            nats -= null + 0.5 * float(cost + 2 * np.log(SD).sum())
+            numbers = best.p[:2] + np.log([motions.stiffness, motions.size])
+            covariance = np.linalg.inv(best.normal)[:2, :2]
+            told = numbers_of(effect, port.slides, sign, numbers, covariance)
+            law = LevelLaw(effect, port.at, nats, told, share_of(self.groups, best.changes))
+            found.append(_Fit(law, best.changes, lower))
+        return found
 
     def _begun(
-        self, weighing: Weighing, motions: JointMotions, effect: str, left: Values
-    ) -> tuple[float, np.ndarray] | None:
+        self, rho: float, motions: JointMotions, shape: Step, left: Values
+    ) -> tuple[float, np.ndarray]:
         """Sign of k and points (V, 4): where a shape gains most to first order, and beyond."""
-        columns = motions.first_order(effect, motions.size * BENDS)
-        both = zip(columns, left, strict=True)
-        gram = weighing.gram([np.append(motions.stiffness * c, v[None], 0) for c, v in both])
+        both = zip(motions.first_order(shape, motions.size * BENDS), left, strict=True)
+        columns = [np.append(motions.stiffness * c, v[None], 0) for c, v in both]
+        gram = gram_of(self.at(rho), columns)
         size = np.diag(gram)[:-1] + FREE**-2
         k = gram[:-1, -1] / size
-        gain = np.where((k > 0) | (effect == "nonlinear_stiffness"), k**2 * size, 0.0)
-        best = int(np.argmax(gain))
-        if not gain[best] > 0:
-            return None
-        first = np.log([max(abs(k[best]), 1e-4), BENDS[best], 1.0, 1.0])
+        k = k if shape is stiffening else np.maximum(k, 1e-4)
+        best = int(np.argmax(k**2 * size))
+        first = np.array([np.log(abs(k[best])), np.log(BENDS[best]), 0.0, 0.0])
         return float(np.sign(k[best])), first + STARTS
 
     def _descended(
-        self, weighing: Weighing, motions: JointMotions, effect: str, sign: float,
+        self, weighed: Weighed, motions: JointMotions, shape: Step, sign: float,
         points: np.ndarray, left: Values,
     ) -> _Point:  # fmt: skip
         """From the best of some points (V, 4) to the best nearby (Gauss, Newton)."""
@@ -236,31 +257,31 @@ class _Search:
         def best_of(many: np.ndarray) -> _Point:
             both = np.concatenate([many, many + np.array([0, SLOPE, 0, 0])])
             k, a = motions.stiffness * np.exp(both[:, 0]), motions.size * np.exp(both[:, 1])
-            found = motions.bent(effect, sign * k, a, motions.stiffness * both[:, 2:])
+            found = motions.bent(shape, sign * k, a, motions.stiffness * both[:, 2:])
             pairs = zip(many, found, found[len(many) :], strict=False)
-            each = [_point(weighing, p, *f, motions.stiffness, left) for p, *f in pairs]
+            each = [_point(weighed, p, *f, motions.stiffness, left) for p, *f in pairs]
             return max(each, key=lambda one: one.value)
 
         best = best_of(points)
         for _ in range(STEPS):
             step = np.linalg.solve(best.normal, best.down)
             step /= max(1.0, float(np.max(np.abs(step) / SD)))
-            new = best_of(best.p + np.outer(SHARES, step))
+            new = best_of(best.p + np.outer(TRIED, step))
             gained, best = new.value - best.value, max(new, best, key=lambda one: one.value)
-            if gained < RESTED:
+            if gained < RESTED * abs(best.value):
                 break
         return best
 
 
 def _point(
-    weighing: Weighing, p: np.ndarray, now: Values, then: Values, stiffness: float, left: Values
+    weighed: Weighed, p: np.ndarray, now: Values, then: Values, stiffness: float, left: Values
 ) -> _Point:
     """Of changes at p, and at an angle a little larger."""
     each = [
         np.concatenate([[v - c[0], c[0], (b[0] - c[0]) / SLOPE], stiffness * c[1:]])
         for v, c, b in zip(left, now, then, strict=True)
     ]
-    gram, away = weighing.gram(each), (p - MEAN) / SD
+    gram, away = gram_of(weighed, each), (p - MEAN) / SD
     value = -0.5 * float(gram[0, 0] + away @ away)
     normal, down = gram[1:, 1:] + np.diag(SD**-2.0), gram[1:, 0] - away / SD
     return _Point(p, value, [c[0] for c in now], normal, down)

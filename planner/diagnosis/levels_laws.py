@@ -14,6 +14,8 @@ from scipy.signal import hilbert
 
 from planner.diagnosis.levels_hits import HitGroup
 
+UNKNOWN = "unknown"
+NEARLY = 1 - 1e-12
 FARTHEST = 5.0  # of the linear swing: a joint that goes farther is no robot's
 Step = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
@@ -35,17 +37,34 @@ def dahl(state: np.ndarray, before: np.ndarray, now: np.ndarray, a: np.ndarray) 
     return end + (state - end) * np.exp(-np.abs(way) / a)
 
 
+def bouc_wen(state: np.ndarray, before: np.ndarray, now: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """Bouc and Wen, dz/dθ = 1 − z²/a² while it loads, 1 while it unloads: exact one way."""
+    way = now - before
+    loaded = np.sign(way) * state
+    straight = np.minimum(np.abs(way), np.maximum(-loaded, 0.0))
+    begun = np.clip((loaded + straight) / a, -NEARLY, NEARLY)
+    return np.sign(way) * a * np.tanh(np.arctanh(begun) + (np.abs(way) - straight) / a)
+
+
+def fluid(state: np.ndarray, before: np.ndarray, now: np.ndarray, a: np.ndarray) -> np.ndarray:
+    """With the square of the speed, as oil has it: no effect that is named, but what else it is."""
+    return (now - before) * np.abs(now - before) / a
+
+
 # An effect's torque for k = 1 after a motion from one angle to another, and its two numbers: k, and
 # a or k a; named for joints that turn and that slide.
-SHAPES: dict[str, Step] = {
-    "nonlinear_stiffness": stiffening,
-    "friction": dahl,
-    "backlash": dead_zone,
-}
+SHAPES: tuple[tuple[str, Step], ...] = (
+    ("nonlinear_stiffness", stiffening),
+    ("friction", dahl),
+    ("friction", bouc_wen),
+    ("backlash", dead_zone),
+    (UNKNOWN, fluid),
+)
 NUMBERS = {
     "nonlinear_stiffness": ("stiffness_change", ("angle", "shift"), False),
     "friction": ("presliding_stiffness", ("coulomb_torque", "coulomb_force"), True),
     "backlash": ("lost_stiffness", ("half_gap", "half_gap"), False),
+    UNKNOWN: ("damping", ("angle", "shift"), False),
 }
 UNITS = {False: ("N·m/rad", "rad", "N·m"), True: ("N/m", "m", "N")}
 # Relative sd of both: what a linear fit that a law has bent leaves wrong. Of 20 concealed joints.
@@ -53,7 +72,7 @@ INEXACT = 0.05
 
 
 def numbers_of(
-    effect: str, slides: bool, log_k_a: np.ndarray, covariance: np.ndarray, sign: float
+    effect: str, slides: bool, sign: float, log_k_a: np.ndarray, covariance: np.ndarray
 ) -> dict[str, tuple[float, float, str]]:
     """A law's numbers by name: value, sd, unit; of logarithms of |k| and a (2,)."""
     stiffness, ways, product = NUMBERS[effect]
@@ -99,11 +118,11 @@ class JointMotions:
     @property
     def window(self) -> np.ndarray:
         """(T,): what the records' window makes of instants."""
-        return self.groups[0].clock.window[: self.swing.shape[1]]
+        return self.groups[0].clock.window
 
-    def first_order(self, effect: str, a: np.ndarray) -> list[np.ndarray]:
+    def first_order(self, step: Step, a: np.ndarray) -> list[np.ndarray]:
         """Changes (C, n, 3, L) of each group by k = 1, bent at each of a (C,)."""
-        return self._answers(self._beyond(self._along(effect, a)))
+        return self._answers(self._beyond(self._along(step, a)))
 
     def free(self, nodes: np.ndarray) -> list[np.ndarray]:
         """By stiffnesses, then losses, that are hat functions of ln swing with `nodes` (B,)."""
@@ -114,7 +133,7 @@ class JointMotions:
         return self._answers(self._beyond(np.concatenate(both, axis=1)))
 
     def bent(
-        self, effect: str, k: np.ndarray, a: np.ndarray, off: np.ndarray
+        self, step: Step, k: np.ndarray, a: np.ndarray, off: np.ndarray
     ) -> list[list[np.ndarray]]:
         """Changes (3, n, 3, L) of each group by V variants of a law, and by 1 of `off` each.
 
@@ -123,10 +142,10 @@ class JointMotions:
         nothing else need be known of the robot. `off` (V, 2) is by how much what the linear fit has
         of stiffness and damping is not what is common, in N·m/rad.
         """
-        step, window, end = SHAPES[effect], self.window, self.swing.shape[1]
+        window, end = self.window, self.swing.shape[1]
         linear, kernel = self.swing * window, self.kernel[:, ::-1].copy()
         steps = float(np.linalg.norm(self.swing) / np.linalg.norm(np.diff(self.swing, axis=1)))
-        common = self._common(self._along(effect, a) * k[:, None]).T + off * (1.0, steps)
+        common = self._common(self._along(step, a) * k[:, None]).T + off * (1.0, steps)
         shown, swing = np.zeros((2, len(k), *self.swing.shape))
         state = before = np.zeros(swing.shape[:2])
         most = FARTHEST * np.max(np.abs(self.swing), axis=1)
@@ -149,9 +168,9 @@ class JointMotions:
         ends = np.cumsum([len(g.swing) for g in self.groups])[:-1]
         return np.split(changes, ends, axis=1)
 
-    def _along(self, effect: str, a: np.ndarray) -> np.ndarray:
+    def _along(self, step: Step, a: np.ndarray) -> np.ndarray:
         """Torques (H, C, T) of k = 1 along the linear swing, bent at each of a (C,)."""
-        step, swing = SHAPES[effect], self.swing
+        swing = self.swing
         out = np.zeros((len(swing), len(a), swing.shape[1]))
         for i in range(1, swing.shape[1]):
             out[..., i] = step(out[..., i - 1], swing[:, i - 1, None], swing[:, i, None], a)

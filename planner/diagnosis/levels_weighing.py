@@ -1,19 +1,20 @@
 """What differs between hits of different force, weighed: evidence, size, and the play of chance."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from planner.diagnosis.levels_hits import HitGroup
 
-DRAWS = 999  # orders of levels that are tried
+QUARTER, SMALL = 0.25, 0.01  # of values; the discrepancy beside which noise is looked at
+DRAWS = 999  # orders of hits that are tried
 Values = Sequence[np.ndarray]  # of each group (n, 3, L), or columns (C, n, 3, L)
 
 
 @dataclass(frozen=True, eq=False)
-class _Weighed:
+class WeighedGroup:
     """A group with a discrepancy of a share ρ of the FRFs' size, that each hit has for itself.
 
     What all hits have in common is left open, and so are the misses of each.
@@ -36,114 +37,111 @@ class _Weighed:
         return out.reshape(len(out), -1).view(float)
 
     @cached_property
-    def misses(self) -> np.ndarray:
-        """(4 n, N)."""
-        return self.white(self.group.misses)
-
-    @cached_property
-    def inverse(self) -> np.ndarray:
-        """(4 n, 4 n): of the Cholesky factor of I + B Bᵀ."""
-        b = self.misses
-        return np.linalg.inv(np.linalg.cholesky(np.eye(len(b)) + b @ b.T))
+    def misses(self) -> tuple[np.ndarray, np.ndarray]:
+        """B (4 n, N), and the inverse of the Cholesky factor of I + B Bᵀ."""
+        b = self.white(self.group.misses)
+        return b, np.linalg.inv(np.linalg.cholesky(np.eye(len(b)) + b @ b.T))
 
     @cached_property
     def volume(self) -> float:
         """−ln of the volume in which FRFs may lie."""
         logs = np.log(self.variance).sum() + np.log(np.sum(1 / self.variance, axis=0)).sum()
-        return float(np.log(np.diag(self.inverse)).sum() - logs)
+        return float(np.log(np.diag(self.misses[1])).sum() - logs)
 
     def gram(self, values: np.ndarray) -> np.ndarray:
         """(C, C) of values (C, n, 3, L), misses integrated out."""
-        white = self.white(values)
-        taken = white @ self.misses.T @ self.inverse.T
+        white, (b, inverse) = self.white(values), self.misses
+        taken = white @ b.T @ inverse.T
         return white @ white.T - taken @ taken.T
 
     def without_misses(self, values: np.ndarray) -> np.ndarray:
         """Values (n, 3, L) without the likeliest misses and what is common."""
-        onto = self.misses @ self.white(values[None])[0]
-        eta = self.inverse.T @ (self.inverse @ onto)
+        b, inverse = self.misses
+        eta = inverse.T @ (inverse @ (b @ self.white(values[None])[0]))
         left = values - np.tensordot(eta, self.group.misses, 1)
         return left - left.mean(axis=0)
 
 
-@dataclass(frozen=True, eq=False)
-class Weighing:
-    """All groups at one ρ."""
+Weighed = Sequence[WeighedGroup]
 
-    groups: Sequence[HitGroup]
-    rho: float
 
-    @cached_property
-    def _each(self) -> list[_Weighed]:
-        return [_Weighed(group, self.rho) for group in self.groups]
+def coloured(groups: Sequence[HitGroup]) -> tuple[HitGroup, ...]:
+    """With as much noise at each line as the softest hits show: floors rumble at low frequencies.
 
-    @cached_property
-    def volume(self) -> float:
-        """−ln of the volume in which FRFs may lie."""
-        return sum(w.volume for w in self._each)
+    That of the quarter of values that differ least: where a joint bends, the rest may say so.
+    """
+    ratios = []
+    for g in groups:
+        n, soft = len(g.peak_n), int(np.argmin(g.peak_n))
+        off = WeighedGroup(g, SMALL).without_misses(g.accelerance)[soft] * n / (n - 1)
+        ratios.append(np.abs(off) ** 2 / g.variance[soft])
+    least = np.quantile(np.array(ratios), QUARTER, axis=(0, 1)) / -np.log(1 - QUARTER)
+    return tuple(replace(g, variance=g.variance * np.maximum(least, 1.0)) for g in groups)
 
-    def gram(self, values: Values) -> np.ndarray:
-        """(C, C) of columns in each group."""
-        return sum(
-            (w.gram(v) for w, v in zip(self._each, values, strict=True)),
-            np.zeros((len(values[0]),) * 2),
-        )
 
-    def evidence(self, left: Values) -> float:
-        """ln of the likelihood of what is left (n, 3, L) of each group."""
-        return self.volume - 0.5 * float(self.gram([v[None] for v in left])[0, 0])
+def gram_of(weighed: Weighed, columns: Values) -> np.ndarray:
+    """(C, C) of columns of all groups."""
+    return np.sum([w.gram(c) for w, c in zip(weighed, columns, strict=True)], axis=0)
 
-    def without_misses(self, left: Values) -> list[np.ndarray]:
-        """What is left (n, 3, L) of each group without the likeliest misses."""
-        return [w.without_misses(v) for w, v in zip(self._each, left, strict=True)]
+
+def evidence(weighed: Weighed, left: Values) -> float:
+    """ln of the likelihood of what is left (n, 3, L) of each group."""
+    chi2 = gram_of(weighed, [v[None] for v in left])[0, 0]
+    return sum(w.volume for w in weighed) - 0.5 * float(chi2)
 
 
 @dataclass(frozen=True)
 class Differences:
     """`size`: by which share of |H| hits differ in the course of their force, more than by chance.
 
-    `chance` is that of so much, were levels exchangeable; 1 where no order could tell.
+    `chance` is that of so much, were hits of a group exchangeable; 1 where no order could tell.
     """
 
     size: float
     chance: float
 
+    def matter(self, size: float, chance: float) -> bool:
+        """Whether they are that large, and so improbable by chance."""
+        return self.size >= size and self.chance <= chance
 
-def differences(weighing: Weighing, left: Values) -> Differences:
-    """Of hits in groups of three or more: those of a linear robot follow no course with the force.
 
-    Nothing is assumed of how large misses are, but that hits of any force miss alike.
+def differences(weighed: Weighed, left: Values) -> Differences:
+    """Hits of a linear robot follow no course with the force: three or more of a group tell.
+
+    Nothing is assumed of how large misses are, but that hits of any force miss alike. All are given
+    as much noise as the noisiest has: soft ones have more. Where no group has three, all of what is
+    there is the size, which nothing but a law can tell from chance.
     """
     rng = np.random.default_rng(0)
-    even = [_evenly_noisy(g, v, rng) for g, v in zip(weighing.groups, left, strict=True)]
-    courses, power, told = 0.0, 0.0, np.zeros(1 + DRAWS)
-    for g, off in zip(weighing.groups, weighing.without_misses(even), strict=True):
-        power += float(np.sum(np.abs(g.accelerance) ** 2))
-        n, course = len(off), np.log(g.peak_n) - np.log(g.peak_n).mean()
-        if n < 3:
+    courses, told, least = 0.0, np.zeros(1 + DRAWS), min(3, max(len(v) for v in left))
+    for w, values in zip(weighed, left, strict=True):
+        g, n = w.group, len(values)
+        lacking = np.sqrt((g.variance.max(axis=0) - g.variance) / 2)
+        if n < least:
             continue
-        course = course / np.linalg.norm(course)
+        noise = rng.standard_normal((2, *values.shape))
+        off = w.without_misses(values + lacking * (noise[0] + 1j * noise[1]))
+        course = np.log(g.peak_n) - np.log(g.peak_n).mean()
+        course /= np.linalg.norm(course)
         along = float(np.sum(np.abs(np.tensordot(course, off, 1)) ** 2))
-        courses += ((n - 1) * along - float(np.sum(np.abs(off) ** 2))) / (n - 2)
-        flat = (off / g.size).reshape(n, -1).view(float)
-        gram = flat @ flat.T
+        whole = float(np.sum(np.abs(off) ** 2))
+        courses += ((n - 1) * along - whole) / (n - 2) if n > 2 else whole
+        flat = (off / np.sqrt(w.variance.max(axis=0))).reshape(n, -1).view(float)
         orders = rng.permuted(np.tile(np.arange(n), (DRAWS, 1)), axis=1)
         each = np.concatenate([course[None], course[orders]])
-        share = np.einsum("di,ij,dj->d", each, gram, each) / np.trace(gram)
+        share = np.sum((each @ flat @ flat.T) * each, axis=1) / np.sum(flat**2)
         told -= n / 2 * np.log(np.maximum(1 - share, 1e-12))
-    chance = (1 + np.count_nonzero(told[1:] >= told[0] - 1e-9)) / (1 + DRAWS)
-    return Differences(float(np.sqrt(max(courses, 0.0) / max(power, 1e-300))), float(chance))
+    chance = (1 + int(np.count_nonzero(told[1:] >= told[0] - 1e-9))) / (1 + DRAWS)
+    share = max(courses, 0.0) / power([w.group for w in weighed])
+    return Differences(float(np.sqrt(share)), chance)
 
 
-def _evenly_noisy(g: HitGroup, left: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """With as much noise in each hit as the noisiest has: soft hits are noisier."""
-    lacking = np.sqrt((g.variance.max(axis=0) - g.variance) / 2)
-    real, imaginary = rng.standard_normal((2, *left.shape))
-    return left + lacking * (real + 1j * imaginary)
+def power(groups: Sequence[HitGroup]) -> float:
+    """Σ |H|² of all hits."""
+    return sum(float(np.sum(np.abs(g.accelerance) ** 2)) for g in groups)
 
 
 def share_of(groups: Sequence[HitGroup], changes: Values) -> float:
     """By which share of |H| hits of a group differ by changes (n, 3, L)."""
     off = sum(float(np.sum(np.abs(c - c.mean(axis=0)) ** 2)) for c in changes)
-    whole = sum(float(np.sum(np.abs(g.accelerance) ** 2)) for g in groups)
-    return float(np.sqrt(off / whole))
+    return float(np.sqrt(off / power(groups)))
