@@ -110,7 +110,7 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | Non
         start = strongest(data)
     if start.size == 0:
         return None
-    fitted = fit(data, start)
+    fitted = fit(data, data.with_one_above(start))
     modes = modes_of_fit(data, fitted, sets)
     error = np.linalg.norm(data.response - model(data, fitted.refined))
     relative = float(error / np.linalg.norm(data.response))

@@ -23,8 +23,9 @@ class Data:
     time from the pulse to the end of the record (see `residues`). `force_share` and
     `force_window_s` say how the noise of the force spoils whole columns (see `Frf`). `pooled`: an
     unknown variance is taken as a level for each entry times one profile of lines. `near`: modes
-    may lie close below the band. `steady`: nothing changes between hits, so that
-    poles close to each other are modes, however alike.
+    may lie close below the band. `above`: a pole above the lines stands for all modes there.
+    `steady`: nothing changes between hits, so that poles close to each other are modes, however
+    alike.
     """
 
     frequency_hz: np.ndarray  # (F,)
@@ -37,6 +38,7 @@ class Data:
     force_window_s: float = 0.0
     pooled: bool = False
     near: bool = False
+    above: bool = False
     steady: bool = False
 
     @cached_property
@@ -54,6 +56,17 @@ class Data:
     def to_poles(self, values: np.ndarray) -> np.ndarray:
         """From the plane of the lines to rad/s."""
         return values if self.step_s is None else np.log(values) / self.step_s
+
+    def is_above(self, poles: np.ndarray) -> np.ndarray:
+        """(m,) bool: which poles stand for the modes above the lines."""
+        return self.above & (poles.imag > 2 * np.pi * self.frequency_hz[-1])
+
+    def with_one_above(self, poles: np.ndarray) -> np.ndarray:
+        """Poles (m,) to start from, with one just above the lines where none is."""
+        if not self.above or not poles.size or np.any(self.is_above(poles)):
+            return poles
+        ratio = float(np.median(-poles.real / np.abs(poles)))
+        return np.append(poles, 2 * np.pi * 1.05 * self.frequency_hz[-1] * (1j - ratio))
 
     def allowed(self, values: np.ndarray) -> bool:
         """Near the band, and decaying as recorded (under the window)."""

@@ -16,7 +16,6 @@ MARGIN = 0.05  # of the band, beyond its edges
 MAX_ORDER = 36
 MOST_REFERENCES = 6  # at once: the order of the polynomial counts for each of them
 LEAST_LINES = 16
-ABOVE = 1.05  # times the last line: where the pole starts that stands for modes above
 # Of rows that fit the denominator of all the worse than the median by more than this, the weight is
 # taken down, so many times over; fewer rows than these cannot tell.
 ODD, REWEIGHED, LEAST_ROWS = 3.0, 3, 6
@@ -60,14 +59,16 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     rows, columns = np.nonzero(matrix.measured)
     response = matrix.accelerance[rows, columns][:, None, chosen]
     rate = matrix.exponential_rate_1_s
-    data = Data(f[chosen], response, None, rate, tail_s=matrix.tail_s, pooled=True, near=True)
+    data = Data(
+        f[chosen], response, None, rate, tail_s=matrix.tail_s, pooled=True, near=True, above=True
+    )
     # A record cut off while it rings leaves ripples, which polynomials take for poles.
     smooth = matrix.ended or matrix
     orders, found = _diagram(smooth, chosen)
     start = np.array([line.pole for line in stable(found)]) + smooth.exponential_rate_1_s
     if not start.size:
         return None
-    start = _with_one_above(start, f[chosen][-1])
+    start = data.with_one_above(start)
     sets = _sets(matrix, rows, columns)
     felt = len(matrix.responses) >= len(matrix.references)
     places = (rows, columns) if felt else (columns, rows)
@@ -76,14 +77,6 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
         return None
     scale, weak, presence = judged(data, fit, variance)
     return MatrixPoles(data, fit, found, rows, columns, sets, scale, weak, presence, orders[-1])
-
-
-def _with_one_above(poles: np.ndarray, last_hz: float) -> np.ndarray:
-    """Beside the poles one above the last line, for all modes that lie there."""
-    if np.max(poles.imag) / (2 * np.pi) > last_hz:
-        return poles
-    ratio = float(np.median(-poles.real / np.abs(poles)))
-    return np.append(poles, 2 * np.pi * ABOVE * last_hz * (1j - ratio))
 
 
 def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Diagram]:

@@ -105,8 +105,7 @@ def _fit(
 def _standing(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
     """(m,) bool: which poles are modes, or stand for those above the last line."""
     _, weak, presence = judged(data, fit, variance)
-    above = fit.poles.imag > 2 * np.pi * data.frequency_hz[-1]
-    return above | (weak <= 1) & (presence >= PRESENT)
+    return data.is_above(fit.poles) | (weak <= 1) & (presence >= PRESENT)
 
 
 def _part_of(fit: SetPoles, kept: np.ndarray) -> SetPoles:

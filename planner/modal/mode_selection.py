@@ -245,7 +245,7 @@ def weakness(data: Data, current: PoleFit) -> np.ndarray:
     found = data.threshold * scale / np.maximum(refined.significance, 1e-300)
     blurred = 2 * np.sqrt(scale) * np.maximum(sd[:m], sd[m:]) / decay
     damped = -refined.poles.real / (MAX_DAMPING * np.abs(refined.poles))
-    return np.max([found, blurred, damped], axis=0)
+    return np.where(data.is_above(refined.poles), 0.0, np.max([found, blurred, damped], axis=0))
 
 
 def scales(data: Data, current: PoleFit) -> np.ndarray:
