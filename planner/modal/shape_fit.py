@@ -1,22 +1,27 @@
-"""Poles and one shape per mode, fitted to all FRFs between some points at once.
+"""Poles and one shape per mode, fitted to all FRFs between some points at once, and how sure.
 
-A mode's residues are R = φ_o φ_i (Maxwell's reciprocity; the factor 1/(2iω_d) is part of φ): n
-numbers instead of n². That is surer by far where FRFs are small, and where differences of them
-count. Poles, shapes and out-of-band terms err together: their joint covariance says how.
+A mode's residues are R = −i φ_o φ_i (Maxwell's reciprocity; the factor 1/(2ω_d) is part of φ): n
+numbers instead of n², real ones where damping is proportional. What the fit does not tell from
+nothing (phases, modes outside the lines) is taken away and the rest fitted again (Wald). That is
+surer by far where FRFs are small: beside a resonance, between two, in differences of them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.stats import chi2
 
 from planner.modal.fit_data import Data
 from planner.modal.mode_selection import PoleFit
 from planner.modal.rank_one_fit import Entries, fit_shape
 from planner.modal.residues import Residues, basis, basis_slope, unpack
 
-STEPS, HALVED = 20, 5  # Gauss-Newton steps, and how often one is shortened
+CHANCE = 0.999  # of what is nothing not to be called something
+SURELY = 1 - 1e-6  # that χ² rises by less where all of it is nothing: else nothing is taken away
+STEPS, HALVED = 20, 6  # of Gauss and Newton, and how often one is shortened
 SETTLED = 1e-2  # fall of χ² in a step that is the last
-ROUNDING = 1e-11  # share of the curvature
+ROUNDING = 1e-13  # share of the curvature
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,14 +29,15 @@ class ShapeFit:
     """Poles (m,) in rad/s and coefficients (e, c) as `residues.basis` has them, and their errors.
 
     `root` (2m + e·c, d) are d independent errors, of one standard deviation each, of the poles'
-    real parts, their imaginary parts, then entry by entry the coefficients. `chi2` is per degree of
-    freedom.
+    real parts, their imaginary parts, then entry by entry the coefficients. `shaped` are the modes
+    (indices) whose residues are of one shape, `chi2` is per degree of freedom.
     """
 
     data: Data
     poles: np.ndarray
     coefficients: np.ndarray
     root: np.ndarray
+    shaped: np.ndarray
     chi2: float
 
     @property
@@ -49,8 +55,7 @@ class ShapeFit:
         """(d, e, F) independent errors of the response, of one standard deviation each."""
         m, lines = self.poles.size, self.data.lines
         columns, slope = basis(lines, self.poles), basis_slope(lines, self.poles)
-        each = self.coefficients.shape[1]
-        own = self.root[2 * m :].reshape(-1, each, self.root.shape[1])
+        own = self.root[2 * m :].reshape(*self.coefficients.shape, -1)
         return np.stack(
             [
                 self.root[: 2 * m].T @ _by_poles(c, slope, m) + part.T @ columns
@@ -61,9 +66,8 @@ class ShapeFit:
 
     def drawn(self, count: int, seed: int) -> list[tuple[np.ndarray, Residues]]:
         """So many poles and residues that are as likely as each other."""
-        m = self.poles.size
+        m, found = self.poles.size, []
         at = np.concatenate([self.poles.real, self.poles.imag])
-        found = []
         for normal in np.random.default_rng(seed).standard_normal((count, self.root.shape[1])):
             by = self.root @ normal
             # Neither decay nor frequency is ever below zero, however unsure.
@@ -73,26 +77,38 @@ class ShapeFit:
         return found
 
 
-def shape_fit(data: Data, fit: PoleFit, entries: Entries) -> ShapeFit:
+def shape_fit(
+    data: Data, fit: PoleFit, entries: Entries, scale: np.ndarray | None = None
+) -> ShapeFit:
     """From a fit whose residues were free, of responses in the order of the `entries` (e,).
 
     Poles outside the lines, and those nearer to each other than their damping, keep free residues:
-    they may stand for several modes.
+    they may stand for several modes. So do all where the FRFs speak against reciprocity (a spindle
+    that turns). Variances grow by `scale` (m,), mode by mode.
     """
+    freedom = 2 * data.entries * data.frequency_hz.size
+
+    def surely_worse(before: float, after: float, fewer: int) -> bool:
+        return after - before > chi2.ppf(SURELY, max(1, fewer)) * max(1.0, before / freedom)
+
     problem = _ShapeProblem.of(data, fit, entries)
-    point = problem.start(fit)
-    for _ in range(STEPS):
-        step = problem.step(point)
-        tried = (problem.moved(point, step / 2**k) for k in range(HALVED))
-        allowed = (problem.at(*values) for values in tried if data.allowed(values[0]))
-        there = next((p for p in allowed if p.chi2 <= point.chi2), point)
-        fall, point = point.chi2 - there.chi2, there
-        if fall < SETTLED:
-            break
-    root = problem.root(point)
-    freedom = 2 * data.entries * data.frequency_hz.size - root.shape[1]
-    whole = problem.coefficients(point.shapes, point.free)
-    return ShapeFit(data, point.poles, whole, root, point.chi2 / max(freedom, 1))
+    point = problem.settled(problem.start(fit), np.ones(problem.size, bool))
+    unshaped = replace(problem, shaped=problem.shaped[:0])
+    if surely_worse(fit.refined.chi2, point.chi2, unshaped.size - problem.size):
+        problem, point = unshaped, unshaped.start(fit)
+    every = np.ones(problem.size, bool)
+    plain, kept = problem.without_nothings(point)
+    plain = problem.settled(plain, kept)
+    if not surely_worse(point.chi2, plain.chi2, np.count_nonzero(~kept)):
+        point, every = plain, kept
+    root = problem.tangent(point.values)[:, every] @ point.root(every)
+    whole = problem.coefficients(point.values)
+    if scale is not None:
+        rest = np.full(whole.shape[1] - 2 * scale.size, np.max(scale))
+        grown = [np.tile(scale, 2), *[np.append(np.tile(scale, 2), rest)] * len(whole)]
+        root = np.sqrt(np.concatenate(grown))[:, None] * root
+    per_freedom = point.chi2 / max(freedom - root.shape[1], 1)
+    return ShapeFit(data, problem.poles(point.values), whole, root, problem.shaped, per_freedom)
 
 
 def _by_poles(coefficients: np.ndarray, slope: np.ndarray, m: int) -> np.ndarray:
@@ -104,19 +120,29 @@ def _by_poles(coefficients: np.ndarray, slope: np.ndarray, m: int) -> np.ndarray
 
 @dataclass(frozen=True, eq=False)
 class _ShapePoint:
-    """Poles (m,), shapes (k, n), coefficients (e, c), those of the shapes unused; χ², slope, N."""
+    """χ² at values (u,), its slope (−½ of it, (u,)) and half its curvature (u, u)."""
 
-    poles: np.ndarray
-    shapes: np.ndarray
-    free: np.ndarray
+    values: np.ndarray
     chi2: float
     slope: np.ndarray
     normal: np.ndarray
 
+    def root(self, kept: np.ndarray) -> np.ndarray:
+        """(k, d) root of the covariance of the values that are kept (u,) bool."""
+        normal = self.normal[np.ix_(kept, kept)]
+        unit = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        values, vectors = np.linalg.eigh(normal / unit[:, None] / unit)
+        some = values > ROUNDING * values[-1]
+        return vectors[:, some] / np.sqrt(values[some]) / unit[:, None]
+
 
 @dataclass(frozen=True, eq=False)
 class _ShapeProblem:
-    """Responses and weights 2/variance (e, F); `shaped` are the modes that have one shape each."""
+    """Responses and weights 2/variance (e, F); `shaped` are the modes that have one shape each.
+
+    Values: Re and Im of the poles, Re φ and Im φ mode by mode, then entry by entry the coefficients
+    that are `left` free: residues of other modes, out-of-band terms.
+    """
 
     data: Data
     response: np.ndarray
@@ -132,37 +158,64 @@ class _ShapeProblem:
         wide = np.maximum(np.abs(poles.real)[:, None], np.abs(poles.real))
         alone = np.all(apart > wide / 2, axis=1)
         alone &= np.abs(poles) < 2 * np.pi * data.frequency_hz[-1]
-        weight = 2 / fit.variance.reshape(count, -1)
-        response = data.response.reshape(count, -1)
+        alone &= count > entries.points  # or nothing would tie the points
+        response, weight = data.response.reshape(count, -1), 2 / fit.variance.reshape(count, -1)
         return cls(data, response, weight, entries, poles.size, np.flatnonzero(alone))
+
+    @cached_property
+    def left(self) -> np.ndarray:
+        """Columns of the coefficients that are free."""
+        columns = np.arange(2 * (self.modes + len(self.data.lines.rest)))
+        return np.setdiff1d(columns, np.r_[self.shaped, self.modes + self.shaped])
+
+    @property
+    def end(self) -> int:
+        """Number of poles' and shapes' values."""
+        return 2 * (self.modes + self.shaped.size * self.entries.points)
+
+    @property
+    def size(self) -> int:
+        """Number of all values."""
+        return self.end + self.left.size * len(self.response)
+
+    def poles(self, values: np.ndarray) -> np.ndarray:
+        """(m,) in rad/s."""
+        return values[: self.modes] + 1j * values[self.modes : 2 * self.modes]
+
+    def _shapes(self, values: np.ndarray) -> np.ndarray:
+        """(k, n) of the modes that have one."""
+        parts = values[2 * self.modes : self.end].reshape(self.shaped.size, 2, self.entries.points)
+        return parts[:, 0] + 1j * parts[:, 1]
+
+    def coefficients(self, values: np.ndarray) -> np.ndarray:
+        """(e, c) of all modes."""
+        shape, e, m = self._shapes(values), self.entries, self.modes
+        out = np.zeros((len(self.response), self.left.size + 2 * self.shaped.size))
+        out[:, self.left] = values[self.end :].reshape(len(out), -1)
+        residue = -1j * (shape[:, e.rows] * shape[:, e.columns]).T
+        out[:, self.shaped], out[:, m + self.shaped] = residue.real, residue.imag
+        return out
 
     def start(self, fit: PoleFit) -> _ShapePoint:
         """Shapes that explain the free residues best."""
         refined, m = fit.refined, self.modes
         residue = refined.residues.residue.reshape(-1, m)
         variance = np.mean(refined.residue_variance, axis=2).reshape(-1, m)
-        shapes = [
-            fit_shape(self.entries, residue[:, k], variance[:, k], 0.5).shape / np.sqrt(1j)
-            for k in self.shaped
-        ]
-        shape = np.array(shapes).reshape(-1, self.entries.points)
-        free = refined.point.coefficients.copy()
-        return self.at(refined.poles, shape, free)
+        shape = np.array(
+            [fit_shape(self.entries, residue[:, k], variance[:, k], 0.5).shape for k in self.shaped]
+        ).reshape(self.shaped.size, 1, self.entries.points)
+        parts = np.concatenate([shape.real, shape.imag], axis=1)
+        free = refined.point.coefficients[:, self.left]
+        both = refined.poles.real, refined.poles.imag
+        return self.at(np.concatenate([*both, parts.ravel(), free.ravel()]))
 
-    def coefficients(self, shapes: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """(e, c) of all modes."""
-        out, e = free.copy(), self.entries
-        residue = (shapes[:, e.rows] * shapes[:, e.columns]).T
-        out[:, self.shaped], out[:, self.modes + self.shaped] = residue.real, residue.imag
-        return out
-
-    def at(self, poles: np.ndarray, shapes: np.ndarray, free: np.ndarray) -> _ShapePoint:
-        """With χ², its slope (−½ of it) and half its curvature by poles and all coefficients."""
-        lines, m = self.data.lines, self.modes
+    def at(self, values: np.ndarray) -> _ShapePoint:
+        """χ² and how it goes on."""
+        m, lines, poles = self.modes, self.data.lines, self.poles(values)
         columns, slope = basis(lines, poles), basis_slope(lines, poles)
-        own, each = self.coefficients(shapes, free), len(columns)
+        own, each = self.coefficients(values), len(columns)
         size = 2 * m + own.size
-        normal, gradient, chi2 = np.zeros((size, size)), np.zeros(size), 0.0
+        normal, gradient, square = np.zeros((size, size)), np.zeros(size), 0.0
         for e, (c, w) in enumerate(zip(own, self.weight, strict=True)):
             part = np.concatenate([_by_poles(c, slope, m), columns])
             off = self.response[e] - c @ columns
@@ -170,66 +223,74 @@ class _ShapeProblem:
             weighted = part.conj() * w
             normal[np.ix_(index, index)] += (weighted @ part.T).real
             gradient[index] += (weighted @ off).real
-            chi2 += float(w @ np.abs(off) ** 2)
-        return _ShapePoint(poles, shapes, free, chi2, gradient, normal)
+            square += float(w @ np.abs(off) ** 2)
+        tangent = self.tangent(values)
+        return _ShapePoint(values, square, tangent.T @ gradient, tangent.T @ normal @ tangent)
 
-    def tangent(self, point: _ShapePoint) -> np.ndarray:
-        """(2m + e·c, u) change of poles and all coefficients with the unknowns.
-
-        These are the poles, then Re φ and Im φ of every point mode by mode, then free coefficients.
-        """
-        m, e = self.modes, self.entries
-        count, each = point.free.shape
-        index = np.arange(count)
-        residue = np.zeros((len(self.shaped), e.points, count), complex)
-        for k, shape in enumerate(point.shapes):
-            np.add.at(residue[k], (e.rows, index), shape[e.columns])
-            np.add.at(residue[k], (e.columns, index), shape[e.rows])
-        both = np.stack([residue, 1j * residue], axis=2)  # (k, points, 2, e)
-        change = np.zeros((*both.shape, each))
-        for k, mode in enumerate(self.shaped):
-            change[k, ..., mode], change[k, ..., m + mode] = both[k].real, both[k].imag
-        size = 2 * m + count * each
-        out = np.zeros((size, 2 * m + 2 * e.points * len(self.shaped) + count * self.left.size))
+    def tangent(self, values: np.ndarray) -> np.ndarray:
+        """(2m + e·c, u) change of poles and all coefficients with the values."""
+        m, e, count = self.modes, self.entries, len(self.response)
+        index, each = np.arange(count), self.left.size + 2 * self.shaped.size
+        out = np.zeros((2 * m + count * each, self.size))
         out[: 2 * m, : 2 * m] = np.eye(2 * m)
-        end = 2 * m + 2 * e.points * len(self.shaped)
-        out[2 * m :, 2 * m : end] = change.reshape(end - 2 * m, -1).T
+        change = np.zeros((count, each, self.shaped.size, 2, e.points))
+        for k, (mode, shape) in enumerate(zip(self.shaped, self._shapes(values), strict=True)):
+            by = np.zeros((count, e.points), complex)
+            np.add.at(by, (index, e.rows), -1j * shape[e.columns])
+            np.add.at(by, (index, e.columns), -1j * shape[e.rows])
+            both = np.stack([by, 1j * by], axis=1)
+            change[:, mode, k], change[:, m + mode, k] = both.real, both.imag
+        out[2 * m :, 2 * m : self.end] = change.reshape(count * each, self.end - 2 * m)
         rows = 2 * m + each * index[:, None] + self.left
-        out[rows.ravel(), end + np.arange(rows.size)] = 1.0
+        out[rows.ravel(), self.end + np.arange(rows.size)] = 1.0
         return out
 
-    @property
-    def left(self) -> np.ndarray:
-        """Columns of the coefficients that are free."""
-        terms = 2 * (self.modes + len(self.data.lines.rest))
-        return np.setdiff1d(np.arange(terms), np.r_[self.shaped, self.modes + self.shaped])
+    def settled(self, point: _ShapePoint, kept: np.ndarray) -> _ShapePoint:
+        """Where χ² is least, the values that are not kept (u,) bool held where they are."""
+        for _ in range(STEPS):
+            root, step = point.root(kept), np.zeros(self.size)
+            step[kept] = root @ (root.T @ point.slope[kept])
+            tried = (point.values + step / 2**k for k in range(HALVED))
+            allowed = (self.at(v) for v in tried if self.data.allowed(self.poles(v)))
+            there = next((one for one in allowed if one.chi2 <= point.chi2), point)
+            fall, point = point.chi2 - there.chi2, there
+            if fall < SETTLED:
+                break
+        return point
 
-    def _scaled(self, point: _ShapePoint) -> tuple[np.ndarray, np.ndarray]:
-        """Tangent in units that make the curvature one on its diagonal; root of its inverse."""
-        tangent = self.tangent(point)
-        normal = tangent.T @ point.normal @ tangent
-        unit = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-        values, vectors = np.linalg.eigh(normal / unit[:, None] / unit)
-        kept = values > ROUNDING * values[-1]
-        return tangent, vectors[:, kept] / np.sqrt(values[kept]) / unit[:, None]
+    def without_nothings(self, point: _ShapePoint) -> tuple[_ShapePoint, np.ndarray]:
+        """The point where what is nothing as far as the fit tells is zero, and what is not (u,)."""
+        kept, values = np.ones(self.size, bool), point.values.copy()
+        root = point.root(kept)
+        covariance = root @ root.T
+        for group in self._nothings():
+            own = covariance[np.ix_(group, group)]
+            unit = np.sqrt(np.maximum(np.diag(own), 1e-300))
+            inverse = np.linalg.pinv(own / unit[:, None] / unit, rcond=1e-10, hermitian=True)
+            inverse = inverse / unit[:, None] / unit
+            if values[group] @ inverse @ values[group] > chi2.ppf(CHANCE, group.size):
+                continue
+            gain = covariance[:, group] @ inverse
+            values = values - gain @ values[group]
+            covariance = covariance - gain @ covariance[group]
+            kept[group], values[group] = False, 0.0
+        poles = slice(0, 2 * self.modes)  # they stay for once, if the step is too far
+        if not self.data.allowed(self.poles(values)):
+            values[poles] = point.values[poles]
+        return self.at(values), kept
 
-    def root(self, point: _ShapePoint) -> np.ndarray:
-        """(2m + e·c, d) independent errors."""
-        tangent, root = self._scaled(point)
-        return tangent @ root
+    def _nothings(self) -> list[np.ndarray]:
+        """Values (indices) that may be nothing, one group after the other.
 
-    def step(self, point: _ShapePoint) -> np.ndarray:
-        """(u,) of Gauss and Newton."""
-        tangent, root = self._scaled(point)
-        return root @ (root.T @ (tangent.T @ point.slope))
-
-    def moved(
-        self, point: _ShapePoint, step: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Poles, shapes and free coefficients after a step (u,)."""
-        m, end = self.modes, 2 * self.modes + 2 * point.shapes.size
-        parts = step[2 * m : end].reshape(*point.shapes.shape, 2)
-        free = point.free.copy()
-        free[:, self.left] += step[end:].reshape(len(free), -1)
-        poles = point.poles + step[:m] + 1j * step[m : 2 * m]
-        return poles, point.shapes + parts[..., 0] + 1j * parts[..., 1], free
+        Out-of-band terms, each and all of their phases; then mode by mode the phases.
+        """
+        own = self.end + np.arange(self.size - self.end).reshape(len(self.response), -1)
+        terms = len(self.data.lines.rest)
+        real, imag = own[:, -2 * terms : -terms], own[:, -terms:]
+        found = [np.r_[real[:, k], imag[:, k]] for k in range(terms)]
+        found.append(imag.ravel())
+        points = self.entries.points
+        for k in range(self.shaped.size):
+            found.append(2 * self.modes + points * (2 * k + 1) + np.arange(points))
+        other = (self.left.size - 2 * terms) // 2
+        return [*found, *(own[:, k] for k in range(other))]
