@@ -10,7 +10,7 @@ from planner.frf.labelled import labelled_frfs
 from planner.frf.quantities import convert
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
-from planner.modal.rational_fit import CLOSE, RationalFit, rational_fit
+from planner.milling.rational_fit import CLOSE, RationalFit, rational_fit
 from planner.recording.frf_files import read_frfs
 from planner.recording.records import AXES, FrfRecord
 

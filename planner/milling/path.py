@@ -10,8 +10,7 @@ from scipy.stats import norm
 from planner.milling.cut import Cut
 from planner.milling.lobes import Loss, losses
 from planner.milling.machine import Machine, multipliers
-from planner.milling.spread import moved
-from planner.milling.structure import Structure
+from planner.milling.structure import Structure, moved
 from planner.milling.uncertainty import PROBABILITY, sampled_limits
 from planner.progress import Tell, quietly, within
 

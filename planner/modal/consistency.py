@@ -21,7 +21,7 @@ from planner.modal.exchanged import (
     turning_helps,
 )
 from planner.modal.matrix_poles import MatrixPoles
-from planner.modal.row_places import turned_rows
+from planner.modal.motion_fields import turned_rows
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_poles import MatrixPoles
+from planner.modal.motion_fields import Foretold, foretold
 from planner.modal.residues import realign
-from planner.modal.row_places import Foretold, foretold
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 

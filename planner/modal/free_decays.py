@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import find_peaks, peak_widths
 
 from planner.errors import InputError, RefusedError
 from planner.modal.estimate_modes import PoleIdentification, identify
@@ -13,9 +14,6 @@ from planner.modal.modes import ModalModel, Mode
 from planner.modal.residues import rank_one
 from planner.recording.records import Channel, TimeRecord
 
-# A hit stands out of the force channel's own noise by this factor and reaches this share of the
-# largest one.
-HIT_FACTOR, HIT_SHARE = 20.0, 0.15
 # The decay starts where the force has fallen to this share of its peak, at latest after that time.
 PULSE_END, PULSE_LONGEST_S = 0.02, 0.3
 LEAST_DECAY_S = 1.0
@@ -101,17 +99,10 @@ def _force(record: TimeRecord, name: str | None) -> Channel | None:
 def _hits(force: np.ndarray, apart: int = 1) -> np.ndarray:
     """Samples at which pulses peak, `apart` samples from each other at least."""
     size = np.abs(force - np.median(force))
-    noise = max(float(np.median(size)), 1e-12 * float(np.max(size, initial=0.0)))
-    limit = max(HIT_FACTOR * noise, HIT_SHARE * float(np.max(size, initial=0.0)))
-    above = np.flatnonzero(size > limit)
-    hits: list[int] = []
-    for index in above:
-        if hits and index - hits[-1] < apart:
-            if size[index] > size[hits[-1]]:
-                hits[-1] = int(index)
-        else:
-            hits.append(int(index))
-    return np.array(hits, int)
+    most = float(np.max(size, initial=0.0))
+    noise = max(float(np.median(size)), 1e-12 * most)
+    # Out of the channel's own noise, and a good share of the largest.
+    return find_peaks(np.r_[0.0, size, 0.0], max(20 * noise, 0.15 * most), distance=apart)[0] - 1
 
 
 def _decays(record: TimeRecord, force: Channel | None, remarks: list[str]) -> _Decays:
@@ -170,18 +161,10 @@ def _pulse_end(force: np.ndarray, hit: int, rate: float) -> int:
 
 
 def _remark_on_pulse(force: Channel, hits: np.ndarray, rate: float, remarks: list[str]) -> None:
-    size = np.abs(force.samples - np.median(force.samples))
-    widths = []
-    for hit in hits:
-        low = high = int(hit)
-        while low > 0 and size[low - 1] > 0.5 * size[hit]:
-            low -= 1
-        while high + 1 < size.size and size[high + 1] > 0.5 * size[hit]:
-            high += 1
-        widths.append(high - low + 1)
+    widths = peak_widths(np.abs(force.samples - np.median(force.samples)), hits)[0]
     if np.median(widths) < LEAST_PULSE_SAMPLES:
         remarks.append(
-            f"The hammer pulse in {force.name} is under-sampled ({np.median(widths):g} samples"
+            f"The hammer pulse in {force.name} is under-sampled ({np.median(widths):.0f} samples"
             f" above half its peak at {rate:g} Hz): its amplitude is useless and was not used."
         )
     if force.unit and force.unit != "N":
@@ -204,19 +187,16 @@ def _identify_sound(
         raise RefusedError(_nothing(record, band))
     explained = _explained(found, band)
     sound = explained >= LEAST_EXPLAINED * np.max(explained)
-    if not np.all(sound):
-        for name, share in zip(np.array(decays.names)[~sound], explained[~sound], strict=True):
-            remarks.append(
-                f"Sensor {name} does not follow the hits (the modes explain {100 * share:.0f} % of"
-                " it): it was left out; check the sensor and its cable."
-            )
-        names = tuple(np.array(decays.names)[sound].tolist())
-        decays = _Decays(decays.samples[sound], names, decays.rate_hz)
-        scale = scale[sound]
-        found = identify_decays(decays.samples / scale, decays.rate_hz, band)
-        if found is None:
-            raise RefusedError(_nothing(record, band))
-    return decays, _rescaled(found, scale)
+    if np.all(sound):
+        return decays, _rescaled(found, scale)
+    for name, share in zip(np.array(decays.names)[~sound], explained[~sound], strict=True):
+        remarks.append(
+            f"Sensor {name} does not follow the hits (the modes explain {100 * share:.0f} % of"
+            " it): it was left out; check the sensor and its cable."
+        )
+    names = tuple(np.array(decays.names)[sound].tolist())
+    fewer = _Decays(decays.samples[sound], names, decays.rate_hz)
+    return _identify_sound(record, fewer, band, remarks)
 
 
 def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarray:

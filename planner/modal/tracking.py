@@ -17,9 +17,8 @@ import numpy as np
 
 from planner.inference import triangular
 from planner.inference.assignment import least_cost
-from planner.modal.label_permutations import mixture, name_chances
 from planner.modal.mac import match_gain, unexpected_cost
-from planner.modal.mode_matching import best, chances
+from planner.modal.mode_matching import best, chances, mixture, name_chances
 from planner.modal.modes import Mode
 
 # Log frequency: how far an unfitted guide may be off, by how much its error varies over the

@@ -130,7 +130,7 @@ class DiagnosisReport(Answer):
 
         Raises InputError where it cannot be written.
         """
-        from planner.frf.frequency_lines import frequency_lines
+        from planner.frf.synthesis import frequency_lines
         from planner.report.predictions import save_frfs
 
         lines = frequency_lines(self.diagnosis.problem.band_hz)

@@ -8,8 +8,7 @@ from planner.campaign.decision import Decision
 from planner.errors import InputError
 from planner.milling.lobes import losses
 from planner.milling.path import along, by_feed, decide
-from planner.milling.spread import ModeSpread
-from planner.milling.structure import Structure
+from planner.milling.structure import ModeSpread, Structure
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way
 
 RPM = 10000.0

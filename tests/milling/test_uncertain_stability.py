@@ -10,12 +10,18 @@ from planner.errors import InputError
 from planner.frf.quantities import convert
 from planner.milling.cutter_frf import CutterFrf, of_accelerance
 from planner.milling.cutter_modes import CutterModes, real_modes
-from planner.milling.doubts import doubts
 from planner.milling.lobes import losses
-from planner.milling.spread import ModeSpread, explaining, moved, sampled
-from planner.milling.structure import Structure, of_frf
+from planner.milling.rational_fit import rational_fit
+from planner.milling.structure import (
+    ModeSpread,
+    Structure,
+    doubts,
+    explaining,
+    moved,
+    of_frf,
+    sampled,
+)
 from planner.milling.uncertainty import sampled_limits
-from planner.modal.rational_fit import rational_fit
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way
 from tests.support.semi_discretisation import semi_growth
 

@@ -9,8 +9,7 @@ import pytest
 from planner.modal.consistency import check
 from planner.modal.exchanged import _exchanged, _gains, _nodes, exchanged_nodes
 from planner.modal.matrix_modes import modes_of_matrix
-from planner.modal.motion_fields import motion_fields
-from planner.modal.row_places import Foretold, turned_rows
+from planner.modal.motion_fields import Foretold, motion_fields, turned_rows
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 from tests.support.rough_hammer_sets import geometry_of, rough_set, spoiled
