@@ -94,12 +94,6 @@ class Frf:
         )
 
 
-# Of ‖H_ij − H_ji‖ over √(‖H_ii‖ ‖H_jj‖). Good poses have 0.05 to 0.35 where hits tilt by 2° and the
-# sensor sits at the tcp, and up to 0.75 where it sits beside it; a turned sign has up to 2, an
-# exchanged axis 1 and more. Chosen between.
-NOT_RECIPROCAL = 0.9
-
-
 def unreciprocal(frf: Frf) -> tuple[str, ...]:
     """Remarks on pairs of axes of a tool's FRF (3, 3, F) that do not fit each other."""
     found = []
@@ -110,7 +104,10 @@ def unreciprocal(frf: Frf) -> tuple[str, ...]:
             continue
         size = np.sqrt(np.linalg.norm(h[i, i]) * np.linalg.norm(h[j, j]))
         apart = float(np.linalg.norm(h[i, j] - h[j, i]) / max(size, 1e-300))
-        if apart > NOT_RECIPROCAL:
+        # Of ‖H_ij − H_ji‖ over √(‖H_ii‖ ‖H_jj‖). Good poses have 0.05 to 0.35 where hits tilt by 2°
+        # and the sensor sits at the tcp, and up to 0.75 where it sits beside it; a turned sign has
+        # up to 2, an exchanged axis 1 and more. Chosen between.
+        if apart > 0.9:
             found.append(
                 f"Hits along {AXES[i]} felt along {AXES[j]} and hits along {AXES[j]} felt along "
                 f"{AXES[i]} differ by {100 * apart:.0f} % of what is felt along the hits: they "

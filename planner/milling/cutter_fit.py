@@ -98,10 +98,6 @@ class CutterFit:
         return self.found.fit_error
 
 
-DAMPING = 0.01  # of a mode that may be hidden: less damped ones are rare; chosen
-SLOWEST_HZ = 2.0  # machines and robots have no mode below; chosen
-
-
 def hidden_below(fit: CutterFit, mean: np.ndarray, depth_m: float) -> float | None:
     """The highest frequency in Hz at which a mode that chatters below a depth could hide, if any.
 
@@ -110,8 +106,10 @@ def hidden_below(fit: CutterFit, mean: np.ndarray, depth_m: float) -> float | No
     the lines that meet its resonance, passes chance; between two of them at the worst.
     """
     hertz = fit.frf.frequency_hz
-    half = np.pi * DAMPING * hertz / np.median(np.diff(hertz))  # π times lines in half a width
+    # Damping of a mode that may be hidden: less damped ones are rare; chosen
+    half = np.pi * 0.01 * hertz / np.median(np.diff(hertz))  # π times lines in half a width
     met = half * np.tanh(half)  # Σ |H/P|² over the lines
     seen = fit.noise * np.sqrt(fit.found.data.threshold / (2 * met))
-    hidden = hertz[(seen * np.linalg.norm(mean, 2) * depth_m > 1) & (hertz > SLOWEST_HZ)]
+    # Machines and robots have no mode below 2 Hz; chosen
+    hidden = hertz[(seen * np.linalg.norm(mean, 2) * depth_m > 1) & (hertz > 2.0)]
     return float(hidden[-1]) if hidden.size else None

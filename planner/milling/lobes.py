@@ -17,13 +17,9 @@ from planner.milling.machine import Machine, Monodromies, check_structure, limit
 from planner.milling.period import Period
 from planner.progress import Tell, quietly
 
-STEPS_TO_FLOOR = 6  # of the scan, up to the zeroth-order floor; flips may come before it
 LEAST_STEPS = 16  # of the scan in all
-EQUAL_STEPS = 24  # of the same length, before steps grow with the depth
 GROWTH = 1.045
 CHUNK = 12  # depths that are scanned at once
-NEARLY = 0.9  # a maximum of |µ| above this, between steps, is looked at more closely
-CLOSER = 9  # depths that then are looked at
 
 
 @dataclass(frozen=True)
@@ -36,8 +32,10 @@ class GrowthAtDepth:
 
 def scanned_depths(floor_m: float, most_m: float) -> np.ndarray:
     """(B,) depths from the first step to the largest."""
-    step = min(floor_m / STEPS_TO_FLOOR, most_m / LEAST_STEPS)
-    equal = step * np.arange(1, EQUAL_STEPS + 1)
+    # Steps of the scan up to the zeroth-order floor: flips may come before it
+    step = min(floor_m / 6, most_m / LEAST_STEPS)
+    # Steps of the same length, before they grow with the depth
+    equal = step * np.arange(1, 24 + 1)
     count = max(0, int(np.ceil(np.log(max(most_m / equal[-1], 1.0)) / np.log(GROWTH))))
     depths = np.concatenate([equal, equal[-1] * GROWTH ** np.arange(1, count + 1)])
     return np.append(depths[depths < most_m * (1 - 1e-9)], most_m)
@@ -68,8 +66,10 @@ def _with_peaks(at: Monodromies, seen: list[GrowthAtDepth]) -> list[GrowthAtDept
     for a, b, c in zip(seen, seen[1:], seen[2:], strict=False):
         if b.size > 0:
             break
-        if b.size > np.log(NEARLY) and b.size >= max(a.size, c.size):
-            more += levels(at, np.linspace(a.depth, c.depth, CLOSER + 2)[1:-1])
+        # A maximum of |µ| above this, between steps, is looked at more closely.
+        if b.size > np.log(0.9) and b.size >= max(a.size, c.size):
+            # So many depths then are looked at.
+            more += levels(at, np.linspace(a.depth, c.depth, 9 + 2)[1:-1])
     return sorted([*seen, *more], key=lambda level: level.depth)
 
 
@@ -83,10 +83,7 @@ def refined(at: Monodromies, low: GrowthAtDepth, high: GrowthAtDepth, width: flo
     return float(brentq(size, low.depth, high.depth, xtol=width * high.depth, rtol=1e-12))
 
 
-DEPTH_ERROR = 3e-4  # relative, up to which points per period are added
-FINER = 1.5  # factor on the points, for the check
 MANY, BLOCK = 60, 10  # speeds from which two processes share them, in blocks of so many
-ROUNDS = 5  # of adding points
 
 
 @dataclass(frozen=True)
@@ -140,14 +137,17 @@ def full_loss(machine: Machine, rpm: float, scan: np.ndarray) -> Loss:
         return NO_LOSS
     depth = refined(at, *bracket)
     factor, error = 1.0, np.inf
-    for _ in range(ROUNDS):
-        factor *= FINER
+    # Rounds of adding points
+    for _ in range(5):
+        # Finer: factor on the points, for the check
+        factor *= 1.5
         at = machine.monodromies(rpm, factor)
         found = _again(at, depth, scan)
         if found is None:
             return NO_LOSS
         error, depth = abs(found - depth) / depth, found
-        if error < DEPTH_ERROR:
+        # Depth error: relative, up to which points per period are added
+        if error < 3e-4:
             break
     return _told(machine, rpm, factor, depth, error)
 

@@ -101,7 +101,6 @@ Monodromies = Callable[[np.ndarray], list[np.ndarray]]  # of depths (B,) in m
 # Points of a period, and more of them per radian of the fastest mode: depths of one-mode cuts are
 # then within 1e-4.
 POINTS, PER_RADIAN = 8, 0.55
-MOST_DEGREE = 32
 MOST_POINTS = 400  # of a period: with more, each depth takes a second
 
 
@@ -124,7 +123,8 @@ class Machine:
                 f"At {rpm:g} rpm the fastest mode swings too often while a tooth cuts; ask for "
                 f'{slowest:.0f} rpm or more, or choose the method "zeroth_order".'
             )
-        elements = int(np.ceil(points / MOST_DEGREE))
+        # Most degree.
+        elements = int(np.ceil(points / 32))
         return Discretisation(int(np.ceil(points / elements)), arc / elements * (1 + 1e-9))
 
     @property
@@ -186,7 +186,6 @@ def multipliers(matrices: list[np.ndarray]) -> np.ndarray:
 
 FINER = 1.5  # factor on the points, until they suffice
 EXACT = 1e-7  # relative change of |µ| up to which points per period are added
-MOST_CHIPS = 600  # points of a period: beyond them eigenvalues take minutes
 
 
 @dataclass(frozen=True)
@@ -204,6 +203,7 @@ def multiplier(machine: Machine, rpm: float, depth_m: float) -> Multiplier:
         built = machine.monodromies(rpm, factor)(np.array([depth_m]))
         size = float(np.abs(multipliers(built)[0]))
         error = abs(size - before)
-        if error < EXACT * size or built[0].shape[0] * FINER > MOST_CHIPS:
+        # Most chips: points of a period: beyond them eigenvalues take minutes
+        if error < EXACT * size or built[0].shape[0] * FINER > 600:
             return Multiplier(size, error)
         factor, before = factor * FINER, size

@@ -16,11 +16,7 @@ from planner.milling.machine import LobeCurves, Machine, check_structure, curves
 from planner.milling.uncertainty import OPEN, REPLICATES
 
 STEP = 1e-4  # relative, of derivatives
-MOST_LINES = 300  # of an FRF, that its sd is explained at
-LEAST_COEFFICIENT = 0.05  # of the stated one: a sample of K_t is not below
 MOST_DAMPING = 0.95
-LEAST_SHARE = 1e-3  # of the median variance over the lines: none counts as if it were known better
-MOST_SD = 0.5  # of ln frequency, damping or size: nothing is known of a mode that is less sure
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +76,8 @@ def explaining(modes: CutterModes, frf: CutterFrf) -> tuple[ModeSpread, float]:
     count = len(np.unique(modes.poles))
     if frf.sd is None or not np.any(frf.sd > 0):
         return ModeSpread.none(count), 1.0
-    every = max(1, len(frf.frequency_hz) // MOST_LINES)
+    # Most lines of an FRF, that its sd is explained at
+    every = max(1, len(frf.frequency_hz) // 300)
     hertz, sd = frf.frequency_hz[::every], frf.sd[..., ::every].transpose(2, 0, 1)
     here = modes.receptance(hertz)
     columns = []
@@ -92,14 +89,16 @@ def explaining(modes: CutterModes, frf: CutterFrf) -> tuple[ModeSpread, float]:
     wanted = sd**2 / scale
     # Line by line alike: few lines of which hardly anything is known say nothing of the others.
     size = np.sum(wanted, axis=(1, 2))[:, None, None]
-    size = np.maximum(size, LEAST_SHARE * np.median(size))
+    # Least share of the median variance over the lines: none counts as if it were known better
+    size = np.maximum(size, 1e-3 * np.median(size))
     a = np.stack([(column / scale / size).ravel() for column in columns], axis=1)
     wanted = (wanted / size).ravel()
     unit = np.linalg.norm(a, axis=0)
     unit[unit == 0] = np.inf
     square = nnls(a / unit, wanted)[0] / unit
     given = float(np.sum(a @ square) / np.sum(wanted))
-    return ModeSpread.of(np.minimum(np.sqrt(square), MOST_SD)), given
+    # Most sd of ln frequency, damping or size: nothing is known of a mode that is less sure
+    return ModeSpread.of(np.minimum(np.sqrt(square), 0.5)), given
 
 
 def sampled(
@@ -112,7 +111,8 @@ def sampled(
     normal = norm.ppf(points) * numbers
     found = []
     for row in normal:
-        kt, kr = 1 + np.maximum(row[-2:], LEAST_COEFFICIENT - 1)
+        # Least coefficient of the stated one: a sample of K_t is not below
+        kt, kr = 1 + np.maximum(row[-2:], 0.05 - 1)
         found.append((moved(modes, row[:-2]), Coefficients(k.kt * kt, k.kr * kr)))
     return found
 

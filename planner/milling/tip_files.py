@@ -35,7 +35,6 @@ MEASURE = (
     "measure FRFs at two points of the tested tool, its tip and one some 30 mm behind it, both "
     "across its axis, and give them as UFF 58 with --reference naming the points"
 )
-MOST_LINES = 200_000
 
 
 def read_tip(
@@ -150,7 +149,8 @@ class TipModesTable(msgspec.Struct, forbid_unknown_fields=True):
 def _modes(path: Path, noise: float) -> TipReceptance:
     table = load_toml(path, TipModesTable, "file of modes at two points")
     low, high, count = table.lines_hz
-    if not (0 < low < high and 2 <= count <= MOST_LINES):
+    # Most lines.
+    if not (0 < low < high and 2 <= count <= 200_000):
         raise InputError(f"{path}: lines_hz has to be [from above 0, to, how many]; correct it.")
     frequency = np.linspace(low, high, count)
     iw = 2j * np.pi * frequency

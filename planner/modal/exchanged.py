@@ -18,8 +18,6 @@ from planner.modal.residues import realign
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 
-LEAST_COMPLETE = 3  # rows measured at all columns, that tell how the columns move
-
 
 @dataclass(frozen=True, eq=False)
 class Sides:
@@ -59,7 +57,8 @@ class Sides:
         phase between the two sides is free: columns as real as can be leave real rows.
         """
         complete = np.all(np.isfinite(self.table), axis=(1, 2))
-        if np.count_nonzero(complete) < LEAST_COMPLETE:
+        # Least complete: rows measured at all columns, that tell how the columns move
+        if np.count_nonzero(complete) < 3:
             return None
         _, count, modes = self.table.shape
         columns = np.zeros((count, modes), complex)

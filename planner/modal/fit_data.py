@@ -8,9 +8,6 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.modal.residues import Lines, laplace
 
-# Chance, in standard normal quantiles, that noise alone passes as a mode somewhere in the band.
-QUANTILE = 5.0
-
 
 @dataclass(frozen=True, eq=False)
 class Data:
@@ -115,7 +112,9 @@ class Data:
     def threshold(self) -> float:
         """Fall of χ² that a mode (pole and residues) reaches by chance with negligible odds."""
         k = 2 * self.entries + 2
-        return k * (1 - 2 / (9 * k) + QUANTILE * np.sqrt(2 / (9 * k))) ** 3
+        # Chance, in standard normal quantiles, that noise alone passes as a mode somewhere in the
+        # band.
+        return k * (1 - 2 / (9 * k) + 5.0 * np.sqrt(2 / (9 * k))) ** 3
 
 
 def too_few_lines(

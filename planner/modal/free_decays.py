@@ -17,20 +17,10 @@ from planner.recording.records import Channel, TimeRecord
 # The decay starts where the force has fallen to this share of its peak, at latest after that time.
 PULSE_END, PULSE_LONGEST_S = 0.02, 0.3
 LEAST_DECAY_S = 1.0
-# Samples above half the peak that a pulse needs for its amplitude to mean anything.
-LEAST_PULSE_SAMPLES = 4
-# A channel responds if its energy in the band after the hit exceeds that at the end this much, in
-# units of the scatter of such a ratio, or if the modes found explain this share of it.
-LEAST_EXPLAINED = 0.2
-# Decays longer than this many samples are cut: their tail is noise.
-LONGEST = 8192
 # The decay is taken to last while its blocks hold this much more energy than the record's median.
 BLOCK_S, ALIVE = 1.0, 1.5
-LEAST_PROBABILITY = 0.5
 MAX_ORDER = 30  # higher ones do not help with a handful of channels
 MARGIN, LEAST_LINES = 0.15, 6  # beyond the band that is fitted too; that suffice
-# MAC above which neighbours within a bandwidth are one mode.
-SAME_SHAPE = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +52,8 @@ def analyse_record(
     decays = _decays(record, force, remarks)
     band = band_hz or _band(decays)
     decays, found = _identify_sound(record, decays, band, remarks)
-    sure = [mode for mode in found.modes if mode.probability >= LEAST_PROBABILITY]
+    # Least probability.
+    sure = [mode for mode in found.modes if mode.probability >= 0.5]
     kept = [mode for mode in sure if band[0] <= mode.frequency_hz <= band[1]]
     modes = _merge(kept, remarks)
     if not modes:
@@ -125,7 +116,8 @@ def _decays(record: TimeRecord, force: Channel | None, remarks: list[str]) -> _D
     ends = [*starts[1:], values.shape[1]]
     margin = round(0.05 * rate)  # the foot of the next pulse
     length = min(e - s for s, e in zip(starts, ends, strict=True)) - margin
-    length = max(8, min(length, LONGEST, _lifetime(values, starts, length, rate)))
+    # Decays longer than this many samples are cut: their tail is noise.
+    length = max(8, min(length, 8192, _lifetime(values, starts, length, rate)))
     samples = np.stack([values[:, s : s + length] for s in starts if s + length <= values.shape[1]])
     names = tuple(c.name for c in responses)
     if not np.all(np.isfinite(samples)):
@@ -162,7 +154,8 @@ def _pulse_end(force: np.ndarray, hit: int, rate: float) -> int:
 
 def _remark_on_pulse(force: Channel, hits: np.ndarray, rate: float, remarks: list[str]) -> None:
     widths = peak_widths(np.abs(force.samples - np.median(force.samples)), hits)[0]
-    if np.median(widths) < LEAST_PULSE_SAMPLES:
+    # Samples above half the peak that a pulse needs for its amplitude to mean anything.
+    if np.median(widths) < 4:
         remarks.append(
             f"The hammer pulse in {force.name} is under-sampled ({np.median(widths):.0f} samples"
             f" above half its peak at {rate:g} Hz): its amplitude is useless and was not used."
@@ -186,7 +179,9 @@ def _identify_sound(
     if found is None or not found.modes:
         raise RefusedError(_nothing(record, band))
     explained = _explained(found, band)
-    sound = explained >= LEAST_EXPLAINED * np.max(explained)
+    # A channel responds if its energy in the band after the hit exceeds that at the end this much,
+    # in units of the scatter of such a ratio, or if the modes found explain this share of it.
+    sound = explained >= 0.2 * np.max(explained)
     if np.all(sound):
         return decays, _rescaled(found, scale)
     for name, share in zip(np.array(decays.names)[~sound], explained[~sound], strict=True):
@@ -236,7 +231,8 @@ def _merge(modes: list[Mode], remarks: list[str]) -> tuple[Mode, ...]:
 
 def _same(a: Mode, b: Mode) -> bool:
     width = max(a.damping_ratio * a.frequency_hz, b.damping_ratio * b.frequency_hz)
-    return abs(a.frequency_hz - b.frequency_hz) < width and mac(a.shape, b.shape) > SAME_SHAPE
+    # MAC above which neighbours within a bandwidth are one mode.
+    return abs(a.frequency_hz - b.frequency_hz) < width and mac(a.shape, b.shape) > 0.95
 
 
 def _merged(group: list[Mode], remarks: list[str]) -> Mode:

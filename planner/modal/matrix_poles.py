@@ -13,9 +13,6 @@ from planner.modal.set_poles import SetPoles
 from planner.modal.stabilisation import Diagram, diagram, stable
 
 MARGIN = 0.05  # of the band, beyond its edges
-MAX_ORDER = 36
-MOST_REFERENCES = 6  # at once: the order of the polynomial counts for each of them
-LEAST_LINES = 16
 # Of rows that fit the denominator of all the worse than the median by more than this, the weight is
 # taken down, so many times over; fewer rows than these cannot tell.
 ODD, REWEIGHED, LEAST_ROWS = 3.0, 3, 6
@@ -54,7 +51,8 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     """
     f = matrix.frequency_hz
     chosen = (f >= band_hz[0] / (1 + MARGIN)) & (f <= band_hz[1] * (1 + MARGIN))
-    if np.count_nonzero(chosen) < LEAST_LINES:
+    # Least lines.
+    if np.count_nonzero(chosen) < 16:
         raise too_few_lines(chosen, f, band_hz)
     rows, columns = np.nonzero(matrix.measured)
     response = matrix.accelerance[rows, columns][:, None, chosen]
@@ -89,7 +87,8 @@ def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Di
     block = table[complete][:, columns]
     level = np.mean(np.abs(block) ** 2, axis=(1, 2))
     weight = np.ones(block.shape[::2]) / np.maximum(level, 1e-300)[:, None]
-    orders = ladder(max(2, min(MAX_ORDER, block.shape[-1] // 3)))
+    # Max order.
+    orders = ladder(max(2, min(36, block.shape[-1] // 3)))
     frequency = matrix.frequency_hz[chosen]
     weight = _without_odd_rows(frequency, block, orders[-1], weight)
     sets: tuple[PoleSet, ...] = plscf(frequency, block, orders, weight)
@@ -114,7 +113,8 @@ def _references(measured: np.ndarray) -> np.ndarray:
     """Columns of measured (o, i) used together: as many FRFs as possible in complete rows."""
     columns = list(np.argsort(-np.sum(measured, axis=0), kind="stable"))
     best, size = columns[:1], 0
-    for count in range(1, min(len(columns), MOST_REFERENCES) + 1):
+    # Most references at once: the order of the polynomial counts for each of them
+    for count in range(1, min(len(columns), 6) + 1):
         complete = int(np.sum(np.all(measured[:, columns[:count]], axis=1))) * count
         if complete > size:
             best, size = columns[:count], complete

@@ -14,13 +14,9 @@ from planner.modal.split_modes import REACH, around, explains, thinned, unsplit
 # Share of the response at its frequency that a mode must be: one of the diagram's stable lines,
 # and one that only the fit's error tells of. Chosen on simulated plates and aeroplanes.
 PRESENT, PRESENT_ADDED = 0.03, 0.2
-MOST_ADDED = 6
-ROUGH_ROUNDS = 2  # of the first fit, whose weights do not know yet how sets differ
-PASSES = 4  # of leaving out and adding
 # A pole that only the error tells of is no more damped than this, and lies above so many lines.
 DAMPING_ADDED, LINES_BELOW = 0.1, 6
 SETTLING = 2  # rounds of a fit that has been fitted before, to other lines or but for a few sets
-MOST_FAILED = 2  # candidates in a row that are no modes: weaker ones are not tried
 
 
 def first_variance(data: Data, poles: np.ndarray) -> np.ndarray:
@@ -51,9 +47,11 @@ def established(
 ) -> tuple[SetPoles, np.ndarray]:  # fmt: skip
     """Fit with every set's own poles, weak modes left out and missing ones added."""
     fit = _fit(data, sets, variance, poles, rounds=0)
-    fit = _fit(data, sets, variance, fit.poles, fit.own, ROUGH_ROUNDS)
+    # Rough rounds of the first fit, whose weights do not know yet how sets differ
+    fit = _fit(data, sets, variance, fit.poles, fit.own, 2)
     searched = False
-    for _ in range(PASSES):
+    # Passes of leaving out and adding
+    for _ in range(4):
         variance = _variance(data, fit.fitted, fit.poles.size)
         # Not before: sets would be moved to where they imitate the modes that a fit lacks.
         if searched:
@@ -157,9 +155,11 @@ def _missing(
     poles, fall = falls(data, weight, weight * error)
     failed, step = 0, data.frequency_hz[1] - data.frequency_hz[0]
     fall[poles.imag / (2 * np.pi) < LINES_BELOW * step] = 0.0
-    for _ in range(MOST_ADDED):
+    # Most added.
+    for _ in range(6):
         best = int(np.argmax(fall))
-        if fall[best] <= data.threshold or failed == MOST_FAILED:
+        # Most failed: candidates in a row that are no modes: weaker ones are not tried
+        if fall[best] <= data.threshold or failed == 2:
             break
         pole = complex(poles[best])
         found = _tried(data, sets, fit, variance, pole)

@@ -14,10 +14,6 @@ from planner.inference.assignment import least_cost
 from planner.modal.mac import mac
 from planner.modal.modes import Mode
 
-# Matchings are summed over subsets of the measured modes; beyond this many, the dearest are out.
-MOST = 12
-HOPELESS = -40.0  # gain below which a match is left out of the sum (odds of 2e-9)
-
 
 def best(gain: np.ndarray, ordered: bool = False) -> np.ndarray:
     """For each label the measured mode that it is, −1 for none; largest total gain.
@@ -91,8 +87,11 @@ def _chances_free(gain: np.ndarray) -> np.ndarray:
     labels, modes = gain.shape
     out = np.zeros((labels, modes))
     largest = np.max(gain, axis=0, initial=-np.inf)
-    columns = np.sort(np.argsort(-largest)[:MOST])
-    columns = columns[largest[columns] > HOPELESS]
+    # Matchings are summed over subsets of the measured modes; beyond this many, the dearest are
+    # out.
+    columns = np.sort(np.argsort(-largest)[:12])
+    # Hopeless: gain below which a match is left out of the sum (odds of 2e-9)
+    columns = columns[largest[columns] > -40.0]
     odds = np.exp(np.clip(gain[:, columns], -400.0, 80.0) / 2)
     n = len(columns)
     taken = (np.arange(2**n)[:, None] >> np.arange(n)) & 1 == 1  # (subsets, modes)
@@ -134,9 +133,7 @@ def _gather(weight: np.ndarray, odds: np.ndarray, taken: np.ndarray) -> np.ndarr
 # places completely (swapped − kept MAC = 1), and with a guide that crosses at the same place.
 # Fitted to ways of a KR10 of graded symmetry, truth seeds 100 to 139.
 ODDS_NONE, ODDS_SWAPPED, ODDS_GUIDE = -9.0, 9.0, 2.0
-DISPLACED = 0.4  # how far from the truth's a guide's crossing may be, in x per √d
 
-LEAST_APART = 0.5  # 2 − MAC − MAC of two modes that can be told apart by their shapes
 
 Row = Sequence[Mode | None]
 
@@ -195,7 +192,8 @@ def name_chances(
                 continue
             middle = (x[i] + x[above]) / 2
             apart = np.linalg.norm(crossed[b] - middle, axis=1) / unit
-            near = np.max(np.exp(-((apart / DISPLACED) ** 2) / 2), initial=0.0)
+            # Displaced: how far from the truth's a guide's crossing may be, in x per √d
+            near = np.max(np.exp(-((apart / 0.4) ** 2) / 2), initial=0.0)
             odds = ODDS_NONE + ODDS_SWAPPED * _swapped(found[above], found[i], b)
             cross = 1 / (1 + np.exp(-odds - ODDS_GUIDE * near))
             chance[i][:, b : b + 2] @= np.array([[1 - cross, cross], [cross, 1 - cross]])
@@ -226,7 +224,8 @@ def _swapped(before: Row, after: Row, b: int) -> float:
     swap = mac(low.shape, high_now.shape) + mac(high.shape, low_now.shape)
     kept = mac(low.shape, low_now.shape) + mac(high.shape, high_now.shape)
     alike = mac(low.shape, high.shape) + mac(low_now.shape, high_now.shape)
-    return float(np.clip((swap - kept) / max(2 - alike, LEAST_APART), -1.0, 1.0))
+    # Least apart: 2 − MAC − MAC of two modes that can be told apart by their shapes
+    return float(np.clip((swap - kept) / max(2 - alike, 0.5), -1.0, 1.0))
 
 
 NEIGHBOURS, GUIDE_WEIGHT = 6, 0.5  # shapes that are compared; the guide's weight among them

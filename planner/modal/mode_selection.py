@@ -64,8 +64,6 @@ MAX_ROUNDS = 12
 MAX_DAMPING = 0.3
 # Neighbours closer than this (half bandwidths, share of frequency) and alike by MAC are one mode.
 TWIN_WIDTHS, TWIN_SHARE, TWIN_MAC = 1.5, 0.02, 0.95
-# Least noise relative to the FRF: below it rounding rules.
-FLOOR = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +133,8 @@ def _scatter(data: Data, refined: Refined, power: np.ndarray) -> np.ndarray:
     if data.pooled:
         local = flat * np.mean(local / flat, axis=(0, 1))
     # A little of the overall level keeps quiet stretches from being trusted without limit.
-    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + FLOOR**2 * power
+    # Least noise relative to the FRF: below it rounding rules.
+    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + 1e-10**2 * power
 
 
 def running_mean(values: np.ndarray, half: int) -> np.ndarray:

@@ -21,10 +21,6 @@ from planner.recording.geometry import Geometry
 # holds its points and lets them turn.
 LENGTHS = (1.0, 1.5, 2.2, 3.3, 5.0, 8.0)
 CARRIES = (2.0, 4.0, 8.0, 16.0)
-# Of a beam one spacing long, over its bending stiffness: along itself and in torsion. Tubes and
-# bars ten times as long as wide; torsion as of closed sections.
-AXIAL, TORSION = 600.0, 0.8
-BED_TURNS = 1e-6  # of its bending stiffness: holds turns that no beam holds
 NUGGET = 0.03  # of the motion: rows err by this
 
 
@@ -68,7 +64,8 @@ def _of_beams(dofs: Sequence[Dof], direction: np.ndarray, geometry: Geometry) ->
     moves = np.arange(len(stiffness)) % 6 < 3
     fields = []
     for reach in CARRIES:
-        held = stiffness + np.diag(np.where(moves, 12 / reach**4, BED_TURNS))
+        # Share of the bending stiffness: holds turns that no beam holds
+        held = stiffness + np.diag(np.where(moves, 12 / reach**4, 1e-6))
         fields.append(np.linalg.inv(held)[np.ix_(chosen, chosen)])
     return fields
 
@@ -82,7 +79,9 @@ def _beam(vector: np.ndarray) -> np.ndarray:
     side /= np.linalg.norm(side)
     turn = np.kron(np.eye(4), np.stack([axis, side, np.cross(axis, side)]))
     stiffness = np.zeros((12, 12))
-    for at, value in (((0, 6), AXIAL / length), ((3, 9), TORSION / length)):
+    # Of a beam one spacing long, over its bending stiffness: along itself and in torsion. Tubes and
+    # bars ten times as long as wide; torsion as of closed sections.
+    for at, value in (((0, 6), 600.0 / length), ((3, 9), 0.8 / length)):
         stiffness[np.ix_(at, at)] += value * np.array([[1, -1], [-1, 1]])
     for at, sign in (((1, 5, 7, 11), 1), ((2, 4, 8, 10), -1)):
         b, c = 6 * length * sign, length**2
@@ -91,9 +90,7 @@ def _beam(vector: np.ndarray) -> np.ndarray:
     return turn.T @ stiffness @ turn
 
 
-KNOWN = 0.1  # a point is known whose sd is less than this share of the mode's usual motion
 LEAST_KNOWN = 8  # degrees of freedom, that foretell others
-LEAST_AROUND = 0.05  # of the mean square, that points are taken to move by around any point
 
 
 def expected(
@@ -151,7 +148,8 @@ def _from_neighbours(
         near[known, np.arange(single.size)] = 0.0
         weight, usual = np.sum(near, axis=1), np.full(len(near), np.mean(square))
         around = np.divide(near @ square, weight, out=usual.copy(), where=weight > 0)
-        variance *= around + LEAST_AROUND * usual
+        # Least around of the mean square, that points are taken to move by around any point
+        variance *= around + 0.05 * usual
         scale = float(np.mean(np.abs(off) ** 2 / variance[known]))
         unlikely = np.sum(np.log(variance[known])) + single.size * np.log(max(scale, 1e-300))
         if unlikely < best:
@@ -165,7 +163,8 @@ def _from_neighbours(
 
 def _known(motion: np.ndarray, sd: np.ndarray) -> np.ndarray:
     """(n,) bool: points whose motion, relative to the mode's usual one, is well measured."""
-    return sd < KNOWN * np.maximum(np.abs(motion), 1.0)
+    # Known: a point is known whose sd is less than this share of the mode's usual motion
+    return sd < 0.1 * np.maximum(np.abs(motion), 1.0)
 
 
 LEAST_ROWS, LEAST_MODES = 8, 3
@@ -174,7 +173,6 @@ LEAST_ROWS, LEAST_MODES = 8, 3
 # row brings less than SECOND as much. Chosen on panels, frames and bolted pieces, none of whose
 # right rows came near; the clearest was another row where that brought 0.86 as much, never below.
 TURNED, STATED, SECOND = 0.35, 2.0, 0.8
-LEAST_MOTION = 0.3  # of the mean over all rows: points that hardly move say nothing
 MOST = 0.1  # share of rows that can be wrong: beyond, the geometry is
 
 
@@ -242,7 +240,8 @@ def turned_rows(dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry) -> 
         found = foretold(dofs, shapes, geometry)
         if found is None:
             return ()
-        row = _clearest(found, size > LEAST_MOTION**2 * np.nanmean(size))
+        # Least motion of the mean over all rows: points that hardly move say nothing
+        row = _clearest(found, size > 0.3**2 * np.nanmean(size))
         if row is None or row in turned:
             return tuple(turned)
         turned.append(row)

@@ -17,11 +17,8 @@ from planner.modal.mode_selection import PoleFit
 from planner.modal.rank_one_fit import Entries, fit_shape
 from planner.modal.residues import Residues, basis, basis_slope, unpack
 
-CHANCE = 0.999  # of what is nothing not to be called something
 SURELY = 1 - 1e-6  # that χ² rises by less where all of it is nothing: else nothing is taken away
 STEPS, HALVED = 20, 6  # of Gauss and Newton, and how often one is shortened
-SETTLED = 1e-2  # fall of χ² in a step that is the last
-ROUNDING = 1e-13  # share of the curvature
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +129,8 @@ class _ShapePoint:
         normal = self.normal[np.ix_(kept, kept)]
         unit = np.sqrt(np.maximum(np.diag(normal), 1e-300))
         values, vectors = np.linalg.eigh(normal / unit[:, None] / unit)
-        some = values > ROUNDING * values[-1]
+        # Rounding: share of the curvature
+        some = values > 1e-13 * values[-1]
         return vectors[:, some] / np.sqrt(values[some]) / unit[:, None]
 
 
@@ -254,7 +252,8 @@ class _ShapeProblem:
             allowed = (self.at(v) for v in tried if self.data.allowed(self.poles(v)))
             there = next((one for one in allowed if one.chi2 <= point.chi2), point)
             fall, point = point.chi2 - there.chi2, there
-            if fall < SETTLED:
+            # Settled: fall of χ² in a step that is the last
+            if fall < 1e-2:
                 break
         return point
 
@@ -268,7 +267,8 @@ class _ShapeProblem:
             unit = np.sqrt(np.maximum(np.diag(own), 1e-300))
             inverse = np.linalg.pinv(own / unit[:, None] / unit, rcond=1e-10, hermitian=True)
             inverse = inverse / unit[:, None] / unit
-            if values[group] @ inverse @ values[group] > chi2.ppf(CHANCE, group.size):
+            # Chance of what is nothing not to be called something
+            if values[group] @ inverse @ values[group] > chi2.ppf(0.999, group.size):
                 continue
             gain = covariance[:, group] @ inverse
             values = values - gain @ values[group]

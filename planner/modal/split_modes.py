@@ -19,18 +19,16 @@ MERGED_ROUNDS = 8  # of a fit whose sets have to part from where two poles were
 # Around a pole so many half bandwidths, and at least so many lines either way, are fitted to judge
 # it.
 REACH, LINES_AROUND = 12.0, 12
-MOST_LINES = 240  # of which that needs no more: of a fine grid, one line in so many
-# Lines farther from every resonance than this many half bandwidths are thinned when poles of sets
-# are fitted: one in so many is kept. Until the last fit fewer are enough, and so many lines in a
-# half bandwidth: on simulated sets frequencies then differ by tenths of their sds.
-NEAR, THINNED = 10.0, 3
 NEAR_FIRST, THINNED_FIRST, ENOUGH = 6.0, 5, 2.0
 
 
 def thinned(data: Data, poles: np.ndarray, every: bool = False) -> np.ndarray:
     """Lines near a resonance (some of them, where they are many; or `every` one), and others."""
     f, step = data.frequency_hz, data.frequency_hz[1] - data.frequency_hz[0]
-    reach, one_far = (NEAR, THINNED) if every else (NEAR_FIRST, THINNED_FIRST)
+    # Lines farther from every resonance than this many half bandwidths are thinned when poles of
+    # sets are fitted: one in so many is kept. Until the last fit fewer are enough, and so many
+    # lines in a half bandwidth: on simulated sets frequencies then differ by tenths of their sds.
+    reach, one_far = (10.0, 3) if every else (NEAR_FIRST, THINNED_FIRST)
     index = np.arange(f.size)
     kept = index % one_far == 0
     for pole in poles:
@@ -59,7 +57,8 @@ def around(
     reach = max(REACH * abs(pole.real) / (2 * np.pi), LINES_AROUND * step)
     lines = thinned(data, np.append(fit.poles, pole))
     lines = lines[np.abs(data.frequency_hz[lines] - centre) < reach]
-    lines = lines[:: 1 + lines.size // MOST_LINES]
+    # Of a fine grid, one line in so many: more than these lines are not needed
+    lines = lines[:: 1 + lines.size // 240]
     response = data.response[..., lines]
     part = replace(data, frequency_hz=data.frequency_hz[lines], response=response, near=False)
     near = np.abs(fit.poles.imag / (2 * np.pi) - centre) < reach
