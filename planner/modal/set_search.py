@@ -1,9 +1,9 @@
 """Sets whose poles Gauss-Newton has left in a wrong place are searched again.
 
 Of two close modes that drift by more than they lie apart, a set may be fitted with one pole on the
-other's peak, or with the two exchanged. The residues of such a set do not go with how the modes
-take part at the references, which all sets share. Its poles are then looked for on a grid, one mode
-after the other, each mode excited as in all sets.
+other's peak, or with the two exchanged. Such a set fits worse than the others around these modes,
+or its residues do not go with how the modes take part at the references, which all sets share. Its
+poles are then looked for on a grid, one mode after the other, each mode excited as in all sets.
 """
 
 from dataclasses import dataclass
@@ -17,9 +17,6 @@ from planner.modal.set_poles import FARTHEST, SetPoles
 
 # Row and column of each entry, columns being those of the few references.
 Places = tuple[np.ndarray, np.ndarray]
-# A set is searched where its residues leave so many times their variance of how the mode takes part
-# (and of what is usual).
-APART = 9.0
 # Poles are looked for up to so many sds of the sets' poles, and half bandwidths, from the common
 # ones; the lines looked at reach so many half bandwidths farther.
 FAR, FAR_HALVES, REACH = 4.0, 2.0, 4.0
@@ -31,7 +28,7 @@ def searched_again(
 ) -> np.ndarray | None:
     """Poles (k, m) of all sets, those of badly fitted sets as found anew; None where none are."""
     taking_part = participation(fit, places)
-    off = _apart(sets, fit, places, taking_part)
+    off = _off(data, sets, fit, variance) | _apart(sets, fit, places, taking_part)
     own, moved = fit.own.copy(), False
     for modes in _together(data, fit):
         for s in np.flatnonzero(off[:, modes].any(axis=1)):
@@ -95,6 +92,21 @@ def _together(data: Data, fit: SetPoles) -> list[np.ndarray]:
     return [np.array(group) for group in groups]
 
 
+def _off(
+    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray
+) -> np.ndarray:
+    """(k, m) bool: sets whose error around a mode is half as much again as that of the usual."""
+    square = np.abs(data.response[:, 0] - fit.fitted) ** 2 / variance
+    off = np.zeros((len(sets), fit.poles.size), bool)
+    for j in range(fit.poles.size):
+        lines = _near(data, fit, j)
+        if lines.any():
+            each = np.mean(square[:, lines], axis=1)
+            error = np.array([np.mean(each[chosen]) for chosen in sets])
+            off[:, j] = error > 1.5 * np.median(error)
+    return off
+
+
 def _apart(
     sets: tuple[np.ndarray, ...], fit: SetPoles, places: Places, taking_part: np.ndarray
 ) -> np.ndarray:
@@ -109,7 +121,8 @@ def _apart(
     left = fit.residue - (along / np.maximum(power, 1e-300))[rows] * theirs
     square = weight * np.abs(left) ** 2
     apart = np.array([np.mean(square[chosen], axis=0) for chosen in sets])
-    return apart > APART * np.maximum(np.median(apart, axis=0), 1.0)
+    # Beyond so many times their variance, and what is usual.
+    return apart > 9.0 * np.maximum(np.median(apart, axis=0), 1.0)
 
 
 @dataclass(frozen=True, eq=False)

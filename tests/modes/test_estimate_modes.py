@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.errors import RefusedError
-from planner.modal.estimate_modes import estimate_modes, identification
+from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac
 from tests.support.modal_systems import System, as_frf, exact_frf, noisy, random_system
 
@@ -155,18 +155,6 @@ def test_sds_do_not_hang_on_the_band():
         lowest = [m.modes[int(np.argmin(np.abs(frequencies(m) - first)))] for m in models]
         sds = [mode.frequency_sd_hz for mode in lowest]
         assert np.max(sds) < 2 * np.min(sds)
-
-
-def test_probability_is_high_for_modes_with_support():
-    rng = np.random.default_rng(6)
-    system = random_system(rng, 4, damping=(0.01, 0.03))
-    h, variance = noisy(exact_frf(system, LINES), 0.02, rng)
-    found = identification(as_frf(LINES, h, variance), BAND)
-    assert found is not None
-    assert len(found.modes) == 4
-    assert all(mode.probability > 0.9 for mode in found.modes)
-    assert all(mode.support > 0.8 for mode in found.modes)
-    assert found.diagram.sets[-1].order == found.order == 40
 
 
 def truncated(system: System, tail_s: float) -> np.ndarray:
