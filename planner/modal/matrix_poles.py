@@ -7,7 +7,7 @@ import numpy as np
 from planner.frf.matrix import FrfMatrix
 from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
-from planner.modal.matrix_selection import established, first_variance, judged
+from planner.modal.matrix_selection import first_variance, judged, select_modes
 from planner.modal.plscf import PoleSet, plscf, row_errors
 from planner.modal.set_poles import SetPoles
 from planner.modal.stabilisation import Diagram, diagram, stable
@@ -70,7 +70,7 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     sets = _sets(matrix, rows, columns)
     felt = len(matrix.responses) >= len(matrix.references)
     places = (rows, columns) if felt else (columns, rows)
-    fit, variance = established(data, sets, first_variance(data, start), start, places)
+    fit, variance = select_modes(data, sets, first_variance(data, start), start, places)
     if not fit.poles.size:
         return None
     scale, weak, presence = judged(data, fit, variance)

@@ -8,8 +8,8 @@ from planner.modal.fit_data import Data
 from planner.modal.mode_selection import MAX_DAMPING, excess, falls, presences, running_mean
 from planner.modal.refine import refine
 from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
-from planner.modal.set_search import Places, searched_again
-from planner.modal.split_modes import REACH, around, explains, thinned, unsplit
+from planner.modal.set_search import Places, reestimated_sets
+from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
 
 # Share of the response at its frequency that a mode must be: one of the diagram's stable lines,
 # and one that only the fit's error tells of. Chosen on simulated plates and aeroplanes.
@@ -41,7 +41,7 @@ def _variance(data: Data, fitted: np.ndarray, modes: int) -> np.ndarray:
     return flat * (0.9 * profile + 0.1) / lost + floor
 
 
-def established(
+def select_modes(
     data: Data, sets: tuple[np.ndarray, ...], variance: np.ndarray, poles: np.ndarray,
     places: Places,
 ) -> tuple[SetPoles, np.ndarray]:  # fmt: skip
@@ -57,7 +57,7 @@ def established(
         if searched:
             fit, variance = _settled(data, sets, fit, places)
         left = _part_of(fit, _standing(data, fit, variance))
-        poles, own = unsplit(data, sets, left, variance, places)
+        poles, own = merged_modes(data, sets, left, variance, places)
         # What a fit lacks is looked for where it has no mode too many.
         if poles.size == fit.poles.size:
             if searched:
@@ -80,7 +80,7 @@ def _settled(
 ) -> tuple[SetPoles, np.ndarray]:
     """The fit, and its variance, after those sets have been searched again that fit badly."""
     variance = _variance(data, fit.fitted, fit.poles.size)
-    own = searched_again(data, sets, fit, variance, places)
+    own = reestimated_sets(data, sets, fit, variance, places)
     if own is None:
         return fit, variance
     fit = _fit(data, sets, variance, fit.poles, own, SETTLING)

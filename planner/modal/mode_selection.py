@@ -96,7 +96,7 @@ def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
         grown = _refine(data, poles, current)
         if _worth(data, current, grown):
             current = _prune(data, grown)
-    return current if data.steady else _unsplit(data, current)
+    return current if data.steady else _merged_twins(data, current)
 
 
 def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
@@ -204,7 +204,7 @@ def _prune(data: Data, current: PoleFit) -> PoleFit:
     return current
 
 
-def _unsplit(data: Data, current: PoleFit) -> PoleFit:
+def _merged_twins(data: Data, current: PoleFit) -> PoleFit:
     """One pole for twins of one shape: hit directions that disagree split a mode in two.
 
     Between two hits a mode moves a little (warmth, amplitude, a clamp that settles); its second

@@ -5,7 +5,7 @@ itself, and, where trace lines join the points, slender beams of one cross-secti
 their flexibility is the covariance, so that a motion is the likelier the less it bends them, and
 points on a straight line move alike along it.
 
-How a point should move in all modes is foretold from the others, each left out in turn: a row that
+How a point should move in all modes is predicted from the others, each left out in turn: a row that
 is the opposite of that was measured with a turned sign.
 """
 
@@ -153,7 +153,7 @@ def _from_neighbours(
         scale = float(np.mean(np.abs(off) ** 2 / variance[known]))
         unlikely = np.sum(np.log(variance[known])) + single.size * np.log(max(scale, 1e-300))
         if unlikely < best:
-            # Whom no known point is related to, nothing is foretold of.
+            # Whom no known point is related to, nothing is predicted of.
             best, found = float(unlikely), (mean, np.where(weight > 0, scale * variance, np.inf))
     if found is not None:
         # What was measured, as far as it was, may say that this point is not like the others.
@@ -168,7 +168,7 @@ def _known(motion: np.ndarray, sd: np.ndarray) -> np.ndarray:
 
 
 LEAST_ROWS, LEAST_MODES = 8, 3
-# A row is turned where the squared difference to what is foretold is less than this, with the sign
+# A row is turned where the squared difference to what is predicted is less than this, with the sign
 # turned, and more than this as stated, relative to the row's own square, and where turning another
 # row brings less than SECOND as much. Chosen on panels, frames and bolted pieces, none of whose
 # right rows came near; the clearest was another row where that brought 0.86 as much, never below.
@@ -177,7 +177,7 @@ MOST = 0.1  # share of rows that can be wrong: beyond, the geometry is
 
 
 @dataclass(frozen=True, eq=False)
-class Foretold:
+class RowPrediction:
     """Rows that have a place: `index` (n,) of them, values (n, m), precision (n, n) over rows."""
 
     index: np.ndarray
@@ -196,15 +196,17 @@ class Foretold:
         return 4 * (slope - np.sum(self.values**2, axis=1) * np.diag(self.precision))
 
     def turning(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) relative squared difference to what is foretold: as stated, and turned."""
+        """(n,) relative squared difference to what is predicted: as stated, and turned."""
         off = (self.precision @ self.values) / np.diag(self.precision)[:, None]
         power = np.maximum(np.sum(self.values**2, axis=1), 1e-300)
         turned = np.sum((2 * self.values - off) ** 2, axis=1)
         return np.sum(off**2, axis=1) / power, turned / power
 
 
-def foretold(dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry) -> Foretold | None:
-    """What the places foretell of rows (n, m) real, NaN where unknown; None where they are few.
+def predicted_rows(
+    dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry
+) -> RowPrediction | None:
+    """What the places predict of rows (n, m) real, NaN where unknown; None where they are few.
 
     Each mode is over its usual error, each row left out in turn, by the likeliest of several
     fields: smooth modes count more.
@@ -228,7 +230,7 @@ def foretold(dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry) -> For
         usual = np.maximum(usual, 0.1 * np.median(usual))
         likely = float(np.sum(np.log(spread[:, None] / usual) - np.minimum(square / usual, 9.0)))
         if likely > best:
-            best, found = likely, Foretold(index, values / np.sqrt(usual), precision)
+            best, found = likely, RowPrediction(index, values / np.sqrt(usual), precision)
     return found
 
 
@@ -237,7 +239,7 @@ def turned_rows(dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry) -> 
     shapes, turned = shapes.copy(), []
     size = np.sum(shapes**2 / np.nanmean(shapes**2, axis=0), axis=1)
     for _ in range(int(MOST * len(dofs)) + 1):
-        found = foretold(dofs, shapes, geometry)
+        found = predicted_rows(dofs, shapes, geometry)
         if found is None:
             return ()
         # Least motion of the mean over all rows: points that hardly move say nothing
@@ -249,7 +251,7 @@ def turned_rows(dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry) -> 
     return ()
 
 
-def _clearest(found: Foretold, moves: np.ndarray) -> int | None:
+def _clearest(found: RowPrediction, moves: np.ndarray) -> int | None:
     """The row (index) that is clearly turned, None where none is or another might be instead."""
     gain = found.gain
     k = int(np.argmax(gain))
@@ -258,7 +260,7 @@ def _clearest(found: Foretold, moves: np.ndarray) -> int | None:
         return None
     values = found.values.copy()
     values[k] *= -1
-    after = Foretold(found.index, values, found.precision).gain
+    after = RowPrediction(found.index, values, found.precision).gain
     # Another row might be turned instead if little is left for it once this one is turned.
     rival = (gain > SECOND * gain[k]) & (after < gain / 2)
     return int(found.index[k]) if np.count_nonzero(rival) <= 1 else None

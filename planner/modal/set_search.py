@@ -23,7 +23,7 @@ FAR, FAR_HALVES, REACH = 4.0, 2.0, 4.0
 FINE = (0.2, 0.06, 0.02)  # half bandwidths: steps of the refinement
 
 
-def searched_again(
+def reestimated_sets(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray, places: Places
 ) -> np.ndarray | None:
     """Poles (k, m) of all sets, those of badly fitted sets as found anew; None where none are."""

@@ -7,7 +7,7 @@ import numpy as np
 from planner.modal.fit_data import Data
 from planner.modal.residues import unit
 from planner.modal.set_poles import SetPoles, StrayedError, fit_sets
-from planner.modal.set_search import Places, searched_again
+from planner.modal.set_search import Places, reestimated_sets
 
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
 # this share of the frequency, or within a bandwidth.
@@ -88,7 +88,7 @@ def _in_most(
     return bool(np.median(each) > APART)
 
 
-def unsplit(
+def merged_modes(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
     places: Places,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
@@ -162,7 +162,7 @@ def _as_one(
             # Where it is one mode, only sets that fitted it badly are explained better by two.
             if _in_most(local, sets, one, more, variance[:, lines]):
                 return None
-            own = searched_again(local, sets, one, variance[:, lines], places)
+            own = reestimated_sets(local, sets, one, variance[:, lines], places)
             if own is None:
                 return None
             one = fit_sets(local, sets, variance[:, lines], one.poles, MERGED_ROUNDS, own)
