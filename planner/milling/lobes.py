@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from planner.inference.parallel import side_by_side
 from planner.milling.machine import Machine, Monodromies, check_structure, limits, multipliers
@@ -80,7 +80,7 @@ def refined(at: Monodromies, low: GrowthAtDepth, high: GrowthAtDepth, width: flo
     def size(depth: float) -> float:
         return known[depth] if depth in known else levels(at, np.array([depth]))[0].size
 
-    return float(brentq(size, low.depth, high.depth, xtol=width * high.depth, rtol=1e-12))
+    return float(root_scalar(size, bracket=(low.depth, high.depth), xtol=width * high.depth).root)
 
 
 MANY, BLOCK = 60, 10  # speeds from which two processes share them, in blocks of so many
@@ -154,9 +154,9 @@ def full_loss(machine: Machine, rpm: float, scan: np.ndarray) -> Loss:
 
 def _again(at: Monodromies, depth: float, scan: np.ndarray) -> float | None:
     """With other points: near where it was, else by another scan."""
-    around = levels(at, depth * np.array([0.998, 1.002]))
-    if around[0].size < 0 < around[1].size:
-        return refined(at, *around)
+    low, high = levels(at, depth * np.array([0.998, 1.002]))
+    if low.size < 0 < high.size:
+        return refined(at, low, high)
     bracket = first_unstable(at, scan)
     return None if bracket is None else refined(at, *bracket)
 

@@ -86,7 +86,8 @@ def shape_fit(
     freedom = 2 * data.entries * data.frequency_hz.size
 
     def surely_worse(before: float, after: float, fewer: int) -> bool:
-        return after - before > chi2.ppf(SURELY, max(1, fewer)) * max(1.0, before / freedom)
+        most = float(chi2.ppf(SURELY, max(1, fewer)))
+        return after - before > most * max(1.0, before / freedom)
 
     problem = _ShapeProblem.of(data, fit, entries)
     point = problem.settled(problem.start(fit), np.ones(problem.size, bool))
@@ -96,7 +97,7 @@ def shape_fit(
     every = np.ones(problem.size, bool)
     plain, kept = problem.without_nothings(point)
     plain = problem.settled(plain, kept)
-    if not surely_worse(point.chi2, plain.chi2, np.count_nonzero(~kept)):
+    if not surely_worse(point.chi2, plain.chi2, int(np.count_nonzero(~kept))):
         point, every = plain, kept
     root = problem.tangent(point.values)[:, every] @ point.root(every)
     whole = problem.coefficients(point.values)
