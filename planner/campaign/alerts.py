@@ -7,7 +7,7 @@ from planner.campaign.model import Model
 from planner.campaign.revisits import Suspicion, hit_again
 from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
-from planner.frf.reciprocity import unreciprocal
+from planner.frf.frf import unreciprocal
 
 
 def alerts(

@@ -258,7 +258,7 @@ class CampaignReads:
     @property
     def frequency_lines(self) -> np.ndarray:
         """Lines (F,) in Hz over campaign.toml's band."""
-        from planner.frf.frequency_lines import frequency_lines
+        from planner.frf.synthesis import frequency_lines
 
         return frequency_lines(self.cell.config.modes.band_hz)
 

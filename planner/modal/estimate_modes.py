@@ -18,7 +18,6 @@ from planner.modal.stabilisation import Diagram, diagram, stable
 # so that it is judged by lines that hold it.
 CUT = 0.12
 LEAST_LINES = 32
-HELD = 1e-10  # of the information on the best held pole: below, rounding rules
 
 
 def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
@@ -72,7 +71,8 @@ def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndar
     point = evaluate(data.lines.part(part), response, weight, refined.poles)
     unit = np.sqrt(np.maximum(np.diag(refined.pole_covariance), 1e-300))
     turned = np.outer(unit, unit)
-    covariance = np.linalg.pinv(point.normal * turned, rcond=HELD, hermitian=True) * turned
+    # Of the information on the best held pole: below, rounding rules
+    covariance = np.linalg.pinv(point.normal * turned, rcond=1e-10, hermitian=True) * turned
     return -covariance @ point.gradient, covariance
 
 
@@ -110,7 +110,7 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | Non
         start = strongest(data)
     if start.size == 0:
         return None
-    fitted = fit(data, start)
+    fitted = fit(data, data.with_one_above(start))
     modes = modes_of_fit(data, fitted, sets)
     error = np.linalg.norm(data.response - model(data, fitted.refined))
     relative = float(error / np.linalg.norm(data.response))

@@ -130,7 +130,7 @@ class DiagnosisReport(Answer):
 
         Raises InputError where it cannot be written.
         """
-        from planner.frf.frequency_lines import frequency_lines
+        from planner.frf.synthesis import frequency_lines
         from planner.report.predictions import save_frfs
 
         search = self.found.search

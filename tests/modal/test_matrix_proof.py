@@ -1,6 +1,6 @@
 """Proofs on fresh roving-hammer sets: shapes, intervals, naming of faults, beside a peer.
 
-SEED=5000 pytest -m slow -s tests/modes/test_matrix_proof.py
+SEED=5000 pytest -m slow -s tests/modal/test_matrix_proof.py
 """
 
 import contextlib

@@ -98,28 +98,6 @@ def test_strangers_carry_no_label_and_are_told():
     assert np.all(right(tracks, truth))
 
 
-def test_neighbours_vouch_for_a_doubtful_mode():
-    truth, guide = crossing()
-    found = poses(truth, np.random.default_rng(2))
-    weak = found[12][3]
-    found[12][3] = mode(weak.frequency_hz, weak.shape, sure=0.05)
-    tracks = track(found, guided(guide), X)
-    assert tracks.modes[12][3] is found[12][3]
-    alone = track(found[12:13], guided(guide[12:13]), X[12:13])
-    assert tracks.probability[12, 3] > alone.probability[0, 3]
-
-
-def test_where_shapes_and_frequencies_agree_too_little_the_label_is_unsure():
-    truth, guide = crossing()
-    found = poses(truth, np.random.default_rng(3))
-    middle = SHAPES[1] + SHAPES[2]
-    found[10][1] = mode(found[10][1].frequency_hz, middle)
-    found[10][2] = mode(found[10][1].frequency_hz * 1.001, middle)
-    tracks = track(found, guided(guide), X)
-    assert np.min(tracks.probability[10, 1:3]) < 0.9
-    assert np.min(tracks.probability[2]) > 0.95
-
-
 def test_nothing_measured_and_nothing_expected():
     assert track([], Guide(np.zeros((0, 2)), np.zeros((0, 2, 3))), np.zeros((0, 1))).modes == ()
     tracks = track([[], []], guided(np.ones((2, 4))), X[:2])

@@ -13,12 +13,6 @@ import numpy as np
 # Relative error of a fit that needs no more poles. At 1e-3 limits of a simulated milling robot were
 # still off by 8 %, through harmonics of the tooth passing near the end of the band.
 CLOSE = 1e-5
-ROUNDS = 12  # of moving the poles, for each number of them
-SETTLED = 1e-9  # relative change of the poles in a round that is the last
-MOST_PAIRS = 14
-FIRST_DAMPING = 0.01  # of the poles that a fit begins with
-GAINED = 0.85  # share of the error left: more poles that leave more of it are not worth it
-PATIENCE = 3  # numbers of poles in a row that gain nothing before more of them are not tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,15 +52,19 @@ def rational_fit(
         return _settled(frequency_hz, response, start)
     best: RationalFit | None = None
     idle = 0
-    for pairs in range(1, min(MOST_PAIRS, len(frequency_hz) // 4) + 1):
+    # Most pairs.
+    for pairs in range(1, min(14, len(frequency_hz) // 4) + 1):
         hertz = np.geomspace(frequency_hz[0], frequency_hz[-1], pairs + 2)[1:-1]
-        first = 2 * np.pi * hertz * (-FIRST_DAMPING + 1j)
+        # First damping of the poles that a fit begins with
+        first = 2 * np.pi * hertz * (-0.01 + 1j)
         found = _settled(frequency_hz, response, first)
-        if best is None or found.error < GAINED * best.error:
+        # Gained: share of the error left: more poles that leave more of it are not worth it
+        if best is None or found.error < 0.85 * best.error:
             best, idle = found, 0
         else:
             idle += 1
-        if best.error < close or idle == PATIENCE:
+        # Patience: numbers of poles in a row that gain nothing before more of them are not tried
+        if best.error < close or idle == 3:
             break
     assert best is not None
     return best
@@ -79,9 +77,11 @@ def _settled(hertz: np.ndarray, response: np.ndarray, poles: np.ndarray) -> Rati
     weight = 1 / np.maximum(size, 1e-9 * size.max())
     scale = 2 * np.pi * hertz[-1]
     s, p = 2j * np.pi * hertz / scale, np.sort_complex(poles / scale)
-    for _ in range(ROUNDS):
+    # Rounds of moving the poles, for each number of them
+    for _ in range(12):
         moved = np.sort_complex(_relocated(s, h, weight, p))
-        still = len(moved) == len(p) and np.max(np.abs(moved - p) / np.abs(p)) < SETTLED
+        # Settled: relative change of the poles in a round that is the last
+        still = len(moved) == len(p) and np.max(np.abs(moved - p) / np.abs(p)) < 1e-9
         p = moved
         if still:
             break
