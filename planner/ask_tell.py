@@ -18,8 +18,8 @@ from planner.campaign.cell import Cell
 from planner.campaign.check import refuse_errors
 from planner.campaign.config import CampaignConfig, check_config, load_campaign_config
 from planner.campaign.events import MeasuredMode, Proposal
-from planner.campaign.fit_memory import FitMemory
 from planner.campaign.log_conversion import from_modal, from_mode
+from planner.campaign.low_fidelity import in_memory
 from planner.campaign.model import Model
 from planner.campaign.planned import inside
 from planner.campaign.proposals import propose
@@ -66,7 +66,7 @@ class AskTell:
             config = load_campaign_config(Path(tables))
         self._cell = Cell.load(loaded.path, config, loaded)
         refuse_errors(self._cell.examined)
-        self._memory = FitMemory()
+        self._recall = in_memory()
         self._state = CampaignState()
         self._frfs: dict[str, Frf] = {}
         self._model: Model | None = None
@@ -145,7 +145,7 @@ class AskTell:
         if self._model is None:
             with threadpool_limits(1):
                 self._model = build(
-                    self._cell, self._state, lambda m, _: self._frfs[m.pose], memory=self._memory
+                    self._cell, self._state, lambda m, _: self._frfs[m.pose], recall=self._recall
                 )
         return self._model
 

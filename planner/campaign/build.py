@@ -7,10 +7,9 @@ import numpy as np
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
-from planner.campaign.fit_memory import FitMemory
 from planner.campaign.frequencies_by_simulation import TunedFrequencies, tuned_frequencies
 from planner.campaign.labels import LabelledPose, label, observations
-from planner.campaign.low_fidelity import LowFidelity, learn
+from planner.campaign.low_fidelity import LowFidelity, Recall, in_memory, learn
 from planner.campaign.misses import tell, visits_of
 from planner.campaign.model import FrfOf, Model
 from planner.campaign.state import CampaignState, Measurement
@@ -31,13 +30,13 @@ def build(
     state: CampaignState,
     frf_of: FrfOf,
     hits_of: Callable[[Measurement, ModesTable], PoseHits] | None = None,
-    memory: FitMemory | None = None,
+    recall: Recall | None = None,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
     `frf_of` gives the tool's FRFs of a measurement, `hits_of` what its hits say at all points,
     which is asked only where the simulation learns. Without it nothing is told of single hits.
-    `memory` keeps what was found of the first measurements, so that nothing is found twice.
+    `recall` says what was found of the first measurements, so that nothing is found twice.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
     noise, told, tuned, learns = None, None, None, cell.config.fidelity.simulation == "updated"
@@ -47,7 +46,7 @@ def build(
         whole = tuple(h.whole for h in hits) if hits is not None else frfs
         joints = cell.robot.joints
         q = joints.internal([m.joints_deg for m in used])
-        low = learn(low, whole, q, table.band_hz, memory, used)
+        low = learn(low, whole, q, table.band_hz, used, recall or in_memory())
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(whole, table.band_hz, misfit)
         if low.learned is not None:

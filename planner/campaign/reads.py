@@ -1,14 +1,15 @@
 """What a campaign folder says: its log, the state and the model that follow from it."""
 
 from collections.abc import Callable
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 import numpy as np
 
-from planner.campaign import model_cache, store
+from planner import content_hash
+from planner.campaign import store
 from planner.campaign.config import (
     CampaignConfig,
     ModesTable,
@@ -17,10 +18,10 @@ from planner.campaign.config import (
 )
 from planner.campaign.events import Configured, Entry, HitRecord, Imported, Refused
 from planner.campaign.journal import Journal
-from planner.campaign.kept_recordings import KeptRecordings, Remembered
+from planner.campaign.kept_recordings import KeptRecordings
 from planner.campaign.state import CampaignState, Measurement, fold
 from planner.dataset.screened_files import Source
-from planner.dataset.store import Store
+from planner.dataset.store import Store, user_store
 from planner.errors import InputError
 from planner.version import __version__
 
@@ -35,18 +36,19 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+LIBRARIES = "msgspec", "numpy", "scipy", "jax", "jaxlib", "pin"  # that a model is computed by
+
 
 class CampaignReads:
     """What can be asked of a campaign folder; nothing here writes into it."""
 
     def __init__(self, directory: Path | str, models: Store | None = None):
-        """Open a folder; `models` keeps fitted models, by default in the user's cache folder."""
+        """Open a folder; `models` keeps what was computed, by default the user's store."""
         self.directory = Path(directory).resolve()
-        self._kept = model_cache.user_models() if models is None else models
+        self._kept = user_store() if models is None else models
         self._journal = Journal(self.directory / store.LOG)
         self._cells: dict[str, Cell] = {}
         self._models: dict[tuple[str, int], Model] = {}
-        self._remembered = Remembered()
         self._folded: tuple[tuple[Entry, ...], CampaignState] = (), fold(())
 
     @property
@@ -101,56 +103,64 @@ class CampaignReads:
         state, configured = self.state, self._configured()
         key = _text(configured), state.model_version
         if key not in self._models:
-            name = self._model_name(configured, state)
-            found = model_cache.kept_model(self._kept, name)
+            found = self.kept_model(state)
             if found is None:
                 found = self._fitted(state)
-                model_cache.keep_model(self._kept, name, found)
+                self._kept.put(self._key("model", state.used), found)
             self._cells[key[0]] = found.cell  # with the candidates that were worked out for it
             self._models = {key: found}
         return self._models[key]
 
     def kept_model(self, state: CampaignState) -> "Model | None":
         """The model of an earlier state of this configuration, where it is kept on disk."""
-        configured = self._configured()
-        return model_cache.kept_model(self._kept, self._model_name(configured, state))
+        key = self._key("model", state.used)
+        if not self._kept.has(key):
+            return None  # without the libraries that a model takes
+        from planner.campaign.model import Model
 
-    def _model_name(self, configured: Configured, state: CampaignState) -> str:
-        return model_cache.key("model", self.directory, configured, state.used)
+        return self._kept.get(key, Model)
 
-    def _fit_name(self, configured: Configured, used: tuple[Measurement, ...]) -> str:
-        return model_cache.key("fit", self.directory, configured, used)
+    def _key(self, what: str, used: tuple[Measurement, ...]) -> str:
+        """Name in the store of what is a function of configuration and measurements in use.
+
+        The robot of a model knows its files by their paths, so the folder is part of it.
+        """
+        measured = tuple(replace(m, time="") for m in used)
+        told = content_hash.of(self._configured()), content_hash.of(measured)
+        computes = content_hash.program(), content_hash.libraries(*LIBRARIES)
+        return content_hash.digest(what, *computes, str(self.directory), *told)
 
     def of_model(self, what: str, kind: type[T], make: Callable[["Model"], T]) -> T:
         """What follows from the model, kept on disk: where it is, the model is not loaded.
 
         Args:
             what: Name of it, one for each `make`.
-            kind: Dataclass that msgspec can encode; arrays are allowed.
+            kind: Its class.
             make: Makes it from the model.
         """
-        used = self.state.used
-        name = model_cache.key(what, self.directory, self._configured(), used)
-        return self._kept.result(name, kind, lambda: make(self.model))
+        return self._kept.result(self._key(what, self.state.used), kind, lambda: make(self.model))
 
     def _fitted(self, state: CampaignState) -> "Model":
         from threadpoolctl import threadpool_limits
 
         from planner.campaign.build import build
-        from planner.campaign.fit_memory import FitMemory
+        from planner.fit.fitted import FitRecord
 
         kept = self.recordings
         kept.look_through(state.used, self._kept)  # a damaged one is told now
+
+        def recall(used: tuple[Measurement, ...], find: Callable[[], FitRecord]) -> FitRecord:
+            return self._kept.result(self._key("fit", used), FitRecord, find)
+
         with threadpool_limits(1):
-            memory = FitMemory(self._kept, partial(self._fit_name, self._configured()))
-            model = build(self.cell, state, kept.frf, kept.hits, memory)
+            model = build(self.cell, state, kept.frf, kept.hits, recall)
             _ = model.frequency_sd_percent, model.frf_sd_percent  # kept: every command needs them
         return model
 
     @property
     def recordings(self) -> KeptRecordings:
         """The recordings that were imported, by the points of the robot as configured now."""
-        return KeptRecordings(self.directory, self.cell.robot.points, self._remembered)
+        return KeptRecordings(self.directory, self.cell.robot.points)
 
     def frf_of(self, measurement: Measurement, table: ModesTable) -> "Frf":
         """The FRF matrix of a measured pose, estimated again from its recordings if need be."""
@@ -237,8 +247,7 @@ class CampaignReads:
         known = model.knows_frfs
         found = model.frf(np.atleast_2d(q_rad), lines)
         if not known:
-            name = self._model_name(self._configured(), self.state)
-            model_cache.keep_model(self._kept, name, model)
+            self._kept.put(self._key("model", self.state.used), model)
         return found
 
     def records(self) -> list[dict[str, Any]]:

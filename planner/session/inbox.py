@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from planner.campaign.store import read_recording, sha256
+from planner.campaign.store import recording_hash
 from planner.errors import ForeignFileError, PlannerError
 from planner.recording.folder import TABLES
 from planner.recording.read import READERS, read, version
@@ -112,7 +112,7 @@ class Inbox:
         if known is not None and known[0] == mark:
             return known[1]
         try:
-            digest = sha256(read_recording(path))
+            digest = recording_hash(path)
             read(path)
             found = Content(digest)
         except PlannerError as error:
