@@ -14,8 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.build import build
-from planner.campaign.cell import Cell
-from planner.campaign.check import refuse_errors
+from planner.campaign.cell import Cell, refuse_errors
 from planner.campaign.config import CampaignConfig, check_config, load_campaign_config
 from planner.campaign.events import MeasuredMode, Proposal
 from planner.campaign.log_conversion import from_modal, from_mode

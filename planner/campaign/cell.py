@@ -9,10 +9,9 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from planner.campaign.check import plan_of
-from planner.campaign.config import CampaignConfig
+from planner.campaign.config import CampaignConfig, load_campaign_config
 from planner.campaign.low_fidelity import LowFidelity
-from planner.check.examine import Examination, examine
+from planner.check.examine import Examination, Plan, examine
 from planner.design.propose import check_name
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
@@ -214,3 +213,26 @@ def _handled(robot: Robot, config: CampaignConfig) -> Robot:
     """The robot with what campaign.toml says of hits, sensor, readback and diagnosis."""
     given = config.of_the_cell()
     return replace(robot, config=msgspec.structs.replace(robot.config, **given)) if given else robot
+
+
+def examine_robot(robot_toml: Path, campaign_toml: Path | None = None) -> Examination:
+    """Check a robot, and a campaign.toml if one is named.
+
+    Raises InputError where a file cannot be read at all.
+    """
+    robot = Robot.load(robot_toml)
+    if campaign_toml is None:
+        return examine(robot)
+    return examine(robot, plan_of(load_campaign_config(campaign_toml), campaign_toml.name))
+
+
+def plan_of(config: CampaignConfig, file: str) -> Plan:
+    """What campaign.toml asks of a robot."""
+    table, simulated = config.modes, config.fidelity.simulation != "none"
+    return Plan(file, config.workspace, table.band_hz, table.count, simulated)
+
+
+def refuse_errors(found: Examination) -> None:
+    """InputError with the first error of a check, if there is one."""
+    if found.errors:
+        raise InputError(found.errors[0].sentence)

@@ -8,8 +8,7 @@ import numpy as np
 from planner.campaign import store
 from planner.campaign.campaign import Campaign
 from planner.dataset.dataset import Dataset, Progress
-from planner.dataset.recordings import recordings_in
-from planner.dataset.visits import Recording
+from planner.dataset.visits import Recording, recordings_in
 from planner.errors import InputError
 from planner.recording.folder import TABLE
 from planner.recording.records import PoseRow

@@ -43,6 +43,19 @@ SCATTER_POSES, TOLD_SCATTER_PERCENT = 5, 0.3
 FEW_POSES = 5
 
 
+@dataclass(frozen=True)
+class RepeatedPose:
+    """The measured pose whose repetition gains more than any new one.
+
+    Gains are reductions of the mean relative variance.
+    """
+
+    pose: str
+    gain: float
+    gain_of_a_new_pose: float
+    text: str
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
     """What is believed after the measurements of one state."""
@@ -204,19 +217,23 @@ class Model:
             return self.decision is not None and self.decision.sure(stop.probability)
         return self.forecast.reached >= stop.probability
 
-    def repeat(self) -> tuple[str, float, float] | None:
-        """The measured pose that gains most from more hits, its gain, and that of a new pose.
-
-        None where nothing is measured. Gains are reductions of the mean relative variance.
-        """
+    def repeat(self) -> "RepeatedPose | None":
+        """The measured pose that gains most from more hits; None where a new pose gains more."""
         if not self.labelled:
             return None
         outputs = self.outlook[0]
         sd = [[m.frequency_sd_hz / m.frequency_hz if m else np.nan for m in p.modes]
               for p in self.labelled]  # fmt: skip
         gain = repeat_gain(outputs, np.array(sd) ** 2)
-        best = int(np.argmax(gain))
-        return self.labelled[best].pose, float(gain[best]), float(np.max(self._gains))
+        best, new = int(np.argmax(gain)), float(np.max(self._gains))
+        if gain[best] <= new:
+            return None
+        pose = self.labelled[best].pose
+        text = (
+            f"Better than a new pose: hit {pose} again, with as many hits as before. That lowers "
+            f"the uncertainty more, as the noise of its hits is now the largest part of it."
+        )
+        return RepeatedPose(pose, float(gain[best]), new, text)
 
     @cached_property
     def _gains(self) -> np.ndarray:
@@ -255,9 +272,9 @@ class Model:
         """How FRFs are predicted; None before one was measured. Worked out when asked for."""
         if not self.frfs:
             return None
-        from planner.campaign.frf_prediction import frf_model_of
+        from planner.campaign.frf_model import FrfModel
 
-        return frf_model_of(self)
+        return FrfModel.of(self)
 
     @property
     def knows_frfs(self) -> bool:

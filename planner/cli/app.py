@@ -10,15 +10,13 @@ from planner.cli.answer import AsJson, FromNames, refusals, respond, warn
 from planner.cli.checking import check
 from planner.cli.comparison import compare
 from planner.cli.couple import couple
-from planner.cli.diagnosis import diagnose
 from planner.cli.documentation import manual, schema
 from planner.cli.exports import export, report
-from planner.cli.identification import identify
+from planner.cli.identification import diagnose, identify
 from planner.cli.modes import modes
 from planner.cli.new import new
-from planner.cli.proving import prove
 from planner.cli.stability import stability
-from planner.cli.study import study
+from planner.cli.study import prove, study
 from planner.errors import InputError
 from planner.words import command
 

@@ -10,9 +10,8 @@ import numpy as np
 
 from planner.dataset.level_columns import Column, column
 from planner.dataset.measure import MeasuredPose
-from planner.dataset.recordings import recordings_in
 from planner.dataset.store import Store, user_store
-from planner.dataset.visits import PoseEntry, Recording, Stay, Visit, stays_of
+from planner.dataset.visits import PoseEntry, Recording, Stay, Visit, recordings_in, stays_of
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf

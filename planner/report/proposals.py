@@ -10,7 +10,7 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
-from planner.campaign.repeated_pose import RepeatedPose
+from planner.campaign.model import RepeatedPose
 from planner.design.stopping import Forecast
 from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer, plain
@@ -128,7 +128,7 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
         ),
         tuple(campaign.cell.robot.joint_names),
         model.forecast,
-        RepeatedPose.of(model),
+        model.repeat(),
         tuple(campaign.cell.remarks),
         places=places_for(model, campaign.state, found[0]),
         joint_units=campaign.cell.robot.joints.declared,

@@ -26,13 +26,11 @@ from planner.session.acts import (
 from planner.session.course import Course, PoseInProgress
 from planner.session.diagnosis_process import LEAST, DiagnosisProcess
 from planner.session.hit_verdicts import HitVerdict, Part, Verdicts
-from planner.session.inbox import Inbox
+from planner.session.inbox import FolderTable, Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys
 from planner.session.page import TakingBack, page_with_hits
 from planner.session.screen import Screen
-from planner.session.station import Station
-from planner.session.table import FolderTable
-from planner.session.teller import Teller
+from planner.session.station import RerunQueue, Station
 
 QUIET_S = 0.6  # a file that stood still for so long is whole: a verdict comes within a second
 
@@ -88,7 +86,7 @@ def watch(
         )  # fmt: skip
         inbox = Inbox(folder, quiet_s, verdicts.unfit)
         return _run(Station(
-            campaign, inbox, Screen(console), source, Teller(campaign, story), verdicts,
+            campaign, inbox, Screen(console), source, RerunQueue(campaign, story), verdicts,
             auto or isinstance(source, NoKeys), hits_per_pose, explaining, LEAST, started,
             None if limit_s is None else started + limit_s,
         ))  # fmt: skip
@@ -103,7 +101,7 @@ def _run(station: Station) -> SessionSummary:
         say_last_import(station)
         while not course.stop:
             course = _step(station, course)
-        station.teller.tell()
+        station.rerun_queue.show()
         if course.stop != "quit":
             with console.status("finding what the simulation lacks"):
                 station.say_diagnosis(wait=True)
@@ -111,7 +109,7 @@ def _run(station: Station) -> SessionSummary:
         course = replace(course, stop="quit", ended=interrupted(station))
     finally:
         with suppress(KeyboardInterrupt):
-            station.teller.tell()
+            station.rerun_queue.show()
     if course.ended:
         console.print(Text(course.ended))
     console.print(Text(f"Session ended: {course.stop}. Go on with the same command."))
@@ -216,7 +214,7 @@ def _shown(
     for at, files in new.items():
         station.campaign.show(at, tuple(files))
     if new:
-        station.teller.note()
+        station.rerun_queue.note()
     return verdicts
 
 

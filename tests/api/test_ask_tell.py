@@ -8,7 +8,7 @@ import pytest
 
 from planner import AskTell, Robot, Simulation
 from planner.campaign.campaign import Campaign
-from planner.campaign.example import EXAMPLE, write_example
+from planner.campaign.store import EXAMPLE, write_example
 from planner.dynamics.simulation import Elasticity
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf

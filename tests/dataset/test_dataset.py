@@ -10,9 +10,9 @@ import pytest
 
 from planner.dataset.dataset import LAID, Dataset, Recording, Visit
 from planner.dataset.measure import OVER
-from planner.dataset.recordings import recordings_in
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
+from planner.dataset.visits import recordings_in
 from planner.errors import InputError, RefusedError
 from planner.frf.estimator import estimate
 from planner.recording.joints import JointUnits

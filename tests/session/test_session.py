@@ -20,7 +20,7 @@ from planner.recording.folder import TABLE
 from planner.replay import replay
 from planner.report.rerun.story import Story
 from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
-from planner.session.teller import Teller
+from planner.session.station import RerunQueue
 from planner.session.watch import watch
 from planner.truth.hits import simulate_hit, write_uff
 from tests.support.hit_csv import write_csv
@@ -291,7 +291,7 @@ def test_undo_after_an_interrupted_import_takes_it_back_with_its_proposal(cell, 
     inbox, console = tmp_path / "inbox", screen()
     script = Script(console, [(wait("all hits are in"), "a")])
     with monkeypatch.context() as patched:
-        patched.setattr(Teller, "note", interrupt)  # right after the import
+        patched.setattr(RerunQueue, "note", interrupt)  # right after the import
         watch(campaign, inbox, console=console, keys=script, hits_per_pose=9, quiet_s=0.05,
               limit_s=30)  # fmt: skip
     assert "the hits of P001: that is in the log; planner undo" in flat(console)
@@ -307,7 +307,7 @@ def test_undo_after_an_interrupted_import_takes_it_back_with_its_proposal(cell, 
     assert all(step.check in ("identical", "kept") for step in replay(again))
 
 
-def interrupt(teller, reports=()):
+def interrupt(rerun_queue, reports=()):
     if reports:
         raise KeyboardInterrupt
 

@@ -11,8 +11,8 @@ from rich.console import Console
 from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
+from planner.session.inbox import FolderTable
 from planner.session.keys import NoKeys
-from planner.session.table import FolderTable
 from planner.session.watch import watch
 from tests.support.hit_csv import write_csv
 from tests.support.outside import call, make_cell, record
