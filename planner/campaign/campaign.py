@@ -1,7 +1,7 @@
 """The campaign: the only thing with state, and its state is a fold over its log."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -32,6 +32,7 @@ from planner.campaign.journal import remove_parts
 from planner.campaign.reads import CampaignReads, as_logged
 from planner.campaign.taking_back import last_acts, last_undone
 from planner.errors import InputError
+from planner.progress import Tell, quietly
 from planner.version import __version__
 
 if TYPE_CHECKING:
@@ -78,7 +79,7 @@ class Campaign(CampaignReads):
         self,
         paths: Sequence[Path | str],
         pose: str | None = None,
-        progress: Callable[[str], None] | None = None,
+        progress: Tell = quietly,
         from_names: bool = False,
     ) -> "tuple[ImportReport, ...]":
         """Import hits, one report per pose, in recording order.
@@ -107,9 +108,8 @@ class Campaign(CampaignReads):
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
             named = frozenset(path for path in given if path.is_file())
             reports = []
-            for delivery, joints_deg in placed:
-                if progress:
-                    progress(delivery.pose)
+            for number, (delivery, joints_deg) in enumerate(placed):
+                progress(delivery.pose, number / len(placed))
                 reports.append(self._import_pose(delivery, joints_deg, named))
             return tuple(reports)
 

@@ -203,7 +203,7 @@ def at_poses_in_band(
     else:
         cuts = cuts_at(cut, rotation, position, names)
     simulated = any(m.simulated for m in campaign.state.recorded)
-    mean, sd = campaign.frf(q, lines)
+    mean, sd = campaign.frf_at(q, lines)
     found: list[Structure | OutOfBandError] = []
     for i, name in enumerate(names):
         where = f"{campaign.directory}, pose {name}"

@@ -7,9 +7,10 @@ import numpy as np
 
 from planner.campaign import store
 from planner.campaign.campaign import Campaign
-from planner.dataset.dataset import Dataset, Progress
+from planner.dataset.dataset import Dataset
 from planner.dataset.visits import Recording, recordings_in
 from planner.errors import InputError
+from planner.progress import Tell
 from planner.recording.folder import TABLE
 from planner.recording.records import PoseRow
 from planner.robot.robot import Robot
@@ -47,7 +48,7 @@ class Material:
             return recordings_in(self.recordings, robot.joints, robot.points)
         return self.campaign.used_recordings
 
-    def read(self, robot: Robot, band_hz: tuple[float, float], progress: Progress) -> Dataset:
+    def read(self, robot: Robot, band_hz: tuple[float, float], progress: Tell) -> Dataset:
         """What is `listed`, read and screened; nothing is written. Raises as `Dataset.of` does."""
         return Dataset.of(
             self.listed(robot),

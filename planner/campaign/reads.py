@@ -23,13 +23,16 @@ from planner.campaign.state import CampaignState, Measurement, fold
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store, user_store
 from planner.errors import InputError
+from planner.progress import Tell, quietly
 from planner.version import __version__
 
 # Imported where they are needed: with what is kept of a model, `status` needs none of them.
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from planner.campaign.cell import Cell
     from planner.campaign.model import Model
-    from planner.dataset.dataset import Dataset, Progress
+    from planner.dataset.dataset import Dataset
     from planner.dataset.visits import Recording
     from planner.frf.frf import Frf
     from planner.surrogate.frf_bands import ModalPrediction
@@ -50,6 +53,11 @@ class CampaignReads:
         self._cells: dict[str, Cell] = {}
         self._models: dict[tuple[str, int], Model] = {}
         self._folded: tuple[tuple[Entry, ...], CampaignState] = (), fold(())
+
+    def __repr__(self) -> str:
+        state = self.state
+        measured, open_ = len(state.used), len(state.open)
+        return f"Campaign({str(self.directory)!r}: {measured} poses measured, {open_} proposed)"
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -171,7 +179,7 @@ class CampaignReads:
         band_hz: tuple[float, float],
         *,
         window_rate_1_s: float = 0.0,
-        progress: "Progress" = lambda text: None,
+        progress: Tell = quietly,
     ) -> "Dataset":
         """Of `used_recordings`, and raises as they do."""
         from planner.dataset.dataset import Dataset
@@ -226,26 +234,38 @@ class CampaignReads:
 
     # -- what is expected ----------------------------------------------------------------------
 
-    def predict(self, q_rad: np.ndarray) -> "ModalPrediction":
-        """Frequencies (Hz) and damping ratios (n, count), with sds, at poses q (n, dof) in rad."""
-        return self.model.predict(np.atleast_2d(q_rad))
+    def predict(self, *, joints_deg: "ArrayLike") -> "ModalPrediction":
+        """Frequencies (Hz) and damping ratios (n, count), with sds, at poses (n, dof) in degrees.
+
+        Places of joints that slide are in mm, here and below.
+        """
+        return self.model.predict(self._q(joints_deg))
 
     def frf(
-        self, q_rad: np.ndarray, frequency_hz: np.ndarray | None = None
+        self, *, joints_deg: "ArrayLike", frequency_hz: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """FRFs at poses, with their uncertainty.
 
         Args:
-            q_rad: Joint angles (n, dof) in rad, in the order of the robot's joints.
+            joints_deg: Joint angles (n, dof) in degrees, in the order of the robot's joints.
             frequency_hz: Lines (F,) in Hz; by default `frequency_lines`.
 
         Returns:
             Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N: response
             axis, then hit axis.
         """
+        return self.frf_at(self._q(joints_deg), frequency_hz)
+
+    def _q(self, joints_deg: "ArrayLike") -> np.ndarray:
+        return self.cell.robot.joints.internal(np.atleast_2d(joints_deg))
+
+    def frf_at(
+        self, q: np.ndarray, frequency_hz: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As `frf`, at poses q (n, dof) in rad; what was worked out for it is kept."""
         lines, model = self.frequency_lines if frequency_hz is None else frequency_hz, self.model
         known = model.knows_frfs
-        found = model.frf(np.atleast_2d(q_rad), lines)
+        found = model.frf(np.atleast_2d(q), lines)
         if not known:
             self._kept.put(self._key("model", self.state.used), model)
         return found
@@ -256,13 +276,13 @@ class CampaignReads:
 
         return measured_records(self.cell.robot.joints, self.state.measurements.values())
 
-    def predict_records(self, q_rad: np.ndarray) -> list[dict[str, Any]]:
-        """`predict` as rows, one for each mode of each pose q (n, dof) in rad."""
+    def predict_records(self, *, joints_deg: "ArrayLike") -> list[dict[str, Any]]:
+        """`predict` as rows, one for each mode of each pose."""
         from planner.campaign.planned import inside
         from planner.campaign.records import predicted_records
 
-        q = np.atleast_2d(q_rad)
-        return predicted_records(self.cell.robot.joints, q, self.predict(q), inside(self.cell, q))
+        q, there = self._q(joints_deg), self.model.predict
+        return predicted_records(self.cell.robot.joints, q, there(q), inside(self.cell, q))
 
     @property
     def frequency_lines(self) -> np.ndarray:

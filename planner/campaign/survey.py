@@ -1,6 +1,6 @@
 """Modes of a recordings folder with several poses: which of them are the same."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from planner.measurement.nuisances import Tolerances
 from planner.measurement.point_places import misplaced, questions
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
+from planner.progress import Tell
 from planner.recording.folder import joint_columns, read_recordings
 from planner.recording.records import PoseRow, RecordingsFolder
 from planner.robot.robot import Robot
@@ -52,7 +53,7 @@ def survey(
     robot_toml: Path | None,
     estimator: str,
     window_rate_1_s: float,
-    progress: Callable[[str], None],
+    progress: Tell,
 ) -> Survey:
     """Analyse each pose; labels follow the simulation's families if a robot is named.
 
@@ -64,7 +65,7 @@ def survey(
     found, every, refused, simulated = [], [], [], False
     visited: list[tuple[Visited, Frf]] = []
     for number, name in enumerate(names):
-        progress(f"pose {name}, {number} of {len(names)} done")
+        progress(f"pose {name}", number / len(names))
         rows = [row for row in table.rows if row.pose == name]
         measured = measure(in_parts(_sources(rows)), band, estimator, window_rate_1_s)
         refused += [

@@ -66,7 +66,7 @@ def _campaign(directory: Path, pose: str | None) -> tuple[TipReceptance, str]:
         )
     q = campaign.cell.robot.joints.internal(stands[pose])
     lines = campaign.frequency_lines
-    mean, sd = campaign.frf(q[None], lines)
+    mean, sd = campaign.frf_at(q[None], lines)
     simulated = any(m.simulated for m in state.recorded)
     return replace(tip_at(campaign, pose, q, lines, mean[0], sd[0]), simulated=simulated), pose
 

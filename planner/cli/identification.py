@@ -47,7 +47,7 @@ def identify(
     """
     from planner.api import identify as fit
     from planner.campaign.material import material
-    from planner.cli.progress import reporting
+    from planner.cli.progress import telling
     from planner.fit.write_robot import check_target
     from planner.report.modal_analysis import check_options
     from planner.report.plot_files import Pictures
@@ -59,7 +59,7 @@ def identify(
     if out is not None:
         check_target(out, nominal)
     band = band_hz or nominal.config.band_hz
-    with reporting("identifying", quiet=as_json) as progress:
+    with telling("identifying", quiet=as_json) as progress:
         dataset = given.read(nominal, band, progress)
         answer = fit(
             dataset,
@@ -98,7 +98,7 @@ def diagnose(
     """
     from planner.api import diagnose_material
     from planner.campaign.material import material
-    from planner.cli.progress import counting
+    from planner.cli.progress import telling
     from planner.recording.folder import read_poses
     from planner.report.modal_analysis import check_options
     from planner.report.status import model_beside
@@ -108,7 +108,7 @@ def diagnose(
     given = material(recordings, robot, window_rate_1_s)
     nominal = given.nominal
     wanted = read_poses(predict, nominal.joints) if predict else ()
-    with counting(quiet=as_json) as tell:
+    with telling("diagnosing", quiet=as_json) as tell:
         answer = diagnose_material(given.with_poses(wanted), nominal, tell)
         if predict:
             q = nominal.joints.internal([row.joints_deg for row in wanted])

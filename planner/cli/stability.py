@@ -69,7 +69,7 @@ def stability(
     Example: planner stability cell7 --pose P001 --cut cut.toml --plot pictures
     """
     from planner.campaign.cut_source import Asked
-    from planner.cli.progress import counting
+    from planner.cli.progress import telling
     from planner.milling.cut import load_cut
     from planner.report.plot_files import Pictures
 
@@ -78,7 +78,7 @@ def stability(
     )
     pictures = Pictures(plot, format_, rrd)
     check(path, origin, turns, poses, map_, pose)
-    with counting(quiet=as_json) as tell:
+    with telling("computing", quiet=as_json) as tell:
         if map_:
             from planner.report.stability_map import map_report
 

@@ -32,11 +32,11 @@ def study(
 
     Example: planner study busch2022 --out figures
     """
-    from planner.cli.progress import counting
+    from planner.cli.progress import telling
     from planner.studies import registry
     from planner.studies.conduct import conduct, conduct_all
 
-    with counting(quiet=as_json) as progress:
+    with telling("studying", quiet=as_json) as progress:
         if name == registry.ALL:
             answer = conduct_all(out, small, progress)
         else:
@@ -63,12 +63,12 @@ def prove(
 
     Example: planner prove --cases 20 --out proof
     """
-    from planner.cli.progress import counting
+    from planner.cli.progress import telling
     from planner.proof.report import write
     from planner.proof.run import Proof, results
     from planner.proof.run import seal as sealed
 
     folder = out or Path(f"proof-{cases}-{seed}")
-    with counting(quiet=as_json) as tell:
+    with telling("proving", quiet=as_json) as tell:
         scored = results(Proof(cases, seed, laboratory), folder, jobs, scheduler, tell)
     return respond(write(folder, sealed(folder), tuple(scored.values())), as_json)

@@ -120,7 +120,7 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
 
     robot, model = campaign.cell.robot, campaign.model
     q = robot.joints.internal([p.joints_deg for p in found])
-    expected = campaign.predict(q)
+    expected = campaign.model.predict(q)
     return ProposalsReport(
         tuple(
             ProposedPose(p, ExpectedMode.all_of(expected, i), axes_in_the_room(robot, q[i]))

@@ -1,4 +1,4 @@
-"""The folder into which the analyser exports: which files are whole and new, what tables say of them."""
+"""The folder into which the analyser exports: files that are whole and new, and their tables."""
 
 import time
 from collections.abc import Callable

@@ -127,7 +127,7 @@ def test_angles_outside_the_limits_are_refused():
 def test_a_campaign_has_rows_too(tmp_path):
     campaign = Campaign.new(tmp_path / "cell", TOML, EXAMPLE / "campaign.toml")
     assert campaign.records() == []
-    rows = campaign.predict_records(np.deg2rad(UNSEEN))
+    rows = campaign.predict_records(joints_deg=UNSEEN)
     assert [(r["pose"], r["mode"]) for r in rows] == [(p, k) for p in (1, 2) for k in range(1, 5)]
     assert rows[4]["joint_1_deg"] == pytest.approx(-30)
 

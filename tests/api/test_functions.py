@@ -37,7 +37,7 @@ def recorded(tmp_path_factory):
 @pytest.fixture(scope="module")
 def dataset(recorded):
     folder, _, robot = recorded
-    return Dataset.read(folder, robot.joint_names, robot.config.band_hz)
+    return Dataset.read(folder, robot)
 
 
 def test_hits_files_frf_and_a_pose_of_a_data_set_give_the_same_modes(recorded, dataset):

@@ -116,13 +116,13 @@ def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
     campaign.import_paths((source / "recordings",), "A11")
     q = campaign.cell.candidates.q[:1]
     assert not campaign.model.knows_frfs
-    first = campaign.frf(q)
+    first = campaign.frf_at(q)
 
     def refused(*given):
         raise AssertionError("worked out again")
 
     monkeypatch.setattr(FrfModel, "of", refused)
-    again = Campaign(tmp_path / "c", store).frf(q)
+    again = Campaign(tmp_path / "c", store).frf_at(q)
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
 
 

@@ -85,8 +85,7 @@ CASES = {
 def told(tmp_path, concealed: Concealed) -> DiagnosisReport:
     case = small_case(tmp_path, concealed.deviation, concealed.artefact, EVERYDAY)
     robot = Robot.load(case.robot_toml)
-    names, band = robot.joint_names, robot.config.band_hz
-    return diagnose(Dataset.read(case.recordings, joint_names=names, band_hz=band), robot)
+    return diagnose(Dataset.read(case.recordings, robot), robot)
 
 
 LONG = {"link that bends"}  # a minute and more: bearings and inertias imitate it

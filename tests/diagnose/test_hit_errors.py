@@ -150,7 +150,7 @@ def missed(robot_toml, tmp_path_factory):
     folder = tmp_path_factory.mktemp("missed")
     write_recordings(folder, truth.joint_names, rows, hammer, "test")
     robot = Robot.load(robot_toml)
-    return Dataset.read(folder, robot.joint_names, robot.config.band_hz), Simulation(robot), aims
+    return Dataset.read(folder, robot), Simulation(robot), aims
 
 
 def test_misses_are_told_and_taken_out(missed):

@@ -92,7 +92,7 @@ def test_diagnosis_names_a_soft_rail_and_nothing_else(kind, softer, tmp_path):
     poses = [(f"P{i}", q) for i, q in enumerate(true_poses(truth, box, 6, SEED))]
     folder = record_poses(truth, poses, tmp_path / "hits", repeats=2, hammer=HAMMER, seed=SEED)
     robot = Robot.load(toml)
-    found = diagnose(Dataset.read(folder, robot.joints, robot.config.band_hz), robot)
+    found = diagnose(Dataset.read(folder, robot), robot)
     told = [(f.effect, f.at, f.parameters) for f in found.findings]
     print(f"\n{kind}, spring times {softer}: {found.verdict}, {told}, {truth.springs[0].stiffness}")
     assert found.verdict == ("consistent" if softer == 1 else "explained")
@@ -118,7 +118,7 @@ def test_four_poses_tell_frequencies_at_unseen_ones(kind, tmp_path):
         record_poses(truth, [pose], folder, repeats=3, hammer=HAMMER, seed=10 * SEED + number)
         campaign.import_paths((folder,))
     q = true_poses(truth, box, 10, SEED + 99)
-    found = campaign.predict(q)
+    found = campaign.model.predict(q)
     real = np.array([truth.modes(one, count)[0] for one in q])
     off = np.abs(found.frequency_hz / real - 1)
     inside = np.mean(np.abs(found.frequency_hz - real) < 2 * found.frequency_sd_hz)

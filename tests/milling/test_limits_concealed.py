@@ -36,7 +36,7 @@ def test_limits_at_poses_never_measured(tmp_path: Path):
     for pose in campaign.state.measurements:
         del angles[pose]
     q, lines = np.deg2rad(np.array(list(angles.values()))), campaign.frequency_lines
-    mean, sd = campaign.frf(q)
+    mean, sd = campaign.frf_at(q)
     given = cut(
         diameter_m=0.018, kt_n_m2=8.8e8, kr_n_m2=0.52e8, spindle_rpm=(500.0, 4000.0, 8),
         depth_m=(0.0, 0.02, 100),

@@ -48,7 +48,7 @@ def judge(case: Path, answer: str) -> Verdict:
     nominal = Simulation(Robot.load(case / "robot" / "robot.toml"))
     began = time.process_time()
     band = nominal.robot.config.band_hz
-    recorded = Dataset.read(case / "recordings", nominal.robot.joint_names, band)
+    recorded = Dataset.read(case / "recordings", nominal.robot, band)
     found = screens.screen(recorded, nominal).findings
     seconds = time.process_time() - began
     hidden = tuple((e["effect"], e["at"]) for e in truth["effects"])
