@@ -93,6 +93,7 @@ def test_every_answer_marks_them(tmp_path):
     marks = {
         row["pose"]: row["outside"]
         for row in campaign.predict_records(joints_deg=np.rad2deg([here, tilted]))
+        for row in campaign.predict_records(joints_deg=np.rad2deg([here, tilted]))
     }
     assert marks == {1: False, 2: True}
     assert str(report.text().renderables[1]) == outside_remark(["tilted"])
