@@ -8,9 +8,9 @@ import numpy as np
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.frequencies_by_simulation import TunedFrequencies, tuned_frequencies
+from planner.campaign.hit_error_estimates import estimate, visits_of
 from planner.campaign.labels import LabelledPose, label, observations
 from planner.campaign.low_fidelity import LowFidelity, Recall, in_memory, learn
-from planner.campaign.misses import tell, visits_of
 from planner.campaign.model import FrfOf, Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.hit_columns import PoseHits
@@ -39,7 +39,7 @@ def build(
     `recall` says what was found of the first measurements, so that nothing is found twice.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
-    noise, told, tuned, learns = None, None, None, cell.config.fidelity.simulation == "updated"
+    noise, errors, tuned, learns = None, None, None, cell.config.fidelity.simulation == "updated"
     if learns and used:
         frfs = tuple(frf_of(m, table) for m in used)
         hits = tuple(hits_of(m, table) for m in used) if hits_of else None
@@ -55,7 +55,7 @@ def build(
             tuned = tuned_frequencies(simulation, seen, q, table.band_hz, cell.tolerances, count)
         if hits is not None and low.learned is not None:
             visits = visits_of(joints, used, hits, frfs)
-            told = tell(visits, low.learned, cell.tolerances, table.band_hz)
+            errors = estimate(visits, low.learned, cell.tolerances, table.band_hz)
     fits = low.learned is None or low.learned.fits
     candidates = [_Guided.by(cell, used, low, tuned if fits else None)]
     if not fits:
@@ -76,7 +76,7 @@ def build(
     )
     if hits_of is not None:
         frf_of = _OfOneHit(frf_of, hits_of)
-    model = Model(cell, best.labelled, best.low, best.seen, surrogate, noise, told, used, frf_of)
+    model = Model(cell, best.labelled, best.low, best.seen, surrogate, noise, errors, used, frf_of)
     if learns:
         _ = model.frfs  # which are at hand, and kept with the model
     return model

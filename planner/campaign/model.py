@@ -10,10 +10,10 @@ import numpy as np
 from planner.campaign.acquisition_inputs import open_parameters, outlook
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
-from planner.campaign.hit_habits import PoseMisses
+from planner.campaign.hit_error_estimates import CampaignHitErrors
+from planner.campaign.hit_errors import PoseHitErrors
 from planner.campaign.labels import LabelledPose, observations
 from planner.campaign.low_fidelity import LowFidelity
-from planner.campaign.misses import CampaignMisses
 from planner.campaign.state import Measurement
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.design.mixed import mixed
@@ -66,7 +66,7 @@ class Model:
     seen: ModalObservations
     surrogate: Surrogate  # of frequencies and damping
     frf_noise: FrfNoise | None = None  # None: no FRF was looked at
-    told: CampaignMisses | None = None  # None: nothing tells how hits missed
+    estimated: CampaignHitErrors | None = None  # None: nothing tells errors of hits
     used: tuple[Measurement, ...] = ()  # of the labelled poses, as they were measured
     frf_of: FrfOf | None = None
 
@@ -99,17 +99,17 @@ class Model:
         return tuple(self.frf_of(m, table).within(table.band_hz) for m in self.used)
 
     @cached_property
-    def misses(self) -> tuple[PoseMisses, ...]:
+    def hit_errors(self) -> tuple[PoseHitErrors, ...]:
         """Of the hits of each pose, where a simulation tells them."""
-        return self.told.poses if self.told else ()
+        return self.estimated.poses if self.estimated else ()
 
     @cached_property
     def seen_exactly(self) -> ModalObservations:
         """`seen` with residues as hits without a miss would give them, which FRFs alone need."""
-        if self.told is None:
+        if self.estimated is None:
             return self.seen
         both = zip(self.labelled, self.used, strict=True)
-        exact = tuple(self.told.corrected(pose, measured) for pose, measured in both)
+        exact = tuple(self.estimated.corrected(pose, measured) for pose, measured in both)
         return observations(self.cell, exact)
 
     @cached_property

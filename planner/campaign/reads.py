@@ -170,6 +170,17 @@ class CampaignReads:
         """The recordings that were imported, by the points of the robot as configured now."""
         return KeptRecordings(self.directory, self.cell.robot.points)
 
+    def stands(self, pose: str | None) -> np.ndarray:
+        """Joint angles (dof,) in rad of a measured or proposed pose; InputError names them."""
+        state = self.state
+        known = {name: p.joints_deg for name, p in state.proposals.items()}
+        known |= {name: m.joints_deg for name, m in state.measurements.items()}
+        if pose is None or pose not in known:
+            given = f"has no pose {pose}; choose" if pose else "is a campaign: say at which pose,"
+            some = ", ".join(list(known)[:5]) or "none yet"
+            raise InputError(f"{self.directory} {given} one of {some} with --pose.")
+        return self.cell.robot.joints.internal(known[pose])
+
     def frf_of(self, measurement: Measurement, table: ModesTable) -> "Frf":
         """The FRF matrix of a measured pose, estimated again from its recordings if need be."""
         return self.recordings.frf(measurement, table)

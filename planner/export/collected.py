@@ -76,7 +76,7 @@ def collect(
     return Collected(
         campaign.directory.name,
         cell.robot.joints,
-        any(m.simulated for m in state.recorded),
+        state.simulated,
         tuple(measured),
         PredictedOf(names, angles, lines, mean, sd, modes),
     )

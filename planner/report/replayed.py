@@ -110,7 +110,7 @@ def replayed(
     from planner.report.rerun.story import Story
 
     steps = []
-    simulated = any(m.simulated for m in campaign.state.recorded)
+    simulated = campaign.state.simulated
     with Story(campaign.cell, rrd, viewer, simulated) as story:
         for step in replay(campaign, until, acquisition):
             last = until or len(campaign.entries)

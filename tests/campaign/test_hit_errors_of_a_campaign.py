@@ -5,7 +5,7 @@ import pytest
 
 from planner.campaign.build import build
 from planner.campaign.campaign import Campaign
-from planner.campaign.hit_habits import HitMiss, habits
+from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.dataset.store import Store
 from planner.replay import replay
 from planner.report.imports import ImportedPoses
@@ -71,14 +71,16 @@ def test_it_is_replayed_identically(cell):
 
 def test_what_hits_have_in_common_is_said():
     def hit(name, tilt, offset):
-        return HitMiss("f", name, tilt, (0.2, 0.2), offset, (1.0, 1.0))
+        return HitErrorEstimate("f", name, tilt, (0.2, 0.2), offset, (1.0, 1.0))
 
     z = [hit("+z", (2.3 + k, 0.1), (4.0 + k, -0.5)) for k in (-0.1, 0.0, 0.1)]
-    assert habits(z) == ("Your z hits land 4 ± 1 mm towards +x and tilt by 2.3 ± 0.2° towards +x.",)
-    assert habits([hit("-x", (0.1, -2.0), (0.0, 0.0))] * 2) == (
+    assert systematic_errors(z) == (
+        "Your z hits land 4 ± 1 mm towards +x and tilt by 2.3 ± 0.2° towards +x.",
+    )
+    assert systematic_errors([hit("-x", (0.1, -2.0), (0.0, 0.0))] * 2) == (
         "Your -x hits tilt by 2.0 ± 0.2° towards −z.",
     )
-    assert habits([hit("+y", (0.3, 0.3), (1.0, 1.0))] * 3) == ()
+    assert systematic_errors([hit("+y", (0.3, 0.3), (1.0, 1.0))] * 3) == ()
 
 
 CELLS = (("kr10", 1, 51), ("irb6640", 1, 52), ("kr210", 3, 53))
