@@ -23,8 +23,6 @@ from planner.robot.inverse_kinematics import singularity
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
 
-CANDIDATE_SEED = 0
-
 
 @dataclass(frozen=True, eq=False)
 class Cell:
@@ -92,9 +90,7 @@ class Cell:
 
     @cached_property
     def _spread(self) -> Candidates:
-        return self.workspace.candidates(
-            self.robot, self.config.acquisition.candidates, CANDIDATE_SEED
-        )
+        return self.workspace.candidates(self.robot, self.config.acquisition.candidates, seed=0)
 
     @property
     def spread(self) -> int:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.campaign import store
+from planner.campaign.acquisition_inputs import MOST_INFORMED
 from planner.campaign.campaign import Campaign
 from planner.dataset.dataset import Dataset
 from planner.dataset.visits import Recording, recordings_in
@@ -14,8 +15,6 @@ from planner.progress import Tell
 from planner.recording.folder import TABLE
 from planner.recording.records import PoseRow
 from planner.robot.robot import Robot
-
-OFFERED = 200  # of a campaign's candidates, evenly spread, that are looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +80,7 @@ def material(folder: Path, robot: Path | None, window_rate_1_s: float) -> Materi
         return Material(recordings, robot, window_rate_1_s, np.zeros((0, 0)), ())
     campaign = Campaign(folder)
     cell = campaign.cell
-    chosen = np.flatnonzero(cell.allowed)[:OFFERED]
+    chosen = np.flatnonzero(cell.allowed)[:MOST_INFORMED]
     names = tuple(f"candidate {i + 1}" for i in chosen)
     path = robot or campaign.robot_toml
     rate = window_rate_1_s or cell.config.modes.window_rate_1_s

@@ -37,9 +37,8 @@ FrfOf = Callable[[Measurement, ModesTable], Frf]
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
-# Scatter from visit to visit is told from so many poses on, where it is larger than usual.
-SCATTER_POSES, TOLD_SCATTER_PERCENT = 5, 0.3
-# Left-out residuals of fewer poses do not tell how far a simulation is off that lacks physics.
+# Fewer poses tell neither the scatter from visit to visit nor, left out one by one, how far a
+# simulation is off that lacks physics.
 FEW_POSES = 5
 
 
@@ -301,9 +300,9 @@ class Model:
                     f"The simulation disagrees with the measurements of mode {', '.join(left)}: "
                     f"predicted without it."
                 )
-        if len(self.labelled) >= SCATTER_POSES:
+        if len(self.labelled) >= FEW_POSES:
             percent = 100 * float(np.sqrt(np.mean(self.surrogate.visit_scatter**2)))
-            if percent > TOLD_SCATTER_PERCENT:
+            if percent > 0.3:  # larger than usual
                 found.append(
                     f"Frequencies scatter by {percent:.1g} % (sd) from visit to visit, more than "
                     f"the modal analysis states: predicted sds include it, further poses do not "

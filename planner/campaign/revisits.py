@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.campaign.events import Imported, MeasuredMode
-from planner.campaign.model import SCATTER_POSES, Model
+from planner.campaign.model import FEW_POSES, Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose
 from planner.frf.reciprocity import unreciprocal
@@ -100,7 +100,7 @@ def _scatter(model: Model) -> float:
 
     Of few poses one that has drifted makes it as large as the drift.
     """
-    if len(model.labelled) < SCATTER_POSES:
+    if len(model.labelled) < FEW_POSES:
         return 0.0
     return float(np.sqrt(np.mean(model.surrogate.visit_scatter**2)))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.campaign.hit_error_estimates import CampaignHitErrors, Visited, estimate_by
+from planner.campaign.labels import ABOVE
 from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.dataset.hit_columns import hits_of
 from planner.dataset.measure import DEFAULT_BAND_HZ, MeasuredPose, measure
@@ -23,8 +24,6 @@ from planner.modal.tracking import Guide, Tracks, track
 from planner.progress import Tell
 from planner.recording.folder import joint_columns, read_recordings
 from planner.robot.robot import Robot
-
-ABOVE = 2  # labels of the simulation above the modes of the pose that has most
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,6 @@ import typer
 from planner.cli.answer import AsJson, FromNames, respond
 from planner.errors import InputError
 
-MAP_POSES, WAY_POSES = 40, 12
-
 
 def stability(
     source: Annotated[
@@ -82,14 +80,12 @@ def stability(
         if map_:
             from planner.report.stability_map import map_report
 
-            return respond(
-                map_report(asked, poses or MAP_POSES, load_cut(cut), pictures, tell), as_json
-            )
+            return respond(map_report(asked, poses or 40, load_cut(cut), pictures, tell), as_json)
         if path is not None or pose == "all":
             from planner.campaign.toolpath_poses import Way
             from planner.report.stability_path import path_report
 
-            way = Way(path, origin, poses or WAY_POSES, turns)
+            way = Way(path, origin, poses or 12, turns)
             return respond(path_report(asked, way, load_cut(cut), pictures, tell), as_json)
         from planner.report.stability_lobes import stability_of
 

@@ -23,7 +23,6 @@ LEFT_SHARE = 0.8  # of MOST_BYTES that is left when some went, so that the next 
 LONGEST_UNUSED_S = 180 * 24 * 3600.0
 WRITING_S = 3600.0  # a part older than this belongs to a process that was stopped
 LOOK_EVERY = 64  # entries written by a process, after which it looks at the size again
-DIGEST_BYTES = 32
 
 T = TypeVar("T")
 
@@ -58,8 +57,8 @@ class Store:
             data = path.read_bytes()
         except OSError:
             return None
-        body = data[DIGEST_BYTES:]
-        if data[:DIGEST_BYTES] != _checksum(key, body):
+        body = data[32:]
+        if data[:32] != _checksum(key, body):
             return None
         try:
             found = pickle.loads(body)  # this user's own file, its checksum verified

@@ -32,8 +32,6 @@ from planner.session.inbox import Inbox
 from planner.session.keys import Keys
 from planner.session.screen import Screen
 
-POLL_S = 0.2
-
 
 class RerunQueue:
     """Keeps each new entry with the model right after it until there is time to show it."""
@@ -123,8 +121,8 @@ class Station:
         return PoseBefore()
 
     def key(self) -> str | None:
-        """The next key, or None after POLL_S."""
-        return self.keys.get(POLL_S)
+        """The next key, or None after a moment."""
+        return self.keys.get(timeout_s=0.2)
 
     @property
     def late(self) -> bool:

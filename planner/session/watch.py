@@ -32,8 +32,6 @@ from planner.session.page import TakingBack, page_with_hits
 from planner.session.screen import Screen
 from planner.session.station import RerunQueue, Station
 
-QUIET_S = 0.6  # a file that stood still for so long is whole: a verdict comes within a second
-
 
 @dataclass(frozen=True)
 class SessionSummary(Answer):
@@ -57,15 +55,16 @@ def watch(
     viewer: bool = False,
     explain: bool = False,
     keys: Keys | None = None,
-    quiet_s: float = QUIET_S,
+    quiet_s: float = 0.6,
     limit_s: float | None = None,
 ) -> SessionSummary:
     """Run a session until quit, target, no pose left, or `limit_s`.
 
     As many hits as campaign.toml's [cost] hits_per_axis make a pose, unless `hits_per_pose` says
-    otherwise. `auto` imports without asking, as does a session without a keyboard. `explain`
-    diagnoses after each import, beside the session, and says what the simulation lacks. Nobody else
-    can act in the campaign meanwhile: InputError names who does.
+    otherwise. A file is whole that stood still for `quiet_s`: a verdict comes within a second.
+    `auto` imports without asking, as does a session without a keyboard. `explain` diagnoses after
+    each import, beside the session, and says what the simulation lacks. Nobody else can act in the
+    campaign meanwhile: InputError names who does.
     """
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the one the analyser exports into.")
