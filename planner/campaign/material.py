@@ -49,13 +49,10 @@ class Material:
 
     def read(self, robot: Robot, band_hz: tuple[float, float], progress: Tell) -> Dataset:
         """What is `listed`, read and screened; nothing is written. Raises as `Dataset.of` does."""
-        return Dataset.of(
-            self.listed(robot),
-            band_hz,
-            window_rate_1_s=self.window_rate_1_s,
-            progress=progress,
-            name=str(self.recordings if self.campaign is None else self.campaign.directory),
-        )
+        how = {"window_rate_1_s": self.window_rate_1_s, "progress": progress}
+        if self.campaign is not None:
+            return self.campaign.dataset(band_hz, **how)
+        return Dataset.read(self.recordings, robot, band_hz, **how)
 
     def with_poses(self, rows: tuple[PoseRow, ...]) -> "Material":
         """The same with the poses of a table, unless a campaign offers its own."""

@@ -20,7 +20,7 @@ from planner.modal.modes import ModalModel
 from planner.progress import Tell, quietly
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.joints import JointUnits
-from planner.recording.points import SENSOR, TCP, PointNames, together
+from planner.recording.points import SENSOR, TCP, together
 from planner.recording.records import Hit
 
 # Rate (1/s) of an exponential window that is laid over all records: decays that they cut off are
@@ -37,8 +37,8 @@ class Recorded(Protocol):
         ...
 
     @property
-    def points(self) -> PointNames:
-        """Where it may be hit and heard."""
+    def points(self) -> Any:
+        """`PointNames`: where it may be hit and heard."""
         ...
 
     @property
