@@ -8,6 +8,7 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planner.campaign.config import CampaignConfig, load_campaign_config
 from planner.campaign.low_fidelity import LowFidelity
@@ -139,6 +140,13 @@ class Cell:
     def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
         """The pose in rad (m); InputError if the robot cannot stand there."""
         return _checked_pose(self.robot, joints_deg, where)
+
+    def poses(self, joints_deg: ArrayLike) -> np.ndarray:
+        """One or several poses (n, dof) in degrees (mm) as q in rad (m), checked as `check_pose`."""
+        angles = np.atleast_2d(np.asarray(joints_deg, dtype=float))
+        for number, row in enumerate(angles, 1):
+            self.check_pose(tuple(row), f"joints_deg, pose {number}")
+        return self.robot.joints.internal(angles)
 
 
 @contextmanager

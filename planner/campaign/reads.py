@@ -250,7 +250,7 @@ class CampaignReads:
 
         Places of joints that slide are in mm, here and below.
         """
-        return self.model.predict(self._q(joints_deg))
+        return self.model.predict(self.cell.poses(joints_deg))
 
     def frf(
         self, *, joints_deg: "ArrayLike", frequency_hz: np.ndarray | None = None
@@ -265,10 +265,7 @@ class CampaignReads:
             Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N: response
             axis, then hit axis.
         """
-        return self.frf_at(self._q(joints_deg), frequency_hz)
-
-    def _q(self, joints_deg: "ArrayLike") -> np.ndarray:
-        return self.cell.robot.joints.internal(np.atleast_2d(joints_deg))
+        return self.frf_at(self.cell.poses(joints_deg), frequency_hz)
 
     def frf_at(
         self, q: np.ndarray, frequency_hz: np.ndarray | None = None
@@ -292,7 +289,7 @@ class CampaignReads:
         from planner.campaign.planned import inside
         from planner.campaign.records import predicted_records
 
-        q, there = self._q(joints_deg), self.model.predict
+        q, there = self.cell.poses(joints_deg), self.model.predict
         return predicted_records(self.cell.robot.joints, q, there(q), inside(self.cell, q))
 
     @property

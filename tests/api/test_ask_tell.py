@@ -125,7 +125,10 @@ def test_angles_outside_the_limits_are_refused():
 
 
 def test_a_campaign_has_rows_too(tmp_path):
-    campaign = Campaign.new(tmp_path / "cell", TOML, EXAMPLE / "campaign.toml")
+    campaign = Campaign.new(str(tmp_path / "cell"), str(TOML), str(EXAMPLE / "campaign.toml"))
+    assert "0 poses measured, 0 proposed" in repr(campaign)
+    with pytest.raises(InputError, match="joint_2"):
+        campaign.predict(joints_deg=[0, 200, 0, 0, 0, 0])
     assert campaign.records() == []
     rows = campaign.predict_records(joints_deg=UNSEEN)
     assert [(r["pose"], r["mode"]) for r in rows] == [(p, k) for p in (1, 2) for k in range(1, 5)]
