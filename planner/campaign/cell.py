@@ -142,7 +142,7 @@ class Cell:
         return _checked_pose(self.robot, joints_deg, where)
 
     def poses(self, joints_deg: ArrayLike) -> np.ndarray:
-        """One or several poses (n, dof) in degrees (mm) as q in rad (m), checked as `check_pose`."""
+        """Poses (n, dof) in degrees (mm), or one of them, as q in rad (m); checked each."""
         angles = np.atleast_2d(np.asarray(joints_deg, dtype=float))
         for number, row in enumerate(angles, 1):
             self.check_pose(tuple(row), f"joints_deg, pose {number}")
