@@ -67,7 +67,7 @@ def test_tables_and_mat_hold_the_same_numbers(named, tmp_path):
     with (tmp_path / "modes.csv").open() as file:
         modes = list(csv.DictReader(file))
     used = named.state.used
-    predicted = named.predict(np.deg2rad([m.joints_deg for m in used]))
+    predicted = named.predict(joints_deg=[m.joints_deg for m in used])
     np.testing.assert_allclose(mat["mode_frequency_hz"], predicted.frequency_hz)
     rows = [r for r in modes if r["source"] == "predicted"]
     np.testing.assert_allclose([float(r["frequency_hz"]) for r in rows],
