@@ -73,7 +73,7 @@ def keep_files(
     seen: set[str] = set()
     for source in delivery.sources:
         try:
-            digest = store.sha256(store.read_recording(source.path))
+            digest = store.recording_hash(source.path)
         except InputError as error:  # one bad file does not keep the others out
             left_out.append(_left(source, "", str(error)))
             continue
@@ -195,7 +195,7 @@ def _owners(state: CampaignState) -> dict[str, str]:
 def _digest(source: Source) -> str:
     """Content hash; "" where the file cannot be read."""
     try:
-        return store.sha256(store.read_recording(source.path))
+        return store.recording_hash(source.path)
     except InputError:
         return ""
 

@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.events import Amplitude, MeasuredMode, Question
-from planner.campaign.hit_habits import HitMiss, habits
+from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.modes import ModeAnswer
 from planner.report.predictions import ExpectedMode
@@ -75,7 +75,7 @@ class PoseImport(Answer):
     remarks: tuple[str, ...]
     amplitude: Amplitude | None
     simulated: bool
-    hit_errors: tuple[HitMiss, ...] = ()
+    hit_errors: tuple[HitErrorEstimate, ...] = ()
     question: "AskedOfPose | None" = None
 
     @classmethod
@@ -96,7 +96,7 @@ class PoseImport(Answer):
             remarks=report.remarks,
             amplitude=measurement.amplitude if measurement else None,
             simulated=bool(measurement and measurement.simulated),
-            hit_errors=report.misses(model),
+            hit_errors=report.hit_errors(model),
             question=AskedOfPose.of(report.question, report.pose),
         )
 
@@ -170,13 +170,13 @@ class ImportedPoses(Answer):
     def of(cls, reports: "tuple[ImportReport, ...]", simulated: bool = False) -> "ImportedPoses":
         """Of what `Campaign.import_paths` gave; hits are told by what all of them taught."""
         model = reports[-1].model
-        every = [hit for pose in model.misses for hit in pose.hits]
+        every = [hit for pose in model.hit_errors for hit in pose.hits]
         poses = tuple(PoseImport.of(report, model) for report in reports)
-        common = habits(every) if any(pose.accepted for pose in poses) else ()
+        common = systematic_errors(every) if any(pose.accepted for pose in poses) else ()
         return cls(poses, common, simulated or any(pose.simulated for pose in poses))
 
     @property
-    def hit_errors(self) -> tuple[HitMiss, ...]:
+    def hit_errors(self) -> tuple[HitErrorEstimate, ...]:
         """Of all accepted hits."""
         return tuple(hit for pose in self.poses for hit in pose.hit_errors)
 

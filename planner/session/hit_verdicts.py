@@ -13,7 +13,7 @@ from planner.recording.records import Hit
 from planner.recording.repeat_sizes import other_size
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
 from planner.recording.sampling_rates import sampled_otherwise
-from planner.session.table import FolderTable
+from planner.session.inbox import FolderTable
 
 # As like as hits of one pose are (0.98 and more on the true robots of the tests); at poses that a
 # campaign proposes one after the other it is below 0.9. Chosen between.

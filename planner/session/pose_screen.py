@@ -13,7 +13,7 @@ from rich.text import Text
 from planner.campaign.events import Proposal
 from planner.recording.joints import JointUnits
 from planner.report.text import with_sd
-from planner.session.fitted_lines import Said, fitted
+from planner.session.screen import Said, fitted
 from planner.words import command
 
 WIDTH, HEIGHT = 80, 22  # of the smallest terminal, less a line for work and the cursor's

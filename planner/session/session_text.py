@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.campaign.events import HitRecord, Question
-from planner.campaign.hit_habits import habits
+from planner.campaign.hit_errors import systematic_errors
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.modal.modes import Mode
@@ -88,7 +88,7 @@ def _refused(hit: HitRecord) -> str:
 
 def _missed(report: ImportReport) -> list[RenderableType]:
     """Hit by hit, how it missed, and what the hits so far have in common."""
-    hits = report.misses()
+    hits = report.hit_errors()
     if not hits:
         return []
     rows = _table("hit", "tilt of its direction", "beside the point")
@@ -96,8 +96,8 @@ def _missed(report: ImportReport) -> list[RenderableType]:
         column.no_wrap = True
     for hit in hits:
         rows.add_row(*hit.cells)
-    every = [hit for pose in report.model.misses for hit in pose.hits]
-    return [Text(""), rows, *(Text(habit, style="bold") for habit in habits(every))]
+    every = [hit for pose in report.model.hit_errors for hit in pose.hits]
+    return [Text(""), rows, *(Text(habit, style="bold") for habit in systematic_errors(every))]
 
 
 def question_panel(question: Question, pose: str, other: str) -> RenderableType:

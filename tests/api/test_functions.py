@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from planner import Dataset, Robot, analyse, identify
+from planner import Dataset, Frf, Hit, Robot, analyse, identify
 from planner.cli.run import run
 from planner.errors import InputError, RefusedError
 from planner.modal.modes import ModalModel
@@ -32,7 +32,15 @@ def recorded(tmp_path_factory):
 @pytest.fixture(scope="module")
 def dataset(recorded):
     folder, _, robot = recorded
-    return Dataset.read(folder, robot.joint_names, robot.config.band_hz)
+    return Dataset.read(folder, robot)
+
+
+def test_a_data_set_says_what_it_holds(recorded, dataset):
+    folder, _, robot = recorded
+    assert repr(dataset).startswith("Dataset(3 poses, 3 visits, ")
+    assert Dataset.read(str(folder), robot).poses == dataset.poses
+    assert all(isinstance(hit, Hit) for visit in dataset.visits for hit in visit.hits)
+    assert isinstance(dataset.frfs[0], Frf)
 
 
 def test_hits_files_frf_and_a_pose_of_a_data_set_give_the_same_modes(recorded, dataset):

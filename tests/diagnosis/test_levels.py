@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.support.level_cases import LevelCase, Protocol, made
 
 from planner.diagnosis.levels import Levels, level_laws
 from planner.effects.parameters import CAD_INERTIAS
@@ -18,6 +17,7 @@ from planner.fit.structure import RobotPrior, RobotStructure
 from planner.measurement.nuisances import Tolerances
 from planner.truth.laws import Backlash
 from tests.support import level_cases
+from tests.support.level_cases import LevelCase, Protocol, made
 
 HOW = Protocol(repeats=1, poses=4)
 NUMBERS = {"friction": ("presliding_stiffness", "coulomb_torque"),

@@ -45,7 +45,7 @@ def one(folder: Path, n: int, seed: int, simulation: Simulation) -> dict[str, tu
     truth, robot = load_truth(TOML, scatter), simulation.robot
     named = [(f"P{i}", row) for i, row in enumerate(poses(n, seed))]
     record_poses(truth, named, folder, repeats=3, seed=seed)
-    recorded = Dataset.read(folder, robot.joint_names, robot.config.band_hz)
+    recorded = Dataset.read(folder, robot)
     silent = measured_frfs(truth, OTHERS, LINES, 1e-9)
     found = {"nominal": (None, fit_similarity(simulation, silent, OTHERS), None)}
     for name, priors in PRIORS.items():

@@ -73,7 +73,7 @@ def recorded(folder: Path, toml: Path, seed: int) -> Dataset:
     nodes = {"sensor": 10} | {name: node for name, *_, node in ALONG}
     write_recordings(folder, truth.joint_names, rows, HAMMER, truth.description, nodes)
     robot = Robot.load(toml)
-    return Dataset.read(folder, robot.joint_names, robot.config.band_hz, points=robot.points)
+    return Dataset.read(folder, robot)
 
 
 def told(robot: Robot, heard: Dataset, poses: int) -> Identification:

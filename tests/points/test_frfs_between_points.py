@@ -107,7 +107,7 @@ def test_hits_elsewhere_and_sensors_that_rove(toml: Path, tmp_path: Path) -> Non
     # A base that gives a little: the foot moves.
     soft = Deviation(extra=(Spring("base", (1.0, 0.0, 0.0), 4e6, 1e3),))
     truth = record(tmp_path / "hits", toml, stays, Secret(soft))
-    found = Dataset.read(tmp_path / "hits", robot.joint_names, (4.0, 90.0), points=robot.points)
+    found = Dataset.read(tmp_path / "hits", robot, (4.0, 90.0))
     assert not found.refused
     assert found.sensors == ("sensor", "elbow", "shoulder", "foot")
     first, second = found.frfs
@@ -132,7 +132,7 @@ def test_a_dead_channel_leaves_the_other_sensors_of_its_hits(toml: Path, tmp_pat
     robot, sensors = Robot.load(toml), ("sensor", "elbow")
     stays = [(f"P{i}", q, "tcp", sensors) for i, q in enumerate(poses(2))]
     record(tmp_path / "hits", toml, stays, Secret(Deviation(3)), dead={"P1": 4})
-    found = Dataset.read(tmp_path / "hits", robot.joint_names, (4.0, 90.0), points=robot.points)
+    found = Dataset.read(tmp_path / "hits", robot, (4.0, 90.0))
     assert not found.refused
     assert [frf.layout.sensors for frf in found.frfs] == [sensors, ("sensor",)]
     whole, lacking = found.measured
@@ -149,7 +149,7 @@ def test_springs_are_identified_from_hits_away_from_the_tool(toml: Path, tmp_pat
     ]
     truth = record(tmp_path / "hits", toml, stays, Secret(Deviation(3, stiffness=0.2, damping=0.1)))
     robot = Robot.load(toml)
-    found = Dataset.read(tmp_path / "hits", robot.joint_names, (4.0, 90.0), points=robot.points)
+    found = Dataset.read(tmp_path / "hits", robot, (4.0, 90.0))
     exact = Tolerances(angle_rad=1e-3, offset_m=1e-4, position_m=1e-4)
     told = identify(
         found.one_hit_frfs, found.q, Simulation(robot), extend=False, tolerances=exact

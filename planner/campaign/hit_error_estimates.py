@@ -1,11 +1,11 @@
-"""How the hits of a campaign missed, and its modes as they are without that."""
+"""Errors of a campaign's hits as its simulation tells them, and its modes without these."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.campaign.hit_habits import HitMiss, Pair, PoseMisses
+from planner.campaign.hit_errors import HitErrorEstimate, Pair, PoseHitErrors
 from planner.campaign.labels import LabelledPose
 from planner.campaign.log_conversion import to_mode
 from planner.campaign.low_fidelity import LowFidelity, learn
@@ -44,7 +44,7 @@ class Visited:
 
 
 @dataclass(frozen=True, eq=False)
-class CampaignMisses:
+class CampaignHitErrors:
     """What is told of all poses with hits; `told` is None where there are none."""
 
     visited: tuple[Visited, ...]
@@ -62,7 +62,7 @@ class CampaignMisses:
         return bool(np.sqrt(np.mean(away**2)) < NO_HAND)
 
     @property
-    def poses(self) -> tuple[PoseMisses, ...]:
+    def poses(self) -> tuple[PoseHitErrors, ...]:
         """Hit by hit; none where the simulation is too wrong to tell."""
         if self.told is None or not self.trusted:
             return ()
@@ -112,29 +112,29 @@ class CampaignMisses:
         ]
 
 
-def tell(
+def estimate(
     visited: Sequence[Visited], learned: Learned | None, t: Tolerances, band_hz: tuple[float, float]
-) -> CampaignMisses:
+) -> CampaignHitErrors:
     """Misses of the hits of all poses, by the simulation as it was identified from them."""
     those = tuple(one for one in visited if len(one.columns.axis))
     if learned is None or not those:
-        return CampaignMisses((), None, t, band_hz)
+        return CampaignHitErrors((), None, t, band_hz)
     visits = [VisitHits(one.q, one.columns) for one in those]
     told = tell_misses(learned.posterior, visits)
-    return CampaignMisses(those, told, t, band_hz)
+    return CampaignHitErrors(those, told, t, band_hz)
 
 
-def told_by(
+def estimate_by(
     nominal: Simulation,
     visited: Sequence[Visited],
     whole: Sequence[Frf],
     t: Tolerances,
     band_hz: tuple[float, float],
-) -> CampaignMisses:
-    """As `tell`, by a simulation that is identified from the FRFs of all points first."""
+) -> CampaignHitErrors:
+    """As `estimate`, by a simulation that is identified from the FRFs of all points first."""
     q = np.array([one.q for one in visited])
     learned = learn(LowFidelity(1, nominal, t), whole, q, band_hz).learned
-    return tell(visited, learned, t, band_hz)
+    return estimate(visited, learned, t, band_hz)
 
 
 def visits_of(
@@ -156,14 +156,14 @@ def visits_of(
     )
 
 
-def _pose(visited: Visited, told: VisitMisses) -> PoseMisses:
+def _pose(visited: Visited, told: VisitMisses) -> PoseHitErrors:
     columns = visited.columns
     sd = np.sqrt(np.diagonal(told.covariance)).reshape(-1, OF_HIT)
     hits = []
     for i, (axis, sign) in enumerate(zip(columns.axis, columns.sign, strict=True)):
         # A hit along −axis: the response is over the force along +axis, and so is its direction.
         hits.append(
-            HitMiss(
+            HitErrorEstimate(
                 visited.files[columns.file[i]],
                 ("+" if sign > 0 else "-") + AXES[axis],
                 _pair(sign * np.rad2deg(told.mean[i, :2])),
@@ -172,7 +172,7 @@ def _pose(visited: Visited, told: VisitMisses) -> PoseMisses:
                 _pair(1e3 * sd[i, 2:]),
             )
         )
-    return PoseMisses(visited.pose, tuple(hits))
+    return PoseHitErrors(visited.pose, tuple(hits))
 
 
 def _pair(values: np.ndarray) -> Pair:

@@ -1,4 +1,4 @@
-"""How hits missed, in the units of a workshop, and what they have in common, in a sentence."""
+"""Errors of hits in the units of a workshop, and what is systematic in them, in a sentence."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class HitMiss:
+class HitErrorEstimate:
     """A hit at r + o with direction e + δ: δ in ° and o in mm, each with its sd, in the tcp frame.
 
     The two numbers are those across the hit's axis, in cyclic order after it: x, y of a z hit.
@@ -41,21 +41,15 @@ class HitMiss:
 
 
 @dataclass(frozen=True)
-class PoseMisses:
+class PoseHitErrors:
     """Of a pose's hits in the order of their files."""
 
     pose: str
-    hits: tuple[HitMiss, ...]
+    hits: tuple[HitErrorEstimate, ...]
 
 
-def misses_of(poses: Sequence[PoseMisses], pose: str, files: Sequence[str]) -> tuple[HitMiss, ...]:
-    """Of those files' hits at a pose, as far as anything is known of them."""
-    every = next((found.hits for found in poses if found.pose == pose), ())
-    return tuple(hit for hit in every if hit.file in files)
-
-
-def habits(hits: Sequence[HitMiss]) -> tuple[str, ...]:
-    """What hits along a signed axis have in common, where it is sure: a sentence an axis."""
+def systematic_errors(hits: Sequence[HitErrorEstimate]) -> tuple[str, ...]:
+    """What errors along a signed axis have in common, where it is sure: a sentence an axis."""
     found = []
     for name in dict.fromkeys(hit.hit for hit in hits):
         group = [hit for hit in hits if hit.hit == name]
