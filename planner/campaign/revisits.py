@@ -9,7 +9,7 @@ from planner.campaign.events import Imported, MeasuredMode
 from planner.campaign.model import FEW_POSES, Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose
-from planner.frf.reciprocity import unreciprocal
+from planner.frf.frf import unreciprocal
 
 LEAST_POSES = 3  # measured, before which hints at drift are not to be relied on
 SAME_MODE = 0.05  # of ln f: so near, a mode of a second visit is that of the first
