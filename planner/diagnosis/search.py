@@ -24,7 +24,7 @@ from planner.fit.fitted import (
 )
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
-from planner.fit.search import Search, _placed
+from planner.fit.search import Search, placed
 from planner.fit.structure import RobotStructure, effects_free
 
 FITTED, SCREENED, ROUGH, AFAR = 24, 48, 14, 12  # lines a pose
@@ -171,7 +171,7 @@ class Explorer:
         structure = base.structure.with_effect(start.effect)
         misfit = replace(base.misfit, structure=structure)
         ends = []
-        for x, _ in _placed(base, start):
+        for x, _ in placed(base, start, all_move=True):
             if misfit.possible(x):
                 at = minimised(misfit, x, FEW, HOPELESS, base.at.own)
                 ends.append(StructureFit(misfit, at, misfit.evidence(at)))

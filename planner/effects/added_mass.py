@@ -19,8 +19,9 @@ from planner.effects.effect import (
 )
 
 LEAST = 0.05  # of the mass's sd: a start needs some mass for its place to matter
-FARTHEST = 3.0  # prior sds, of a start's mass and place
-PLACES = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])  # in sds, where it is looked for
+FARTHEST = 2.0  # prior sds, of a start's mass; its place begins within one of where it is tried
+CENTRE = ((0.0, 0.0, 0.0),)
+AROUND = (*CENTRE, *map(tuple, np.vstack([np.eye(3), -np.eye(3)]).tolist()))
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class PointMass(Operator):
     centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     mass_kg: float = 1.0  # its sd
     size_m: float = 1.0  # sd of its place
+    places: tuple[tuple[float, ...], ...] = CENTRE  # in sds, where it is looked for
 
     kind = "added_mass"
     absorbed = True
@@ -46,7 +48,8 @@ class PointMass(Operator):
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """By the columns of the mass and of its first moments, at the likeliest of some places."""
-        return (max((self._start(motions, gain, place) for place in PLACES), key=nats_of),)
+        places = map(np.array, self.places)
+        return (max((self._start(motions, gain, place) for place in places), key=nats_of),)
 
     def _start(self, motions: Motions, gain: Gain, place: np.ndarray) -> Start:
         columns = motions.changed_by(self.impedance(motions.poses, np.array([1.0, *place])))
@@ -54,7 +57,7 @@ class PointMass(Operator):
         mass = float(np.clip(psi[0], -FARTHEST, FARTHEST))
         if abs(mass) < LEAST:
             mass = LEAST
-        place = np.clip(place + psi[1:] / mass, -FARTHEST, FARTHEST)
+        place = place + np.clip(psi[1:] / mass, -1, 1)
         return Start(self, np.array([mass, *place]), nats, moved)
 
     def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray]:

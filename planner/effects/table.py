@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.effects.added_mass import PointMass
+from planner.effects.added_mass import AROUND, PointMass
 from planner.effects.chain import ChannelDelay, Polarity, SensorGain, SensorRotation
 from planner.effects.effect import Number, Operator
 from planner.effects.far_off import FarOffSpring
@@ -83,6 +83,7 @@ class Repertoire:
             groups.setdefault(key, []).append(number)
         effects = [kind(at, tuple(numbers)) for (kind, at), numbers in groups.items()]
         effects += [*_operators(simulation), *further]
+        effects = list({e.label: e for e in effects}.values())  # of one place the last counts
         widest = Simulation(wider)
         return cls(
             simulation, priors, widest, replace(priors, bounds=bounds), stated, tuple(effects)
@@ -208,11 +209,7 @@ def _operators(simulation: Simulation) -> list[Operator]:
         found.append(LinkResonator(at, (), numbers, joint, band))
     if not any(b.loss_factor for b in robot.config.compliance):
         found.append(_structural(robot))
-    for number, spring, block in _own(robot):
-        waves = tuple(f"{f}_{n}" for n in AngleSpring.orders for f in ("cosine", "sine"))
-        shares = tuple(Number(name, "1", 0.0, ANGLE_SHARE) for name in waves)
-        mine = (spring,), (block.stiffness,)
-        found.append(AngleSpring(f"joint_{number + 1}", (), shares, *mine, block.joint, number))
+    found += [_angle_spring((1,), *one) for one in _own(robot)]
     return found
 
 
@@ -225,6 +222,15 @@ def _own(robot: Robot) -> list[tuple[int, int, Compliance]]:
     ]
 
 
+def _angle_spring(
+    orders: tuple[int, ...], number: int, spring: int, block: Compliance
+) -> AngleSpring:
+    waves = tuple(f"{f}_{n}" for n in orders for f in ("cosine", "sine"))
+    shares = tuple(Number(name, "1", 0.0, ANGLE_SHARE) for name in waves)
+    at, mine = f"joint_{number + 1}", ((spring,), (block.stiffness,))
+    return AngleSpring(at, (), shares, *mine, block.joint, number, orders)
+
+
 def diagnosed(simulation: Simulation) -> list[Operator]:
     """What only a diagnosis looks for: the chain, time, and what has no name of its own."""
     robot, elastic = simulation.robot, simulation.elastic
@@ -234,7 +240,10 @@ def diagnosed(simulation: Simulation) -> list[Operator]:
     found += [Polarity(f"sensor_{a}") for a in turn]
     found.append(SensorRotation("sensor", (), angles))
     found.append(ChannelDelay("sensor", (), (Number("delay", "s", 0.0, DELAY_S),)))
+    masses = (e for e in _operators(simulation) if isinstance(e, PointMass))
+    found += [replace(e, places=AROUND) for e in masses]
     own = _own(robot)
+    found += [_angle_spring((1, 2), *one) for one in own]
     for number, spring, block in own:
         at, mine = f"joint_{number + 1}", ((spring,), (block.stiffness,))
         found.append(FarOffSpring(at, (), (), spring, FAR_OFF, place_name(block)))

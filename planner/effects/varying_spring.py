@@ -55,13 +55,14 @@ class VaryingSpring(Operator):
 
 @dataclass(frozen=True)
 class AngleSpring(VaryingSpring):
-    """cos and sin of the joint's angle, once and twice a turn: gears out of round, balancers."""
+    """cos and sin of so many times the joint's angle: gears out of round, balancers."""
 
     joint: str = ""
     number: int = 0  # of the joint, from 0
 
+    orders: tuple[int, ...] = (1,)
+
     kind = "angle_dependent_stiffness"
-    orders = (1, 2)
 
     def shares(self, poses: PosedBodies) -> list[list[np.ndarray]]:
         """See `VaryingSpring.shares`."""

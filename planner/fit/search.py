@@ -200,7 +200,7 @@ class Search:
         """Starts beside a structure: a few steps each, the best farther, the very best settled."""
         pool = []
         for start in starts:
-            tried = [self._few(base, start, x, steps) for x, steps in _placed(base, start)]
+            tried = [self._few(base, start, x, steps) for x, steps in placed(base, start)]
             pool += sorted((t for t in tried if t is not None), key=evidence_of)[-1:]
         pool.sort(key=evidence_of, reverse=True)
         pool = [stepped(p, FURTHER) for p in pool[:FINALISTS] if p.evidence > known - FAR]
@@ -298,16 +298,18 @@ class Search:
         return StructureFit(best.misfit, at, best.misfit.evidence(at))
 
 
-def _placed(base: StructureFit, start: Start) -> list[tuple[np.ndarray, int]]:
-    """Where fits with one more effect begin, and their steps."""
+def placed(
+    base: StructureFit, start: Start, all_move: bool = False
+) -> list[tuple[np.ndarray, int]]:
+    """Where fits with one more effect begin, and their steps; `all_move`: of all numbers."""
     structure = base.structure.with_effect(start.effect)
     x = structure.carried(base.structure, base.at.x)
     effect = structure.effects[-1]
     if not effect.springs:
-        if start.moved is not None:
+        if all_move and start.moved is not None:
             x = structure.carried(base.structure, base.at.x + start.moved)
+            x = np.clip(x, structure.least, structure.mean + REACH * structure.sd)
         x[structure.own[-1]] = start.psi
-        x = np.clip(x, structure.least, structure.mean + REACH * structure.sd)
         if not isinstance(effect, LinkResonator):
             return [(x, 4)]
         light = x.copy()
