@@ -11,6 +11,7 @@ from planner.diagnosis.exponential_window import screen_window
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.levels import LevelLaw, Levels, level_laws
 from planner.diagnosis.search import FITTED, LEAST, Explored, Explorer
+from planner.diagnosis.tone import screen_tone
 from planner.diagnosis.verdict import NamedEffect, Verdict, judged
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
@@ -144,7 +145,8 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
         raise InputError(TOO_SOFT)
     steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
     explored = Explorer(steps).explored()
-    heard = [] if window is None else [(window.effect, window.at)]
+    screened = tuple(f for f in (window, screen_tone(recorded)) if f is not None)
+    heard = [(f.effect, f.at) for f in screened]
     matters = robot.config.diagnose.matters
     tell("comparing hits of different force", 0.85)
     likeliest = max(explored.settled, key=evidence_of)
@@ -158,7 +160,7 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
         search,
         explored,
         verdict,
-        () if window is None else (window,),
+        screened,
         levels,
         _agreement(fits, fits),
         aside,

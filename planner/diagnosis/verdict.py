@@ -99,7 +99,7 @@ def judged(
     named = [e for e in effects if e.counts]
     nameless = any(e.place[0] in NAMELESS for e in named)
     left = (size_of(best) > EXPLAINS * matters or nameless) and not laws
-    unknown = left or bool(levels and levels.unexplained)
+    unknown = left or bool(levels and levels.unexplained) or UNKNOWN in heard
     there = named or heard or laws
     verdict = "unexplained" if unknown else "explained" if there else "consistent"
     candidates = _candidates(weights, effects, unknown, tuple(heard))
