@@ -198,7 +198,7 @@ def searching(
 
 def _order(recorded: Dataset) -> np.ndarray:
     """How much of the campaign was over, 0 to 1, when each pose was hit first."""
-    first: dict[str, int] = {}
+    first: dict[str, float] = {}
     for visit in recorded.visits:
         first.setdefault(visit.pose, visit.order)
     order = np.array([first.get(pose, 0) for pose in recorded.poses], dtype=float)

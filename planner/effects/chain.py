@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from planner.effects.effect import ACROSS, Gain, Motions, Operator, Start
 
@@ -73,6 +72,8 @@ class SensorRotation(Operator):
 
     def chain(self, s: np.ndarray, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Operator.chain`."""
+        from scipy.spatial.transform import Rotation  # not needed between hits
+
         there = Rotation.from_rotvec(psi).as_matrix()
         steps = STEP_RAD * np.eye(3)
         slopes = [(Rotation.from_rotvec(psi + d).as_matrix() - there) / STEP_RAD for d in steps]
@@ -80,6 +81,8 @@ class SensorRotation(Operator):
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """From where it is mounted as stated, and by the rotation that fits best (Procrustes)."""
+        from scipy.spatial.transform import Rotation
+
         h, y = motions.accelerance, motions.measured
         size = np.sqrt(np.mean(np.abs(y) ** 2, axis=(1, 2), keepdims=True)) + 1e-300
         rows = [(a / size).reshape(len(a), -1, 3, *a.shape[2:]) for a in (h, y)]

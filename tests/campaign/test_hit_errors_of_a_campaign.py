@@ -78,7 +78,7 @@ def test_what_hits_have_in_common_is_said():
         "Your z hits land 4 ± 1 mm towards +x and tilt by 2.3 ± 0.2° towards +x.",
     )
     assert systematic_errors([hit("-x", (0.1, -2.0), (0.0, 0.0))] * 2) == (
-        "Your -x hits tilt by 2.0 ± 0.2° towards −z.",
+        "Your −x hits tilt by 2.0 ± 0.2° towards −z.",
     )
     assert systematic_errors([hit("+y", (0.3, 0.3), (1.0, 1.0))] * 3) == ()
 

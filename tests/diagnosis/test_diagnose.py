@@ -126,7 +126,7 @@ def test_the_robot_that_is_written_is_read_back_and_predicts(tmp_path):
 def test_the_function_says_what_the_command_says(tmp_path):
     case = small_case(tmp_path, CONCEALED["gain"])
     robot = Robot.load(case.robot_toml)
-    dataset = Dataset.read(case.recordings, robot.joints, robot.config.band_hz, points=robot.points)
+    dataset = Dataset.read(case.recordings, robot, robot.config.band_hz)
     found = diagnose(dataset, robot, offered={"there": dataset.q[0] + 0.1})
     answer = diagnosed(case)
     mine = json.loads(json.dumps(found.to_json()))

@@ -285,7 +285,7 @@ def damage(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     asked, whole = undamaged(cell, log)
     kind = str(rng.choice(["log", "recording", "cache"], p=[0.5, 0.3, 0.2]))
     recordings = sorted((cell.campaign / "recordings").glob("*.uff"))
-    kept = sorted(p for name in ("models", "poses") for p in (cache / name).glob("*"))
+    kept = sorted(p for p in (cache / "results").glob("*") if p.is_file())
     among = {"log": [cell.log], "recording": recordings, "cache": kept}[kind]
     path = among[int(rng.integers(len(among)))]
     content, entries_before = path.read_bytes(), entries(cell)
