@@ -37,7 +37,9 @@ def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
         by_chance = variance - own[k] + common[k]
         # An error of the model, too, moves a pole the farther the less the lines hold it. Real and
         # imaginary parts suffer from the same cause: one factor a mode.
-        beyond = np.maximum(moved.reshape(2, m).T[k] ** 2 - by_chance, 0.0) / variance
+        beyond = np.maximum(moved.reshape(2, m).T[k] ** 2 - by_chance, 0.0)
+        # A pole that exact FRFs hold has no variance to inflate.
+        beyond = np.divide(beyond, variance, out=np.zeros_like(beyond), where=variance > 0)
         factor[k] = np.maximum(factor[k], 1 + np.max(beyond, axis=1))
     return factor
 

@@ -1,5 +1,6 @@
 """Which poles are modes: fit, leave out what the data do not need, add what they still miss."""
 
+import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -293,6 +294,7 @@ def presences(data: Data, poles: np.ndarray, residue: np.ndarray) -> np.ndarray:
     """
     lines = [int(np.argmin(np.abs(data.frequency_hz - p.imag / (2 * np.pi)))) for p in poles]
     ones = unit(data.lines, data.to_plane(poles))[np.arange(poles.size), lines]
-    whole = np.linalg.norm(data.response[..., lines].reshape(-1, poles.size), axis=0)
-    own = np.linalg.norm(residue.reshape(-1, poles.size) * ones, axis=0)
+    each = math.prod(residue.shape[:-1]), poles.size  # of no pole, too
+    whole = np.linalg.norm(data.response[..., lines].reshape(each), axis=0)
+    own = np.linalg.norm(residue.reshape(each) * ones, axis=0)
     return own / np.maximum(whole, 1e-300)

@@ -203,6 +203,8 @@ def _number(path: Path, tag: str, text: str) -> float:
 
 def _date(date: str, time: str) -> np.datetime64 | None:
     day, clock = date.replace("/", "-"), time.replace(",", ".")[:18]  # to ns
+    if not re.fullmatch(r"[\d:.]*", clock):  # NumPy warns of time zones, which the format has not
+        return None
     try:
         return np.datetime64(f"{day}T{clock}", "ns")
     except ValueError:

@@ -1,6 +1,7 @@
 """`planner modes` of time histories of any points: one sensor, a roving hammer, a roving sensor."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -182,3 +183,17 @@ def test_what_readers_notice_of_hits_is_told(tmp_path, capsys):
     code, _, err = modes(capsys, written(len(rows) // 2))
     assert code == 3
     assert "s apart" in err
+
+
+def test_short_records_of_one_sensor_give_modes_or_a_sentence(tmp_path, capsys):
+    one = tap(PLATE, 0, (0,), np.random.default_rng(2))
+    for kept in (120, 160, 180, 200, 220, 260, 300, 340, 380, 420):
+        cut = replace(
+            one, force_n=one.force_n[:kept], acceleration_m_s2=one.acceleration_m_s2[:, :kept]
+        )
+        path = write_csv(tmp_path / f"{kept}.csv", cut, "acceleration_z_m_s2", "hit: +z")
+        code, _, err = modes(capsys, path)
+        assert code in (0, 3), (kept, err)
+        assert code == 0 or err.startswith(
+            ("No mode could be found", "No modes could be identified")
+        )

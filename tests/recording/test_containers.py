@@ -132,6 +132,17 @@ def cut_after(word, count):
     return lambda path: path.write_text(word.join(parts[:count]) + word)
 
 
+def damaged_heap(path):
+    """HDF5 whose free space among its texts has no size."""
+    ONE_HIT["HDF5: channels in rows"][1](path, HITS)
+    data = bytearray(path.read_bytes())
+    at = data.index(b"GCOL") + 16
+    while any(data[at : at + 2]):
+        at += 16 + -(-int.from_bytes(data[at + 8 : at + 16], "little") // 8) * 8
+    data[at + 8 : at + 16] = bytes(8)
+    path.write_bytes(data)
+
+
 UNIT_TWICE = {
     "values": np.ones(99),
     "quantity": {"label": "g", "unit_transformation": {"factor": 9.8}},
@@ -154,6 +165,7 @@ REFUSED = {
     "a hit among others with what is no number": (
         ".mat", lambda path: MANY_HITS["MAT: an array of structs"][1](path, [HITS[0], NAN]),
         "sample 11 is not a finite"),
+    "HDF5: a damaged heap of texts": (".h5", damaged_heap, "damaged where its texts lie"),
     "LVM: spectra": (".lvm", changed("X_Dimension\tTime", "X_Dimension\tFrequency"), "over Hz"),
     "LVM: a word": (".lvm", changed(*WORD), f"row {WORD_ROW}: Hammer is x"),
     "LVM: fewer rows than stated": (".lvm", changed("Samples\t512", "Samples\t513"), "cut off"),
@@ -177,6 +189,12 @@ def test_what_is_not_understood_is_said(tmp_path, what):
     write(path)
     with pytest.raises(InputError, match=words):
         read(path)
+
+
+def test_a_date_that_is_none_is_no_date(tmp_path):
+    (tmp_path / "zone.lvm").write_text(lvm(HITS[:1]).replace("08:00:30.25", "08:00:30-25"))
+    (hit,) = hits_from(read(tmp_path / "zone.lvm"))
+    same(hit, HITS[0])
 
 
 def test_segments_that_go_on_are_one_record(tmp_path):
