@@ -8,9 +8,9 @@ from rich.text import Text
 
 from planner.campaign.arrivals import stated_otherwise
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Confirmed, Imported, Proposal
+from planner.campaign.events import Confirmed, Imported, Proposal, Refused
 from planner.campaign.state import taken_back
-from planner.dataset.screened_files import Source
+from planner.dataset.screened_files import Source, read_one
 from planner.session.course import Course
 from planner.session.diagnosis_process import DiagnosisProcess
 from planner.session.hit_verdicts import PoseBefore, Verdicts
@@ -66,17 +66,20 @@ class Station:
         return any(not stated_otherwise(Source.of(row), hit) for hit in hits)
 
     def pose_before(self, pose: str) -> PoseBefore:
-        """The pose measured last, other than this one, and what was hit there."""
+        """Where the robot was before this pose, and the usable hits there, refused or not."""
         entries, state = self.campaign.entries, self.campaign.state
         undone = taken_back(entries)
         for entry in reversed(entries):
             event = entry.event
-            if entry.seq in undone or not isinstance(event, Imported | Confirmed):
+            if entry.seq in undone or not isinstance(event, Imported | Confirmed | Refused):
                 continue
             known = state.hit_at(event.pose)
-            if known is not None and event.pose != pose:
-                sources = self.campaign.recordings.sources(known)
-                return PoseBefore(event.pose, tuple(h for s in sources for h in s.read()[0]))
+            records = [hit for at, hit in state.refused.values() if at == event.pose]
+            records += known.accepted if known is not None else ()
+            if records and event.pose != pose:
+                kept, band = self.campaign.recordings, self.campaign.cell.config.modes.band_hz
+                read = (read_one(kept.source(record), band)[1] for record in records)
+                return PoseBefore(event.pose, tuple(hit for hits in read for hit in hits))
         return PoseBefore()
 
     def key(self) -> str | None:
