@@ -90,7 +90,7 @@ def test_a_session_shows_imports_and_goes_on(cell):
     proposal = campaign.next()[0]
     analyser = threading.Thread(target=deliver, args=(truth, tmp_path, proposal, 0))
     script = Script(console, [
-        (wait("all hits are in"), "?"), (wait("set all waiting hits aside"), "s"),
+        (wait("all hits are in"), "?"), (wait("set bad hits, or all, aside"), "s"),
         (wait("★"), "a"), (wait("Pose P001: 9 hits in"), "k"), (wait("stands in the way?"), "\n"),
         (wait("not be offered"), "u"),
         (wait("Took back"), "q"),
