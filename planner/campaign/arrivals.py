@@ -220,7 +220,7 @@ def _reason_against(
             return ""
         return f"hits of {pose} wait for an answer: {held.question.text if held.question else ''}"
     certain = delivery.by_table or (delivery.said and named)
-    shown = state.shown.get(digest, pose)
+    shown = state.came(digest, pose)
     if shown != pose and not certain:
         return (
             f"it came at {shown}, and nobody said that it is of {pose}; to import it there, name "

@@ -222,14 +222,14 @@ class Campaign(CampaignReads):
             acts = (e.event.act for e in undone if isinstance(e.event, Undone))
             return tuple(self.entries[act - 1] for act in acts)
 
-    def show(self, pose: str, files: Sequence[str]) -> None:
+    def show(self, pose: str, files: Sequence[str], at: str = "") -> None:
         """Files (sha256) are of a pose, as they were shown there: they never move on by themselves.
 
-        What was said of a file before holds.
+        With `at` that is a guess, and they came there. What was said of a file before holds.
         """
         with self._acting():
             if new := tuple(file for file in files if file not in self.state.shown):
-                self._append(FilesShown(pose, new))
+                self._append(FilesShown(pose, new, at))
 
     def place(self, pose: str, files: Sequence[str]) -> None:
         """The engineer says that files (sha256) shown elsewhere were hit at this pose."""

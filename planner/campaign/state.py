@@ -71,6 +71,9 @@ class CampaignState:
     held: dict[str, Measurement] = field(default_factory=dict)  # until their question is answered
     refused: dict[str, tuple[str, HitRecord]] = field(default_factory=dict)  # by sha256: pose, hit
     shown: dict[str, str] = field(default_factory=dict)  # by sha256: the pose that it is of
+    guessed: dict[str, str] = field(
+        default_factory=dict
+    )  # where those came of which that is a guess
     skipped: dict[str, str] = field(default_factory=dict)
     avoided: frozenset[str] = frozenset()  # of these, those whose neighbours are not offered either
     starred: frozenset[str] = frozenset()
@@ -98,6 +101,14 @@ class CampaignState:
     def over(self) -> tuple[Measurement, ...]:
         """Poses that are not to be proposed again, for there were hits."""
         return self.measured
+
+    def came(self, digest: str, pose: str) -> str:
+        """The pose that a file (sha256) is of, as seen from `pose`; that where nothing is known.
+
+        What is only guessed to be of it is not taken for its own: there it is of where it came.
+        """
+        known = self.shown.get(digest, pose)
+        return self.guessed.get(digest, known) if known == pose else known
 
     def unchanged_by(self, event: AnyEvent) -> bool:
         """Whether an act changes neither the model nor what is proposed."""
@@ -191,9 +202,14 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
             doubt = _doubt(state, event.pose)
             return replace(changed, open=left, skipped=skipped, avoided=avoided, doubt=doubt)
         case FilesShown():
-            return replace(state, shown={**dict.fromkeys(event.files, event.pose), **state.shown})
+            new = [file for file in event.files if file not in state.shown]
+            guessed = state.guessed | (dict.fromkeys(new, event.at) if event.at else {})
+            shown = state.shown | dict.fromkeys(new, event.pose)
+            return replace(state, shown=shown, guessed=guessed)
         case FilesPlaced():
-            return replace(state, shown=state.shown | dict.fromkeys(event.files, event.pose))
+            guessed = {file: at for file, at in state.guessed.items() if file not in event.files}
+            shown = state.shown | dict.fromkeys(event.files, event.pose)
+            return replace(state, shown=shown, guessed=guessed)
         case Starred():
             return replace(state, starred=state.starred | {event.pose})
     return state

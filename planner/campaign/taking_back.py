@@ -100,8 +100,10 @@ def act(entry: Entry) -> str:
     if isinstance(event, Undone):
         return f"took back entry {event.act}"
     if isinstance(event, FilesShown | FilesPlaced):
-        said = "shown at" if isinstance(event, FilesShown) else "said to be of"
-        return f"{counted(len(event.files), 'file')} {said} {event.pose}"
+        if isinstance(event, FilesPlaced):
+            return f"{counted(len(event.files), 'file')} said to be of {event.pose}"
+        like = f", like those of {event.pose}" if event.at else ""
+        return f"{counted(len(event.files), 'file')} shown at {event.at or event.pose}{like}"
     told = msgspec.to_builtins(event)
     reason = f": {told['reason']}" if told.get("reason") else ""
     return f"{told['kind']} {told['pose']}{reason}"

@@ -53,7 +53,7 @@ class HitVerdict:
 
 @dataclass(frozen=True, eq=False)
 class PoseBefore:
-    """The pose measured last in a session and what was hit there; "" before the first."""
+    """The pose hit last before this one, and its hits; "" before the first."""
 
     pose: str = ""
     hits: tuple[Hit, ...] = ()

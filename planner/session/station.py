@@ -18,12 +18,13 @@ from planner.campaign.events import (
     FilesShown,
     Imported,
     Proposal,
+    Refused,
 )
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.campaign.state import taken_back
 from planner.dataset.measure import MeasuredPose
-from planner.dataset.screened_files import Source
+from planner.dataset.screened_files import Source, read_one
 from planner.report.rerun.story import Story
 from planner.session.course import Course
 from planner.session.diagnosis_process import DiagnosisProcess
@@ -107,17 +108,20 @@ class Station:
         return any(not stated_otherwise(Source.of(row), hit) for hit in hits)
 
     def pose_before(self, pose: str) -> PoseBefore:
-        """The pose measured last, other than this one, and what was hit there."""
+        """Where the robot was before this pose, and the usable hits there, refused or not."""
         entries, state = self.campaign.entries, self.campaign.state
         undone = taken_back(entries)
         for entry in reversed(entries):
             event = entry.event
-            if entry.seq in undone or not isinstance(event, Imported | Confirmed):
+            if entry.seq in undone or not isinstance(event, Imported | Confirmed | Refused):
                 continue
             known = state.hit_at(event.pose)
-            if known is not None and event.pose != pose:
-                sources = self.campaign.recordings.sources(known)
-                return PoseBefore(event.pose, tuple(h for s in sources for h in s.read()[0]))
+            records = [hit for at, hit in state.refused.values() if at == event.pose]
+            records += known.accepted if known is not None else ()
+            if records and event.pose != pose:
+                kept, band = self.campaign.recordings, self.campaign.cell.config.modes.band_hz
+                read = (read_one(kept.source(record), band)[1] for record in records)
+                return PoseBefore(event.pose, tuple(hit for hits in read for hit in hits))
         return PoseBefore()
 
     def key(self) -> str | None:

@@ -202,9 +202,10 @@ def _shown(
 
     Of files that a table lists it says the pose.
     """
-    pose, known = visit.proposal.pose, station.campaign.state.shown
+    pose, state = visit.proposal.pose, station.campaign.state
     digests = {path: station.inbox.digest(path) for path in whole}
-    shown = {path: known[digest] for path, digest in digests.items() if digest in known}
+    known = {path: digest for path, digest in digests.items() if digest in state.shown}
+    shown = {path: state.came(digest, pose) for path, digest in known.items()}
     rows = ((path, station.verdicts.table.row(path)) for path in whole)
     shown |= {path: row.pose for path, row in rows if row is not None}
     verdicts = station.verdicts.of(whole, visit.before, here, numbers, shown, pose)
@@ -212,8 +213,8 @@ def _shown(
     for verdict in verdicts:
         if verdict.path not in shown and digests[verdict.path]:
             new.setdefault(verdict.came or pose, {})[digests[verdict.path]] = None
-    for at, files in new.items():
-        station.campaign.show(at, tuple(files))
+    for of, files in new.items():
+        station.campaign.show(of, tuple(files), pose if of != pose else "")
     if new:
         station.rerun_queue.note()
     return verdicts

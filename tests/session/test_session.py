@@ -36,7 +36,7 @@ def test_a_session_shows_imports_and_goes_on(cell, deliver, session):
     analyser.start()
     played = session(
         campaign, inbox,
-        ("all hits are in", "?"), ("set all waiting hits aside", "s"), ("★", "a"),
+        ("all hits are in", "?"), ("set bad hits, or all, aside", "s"), ("★", "a"),
         ("Pose P001: 9 hits in", "k"), ("stands in the way?", "\n"), ("not be offered", "u"),
         ("Took back", "q"),
         limit_s=60, quiet_s=0.15,

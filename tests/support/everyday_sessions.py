@@ -171,7 +171,7 @@ class Engineer:
         state = self.campaign.state
         digests = {sha256(path) for path in self.inbox.iterdir()}
         used = {h.sha256 for m in state.recorded for h in m.hits} | state.refused.keys()
-        waiting = [(d, state.shown[d]) for d in digests - used if d in state.shown]
+        waiting = [(d, state.came(d, self.at_pose)) for d in digests - used if d in state.shown]
         late = [(d, pose) for d, pose in waiting if pose != self.at_pose]
         here = state.proposals[self.at_pose].joints_deg
         if late and all(self.from_there(d, here) for d, _ in late):
