@@ -146,9 +146,21 @@ def incomplete(page: PosePage) -> str:
 
 
 def result_line(report: ImportReport) -> str:
-    """What came out against what was expected, in one sentence."""
+    """What came out, and how far at most it is off what was expected; the panel has each mode."""
     said = f"{report.pose}: {_in(report)}"
-    return f"{said}; {against_expected(report.pose, report.model, report.model_before)}"
+    labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
+    if labelled is None:
+        return f"{said}; no modes"
+    found = [(k, m) for k, m in enumerate(labelled.modes) if m is not None]
+    said = f"{said}; {', '.join(f'{m.frequency_hz:.2f}' for _, m in found)} Hz"
+    if report.model_before is None or not found:
+        return said
+    expected = report.model_before.predict(labelled.q[None])
+    means, sds = expected.frequency_hz[0], expected.frequency_sd_hz[0]
+    off = max((_sds_off(m, means[k], sds[k]) for k, m in found), key=abs)
+    missing = len(labelled.modes) - len(found)
+    lacks = f", {counted(missing, 'mode')} not found" if missing else ""
+    return f"{said}, at most {abs(off):.1f} sd off what was expected{lacks}"
 
 
 def against_expected(pose: str, model: Model, before: Model | None) -> str:
@@ -162,15 +174,14 @@ def against_expected(pose: str, model: Model, before: Model | None) -> str:
         said = f"mode {k + 1} not found" if mode is None else f"{mode.frequency_hz:.2f} Hz"
         if expected is not None:
             there, sd = expected.frequency_hz[0, k], expected.frequency_sd_hz[0, k]
-            off = "" if mode is None else _off_by(mode, there, sd)
+            off = "" if mode is None else f", {_sds_off(mode, there, sd):+.1f} sd"
             said = f"{said} (expected {there:.2f}{off})"
         each.append(said)
     return ", ".join(each)
 
 
-def _off_by(mode: Mode, expected_hz: float, sd_hz: float) -> str:
-    off = (mode.frequency_hz - expected_hz) / np.hypot(sd_hz, mode.frequency_sd_hz)
-    return f", {off:+.1f} sd"
+def _sds_off(mode: Mode, expected_hz: float, sd_hz: float) -> float:
+    return float((mode.frequency_hz - expected_hz) / np.hypot(sd_hz, mode.frequency_sd_hz))
 
 
 def progress_line(
