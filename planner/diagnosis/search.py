@@ -170,11 +170,13 @@ class Explorer:
     def _few(self, base: StructureFit, start: Start) -> StructureFit | None:
         structure = base.structure.with_effect(start.effect)
         misfit = replace(base.misfit, structure=structure)
+        # Where the first order leads to no robot that can be, it begins without the effect.
+        none = structure.carried(base.structure, base.at.x)
+        begun = [x for x, _ in placed(base, start, all_move=True) if misfit.possible(x)]
         ends = []
-        for x, _ in placed(base, start, all_move=True):
-            if misfit.possible(x):
-                at = minimised(misfit, x, FEW, HOPELESS, base.at.own)
-                ends.append(StructureFit(misfit, at, misfit.evidence(at)))
+        for x in begun or [x for x in (none,) if misfit.possible(x)]:
+            at = minimised(misfit, x, FEW, HOPELESS, base.at.own)
+            ends.append(StructureFit(misfit, at, misfit.evidence(at)))
         return max(ends, key=evidence_of, default=None)
 
     def _from_afar(self, base: StructureFit, starts: Sequence[Start]) -> list[StructureFit]:
