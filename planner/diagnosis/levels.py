@@ -259,7 +259,7 @@ class _Search:
             k, a = motions.stiffness * np.exp(both[:, 0]), motions.size * np.exp(both[:, 1])
             found = motions.bent(shape, sign * k, a, motions.stiffness * both[:, 2:])
             pairs = zip(many, found, found[len(many) :], strict=False)
-            each = [_point(weighed, p, *f, motions.stiffness, left) for p, *f in pairs]
+            each = (_point(weighed, p, x, y, motions.stiffness, left) for p, x, y in pairs)
             return max(each, key=lambda one: one.value)
 
         best = best_of(points)

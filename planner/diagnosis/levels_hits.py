@@ -44,7 +44,7 @@ class Clock:
 
     @property
     def _count(self) -> int:
-        return next_fast_len(3 * self.lines, real=True)
+        return int(next_fast_len(3 * self.lines, real=True) or 0)
 
     @property
     def window(self) -> np.ndarray:

@@ -126,7 +126,7 @@ class JointMotions:
 
     def free(self, nodes: np.ndarray) -> list[np.ndarray]:
         """By stiffnesses, then losses, that are hat functions of ln swing with `nodes` (B,)."""
-        whole = hilbert(self.swing, axis=1)
+        whole = np.asarray(hilbert(self.swing, axis=1))
         at = np.clip(np.log(np.abs(whole) + 1e-300), nodes[0], nodes[-1])
         hats = np.maximum(0.0, 1 - np.abs(at[:, None] - nodes[:, None]) / (nodes[1] - nodes[0]))
         both = [hats * whole.real[:, None], -hats * whole.imag[:, None]]
