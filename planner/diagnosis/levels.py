@@ -72,8 +72,9 @@ class Levels:
     """How hits of different force differ (`seen`), by which laws, and what these leave (`left`).
 
     `free` are the nats of a stiffness that goes freely with its swing, by joint; `candidates`
-    (effect, joint, probability) are all that were weighed for the first law. `laws` have evidence,
-    matter and explain; `unexplained` says that they do not, and levels matter and are not chance.
+    (effect, joint, probability) are all that were weighed for the first law, "unknown" where it is
+    none that is named. `laws` have evidence, matter and explain; `unexplained` says that what they
+    and smaller ones leave matters and is not chance.
     """
 
     seen: Differences
