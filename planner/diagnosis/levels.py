@@ -43,12 +43,13 @@ EXPLAINS = 0.3
 # Prior means and sds: of ln of k in the joint's stiffness, of ln of a in its swing, and of what the
 # linear fit has of the law's average otherwise, in the joint's stiffness. Chosen wide.
 MEAN, SD = np.array([-1.5, -1.2, 0.0, 0.0]), np.array([1.5, 1.2, 0.1, 0.1])
+LONGEST = np.array([1.0, 1.0, 0.3, 0.3])  # of a step
 FREE = 0.5  # prior sd of a free stiffness, in the joint's
 NODES = np.log(np.geomspace(0.05, 2.0, 5))  # of its course over the swing
-BENDS = np.geomspace(0.03, 2.5, 8)  # a in the joint's swing, where fits begin; ln k, ln a besides
-STARTS = np.array([[k, a, 0.0, 0.0] for k, a in ((0, 0), (1, 0), (1, 1), (2, 1))])
+BENDS = np.geomspace(0.05, 2.5, 6)  # a in the joint's swing, where fits begin
+STRONGER = (0.0, 1.0)  # of ln k there, over what the first order tells
 # Of a fit: most steps, shares of them that are tried, gain of χ² that ends it; of differences.
-STEPS, TRIED, RESTED, SLOPE = 8, (1.0, 0.4, 0.1), 3e-4, 0.05
+STEPS, TRIED, RESTED, SLOPE = 20, (1.0, 0.4, 0.1), 1e-4, 0.05
 MOST = 2  # joints
 
 
@@ -71,8 +72,9 @@ class Levels:
     """How hits of different force differ (`seen`), by which laws, and what these leave (`left`).
 
     `free` are the nats of a stiffness that goes freely with its swing, by joint; `candidates`
-    (effect, joint, probability) are all that were weighed for the first law. `laws` have evidence,
-    matter and explain; `unexplained` says that they do not, and levels matter and are not chance.
+    (effect, joint, probability) are all that were weighed for the first law, "unknown" where it is
+    none that is named. `laws` have evidence, matter and explain; `unexplained` says that what they
+    and smaller ones leave matters and is not chance.
     """
 
     seen: Differences
@@ -120,15 +122,15 @@ def laws_of(groups: Sequence[HitGroup], ports: Sequence[JointPort], matters: flo
         if not found.laws:
             found = replace(found, free=gains, candidates=_candidates(fits, gains))
         least = max([LEAST, *(EXPLAINS * law.nats for law in found.laws)])
-        if best.law.effect == UNKNOWN or best.law.nats < least or best.law.share < matters:
+        if best.law.effect == UNKNOWN or best.law.nats < least:
             break
         left = [v - c for v, c in zip(left, best.changes, strict=True)]
         null, rho = search.likeliest(lambda w, left=left: evidence(w, left), best.rho)
         after = differences(search.at(rho), left)
         found = replace(found, laws=(*found.laws, best.law), left=after)
     if found.explained >= EXPLAINS:
-        return found
-    return replace(found, laws=(), left=seen, unexplained=seen.matter(matters, BY_CHANCE))
+        return replace(found, laws=tuple(law for law in found.laws if law.share >= matters))
+    return replace(found, laws=(), unexplained=found.left.matter(matters, BY_CHANCE))
 
 
 def gain(weighed: Weighed, columns: Values, left: Values) -> float:
@@ -237,16 +239,18 @@ class _Search:
     def _begun(
         self, rho: float, motions: JointMotions, shape: Step, left: Values
     ) -> tuple[float, np.ndarray]:
-        """Sign of k and points (V, 4): where a shape gains most to first order, and beyond."""
+        """Sign of k, and points (V, 4): the k that gains most to first order at each angle."""
         both = zip(motions.first_order(shape, motions.size * BENDS), left, strict=True)
         columns = [np.append(motions.stiffness * c, v[None], 0) for c, v in both]
         gram = gram_of(self.at(rho), columns)
         size = np.diag(gram)[:-1] + FREE**-2
         k = gram[:-1, -1] / size
         k = k if shape is stiffening else np.maximum(k, 1e-4)
-        best = int(np.argmax(k**2 * size))
-        first = np.array([np.log(abs(k[best])), np.log(BENDS[best]), 0.0, 0.0])
-        return float(np.sign(k[best])), first + STARTS
+        sign = np.sign(k[int(np.argmax(k**2 * size))])
+        k = np.log(np.where(k * sign > 0, np.abs(k), 1e-4))
+        points = [[one + more, bend, 0.0, 0.0] for one, bend in zip(k, np.log(BENDS), strict=True)
+                  for more in STRONGER]  # fmt: skip
+        return float(sign), np.array(points)
 
     def _descended(
         self, weighed: Weighed, motions: JointMotions, shape: Step, sign: float,
@@ -259,14 +263,13 @@ class _Search:
             k, a = motions.stiffness * np.exp(both[:, 0]), motions.size * np.exp(both[:, 1])
             found = motions.bent(shape, sign * k, a, motions.stiffness * both[:, 2:])
             pairs = zip(many, found, found[len(many) :], strict=False)
-            one = (weighed, motions.stiffness, left)
-            each = [_point(one[0], p, a, b, *one[1:]) for p, a, b in pairs]
+            each = (_point(weighed, p, x, y, motions.stiffness, left) for p, x, y in pairs)
             return max(each, key=lambda one: one.value)
 
         best = best_of(points)
         for _ in range(STEPS):
             step = np.linalg.solve(best.normal, best.down)
-            step /= max(1.0, float(np.max(np.abs(step) / SD)))
+            step /= max(1.0, float(np.max(np.abs(step) / LONGEST)))
             new = best_of(best.p + np.outer(TRIED, step))
             gained, best = new.value - best.value, max(new, best, key=lambda one: one.value)
             if gained < RESTED * abs(best.value):
