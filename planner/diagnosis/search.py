@@ -153,13 +153,7 @@ class Explorer:
 
     def _starts(self, base: StructureFit, dense: FrfData) -> list[Start]:
         misfit = replace(base.misfit, data=dense)
-        at = misfit(base.at.x, base.at.own)
-        at = misfit(base.at.x, at.own, keep=True)
-        motions = misfit.motions(at)
-
-        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-            return misfit.gain(at, columns, sd)
-
+        motions, gain = misfit.first_order(base.at.x, base.at.own)
         free, every = effects_free(base.structure), base.structure.prior.repertoire.effects
         again = (e for e in every if isinstance(e, LinkResonator) and e not in free)
         far = size_of(base) >= CLOSE

@@ -7,13 +7,13 @@ pose (Woodbury), linearised about where they were last; the chain is common to a
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from planner.dynamics.gradient import Impedance, Inertias, motion_slopes, moved
 from planner.dynamics.motion import Motion, Turned
-from planner.effects.effect import Motions
+from planner.effects.effect import Gain, Motions
 from planner.fit.data import FrfData, among
 from planner.fit.inertias import spatial
 from planner.fit.structure import REACH, RobotStructure
@@ -397,6 +397,14 @@ class FrfMisfit:
         z = -np.linalg.solve(inner, pull * sd)
         nats = 0.5 * float(z @ inner @ z) - 0.5 * float(np.linalg.slogdet(inner)[1])
         return nats, z * sd, -at.covariance @ (slope + cross @ (z * sd))
+
+    def first_order(self, x: np.ndarray, own: np.ndarray) -> tuple[Motions, Gain]:
+        """How hits and sensors move the springs at x, and what columns gain beside all else.
+
+        Own numbers (n, l) are told once more before.
+        """
+        at = self(x, self(x, own).own, keep=True)
+        return self.motions(at), partial(self.gain, at)
 
     def motions(self, at: At) -> Motions:
         """How hits and sensors move the springs, as effects' first-order columns need it."""

@@ -27,7 +27,7 @@ from planner.fit.fitted import (
     without,
 )
 from planner.fit.gauss_newton import minimised
-from planner.fit.misfit import At, FrfMisfit
+from planner.fit.misfit import FrfMisfit
 from planner.fit.structure import REACH, RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
@@ -171,13 +171,7 @@ class Search:
     def _starts(self, best: StructureFit, dense: FrfData) -> list[Start]:
         """All effects that it has not; of operators those that the first order ranks first."""
         misfit = replace(best.misfit, data=dense)
-        at = misfit(best.at.x, best.at.own)
-        at = misfit(best.at.x, at.own, keep=True)
-        motions = misfit.motions(at)
-
-        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-            return misfit.gain(at, columns, sd)
-
+        motions, gain = misfit.first_order(best.at.x, best.at.own)
         free = effects_free(best.structure)
         again = [  # something else may hang on the same link
             e for e in self.prior.repertoire.effects
@@ -246,21 +240,14 @@ class Search:
             base = without(best, [effect], 4)
             if base is None:
                 continue
-            at = base.misfit(base.at.x, base.at.own, keep=True)
-            motions = base.misfit.motions(at)
-
-            def gain(
-                columns: np.ndarray, sd: np.ndarray, base: StructureFit = base, at: At = at
-            ) -> tuple[float, np.ndarray, np.ndarray]:
-                return base.misfit.gain(at, columns, sd)
-
+            motions, gain = base.misfit.first_order(base.at.x, base.at.own)
             psi = best.at.x[best.structure.own[best.structure.effects.index(effect)]]
             others = [
                 e for e in effects_free(base.structure)
                 if type(e) is type(effect) and e.at != effect.at.split("#")[0]
             ]  # fmt: skip
             starts = [_elsewhere(e, psi, motions, gain) for e in others]
-            ends = self._compete(replace(base, at=at), starts, best.evidence)
+            ends = self._compete(base, starts, best.evidence)
             if ends and ends[0].evidence > best.evidence + SAME:
                 self.tell(f"{effect.label} → {ends[0].structure.effects[-1].label}")
                 return converged(ends[0])
