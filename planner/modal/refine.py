@@ -222,7 +222,8 @@ def _finish(
     entries, p = point.coefficients.shape
     covariance = np.linalg.pinv(point.normal, hermitian=True)
     spread = np.einsum("eka,ab,ekb->ek", point.sensitivity, covariance, point.sensitivity)
-    variance = np.einsum("ekk->ek", point.inverse) + spread
+    # Of rounding, where lines without noise leave curvatures almost singular, variances below 0
+    variance = np.maximum(np.einsum("ekk->ek", point.inverse) + spread, 0.0)
     residues = unpack(point.coefficients.reshape(*shape, p), m)
     return Refined(
         poles,
