@@ -263,9 +263,11 @@ class _ShapeProblem:
         kept, values = np.ones(self.size, bool), point.values.copy()
         root = point.root(kept)
         covariance = root @ root.T
+        # What earlier groups leave no freedom has a variance of rounding alone.
+        least = np.maximum(1e-13 * np.diag(covariance), 1e-300)
         for group in self._nothings():
             own = covariance[np.ix_(group, group)]
-            unit = np.sqrt(np.maximum(np.diag(own), 1e-300))
+            unit = np.sqrt(np.maximum(np.diag(own), least[group]))
             inverse = np.linalg.pinv(own / unit[:, None] / unit, rcond=1e-10, hermitian=True)
             inverse = inverse / unit[:, None] / unit
             # Chance of what is nothing not to be called something
