@@ -49,6 +49,10 @@ class Robot:
     joints: JointUnits
     left_out: tuple[UnusableShape, ...] = ()  # shapes of the URDF that cannot be used
 
+    def __repr__(self) -> str:
+        joints, springs = len(self.joints.names), len(self.config.compliance)
+        return f"Robot({self.config.name!r}: {joints} joints, {springs} springs, {str(self.path)!r})"
+
     @classmethod
     def load(cls, robot_toml: Path | str) -> "Robot":
         """Read robot.toml and its URDF. Raises InputError naming file, entry and remedy."""
