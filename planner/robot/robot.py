@@ -51,7 +51,9 @@ class Robot:
 
     def __repr__(self) -> str:
         joints, springs = len(self.joints.names), len(self.config.compliance)
-        return f"Robot({self.config.name!r}: {joints} joints, {springs} springs, {str(self.path)!r})"
+        return (
+            f"Robot({self.config.name!r}: {joints} joints, {springs} springs, {str(self.path)!r})"
+        )
 
     @classmethod
     def load(cls, robot_toml: Path | str) -> "Robot":
