@@ -10,17 +10,23 @@ if TYPE_CHECKING:
     from planner.campaign.campaign import Campaign
     from planner.dataset.dataset import Dataset
     from planner.dynamics.simulation import Simulation
+    from planner.frf.frf import Frf
+    from planner.modal.modes import Mode
+    from planner.recording.records import Hit
     from planner.robot.robot import Robot
 
 __all__ = [
-    "AskTell", "Campaign", "Dataset", "Robot", "Simulation", "__version__", "analyse", "diagnose",
-    "identify",
+    "AskTell", "Campaign", "Dataset", "Frf", "Hit", "Mode", "Robot", "Simulation", "__version__",
+    "analyse", "diagnose", "identify",
 ]  # fmt: skip
 
 _MODULES = {
     "AskTell": "planner.ask_tell",
     "Campaign": "planner.campaign.campaign",
     "Dataset": "planner.dataset.dataset",
+    "Frf": "planner.frf.frf",
+    "Hit": "planner.recording.records",
+    "Mode": "planner.modal.modes",
     "Robot": "planner.robot.robot",
     "Simulation": "planner.dynamics.simulation",
     "analyse": "planner.api",

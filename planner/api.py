@@ -1,7 +1,7 @@
 """What scripts call: modal analysis, identification and diagnosis as functions of typed values."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +12,11 @@ from planner.campaign.material import Material
 from planner.dataset.dataset import Dataset
 from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import in_parts
+from planner.design.discrimination import tied
 from planner.design.extra_sensor import extra_sensor
 from planner.design.next_hit import next_hit
 from planner.diagnosis.diagnose import explain
+from planner.diagnosis.odd_pose import odd_pose
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS, Priors
 from planner.errors import InputError, RefusedError
@@ -98,7 +100,7 @@ def identify(
     inertias: bool = True,
     extend: bool = True,
     held_out: int | None = None,
-    progress: Callable[[str], None] = lambda text: None,
+    progress: Tell = quietly,
 ) -> IdentificationReport:
     """Fit the elastic parameters of a robot's simulation to recorded FRFs of several poses.
 
@@ -113,7 +115,7 @@ def identify(
         extend: Whether what robot.toml leaves out (a floor or bearings that give way, links that
             bend, masses, resonators) is looked for where its springs do not explain the FRFs.
         held_out: How many poses to judge by; by default one of four.
-        progress: Is told what is being done.
+        progress: Is told what is being done; the share that is done is not known, 0.
 
     Returns:
         Stiffness in N·m/rad and damping in N·m·s/rad with standard deviations, the agreement
@@ -136,7 +138,7 @@ def identify(
             dataset.frfs,
             band_hz=band,
             extend=extend,
-            tell=progress,
+            tell=lambda text: progress(text, 0.0),
         )
         basis = IdentificationBasis(dataset, judged, nominal)
         made = identification_report(basis, band, inertias)
@@ -169,9 +171,10 @@ def diagnose(
     """
     started = time.perf_counter()
     with threadpool_limits(1):
-        explained = explain(dataset, Simulation(robot), progress)
-        hit, sensor = next_hit(explained, offered or {}), extra_sensor(explained, offered or {})
-        made = diagnosis_report(explained)
+        found = explain(dataset, Simulation(robot), progress)
+        left, poses = tied(found), offered or {}
+        hit, sensor = next_hit(found, left, poses), extra_sensor(found, left, poses)
+        made = diagnosis_report(found, odd_pose(found))
     return replace(made, next=hit, next_sensor=sensor, seconds=time.perf_counter() - started)
 
 
@@ -183,7 +186,7 @@ def diagnose_material(
     `robot` is the one of `given`, where it was loaded already.
     """
     robot = robot or given.nominal
-    dataset = given.read(robot, robot.config.band_hz, lambda text: progress(text, 0.0))
+    dataset = given.read(robot, robot.config.band_hz, lambda text, share: progress(text, 0.0))
     offered = dict(zip(given.names, given.offered, strict=True))
     return diagnose(dataset, robot, offered=offered, progress=progress)
 

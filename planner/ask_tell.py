@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
+from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.build import build
-from planner.campaign.cell import Cell
-from planner.campaign.check import refuse_errors
+from planner.campaign.cell import Cell, refuse_errors
 from planner.campaign.config import CampaignConfig, check_config, load_campaign_config
 from planner.campaign.events import MeasuredMode, Proposal
-from planner.campaign.fit_memory import FitMemory
 from planner.campaign.log_conversion import from_modal, from_mode
+from planner.campaign.low_fidelity import in_memory
 from planner.campaign.model import Model
 from planner.campaign.planned import inside
 from planner.campaign.proposals import propose
@@ -66,7 +66,7 @@ class AskTell:
             config = load_campaign_config(Path(tables))
         self._cell = Cell.load(loaded.path, config, loaded)
         refuse_errors(self._cell.examined)
-        self._memory = FitMemory()
+        self._recall = in_memory()
         self._state = CampaignState()
         self._frfs: dict[str, Frf] = {}
         self._model: Model | None = None
@@ -145,7 +145,7 @@ class AskTell:
         if self._model is None:
             with threadpool_limits(1):
                 self._model = build(
-                    self._cell, self._state, lambda m, _: self._frfs[m.pose], memory=self._memory
+                    self._cell, self._state, lambda m, _: self._frfs[m.pose], recall=self._recall
                 )
         return self._model
 
@@ -154,13 +154,11 @@ class AskTell:
         """Whether the target of [stop] is reached."""
         return bool(self.model.done)
 
-    def predict(self, joints_deg: Sequence[float] | np.ndarray) -> "ModalPrediction":
+    def predict(self, joints_deg: ArrayLike) -> "ModalPrediction":
         """Frequencies (Hz), damping ratios (n, count), sds at poses (n, dof) in degrees."""
-        return self.model.predict(self._poses(joints_deg))
+        return self.model.predict(self._cell.poses(joints_deg))
 
-    def frf(
-        self, joints_deg: Sequence[float] | np.ndarray, frequency_hz: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def frf(self, joints_deg: ArrayLike, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Accelerance in m/s²/N at poses (n, dof) in degrees and lines (F,) in Hz.
 
         Returns:
@@ -171,23 +169,17 @@ class AskTell:
         """
         if any(not frf.measured.any() for frf in self._frfs.values()):
             raise InputError("FRFs are predicted from FRFs; of some poses only modes were told.")
-        return self.model.frf(self._poses(joints_deg), np.asarray(frequency_hz, dtype=float))
+        return self.model.frf(self._cell.poses(joints_deg), np.asarray(frequency_hz, dtype=float))
 
     def records(self) -> list[dict[str, Any]]:
         """All modes that were told, one row each: what pandas.DataFrame takes."""
         return measured_records(self._cell.robot.joints, self._state.measurements.values())
 
-    def predict_records(self, joints_deg: Sequence[float] | np.ndarray) -> list[dict[str, Any]]:
+    def predict_records(self, joints_deg: ArrayLike) -> list[dict[str, Any]]:
         """`predict` as rows, one for each mode of each pose."""
-        q = self._poses(joints_deg)
+        q = self._cell.poses(joints_deg)
         there = inside(self._cell, q)
         return predicted_records(self._cell.robot.joints, q, self.model.predict(q), there)
-
-    def _poses(self, joints_deg: Sequence[float] | np.ndarray) -> np.ndarray:
-        angles = np.atleast_2d(np.asarray(joints_deg, dtype=float))
-        for number, row in enumerate(angles, 1):
-            self._cell.check_pose(tuple(row), f"joints_deg, pose {number}")
-        return self._cell.robot.joints.internal(angles)
 
 
 def _mode(given: Mode | Mapping[str, float] | Sequence[float]) -> MeasuredMode:

@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from planner.campaign.state import Measurement
 from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
 from planner.errors import InputError, NoPoseLeftError
+from planner.progress import Tell
 from planner.recording.folder import read_recordings
 from planner.recording.joints import JointUnits
 from planner.recording.records import PoseRow
@@ -68,7 +69,7 @@ class Pool:
 
 
 def play(
-    directory: Path | None, measurements: int, viewer: bool, progress: Callable[[str], None]
+    directory: Path | None, measurements: int, viewer: bool, progress: Tell
 ) -> DemonstrationReport:
     """Play a campaign until its target, `measurements`, or the pool's end; returns the summary."""
     source = shipped(NAME)
@@ -85,7 +86,7 @@ def play(
         story.tell(campaign.entries[-1], campaign.model)
         while len(used) < min(measurements, len(pool.rows)) and not campaign.model.done:
             pose = pool.nearest(campaign.cell, proposal, used)
-            progress(f"measurement {len(used) + 1}: pose {pose}")
+            progress(f"measurement {len(used) + 1}: pose {pose}", len(used) / measurements)
             if used:
                 started = time.perf_counter()
             report = campaign.import_paths((pool.folder,), pose)[0]
@@ -116,7 +117,7 @@ def _summary(
     used: list[str],
     steps: list[DemonstrationStep],
     rrd: Path,
-    progress: Callable[[str], None],
+    progress: Tell,
 ) -> DemonstrationReport:
     cell = campaign.cell
     unused = [pose for pose in pool.rows if pose not in used]
@@ -150,13 +151,11 @@ def _summary(
     )
 
 
-def _measured_hz(
-    cell: Cell, pool: Pool, poses: list[str], progress: Callable[[str], None]
-) -> np.ndarray:
+def _measured_hz(cell: Cell, pool: Pool, poses: list[str], progress: Tell) -> np.ndarray:
     """Frequencies (n, count) in Hz that the recordings of poses give; NaN where none was found."""
     found = []
     for i, pose in enumerate(poses):
-        progress(f"checking on unused pose {i + 1} of {len(poses)}")
+        progress(f"checking on unused pose {i + 1}", i / len(poses))
         rows = pool.rows[pose]
         sources = tuple(Source.of(r) for r in rows if r.file)
         table = cell.config.modes

@@ -22,8 +22,8 @@ from planner.campaign.events import (
     Proposal,
     Proposed,
 )
-from planner.campaign.fit_memory import FitMemory
 from planner.campaign.log_conversion import from_modal
+from planner.campaign.low_fidelity import Recall, in_memory
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement, fold, without
@@ -85,7 +85,7 @@ def replay(
         # A model follows from configuration and measurements: skips and undone acts leave it alone.
         models: dict[tuple[int, tuple[Measurement, ...]], Model] = {}
         model, kept = None, campaign.recordings
-        memories: dict[int, FitMemory] = {}
+        recalls: dict[int, Recall] = {}
         for entry in entries[:until]:
             before, after = fold(entries[: entry.seq - 1]), fold(entries[: entry.seq])
             check, detail, measured = _check(campaign, entry, before, model)
@@ -93,9 +93,9 @@ def replay(
             assert after.configured is not None
             cell = cells.of(after.configured)
             key = id(cell), after.used
-            memories.setdefault(id(cell), FitMemory())
+            recall = recalls.setdefault(id(cell), in_memory())
             if key not in models:
-                models[key] = build(cell, after, kept.frf, kept.hits, memories[id(cell)])
+                models[key] = build(cell, after, kept.frf, kept.hits, recall)
             model = models[key]
             yield Step(entry, check, detail, after, model, measured, instead)
 

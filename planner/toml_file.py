@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from planner import file_content
 from planner.errors import InputError
 
 T = TypeVar("T")
@@ -19,7 +20,7 @@ LONGEST = 40  # of a wrong value that is repeated
 def read_toml_text(path: Path, name: str) -> str:
     """Text of a TOML file, without a byte order mark; InputError naming file and remedy."""
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return file_content.read(path).decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(f"{path} does not exist; name a {name}.") from None
     except IsADirectoryError:

@@ -11,9 +11,9 @@ SHIPPED, HERE = Path(__file__).parent, Path.cwd()
 campaign = Campaign.new(HERE / "cell", SHIPPED / "robot/robot.toml", SHIPPED / "campaign.toml")
 for pose in ("A11", "A24", "A57"):
     campaign.import_paths((SHIPPED / "recordings",), pose)
-proposal = campaign.next()[0]
-expected, (h, sd) = campaign.predict(q := np.deg2rad(proposal.joints_deg)), campaign.frf(q)
-print(proposal.pose, proposal.joints_deg, expected.frequency_hz, expected.frequency_sd_hz)
+at = (proposal := campaign.next()[0]).joints_deg
+expected, (h, sd) = campaign.predict(joints_deg=at), campaign.frf(joints_deg=at)
+print(proposal.pose, at, expected.frequency_hz, expected.frequency_sd_hz)
 lines, size, band = campaign.frequency_lines, np.abs(h[0, 0, 0]), 2 * sd[0, 0, 0]
 plt.fill_between(lines, np.maximum(size - band, 0), size + band, alpha=0.3)
 plt.plot(lines, size)

@@ -73,7 +73,7 @@ def keep_files(
     seen: set[str] = set()
     for source in delivery.sources:
         try:
-            digest = store.sha256(store.read_recording(source.path))
+            digest = store.recording_hash(source.path)
         except InputError as error:  # one bad file does not keep the others out
             left_out.append(_left(source, "", str(error)))
             continue
@@ -195,7 +195,7 @@ def _owners(state: CampaignState) -> dict[str, str]:
 def _digest(source: Source) -> str:
     """Content hash; "" where the file cannot be read."""
     try:
-        return store.sha256(store.read_recording(source.path))
+        return store.recording_hash(source.path)
     except InputError:
         return ""
 
@@ -220,7 +220,7 @@ def _reason_against(
             return ""
         return f"hits of {pose} wait for an answer: {held.question.text if held.question else ''}"
     certain = delivery.by_table or (delivery.said and named)
-    shown = state.shown.get(digest, pose)
+    shown = state.came(digest, pose)
     if shown != pose and not certain:
         return (
             f"it came at {shown}, and nobody said that it is of {pose}; to import it there, name "

@@ -29,4 +29,4 @@ def asked_of(model: Model, state: CampaignState, new: NewHits) -> Question | Non
         return None
     if not model.labelled:
         return chain_question(model, new.pose, new.joints_deg, new.measured.frf)
-    return question(model, state, new.pose, new.joints_deg, new.measured.one_hit_frf)
+    return question(model, state, new.pose, new.joints_deg, new.measured)

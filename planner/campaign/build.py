@@ -7,11 +7,10 @@ import numpy as np
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
-from planner.campaign.fit_memory import FitMemory
 from planner.campaign.frequencies_by_simulation import TunedFrequencies, tuned_frequencies
+from planner.campaign.hit_error_estimates import estimate, visits_of
 from planner.campaign.labels import LabelledPose, label, observations
-from planner.campaign.low_fidelity import LowFidelity, learn
-from planner.campaign.misses import tell, visits_of
+from planner.campaign.low_fidelity import LowFidelity, Recall, in_memory, learn
 from planner.campaign.model import FrfOf, Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.hit_columns import PoseHits
@@ -31,23 +30,23 @@ def build(
     state: CampaignState,
     frf_of: FrfOf,
     hits_of: Callable[[Measurement, ModesTable], PoseHits] | None = None,
-    memory: FitMemory | None = None,
+    recall: Recall | None = None,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
     `frf_of` gives the tool's FRFs of a measurement, `hits_of` what its hits say at all points,
     which is asked only where the simulation learns. Without it nothing is told of single hits.
-    `memory` keeps what was found of the first measurements, so that nothing is found twice.
+    `recall` says what was found of the first measurements, so that nothing is found twice.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
-    noise, told, tuned, learns = None, None, None, cell.config.fidelity.simulation == "updated"
+    noise, errors, tuned, learns = None, None, None, cell.config.fidelity.simulation == "updated"
     if learns and used:
         frfs = tuple(frf_of(m, table) for m in used)
         hits = tuple(hits_of(m, table) for m in used) if hits_of else None
         whole = tuple(h.whole for h in hits) if hits is not None else frfs
         joints = cell.robot.joints
         q = joints.internal([m.joints_deg for m in used])
-        low = learn(low, whole, q, table.band_hz, memory, used)
+        low = learn(low, whole, q, table.band_hz, used, recall or in_memory())
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(whole, table.band_hz, misfit)
         if low.learned is not None:
@@ -56,7 +55,7 @@ def build(
             tuned = tuned_frequencies(simulation, seen, q, table.band_hz, cell.tolerances, count)
         if hits is not None and low.learned is not None:
             visits = visits_of(joints, used, hits, frfs)
-            told = tell(visits, low.learned, cell.tolerances, table.band_hz)
+            errors = estimate(visits, low.learned, cell.tolerances, table.band_hz)
     fits = low.learned is None or low.learned.fits
     candidates = [_Guided.by(cell, used, low, tuned if fits else None)]
     if not fits:
@@ -77,7 +76,7 @@ def build(
     )
     if hits_of is not None:
         frf_of = _OfOneHit(frf_of, hits_of)
-    model = Model(cell, best.labelled, best.low, best.seen, surrogate, noise, told, used, frf_of)
+    model = Model(cell, best.labelled, best.low, best.seen, surrogate, noise, errors, used, frf_of)
     if learns:
         _ = model.frfs  # which are at hand, and kept with the model
     return model

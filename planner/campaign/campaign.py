@@ -1,7 +1,8 @@
 """The campaign: the only thing with state, and its state is a fold over its log."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +10,6 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from planner.campaign import store
-from planner.campaign.acting import Acting
 from planner.campaign.config import load_campaign_config
 from planner.campaign.events import (
     REFUSED,
@@ -28,9 +28,11 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
+from planner.campaign.journal import remove_parts
 from planner.campaign.reads import CampaignReads, as_logged
 from planner.campaign.taking_back import last_acts, last_undone
 from planner.errors import InputError
+from planner.progress import Tell, quietly
 from planner.version import __version__
 
 if TYPE_CHECKING:
@@ -77,7 +79,7 @@ class Campaign(CampaignReads):
         self,
         paths: Sequence[Path | str],
         pose: str | None = None,
-        progress: Callable[[str], None] | None = None,
+        progress: Tell = quietly,
         from_names: bool = False,
     ) -> "tuple[ImportReport, ...]":
         """Import hits, one report per pose, in recording order.
@@ -106,9 +108,8 @@ class Campaign(CampaignReads):
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
             named = frozenset(path for path in given if path.is_file())
             reports = []
-            for delivery, joints_deg in placed:
-                if progress:
-                    progress(delivery.pose)
+            for number, (delivery, joints_deg) in enumerate(placed):
+                progress(delivery.pose, number / len(placed))
                 reports.append(self._import_pose(delivery, joints_deg, named))
             return tuple(reports)
 
@@ -221,14 +222,14 @@ class Campaign(CampaignReads):
             acts = (e.event.act for e in undone if isinstance(e.event, Undone))
             return tuple(self.entries[act - 1] for act in acts)
 
-    def show(self, pose: str, files: Sequence[str]) -> None:
+    def show(self, pose: str, files: Sequence[str], at: str = "") -> None:
         """Files (sha256) are of a pose, as they were shown there: they never move on by themselves.
 
-        What was said of a file before holds.
+        With `at` that is a guess, and they came there. What was said of a file before holds.
         """
         with self._acting():
             if new := tuple(file for file in files if file not in self.state.shown):
-                self._append(FilesShown(pose, new))
+                self._append(FilesShown(pose, new, at))
 
     def place(self, pose: str, files: Sequence[str]) -> None:
         """The engineer says that files (sha256) shown elsewhere were hit at this pose."""
@@ -241,15 +242,20 @@ class Campaign(CampaignReads):
 
     # -- inside --------------------------------------------------------------------------------
 
-    def _acting(self):
-        return Acting(self)
+    @contextmanager
+    def _acting(self) -> Iterator[None]:
+        """The campaign's lock, its log read afresh and its configuration followed."""
+        with self._journal.writing():
+            remove_parts(self.directory / store.RECORDINGS)
+            self._log_configuration()
+            yield
 
     def _append(self, event: AnyEvent) -> Entry:
         return self._journal.append(event)
 
     def _log_configuration(self) -> None:
         """Follow changes made by hand to campaign.toml or the robot folder."""
-        from planner.campaign.check import refuse_errors
+        from planner.campaign.cell import refuse_errors
 
         configured, logged = self._configured(), self.state.configured
         assert logged is not None
@@ -288,7 +294,6 @@ class Campaign(CampaignReads):
     def _import_pose(
         self, delivery: "Delivery", joints_deg: tuple[float, ...], named: frozenset[Path]
     ) -> "ImportReport":
-        from planner.campaign.alerts import alerts
         from planner.campaign.arrivals import keep_files
         from planner.campaign.asking import NewHits, asked_of
         from planner.campaign.contradictions import contradiction
@@ -302,7 +307,7 @@ class Campaign(CampaignReads):
             taken_after_all,
         )
         from planner.campaign.log_conversion import from_homogeneity, from_modal
-        from planner.campaign.revisits import suspected
+        from planner.campaign.revisits import alerts, suspected
         from planner.dataset.screened_files import hits_of_files
 
         started, delivery = time.perf_counter(), self._let_go(delivery)
@@ -365,7 +370,7 @@ class Campaign(CampaignReads):
                 *taken_after_all(state, fresh),
                 *displacement(self.cell.robot.joints, state, delivery, stood),
                 *lacking(state, measurement),
-                *model.remarks,
+                *(() if event.question else model.remarks),
             ),
             left_out=left_out,
             question=event.question,
@@ -377,8 +382,7 @@ def _first_entry(directory: Path) -> bytes:
     """The log of a new campaign, once robot and workspace have been held against each other."""
     from datetime import UTC, datetime
 
-    from planner.campaign.cell import Cell
-    from planner.campaign.check import refuse_errors
+    from planner.campaign.cell import Cell, refuse_errors
     from planner.campaign.journal import encode_line
 
     config = load_campaign_config(directory / store.CONFIG)

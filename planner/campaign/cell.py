@@ -8,11 +8,11 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+from numpy.typing import ArrayLike
 
-from planner.campaign.check import plan_of
-from planner.campaign.config import CampaignConfig
+from planner.campaign.config import CampaignConfig, load_campaign_config
 from planner.campaign.low_fidelity import LowFidelity
-from planner.check.examine import Examination, examine
+from planner.check.examine import Examination, Plan, examine
 from planner.design.propose import check_name
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
@@ -23,8 +23,6 @@ from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import singularity
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
-
-CANDIDATE_SEED = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +91,7 @@ class Cell:
 
     @cached_property
     def _spread(self) -> Candidates:
-        return self.workspace.candidates(
-            self.robot, self.config.acquisition.candidates, CANDIDATE_SEED
-        )
+        return self.workspace.candidates(self.robot, self.config.acquisition.candidates, seed=0)
 
     @property
     def spread(self) -> int:
@@ -144,6 +140,13 @@ class Cell:
     def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
         """The pose in rad (m); InputError if the robot cannot stand there."""
         return _checked_pose(self.robot, joints_deg, where)
+
+    def poses(self, joints_deg: ArrayLike) -> np.ndarray:
+        """Poses (n, dof) in degrees (mm), or one of them, as q in rad (m); checked each."""
+        angles = np.atleast_2d(np.asarray(joints_deg, dtype=float))
+        for number, row in enumerate(angles, 1):
+            self.check_pose(tuple(row), f"joints_deg, pose {number}")
+        return self.robot.joints.internal(angles)
 
 
 @contextmanager
@@ -214,3 +217,26 @@ def _handled(robot: Robot, config: CampaignConfig) -> Robot:
     """The robot with what campaign.toml says of hits, sensor, readback and diagnosis."""
     given = config.of_the_cell()
     return replace(robot, config=msgspec.structs.replace(robot.config, **given)) if given else robot
+
+
+def examine_robot(robot_toml: Path, campaign_toml: Path | None = None) -> Examination:
+    """Check a robot, and a campaign.toml if one is named.
+
+    Raises InputError where a file cannot be read at all.
+    """
+    robot = Robot.load(robot_toml)
+    if campaign_toml is None:
+        return examine(robot)
+    return examine(robot, plan_of(load_campaign_config(campaign_toml), campaign_toml.name))
+
+
+def plan_of(config: CampaignConfig, file: str) -> Plan:
+    """What campaign.toml asks of a robot."""
+    table, simulated = config.modes, config.fidelity.simulation != "none"
+    return Plan(file, config.workspace, table.band_hz, table.count, simulated)
+
+
+def refuse_errors(found: Examination) -> None:
+    """InputError with the first error of a check, if there is one."""
+    if found.errors:
+        raise InputError(found.errors[0].sentence)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from planner.recording.points import AXES
 
@@ -63,7 +62,7 @@ class ChainFault:
             )
         if np.linalg.det(self.matrix) < 0:
             return f"the sensor's axes look exchanged: {reads}?"
-        turn = Rotation.from_matrix(self.matrix).magnitude()
+        turn = np.arccos((np.trace(self.matrix) - 1) / 2)
         return f"the sensor looks turned by {np.rad2deg(turn):.0f}°: {reads}?"
 
 

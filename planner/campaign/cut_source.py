@@ -125,7 +125,10 @@ def structure_of(asked: Asked, cut: Cut) -> Structure:
     """From modes, FRFs, or a campaign at a pose."""
     source, change = asked.source, ToolChange.of(asked, cut)
     if is_campaign(source):
-        campaign, q = _stands(source, asked.pose)
+        from planner.campaign.campaign import Campaign
+
+        campaign = Campaign(source)
+        q = campaign.stands(asked.pose)
         (found,) = at_poses(campaign, (str(asked.pose),), q[None], cut, change)
         return _with(found, outside(campaign, (str(asked.pose),), q[None]))
     no_pose(cut, source)
@@ -160,21 +163,6 @@ def _coupled(asked: Asked, change: ToolChange, pose: str | None, cut: Cut) -> St
     return _with(of_frf(frf, cut), remarks)
 
 
-def _stands(directory: Path, pose: str | None) -> "tuple[Campaign, np.ndarray]":
-    from planner.campaign.campaign import Campaign
-
-    campaign = Campaign(directory)
-    state = campaign.state
-    known = {m.pose: m.joints_deg for m in state.measurements.values()}
-    known |= {name: p.joints_deg for name, p in state.proposals.items() if name not in known}
-    if pose is None or pose not in known:
-        given = f"has no pose {pose}; choose" if pose else "is a campaign: say at which pose,"
-        raise InputError(
-            f"{directory} {given} one of {', '.join(known) or 'none yet'} with --pose."
-        )
-    return campaign, campaign.cell.robot.joints.internal(known[pose])
-
-
 def at_poses(
     campaign: "Campaign", names: Sequence[str], q: np.ndarray, cut: Cut,
     change: ToolChange | None, feeds: np.ndarray | None = None,
@@ -202,8 +190,8 @@ def at_poses_in_band(
         cuts = [turned_to(cut, *row) for row in zip(rotation, feeds, names, strict=True)]
     else:
         cuts = cuts_at(cut, rotation, position, names)
-    simulated = any(m.simulated for m in campaign.state.recorded)
-    mean, sd = campaign.frf(q, lines)
+    simulated = campaign.state.simulated
+    mean, sd = campaign.frf_at(q, lines)
     found: list[Structure | OutOfBandError] = []
     for i, name in enumerate(names):
         where = f"{campaign.directory}, pose {name}"

@@ -11,7 +11,7 @@ from planner.campaign.acquisition_inputs import open_parameters, poses_at
 from planner.design.frequency_posterior import FrequencyOutputs, Margins
 from planner.design.stability import share_left, stability, with_margins
 from planner.errors import InputError
-from planner.frf.frequency_lines import frequency_lines
+from planner.frf.synthesis import frequency_lines
 from planner.milling.cut import Cut, cuts_at
 from planner.milling.cutter_frf import of_accelerance
 from planner.milling.path import PoseDecision, decide

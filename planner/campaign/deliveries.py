@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from planner.dataset.recordings import table_folders
 from planner.dataset.screened_files import Source
+from planner.dataset.visits import table_folders
 from planner.errors import InputError
 from planner.recording.folder import CHANNELS, TABLE, files_in, read_recordings
 from planner.recording.joints import JointUnits

@@ -182,12 +182,14 @@ class Skipped(Event, frozen=True, tag="skipped"):
 class FilesShown(Event, frozen=True, tag="shown"):
     """Files, by content (sha256), that are of a pose: they were shown while the robot was there.
 
-    Or they came right after, and answer as that pose did. It is logged before anything can become
-    of them, so that they never move on by themselves; the first entry that names a file holds.
+    Or they came `at` the next one and answer as that pose did: a guess, until the engineer says. It
+    is logged before anything can become of them, so that they never move on by themselves; the
+    first entry that names a file holds.
     """
 
     pose: str
     files: tuple[str, ...]
+    at: str = ""
 
 
 class FilesPlaced(Event, frozen=True, tag="placed"):

@@ -4,19 +4,27 @@ The simulation brings all of its modes, over the whole band. FRFs made of fused 
 as those of measured poses, each predicted from the others, say.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from planner.fit.posterior import RobotPosterior
-from planner.measurement.measured_frfs import Measured
+from planner.measurement.measured_frfs import Measured, common_band, stack
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
+from planner.surrogate.leave_one_out import left_out_modes
+
+if TYPE_CHECKING:
+    from planner.campaign.model import Model
 
 Moments = tuple[np.ndarray, np.ndarray]  # mean and sd (n, 3, 3, F) of FRFs in m/s²/N
 ZONES = (
     5  # of the band, evenly on a logarithmic scale: what is left out differs from one to another
 )
+LINES, LEAST, MOST = 300, 20, 80  # of all poses together, and of one at least and at most
+MODEL_ERROR = 0.01  # relative sd of what no modes follow
 WIDTH = 0.05  # of the frequency: over which an FRF's size is averaged
 OWN = 0.5  # share of an FRF's own square in its size; the rest is the mean of all nine
 # What is expected of an error's size before any pose is left out: its median, and sds of its
@@ -34,14 +42,12 @@ SHIFTS = np.linspace(-3, 3, 25)  # of a campaign from others, in sds
 class LeftOut:
     """FRFs (3, 3, F) of a measured pose, and predicted from the others; `used` where measured.
 
-    `explained`: of their difference, what the hits' own misses explain; `known`: variance of noise
-    and of the prediction as it is.
+    `known`: variance of noise and of the prediction as it is.
     """
 
     frequency_hz: np.ndarray
     measured: np.ndarray
     predicted: np.ndarray
-    explained: np.ndarray
     known: np.ndarray
     used: np.ndarray
 
@@ -86,7 +92,7 @@ def _log_likelihood(pose: LeftOut, edges_hz: np.ndarray) -> np.ndarray:
         if not here.any():
             continue
         size, known = square[here], pose.known[here]
-        left = np.abs(pose.off[here] - pose.explained[here]) ** 2
+        left = np.abs(pose.off[here]) ** 2
         weight = size / (known + ERROR_BEFORE**2 * size) ** 2
         weight /= weight @ size
         expected = SIZES**2 + weight @ known
@@ -124,6 +130,19 @@ class FrfModel:
     simulated: RobotPosterior | None
     modal_error: ErrorByZone
 
+    @classmethod
+    def of(cls, model: "Model") -> "FrfModel":
+        """From the FRFs of a model's poses and, where there is one, from what was identified."""
+        band, learned = model.cell.config.modes.band_hz, model.low.learned
+        simulated = learned.posterior if learned is not None and learned.fits else None
+        found: tuple[LeftOut, ...] = ()
+        if simulated is None and len(model.frfs) > 1:
+            lines = int(np.clip(LINES // len(model.frfs), LEAST, MOST))
+            with threadpool_limits(1):
+                measured = stack(model.frfs, common_band(model.frfs, band), lines, MODEL_ERROR)
+                found = tuple(_left_out(model, measured))
+        return cls(simulated, ErrorByZone.of(found, band))
+
     def predict(
         self, q: np.ndarray, frequency_hz: np.ndarray, modal: Callable[[], Moments]
     ) -> Moments:
@@ -135,43 +154,17 @@ class FrfModel:
         return mean, np.hypot(sd, relative * local_size(mean, frequency_hz))
 
 
-def frf_model(
-    simulated: RobotPosterior | None,
-    measured: Measured,
-    band_hz: tuple[float, float],
-    left_out_modes: Callable[[], ModalPrediction],
-    above: Callable[[int, np.ndarray], np.ndarray],
-) -> FrfModel:
-    """Of the FRFs of n measured poses.
-
-    Args:
-        simulated: the simulation after these FRFs, where it explains them.
-        measured: what was measured.
-        band_hz: over which FRFs are predicted.
-        left_out_modes: fused modes (n, k) at each pose without it.
-        above: what higher modes add at a pose, by its number, on lines (F,): (3, 3, F) in m/s²/N.
-    """
-    found: list[LeftOut] = []
-    if simulated is None and len(measured.s) > 1:
-        found = _fused(measured, left_out_modes(), above)
-    return FrfModel(simulated, ErrorByZone.of(found, band_hz))
-
-
-def _fused(
-    measured: Measured,
-    modes: ModalPrediction,
-    above: Callable[[int, np.ndarray], np.ndarray],
-) -> list[LeftOut]:
-    found = []
+def _left_out(model: "Model", measured: Measured) -> Iterator[LeftOut]:
+    """Each pose's FRFs from the fused modes of the others, and the modes above them."""
+    fused = left_out_modes(model.with_residues, model.seen_exactly)
     for i, (hertz, s) in enumerate(zip(measured.frequency_hz, measured.s, strict=True)):
-        one = ModalPrediction(*(values[i : i + 1] for values in vars(modes).values()))
+        one = ModalPrediction(*(values[i : i + 1] for values in vars(fused).values()))
         mean, sd = frf_moments(_windowed(one, float(s.real[0])), hertz)
-        predicted = mean[0] * (s / (1j * s.imag)) ** 2 + above(i, hertz)
+        above = model.low.above(model.labelled[i].q[None], hertz)[0]
+        predicted = mean[0] * (s / (1j * s.imag)) ** 2 + above
         used = measured.used[i]
         known = np.where(used, measured.sd[i], 0.0) ** 2 + sd[0] ** 2
-        nothing = np.zeros_like(predicted)
-        found.append(LeftOut(hertz, measured.accelerance[i], predicted, nothing, known, used))
-    return found
+        yield LeftOut(hertz, measured.accelerance[i], predicted, known, used)
 
 
 def _windowed(modes: ModalPrediction, rate_1_s: float) -> ModalPrediction:

@@ -14,7 +14,7 @@ from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.deliveries import Delivery
 from planner.campaign.events import REFUSED, HitRecord, Question
-from planner.campaign.hit_habits import HitMiss, misses_of
+from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.kept_recordings import KeptRecordings
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
@@ -45,10 +45,12 @@ class ImportReport:
     question: Question | None = None
     alerts: tuple[str, ...] = ()  # of the remarks, those to be acted upon while the robot stands
 
-    def misses(self, model: Model | None = None) -> tuple[HitMiss, ...]:
-        """How each accepted hit missed, by this import's model or a later one."""
+    def hit_errors(self, model: Model | None = None) -> tuple[HitErrorEstimate, ...]:
+        """Of each accepted hit, as far as they are known, by this import's model or a later one."""
         files = [hit.file for hit in self.accepted]
-        return misses_of((model or self.model).misses, self.pose, files)
+        poses = (model or self.model).hit_errors
+        own = next((found.hits for found in poses if found.pose == self.pose), ())
+        return tuple(hit for hit in own if hit.file in files)
 
 
 def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, ...]:

@@ -1,17 +1,17 @@
 """The low fidelity of a campaign: the simulation as it stands, or as the recordings teach it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from planner.campaign.fit_memory import FitMemory, steps
 from planner.campaign.state import Measurement
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.effects.parameters import CAD_INERTIAS, Priors
 from planner.effects.table import Repertoire
+from planner.fit.fitted import FitRecord
 from planner.fit.frequency_uncertainty import frequency_sd
 from planner.fit.learned import Learned
 from planner.fit.result import Identification
@@ -26,6 +26,10 @@ BELIEVED = 0.99  # in a simulation that fits the recordings
 # Of ln f: what is left where the simulation explains the recordings, and where not, in shares of
 # what is not explained of |H|: resonances of a few per cent of damping shift by so much of it.
 RIGHT, DAMPING = 0.001, 0.05
+
+Used = tuple[Measurement, ...]
+# What was found of these measurements before, or is found now.
+Recall = Callable[[Used, Callable[[], FitRecord]], FitRecord]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,13 +156,14 @@ def learn(
     frfs: Sequence[Frf],
     q: np.ndarray,
     band_hz: tuple[float, float],
-    memory: FitMemory | None = None,
-    used: tuple[Measurement, ...] = (),
+    used: Used = (),
+    recall: Recall = lambda used, find: find(),
 ) -> LowFidelity:
     """The simulation identified from the FRFs measured at q (n, dof) in rad.
 
-    They may be between any points. Where the measurements in use are named, from what was found of
-    the first of them, which `memory` keeps.
+    They may be between any points. Where the measurements in use are named, what is found of n
+    begins where that of the first 1, 2, 3, 4, 6, 8, 12, … led: it is a function of the measurements
+    in their order alone, whatever was computed before, and each step costs little.
     """
     nominal = before.nominal
     if nominal is None or not frfs:
@@ -168,14 +173,34 @@ def learn(
     def search(count: int) -> Search:
         return Search(prior, tuple(frfs[:count]), q[:count], band_hz, before.tolerances)
 
-    memory, warm = memory or FitMemory(), None
+    def found(count: int) -> FitRecord:
+        def find() -> FitRecord:
+            fewer = _fewer(count)
+            return search(count).found(found(fewer) if fewer else None).remembered
+
+        return recall(used[:count], find)
+
     with threadpool_limits(1):
-        for count in (*steps(len(used)), len(used)) if used else ():
-            known = memory.get(used[:count])
-            if known is None:
-                known = search(count).found(warm).remembered
-                memory.put(used[:count], known)
-            warm = known
         whole = search(len(frfs))
-        learned = Learned.of(whole.recalled(warm) if warm else whole.found())
+        learned = Learned.of(whole.recalled(found(len(used))) if used else whole.found())
     return replace(before, learned=learned)
+
+
+def _fewer(count: int) -> int:
+    """The largest of 1, 2, 3, 4, 6, 8, 12, … below a count; 0 below 2."""
+    series = sorted(
+        {1, *(n for k in range(1, count.bit_length()) for n in (2**k, 3 * 2 ** (k - 1)))}
+    )
+    return max((n for n in series if n < count), default=0)
+
+
+def in_memory() -> Recall:
+    """Recalls for as long as it is there itself."""
+    kept: dict[Used, FitRecord] = {}
+
+    def recall(used: Used, find: Callable[[], FitRecord]) -> FitRecord:
+        if used not in kept:
+            kept[used] = find()
+        return kept[used]
+
+    return recall

@@ -6,16 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from planner.campaign import store
+from planner.campaign.acquisition_inputs import MOST_INFORMED
 from planner.campaign.campaign import Campaign
-from planner.dataset.dataset import Dataset, Progress
-from planner.dataset.recordings import recordings_in
-from planner.dataset.visits import Recording
+from planner.dataset.dataset import Dataset
+from planner.dataset.visits import Recording, recordings_in
 from planner.errors import InputError
+from planner.progress import Tell
 from planner.recording.folder import TABLE
 from planner.recording.records import PoseRow
 from planner.robot.robot import Robot
-
-OFFERED = 200  # of a campaign's candidates, evenly spread, that are looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +47,12 @@ class Material:
             return recordings_in(self.recordings, robot.joints, robot.points)
         return self.campaign.used_recordings
 
-    def read(self, robot: Robot, band_hz: tuple[float, float], progress: Progress) -> Dataset:
+    def read(self, robot: Robot, band_hz: tuple[float, float], progress: Tell) -> Dataset:
         """What is `listed`, read and screened; nothing is written. Raises as `Dataset.of` does."""
-        return Dataset.of(
-            self.listed(robot),
-            band_hz,
-            window_rate_1_s=self.window_rate_1_s,
-            progress=progress,
-            name=str(self.recordings if self.campaign is None else self.campaign.directory),
-        )
+        how = {"window_rate_1_s": self.window_rate_1_s, "progress": progress}
+        if self.campaign is not None:
+            return self.campaign.dataset(band_hz, **how)
+        return Dataset.read(self.recordings, robot, band_hz, **how)
 
     def with_poses(self, rows: tuple[PoseRow, ...]) -> "Material":
         """The same with the poses of a table, unless a campaign offers its own."""
@@ -81,7 +77,7 @@ def material(folder: Path, robot: Path | None, window_rate_1_s: float) -> Materi
         return Material(recordings, robot, window_rate_1_s, np.zeros((0, 0)), ())
     campaign = Campaign(folder)
     cell = campaign.cell
-    chosen = np.flatnonzero(cell.allowed)[:OFFERED]
+    chosen = np.flatnonzero(cell.allowed)[:MOST_INFORMED]
     names = tuple(f"candidate {i + 1}" for i in chosen)
     path = robot or campaign.robot_toml
     rate = window_rate_1_s or cell.config.modes.window_rate_1_s

@@ -10,10 +10,10 @@ import numpy as np
 from planner.campaign.acquisition_inputs import open_parameters, outlook
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
-from planner.campaign.hit_habits import PoseMisses
+from planner.campaign.hit_error_estimates import CampaignHitErrors
+from planner.campaign.hit_errors import PoseHitErrors
 from planner.campaign.labels import LabelledPose, observations
 from planner.campaign.low_fidelity import LowFidelity
-from planner.campaign.misses import CampaignMisses
 from planner.campaign.state import Measurement
 from planner.design.acquisitions import mixed
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
@@ -37,10 +37,22 @@ FrfOf = Callable[[Measurement, ModesTable], Frf]
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
-# Scatter from visit to visit is told from so many poses on, where it is larger than usual.
-SCATTER_POSES, TOLD_SCATTER_PERCENT = 5, 0.3
-# Left-out residuals of fewer poses do not tell how far a simulation is off that lacks physics.
+# Fewer poses tell neither the scatter from visit to visit nor, left out one by one, how far a
+# simulation is off that lacks physics.
 FEW_POSES = 5
+
+
+@dataclass(frozen=True)
+class RepeatedPose:
+    """The measured pose whose repetition gains more than any new one.
+
+    Gains are reductions of the mean relative variance.
+    """
+
+    pose: str
+    gain: float
+    gain_of_a_new_pose: float
+    text: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +65,7 @@ class Model:
     seen: ModalObservations
     surrogate: Surrogate  # of frequencies and damping
     frf_noise: FrfNoise | None = None  # None: no FRF was looked at
-    told: CampaignMisses | None = None  # None: nothing tells how hits missed
+    estimated: CampaignHitErrors | None = None  # None: nothing tells errors of hits
     used: tuple[Measurement, ...] = ()  # of the labelled poses, as they were measured
     frf_of: FrfOf | None = None
 
@@ -86,17 +98,17 @@ class Model:
         return tuple(self.frf_of(m, table).within(table.band_hz) for m in self.used)
 
     @cached_property
-    def misses(self) -> tuple[PoseMisses, ...]:
+    def hit_errors(self) -> tuple[PoseHitErrors, ...]:
         """Of the hits of each pose, where a simulation tells them."""
-        return self.told.poses if self.told else ()
+        return self.estimated.poses if self.estimated else ()
 
     @cached_property
     def seen_exactly(self) -> ModalObservations:
         """`seen` with residues as hits without a miss would give them, which FRFs alone need."""
-        if self.told is None:
+        if self.estimated is None:
             return self.seen
         both = zip(self.labelled, self.used, strict=True)
-        exact = tuple(self.told.corrected(pose, measured) for pose, measured in both)
+        exact = tuple(self.estimated.corrected(pose, measured) for pose, measured in both)
         return observations(self.cell, exact)
 
     @cached_property
@@ -204,19 +216,23 @@ class Model:
             return self.decision is not None and self.decision.sure(stop.probability)
         return self.forecast.reached >= stop.probability
 
-    def repeat(self) -> tuple[str, float, float] | None:
-        """The measured pose that gains most from more hits, its gain, and that of a new pose.
-
-        None where nothing is measured. Gains are reductions of the mean relative variance.
-        """
+    def repeat(self) -> "RepeatedPose | None":
+        """The measured pose that gains most from more hits; None where a new pose gains more."""
         if not self.labelled:
             return None
         outputs = self.outlook[0]
         sd = [[m.frequency_sd_hz / m.frequency_hz if m else np.nan for m in p.modes]
               for p in self.labelled]  # fmt: skip
         gain = repeat_gain(outputs, np.array(sd) ** 2)
-        best = int(np.argmax(gain))
-        return self.labelled[best].pose, float(gain[best]), float(np.max(self._gains))
+        best, new = int(np.argmax(gain)), float(np.max(self._gains))
+        if gain[best] <= new:
+            return None
+        pose = self.labelled[best].pose
+        text = (
+            f"Better than a new pose: hit {pose} again, with as many hits as before. That lowers "
+            f"the uncertainty more, as the noise of its hits is now the largest part of it."
+        )
+        return RepeatedPose(pose, float(gain[best]), new, text)
 
     @cached_property
     def _gains(self) -> np.ndarray:
@@ -255,9 +271,9 @@ class Model:
         """How FRFs are predicted; None before one was measured. Worked out when asked for."""
         if not self.frfs:
             return None
-        from planner.campaign.frf_prediction import frf_model_of
+        from planner.campaign.frf_model import FrfModel
 
-        return frf_model_of(self)
+        return FrfModel.of(self)
 
     @property
     def knows_frfs(self) -> bool:
@@ -284,9 +300,9 @@ class Model:
                     f"The simulation disagrees with the measurements of mode {', '.join(left)}: "
                     f"predicted without it."
                 )
-        if len(self.labelled) >= SCATTER_POSES:
+        if len(self.labelled) >= FEW_POSES:
             percent = 100 * float(np.sqrt(np.mean(self.surrogate.visit_scatter**2)))
-            if percent > TOLD_SCATTER_PERCENT:
+            if percent > 0.3:  # larger than usual
                 found.append(
                     f"Frequencies scatter by {percent:.1g} % (sd) from visit to visit, more than "
                     f"the modal analysis states: predicted sds include it, further poses do not "

@@ -15,7 +15,7 @@ from planner.campaign.events import Proposal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.design.hit_axes import axis_shares
-from planner.design.propose import INFORMED, Pick, Travel
+from planner.design.propose import DESCRIPTIONS, INFORMED, Pick, Travel
 from planner.design.propose import propose as choose
 from planner.design.sensor_places import BetterPlaces, better_places
 from planner.design.space_filling import DESIGNS
@@ -76,11 +76,16 @@ def _new_poses(
 
 
 def _names(state: CampaignState, angles: list[tuple[float, ...]]) -> list[str]:
-    """Names of proposed poses: the one that a pose was proposed under before, else a new one."""
+    """Names of proposed poses: the one that a pose was proposed under before, else a new one.
+
+    A new one is of no other pose, also of none that was measured without a proposal.
+    """
     taken = {*(m.pose for m in state.over), *state.held}
     known = {p.joints_deg: name for name, p in state.proposals.items() if name not in taken}
-    new = counted(state.proposals_made + 1)
-    return [known.get(joints_deg) or f"P{next(new):03d}" for joints_deg in angles]
+    every = (f"P{number:03d}" for number in counted(state.proposals_made + 1))
+    given = {*state.proposals, *state.measurements, *state.held}
+    new = (name for name in every if name not in given)
+    return [known.get(joints_deg) or next(new) for joints_deg in angles]
 
 
 def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
@@ -155,4 +160,4 @@ def _reason(model: Model, index: int, acquisition: str) -> str:
         distance = np.linalg.norm(x - model.cell.candidates.features[index], axis=1)
         near = model.labelled[int(np.argmin(distance))].pose
         text += f" here, nearest measured pose {near}"
-    return f"{acquisition.replace('_', ' ')}: {text}"
+    return f"{DESCRIPTIONS[acquisition]} ({acquisition.replace('_', ' ')}); {text}"

@@ -14,16 +14,20 @@ from functools import cached_property
 import numpy as np
 
 from planner.campaign.chain_faults import LEAST, NONE, TURNED, ChainFault
+from planner.campaign.chain_question import chain_question
 from planner.campaign.events import Question
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
+from planner.dataset.measure import MeasuredPose
 from planner.fit.expected import LINES, SIZES, ExpectedFrfs, turned
 from planner.frf.frf import Frf
 from planner.recording.points import TOOL
 
 LOG_ODDS = np.log(1000.0)  # against a mistake, before anything is measured
 BETTER = 3.0  # times less is left by a mistake that explains them
-SURE = 2  # measured poses before which another structure may explain what nothing known fits
+# Measured poses before which another structure may explain what nothing known fits: until then
+# the simulation alone tells of the chain, as before the first.
+SURE = 2
 FOLLOWED = 3  # mistakes that are fitted, those that seem likeliest at once
 
 
@@ -47,14 +51,13 @@ def question(
     state: CampaignState,
     pose: str,
     joints_deg: tuple[float, ...],
-    frf: Frf | None,
+    measured: MeasuredPose,
 ) -> Question | None:
     """What to ask the engineer before new hits of a pose are believed; None: nothing.
 
-    `frf` is by the new hits alone, each column as if of one hit; `model` and `state` are those
-    before the import.
+    `measured` is of the new hits alone; `model` and `state` are those before the import.
     """
-    learned = model.low.learned or model.low.suspect
+    learned, frf = model.low.learned or model.low.suspect, measured.one_hit_frf
     if frf is None or learned is None:
         return None
     expected = ExpectedFrfs(learned.posterior, model.cell.config.modes.band_hz)
@@ -64,8 +67,11 @@ def question(
         return None
     mistakes = [*typed, *_poses(model, state, pose, joints_deg), *_chains(state, expected, q, frf)]
     fits = stated.instead(mistakes)
-    if fits is None and not (stated.impossible and learned.poses >= SURE):
+    if fits is None and not stated.impossible:
         return None
+    if fits is None and learned.poses < SURE:
+        called_right = _called_right(state)
+        return None if called_right else chain_question(model, pose, joints_deg, measured.frf)
     return _asked(pose, 100 * expected.off(q, frf), fits)
 
 
@@ -161,13 +167,16 @@ def _chains(
     state: CampaignState, expected: ExpectedFrfs, q: np.ndarray, frf: Frf
 ) -> Iterator[Mistake]:
     """What the tool's chain may show instead; nothing once the engineer called it right."""
-    earlier = state.measurements.values()
-    if frf.layout.sensors != TOOL.sensors:
-        return
-    if any(m.question is not None and m.question.about == "chain" for m in earlier):
+    if frf.layout.sensors != TOOL.sensors or _called_right(state):
         return
     for fault in (*TURNED, *scaled(expected.ratio(q, frf))):
         yield Mistake(q, fault.asked, about="chain", fault=fault)
+
+
+def _called_right(state: CampaignState) -> bool:
+    """Whether the engineer was asked of the chain before, and used the hits."""
+    asked = (m.question for m in state.measurements.values() if m.question is not None)
+    return any(question.about == "chain" for question in asked)
 
 
 def scaled(ratio: np.ndarray) -> Iterator[ChainFault]:

@@ -1,14 +1,15 @@
 """What a campaign folder says: its log, the state and the model that follow from it."""
 
 from collections.abc import Callable
-from functools import partial
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 import numpy as np
 
-from planner.campaign import model_cache, store
+from planner import content_hash
+from planner.campaign import store
 from planner.campaign.config import (
     CampaignConfig,
     ModesTable,
@@ -17,37 +18,46 @@ from planner.campaign.config import (
 )
 from planner.campaign.events import Configured, Entry, HitRecord, Imported, Refused
 from planner.campaign.journal import Journal
-from planner.campaign.kept_recordings import KeptRecordings, Remembered
+from planner.campaign.kept_recordings import KeptRecordings
 from planner.campaign.state import CampaignState, Measurement, fold
 from planner.dataset.screened_files import Source
-from planner.dataset.store import Store
+from planner.dataset.store import Store, user_store
 from planner.errors import InputError
+from planner.progress import Tell, quietly
 from planner.version import __version__
 
 # Imported where they are needed: with what is kept of a model, `status` needs none of them.
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from planner.campaign.cell import Cell
     from planner.campaign.model import Model
-    from planner.dataset.dataset import Dataset, Progress
+    from planner.dataset.dataset import Dataset
     from planner.dataset.visits import Recording
     from planner.frf.frf import Frf
     from planner.surrogate.frf_bands import ModalPrediction
 
 T = TypeVar("T")
 
+LIBRARIES = "msgspec", "numpy", "scipy", "jax", "jaxlib", "pin"  # that a model is computed by
+
 
 class CampaignReads:
     """What can be asked of a campaign folder; nothing here writes into it."""
 
     def __init__(self, directory: Path | str, models: Store | None = None):
-        """Open a folder; `models` keeps fitted models, by default in the user's cache folder."""
+        """Open a folder; `models` keeps what was computed, by default the user's store."""
         self.directory = Path(directory).resolve()
-        self._kept = model_cache.user_models() if models is None else models
+        self._kept = user_store() if models is None else models
         self._journal = Journal(self.directory / store.LOG)
         self._cells: dict[str, Cell] = {}
         self._models: dict[tuple[str, int], Model] = {}
-        self._remembered = Remembered()
         self._folded: tuple[tuple[Entry, ...], CampaignState] = (), fold(())
+
+    def __repr__(self) -> str:
+        state = self.state
+        measured, open_ = len(state.used), len(state.open)
+        return f"Campaign({str(self.directory)!r}: {measured} poses measured, {open_} proposed)"
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -101,56 +111,75 @@ class CampaignReads:
         state, configured = self.state, self._configured()
         key = _text(configured), state.model_version
         if key not in self._models:
-            name = self._model_name(configured, state)
-            found = model_cache.kept_model(self._kept, name)
+            found = self.kept_model(state)
             if found is None:
                 found = self._fitted(state)
-                model_cache.keep_model(self._kept, name, found)
+                self._kept.put(self._key("model", state.used), found)
             self._cells[key[0]] = found.cell  # with the candidates that were worked out for it
             self._models = {key: found}
         return self._models[key]
 
     def kept_model(self, state: CampaignState) -> "Model | None":
         """The model of an earlier state of this configuration, where it is kept on disk."""
-        configured = self._configured()
-        return model_cache.kept_model(self._kept, self._model_name(configured, state))
+        key = self._key("model", state.used)
+        if not self._kept.has(key):
+            return None  # without the libraries that a model takes
+        from planner.campaign.model import Model
 
-    def _model_name(self, configured: Configured, state: CampaignState) -> str:
-        return model_cache.key("model", self.directory, configured, state.used)
+        return self._kept.get(key, Model)
 
-    def _fit_name(self, configured: Configured, used: tuple[Measurement, ...]) -> str:
-        return model_cache.key("fit", self.directory, configured, used)
+    def _key(self, what: str, used: tuple[Measurement, ...]) -> str:
+        """Name in the store of what is a function of configuration and measurements in use.
+
+        The robot of a model knows its files by their paths, so the folder is part of it.
+        """
+        measured = tuple(replace(m, time="") for m in used)
+        told = content_hash.of(self._configured()), content_hash.of(measured)
+        computes = content_hash.program(), content_hash.libraries(*LIBRARIES)
+        return content_hash.digest(what, *computes, str(self.directory), *told)
 
     def of_model(self, what: str, kind: type[T], make: Callable[["Model"], T]) -> T:
         """What follows from the model, kept on disk: where it is, the model is not loaded.
 
         Args:
             what: Name of it, one for each `make`.
-            kind: Dataclass that msgspec can encode; arrays are allowed.
+            kind: Its class.
             make: Makes it from the model.
         """
-        used = self.state.used
-        name = model_cache.key(what, self.directory, self._configured(), used)
-        return self._kept.result(name, kind, lambda: make(self.model))
+        return self._kept.result(self._key(what, self.state.used), kind, lambda: make(self.model))
 
     def _fitted(self, state: CampaignState) -> "Model":
         from threadpoolctl import threadpool_limits
 
         from planner.campaign.build import build
-        from planner.campaign.fit_memory import FitMemory
+        from planner.fit.fitted import FitRecord
 
         kept = self.recordings
         kept.look_through(state.used, self._kept)  # a damaged one is told now
+
+        def recall(used: tuple[Measurement, ...], find: Callable[[], FitRecord]) -> FitRecord:
+            return self._kept.result(self._key("fit", used), FitRecord, find)
+
         with threadpool_limits(1):
-            memory = FitMemory(self._kept, partial(self._fit_name, self._configured()))
-            model = build(self.cell, state, kept.frf, kept.hits, memory)
+            model = build(self.cell, state, kept.frf, kept.hits, recall)
             _ = model.frequency_sd_percent, model.frf_sd_percent  # kept: every command needs them
         return model
 
     @property
     def recordings(self) -> KeptRecordings:
         """The recordings that were imported, by the points of the robot as configured now."""
-        return KeptRecordings(self.directory, self.cell.robot.points, self._remembered)
+        return KeptRecordings(self.directory, self.cell.robot.points)
+
+    def stands(self, pose: str | None) -> np.ndarray:
+        """Joint angles (dof,) in rad of a measured or proposed pose; InputError names them."""
+        state = self.state
+        known = {name: p.joints_deg for name, p in state.proposals.items()}
+        known |= {name: m.joints_deg for name, m in state.measurements.items()}
+        if pose is None or pose not in known:
+            given = f"has no pose {pose}; choose" if pose else "is a campaign: say at which pose,"
+            some = ", ".join(list(known)[:5]) or "none yet"
+            raise InputError(f"{self.directory} {given} one of {some} with --pose.")
+        return self.cell.robot.joints.internal(known[pose])
 
     def frf_of(self, measurement: Measurement, table: ModesTable) -> "Frf":
         """The FRF matrix of a measured pose, estimated again from its recordings if need be."""
@@ -161,7 +190,7 @@ class CampaignReads:
         band_hz: tuple[float, float],
         *,
         window_rate_1_s: float = 0.0,
-        progress: "Progress" = lambda text: None,
+        progress: Tell = quietly,
     ) -> "Dataset":
         """Of `used_recordings`, and raises as they do."""
         from planner.dataset.dataset import Dataset
@@ -216,29 +245,37 @@ class CampaignReads:
 
     # -- what is expected ----------------------------------------------------------------------
 
-    def predict(self, q_rad: np.ndarray) -> "ModalPrediction":
-        """Frequencies (Hz) and damping ratios (n, count), with sds, at poses q (n, dof) in rad."""
-        return self.model.predict(np.atleast_2d(q_rad))
+    def predict(self, *, joints_deg: "ArrayLike") -> "ModalPrediction":
+        """Frequencies (Hz) and damping ratios (n, count), with sds, at poses (n, dof) in degrees.
+
+        Places of joints that slide are in mm, here and below.
+        """
+        return self.model.predict(self.cell.poses(joints_deg))
 
     def frf(
-        self, q_rad: np.ndarray, frequency_hz: np.ndarray | None = None
+        self, *, joints_deg: "ArrayLike", frequency_hz: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """FRFs at poses, with their uncertainty.
 
         Args:
-            q_rad: Joint angles (n, dof) in rad, in the order of the robot's joints.
+            joints_deg: Joint angles (n, dof) in degrees, in the order of the robot's joints.
             frequency_hz: Lines (F,) in Hz; by default `frequency_lines`.
 
         Returns:
             Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N: response
             axis, then hit axis.
         """
+        return self.frf_at(self.cell.poses(joints_deg), frequency_hz)
+
+    def frf_at(
+        self, q: np.ndarray, frequency_hz: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As `frf`, at poses q (n, dof) in rad; what was worked out for it is kept."""
         lines, model = self.frequency_lines if frequency_hz is None else frequency_hz, self.model
         known = model.knows_frfs
-        found = model.frf(np.atleast_2d(q_rad), lines)
+        found = model.frf(np.atleast_2d(q), lines)
         if not known:
-            name = self._model_name(self._configured(), self.state)
-            model_cache.keep_model(self._kept, name, model)
+            self._kept.put(self._key("model", self.state.used), model)
         return found
 
     def records(self) -> list[dict[str, Any]]:
@@ -247,18 +284,18 @@ class CampaignReads:
 
         return measured_records(self.cell.robot.joints, self.state.measurements.values())
 
-    def predict_records(self, q_rad: np.ndarray) -> list[dict[str, Any]]:
-        """`predict` as rows, one for each mode of each pose q (n, dof) in rad."""
+    def predict_records(self, *, joints_deg: "ArrayLike") -> list[dict[str, Any]]:
+        """`predict` as rows, one for each mode of each pose."""
         from planner.campaign.planned import inside
         from planner.campaign.records import predicted_records
 
-        q = np.atleast_2d(q_rad)
-        return predicted_records(self.cell.robot.joints, q, self.predict(q), inside(self.cell, q))
+        q, there = self.cell.poses(joints_deg), self.model.predict
+        return predicted_records(self.cell.robot.joints, q, there(q), inside(self.cell, q))
 
     @property
     def frequency_lines(self) -> np.ndarray:
         """Lines (F,) in Hz over campaign.toml's band."""
-        from planner.frf.frequency_lines import frequency_lines
+        from planner.frf.synthesis import frequency_lines
 
         return frequency_lines(self.cell.config.modes.band_hz)
 

@@ -1,13 +1,15 @@
-"""Drift: a pose that was hit again, and hits that all lie to one side of what is expected."""
+"""What an import notices that is to be acted upon while the robot still stands there: drift too."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from planner.campaign.events import MeasuredMode
-from planner.campaign.model import SCATTER_POSES, Model
+from planner.campaign.events import Imported, MeasuredMode
+from planner.campaign.model import FEW_POSES, Model
 from planner.campaign.state import CampaignState, Measurement
+from planner.dataset.measure import MeasuredPose
+from planner.frf.frf import unreciprocal
 
 LEAST_POSES = 3  # measured, before which hints at drift are not to be relied on
 SAME_MODE = 0.05  # of ln f: so near, a mode of a second visit is that of the first
@@ -98,7 +100,7 @@ def _scatter(model: Model) -> float:
 
     Of few poses one that has drifted makes it as large as the drift.
     """
-    if len(model.labelled) < SCATTER_POSES:
+    if len(model.labelled) < FEW_POSES:
         return 0.0
     return float(np.sqrt(np.mean(model.surrogate.visit_scatter**2)))
 
@@ -117,3 +119,33 @@ def _beside(
         sd = float(np.sqrt(own[0] ** 2 + own[1] ** 2 + 2 * scatter**2))
         found.append((mode.frequency_hz, ratio[k], sd))
     return found
+
+
+def alerts(
+    model: Model,
+    state: CampaignState,
+    event: Imported,
+    measured: MeasuredPose,
+    modes: Sequence[MeasuredMode],
+    suspicion: Suspicion | None,
+) -> tuple[str, ...]:
+    """Remarks on new hits, their channels, reciprocity and drift.
+
+    Args:
+        model: Before the import, as is `state`.
+        state: See `model`.
+        event: The import.
+        measured: All hits of the pose, the new ones last.
+        modes: By the new hits alone.
+        suspicion: Of drift, where they hint at it.
+    """
+    verdicts = measured.verdicts[-len(event.hits) :]
+    told = tuple(dict.fromkeys(text for one in verdicts for text in one.remarks))
+    if event.question is not None:
+        return told
+    if measured.frf is not None:
+        told += unreciprocal(measured.frf)
+    known = state.hit_at(event.pose)
+    if known is not None:
+        return told + hit_again(model, known, modes)
+    return told if suspicion is None else (*told, suspicion.text)

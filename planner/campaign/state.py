@@ -65,11 +65,15 @@ class CampaignState:
     proposals: dict[str, Proposal] = field(default_factory=dict)  # all ever made, undone ones too
     open: tuple[str, ...] = ()  # proposed and not yet measured, skipped or superseded
     proposed_by: str = ""  # acquisition that made the open proposals
-    stale: bool = True  # the model changed since the open proposals were made
+    # The model changed since the open proposals were made, by more than late hits of a pose before.
+    stale: bool = True
     measurements: dict[str, Measurement] = field(default_factory=dict)
     held: dict[str, Measurement] = field(default_factory=dict)  # until their question is answered
     refused: dict[str, tuple[str, HitRecord]] = field(default_factory=dict)  # by sha256: pose, hit
     shown: dict[str, str] = field(default_factory=dict)  # by sha256: the pose that it is of
+    guessed: dict[str, str] = field(
+        default_factory=dict
+    )  # where those came of which that is a guess
     skipped: dict[str, str] = field(default_factory=dict)
     avoided: frozenset[str] = frozenset()  # of these, those whose neighbours are not offered either
     starred: frozenset[str] = frozenset()
@@ -97,6 +101,14 @@ class CampaignState:
     def over(self) -> tuple[Measurement, ...]:
         """Poses that are not to be proposed again, for there were hits."""
         return self.measured
+
+    def came(self, digest: str, pose: str) -> str:
+        """The pose that a file (sha256) is of, as seen from `pose`; that where nothing is known.
+
+        What is only guessed to be of it is not taken for its own: there it is of where it came.
+        """
+        known = self.shown.get(digest, pose)
+        return self.guessed.get(digest, known) if known == pose else known
 
     def unchanged_by(self, event: AnyEvent) -> bool:
         """Whether an act changes neither the model nor what is proposed."""
@@ -128,7 +140,7 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
             )
         if isinstance(entry.event, Undone):
             if not state.unchanged_by(_act_of(entries, entry.event)):
-                state = replace(state, stale=True, model_version=entry.seq)
+                state = replace(state, model_version=entry.seq)
         elif entry.seq not in undone:
             state = _apply(state, entry.event, entry)
         state = replace(state, events=entry.seq)
@@ -190,9 +202,14 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
             doubt = _doubt(state, event.pose)
             return replace(changed, open=left, skipped=skipped, avoided=avoided, doubt=doubt)
         case FilesShown():
-            return replace(state, shown={**dict.fromkeys(event.files, event.pose), **state.shown})
+            new = [file for file in event.files if file not in state.shown]
+            guessed = state.guessed | (dict.fromkeys(new, event.at) if event.at else {})
+            shown = state.shown | dict.fromkeys(new, event.pose)
+            return replace(state, shown=shown, guessed=guessed)
         case FilesPlaced():
-            return replace(state, shown=state.shown | dict.fromkeys(event.files, event.pose))
+            guessed = {file: at for file, at in state.guessed.items() if file not in event.files}
+            shown = state.shown | dict.fromkeys(event.files, event.pose)
+            return replace(state, shown=shown, guessed=guessed)
         case Starred():
             return replace(state, starred=state.starred | {event.pose})
     return state
@@ -224,7 +241,11 @@ def _imported(
     if state.unchanged_by(event):
         return replace(state, refused=refused, measurements=measurements)
     doubt = (event.again, event.pose) if event.again else _doubt(state, event.pose)
-    return replace(changed, open=left, refused=refused, measurements=measurements, doubt=doubt)
+    late = state.hit_at(event.pose) is not None and event.pose not in state.open
+    stale = state.stale if late and doubt == state.doubt else True
+    return replace(
+        changed, open=left, refused=refused, measurements=measurements, doubt=doubt, stale=stale
+    )
 
 
 def without(known: Measurement | None, replaced: Sequence[tuple[str, str]]) -> Measurement | None:

@@ -1,15 +1,16 @@
 """What a campaign folder holds besides its log: the robot folder and the raw recordings."""
 
 import glob
-import hashlib
 import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
+from planner import file_content
 from planner.campaign.config import load_campaign_config
 from planner.campaign.journal import sync_folder, write_synced
 from planner.errors import InputError
@@ -22,26 +23,25 @@ ROBOT = "robot"
 RECORDINGS = "recordings"
 MAX_FILE_BYTES = 512 * 1024 * 1024
 
+T = TypeVar("T")
+
 
 def is_campaign(path: Path) -> bool:
     """Whether a path is a campaign's folder, be it damaged."""
     return any((path / name).exists() for name in (LOG, CONFIG))
 
 
-def sha256(data: bytes) -> str:
-    """Content hash under which a file is kept."""
-    return hashlib.sha256(data).hexdigest()
-
-
 def store_recording(folder: Path, path: Path) -> tuple[str, str]:
     """Keep a recording under its content hash; returns (sha256, suffix). Idempotent."""
-    data = read_recording(path)
-    digest, suffix = sha256(data), "".join(path.suffixes[-2:]).lower()
+    from planner.recording.read import content
+
+    digest, suffix = recording_hash(path), "".join(path.suffixes[-2:]).lower()
     suffix = suffix if suffix.endswith(".gz") else path.suffix.lower()
     kept = recording_path(folder, digest, suffix)
     if not kept.exists():
         kept.parent.mkdir(exist_ok=True)
-        write_synced(kept, data)
+        write_synced(kept, content(path))
+        file_content.remember(kept, file_content.mark(kept), digest)
     return digest, suffix
 
 
@@ -52,15 +52,15 @@ def recording_path(folder: Path, digest: str, suffix: str) -> Path:
     return folder.joinpath(RECORDINGS, f"{digest}{suffix}")
 
 
-def read_recording(path: Path) -> bytes:
-    """A recording's bytes with all that reading it takes, or InputError saying why not."""
-    from planner.recording.read import content
+def recording_hash(path: Path) -> str:
+    """Hash of a recording with all that reading it takes, or InputError saying why not."""
+    from planner.recording.read import digest
 
-    return read_bytes(path, content)
+    return _unless_wrong(path, digest)
 
 
-def read_bytes(path: Path, read: Callable[[Path], bytes] = Path.read_bytes) -> bytes:
-    """A file's bytes, or InputError saying why not."""
+def _unless_wrong(path: Path, read: Callable[[Path], T]) -> T:
+    """What reading a file gives, or InputError saying why not."""
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise InputError(
@@ -77,7 +77,7 @@ def robot_hashes(folder: Path) -> dict[str, str]:
     """sha256 of each file of the campaign's robot folder, by relative path."""
     root = folder / ROBOT
     files = sorted(path for path in root.rglob("*") if path.is_file())
-    return {path.relative_to(root).as_posix(): sha256(path.read_bytes()) for path in files}
+    return {path.relative_to(root).as_posix(): file_content.sha256(path) for path in files}
 
 
 def keep_robot_files(folder: Path, hashes: dict[str, str]) -> None:
@@ -86,7 +86,7 @@ def keep_robot_files(folder: Path, hashes: dict[str, str]) -> None:
         kept = folder / RECORDINGS / f"{digest}.robot"
         if not kept.exists():
             kept.parent.mkdir(exist_ok=True)
-            write_synced(kept, (folder / ROBOT / name).read_bytes())
+            write_synced(kept, file_content.read(folder / ROBOT / name))
 
 
 def restore_robot(folder: Path, hashes: dict[str, str], target: Path) -> None:
@@ -102,17 +102,16 @@ def restore_robot(folder: Path, hashes: dict[str, str], target: Path) -> None:
                 f"{folder / LOG} names {name!r} as a file of the robot folder, which it cannot "
                 f"be; nothing is written there. The log is not one that planner wrote."
             )
-        data = read_kept(folder / RECORDINGS / f"{digest}.robot", digest, f"the robot's {name}")
+        kept = folder / RECORDINGS / f"{digest}.robot"
+        check_kept(kept, digest, f"the robot's {name}")
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
+        path.write_bytes(file_content.read(kept))
 
 
-def read_kept(kept: Path, digest: str, what: str) -> bytes:
-    """A kept file's bytes, as they were when it was kept; InputError where they are not."""
-    data = read_bytes(kept)
-    if sha256(data) != digest:
+def check_kept(kept: Path, digest: str, what: str) -> None:
+    """InputError where a kept file is not as it was when it was kept."""
+    if _unless_wrong(kept, file_content.sha256) != digest:
         raise InputError(f"{kept} is not what was kept as {what}; restore it from a copy.")
-    return data
 
 
 def _is_hash(text: str) -> bool:
@@ -250,3 +249,25 @@ def _default(directory: Path, robot_file: str) -> str:
     document.add("workspace", tomlkit.item({"joints_deg": limits}))
     document.add("modes", tomlkit.item({"band_hz": list(robot.config.band_hz)}))
     return tomlkit.dumps(document)
+
+
+EXAMPLE = Path(__file__).parent.parent / "example"
+
+
+def write_example(directory: Path) -> tuple[str, str, str, tuple[str, ...]]:
+    """Write them into a folder that is new or empty.
+
+    Returns:
+        The folder, its robot.toml and campaign.toml, and all files, as absolute paths.
+    """
+    folder = directory.absolute()
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{directory} exists and is not empty; choose another folder.")
+    try:
+        shutil.copytree(EXAMPLE, folder, dirs_exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{directory} cannot be written ({error.strerror}); choose another folder."
+        ) from None
+    files = tuple(str(path) for path in sorted(folder.rglob("*")) if path.is_file())
+    return str(folder), str(folder / "robot" / "robot.toml"), str(folder / "campaign.toml"), files

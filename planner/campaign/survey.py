@@ -1,44 +1,43 @@
 """Modes of a recordings folder with several poses: which of them are the same."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from planner.campaign.hit_error_estimates import CampaignHitErrors, Visited, estimate_by
+from planner.campaign.labels import ABOVE
 from planner.campaign.low_fidelity import LowFidelity, learn
-from planner.campaign.misses import CampaignMisses, Visited, told_by
 from planner.dataset.hit_columns import hits_of
 from planner.dataset.measure import DEFAULT_BAND_HZ, MeasuredPose, measure
 from planner.dataset.screened_files import Source, in_parts
 from planner.dynamics.simulation import Simulation
 from planner.errors import RefusedError, RefusedFile
 from planner.frf.frf import Frf
-from planner.identification.sensor_masses import WithoutSensors, without_sensors
 from planner.measurement.measured_frfs import common_band
 from planner.measurement.nuisances import Tolerances
 from planner.measurement.point_places import misplaced, questions
+from planner.measurement.sensor_masses import WithoutSensors, without_sensors
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
+from planner.progress import Tell
 from planner.recording.folder import joint_columns, read_recordings
-from planner.recording.records import PoseRow, RecordingsFolder
 from planner.robot.robot import Robot
-
-ABOVE = 2  # labels of the simulation above the modes of the pose that has most
 
 
 @dataclass(frozen=True, eq=False)
 class Survey:
     """Labelled modes of named poses in a band (Hz); `bare` holds what sensors had lowered.
 
-    `simulated_hz` (n, k) are the labels' simulated frequencies, None without a robot; `misses` how
-    hits departed from their points and axes.
+    `simulated_hz` (n, k) are the labels' simulated frequencies, None without a robot; `hit_errors`
+    how hits departed from their points and axes.
     """
 
     poses: tuple[str, ...]
     tracks: Tracks
     bare: WithoutSensors
-    misses: CampaignMisses
+    hit_errors: CampaignHitErrors
     band_hz: tuple[float, float]
     refused: tuple[RefusedFile, ...]
     remarks: tuple[str, ...]
@@ -52,28 +51,30 @@ def survey(
     robot_toml: Path | None,
     estimator: str,
     window_rate_1_s: float,
-    progress: Callable[[str], None],
+    progress: Tell,
 ) -> Survey:
     """Analyse each pose; labels follow the simulation's families if a robot is named.
 
     Raises RefusedError where no pose gives a mode.
     """
-    band = band_hz or DEFAULT_BAND_HZ
-    table = _table(folder, robot_toml)
+    band, robot = band_hz or DEFAULT_BAND_HZ, Robot.load(robot_toml) if robot_toml else None
+    joints = joint_columns(folder) if robot is None else robot.joints
+    table = read_recordings(folder, joints, None if robot is None else robot.points)
     names = tuple(dict.fromkeys(row.pose for row in table.rows))
     found, every, refused, simulated = [], [], [], False
     visited: list[tuple[Visited, Frf]] = []
     for number, name in enumerate(names):
-        progress(f"pose {name}, {number} of {len(names)} done")
+        progress(f"pose {name}", number / len(names))
         rows = [row for row in table.rows if row.pose == name]
-        measured = measure(in_parts(_sources(rows)), band, estimator, window_rate_1_s)
+        sources = tuple(Source.of(row) for row in rows if row.file)
+        measured = measure(in_parts(sources), band, estimator, window_rate_1_s)
         refused += [
             RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted
         ]
         simulated |= any(v.simulated for v in measured.verdicts)
         found.append(measured.modal.modes if measured.modal else ())
         every.append(measured)
-        if robot_toml is not None and measured.frf is not None:
+        if robot is not None and measured.frf is not None:
             q = table.joints.internal(rows[0].joints_deg)
             visited.append(_visited(name, q, measured))
     if not any(found):
@@ -85,27 +86,19 @@ def survey(
         )
     first = {row.pose: row for row in reversed(table.rows)}
     q = table.joints.internal([first[name].joints_deg for name in names])
-    misses = _misses(visited, robot_toml, band)
-    found = [tuple(misses.without_misses(*one)) for one in zip(names, found, strict=True)]
-    simulations = _simulations(misses, robot_toml)
+    nominal = None if robot is None else Simulation(robot)
+    errors = _hit_errors(visited, nominal, band)
+    found = [tuple(errors.without_misses(*one)) for one in zip(names, found, strict=True)]
+    simulations = [] if nominal is None else [nominal]  # as stated, then as identified
+    if errors.told is not None and errors.trusted:
+        simulations.append(errors.told.simulation)
     doubts = _doubts(names, simulations, q, every, band)
     bare = without_sensors(names, found, simulations, q, every)
-    tracks, expected = _labelled(bare.modes, q, robot_toml)
+    tracks, expected = _labelled(bare.modes, q, nominal)
     return Survey(
-        names, tracks, bare, misses, band, tuple(refused), (*doubts, *bare.remarks), simulated,
+        names, tracks, bare, errors, band, tuple(refused), (*doubts, *bare.remarks), simulated,
         expected,
     )  # fmt: skip
-
-
-def _table(folder: Path, robot_toml: Path | None) -> RecordingsFolder:
-    if robot_toml is None:
-        return read_recordings(folder, joint_columns(folder))
-    robot = Robot.load(robot_toml)
-    return read_recordings(folder, robot.joints, robot.points)
-
-
-def _sources(rows: list[PoseRow]) -> tuple[Source, ...]:
-    return tuple(Source.of(r) for r in rows if r.file)
 
 
 def _visited(pose: str, q: np.ndarray, measured: MeasuredPose) -> tuple[Visited, Frf]:
@@ -117,27 +110,18 @@ def _visited(pose: str, q: np.ndarray, measured: MeasuredPose) -> tuple[Visited,
     return Visited(pose, files, q, hits.columns, measured.frf), hits.whole
 
 
-def _misses(
-    visited: list[tuple[Visited, Frf]], robot_toml: Path | None, band: tuple[float, float]
-) -> CampaignMisses:
+def _hit_errors(
+    visited: list[tuple[Visited, Frf]], nominal: Simulation | None, band: tuple[float, float]
+) -> CampaignHitErrors:
     """By the robot's simulation, identified from these recordings; none without a robot."""
-    if robot_toml is None or not visited:
-        return CampaignMisses((), None, Tolerances(), band)
-    robot = Robot.load(robot_toml)
+    if nominal is None or not visited:
+        return CampaignHitErrors((), None, Tolerances(), band)
     visits, whole = zip(*visited, strict=True)
-    return told_by(Simulation(robot), visits, whole, _tolerances(robot), band)
+    return estimate_by(nominal, visits, whole, _tolerances(nominal), band)
 
 
-def _tolerances(robot: Robot) -> Tolerances:
-    return Tolerances.of(robot.config, robot.joints.slides)
-
-
-def _simulations(misses: CampaignMisses, robot_toml: Path | None) -> list[Simulation]:
-    """As stated, and as identified from the recordings where that was done."""
-    if robot_toml is None:
-        return []
-    told = [misses.told.simulation] if misses.told is not None and misses.trusted else []
-    return [Simulation(Robot.load(robot_toml)), *told]
+def _tolerances(simulation: Simulation) -> Tolerances:
+    return Tolerances.of(simulation.robot.config, simulation.robot.joints.slides)
 
 
 def _doubts(
@@ -158,7 +142,7 @@ def _doubts(
     known = [(i, frf) for i, frf in tool if frf is not None]
     if found and known:
         # What was identified from wrongly named points too is spoiled: from the tool's alone.
-        nominal = LowFidelity(1, simulations[0], _tolerances(simulations[0].robot))
+        nominal = LowFidelity(1, simulations[0], _tolerances(simulations[0]))
         learned = learn(nominal, [frf for _, frf in known], q[[i for i, _ in known]], band).learned
         if learned is not None:
             tried = [*simulations, learned.identified.simulation]
@@ -167,14 +151,13 @@ def _doubts(
 
 
 def _labelled(
-    found: Sequence[tuple[Mode, ...]], q: np.ndarray, robot_toml: Path | None
+    found: Sequence[tuple[Mode, ...]], q: np.ndarray, simulation: Simulation | None
 ) -> tuple[Tracks, np.ndarray | None]:
     span = np.ptp(q, axis=0)
     x = ((q - q.min(axis=0)) / np.where(span > 0, span, 1.0))[:, span > 0]
     labels = max(map(len, found))
-    if robot_toml is None:
+    if simulation is None:
         return track(found, Guide.by_example(found), x), None
-    simulation = Simulation(Robot.load(robot_toml))
     middle = int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))
     count = min(labels + ABOVE, simulation.elastic.size)
     modes = simulation.followed(q, count, simulation.families(q[middle], q))

@@ -55,20 +55,10 @@ def tip_of(
 
 def _campaign(directory: Path, pose: str | None) -> tuple[TipReceptance, str]:
     campaign = Campaign(directory)
-    state = campaign.state
-    stands = {name: m.joints_deg for name, m in state.measurements.items()}
-    stands |= {name: p.joints_deg for name, p in state.proposals.items() if name not in stands}
-    if pose is None or pose not in stands:
-        some = ", ".join(list(stands)[:5]) or "none yet"
-        raise InputError(
-            f"{directory}: name one of its poses by --pose ({some}); for another, "
-            f"write its FRFs with predict --out and couple that file with --robot."
-        )
-    q = campaign.cell.robot.joints.internal(stands[pose])
-    lines = campaign.frequency_lines
-    mean, sd = campaign.frf(q[None], lines)
-    simulated = any(m.simulated for m in state.recorded)
-    return replace(tip_at(campaign, pose, q, lines, mean[0], sd[0]), simulated=simulated), pose
+    q, lines = campaign.stands(pose), campaign.frequency_lines
+    mean, sd = campaign.frf_at(q, lines)
+    tip = tip_at(campaign, str(pose), q, lines, mean[0], sd[0])
+    return replace(tip, simulated=campaign.state.simulated), str(pose)
 
 
 def tip_at(

@@ -10,15 +10,13 @@ from planner.cli.answer import AsJson, FromNames, refusals, respond, warn
 from planner.cli.checking import check
 from planner.cli.comparison import compare
 from planner.cli.couple import couple
-from planner.cli.diagnosis import diagnose
 from planner.cli.documentation import manual, schema
 from planner.cli.exports import export, report
-from planner.cli.identification import identify
+from planner.cli.identification import diagnose, identify
 from planner.cli.modes import modes
 from planner.cli.new import new
-from planner.cli.proving import prove
 from planner.cli.stability import stability
-from planner.cli.study import study
+from planner.cli.study import prove, study
 from planner.errors import InputError
 from planner.words import command
 
@@ -79,10 +77,10 @@ def import_(
     Example: planner import cell7 exports/P001
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli.progress import reporting
+    from planner.cli.progress import telling
     from planner.report.imports import ImportedPoses
 
-    with reporting("importing", quiet=as_json) as progress:
+    with telling("importing", quiet=as_json) as progress:
         campaign = Campaign(directory)
         reports = campaign.import_paths(tuple(paths), pose, progress, from_names)
     answer = ImportedPoses.of(reports, campaign.state.simulated)
@@ -178,16 +176,16 @@ def predict(
     Example: planner predict cell7 poses.csv --out frfs.npz
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli.progress import reporting
+    from planner.cli.progress import telling
     from planner.recording.folder import read_poses
     from planner.report.predictions import predictions
 
-    with reporting("predicting", quiet=as_json) as progress:
+    with telling("predicting", quiet=as_json) as progress:
         campaign = Campaign(directory)
         cell, rows = campaign.cell, read_poses(poses, campaign.cell.robot.joints)
         q = [cell.check_pose(row.joints_deg, f"{poses}, row {row.row}") for row in rows]
         npz = out or campaign.directory / "predictions" / f"{poses.stem}.npz"
-        progress(f"{len(rows)} poses")
+        progress(f"{len(rows)} poses", 0.0)
         answer = predictions(campaign, [row.pose for row in rows], q, npz)
     return respond(answer, as_json)
 
@@ -208,10 +206,10 @@ def replay(
     Example: planner replay cell7 --rrd cell7.rrd
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli.progress import reporting
+    from planner.cli.progress import telling
     from planner.report.replayed import replayed
 
-    with reporting("replaying", quiet=as_json) as progress:
+    with telling("replaying", quiet=as_json) as progress:
         answer = replayed(Campaign(directory), until, rrd, viewer, progress, acquisition)
     if not answer.reproduced:
         warn("The log was not reproduced; see the steps that differ.")
@@ -238,9 +236,9 @@ def demo(
 
     Example: planner demo --measurements 6
     """
-    from planner.cli.progress import reporting
+    from planner.cli.progress import telling
     from planner.demo import play
 
-    with reporting("playing", quiet=as_json) as progress:
+    with telling("playing", quiet=as_json) as progress:
         answer = play(directory, measurements, viewer, progress)
     return respond(answer, as_json)

@@ -24,7 +24,7 @@ def check(
 
     Example: planner check robot/robot.toml --plot pictures
     """
-    from planner.campaign.check import examine_robot
+    from planner.campaign.cell import examine_robot
     from planner.report.plot_files import Pictures
     from planner.report.robot_check import RobotCheckReport
 

@@ -50,7 +50,7 @@ def compare(
     """
     from planner.campaign import store
     from planner.campaign.material import material
-    from planner.cli.progress import bars
+    from planner.cli.progress import telling
     from planner.compare.bench import assemble, decide
     from planner.compare.resume import conduct, recorded
     from planner.compare.tasks import Study
@@ -66,7 +66,7 @@ def compare(
         campaign = given.campaign.directory / store.CONFIG
     config = decide(loaded, listed, campaign, simulation)
     folder = out or _cache_folder()
-    with bars(quiet=as_json) as progress:
+    with telling("comparing", quiet=as_json) as progress:
         poses = recorded(listed, loaded.joints, config.modes, workers, progress)
         bench, remarks = assemble(loaded, config, poses)
         study = Study.plan(bench, strategies, repeats, initial, budget)

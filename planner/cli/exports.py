@@ -27,11 +27,11 @@ def report(
     Example: planner report cell7 --out cell7.html
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli.progress import reporting
+    from planner.cli.progress import telling
     from planner.report.campaign_report import write_report
 
-    with reporting("writing", quiet=as_json) as progress:
-        progress("the report")
+    with telling("writing", quiet=as_json) as progress:
+        progress("the report", 0.0)
         answer = write_report(Campaign(directory), out, diagnosis)
     return respond(answer, as_json)
 

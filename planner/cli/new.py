@@ -44,8 +44,8 @@ def new(
     Example: planner new cell7 --urdf arm.urdf --mass-kg 1068 --payload-kg 210
     """
     from planner.campaign.campaign import Campaign
-    from planner.campaign.example import write_example
     from planner.campaign.from_urdf import StatedMasses, new_from_urdf
+    from planner.campaign.store import write_example
     from planner.report.campaign_acts import ExampleFolder, NewCampaign
 
     if (robot is not None) + example + (urdf is not None) != 1:

@@ -1,10 +1,12 @@
 """Progress on stderr: bars where somebody is looking, else a line now and then."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from planner.progress import Tell
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,50 +23,27 @@ def console(quiet: bool, stderr: bool = True):
 
 
 @contextmanager
-def reporting(verb: str, quiet: bool) -> Iterator[Callable[[str], None]]:
-    """A function that shows what is being done, with the time it has taken so far."""
-    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-    with _shown(columns, quiet) as bar:
-        task = bar.add_task(verb, total=None)
-        yield lambda text: bar.update(task, description=f"{verb}: {text}")
-
-
-@contextmanager
-def bars(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """A function (what, done, of how many) that moves a bar for each thing that is counted."""
+def telling(verb: str, quiet: bool) -> Iterator[Tell]:
+    """A function that shows what is being done, and as a bar the share (0 to 1) that is done."""
     from rich.progress import (
         BarColumn,
-        MofNCompleteColumn,
+        SpinnerColumn,
+        TaskProgressColumn,
         TextColumn,
         TimeElapsedColumn,
-        TimeRemainingColumn,
     )
 
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
-    times = (TimeElapsedColumn(), TimeRemainingColumn())
-    shown: dict[str, Any] = {}
-    with _shown((*columns, *times), quiet) as progress:
-
-        def tell(what: str, done: int, total: int) -> None:
-            if what not in shown:
-                shown[what] = progress.add_task(what, total=total)
-            progress.update(shown[what], completed=done)
-
-        yield tell
-
-
-@contextmanager
-def counting(quiet: bool) -> Iterator[Callable[[str, float], None]]:
-    """A function that shows what is being done and which share (0 to 1) is, as a bar."""
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
-
-    columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
+    columns = (SpinnerColumn(), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
                TextColumn("{task.description}", markup=False))  # fmt: skip
     with _shown(columns, quiet) as bar:
-        task = bar.add_task("starting", total=1.0)
-        yield lambda text, share: bar.update(task, description=text, completed=share)
+        task = bar.add_task(verb, total=None)
+
+        def tell(text: str, share: float) -> None:
+            if share > 0:  # until then nobody knows how long it takes
+                bar.update(task, total=1.0)
+            bar.update(task, description=f"{verb}: {text}", completed=share)
+
+        yield tell
 
 
 @contextmanager
@@ -91,6 +70,5 @@ def _tell(bar: "Progress", screen: "Console", done: Event, started: float) -> No
     while not done.wait(wait):
         wait = min(2 * wait, LAST_S)
         for task in bar.tasks[-1:]:
-            of = f", {task.completed:g} of {task.total:g}" if (task.total or 0) > 1 else ""
-            of = f", {100 * task.completed:.0f} %" if task.total == 1 else of
+            of = f", {100 * task.completed:.0f} %" if task.total else ""
             screen.print(f"{task.description}{of} ({time.monotonic() - started:.0f} s)")

@@ -8,8 +8,6 @@ import typer
 from planner.cli.answer import AsJson, FromNames, respond
 from planner.errors import InputError
 
-MAP_POSES, WAY_POSES = 40, 12
-
 
 def stability(
     source: Annotated[
@@ -69,7 +67,7 @@ def stability(
     Example: planner stability cell7 --pose P001 --cut cut.toml --plot pictures
     """
     from planner.campaign.cut_source import Asked
-    from planner.cli.progress import counting
+    from planner.cli.progress import telling
     from planner.milling.cut import load_cut
     from planner.report.plot_files import Pictures
 
@@ -78,18 +76,16 @@ def stability(
     )
     pictures = Pictures(plot, format_, rrd)
     check(path, origin, turns, poses, map_, pose)
-    with counting(quiet=as_json) as tell:
+    with telling("computing", quiet=as_json) as tell:
         if map_:
             from planner.report.stability_map import map_report
 
-            return respond(
-                map_report(asked, poses or MAP_POSES, load_cut(cut), pictures, tell), as_json
-            )
+            return respond(map_report(asked, poses or 40, load_cut(cut), pictures, tell), as_json)
         if path is not None or pose == "all":
             from planner.campaign.toolpath_poses import Way
             from planner.report.stability_path import path_report
 
-            way = Way(path, origin, poses or WAY_POSES, turns)
+            way = Way(path, origin, poses or 12, turns)
             return respond(path_report(asked, way, load_cut(cut), pictures, tell), as_json)
         from planner.report.stability_lobes import stability_of
 

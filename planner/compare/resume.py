@@ -1,6 +1,6 @@
 """Conducting a comparison: what was done before is taken up, the rest done and kept at once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,10 @@ from planner.compare.run import run
 from planner.compare.tasks import Run, Study, Task
 from planner.dataset.visits import Recording
 from planner.errors import InputError
+from planner.progress import Tell
 from planner.recording.joints import JointUnits
 
 RUNS = "runs"
-Progress = Callable[[str, int, int], None]  # what is counted, done, of how many
 
 
 def recorded(
@@ -25,18 +25,18 @@ def recorded(
     joints: JointUnits,
     table: ModesTable,
     workers: int,
-    progress: Progress,
+    progress: Tell,
 ) -> tuple[PoolPose, ...]:
     """All poses of recordings; what was found of them before is taken up."""
     files = pool.poses_of(recordings, joints, table)
     found = {i: pool.make(None, f) for i, f in enumerate(files) if pool.kept(f)}
     todo = [i for i in range(len(files)) if i not in found]
-    progress("poses", len(found), len(files))
+    _count(progress, "poses", len(found), len(files))
     for k, pose in processes.each(pool.make, None, [files[i] for i in todo], workers):
         if isinstance(pose, Failure):
             raise InputError(f"Pose {files[todo[k]].pose}: {pose.reason}")
         found[todo[k]] = pose
-        progress("poses", len(found), len(files))
+        _count(progress, "poses", len(found), len(files))
     return tuple(found[i] for i in range(len(files)))
 
 
@@ -46,7 +46,7 @@ def conduct(
     folder: Path,
     scheduler: str | None,
     workers: int,
-    progress: Progress,
+    progress: Tell,
 ) -> tuple[dict[Task, Run | Failure], tuple[str, ...]]:
     """Every run of a study, and remarks on kept ones that were damaged and are done again.
 
@@ -58,13 +58,13 @@ def conduct(
     found: dict[Task, Run | Failure] = {task: run for task, run in read.items() if run}
     todo = [task for task in study.tasks if task not in found]
     damaged = [paths[task].name for task in todo if paths[task].exists()]
-    progress("runs", len(found), len(paths))
+    _count(progress, "runs", len(found), len(paths))
     if todo:
         for k, answer in _spread(bench, todo, scheduler, workers):
             if isinstance(answer, Run):
                 write_checked(paths[todo[k]], answer)
             found[todo[k]] = answer
-            progress("runs", len(found), len(paths))
+            _count(progress, "runs", len(found), len(paths))
     return {task: found[task] for task in study.tasks}, _told(damaged, kept)
 
 
@@ -72,6 +72,10 @@ def _spread(bench: Bench, tasks: list[Task], scheduler: str | None, workers: int
     if scheduler is not None:
         return cluster.each(run, bench, tasks, scheduler)
     return processes.each(run, bench, tasks, workers)
+
+
+def _count(tell: Tell, what: str, done: int, total: int) -> None:
+    tell(f"{what}, {done} of {total}", done / max(total, 1))
 
 
 def _told(damaged: list[str], folder: Path) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 from planner import content_hash
 from planner.campaign.acquisition_inputs import cost_of
 from planner.campaign.build import build
-from planner.campaign.fit_memory import FitMemory
+from planner.campaign.low_fidelity import Recall, in_memory
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
@@ -49,9 +49,9 @@ def play(bench: Bench, used: list[int], then: list[int], task: Task) -> Run:
     """A run: first the poses `used`, then those of `then`, then what the strategy proposes."""
     wall, process = time.perf_counter(), time.process_time()
     cell = cell_of(bench)
-    counts, scores, memory = [], [], FitMemory()
+    counts, scores, recall = [], [], in_memory()
     while True:
-        model, state = _fitted(bench, cell, used, task.seed, memory)
+        model, state = _fitted(bench, cell, used, task.seed, recall)
         counts.append(len(used))
         scores.append(_judged(bench, model, used))
         if len(used) == task.budget:
@@ -85,12 +85,12 @@ def planned(cell: PoolCell, task: Task) -> list[int]:
 
 
 def _fitted(
-    bench: Bench, cell: PoolCell, used: list[int], seed: int, memory: FitMemory
+    bench: Bench, cell: PoolCell, used: list[int], seed: int, recall: Recall
 ) -> tuple[Model, CampaignState]:
     measured = [bench.measurements[i] for i in used]
     frfs = {bench.measurements[i].pose: bench.frfs[i] for i in used}
     state = CampaignState(measurements={m.pose: m for m in measured}, events=seed)
-    return build(cell, state, lambda m, _: frfs[m.pose], memory=memory), state
+    return build(cell, state, lambda m, _: frfs[m.pose], recall=recall), state
 
 
 def _judged(bench: Bench, model: Model, used: list[int]) -> Score:

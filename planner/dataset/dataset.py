@@ -1,32 +1,50 @@
 """Recordings read, screened and in order: what every analysis of several poses is given."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
 from planner.dataset.level_columns import Column, column
 from planner.dataset.measure import MeasuredPose
-from planner.dataset.recordings import recordings_in
 from planner.dataset.store import Store, user_store
-from planner.dataset.visits import PoseEntry, Recording, Stay, Visit, stays_of
+from planner.dataset.visits import PoseEntry, Recording, Stay, Visit, recordings_in, stays_of
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.modal.modes import ModalModel
+from planner.progress import Tell, quietly
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.joints import JointUnits
-from planner.recording.points import SENSOR, TCP, PointNames, together
+from planner.recording.points import SENSOR, TCP, together
 from planner.recording.records import Hit
 
 # Rate (1/s) of an exponential window that is laid over all records: decays that they cut off are
 # then too small to matter, and FRFs hold at s = iω + rate.
 LAID = 2.0
 
-Progress = Callable[[str], None]
+
+class Recorded(Protocol):
+    """What recordings are read with of a robot."""
+
+    @property
+    def joints(self) -> JointUnits:
+        """Names and units of its joints, in the order of angles."""
+        ...
+
+    @property
+    def points(self) -> Any:
+        """`PointNames`: where it may be hit and heard."""
+        ...
+
+    @property
+    def config(self) -> Any:
+        """What robot.toml says; its `band_hz` is needed."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,35 +68,33 @@ class Dataset:
     @classmethod
     def read(
         cls,
-        folder: Path,
-        joint_names: JointUnits | Sequence[str],
-        band_hz: tuple[float, float],
+        folder: Path | str,
+        robot: "Recorded",
+        band_hz: tuple[float, float] | None = None,
         *,
         window_rate_1_s: float = 0.0,
-        progress: Progress = lambda text: None,
+        progress: Tell = quietly,
         store: Store | None = None,
-        points: PointNames | None = None,
     ) -> "Dataset":
         """Read and screen all hits of a folder as the analyser wrote it.
 
         Args:
             folder: Holds recordings.csv and the files that it names, or subfolders that do; or
                 the table itself.
-            joint_names: Of the robot, in the order of the angles; `Robot.joints` where some of
-                them slide.
-            band_hz: Which the hits have to excite, and in which FRFs are wanted.
+            robot: Whose joints the table has, and where it may be hit and heard.
+            band_hz: Which the hits have to excite, and in which FRFs are wanted; by default that of
+                robot.toml.
             window_rate_1_s: Of an exponential window that the analyser laid over all channels.
-            progress: Is told which pose is read.
+            progress: Is told which pose is read, and which share (0 to 1) of them is.
             store: Where FRFs and modes are looked up and kept; by default the user's.
-            points: Where the robot may be hit and heard (`Robot.points`); none: at the tool alone.
 
         Raises:
             InputError: The table is wrong.
             RefusedError: No pose has a hit that can be used.
         """
         return cls.of(
-            recordings_in(folder, JointUnits.of(joint_names), points),
-            band_hz,
+            recordings_in(Path(folder), robot.joints, robot.points),
+            band_hz or robot.config.band_hz,
             window_rate_1_s=window_rate_1_s,
             progress=progress,
             store=store,
@@ -92,7 +108,7 @@ class Dataset:
         band_hz: tuple[float, float],
         *,
         window_rate_1_s: float = 0.0,
-        progress: Progress = lambda text: None,
+        progress: Tell = quietly,
         store: Store | None = None,
         name: str = "The recordings",
     ) -> "Dataset":
@@ -106,7 +122,7 @@ class Dataset:
             by_pose.setdefault(recording.pose, []).append(recording)
         entries = []
         for number, (pose, group) in enumerate(by_pose.items()):
-            progress(f"reading pose {pose}, {number} of {len(by_pose)} done")
+            progress(f"reading pose {pose}", number / len(by_pose))
             sources = tuple(recording.source for recording in group)
             measured = MeasuredPose(sources, band_hz, window_rate_1_s=window_rate_1_s, store=store)
             _ = measured.averaged
@@ -158,6 +174,11 @@ class Dataset:
             stays=tuple(Stay(i, (0,), v.q, v.order) for i, v in enumerate(given)),
             window_rate_1_s=rate,
         )
+
+    def __repr__(self) -> str:
+        low, high = self.band_hz
+        poses, visits = len(self.entries), len(self.stays)
+        return f"Dataset({poses} poses, {visits} visits, {low:g} to {high:g} Hz)"
 
     # -- by pose -------------------------------------------------------------------------------
 

@@ -14,7 +14,6 @@ from planner.recording.records import Hit
 
 LINES = 48  # of each hit, at most: four numbers a hit are told from 144 complex values
 DROP = 0.1  # of a pulse's force spectrum, where it ceases to excite: 20 dB
-CHANNELS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +118,7 @@ def hits_of(
 
 def no_columns() -> HitColumns:
     """Of no hit."""
-    empty, h = np.zeros(0), np.zeros((0, CHANNELS, 0))
+    empty, h = np.zeros(0), np.zeros((0, 3, 0))
     return HitColumns(
         empty.astype(int), empty.astype(int), empty, empty, h.astype(complex), h,
         np.zeros((0, 0)), LAID, np.inf,

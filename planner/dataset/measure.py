@@ -222,14 +222,14 @@ def program() -> str:
 
 def _digest(sources: tuple[Source, ...]) -> str:
     """Of all files' content; a file that cannot be read counts as it is named nowhere else."""
-    from planner.recording.read import content
+    from planner.recording.read import digest
 
     contents = []
     for source in sources:
         try:
-            contents.append(content(source.path))
+            contents.append(digest(source.path))
         except (OSError, InputError) as error:
-            contents.append(f"{source.path}: {error}".encode())
+            contents.append(f"{source.path}: {error}")
     return content_hash.digest(*contents)
 
 

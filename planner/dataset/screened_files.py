@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from planner.errors import AxisNotStatedError, InputError, PlannerError
 from planner.recording.points import StatedPoints
-from planner.recording.records import FrfRecord, Hit, PoseRow, Record
+from planner.recording.records import NOTICED, Fault, FrfRecord, Hit, PoseRow, Record
 from planner.words import counted
 
 RecordT = TypeVar("RecordT", bound=Record)
@@ -228,13 +228,20 @@ def read_one(
     ]
     told = tuple(f.text for _, faults in judged for f in faults if not f.refuse)
     simulated, axis = any(hit.simulated for hit in found), found[0].axis
-    reasons = [" ".join(f.text for f in faults if f.refuse) for _, faults in judged]
+    reasons = [_why_refused(faults) for _, faults in judged]
     if all(reasons):
         return FileVerdict(source, False, " ".join(reasons), axis, simulated, told), (), []
     good = [hit for (hit, _), reason in zip(judged, reasons, strict=True) if not reason]
     hits = tuple(replace(hit, repeat=source.repeat or hit.repeat) for hit in good)
     refused = _refused_hits(source, reasons) if any(reasons) else ()
     return FileVerdict(source, True, "", axis, simulated, told, False, refused), hits, []
+
+
+def _why_refused(faults: Sequence[Fault]) -> str:
+    """Why a hit is refused, with what its reader noticed; "" where it is good."""
+    noticed = [f.text for f in faults if f.kind == NOTICED]
+    reasons = [f.text for f in faults if f.refuse]
+    return " ".join((*reasons, *noticed)) if reasons else ""
 
 
 def _refused_hits(source: Source, reasons: list[str]) -> tuple[tuple[str, str], ...]:

@@ -1,12 +1,13 @@
 """Results kept on disk under a hash of all that they depend on: computed once, found again.
 
 The store is shared by all commands and processes of a user. An entry is a checksum and what it
-covers: the key and the result. One that is damaged, half written or of another key is as good as
-none, and a store that cannot be written only costs time.
+covers: the key and the result, pickled, so that it comes back bit by bit. One that is damaged, half
+written or of another key is as good as none, and a store that cannot be written only costs time.
 """
 
 import hashlib
 import os
+import pickle
 import tempfile
 import time
 from collections.abc import Callable
@@ -15,17 +16,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-import msgspec
-import numpy as np
-
 from planner import cache_folder
 
-MOST_BYTES = 512 * 1024 * 1024  # about a thousand poses; then the entries unused longest go
+MOST_BYTES = 768 * 1024 * 1024  # a thousand poses, fifty models; then those unused longest go
 LEFT_SHARE = 0.8  # of MOST_BYTES that is left when some went, so that the next ones fit
 LONGEST_UNUSED_S = 180 * 24 * 3600.0
 WRITING_S = 3600.0  # a part older than this belongs to a process that was stopped
 LOOK_EVERY = 64  # entries written by a process, after which it looks at the size again
-DIGEST_BYTES = 32
 
 T = TypeVar("T")
 
@@ -42,7 +39,7 @@ class Store:
 
         Args:
             key: Hash of all that the result depends on, the kind of result among it.
-            kind: Dataclass that msgspec can encode; arrays are allowed.
+            kind: Class of the result.
             make: Makes the result; what it raises is raised, and nothing is kept.
         """
         found = self.get(key, kind)
@@ -60,26 +57,32 @@ class Store:
             data = path.read_bytes()
         except OSError:
             return None
-        body = data[DIGEST_BYTES:]
-        if data[:DIGEST_BYTES] != _checksum(key, body):
+        body = data[32:]
+        if data[:32] != _checksum(key, body):
             return None
         try:
-            found = msgspec.msgpack.decode(body, type=kind, dec_hook=_decoded)
-        except (msgspec.MsgspecError, ValueError, TypeError, KeyError, NotImplementedError):
+            found = pickle.loads(body)  # this user's own file, its checksum verified
+        except Exception:  # whatever a library makes of it, it is made again
             return None
         with suppress(OSError):
             os.utime(path)  # entries in use are the last to go
-        return found
+        return found if isinstance(found, kind) else None
 
     def has(self, key: str) -> bool:
         """Whether there is an entry, whole or not."""
         return self.folder is not None and (self.folder / key).is_file()
 
     def put(self, key: str, result: Any) -> None:
-        """Keep a result; another process sees all of it or nothing."""
+        """Keep a result; another process sees all of it or nothing.
+
+        One that a library cannot pickle only costs the time to make it again.
+        """
         if self.folder is None:
             return
-        body = msgspec.msgpack.encode(result, enc_hook=_encoded)
+        try:
+            body = pickle.dumps(result, pickle.HIGHEST_PROTOCOL)
+        except (pickle.PicklingError, TypeError, AttributeError, RuntimeError):
+            return
         part = None
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -120,7 +123,7 @@ class Store:
 def user_store() -> Store:
     """The store of this user; one that keeps nothing where there is no home."""
     try:
-        return _store_in(cache_folder.folder("poses"))
+        return _store_in(cache_folder.folder("results"))
     except RuntimeError:
         return Store(None)
 
@@ -133,23 +136,3 @@ def _store_in(folder: Path) -> Store:
 
 def _checksum(key: str, body: bytes) -> bytes:
     return hashlib.sha256(key.encode() + b"\n" + body).digest()
-
-
-def _encoded(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        data = np.ascontiguousarray(value)
-        return {"dtype": data.dtype.str, "shape": data.shape, "data": data.tobytes()}
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, Path):
-        return str(value)
-    raise NotImplementedError(f"{type(value).__name__} cannot be kept")
-
-
-def _decoded(kind: type, value: Any) -> Any:
-    if kind is np.ndarray:
-        flat = np.frombuffer(value["data"], np.dtype(value["dtype"]))
-        return flat.reshape(value["shape"]).copy()
-    if kind is Path:
-        return Path(value)
-    raise NotImplementedError(f"{kind.__name__} cannot be read")

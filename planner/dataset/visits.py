@@ -1,14 +1,20 @@
 """Files by pose and by visit: where a recording was made, and which of them belong together."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source
+from planner.errors import InputError
+from planner.recording.folder import TABLE, read_recordings
+from planner.recording.joints import JointUnits
+from planner.recording.points import PointNames
 from planner.recording.records import Hit
 
 
@@ -66,4 +72,53 @@ def stays_of(recordings: Sequence[Recording]) -> tuple[Stay, ...]:
         q = np.mean([recording.q for recording in run], axis=0)
         order = place / max(len(runs) - 1, 1)
         found.append(Stay(entry, tuple(range(first, files[pose])), q, order))
+    return tuple(found)
+
+
+def table_folders(path: Path) -> tuple[Path, ...]:
+    """Folders with a recordings.csv: of a table its own, a folder itself, or its subfolders.
+
+    P2 comes before P10. None where there is no table; hidden folders are passed over.
+    """
+    if path.name == TABLE or (path / TABLE).is_file():
+        return (path.parent if path.name == TABLE else path,)
+    found = (table.parent.relative_to(path) for table in path.rglob(TABLE))
+    shown = (folder for folder in found if not any(part[0] == "." for part in folder.parts))
+    return tuple(path / folder for folder in sorted(shown, key=_numbered))
+
+
+def _numbered(folder: Path) -> list[tuple[str, int]]:
+    """Of a name each text with the number that follows it."""
+    parts = re.findall(r"(\D*)(\d*)", folder.as_posix())
+    return [(text, int(digits or 0)) for text, digits in parts]
+
+
+def recordings_in(
+    path: Path, joints: JointUnits, points: PointNames | None = None
+) -> tuple[Recording, ...]:
+    """Every file that the tables at a path list, in the order of recording.
+
+    `path` is a folder with recordings.csv, the table itself, or a folder whose subfolders have one
+    each, whose order is then that of their names.
+    Raises InputError where there is no table, one is wrong, or two differ on where a pose was.
+    """
+    folders = table_folders(path) if path.exists() else (path,)
+    if not folders:
+        raise InputError(
+            f"{path} has no {TABLE}, nor has a folder in it; add one that says of each file at "
+            f"which pose it was recorded and how the joints stood."
+        )
+    found: list[Recording] = []
+    first: dict[str, tuple[Path, tuple[float, ...]]] = {}
+    for folder in folders:
+        for row in read_recordings(folder, joints, points).rows:
+            where, stood = first.setdefault(row.pose, (folder / TABLE, row.joints_deg))
+            if off := joints.apart(stood, row.joints_deg):
+                raise InputError(
+                    f"{folder / TABLE}, row {row.row}: pose {row.pose} has a joint {off} away from "
+                    f"where {where} has it; give another pose another name."
+                )
+            if row.file:
+                q = joints.internal(row.joints_deg)
+                found.append(Recording(row.pose, q, Source.of(row)))
     return tuple(found)

@@ -1,16 +1,16 @@
 """The point where one more sensor would best tell apart what a diagnosis leaves tied."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import msgspec
 import numpy as np
 
-from planner.design.discrimination import MOST_CANDIDATES, separation
-from planner.design.next_hit import as_ratio, in_words
-from planner.diagnosis.diagnose import Explained
+from planner.design.discrimination import Tied, separation
+from planner.design.next_hit import as_ratio, evenly, in_words
+from planner.diagnosis.diagnose import Diagnosis
 from planner.recording.joints import JointUnits
-from planner.recording.points import SENSOR, TCP, Layout
+from planner.recording.points import SENSOR, TCP
 
 MOST_POSES = 12  # at which the points are compared, evenly taken from those there are
 # A sensor is only worth being moved where it tells so much more than the same hit without it;
@@ -47,32 +47,24 @@ class ExtraSensor:
         )
 
 
-def extra_sensor(explained: Explained, offered: Mapping[str, np.ndarray]) -> ExtraSensor | None:
+def extra_sensor(
+    found: Diagnosis, tied: Sequence[Tied], offered: Mapping[str, np.ndarray]
+) -> ExtraSensor | None:
     """At which point of robot.toml that no sensor was at one would part most.
 
     Hits are at the poses that were measured or are `offered`, by name: joint angles (dof,) in rad.
     None where nothing is tied, no such point is stated, or none tells much more than the sensors
     that there were.
     """
-    recorded, found = explained.recorded, explained.judged.diagnosis
-    tied = [c for c in found.undecided if c.fit is not None][:MOST_CANDIDATES]
-    problem = found.problem
-    there = tuple(dict.fromkeys((SENSOR, *problem.layout.sensors)))
-    joints, named = problem.simulation.robot.joints, problem.simulation.robot.points
-    places = {named.sensor(name) for name in named.axes} - {*there, TCP}
+    recorded, robot = found.recorded, found.search.prior.repertoire.stiff.robot
+    there = found.best.misfit.data.measured.layout.sensors
+    places = {robot.points.sensor(name) for name in robot.points.axes} - {*there, SENSOR, TCP}
     if len(tied) < 2 or not places:
         return None
-    poses = {**dict(zip(recorded.poses, recorded.q, strict=True)), **offered}
-    kept = np.unique(np.linspace(0, len(poses) - 1, MOST_POSES).round().astype(int))
-    names, q = [list(poses)[i] for i in kept], np.array([*poses.values()])[kept]
-    fits, shares = [c.fit for c in tied if c.fit is not None], [c.probability for c in tied]
-
-    def told(sensors: tuple[str, ...]) -> np.ndarray:
-        layout = Layout((TCP,), sensors)
-        return np.nan_to_num(separation(problem, fits, shares, q, found.temper, layout))
-
-    without = float(told(there).max())
-    each = {place: told((*there, place)) for place in sorted(places)}
+    measured = dict(zip(recorded.poses, recorded.q, strict=True))
+    names, q = evenly({**measured, **offered}, MOST_POSES)
+    without = float(separation(tied, q).max())
+    each = {place: separation(tied, q, (place,)) for place in sorted(places)}
     best = max(each, key=lambda place: each[place].max())
     most = float(each[best].max())
     if most < without + WORTH:
@@ -81,10 +73,10 @@ def extra_sensor(explained: Explained, offered: Mapping[str, np.ndarray]) -> Ext
     return ExtraSensor(
         best,
         names[pose],
-        tuple(round(float(v), 3) for v in joints.shown(q[pose])),
+        tuple(round(float(v), 3) for v in robot.joints.shown(q[pose])),
         "xyz"[axis],
         most,
         without,
-        tuple(in_words(c.places, c.probability) for c in tied),
-        joints.declared,
+        tuple(in_words(t.places, t.probability) for t in tied),
+        robot.joints.declared,
     )

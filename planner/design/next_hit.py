@@ -6,13 +6,12 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from planner.design.discrimination import DiscriminatingHit, best_hit
-from planner.design.law_discrimination import best_forces, undecided
-from planner.diagnosis.diagnose import Explained
-from planner.diagnosis.laws.law_at_joints import Laws
+from planner.design.discrimination import Tied, separation
+from planner.diagnosis.diagnose import Diagnosis
 from planner.recording.joints import JointUnits
 from planner.words import probable
 
+MOST_POSES = 40  # of those offered, evenly taken
 MOST_ODDS = 1e4  # what is said of a robot is never surer
 
 
@@ -44,64 +43,37 @@ class NextHit:
         )
 
 
-def next_hit(explained: Explained, offered: Mapping[str, np.ndarray]) -> NextHit | None:
+def next_hit(
+    found: Diagnosis, tied: Sequence[Tied], offered: Mapping[str, np.ndarray]
+) -> NextHit | None:
     """The best hit at one of the `offered` poses, by name: joint angles (dof,) in rad.
 
     None if nothing is tied or no pose is offered.
     """
-    recorded = explained.recorded
-    if not offered:
+    if not offered or len(tied) < 2:
         return None
-    for finding, _ in explained.whole.established:
-        laws = finding.laws and undecided(finding.laws)
-        if laws and len(laws.candidates) > 1:
-            return _of_laws(finding.at, laws, recorded.level_n, offered)
-    found = explained.judged.diagnosis
-    tied = [(c.fit, c.probability) for c in found.undecided if c.fit is not None]
-    if len(tied) < 2:
-        return None
-    fits, shares = [f for f, _ in tied], [p for _, p in tied]
-    best = best_hit(found.problem, fits, shares, _angles(offered), found.temper)
-    # Linear candidates answer in proportion: the harder, the less noise.
-    hardest = [float(recorded.level_n[-1])] if recorded.visits else []
-    names = [in_words(c.places, c.probability) for c in found.undecided if c.fit is not None]
-    return _at(best, hardest, offered, names, found.problem.simulation.robot.joints)
-
-
-def _of_laws(
-    at: str | None,
-    laws: Laws,
-    level_n: np.ndarray,
-    offered: Mapping[str, np.ndarray],
-) -> NextHit:
-    best = best_forces(laws, float(level_n[0]), float(level_n[-1]), _angles(offered))
-    both = zip(laws.candidates, laws.probability, strict=True)
-    names = [in_words([(c.law.effect, at)], p) for c, p in both]
-    joints = laws.problem.simulation.robot.joints
-    return _at(best.hit, list(best.force_n), offered, names, joints)
-
-
-def _angles(offered: Mapping[str, np.ndarray]) -> np.ndarray:
-    return np.array(list(offered.values()))
-
-
-def _at(
-    best: DiscriminatingHit,
-    force_n: list[float],
-    offered: Mapping[str, np.ndarray],
-    between: list[str],
-    joints: JointUnits,
-) -> NextHit:
-    name, q = list(offered.items())[best.pose]
+    names, q = evenly(offered, MOST_POSES)
+    gain = separation(tied, q)
+    pose, axis = map(int, np.unravel_index(np.argmax(gain), gain.shape))
+    # All explanations answer in proportion: the harder, the less noise.
+    hardest = [float(found.recorded.level_n[-1])] if found.recorded.visits else []
+    joints = found.search.prior.repertoire.stiff.robot.joints
     return NextHit(
-        pose=name,
-        joints_deg=tuple(round(float(v), 3) for v in joints.shown(q)),
-        hit="xyz"[best.axis],
-        force_n=tuple(_at_most(force) for force in force_n),
-        log_odds=best.log_odds,
-        between=tuple(between),
+        pose=names[pose],
+        joints_deg=tuple(round(float(v), 3) for v in joints.shown(q[pose])),
+        hit="xyz"[axis],
+        force_n=tuple(_at_most(force) for force in hardest),
+        log_odds=float(gain[pose, axis]),
+        between=tuple(in_words(t.places, t.probability) for t in tied),
         joint_units=joints.declared,
     )
+
+
+def evenly(poses: Mapping[str, np.ndarray], most: int) -> tuple[list[str], np.ndarray]:
+    """At most so many of named poses, evenly taken: names (n,), joint angles (n, dof) in rad."""
+    names = list(poses)
+    kept = np.unique(np.linspace(0, len(names) - 1, most).round().astype(int))
+    return [names[i] for i in kept], np.array([poses[names[i]] for i in kept])
 
 
 def _at_most(force_n: float) -> float:

@@ -77,7 +77,7 @@ DESCRIPTIONS = {
     "mutual_information": "the pose that tells most of all the others",
     "parameter_information": "the pose that makes predictions surest by what parameters leave open",
     "d_information": "the pose that tells most of the simulation's parameters themselves",
-    "mixed": "integrated_variance, by frequencies and the simulation's parameters together",
+    "mixed": "the pose that makes the workspace surest by frequencies and parameters together",
     "goal": "the pose that makes those of [goal] surest",
     "stability": "the pose that tells most of whether the cut of [cut] is stable",
     "random": "poses at random, without looking at the model",

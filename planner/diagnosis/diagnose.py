@@ -1,188 +1,250 @@
-"""The whole diagnosis in its order: chain, time and force levels; effects; both; a judgement."""
+"""The whole diagnosis: window and tone by signals, effects by FRFs, laws by force levels."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from planner.dataset.dataset import Dataset
+from planner.diagnosis.exponential_window import screen_window
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.held_out_check import JudgedDiagnosis, judge
-from planner.diagnosis.hidden_inertias import hidden_inertias
-from planner.diagnosis.law_beside_linear import beside, leaves_room, of_levels
-from planner.diagnosis.linear_diagnosis import Diagnosis, beside_another, diagnose
-from planner.diagnosis.misses_again import abstained, asked_again
-from planner.diagnosis.odd_pose import OddPose, odd_pose
-from planner.diagnosis.revoked_artefacts import taken_back
-from planner.diagnosis.screens import force_levels
-from planner.diagnosis.screens.drift import along_a_joint, returned
-from planner.diagnosis.screens.hit_errors import describe
-from planner.diagnosis.screens.screen import screen
-from planner.diagnosis.thresholds import (
-    ARTEFACTS,
-    DRIFT_CRUDE,
-    DRIFT_GAINS,
-    ODDS_OF_NOTHING,
-    PAYS,
-    SECOND_EFFECT,
-    UNKNOWN,
-)
-from planner.diagnosis.verdict import Together, linear_effects_apply, together
+from planner.diagnosis.levels import LevelLaw, Levels, level_laws
+from planner.diagnosis.search import FITTED, LEAST, Explored, Explorer
+from planner.diagnosis.tone import screen_tone
+from planner.diagnosis.verdict import NamedEffect, Verdict, judged
 from planner.dynamics.simulation import Simulation
-from planner.progress import Tell, within
+from planner.effects.parameters import CAD_INERTIAS
+from planner.effects.table import Repertoire, diagnosed
+from planner.errors import InputError
+from planner.fit.fitted import StructureFit, evidence_of, settled
+from planner.fit.held_out import set_aside
+from planner.fit.identify import TOO_SOFT
+from planner.fit.misfit import FrfMisfit
+from planner.fit.posterior import RobotPosterior
+from planner.fit.search import Search
+from planner.fit.structure import RobotPrior, RobotStructure
+from planner.frf.frf import Frf
+from planner.measurement.agreement import Similarity, similarity_of
+from planner.measurement.nuisances import Tolerances
+from planner.progress import Tell, quietly
+
+# Stated springs are known as well as datasheets have them (a fifth), dampers to a factor of two;
+# masses lie elsewhere by 8 % of a body's radius of gyration: cables, oil, covers.
+PRIORS = replace(CAD_INERTIAS, stiffness_factor=1.2, damping_factor=2.0, elsewhere=0.08)
+MOST_BETWEEN = 8  # poses between measured ones, at which sizes are told
+
+
+@dataclass(frozen=True)
+class ThreefoldSimilarity:
+    """Of the simulation as stated, refitted, and with what explains the recordings."""
+
+    nominal: Similarity
+    refitted: Similarity
+    explained: Similarity
+
+
+@dataclass(frozen=True)
+class Established:
+    """An effect that is there and matters: its place, how sure that is, by which share of |H| FRFs
+    change when it is left out (None: of the signals alone), parameters (value, sd, unit) by name,
+    and what to do."""
+
+    effect: str
+    at: str | None
+    probability: float
+    change: float | None
+    parameters: Mapping[str, tuple[float, float, str]]
+    text: str
 
 
 @dataclass(frozen=True, eq=False)
-class Explained:
-    """`recorded` as it was used, without artefacts; what explains it, judged; all candidates.
+class Diagnosis:
+    """What was `recorded` (as it was used), the fits, the verdict, and agreement with FRFs.
 
-    `odd` is the pose that is at odds with all others, where nothing explains the recordings.
+    `screened` is what signals tell without any model. `aside` are numbers of poses that the fits
+    behind `held_out` did not see.
     """
 
     recorded: Dataset
-    judged: JudgedDiagnosis
-    whole: Together
-    odd: OddPose | None = None
-
-
-def explain(
-    recorded: Dataset, simulation: Simulation, tell: Tell, *, chain: bool = True
-) -> Explained:
-    """What `simulation` lacks; hits are screened unless a window is stated that they carry.
-
-    Without `chain` its artefacts are left to the effects.
-    """
-    tell("looking at the measuring chain, the order in time and the force levels", 0.02)
-    as_recorded, screened = recorded, bool(recorded.visits) and not recorded.window_rate_1_s
-    looked = _looked_at(recorded, simulation, within(tell, 0.02, 0.6), screened, chain=chain)
-    if looked.doubtful:
-        other = _looked_at(recorded, simulation, within(tell, 0.6, 0.85), screened, chain=False)
-        looked = other if other.better_than(looked) else looked
-    recorded, missed, findings, found = looked.clean, looked.missed, looked.findings, looked.found
-    linear = linear_effects_apply(findings)
-    tell("looking for a nonlinear joint beside it", 0.85)
-    closer = within(tell, 0.85, 0.95)
-    again = asked_again(missed, findings, found, closer) if screened else None
-    if again is not None:
-        findings, recorded = again[0], replace(again[1], remarks=recorded.remarks)
-        linear = linear_effects_apply(findings)
-    both = beside(missed, findings, found, closer) if screened and again is None else None
-    if both is not None:
-        findings, found = both
-    elif not linear:
-        found = replace(found, best=found.refitted)
-    findings, wanted = abstained(findings)
-    recorded = replace(recorded, remarks=(*recorded.remarks, *wanted))
-    tell("judging at poses set aside", 0.95)
-    judged = judge(found)
-    counts = linear or both is not None or again is not None
-    if counts:
-        kept, found = taken_back(findings, judged.diagnosis)
-        if len(kept) < len(findings):
-            nothing_else = not any(e.at for e in found.candidates[0].effects)
-            if chain and screened and (nothing_else or _laws_of_levels(as_recorded, simulation)):
-                return explain(as_recorded, simulation, within(tell, 0.95, 1.0), chain=False)
-            said = "A correction was undone: by the explanation found there was no such artefact."
-            recorded = replace(recorded, remarks=(*recorded.remarks, said))
-        findings, judged = kept, replace(judged, diagnosis=found)
-    whole = together(findings, judged.diagnosis, counts)
-    if whole.verdict == "consistent":
-        said = hidden_inertias(judged.diagnosis)
-        recorded = replace(recorded, remarks=(*recorded.remarks, *said))
-    odd = None
-    if whole.verdict == "unexplained":
-        tell("looking for a pose at odds with the others", 0.97)
-        odd = odd_pose(judged.diagnosis, recorded.poses)
-    return Explained(recorded, judged, whole, odd)
-
-
-def _laws_of_levels(recorded: Dataset, simulation: Simulation) -> bool:
-    """Whether hits that were not corrected tell of a joint's law."""
-    return any(f.effect != UNKNOWN for f in force_levels.screen(recorded, simulation, single=True))
-
-
-@dataclass(frozen=True, eq=False)
-class _Looked:
-    """Recordings without artefacts and misses, and with the misses; what hits and FRFs say."""
-
-    clean: Dataset
-    missed: Dataset
-    findings: tuple[Finding, ...]
-    found: Diagnosis
+    search: Search
+    explored: Explored
+    verdict: Verdict
+    screened: tuple[Finding, ...]
+    levels: Levels | None
+    fitted: ThreefoldSimilarity
+    aside: tuple[int, ...]
+    held_out: ThreefoldSimilarity | None
 
     @property
-    def of_chain(self) -> tuple[Finding, ...]:
-        """Artefacts that only a simulation tells, not the force's own noise."""
+    def refitted(self) -> StructureFit:
+        """The robot as stated, refitted."""
+        return self.explored.plain
+
+    @property
+    def best(self) -> StructureFit:
+        """With what explains the recordings."""
+        return self.verdict.best
+
+    @cached_property
+    def robot(self) -> RobotPosterior:
+        """What is believed of the robot with what explains the recordings."""
+        return RobotPosterior.of(self.best)
+
+    @cached_property
+    def findings(self) -> tuple[Established, ...]:
+        """Of signals first, then of the fits, what changes most first."""
+        heard = [
+            Established(f.effect, f.at, 1.0, None, f.parameters, f.text) for f in self.screened
+        ]
+        told = self.verdict.verdict == "explained" and self.levels
+        laws = [
+            Established(
+                law.effect, law.at, self._share(law), law.share, law.parameters, _words(law)
+            )
+            for law in (told.laws if told else ())
+        ]
+        return *heard, *laws, *(self._established(e, e.probability) for e in self.verdict.findings)
+
+    def _share(self, law: LevelLaw) -> float:
+        place = law.effect, law.at
+        return sum(c.probability for c in self.verdict.candidates if place in c.places)
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """What is there and too small to matter, in words."""
+        told = [e for e in self.verdict.effects if not e.counts and e.nats > LEAST]
         return tuple(
-            f for f in self.findings if f.effect in ARTEFACTS and f.effect != "exponential_window"
+            f"Too small to matter ({100 * e.change:.2g} % of |H|): "
+            f"{self._established(e, e.probability).text}"
+            for e in told
         )
 
-    @property
-    def doubtful(self) -> bool:
-        """Whether an artefact was told by a simulation that even then lacks what matters."""
-        matters = self.found.problem.simulation.robot.config.diagnose.matters
-        return (
-            bool(self.of_chain)
-            and linear_effects_apply(self.findings)
-            and self.found.left > matters
-        )
-
-    def better_than(self, corrected: "_Looked") -> bool:
-        """Whether recordings as they are say more than `corrected` ones, artefacts being rare."""
-        rare = len(corrected.of_chain) * np.log(SECOND_EFFECT / ODDS_OF_NOTHING)
-        return linear_effects_apply(self.findings) and (
-            self.found.log_evidence > corrected.found.log_evidence + rare
-        )
+    def _established(self, named: NamedEffect, probability: float) -> Established:
+        effect = named.operator
+        values = self.robot.values(effect)
+        text = effect.words(values).replace(effect.at, effect.at.split("#")[0])
+        parameters = effect.parameters(values)
+        return Established(*effect.name, probability, named.change, parameters, text)
 
 
-def _looked_at(
-    recorded: Dataset, simulation: Simulation, tell: Tell, screened: bool, *, chain: bool = True
-) -> _Looked:
-    """What screens and FRFs say; without `chain` its artefacts are left to the effects."""
-    findings, missed = (), recorded
-    if screened:
-        early = within(tell, 0.0, 0.2)
-        recorded, missed, findings = _screened(recorded, simulation, early, chain)
-    crude = [f for f in findings if f.effect == "drift" and _doubtful(f, recorded)]
-    linear = linear_effects_apply([f for f in findings if f not in crude])
-    found = diagnose(
-        recorded.ended_frfs,
-        recorded.q,
-        simulation,
-        effects=None if linear or leaves_room(findings) else (),
-        bent=any(not f.slight for f in of_levels(findings)),
-        tell=within(tell, 0.2, 1.0),
+def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> Diagnosis:
+    """What `simulation` lacks, by recordings.
+
+    Raises InputError where nothing of the FRFs lies in robot.toml's band, or where the robot would
+    not stand at their poses.
+    """
+    tell("looking at the signals", 0.02)
+    window = None if recorded.window_rate_1_s else screen_window(recorded)
+    if window is not None:
+        recorded = recorded.corrected(recorded.visits, window.parameters["rate"][0])
+    robot = simulation.robot
+    search = searching(recorded.ended_frfs, recorded.q, simulation, _order(recorded))
+    stated = RobotStructure(search.prior)
+    if not FrfMisfit(stated, search.data(1), search.tolerances).possible(stated.mean):
+        raise InputError(TOO_SOFT)
+    steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
+    explored = Explorer(steps).explored()
+    screened = tuple(f for f in (window, screen_tone(recorded)) if f is not None)
+    heard = [(f.effect, f.at) for f in screened]
+    matters = robot.config.diagnose.matters
+    tell("comparing hits of different force", 0.85)
+    likeliest = max(explored.settled, key=evidence_of)
+    levels = level_laws(recorded, likeliest) if recorded.visits else None
+    tell("judging", 0.9)
+    verdict = judged(explored, matters, between(recorded.q), heard, levels)
+    aside = set_aside(recorded.q)
+    fits = explored.plain, verdict.best
+    return Diagnosis(
+        recorded,
+        search,
+        explored,
+        verdict,
+        screened,
+        levels,
+        _agreement(fits, fits),
+        aside,
+        _held_out(search, fits, aside) if aside else None,
     )
-    if found.verdict == "explained" and all(_rather(found, f) for f in crude):
-        # Poses that were visited one after the other differ, and so do times.
-        findings = tuple(f for f in findings if f not in crude)
-    if any(f.effect in ARTEFACTS for f in findings):
-        found = beside_another(found)
-    return _Looked(recorded, missed, findings, found)
 
 
-def _doubtful(drift: Finding, recorded: Dataset) -> bool:
-    """Whether what goes with the pose may be what is told as drift."""
-    swept = returned(recorded) is None and along_a_joint(recorded)
-    return swept or drift.misfit > DRIFT_CRUDE or drift.gain < DRIFT_GAINS
+def _words(law: LevelLaw) -> str:
+    """What to do about a joint's law."""
+    said = {
+        "friction": f"{law.at} rubs: check its lubrication, seals and brake.",
+        "backlash": f"{law.at} has play: check its gear and bearings.",
+        "nonlinear_stiffness": f"The stiffness of {law.at} goes with how far it swings: check the "
+        "gear's preload and what it is mounted on.",
+    }
+    return f"{said[law.effect]} Hits of different force differ by {100 * law.share:.2g} % of |H|."
 
 
-def _rather(found: Diagnosis, drift: Finding) -> bool:
-    """Whether linear effects explain clearly more than drift."""
-    if drift.misfit > DRIFT_CRUDE:
-        return drift.misfit > PAYS * found.best.per_value
-    return found.refitted.per_value / found.best.per_value > PAYS * drift.gain
+def searching(
+    frfs: Sequence[Frf], q: np.ndarray, simulation: Simulation, order: np.ndarray | None = None
+) -> Search:
+    """A search of the whole library, in which nothing is told that does not matter."""
+    robot = simulation.robot
+    prior = RobotPrior(Repertoire.of(simulation, PRIORS, diagnosed(simulation)))
+    return Search(
+        prior,
+        tuple(frfs),
+        np.atleast_2d(q),
+        robot.config.band_hz,
+        Tolerances.of(robot.config, robot.joints.slides),
+        order=order,
+        floor=robot.config.diagnose.matters,
+    )
 
 
-def _screened(
-    recorded: Dataset, simulation: Simulation, tell: Tell, chain: bool
-) -> tuple[Dataset, Dataset, tuple[Finding, ...]]:
-    """Recordings corrected for artefacts and misses, for artefacts alone, and what hits say."""
-    found = screen(recorded, simulation, tell, chain=chain)
-    artefacts = [f.effect.replace("_", " ") for f in found.findings if f.effect in ARTEFACTS]
-    said = [f"The recordings were corrected for: {', '.join(artefacts)}."] if artefacts else []
-    if found.hit_errors:
-        said.append(describe(found.hit_errors))
-    if not said:
-        return recorded, recorded, found.findings
-    clean = replace(found.clean, remarks=(*recorded.remarks, *said))
-    return clean, found.missed, found.findings
+def _order(recorded: Dataset) -> np.ndarray:
+    """How much of the campaign was over, 0 to 1, when each pose was hit first."""
+    first: dict[str, float] = {}
+    for visit in recorded.visits:
+        first.setdefault(visit.pose, visit.order)
+    order = np.array([first.get(pose, 0) for pose in recorded.poses], dtype=float)
+    return (order - order.min()) / max(float(np.ptp(order)), 1.0)
+
+
+def between(q: np.ndarray) -> np.ndarray:
+    """Poses half-way between each of q (n, dof) in rad and the one nearest to it."""
+    if len(q) < 2:
+        return q
+    span = np.maximum(np.ptp(q, axis=0), 1e-9)
+    apart = np.linalg.norm((q[:, None] - q[None]) / span, axis=2) + 1e9 * np.eye(len(q))
+    pairs = {tuple(sorted((i, int(k)))) for i, k in enumerate(np.argmin(apart, axis=1))}
+    made = [(q[i] + q[k]) / 2 for i, k in sorted(pairs)]
+    return np.array(made)[:MOST_BETWEEN]
+
+
+def _agreement(
+    seen: tuple[StructureFit, StructureFit], there: tuple[StructureFit, StructureFit]
+) -> ThreefoldSimilarity:
+    """At the data of `there`, of the structures as fitted in `seen`, and as stated."""
+    data = there[0].misfit.data
+    plain = FrfMisfit(RobotStructure(seen[0].structure.prior, (), data.sensors), data,
+                      seen[0].misfit.tolerances)  # fmt: skip
+    found = [similarity_of(data.measured, plain.motion(plain.structure.mean, None).accelerance)]
+    for fit in seen:
+        misfit = replace(fit.misfit, data=data)
+        for name in ("matrices", "jacobians", "poses"):
+            vars(misfit).pop(name, None)
+        h = misfit.heard(fit.at.x, misfit.motion(fit.at.x, None).accelerance)
+        found.append(similarity_of(data.measured, h))
+    return ThreefoldSimilarity(*found)
+
+
+def _held_out(
+    search: Search, fits: tuple[StructureFit, StructureFit], aside: tuple[int, ...]
+) -> ThreefoldSimilarity:
+    """Of fits that never saw the poses set aside; the structure was chosen with all."""
+    data = search.data(FITTED)
+    kept = np.array([i for i in range(len(data.q)) if i not in aside])
+    again = []
+    for fit in fits:
+        misfit = FrfMisfit(
+            fit.structure, data.at(kept), search.tolerances, fit.misfit.rho, search.floor
+        )
+        again.append(settled(misfit, misfit(fit.at.x, fit.at.own[kept])))
+    there = replace(again[0].misfit, data=data.at(np.array(aside)))
+    shown = StructureFit(there, again[0].at, 0.0)
+    return _agreement((again[0], again[1]), (shown, shown))

@@ -1,16 +1,18 @@
 """One pose at odds with all others: the robot did not stand there as said, or differs there."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from planner.diagnosis.linear.predict import anew
-from planner.diagnosis.linear_diagnosis import Diagnosis
-from planner.diagnosis.thresholds import RESIDUAL_CLEARLY
+import numpy as np
+
+from planner.diagnosis.diagnose import Diagnosis
+from planner.fit.fitted import settled
+from planner.fit.misfit import FrfMisfit
+from planner.fit.posterior import RobotPosterior
 from planner.words import significant
 
-LEAST, MOST = 3, 12  # poses among which one can be odd; beyond, refits take long. Chosen
-TRIED = 2  # poses that refitting follows least: each takes a refit of seconds. Chosen
-AGREES = 1.0  # misfit at noise and what just does not matter
+LEAST, MOST = 3, 12  # poses among which one can be odd
+TRIED = 2  # poses that refitting follows least
+CLEARLY, AGREES = 2.0, 1.0  # misfits; at 1 are noise and what just does not matter
 
 
 @dataclass(frozen=True)
@@ -32,22 +34,24 @@ class OddPose:
         )
 
 
-def odd_pose(found: Diagnosis, poses: Sequence[str]) -> OddPose | None:
-    """The pose (named as the problem's FRFs are) without which refitting alone explains the rest.
+def odd_pose(found: Diagnosis) -> OddPose | None:
+    """The pose without which refitting alone explains the rest, where nothing explains them all.
 
     None where there is no such pose among the worst, or more than one: then it is not known which.
     """
-    problem, refitted = found.problem, found.refitted
-    names = list(dict.fromkeys(poses))
-    if refitted.per_value <= RESIDUAL_CLEARLY or not LEAST <= len(names) <= MOST:
+    names, fit = np.array(found.recorded.poses), found.refitted
+    every, least = list(dict.fromkeys(names)), found.search.floor
+    whole, by_pose = RobotPosterior.of(fit).misfits(least)
+    several = LEAST <= len(every) <= MOST
+    if found.verdict.verdict != "unexplained" or whole <= CLEARLY or not several:
         return None
-    misfit = {name: 0.0 for name in names}
-    for pose, chi2 in zip(poses, refitted.data.chi2, strict=True):
-        misfit[pose] += float(chi2)
     odd = []
-    for name in sorted(names, key=lambda name: -misfit[name])[:TRIED]:
-        rest = problem.at([i for i, pose in enumerate(poses) if pose != name])
-        without = anew(rest, refitted).per_value
+    for name in sorted(every, key=lambda name: -by_pose[names == name].sum())[:TRIED]:
+        rest = np.flatnonzero(names != name)
+        data = fit.misfit.data.at(rest)
+        misfit = FrfMisfit(fit.structure, data, found.search.tolerances, fit.misfit.rho, least)
+        again = settled(misfit, misfit(fit.at.x, fit.at.own[rest]), rounds=2)
+        without = RobotPosterior.of(again).misfits(least)[0]
         if without <= AGREES:
-            odd.append(OddPose(name, refitted.per_value, without))
+            odd.append(OddPose(str(name), whole, without))
     return odd[0] if len(odd) == 1 else None

@@ -1,92 +1,227 @@
-"""Screens and linear effects together: one verdict, one list of candidates.
+"""One verdict over everything that was settled; nothing rewrites it.
 
-Screens look at what averaged FRFs hide: the measuring chain, the order in time, the force levels.
-Artefacts are corrected before physics is looked for. Where a joint is nonlinear, or drifts,
-averaged FRFs cannot be those of any linear effect, and none is looked for.
+Physics that robot.toml leaves out counts by size: how much of |H| at poses set aside changes when
+it is dropped and the rest refitted. What refitting takes the place of (a stated spring, a mass, the
+chain) counts by evidence beyond its stated tolerance.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import expit, logsumexp
+from scipy.stats import norm
 
-from planner.diagnosis.finding import Finding
-from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis, Place, verdict_of
-from planner.diagnosis.thresholds import ARTEFACTS, SCREEN_PRIOR, SUREST_SCREEN, UNKNOWN
-from planner.inference.evidence import probability as posterior
+from planner.diagnosis.levels import Levels
+from planner.diagnosis.search import LEAST, RARE, Explored, added, built, key_of
+from planner.effects.effect import Operator
+from planner.fit.fitted import StructureFit, evidence_of, settled, size_of, without
+from planner.fit.posterior import RobotPosterior
+
+SURE = 0.9  # probability from which an effect's size counts as beyond what matters
+EXPLAINS = 2.0  # times what matters: a discrepancy up to which nothing else is wanted
+# Effects without a name of their own imitate what a named one's shape lacks: they count from so
+# many times what matters on, and so much of all that is gained.
+VAGUE, OF_ALL = 3.0, 0.05
+BENT = 2.0  # times what levels differ by, from which a linear effect beside a law is told
+LINES = 40  # of the band, on which sizes are told
+Place = tuple[str, str | None]
+UNKNOWN, NONE = ("unknown", None), ("none", None)
+NAMELESS = "frequency_dependent_joint", "between_links", "ground_contact"
+
+
+@dataclass(frozen=True, eq=False)
+class NamedEffect:
+    """An effect of the explanation: `nats` that it gains, share of |H| that it changes, and the
+    probability that it is there."""
+
+    operator: Operator
+    nats: float
+    change: float
+    probability: float
+    counts: bool
+
+    @property
+    def place(self) -> Place:
+        """Its name, and where it is."""
+        return self.operator.name
 
 
 @dataclass(frozen=True)
-class Ranked:
-    """Effects at their places that are there together, none of them if empty."""
+class Candidate:
+    """Effects that are there together, and how probable that is."""
 
     places: tuple[Place, ...]
     probability: float
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
-    """Verdict, all candidates (most probable first, summing to 1), and what screens established."""
+class Verdict:
+    """`candidates` sum to 1, most probable first; of `effects` those that count are findings."""
 
     verdict: str
-    candidates: tuple[Ranked, ...]
-    established: tuple[tuple[Finding, float], ...]  # with their probabilities
-    linear: bool  # whether linear effects belong to the findings too
+    effects: tuple[NamedEffect, ...]
+    candidates: tuple[Candidate, ...]
+    sets: tuple[tuple[Place, ...], ...]
+    best: StructureFit
+
+    @property
+    def findings(self) -> tuple[NamedEffect, ...]:
+        """What is there and matters; nothing where it does not explain the recordings."""
+        told = self.verdict == "explained"
+        counted = (e for e in self.effects if e.counts and (told or e.operator.artefact))
+        return tuple({e.place: e for e in reversed(tuple(counted))}.values())[::-1]
 
 
-def linear_effects_apply(findings: Sequence[Finding]) -> bool:
-    """Whether averaged FRFs, once artefacts are corrected, may be those of linear effects."""
-    return all(f.effect in (*ARTEFACTS, UNKNOWN) for f in findings)
+def judged(
+    explored: Explored,
+    matters: float,
+    q: np.ndarray,
+    heard: Sequence[Place] = (),
+    levels: Levels | None = None,
+) -> Verdict:
+    """Of what was explored, of effects `heard` in the signals, and of laws of force `levels`.
 
-
-def probability(finding: Finding) -> float:
-    """Of what a screen found, from its evidence."""
-    return min(SUREST_SCREEN, finding.sure, posterior(finding.log_evidence, SCREEN_PRIOR))
-
-
-def _ways(findings: Sequence[Finding]) -> tuple[tuple[tuple[Place, ...], float], ...]:
-    """What was found, and the same with a rival in a finding's stead; shares sum to one."""
-    ways: list[tuple[tuple[Place, ...], float]] = [((), 1.0)]
-    for f in findings:
-        others = sum(share for _, share in f.rivals)
-        names = ((f.effect, 1.0 - others), *f.rivals)
-        ways = [((*way, (name, f.at)), w * share) for way, w in ways for name, share in names]
-    return tuple(ways)
-
-
-def together(
-    findings: Sequence[Finding], diagnosis: Diagnosis, linear: bool | None = None
-) -> Together:
-    """Combine; `diagnosis` is that of the corrected FRFs.
-
-    `linear`: whether its effects count, by default where no screen found other physics.
+    Sizes are told at q (n, dof) in rad, poses that were not measured. Averages over levels are bent
+    by a joint's law: beside one only what changes FRFs by more than levels do is told.
     """
-    known = [(f, probability(f)) for f in findings if f.effect != UNKNOWN]
-    strange = max((probability(f) for f in findings if f.effect == UNKNOWN), default=0.0)
-    linear = linear_effects_apply(findings) if linear is None else linear
-    others = diagnosis.candidates if linear else ()
-    share = float(np.prod([p for _, p in known])) * (1 - strange)
-    ways = _ways([f for f, _ in known])
-    own = {("joint_stiffness", f.at) for f, _ in known}
-    ranked = {("none", None): 0.0, (UNKNOWN, None): 1 - share}
-    out: dict[tuple[Place, ...], float] = {(key,): value for key, value in ranked.items()}
-    for places, weight in _linear(others) or (((), 1.0),):
-        unknown = places == ((UNKNOWN, None),)
-        for way, part in ways:
-            # What a screen corrected for leaves a little of the same behind, and a joint's own
-            # spring is part of its law.
-            rest = tuple(p for p in places if p not in way and p not in own)
-            key = places if unknown else (way + rest) or (("none", None),)
-            out[key] = out.get(key, 0.0) + share * weight * part
-    ranked_all = [Ranked(places, p) for places, p in out.items()]
-    candidates = sorted(ranked_all, key=lambda r: -r.probability)
-    verdict = verdict_of(candidates[0].places)
-    told = tuple((f, p * (1.0 - sum(share for _, share in f.rivals))) for f, p in known)
-    return Together(verdict, tuple(candidates), told, linear)
+    weights = probabilities(explored.settled)
+    best = max(explored.settled, key=lambda f: weights[key_of(f)])
+    effects = _weighed(explored, best, weights, matters, q)
+    laws = levels.laws if levels else ()
+    if levels and laws:
+        bent = BENT * levels.seen.size
+        bends = {law.at for law in laws}
+        beside = [e.operator.artefact or (e.change > bent and e.place[1] not in bends)
+                  for e in effects]  # fmt: skip
+        pairs = zip(effects, beside, strict=True)
+        effects = [replace(e, counts=e.counts and apart) for e, apart in pairs]
+    named = [e for e in effects if e.counts]
+    nameless = any(e.place[0] in NAMELESS for e in named)
+    left = (size_of(best) > EXPLAINS * matters or nameless) and not laws
+    unknown = left or bool(levels and levels.unexplained) or UNKNOWN in heard
+    there = named or heard or laws
+    verdict = "unexplained" if unknown else "explained" if there else "consistent"
+    candidates = _candidates(weights, effects, unknown, tuple(heard))
+    if levels and laws and not unknown:
+        candidates = _with_laws(candidates, levels)
+    return Verdict(verdict, tuple(effects), candidates, _sets(named, weights), best)
 
 
-def _linear(candidates: Sequence[Candidate]) -> tuple[tuple[tuple[Place, ...], float], ...]:
-    def places(candidate: Candidate) -> tuple[Place, ...]:
-        return tuple(p for p in candidate.places if p[0] != "none")
+def probabilities(fits: Sequence[StructureFit]) -> dict[frozenset[Place], float]:
+    """Probability of each set of effects, among all that were settled."""
+    logs = {key_of(f): f.evidence - RARE * len(key_of(f)) for f in fits}
+    total = float(np.asarray(logsumexp(list(logs.values()))))
+    return {key: float(np.exp(log - total)) for key, log in logs.items()}
 
-    return tuple((places(c), c.probability) for c in candidates)
+
+def _weighed(
+    explored: Explored,
+    best: StructureFit,
+    weights: dict[frozenset[Place], float],
+    matters: float,
+    q: np.ndarray,
+) -> list[NamedEffect]:
+    gained = best.evidence - explored.plain.evidence
+    lines = np.linspace(*_band(best), LINES)
+    whole = RobotPosterior.of(best)
+    h = _physics(whole, q, lines)
+    found = []
+    for effect in (*added(best), *_beyond(best)):
+        fewer = _without(explored, best, effect)
+        if fewer is None:
+            nats, change = gained, 1.0
+        else:
+            nats = best.evidence - fewer.evidence
+            other = _physics(RobotPosterior.of(fewer), q, lines)
+            change = float(np.linalg.norm(np.abs(h) - np.abs(other)) / np.linalg.norm(h))
+        probability = sum(w for key, w in weights.items() if effect.name in key)
+        if effect in built(best):
+            probability = float(expit(nats - RARE))
+        # Its size is as well known as its amplitude is.
+        vague = effect.name[0] in NAMELESS
+        least = matters * (VAGUE if vague else 1.0)
+        sure = norm.cdf((change - least) / (change / np.sqrt(2 * max(nats, 1.0)) + 1e-12))
+        there = nats > max(LEAST, OF_ALL * gained if vague else 0.0)
+        counts = there and (effect.absorbed or sure >= SURE)
+        found.append(NamedEffect(effect, float(nats), change, float(probability), bool(counts)))
+    return sorted(found, key=lambda e: -e.change)
+
+
+def _beyond(best: StructureFit) -> list[Operator]:
+    """What every robot has, where it is so much that it is worth a word."""
+    structure, x = best.structure, best.at.x
+    e, omega = structure.elasticity(x), 2 * np.pi * float(np.sqrt(np.prod(_band(best))))
+    viscous = dict(zip(structure.springs, omega * e.damping / e.stiffness, strict=True))
+    own = zip(structure.effects, structure.own, strict=True)
+    return [f for f, at in own if f in built(best) and f.beyond(x[at], viscous)]
+
+
+def _without(explored: Explored, best: StructureFit, effect: Operator) -> StructureFit | None:
+    """The best that there is without an effect: refitted from here, or as the search came by."""
+    rest = key_of(best) - {effect.name}
+    met = [f for f in explored.settled if key_of(f) == rest and len(added(f)) < len(added(best))]
+    fewer = without(best, [effect])
+    if fewer is not None:
+        met.append(settled(fewer.misfit, fewer.at, rounds=2))
+    return max(met, key=evidence_of, default=None)
+
+
+def _band(best: StructureFit) -> tuple[float, float]:
+    lines = best.misfit.data.measured.frequency_hz
+    return float(lines.min()), float(lines.max())
+
+
+def _physics(posterior: RobotPosterior, q: np.ndarray, lines: np.ndarray) -> np.ndarray:
+    """FRFs (n, 3, 3, F) of the robot itself, in m/s²/N."""
+    misfit = replace(posterior.found.misfit, data=posterior.at(q, lines))
+    return misfit.motion(posterior.x, None).accelerance
+
+
+def _candidates(
+    weights: dict[frozenset[Place], float],
+    effects: Sequence[NamedEffect],
+    unknown: bool,
+    heard: tuple[Place, ...],
+) -> tuple[Candidate, ...]:
+    """Sets by what of them counts; what no name explains is "unknown"."""
+    counts = {e.place for e in effects if e.counts}
+    idle = {e.place for e in effects} - counts
+    heard = (*heard, *sorted(p for p in counts if not any(p in key for key in weights)))
+    shares: dict[tuple[Place, ...], float] = {}
+    for key, weight in weights.items():
+        rest = (*heard, *sorted(p for p in key if p not in idle))
+        places = (UNKNOWN,) if unknown else rest or (NONE,)
+        shares[places] = shares.get(places, 0.0) + weight
+    shares.setdefault((UNKNOWN,), 0.0)
+    ranked = sorted(shares.items(), key=lambda item: -item[1])
+    return tuple(Candidate(places, share) for places, share in ranked)
+
+
+def _with_laws(candidates: Sequence[Candidate], levels: Levels) -> tuple[Candidate, ...]:
+    """The likeliest set of linear effects, with each law that was weighed at a joint."""
+    first = tuple(p for p in candidates[0].places if p != NONE)
+    further = tuple((law.effect, law.at) for law in levels.laws[1:])
+    found = [
+        Candidate((*first, (effect, at), *further), share)
+        for effect, at, share in levels.candidates
+    ]
+    return *sorted(found, key=lambda c: -c.probability), Candidate((UNKNOWN,), 0.0)
+
+
+def _sets(
+    named: Sequence[NamedEffect], weights: dict[frozenset[Place], float]
+) -> tuple[tuple[Place, ...], ...]:
+    """For each finding what may stand in its place, where that is not much less likely."""
+    out = []
+    best = max(weights, key=lambda key: weights[key])
+    for effect in named:
+        rest = best - {effect.place}
+        others = [
+            next(iter(key - rest))
+            for key, weight in weights.items()
+            if weight > 0.05 and key != best and rest <= key and len(key) == len(best)
+        ]
+        if others and effect.place in best:
+            out.append((effect.place, *others))
+    return tuple(out)

@@ -1,11 +1,10 @@
 """The simulation of a robot: modes and FRFs at any pose."""
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import msgspec
 import numpy as np
 
 from planner.dynamics.mode_families import Families, rearranged, undamped_modes
@@ -17,11 +16,8 @@ from planner.dynamics.vibration import (
     receptance,
     solve_poles,
 )
-from planner.robot.config import EffectTable, without_effects
 from planner.robot.elastic_model import ElasticModel, Matrices
 from planner.robot.robot import Robot
-from planner.robot.urdf_elements import without_stated_inertias
-from planner.robot.urdf_inertias import urdf_with_inertias
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,33 +58,6 @@ class Simulation:
             elastic = ElasticModel(self.robot, inertia_change)
         other.elastic = elastic.carried_by(elasticity.stiffness)
         return other
-
-    def with_effects(
-        self,
-        springs: Sequence[Mapping[str, float]],
-        effects: Sequence[EffectTable],
-        bodies: tuple[str, ...],
-        inertia_change: np.ndarray,
-    ) -> "Simulation":
-        """The simulation of the robot with its springs and inertias changed, and with [[effects]].
-
-        Args:
-            springs: stiffness (N·m/rad), damping (N·m·s/rad) and loss_factor of the [[compliance]]
-                blocks of robot.toml in their order, by name.
-            effects: further [[effects]] of robot.toml.
-            bodies: names of those whose inertias change, as `ElasticModel.bodies`.
-            inertia_change: (bodies, 10) as `ElasticModel.inertia`; links take what they can.
-        """
-        own = without_effects(self.robot.config)
-        blocks = [
-            msgspec.structs.replace(block, **values)
-            for block, values in zip(own.compliance, springs, strict=True)
-        ]
-        config = msgspec.structs.replace(
-            without_stated_inertias(own), compliance=tuple(blocks), effects=(*own.effects, *effects)
-        )
-        urdf, _ = urdf_with_inertias(self.robot, bodies, inertia_change)
-        return Simulation(self.robot.described(config, urdf))
 
     @cached_property
     def stiffness(self) -> np.ndarray:

@@ -14,11 +14,14 @@ from planner.effects.effect import (
     PosedBodies,
     Start,
     moving,
+    nats_of,
     turning,
 )
 
 LEAST = 0.05  # of the mass's sd: a start needs some mass for its place to matter
-FARTHEST = 2.0  # prior sds, of a start's mass; its place begins within one
+FARTHEST = 2.0  # prior sds, of a start's mass; its place begins within one of where it is tried
+CENTRE = ((0.0, 0.0, 0.0),)
+AROUND = (*CENTRE, *map(tuple, np.vstack([np.eye(3), -np.eye(3)]).tolist()))
 
 
 @dataclass(frozen=True)
@@ -29,8 +32,10 @@ class PointMass(Operator):
     centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     mass_kg: float = 1.0  # its sd
     size_m: float = 1.0  # sd of its place
+    places: tuple[tuple[float, ...], ...] = CENTRE  # in sds, where it is looked for
 
     kind = "added_mass"
+    absorbed = True
 
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """m s² Jₚᵀ Jₚ at the place p."""
@@ -42,18 +47,18 @@ class PointMass(Operator):
         return Impedance(ports, shapes, ((0, psi[0] * unit),), (((0, unit),), *moved))
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
-        """By the columns of the mass and of its first moments."""
-        poses = motions.poses
-        one = self.impedance(poses, np.array([1.0, 0, 0, 0]))
-        minus = -(poses.s**2)[:, None, None]
-        shape = (len(poses.q), 4, motions.x_sensor.shape[2], motions.x_hit.shape[2], minus.shape[3])
-        columns = np.empty(shape, dtype=complex)
-        one.gradient(motions.x_hit * minus, motions.x_sensor, columns)
-        nats, psi = gain(columns, np.array([1.0, 0.7, 0.7, 0.7]))
+        """By the columns of the mass and of its first moments, at the likeliest of some places."""
+        places = map(np.array, self.places)
+        return (max((self._start(motions, gain, place) for place in places), key=nats_of),)
+
+    def _start(self, motions: Motions, gain: Gain, place: np.ndarray) -> Start:
+        columns = motions.changed_by(self.impedance(motions.poses, np.array([1.0, *place])))
+        nats, psi, moved = gain(columns, np.array([1.0, 0.7, 0.7, 0.7]))
         mass = float(np.clip(psi[0], -FARTHEST, FARTHEST))
         if abs(mass) < LEAST:
             mass = LEAST
-        return (Start(self, np.append(mass, np.clip(psi[1:] / mass, -1, 1)), nats),)
+        place = place + np.clip(psi[1:] / mass, -1, 1)
+        return Start(self, np.array([mass, *place]), nats, moved)
 
     def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray]:
         """See `Operator.inertia`."""
@@ -64,6 +69,17 @@ class PointMass(Operator):
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """See `Operator.vanishing`."""
         return -psi[:1]
+
+    def parameters(
+        self, values: Mapping[str, tuple[float, float]]
+    ) -> dict[str, tuple[float, float, str]]:
+        """See `Operator.parameters`."""
+        mass, sd = values["mass"]
+        out = {"mass": (self.mass_kg * mass, self.mass_kg * sd, "kg")}
+        for axis, centre in zip("xyz", self.centre_m, strict=True):
+            at, sd = values[f"position_{axis}"]
+            out[f"position_{axis}"] = centre + self.size_m * at, self.size_m * sd, "m"
+        return out
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""

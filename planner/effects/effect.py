@@ -14,8 +14,9 @@ import numpy as np
 
 from planner.dynamics.gradient import Impedance
 
-# (columns (n, k, r, c, F) of changes of H, their prior sds (k,)) → nats gained, likeliest ψ (k,).
-Gain = Callable[[np.ndarray, np.ndarray], tuple[float, np.ndarray]]
+# (columns (n, k, r, c, F) of changes of H, their prior sds (k,)) → nats gained, likeliest ψ (k,),
+# and by how much all other numbers (D,) of the fit move with it.
+Gain = Callable[[np.ndarray, np.ndarray], tuple[float, np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,8 @@ class Number:
 class PosedBodies:
     """PosedBodies q (n, dof) in rad at s (n, F), and how e springs move bodies, (n, B, 6, e).
 
-    `springs` (e,) are the numbers of the springs among all that the robot may have.
+    `springs` (e,) are the numbers of the springs among all that the robot may have; `order` (n,) is
+    how much of the campaign was over, 0 to 1, when each pose was hit.
     """
 
     q: np.ndarray
@@ -45,6 +47,7 @@ class PosedBodies:
     jacobians: np.ndarray
     bodies: tuple[str, ...]
     springs: tuple[int, ...]
+    order: np.ndarray
 
     def body(self, joint: str) -> np.ndarray:
         """(n, 6, e): how the springs move what turns with a joint, linear part first."""
@@ -62,11 +65,16 @@ ACROSS = np.array([np.cross(np.eye(3), e).T for e in np.eye(3)])
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """How hits (n, e, c, F) and sensors (n, e, r, F) move the springs, per unit of force."""
+    """How hits (n, e, c, F) and sensors (n, e, r, F) move the springs, per unit of force.
+
+    `accelerance` (n, r, c, F) is what the fit so far has, `measured` what was recorded.
+    """
 
     poses: PosedBodies
     x_hit: np.ndarray
     x_sensor: np.ndarray
+    accelerance: np.ndarray
+    measured: np.ndarray
 
     def at(self, ports: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Motions (n, p, c, F) and (n, p, r, F) of ports (n, p, e)."""
@@ -76,14 +84,39 @@ class Motions:
         )
         return hit, sensor
 
+    def changed_by(self, added: Impedance) -> np.ndarray:
+        """(n, p, r, c, F): how accelerances change with each number of what is added to Z."""
+        minus = -(self.poses.s**2)[:, None, None]
+        shape = (len(minus), len(added.slope), self.x_sensor.shape[2], self.x_hit.shape[2])
+        columns = np.empty((*shape, minus.shape[3]), dtype=complex)
+        added.gradient(self.x_hit * minus, self.x_sensor, columns)
+        return columns
+
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """An effect, where a fit begins with it (ψ), and the nats that the first order promises."""
+    """An effect, where a fit begins with it (ψ, and by how much the other numbers move, if they
+    do), and the nats that the first order promises."""
 
     effect: "Operator"
     psi: np.ndarray
     nats: float
+    moved: np.ndarray | None = None
+
+
+def nats_of(start: Start) -> float:
+    """What the first order promises."""
+    return start.nats
+
+
+@dataclass(frozen=True)
+class SpringPrior:
+    """Of ln k: normal `shift` above the usual median, with sd `log_sd`; not below `least`, which
+    counts from that median too."""
+
+    shift: float
+    log_sd: float
+    least: float = -np.inf
 
 
 @dataclass(frozen=True)
@@ -95,11 +128,21 @@ class Operator(ABC):
     numbers: tuple[Number, ...] = ()
 
     kind: ClassVar[str] = ""
+    effect: ClassVar[str] = ""  # by which name diagnoses tell of it, where that is not its kind
+    # Whether refitting the robot takes its place, so that it counts by evidence and not by size.
+    absorbed: ClassVar[bool] = False
+    # Of the measuring chain: no physics, and prediction does without it.
+    artefact: ClassVar[bool] = False
 
     @property
     def label(self) -> str:
         """ "local_resonator at link_3"."""
         return f"{self.kind} at {self.at}"
+
+    @property
+    def name(self) -> tuple[str, str]:
+        """What it is called, and where: ("base_compliance", "base")."""
+        return self.effect or self.kind, self.at.split("#")[0]
 
     @property
     def mean(self) -> np.ndarray:
@@ -115,6 +158,18 @@ class Operator(ABC):
         """What it adds to the dynamic stiffness beside its springs, with slopes by ψ."""
         return None
 
+    def chain(self, s: np.ndarray, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Factor (n or 1, 3, 3, F or 1) of what each sensor hears, and its slopes (p, …) by ψ."""
+        return None
+
+    @property
+    def spring_priors(self) -> Mapping[int, SpringPrior]:
+        """What is known of springs where this effect is, other than without it, by their numbers.
+
+        Of effects on the same spring the last counts.
+        """
+        return {}
+
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """Where fits with it begin, by its first-order columns; springs are tried as they are."""
         return (Start(self, self.mean, np.inf),)
@@ -127,9 +182,24 @@ class Operator(ABC):
         """The body whose inertia (10,) it changes, where it is nothing else, and by what."""
         return None
 
+    def beyond(self, psi: np.ndarray, viscous: Mapping[int, float]) -> bool:
+        """Whether what every robot has is so much that it is worth a word.
+
+        `viscous` are the loss factors of springs' dampers in the middle of the band, by number.
+        """
+        return False
+
     def losses(self, psi: np.ndarray) -> dict[int, float]:
         """Loss factors that it gives springs, by their numbers."""
         return {}
+
+    def parameters(
+        self, values: Mapping[str, tuple[float, float]]
+    ) -> dict[str, tuple[float, float, str]]:
+        """Values, sds and units of its springs and numbers, by name."""
+        units = {n.name: n.unit for n in self.numbers}
+        spring = {True: "N/m", False: "N·m/rad"}
+        return {n: (*v, units.get(n) or spring[" along " in n]) for n, v in values.items()}
 
     @abstractmethod
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:

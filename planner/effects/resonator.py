@@ -16,6 +16,7 @@ from planner.effects.effect import (
     PosedBodies,
     Start,
     moving,
+    nats_of,
     turning,
 )
 
@@ -68,7 +69,7 @@ class LinkResonator(Operator):
         tried = [
             self.at_frequency(f, motions, gain) for f in np.geomspace(low * 1.1, high, SCREENED)
         ]
-        return (max(tried, key=lambda start: start.nats),)
+        return (max(tried, key=nats_of),)
 
     def at_frequency(self, hertz: float, motions: Motions, gain: Gain) -> Start:
         """Where it begins at one frequency: six columns, one for each pair of directions."""
@@ -87,7 +88,7 @@ class LinkResonator(Operator):
         ]
         usual = float(np.exp(middle[0]))
         sds = usual * np.array([1.0 if i == k else 0.5 for i, k in PAIRS])
-        nats, psi = gain(np.stack(columns, axis=1), sds)
+        nats, psi, moved = gain(np.stack(columns, axis=1), sds)
         dyad = np.zeros((3, 3))
         for value, (i, k) in zip(psi, PAIRS, strict=True):
             dyad[i, k] = dyad[k, i] = value
@@ -96,7 +97,7 @@ class LinkResonator(Operator):
         start = middle.copy()
         start[0] = np.log(np.clip(abs(sizes[most]), 0.2 * usual, 5 * usual))
         start[1], start[3:6] = np.log(hertz), ways[:, most]
-        return Start(self.towards(ways[:, most]), start, nats)
+        return Start(self.towards(ways[:, most]), start, nats, moved)
 
     def towards(self, way: np.ndarray) -> "LinkResonator":
         """The same with its direction expected about `way` (3,)."""

@@ -3,7 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from planner.effects.effect import Operator
+import numpy as np
+
+from planner.effects.effect import Operator, SpringPrior
+
+# Stiffness of what is not stated, in that of the stiffest spring stated at the joint (the floor: of
+# the whole robot); of bearings of which nobody would say a word.
+STIFFNESS, SLIGHTLY = (1.0, 300.0), (50.0, 2000.0)
+SOFT_SD = float(np.log(STIFFNESS[1] / STIFFNESS[0]) / np.sqrt(12))  # of a log-uniform one
 
 
 @dataclass(frozen=True)
@@ -11,6 +18,7 @@ class SoftBase(Operator):
     """The base tilts on its floor."""
 
     kind = "soft_base"
+    effect = "base_compliance"
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
@@ -22,6 +30,7 @@ class ShiftingBase(Operator):
     """The base turns and shifts on its floor."""
 
     kind = "shifting_base"
+    effect = "base_compliance"
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
@@ -32,7 +41,12 @@ class ShiftingBase(Operator):
 class Tilt(Operator):
     """A joint's bearing tilts across its axis."""
 
-    kind = "tilt"
+    kind = "transverse_compliance"
+
+    @property
+    def spring_priors(self) -> Mapping[int, SpringPrior]:
+        """As any spring that is not stated, whatever bearings are elsewhere."""
+        return {spring: SpringPrior(0.0, SOFT_SD) for spring in self.springs}
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
@@ -40,10 +54,31 @@ class Tilt(Operator):
 
 
 @dataclass(frozen=True)
+class SlightBearing(Operator):
+    """A bearing that gives as little as all do: nothing is wrong, and FRFs show it.
+
+    Its stiffness is within SLIGHTLY times the joint's.
+    """
+
+    kind = "slight_bearing"
+
+    @property
+    def spring_priors(self) -> Mapping[int, SpringPrior]:
+        """See `Operator.spring_priors`."""
+        low, high = np.log(SLIGHTLY) - np.log(STIFFNESS).mean()
+        prior = SpringPrior((low + high) / 2, (high - low) / np.sqrt(12), low)
+        return {spring: prior for spring in self.springs}
+
+    def words(self, values: Mapping[str, tuple[float, float]]) -> str:
+        """See `Operator.words`."""
+        return f"The bearing of {self.at} gives slightly, as any does."
+
+
+@dataclass(frozen=True)
 class BendingLink(Operator):
     """A link bends and twists half-way to the next joint."""
 
-    kind = "bending_link"
+    kind = "link_flexibility"
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""

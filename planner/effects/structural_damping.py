@@ -9,6 +9,7 @@ from planner.dynamics.gradient import Impedance
 from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
 
 LEAST, MOST = 0.002, 0.3  # of a start
+INSTEAD = 0.8  # share of the dissipation, from which loss factors take the place of dampers
 
 
 @dataclass(frozen=True)
@@ -40,13 +41,15 @@ class LossFactors(Operator):
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """By the columns of all loss factors."""
-        poses, usual = motions.poses, np.exp(self.mean)
-        one, minus = self.impedance(poses, self.mean), -(poses.s**2)[:, None, None]
-        shape = (len(poses.q), len(usual), motions.x_sensor.shape[2], motions.x_hit.shape[2])
-        columns = np.empty((*shape, minus.shape[3]), dtype=complex)
-        one.gradient(motions.x_hit * minus, motions.x_sensor, columns)
-        nats, share = gain(columns, np.ones(len(usual)))
-        return (Start(self, np.log(np.clip(share * usual, LEAST, MOST)), nats),)
+        usual = np.exp(self.mean)
+        columns = motions.changed_by(self.impedance(motions.poses, self.mean))
+        nats, share, moved = gain(columns, np.ones(len(usual)))
+        return (Start(self, np.log(np.clip(share * usual, LEAST, MOST)), nats, moved),)
+
+    def beyond(self, psi: np.ndarray, viscous: Mapping[int, float]) -> bool:
+        """Whether most springs dissipate so instead of by their dampers."""
+        shares = [eta / (eta + viscous[spring]) for spring, eta in self.losses(psi).items()]
+        return float(np.median(shares)) > INSTEAD
 
     def losses(self, psi: np.ndarray) -> dict[int, float]:
         """See `Operator.losses`."""

@@ -4,34 +4,46 @@ Springs that robot.toml does not state are expected stiffer than those that are,
 nobody knows. The wider robot has them all, one after the other; a structure uses some of them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.effects.added_mass import PointMass
-from planner.effects.angle_spring import AngleSpring
+from planner.effects.added_mass import AROUND, PointMass
+from planner.effects.chain import ChannelDelay, Polarity, SensorGain, SensorRotation
 from planner.effects.effect import Number, Operator
+from planner.effects.far_off import FarOffSpring
+from planner.effects.links import PAIRS, BetweenLinks, GroundContact
 from planner.effects.parameters import Priors, place_name
 from planner.effects.resonator import LinkResonator
-from planner.effects.springs import BendingLink, ShiftingBase, SoftBase, Tilt
+from planner.effects.springs import (
+    STIFFNESS,
+    BendingLink,
+    ShiftingBase,
+    SlightBearing,
+    SoftBase,
+    Tilt,
+)
 from planner.effects.structural_damping import LossFactors
+from planner.effects.varying_spring import HATS, AngleSpring, Drift, FrequencyDependentJoint
 from planner.errors import InputError
 from planner.robot.config import BASE, Compliance
 from planner.robot.massless_base import massless_base
 from planner.robot.robot import Robot
 
-# Stiffness of what is not stated, in that of the stiffest spring stated at the joint (the floor: of
-# the whole robot), and damping in s of stiffness: 0.1 to 3 % of critical at 5 to 30 Hz.
-STIFFNESS, DAMPING_S = (1.0, 300.0), (1e-4, 3e-3)
+# Damping of what is not stated, in s of stiffness: 0.1 to 3 % of critical at 5 to 30 Hz.
+DAMPING_S = 1e-4, 3e-3
 ALONG = 0.5  # cosine above which a stated axis already covers this one
 SHORT, BEND = 0.1, 0.3  # of the longest link: does not bend; of the joint's stiffness: a link's
 ADDED_MASS, ADDED_PLACE = 0.22, 0.35  # sds: of the links' mean mass, of the longest link
 RESONATOR_MASS, RESONATOR_DAMPING = 0.05, 0.03  # medians: of the links' mean mass; ratio
 LOSS_FACTOR = 0.02  # median, with a factor of e as its sd
 ANGLE_SHARE = 0.3  # sd of a joint's stiffness that goes with its angle
+# Sds of what a diagnosis looks for: gain of a channel (logarithm), angles (rad), delay (s), far-off
+# spring (logarithm), shares of stiffness that go with frequency and time.
+GAIN, TURNED_RAD, DELAY_S, FAR_OFF, HAT, DRIFT = 0.5, 0.5, 5e-4, 1.2, 0.3, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +61,10 @@ class Repertoire:
     effects: tuple[Operator, ...]
 
     @classmethod
-    def of(cls, simulation: Simulation, priors: Priors) -> "Repertoire":
-        """Of a robot as robot.toml states it."""
+    def of(
+        cls, simulation: Simulation, priors: Priors, further: Sequence[Operator] = ()
+    ) -> "Repertoire":
+        """Of a robot as robot.toml states it; `further` effects beside those of every campaign."""
         robot = simulation.robot
         config = msgspec.structs.replace(
             robot.config, payload=(*robot.config.payload, *massless_base(robot))
@@ -68,11 +82,17 @@ class Repertoire:
         for number, key in enumerate(found, stated):
             groups.setdefault(key, []).append(number)
         effects = [kind(at, tuple(numbers)) for (kind, at), numbers in groups.items()]
-        effects += _operators(simulation)
+        effects += [*_operators(simulation), *further]
+        effects = list({e.label: e for e in effects}.values())  # of one place the last counts
         widest = Simulation(wider)
         return cls(
             simulation, priors, widest, replace(priors, bounds=bounds), stated, tuple(effects)
         )
+
+    def as_built(self) -> tuple[Operator, ...]:
+        """What every robot has: bearings that give slightly, and loss factors where none are."""
+        bearings = [SlightBearing(e.at, e.springs) for e in self.effects if isinstance(e, Tilt)]
+        return (*bearings, *(e for e in self.effects if isinstance(e, LossFactors)))
 
     def priors_with(self, bounds: Mapping[str, tuple[float, float]]) -> Priors:
         """What is known of a robot that has some of the springs."""
@@ -189,14 +209,65 @@ def _operators(simulation: Simulation) -> list[Operator]:
         found.append(LinkResonator(at, (), numbers, joint, band))
     if not any(b.loss_factor for b in robot.config.compliance):
         found.append(_structural(robot))
-    own = [(n, b) for n, b in enumerate(robot.config.compliance) if robot.is_own(b)]
-    for spring, block in own:
-        number = robot.joint_names.index(block.joint)
-        shares = tuple(Number(name, "1", 0.0, ANGLE_SHARE) for name in ("cosine", "sine"))
-        if not robot.slides_along(block):
-            at = f"joint_{number + 1}"
-            wave = block.joint, number, spring, block.stiffness
-            found.append(AngleSpring(at, (), shares, *wave))
+    found += [_angle_spring((1,), *one) for one in _own(robot)]
+    return found
+
+
+def _own(robot: Robot) -> list[tuple[int, int, Compliance]]:
+    """Springs of joints about their own axis: the joint's number, the spring's, and it."""
+    return [
+        (robot.joint_names.index(b.joint), n, b)
+        for n, b in enumerate(robot.config.compliance)
+        if robot.is_own(b) and not robot.slides_along(b)
+    ]
+
+
+def _angle_spring(
+    orders: tuple[int, ...], number: int, spring: int, block: Compliance
+) -> AngleSpring:
+    waves = tuple(f"{f}_{n}" for n in orders for f in ("cosine", "sine"))
+    shares = tuple(Number(name, "1", 0.0, ANGLE_SHARE) for name in waves)
+    at, mine = f"joint_{number + 1}", ((spring,), (block.stiffness,))
+    return AngleSpring(at, (), shares, *mine, block.joint, number, orders)
+
+
+def diagnosed(simulation: Simulation) -> list[Operator]:
+    """What only a diagnosis looks for: the chain, time, and what has no name of its own."""
+    robot, elastic = simulation.robot, simulation.elastic
+    gain, turn = Number("gain", "1", 0.0, GAIN, True), "xyz"
+    angles = tuple(Number(f"angle_{a}", "rad", 0.0, TURNED_RAD) for a in turn)
+    found: list[Operator] = [SensorGain(f"sensor_{a}", (), (gain,)) for a in turn]
+    found += [Polarity(f"sensor_{a}") for a in turn]
+    found.append(SensorRotation("sensor", (), angles))
+    found.append(ChannelDelay("sensor", (), (Number("delay", "s", 0.0, DELAY_S),)))
+    masses = (e for e in _operators(simulation) if isinstance(e, PointMass))
+    found += [replace(e, places=AROUND) for e in masses]
+    own = _own(robot)
+    found += [_angle_spring((1, 2), *one) for one in own]
+    for number, spring, block in own:
+        at, mine = f"joint_{number + 1}", ((spring,), (block.stiffness,))
+        found.append(FarOffSpring(at, (), (), spring, FAR_OFF, place_name(block)))
+        hats = tuple(
+            Number(f"{w}_{k}", "1", 0.0, HAT) for w in ("real", "loss") for k in range(HATS)
+        )
+        found.append(FrequencyDependentJoint(at, (), hats, *mine, robot.config.band_hz))
+    if own:
+        changes = tuple(Number(f"change of joint_{n + 1}", "1", 0.0, DRIFT) for n, _, _ in own)
+        springs = tuple(i for _, i, _ in own), tuple(b.stiffness for _, _, b in own)
+        found.append(Drift("campaign", (), changes, *springs))
+    size = max(float(np.linalg.norm(p.translation)) for p in robot.model.jointPlacements)
+    scale = float(np.median([b.stiffness for _, _, b in own])) / size**2 if own else 0.0
+    numbers = tuple(Number(f"stiffness_{i}{k}", "1", 0.0, 1.0) for i, k in PAIRS)
+    links = [(n, j) for n, j in enumerate(robot.joint_names, 1) if j in elastic.bodies]
+    for number, joint in links if own else ():
+        body = elastic.inertia[elastic.bodies.index(joint)]
+        x, y, z = map(float, body[1:4] / body[0]) if body[0] > 0 else (0.0, 0.0, 0.0)
+        if number > 1:
+            found.append(GroundContact(f"link_{number}", (), numbers, joint, "", (x, y, z), scale))
+        for inner, other in links:
+            if inner < number - 1:
+                at = f"link_{inner}-link_{number}"
+                found.append(BetweenLinks(at, (), numbers, joint, other, (0.0, 0.0, 0.0), scale))
     return found
 
 

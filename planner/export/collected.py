@@ -67,8 +67,8 @@ def collect(
     q = cell.robot.joints.internal(angles)
     count = table.count
     if names:
-        mean, sd = campaign.frf(q, lines)
-        modes = campaign.predict(q)
+        mean, sd = campaign.frf_at(q, lines)
+        modes = campaign.model.predict(q)
     else:
         mean, sd = np.empty((0, 3, 3, len(lines)), complex), np.empty((0, 3, 3, len(lines)))
         none = np.empty((0, count))
@@ -76,7 +76,7 @@ def collect(
     return Collected(
         campaign.directory.name,
         cell.robot.joints,
-        any(m.simulated for m in state.recorded),
+        state.simulated,
         tuple(measured),
         PredictedOf(names, angles, lines, mean, sd, modes),
     )

@@ -43,7 +43,7 @@ def model_arrays(campaign: Campaign, found: Collected) -> dict[str, np.ndarray]:
         raise InputError("The workspace is one pose: there is nothing to interpolate; export csv.")
     number = FEW_POINTS if cell.workspace.varying.sum() <= 2 else MANY_POINTS
     points = cell.workspace.candidates(cell.robot, number, SEED)
-    p = campaign.predict(points.q)
+    p = campaign.model.predict(points.q)
     relative = p.frequency_sd_hz / p.frequency_hz
     values = np.hstack([np.log(p.frequency_hz), np.log(relative), p.damping_ratio])
     if len(x := points.features) < 2 * NEIGHBOURS:

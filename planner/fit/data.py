@@ -23,6 +23,7 @@ class FrfData:
     measured: Measured
     matrices: Matrices
     jacobians: np.ndarray
+    order: np.ndarray | None = None  # nothing changes in the course of time
 
     @classmethod
     def of(
@@ -32,14 +33,17 @@ class FrfData:
         q: np.ndarray,
         band_hz: tuple[float, float],
         lines: int,
+        order: np.ndarray | None = None,
     ) -> "FrfData":
-        """On so many lines a pose, closer together where half-power bands are narrow."""
+        """On so many lines a pose, closer together where half-power bands are narrow.
+
+        `order` (n,) is how much of the campaign was over, 0 to 1, when each was hit.
+        """
         seen = common_band(frfs, band_hz)
         measured = stack(frfs, seen, lines, SMALLEST, geometric=True)
         elastic = prior.carried
-        return cls(
-            q, measured, matrices_at(elastic, q, frfs, sloped=True), elastic.body_jacobians(q)
-        )
+        matrices = matrices_at(elastic, q, frfs, sloped=True)
+        return cls(q, measured, matrices, elastic.body_jacobians(q), order)
 
     @property
     def sensors(self) -> int:
@@ -51,12 +55,17 @@ class FrfData:
         springs = list(structure.springs)
         bodies = structure.prior.repertoire.simulation.elastic.bodies
         jacobians = self.jacobians[..., springs]
-        return PosedBodies(self.q, self.measured.s, jacobians, bodies, structure.springs)
+        order = np.zeros(len(self.q)) if self.order is None else self.order
+        return PosedBodies(self.q, self.measured.s, jacobians, bodies, structure.springs, order)
 
     def at(self, poses: np.ndarray) -> "FrfData":
         """Of some of the poses, by their numbers."""
         return FrfData(
-            self.q[poses], self.measured.at(poses), self.matrices.at(poses), self.jacobians[poses]
+            self.q[poses],
+            self.measured.at(poses),
+            self.matrices.at(poses),
+            self.jacobians[poses],
+            None if self.order is None else self.order[poses],
         )
 
 

@@ -92,17 +92,19 @@ def converged(found: StructureFit) -> StructureFit:
 def sized(misfit: FrfMisfit, at: At) -> tuple[FrfMisfit, At]:
     """With the likeliest size of the discrepancy, uphill from the present one; what is there."""
     around, known = misfit.around(at.x, at.own), {}
+    sizes = [s for s in SIZES if s > misfit.floor]
+    sizes = [misfit.floor, *sizes] if misfit.floor else sizes
 
     def worth(k: int) -> float:
         if k not in known:
-            one = misfit.with_rho(SIZES[k])
+            one = misfit.with_rho(sizes[k])
             there = one.weighed(around)
             known[k] = one.evidence(there) + _of_size(one), one, there
         return known[k][0]
 
-    k = int(np.argmin(np.abs(np.log(np.array(SIZES) / _rho(misfit)))))
+    k = int(np.argmin(np.abs(np.log(np.array(sizes) / _rho(misfit)))))
     while True:
-        near = [j for j in (k - 1, k, k + 1) if 0 <= j < len(SIZES)]
+        near = [j for j in (k - 1, k, k + 1) if 0 <= j < len(sizes)]
         best = max(near, key=worth)
         if best == k:
             return known[k][1], known[k][2]
@@ -154,7 +156,7 @@ def without(best: StructureFit, effects: Sequence[Operator], steps: int = 5) -> 
     for effect in effects:
         structure = structure.without(effect)
     misfit = replace(best.misfit, structure=structure)
-    x = structure.carried(best.structure, best.at.x)
+    x = np.maximum(structure.carried(best.structure, best.at.x), structure.least)
     if not misfit.possible(x):
         return None
     at = minimised(misfit, x, steps, 1.0, best.at.own)

@@ -22,13 +22,16 @@ def minimised(
     `by_prior`: damped in the prior's sds, not the data's: so it follows what they leave open.
     """
     s = misfit.structure
-    low, high = s.mean - REACH * s.sd, s.mean + REACH * s.sd
+    low, high = s.least, s.mean + REACH * s.sd
     at, rejected, growth = misfit(x, own), 0, GROWTH
     damping = 1e-2 if by_prior else 1e-3
     for _ in range(steps):
         normal, gradient = at.normal + s.precision, at.gradient + s.precision @ (at.x - s.mean)
         scale = np.diag(s.precision) if by_prior else np.diag(normal)
-        step = -np.linalg.solve(normal + damping * np.diag(scale), gradient)
+        free = ~((at.x <= low) & (gradient > 0))  # what is as small as it may be stays there
+        step = np.zeros(len(free))
+        damped = (normal + damping * np.diag(scale))[np.ix_(free, free)]
+        step[free] = -np.linalg.solve(damped, gradient[free])
         promised = -float(gradient @ step + 0.5 * step @ normal @ step)
         if promised < tolerance:
             break

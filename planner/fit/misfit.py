@@ -7,13 +7,13 @@ pose (Woodbury), linearised about where they were last; the chain is common to a
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from planner.dynamics.gradient import Impedance, Inertias, motion_slopes, moved
 from planner.dynamics.motion import Motion, Turned
-from planner.effects.effect import Motions
+from planner.effects.effect import Gain, Motions
 from planner.fit.data import FrfData, among
 from planner.fit.inertias import spatial
 from planner.fit.structure import REACH, RobotStructure
@@ -75,18 +75,23 @@ class Around:
     """The model at x: columns (n, D + l + 1, r, c, F) by x and own numbers, the residual last."""
 
     x: np.ndarray
+    accelerance: np.ndarray
     columns: np.ndarray
     motion: Motion
 
 
 @dataclass(frozen=True, eq=False)
 class FrfMisfit:
-    """Of a structure on data; `rho` is the discrepancy's size, None: logarithms are compared."""
+    """Of a structure on data; `rho` is the discrepancy's size, None: logarithms are compared.
+
+    It is inferred, but never below `floor`: what matters less than that is nobody's concern.
+    """
 
     structure: RobotStructure
     data: FrfData
     tolerances: Tolerances
     rho: float | None = 0.03
+    floor: float = 0.0
 
     @cached_property
     def matrices(self) -> Matrices:
@@ -225,7 +230,11 @@ class FrfMisfit:
             moved = (one @ own.view(float)).view(complex)
             at = structure.inertial.start + mine
             out[:, at] += moved.reshape(n, len(mine), *shape)
-        out[:, structure.inertial.stop :] = raw[:, springs + 10 * bodies :]
+        at = springs + 10 * bodies
+        for effect, own in zip(structure.effects, structure.own, strict=True):
+            count = own.stop - own.start if effect.impedance(self.poses, x[own]) else 0
+            out[:, own] = raw[:, at : at + count] if count else 0.0
+            at += count
         visits = by_block[:, :e] + by_block[:, e : 2 * e]  # dampers scatter with their springs
         return out, visits
 
@@ -246,7 +255,22 @@ class FrfMisfit:
         out[:, s.size : s.size + numbers.hits] = open_[:, : numbers.hits]
         out[:, s.size + numbers.hits : own] = open_[:, numbers.known :]
         np.multiply(visits, self.tolerances.visit_stiffness, out=out[:, own:-1])
-        return h, out, motion
+        return self.heard(x, h, out[:, :-1]), out, motion
+
+    def heard(self, x: np.ndarray, h: np.ndarray, columns: np.ndarray | None = None) -> np.ndarray:
+        """What the chain makes of accelerances h (n, r, c, F), and in place of their columns."""
+        structure = self.structure
+        for effect, own in zip(structure.effects, structure.own, strict=True):
+            given = effect.chain(self.data.measured.s, x[own])
+            if given is None:
+                continue
+            raw, (factor, slopes) = h, given
+            h = _times(factor, raw)
+            if columns is not None:
+                columns[:] = _times(factor[:, None], columns)
+                for k, slope in enumerate(slopes):
+                    columns[:, own.start + k] = _times(slope, raw)
+        return h
 
     @cached_property
     def open_numbers(self) -> tuple[OpenNumbers, int]:
@@ -260,7 +284,7 @@ class FrfMisfit:
         numbers, joints = self.open_numbers
         return np.zeros((len(self.data.q), numbers.hits + joints + len(self.structure.springs)))
 
-    def _about(self, own: np.ndarray, x: np.ndarray) -> np.ndarray:
+    def about(self, own: np.ndarray, x: np.ndarray) -> np.ndarray:
         """(n, hits + chain + joints), from own numbers and the chain as x has it."""
         numbers, joints = self.open_numbers
         chain = np.tile(x[self.structure.chain], (len(own), 1))
@@ -279,18 +303,18 @@ class FrfMisfit:
         if own is not None:
             given[:, :size] = np.clip(own[:, :size], -FARTHEST, FARTHEST)
         m, d = self.data.measured, self.structure.size
-        h, columns, motion = self.columns(x, self._about(given, x))
+        h, columns, motion = self.columns(x, self.about(given, x))
         there = np.einsum("nl,nlijf->nijf", given[:, :size], columns[:, d : d + size])
         if self.rho is None:
             off = h * np.log(np.where(self._told(h), h / m.accelerance, 1.0)) - there
         else:
             off = np.where(m.used, h - m.accelerance, 0.0) - there
         columns[:, -1] = off
-        return Around(x, columns, motion)
+        return Around(x, h, columns, motion)
 
     def weighed(self, around: "Around", keep: bool = False) -> At:
         """By noise and discrepancy."""
-        white = self._white(around.columns, around.motion.accelerance)
+        white = self._white(around.columns, around.accelerance)
         return self._eliminated(around.x, white, keep, around.motion)
 
     def _white(self, columns: np.ndarray, h: np.ndarray) -> np.ndarray:
@@ -351,8 +375,10 @@ class FrfMisfit:
         spent = np.linalg.slogdet(at.normal + s.precision)[1] - np.linalg.slogdet(s.precision)[1]
         return -0.5 * (at.chi2 + prior + at.volume + self.noise_volume + float(spent))
 
-    def gain(self, at: At, columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
-        """Nats that columns (n, k, r, c, F) of sds (k,) gain beside all else, and their size."""
+    def gain(
+        self, at: At, columns: np.ndarray, sd: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        """See `Gain`, of columns (n, k, r, c, F) of sds (k,)."""
         s, d = self.structure, self.structure.size
         kept, new = at.eliminated, self.whitened(columns)
         assert kept is not None
@@ -370,9 +396,25 @@ class FrfMisfit:
         inner = square * np.outer(sd, sd) + np.eye(k)
         z = -np.linalg.solve(inner, pull * sd)
         nats = 0.5 * float(z @ inner @ z) - 0.5 * float(np.linalg.slogdet(inner)[1])
-        return nats, z * sd
+        return nats, z * sd, -at.covariance @ (slope + cross @ (z * sd))
+
+    def first_order(self, x: np.ndarray, own: np.ndarray) -> tuple[Motions, Gain]:
+        """How hits and sensors move the springs at x, and what columns gain beside all else.
+
+        Own numbers (n, l) are told once more before.
+        """
+        at = self(x, self(x, own).own, keep=True)
+        return self.motions(at), partial(self.gain, at)
 
     def motions(self, at: At) -> Motions:
         """How hits and sensors move the springs, as effects' first-order columns need it."""
-        motion = at.motion
-        return Motions(self.poses, motion.x_hit, motion.scaled(motion.x_sensor))
+        motion, x = at.motion, at.x
+        sensor = self.heard(x, motion.scaled(motion.x_sensor).swapaxes(1, 2)).swapaxes(1, 2)
+        m, h = self.data.measured, self.heard(x, motion.accelerance)
+        return Motions(self.poses, motion.x_hit, sensor, h, np.where(m.used, m.accelerance, h))
+
+
+def _times(factor: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """Factors (…, 3, 3, F) of each sensor times accelerances (…, 3s, c, F)."""
+    apart = h.reshape(*h.shape[:-3], h.shape[-3] // 3, 3, *h.shape[-2:])
+    return np.einsum("...ijf,...sjcf->...sicf", factor, apart).reshape(h.shape)

@@ -13,6 +13,7 @@ from planner.fit.misfit import SHARE, FrfMisfit
 from planner.fit.structure import RobotStructure, exported
 from planner.inference.least_squares import inverse
 from planner.measurement.measured_frfs import Measured
+from planner.recording.points import TOOL, Layout
 
 # What no structure explains, in shares of |H|, up to which the simulation is followed: of a fit
 # that lacks nothing it is 0.001 to 0.015. Chosen.
@@ -60,7 +61,7 @@ class RobotPosterior:
         """FRFs (n, 3, 3, F) of the tool in m/s²/N at q (n, dof) in rad, and their sds."""
         means, sds = [], []
         for row in np.atleast_2d(q):
-            misfit = FrfMisfit(self.structure, self._at(row[None], frequency_hz), self.tolerances)
+            misfit = FrfMisfit(self.structure, self.at(row[None], frequency_hz), self.tolerances)
             motion = misfit.motion(self.x, None)
             slopes, _ = misfit.slopes(motion, self.x)
             moved = self.root.T @ slopes[0].reshape(slopes.shape[1], -1)
@@ -80,15 +81,16 @@ class RobotPosterior:
         """Of hits, chain and readback."""
         return self.found.misfit.tolerances
 
-    def _at(self, q: np.ndarray, frequency_hz: np.ndarray) -> FrfData:
+    def at(self, q: np.ndarray, frequency_hz: np.ndarray, layout: Layout = TOOL) -> FrfData:
+        """Nothing measured at q (n, dof) in rad on lines (F,) or (n, F), between some points."""
         elastic = self._carried
-        lines = np.atleast_2d(frequency_hz)
-        shape = (len(q), 3, 3, lines.shape[1])
-        ones = np.ones(shape)
+        lines = np.broadcast_to(frequency_hz, (len(q), np.shape(frequency_hz)[-1]))
+        ones = np.ones((len(q), *layout.shape, lines.shape[1]))
         measured = Measured(
-            lines, 2j * np.pi * lines, ones.astype(complex), ones, np.full(len(q), np.inf)
+            lines, 2j * np.pi * lines, ones.astype(complex), ones, np.full(len(q), np.inf), layout
         )
-        return FrfData(q, measured, elastic.matrices(q), elastic.body_jacobians(q))
+        matrices = elastic.matrices(q, layout=layout)
+        return FrfData(q, measured, matrices, elastic.body_jacobians(q))
 
     @cached_property
     def _carried(self):
@@ -123,25 +125,30 @@ class RobotPosterior:
         return float(t.gain * own + t.force_gain * chain[-2]), allowed
 
     def misfits(self, least: float) -> tuple[float, np.ndarray]:
-        """Square of what is left over the noise's variance, of all and by pose (n,).
+        """Square of what is `left` over the noise's variance, of all and by pose (n,).
 
         `least` is a relative sd that counts as noise.
         """
-        misfit, at = self.found.misfit, self.found.at
-        m, columns = misfit.data.measured, misfit.around(at.x, at.own).columns
-        own = columns[:, self.structure.size : -1]
-        left = columns[:, -1] + np.einsum("nl,nlijf->nijf", at.own, own)
-        noise = m.sd**2 + (least * misfit.size) ** 2
-        ratio = np.where(m.used, np.abs(left) ** 2 / noise, 0.0)
+        misfit = self.found.misfit
+        m, noise = misfit.data.measured, np.hypot(misfit.data.measured.sd, least * misfit.size)
+        ratio = np.where(m.used, np.abs(self.left / noise) ** 2, 0.0)
         count = np.maximum(m.used.sum(axis=(1, 2, 3)), 1)
         return float(ratio.sum() / count.sum()), ratio.sum(axis=(1, 2, 3)) / count
+
+    @cached_property
+    def left(self) -> np.ndarray:
+        """(n, r, c, F) in m/s²/N: simulated less measured, once the likeliest misses are out."""
+        misfit, at = self.found.misfit, self.found.at
+        columns = misfit.around(at.x, at.own).columns
+        own = columns[:, self.structure.size : -1]
+        return columns[:, -1] + np.einsum("nl,nlijf->nijf", at.own, own)
 
     def values(self, effect: Operator) -> dict[str, tuple[float, float]]:
         """An effect's stiffnesses and own numbers by name, with sds, in their units."""
         s, sd = self.structure, np.sqrt(np.diagonal(self.covariance))
         out = {}
         for i, p in enumerate(s.parameters[: s.stiffnesses]):
-            if set(p.blocks) <= set(effect.springs):
+            if set(p.blocks) <= {*effect.springs, *effect.spring_priors}:
                 out[p.name] = float(np.exp(self.x[i])), float(np.exp(self.x[i]) * sd[i])
         own = s.own[s.effects.index(effect)]
         for number, value, spread in zip(effect.numbers, self.x[own], sd[own], strict=True):

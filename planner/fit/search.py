@@ -27,8 +27,8 @@ from planner.fit.fitted import (
     without,
 )
 from planner.fit.gauss_newton import minimised
-from planner.fit.misfit import At, FrfMisfit
-from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
+from planner.fit.misfit import FrfMisfit
+from planner.fit.structure import REACH, RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.measurement.truncated_decay import completed
@@ -59,10 +59,12 @@ class Search:
     tolerances: Tolerances
     tell: Callable[[str], None] = lambda _: None
     extend: bool = True  # where what is stated does not explain them
+    order: np.ndarray | None = None  # as in `FrfData.of`
+    floor: float = 0.0  # as in `FrfMisfit`
 
     def data(self, lines: int) -> FrfData:
         """On so many lines a pose."""
-        return FrfData.of(self.prior, self.frfs, self.q, self.band_hz, lines)
+        return FrfData.of(self.prior, self.frfs, self.q, self.band_hz, lines, self.order)
 
     def found(self, warm: FitRecord | None = None) -> StructureFit:
         """The structure that explains them best; from what was found before, if that is given.
@@ -116,7 +118,7 @@ class Search:
         numbers = dict(zip(known.names, known.x, strict=True))
         pairs = zip(structure.names, structure.mean, strict=True)
         x = np.array([numbers.get(name, mean) for name, mean in pairs])
-        return FrfMisfit(structure, data, self.tolerances, size), x
+        return FrfMisfit(structure, data, self.tolerances, size, self.floor), x
 
     def recalled(self, known: FitRecord) -> StructureFit:
         """What was found of these FRFs before, as it was."""
@@ -130,7 +132,7 @@ class Search:
         self, data: FrfData, structure: RobotStructure, x: np.ndarray | None = None
     ) -> StructureFit:
         """From x (the prior's mean): logarithms first, then FRFs that count more and more."""
-        misfit = FrfMisfit(structure, data, self.tolerances, None)
+        misfit = FrfMisfit(structure, data, self.tolerances, None, self.floor)
         at = minimised(misfit, structure.mean if x is None else x, LOG_STEPS)
         own = None
         for size, steps in ANNEALED:
@@ -169,13 +171,7 @@ class Search:
     def _starts(self, best: StructureFit, dense: FrfData) -> list[Start]:
         """All effects that it has not; of operators those that the first order ranks first."""
         misfit = replace(best.misfit, data=dense)
-        at = misfit(best.at.x, best.at.own)
-        at = misfit(best.at.x, at.own, keep=True)
-        motions = misfit.motions(at)
-
-        def gain(columns: np.ndarray, sd: np.ndarray) -> tuple[float, np.ndarray]:
-            return misfit.gain(at, columns, sd)
-
+        motions, gain = misfit.first_order(best.at.x, best.at.own)
         free = effects_free(best.structure)
         again = [  # something else may hang on the same link
             e for e in self.prior.repertoire.effects
@@ -198,7 +194,7 @@ class Search:
         """Starts beside a structure: a few steps each, the best farther, the very best settled."""
         pool = []
         for start in starts:
-            tried = [self._few(base, start, x, steps) for x, steps in _placed(base, start)]
+            tried = [self._few(base, start, x, steps) for x, steps in placed(base, start)]
             pool += sorted((t for t in tried if t is not None), key=evidence_of)[-1:]
         pool.sort(key=evidence_of, reverse=True)
         pool = [stepped(p, FURTHER) for p in pool[:FINALISTS] if p.evidence > known - FAR]
@@ -244,21 +240,14 @@ class Search:
             base = without(best, [effect], 4)
             if base is None:
                 continue
-            at = base.misfit(base.at.x, base.at.own, keep=True)
-            motions = base.misfit.motions(at)
-
-            def gain(
-                columns: np.ndarray, sd: np.ndarray, base: StructureFit = base, at: At = at
-            ) -> tuple[float, np.ndarray]:
-                return base.misfit.gain(at, columns, sd)
-
+            motions, gain = base.misfit.first_order(base.at.x, base.at.own)
             psi = best.at.x[best.structure.own[best.structure.effects.index(effect)]]
             others = [
                 e for e in effects_free(base.structure)
                 if type(e) is type(effect) and e.at != effect.at.split("#")[0]
             ]  # fmt: skip
             starts = [_elsewhere(e, psi, motions, gain) for e in others]
-            ends = self._compete(replace(base, at=at), starts, best.evidence)
+            ends = self._compete(base, starts, best.evidence)
             if ends and ends[0].evidence > best.evidence + SAME:
                 self.tell(f"{effect.label} → {ends[0].structure.effects[-1].label}")
                 return converged(ends[0])
@@ -288,7 +277,7 @@ class Search:
     def _last(self, best: StructureFit) -> StructureFit:
         """On all lines, and at last along what the data leave open."""
         misfit = FrfMisfit(
-            best.structure, self.data(LAST), self.tolerances, max(size_of(best), 0.01)
+            best.structure, self.data(LAST), self.tolerances, max(size_of(best), 0.01), self.floor
         )
         at = minimised(misfit, best.at.x, 10, own=best.at.own)
         best = settled(misfit, at, rounds=2, steps=15)
@@ -296,12 +285,17 @@ class Search:
         return StructureFit(best.misfit, at, best.misfit.evidence(at))
 
 
-def _placed(base: StructureFit, start: Start) -> list[tuple[np.ndarray, int]]:
-    """Where fits with one more effect begin, and their steps."""
+def placed(
+    base: StructureFit, start: Start, all_move: bool = False
+) -> list[tuple[np.ndarray, int]]:
+    """Where fits with one more effect begin, and their steps; `all_move`: of all numbers."""
     structure = base.structure.with_effect(start.effect)
     x = structure.carried(base.structure, base.at.x)
     effect = structure.effects[-1]
     if not effect.springs:
+        if all_move and start.moved is not None:
+            x = structure.carried(base.structure, base.at.x + start.moved)
+            x = np.clip(x, structure.least, structure.mean + REACH * structure.sd)
         x[structure.own[-1]] = start.psi
         if not isinstance(effect, LinkResonator):
             return [(x, 4)]

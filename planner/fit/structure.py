@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from planner.dynamics.simulation import Elasticity, Simulation
-from planner.effects.effect import Operator
+from planner.effects.effect import Operator, SpringPrior
 from planner.effects.parameters import Parameter, Parametrisation, parametrise
 from planner.effects.table import Repertoire
 from planner.fit.inertias import BodyNumbers, body_numbers, pseudo_inertia
@@ -165,6 +165,21 @@ class RobotStructure:
         return out
 
     @cached_property
+    def _known(self) -> dict[int, SpringPrior]:
+        """What effects say of stiffnesses, by the numbers of their parameters."""
+        told = {spring: p for e in self.effects for spring, p in e.spring_priors.items()}
+        springs = enumerate(self.parameters[: self.stiffnesses])
+        return {i: told[p.blocks[0]] for i, p in springs if p.blocks[0] in told}
+
+    @cached_property
+    def least(self) -> np.ndarray:
+        """Where a fit ends: so many sds below what is expected, or where an effect says."""
+        low = self.mean - REACH * self.sd
+        for i, known in self._known.items():
+            low[i] = max(low[i], self.mean[i] - known.shift + known.least)
+        return low
+
+    @cached_property
     def mean(self) -> np.ndarray:
         """Prior mean of x."""
         springs = [np.log(p.median) for p in self.parameters]
@@ -172,6 +187,8 @@ class RobotStructure:
         for i, p in enumerate(self.parameters):
             if p.kind == "damping":
                 springs[i] -= log_k[p.blocks]
+        for i, known in self._known.items():
+            springs[i] += known.shift
         psi = [e.mean for e in self.effects]
         rest = np.zeros(self.chain.stop - self.chain.start)
         return np.concatenate([springs, np.zeros(self.bodies.size), *psi, rest])
@@ -181,6 +198,8 @@ class RobotStructure:
         """Prior sd of x."""
         ones = np.ones(self.bodies.size), np.ones(self.chain.stop - self.chain.start)
         springs = [p.log_sd for p in self.parameters]
+        for i, known in self._known.items():
+            springs[i] = known.log_sd
         return np.concatenate([springs, ones[0], *(e.sd for e in self.effects), ones[1]])
 
     @cached_property

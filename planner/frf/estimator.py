@@ -21,7 +21,6 @@ from planner.recording.records import Hit
 
 ESTIMATORS = "h1", "h2", "hv", "weighted", "one_hit"
 DROP_DB = 20.0  # of the force spectrum, where the pulse ceases to excite
-SMOOTH = 11  # lines over which the variance, which varies slowly, is averaged
 LEVEL_LINES = 15  # over which scatter of weighted hits is compared with what their noise explains
 PRIOR = 12.0  # real values of scatter that the pooled level counts for, beside those near a line
 
@@ -143,7 +142,8 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
         else:
             # Noise may grow with the hit: each counts with its own error (White's, HC2).
             error = left / np.maximum(1 - told, 1e-6)
-            parts = [_smooth(e, SMOOTH) * t for e, t in zip(error, told, strict=True)]
+            # Lines over which the variance, which varies slowly, is averaged
+            parts = [_smooth(e, 11) * t for e, t in zip(error, told, strict=True)]
             variance = np.sum(parts, axis=0) / sff
     coherence = np.clip(np.abs(sxf) ** 2 / np.maximum(sff * sxx, 1e-300), 0.0, 1.0)
     return h, variance, coherence if len(group) > 1 else np.full(h.shape, np.nan), share

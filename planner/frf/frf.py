@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.recording.points import SENSOR, TCP, TOOL, Layout
+from planner.recording.records import AXES
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,3 +92,25 @@ class Frf:
             coherence=self.coherence[..., kept],
             force_share=share,
         )
+
+
+def unreciprocal(frf: Frf) -> tuple[str, ...]:
+    """Remarks on pairs of axes of a tool's FRF (3, 3, F) that do not fit each other."""
+    found = []
+    h = frf.accelerance
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        entries = h[i, j], h[j, i], h[i, i], h[j, j]
+        if not all(np.all(np.isfinite(entry)) for entry in entries):
+            continue
+        size = np.sqrt(np.linalg.norm(h[i, i]) * np.linalg.norm(h[j, j]))
+        apart = float(np.linalg.norm(h[i, j] - h[j, i]) / max(size, 1e-300))
+        # Of ‖H_ij − H_ji‖ over √(‖H_ii‖ ‖H_jj‖). Good poses have 0.05 to 0.35 where hits tilt by 2°
+        # and the sensor sits at the tcp, and up to 0.75 where it sits beside it; a turned sign has
+        # up to 2, an exchanged axis 1 and more. Chosen between.
+        if apart > 0.9:
+            found.append(
+                f"Hits along {AXES[i]} felt along {AXES[j]} and hits along {AXES[j]} felt along "
+                f"{AXES[i]} differ by {100 * apart:.0f} % of what is felt along the hits: they "
+                f"should be alike; check axes and signs of hits and sensor."
+            )
+    return tuple(found)

@@ -10,8 +10,6 @@ from planner.errors import PlannerError, RefusedError
 from planner.frf.quantities import convert
 from planner.recording.records import FrfRecord
 
-# Relative, of one line in two files: headers state the spacing to five digits or so.
-SAME_LINE = 1e-4
 # What a record states of each of its FRFs.
 OF_EACH = "response_direction", "reference_direction", "response_node", "reference_node"
 
@@ -71,7 +69,8 @@ def common_lines(records: Sequence[FrfRecord], refusal: type[PlannerError]) -> n
     lines = np.asarray(first.frequency_hz, float)
     for record in records[1:]:
         other = np.asarray(record.frequency_hz, float)
-        if other.size != lines.size or not np.allclose(other, lines, rtol=SAME_LINE, atol=1e-9):
+        # Relative, of one line in two files: headers state the spacing to five digits or so.
+        if other.size != lines.size or not np.allclose(other, lines, rtol=1e-4, atol=1e-9):
             if record.source == first.source:
                 raise refusal(f"{record.source} mixes frequency lines; export one grid.")
             raise refusal(

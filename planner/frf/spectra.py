@@ -15,12 +15,8 @@ from planner.recording.points import TOOL, Layout
 from planner.recording.records import Hit
 from planner.recording.sampling import same_rate
 
-MARGIN = 1.3  # lines beyond the band, so that modes at its edge are met from both sides
-NYQUIST_SHARE = 0.45  # beyond it anti-alias filters act
-LEAST_SAMPLES = 64  # of a record after its pulse
 LEAST_QUIET = 8  # samples before the pulse that tell offset and noise
 FADED = 1e-3  # of the noise that a window leaves: fainter noise is the digits' own
-LAST_SAMPLES = 64  # of a record: they bound its noise where nothing was recorded before the pulse
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +86,9 @@ def transform(
     before, after, remarks = _alignment(hits)
     length = max(before + after, samples or 0)
     frequency = np.fft.rfftfreq(length, 1 / rate)
-    chosen = (frequency > 0) & (frequency <= min(MARGIN * band_hz[1], NYQUIST_SHARE * rate))
+    # Margin: lines beyond the band, so that modes at its edge are met from both sides
+    # Nyquist share: beyond it anti-alias filters act
+    chosen = (frequency > 0) & (frequency <= min(1.3 * band_hz[1], 0.45 * rate))
     windows = windows or Windows()
     found = tuple(_transform(hit, before, after, length, chosen, windows) for hit in hits)
     tail = float(np.mean([_tail(hit, before, after) for hit in hits]))
@@ -101,7 +99,8 @@ def _alignment(hits: tuple[Hit, ...]) -> tuple[int, int, tuple[str, ...]]:
     """Samples before the peak, and from it on, that every hit has."""
     before = min(hit.pulse.peak for hit in hits)
     after = min(len(hit.force_n) - hit.pulse.peak for hit in hits)
-    if after < LEAST_SAMPLES:
+    # Least samples of a record after its pulse
+    if after < 64:
         raise RefusedError("A record ends right after its pulse; record longer.")
     if before + after < 0.9 * max(len(hit.force_n) for hit in hits):
         return before, after, ("Records of different length were cut to the shortest.",)
@@ -124,7 +123,8 @@ def _transform(
     if known:
         force = force - np.mean(force[quiet])
         response = response - np.mean(response[:, quiet], axis=1, keepdims=True)
-    noise = np.var(response[:, quiet] if known else response[:, -LAST_SAMPLES:], axis=1, ddof=1)
+    # Last samples of a record: they bound its noise where nothing was recorded before the pulse
+    noise = np.var(response[:, quiet] if known else response[:, -64:], axis=1, ddof=1)
     first, end = pulse.around(samples)
     near = np.zeros(samples)
     near[max(first, start) : end] = 1.0

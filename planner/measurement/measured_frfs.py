@@ -23,8 +23,7 @@ class Measured:
 
     `s` (n, F) is the Laplace variable at which they hold, `accelerance` (n, r, c, F) in m/s²/N
     between the points of `layout`, `sd` (n, r, c, F) the root of E|δH|², ∞ where nothing was
-    measured (accelerance is 1 there), `tail_s` (n,) as in `Frf`. `noise_sd` (n, r, c, F) is what of
-    `sd` is the measurement's own; None: all of it.
+    measured (accelerance is 1 there), `tail_s` (n,) as in `Frf`.
     """
 
     frequency_hz: np.ndarray
@@ -33,7 +32,6 @@ class Measured:
     sd: np.ndarray
     tail_s: np.ndarray
     layout: Layout = TOOL
-    noise_sd: np.ndarray | None = None
 
     @property
     def used(self) -> np.ndarray:
@@ -43,15 +41,7 @@ class Measured:
     def at(self, poses: np.ndarray) -> "Measured":
         """Of some of the poses, by their numbers."""
         parts = self.frequency_hz, self.s, self.accelerance, self.sd, self.tail_s
-        noise = None if self.noise_sd is None else self.noise_sd[poses]
-        return Measured(*(part[poses] for part in parts), layout=self.layout, noise_sd=noise)
-
-    def thinned(self, step: int) -> "Measured":
-        """Of every so many-th line."""
-        parts = (self.frequency_hz, self.s, self.accelerance, self.sd)
-        noise = None if self.noise_sd is None else self.noise_sd[..., ::step]
-        few = (part[..., ::step] for part in parts)
-        return Measured(*few, tail_s=self.tail_s, layout=self.layout, noise_sd=noise)
+        return Measured(*(part[poses] for part in parts), layout=self.layout)
 
     def loaded(self, matrices: Matrices, simulation: Simulation) -> Matrices:
         """Matrices between the points of `layout` with the mass of sensors that were there."""
@@ -80,15 +70,13 @@ def stack(
     band_hz: tuple[float, float],
     most_lines: int,
     model_error: float,
-    spread: float = 0.0,
     geometric: bool = False,
 ) -> Measured:
     """FRFs in a band, thinned out evenly to at most `most_lines` a pose.
 
     `model_error` is a relative sd added to that of the noise, for all that a simulation cannot
-    follow: calibration, angles, friction; it goes with each FRF and, by the share `spread`, with
-    the rms of all FRFs of the pose at that frequency. Lines are evenly spaced, or evenly on a
-    logarithmic scale.
+    follow: calibration, angles, friction. Lines are evenly spaced, or evenly on a logarithmic
+    scale.
     """
     chosen = [_lines(frf, band_hz, most_lines, geometric) for frf in frfs]
     layout = layout_of(frfs)
@@ -101,24 +89,20 @@ def stack(
     frequency = np.full((n, f), float(band_hz[1]))
     h = np.ones((n, *layout.shape, f), dtype=complex)
     sd = np.full((n, *layout.shape, f), np.inf)
-    own = sd.copy()
     for i, (frf, lines) in enumerate(zip(frfs, chosen, strict=True)):
         count = len(lines)
         frequency[i, :count] = frf.frequency_hz[lines]
         values, noise = frf.accelerance[..., lines], noise_sd(frf)[..., lines]
         given = np.isfinite(values) & np.isfinite(noise)
         size = np.abs(values)
-        if spread:
-            size = np.hypot(size, spread * np.sqrt(np.nanmean(size**2, axis=(0, 1))))
         total = np.sqrt(noise**2 + (model_error * size) ** 2)
         given &= total > 0
         at = np.ix_([i], layout.rows(frf.layout), layout.columns(frf.layout), range(count))
         h[at] = np.where(given, values, 1.0)
         sd[at] = np.where(given, total, np.inf)
-        own[at] = np.where(given, noise, np.inf)
     rates = np.array([frf.exponential_rate_1_s for frf in frfs])
     tails = np.array([frf.tail_s for frf in frfs])
-    return Measured(frequency, laplace(frequency, rates), h, sd, tails, layout, own)
+    return Measured(frequency, laplace(frequency, rates), h, sd, tails, layout)
 
 
 def layout_of(frfs: Sequence[Frf]) -> Layout:

@@ -12,13 +12,6 @@ from planner.measurement.nuisances import (
     Tolerances,
 )
 
-MISSED_MOST = 4.0  # prior sds, that a guess of a miss is kept within while a simulation is far off
-
-
-def guess(eta: np.ndarray) -> np.ndarray:
-    """Numbers (n, l) in sds around which misses are taken, where eta are the likeliest."""
-    return np.clip(eta, -MISSED_MOST, MISSED_MOST)
-
 
 def actual_ports(
     eta: np.ndarray, s: np.ndarray, t: Tolerances, shape: tuple[int, int]

@@ -88,18 +88,9 @@ class OpenNumbers:
         """Of hits and chain: those of the joints follow."""
         return self.hits + self.chain
 
-    def own(self, values: np.ndarray) -> np.ndarray:
-        """Of values (l, …) of all numbers those of the pose alone: hits and joints."""
-        return np.concatenate([values[: self.hits], values[self.known :]])
-
-    def shared(self, values: np.ndarray) -> np.ndarray:
-        """Of values (l, …) those of the chain."""
-        return values[self.hits : self.known]
-
 
 # Of one hit point and one sensor: what is predicted at the tool.
-HIT_NUMBERS, CHAIN_NUMBERS = 3 * OF_HIT, OF_SENSOR + OF_HAMMER
-OPEN = HIT_NUMBERS + CHAIN_NUMBERS  # and one more of each joint
+HIT_NUMBERS = 3 * OF_HIT
 
 
 def hit_basis(
@@ -180,14 +171,6 @@ class _Answers:
             h, turned.forces, turned.moment, turned.felt, turned.turning, by_angle, actual.matrix
         )
 
-    def between(self, rows: slice, columns: slice) -> "_Answers":
-        """Of one sensor and one hit point."""
-        at = (slice(None), rows, columns)
-        parts = (one[at] for one in (self.h, self.forces, self.moment, self.felt, self.turning))
-        by_angle = None if self.by_angle is None else self.by_angle[:, :, rows, columns]
-        matrix = None if self.matrix is None else self.matrix[:, rows, rows]
-        return _Answers(*parts, by_angle=by_angle, matrix=matrix)
-
 
 def _basis(a: _Answers, s: np.ndarray, t: Tolerances) -> np.ndarray:
     n, rows, columns, lines = a.h.shape
@@ -210,97 +193,6 @@ def _basis(a: _Answers, s: np.ndarray, t: Tolerances) -> np.ndarray:
         sd = np.broadcast_to(t.joint_rad, joints).reshape(-1, 1, 1, 1)
         np.multiply(a.by_angle, sd, out=out[:, numbers.known :])
     return out
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """What the hits at one point open of what one sensor heard: `basis` (n, l, 3, 3, F).
-
-    `rows` and `columns` are theirs in the FRFs, `numbers` (l,) those that move them.
-    """
-
-    rows: slice
-    columns: slice
-    numbers: np.ndarray
-    basis: np.ndarray
-
-    def of(self, values: np.ndarray) -> np.ndarray:
-        """Of values (k, r, c, F) the block's, as real rows (k, 18F)."""
-        return real_rows(values[:, self.rows, self.columns])
-
-
-def blocks(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> tuple[Block, ...]:
-    """`basis` without all that is 0: of each sensor and hit point."""
-    numbers, found, answers = OpenNumbers.of(h), [], _Answers.of(h, turned)
-    joints = 0 if answers.by_angle is None else answers.by_angle.shape[1]
-    of_all = np.arange(numbers.known - OF_HAMMER, numbers.known + joints)
-    for sensor in range(h.shape[1] // 3):
-        of_sensor = numbers.hits + OF_SENSOR * sensor + np.arange(OF_SENSOR)
-        for point in range(h.shape[2] // 3):
-            of_hits = HIT_NUMBERS * point + np.arange(HIT_NUMBERS)
-            rows, columns = (slice(3 * k, 3 * k + 3) for k in (sensor, point))
-            own = _basis(answers.between(rows, columns), s, t)
-            every = np.concatenate([of_hits, of_sensor, of_all])
-            found.append(Block(rows, columns, every, own))
-    return tuple(found)
-
-
-@dataclass(frozen=True, eq=False)
-class Marginal:
-    """A pose's misfit with η integrated out: χ², half gradient, normal.
-
-    `factor` (l, l) is that of I + B Bᵀ by Cholesky, `whitened` (l,) what it makes of B r.
-    """
-
-    chi2: float
-    gradient: np.ndarray
-    normal: np.ndarray
-    factor: np.ndarray
-    whitened: np.ndarray
-
-    @property
-    def log_volume(self) -> float:
-        """ln|I + B Bᵀ|."""
-        return 2 * float(np.sum(np.log(np.diagonal(self.factor))))
-
-    @property
-    def eta(self) -> np.ndarray:
-        """E[η] (l,)."""
-        return np.linalg.solve(self.factor.T, self.whitened)
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """Some of a pose's residuals (m,), with unit noise, and derivatives (d, m).
-
-    `b` (l, m) is how the `numbers` (l,) move them, all others not doing so.
-    """
-
-    residual: np.ndarray
-    jacobian: np.ndarray
-    b: np.ndarray
-    numbers: np.ndarray
-
-
-def marginal(residual: np.ndarray, jacobian: np.ndarray, b: np.ndarray) -> Marginal:
-    """Of residuals (m,) with unit noise, their derivatives (d, m) and B (l, m)."""
-    return marginal_of([Part(residual, jacobian, b, np.arange(len(b)))], len(b), len(jacobian))
-
-
-def marginal_of(parts: Sequence[Part], size: int, count: int) -> Marginal:
-    """The same of parts of a pose that have `size` numbers, and `count` derivatives."""
-    inner, onto = np.eye(size), np.zeros((size, 1 + count))
-    chi2, gradient, normal = 0.0, np.zeros(count), np.zeros((count, count))
-    for p in parts:
-        inner[np.ix_(p.numbers, p.numbers)] += p.b @ p.b.T
-        onto[p.numbers] += p.b @ np.concatenate([p.residual[None], p.jacobian]).T
-        chi2 += float(p.residual @ p.residual)
-        gradient += p.jacobian @ p.residual
-        normal += p.jacobian @ p.jacobian.T
-    factor = np.linalg.cholesky(inner)
-    onto = np.linalg.solve(factor, onto)
-    r, j = onto[:, 0], onto[:, 1:]
-    return Marginal(chi2 - float(r @ r), gradient - j.T @ r, normal - j.T @ j, factor, r)
 
 
 def real_rows(values: np.ndarray) -> np.ndarray:

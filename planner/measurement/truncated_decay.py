@@ -4,32 +4,16 @@ A pulse's response is a sum of decays; cut at T it loses ∫ from T of each, whi
 is R λ² e^((λ−s)T) / (s−λ) for a pole λ with residue R of the receptance.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from planner.dynamics.gradient import laplace
-from planner.dynamics.simulation import Elasticity, Simulation
-from planner.dynamics.vibration import Poles, solve_poles
+from planner.dynamics.simulation import Simulation
+from planner.dynamics.vibration import Poles
 from planner.frf.frf import Frf
-from planner.robot.elastic_model import Matrices
 
 OVER = -12.0  # Re λ T below which a decay is over: less than 1e-5 of it is left
-NEGLIGIBLE = 0.02
-STEP = 1e-4  # of a logarithm
-INERTIAL_STEP = 1e-3  # of an sd
-
-
-@dataclass(frozen=True, eq=False)
-class Completion:
-    """What the records lack at given springs: `values` (n, 3, 3, F) in m/s²/N.
-
-    `slope` (n, 2e or 3e, + R, 3, 3, F) is with respect to the springs' logarithms, then to R
-    inertial parameters; None where the values are taken to hold everywhere.
-    """
-
-    values: np.ndarray
-    slope: np.ndarray | None
 
 
 def cut_off(solved: Poles, s: np.ndarray, tail_s: np.ndarray) -> np.ndarray:
@@ -67,51 +51,3 @@ def completed(frf: Frf, simulation: Simulation, q: np.ndarray) -> Frf:
     values = frf.accelerance.copy()
     values[..., above] += cut_off(solved, s, np.array([frf.tail_s]))[0]
     return replace(frf, accelerance=values, tail_s=float("inf"))
-
-
-def completion(
-    matrices: Matrices,
-    elasticity: Elasticity,
-    mass: np.ndarray,
-    s: np.ndarray,
-    tail_s: np.ndarray,
-    sd: np.ndarray,
-    mass_slope: np.ndarray | None = None,
-    sloped: bool = True,
-) -> Completion | None:
-    """Completion at springs and mass matrices (n, e, e); its slope by differences, or None.
-
-    `mass_slope` (R, n, e, e): of the masses with respect to parameters that follow the springs.
-
-    None where what is cut off is lost in the noise of sd (n, 3, 3, F).
-    """
-
-    def lost(springs: Elasticity, mass: np.ndarray = mass) -> np.ndarray:
-        stiffness = np.diag(springs.stiffness * (1 + 1j * springs.loss_factor))
-        solved = solve_poles(
-            mass,
-            np.diag(springs.damping),
-            stiffness + matrices.geometric,
-            matrices.hit,
-            matrices.sensor,
-        )
-        return cut_off(solved, s, tail_s)
-
-    kinds = ("stiffness", "damping", "loss_factor")[: 3 if elasticity.loss_factor.any() else 2]
-    values, slopes = lost(elasticity), []
-    if np.all(np.abs(values) < NEGLIGIBLE * sd):
-        return None
-    if not sloped:
-        return Completion(values, None)
-    for kind in kinds:
-        for j, value in enumerate(getattr(elasticity, kind)):
-            moved = getattr(elasticity, kind).copy()
-            moved[j] *= np.exp(STEP)
-            same = value == 0
-            after = values if same else lost(replace(elasticity, **{kind: moved}))
-            slopes.append((after - values) / STEP)
-    for change in () if mass_slope is None else mass_slope:
-        moves = bool(np.any(change))
-        after = lost(elasticity, mass + INERTIAL_STEP * change) if moves else values
-        slopes.append((after - values) / INERTIAL_STEP)
-    return Completion(values, np.stack(slopes, axis=1))

@@ -16,7 +16,6 @@ import numpy as np
 
 SLICES = 24  # of a tapered segment: one that narrows to less than half is then exact to 1e-5
 TAYLOR = 14  # terms of the exponential: 1e-16 at the norm to which matrices are halved
-HALVED_TO = 0.5
 GAUSS = np.sqrt(3) / 6  # places of Gauss's two points on a slice, from its middle
 
 
@@ -192,7 +191,8 @@ def exponential(a: np.ndarray) -> np.ndarray:
     scale = _balance(np.abs(a).reshape(-1, size, size).max(axis=0))
     b = a / scale[:, None] * scale
     norm = np.abs(b).sum(axis=-1).max()
-    halvings = max(0, int(np.ceil(np.log2(max(norm, 1e-300) / HALVED_TO))))
+    # Halved to.
+    halvings = max(0, int(np.ceil(np.log2(max(norm, 1e-300) / 0.5))))
     b = b / 2.0**halvings
     eye = np.eye(size)
     # exp(b) − 1 is what is squared: small parts keep their digits beside the 1.

@@ -17,9 +17,6 @@ from planner.milling.tool import NUMBERS, Tool, ToolContact
 FARTHEST = np.log(1e3)  # from the numbers stated: the prior's bounds
 PRIOR_SD = np.log(10.0)  # of each number around its stated one
 STARTS = (0.0, -1.5)  # of stiffnesses, as logarithms beside those stated
-# Relative error that the model is allowed where measured FRFs and coupled ones state less: tools
-# are no rods.
-MODEL_SD = 0.02
 KNOWN = np.log(3.0)  # sd of a logarithm from which a number counts as not determined
 
 
@@ -76,7 +73,9 @@ def fit_contact(
 
     first = couple(tip, target, reference)
     size = np.abs(np.where(known, seen, 1.0))
-    sd = np.hypot(MODEL_SD * size, np.where(known, first.sd[:3, :3], 0.0))[known]
+    # Relative error that the model is allowed where measured FRFs and coupled ones state less:
+    # tools are no rods.
+    sd = np.hypot(0.02 * size, np.where(known, first.sd[:3, :3], 0.0))[known]
 
     def off(z: np.ndarray) -> np.ndarray:
         away = (couple(tip, held(z), reference).receptance[:3, :3] - seen)[known] / sd

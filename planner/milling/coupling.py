@@ -22,7 +22,6 @@ from planner.recording.records import AXES
 MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # Above this a 1 % error of every measured FRF is more than a tenth of the coupled one.
 AMPLIFICATION_LIMIT = 10.0
-SHARE = 1e-9  # of an axis in another: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,13 +212,11 @@ def _whole(values: np.ndarray, kept: tuple[int, ...], frame: np.ndarray) -> np.n
     whole = np.moveaxis(turn @ out @ turn.T, 0, -1)
     # A direction is not known where motions that were not kept have a share in it.
     lacking = [k for k in range(6) if k not in kept]
-    unknown = np.any(np.abs(turn[:, lacking]) > SHARE, axis=1)
+    # Share of an axis in another: rounding
+    unknown = np.any(np.abs(turn[:, lacking]) > 1e-9, axis=1)
     whole[unknown] = np.nan
     whole[:, unknown] = np.nan
     return whole
-
-
-PROMINENT = 0.02  # of the largest peak of the three directions: smaller ones are not listed
 
 
 @dataclass(frozen=True)
@@ -266,7 +263,8 @@ def resonances(coupled: CoupledFrf) -> tuple[Resonance, ...]:
     found = []
     for k in range(3):
         for line in find_peaks(size[k])[0]:
-            if size[k, line] >= PROMINENT * size.max():
+            # Peaks below this share of the largest of the three directions are not listed.
+            if size[k, line] >= 0.02 * size.max():
                 relative = 100 * coupled.sd[k, k, line] / size[k, line]
                 found.append(
                     Resonance(

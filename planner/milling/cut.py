@@ -40,9 +40,7 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     feed: tuple[float, float, float] = (1.0, 0.0, 0.0)
     feed_in: Literal["frf", "base", "path"] = "frf"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    method: Literal["full_discretisation", "semi_discretisation", "zeroth_order"] = (
-        "full_discretisation"
-    )
+    method: Literal["full_discretisation", "zeroth_order"] = "full_discretisation"
     pitch_deg: list[float] | None = None
     helix_deg: float = 0.0
     kt_sd_percent: float = 0.0
@@ -154,9 +152,6 @@ def _check_directions(cut: Cut, path: Path) -> None:
         raise InputError(f"{path}: feed is not at right angles to the axis; correct one of them.")
 
 
-LEAST_ACROSS = 0.2  # of a feed's length across the tool's axis: with less it is a plunge
-
-
 def cuts_at(
     cut: Cut, rotation: np.ndarray, position_m: np.ndarray, names: Sequence[str]
 ) -> list[Cut]:
@@ -185,7 +180,8 @@ def turned_to(cut: Cut, rotation: np.ndarray, feed: np.ndarray, name: str) -> Cu
     own = rotation.T @ (feed / max(float(np.linalg.norm(feed)), 1e-300))
     across = own - axis * (axis @ own)
     size = float(np.linalg.norm(across))
-    if not size > LEAST_ACROSS:
+    # Least share of a feed's length across the tool's axis: with less it is a plunge
+    if not size > 0.2:
         raise InputError(
             f"{name}: the feed is along the tool's axis, or there is none; check feed, feed_in and "
             f"axis in the cut's file, and the path."

@@ -14,13 +14,10 @@ from planner.milling.cutter_frf import CutterFrf
 from planner.milling.cutter_modes import CutterModes
 from planner.modal.estimate_modes import PoleIdentification, identify, inflation
 from planner.modal.fit_data import Data
-from planner.modal.mode_selection import scales
-from planner.modal.plain_modes import PlainModes
+from planner.modal.mode_selection import scales, weakness
+from planner.modal.rank_one_fit import Entries
 from planner.modal.residues import Residues
-
-# Of a residue's second part: share of the FRF, anywhere, and sds of its noise that count.
-SECOND, TOLD = 1e-3, 3.0
-SAME = 1e-9  # relative, of a pole and itself: rounding
+from planner.modal.shape_fit import ShapeFit, shape_fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +31,7 @@ class CutterFit:
     frf: CutterFrf
     there: np.ndarray
     found: PoleIdentification
-    plain: PlainModes
+    shaped: ShapeFit
 
     @classmethod
     def of(cls, frf: CutterFrf) -> "CutterFit":
@@ -53,18 +50,17 @@ class CutterFit:
             )
         alone = np.zeros((2 * found.fit.refined.poles.size,) * 2)
         scale = scales(data, found.fit) * inflation(data, found.fit, alone)
-        number = np.cumsum(there.ravel()).reshape(2, 2) - 1
-        pairs = [(int(number[0, 1]), int(number[1, 0]))] if there[0, 1] and there[1, 0] else []
-        return cls(frf, there, found, PlainModes.of(data, found.fit, scale, pairs))
+        rows, columns = np.nonzero(there)
+        return cls(frf, there, found, shape_fit(data, found.fit, Entries(rows, columns, 2), scale))
 
     @cached_property
     def modes(self) -> CutterModes:
         """Those that are established, and what modes above the lines give way."""
-        return self._as_modes(*self.plain.modes())
+        return self._as_modes(self.shaped.poles, self.shaped.residues)
 
     def drawn(self, count: int, seed: int) -> list[CutterModes]:
         """So many sets of modes that are as likely as each other, by the noise of the FRFs."""
-        return [self._as_modes(*one) for one in self.plain.drawn(count, seed)]
+        return [self._as_modes(*one) for one in self.shaped.drawn(count, seed)]
 
     def _whole(self, values: np.ndarray) -> np.ndarray:
         """(2, 2, n) of values (e, n) of the fitted FRFs."""
@@ -72,42 +68,22 @@ class CutterFit:
         out[self.there] = values
         return out
 
-    @cached_property
-    def _parts(self) -> list[tuple[int, int]]:
-        """Pole by pole how many shapes and drives its residue is of: two where two modes are one.
-
-        Poles that are not established are left out.
-        """
-        poles, residues = self.plain.modes()
-        s = 2j * np.pi * self.frf.frequency_hz
-        size = np.linalg.norm(self.frf.receptance, axis=(0, 1))
-        known = np.array([mode.pole for mode in self.found.modes])
-        sd = np.sqrt(self.plain.residue_variance().sum(axis=0))
-        residue, parts = self._whole(residues.residue), []
-        for k, pole in enumerate(poles):
-            if np.min(np.abs(known / self.found.fit.refined.poles[k] - 1)) > SAME:
-                continue
-            second = np.linalg.svd(residue[..., k], compute_uv=False)[1]
-            shows = second * np.max((1 / np.abs(s - pole) + 1 / np.abs(s - pole.conj())) / size)
-            parts.append((k, 1 + int(shows > SECOND and second > TOLD * sd[k])))
-        return parts
-
     def _as_modes(self, fitted: np.ndarray, residues: Residues) -> CutterModes:
-        poles, shapes, drives = [], [], []
+        """With two shapes and drives where a pole may stand for several modes."""
         residue, upper = self._whole(residues.residue), self._whole(residues.rest)[..., -1]
-        for k, count in self._parts:
-            left, sizes, right = np.linalg.svd(residue[..., k])
-            for part in range(count):
-                poles.append(fitted[k])
-                shapes.append(left[:, part] * sizes[part])
-                drives.append(right[part])
-        return CutterModes(np.array(poles), np.array(shapes), np.array(drives), upper.real)
+        kept = np.flatnonzero(weakness(self.found.data, self.found.fit) <= 1)
+        which = np.repeat(kept, np.where(np.isin(kept, self.shaped.shaped), 1, 2))
+        part = np.append(0, (np.diff(which) == 0).astype(int))
+        left, sizes, right = np.linalg.svd(np.moveaxis(residue, -1, 0)[which])
+        number = np.arange(which.size)
+        shapes = left[number, :, part] * sizes[number, part][:, None]
+        return CutterModes(fitted[which], shapes, right[number, part], upper.real)
 
     def receptance(self, told: np.ndarray) -> np.ndarray:
         """(F, 2, 2) in m/N of the modes; of others below too at lines (F,) that tell of these."""
         s = 2j * np.pi * self.frf.frequency_hz[told, None, None]
         found = self.modes.receptance(self.frf.frequency_hz)
-        found[told] += self._whole(self.plain.modes()[1].rest)[..., 0] / s**2
+        found[told] += self._whole(self.shaped.residues.rest)[..., 0] / s**2
         return found
 
     @property
@@ -122,10 +98,6 @@ class CutterFit:
         return self.found.fit_error
 
 
-DAMPING = 0.01  # of a mode that may be hidden: less damped ones are rare; chosen
-SLOWEST_HZ = 2.0  # machines and robots have no mode below; chosen
-
-
 def hidden_below(fit: CutterFit, mean: np.ndarray, depth_m: float) -> float | None:
     """The highest frequency in Hz at which a mode that chatters below a depth could hide, if any.
 
@@ -134,8 +106,10 @@ def hidden_below(fit: CutterFit, mean: np.ndarray, depth_m: float) -> float | No
     the lines that meet its resonance, passes chance; between two of them at the worst.
     """
     hertz = fit.frf.frequency_hz
-    half = np.pi * DAMPING * hertz / np.median(np.diff(hertz))  # π times lines in half a width
+    # Damping of a mode that may be hidden: less damped ones are rare; chosen
+    half = np.pi * 0.01 * hertz / np.median(np.diff(hertz))  # π times lines in half a width
     met = half * np.tanh(half)  # Σ |H/P|² over the lines
     seen = fit.noise * np.sqrt(fit.found.data.threshold / (2 * met))
-    hidden = hertz[(seen * np.linalg.norm(mean, 2) * depth_m > 1) & (hertz > SLOWEST_HZ)]
+    # Machines and robots have no mode below 2 Hz; chosen
+    hidden = hertz[(seen * np.linalg.norm(mean, 2) * depth_m > 1) & (hertz > 2.0)]
     return float(hidden[-1]) if hidden.size else None

@@ -10,20 +10,17 @@ from planner.frf.labelled import labelled_frfs
 from planner.frf.quantities import convert
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
-from planner.modal.rational_fit import CLOSE, RationalFit, rational_fit
+from planner.milling.rational_fit import CLOSE, RationalFit, rational_fit
 from planner.recording.file_names import read_frfs
 from planner.recording.records import AXES, FrfRecord
 
 SEEN = 1e-9  # share of a direction in the plane of the cut that does not count
-SECOND = 1e-3  # share of the FRF, anywhere, below which a residue's second part does not count
 LEAST_LINES = 16
 FAR = 3.0  # times the highest line
-WORSE = 2.0  # times a fit's error that modes may be off by which leave far poles out; chosen
 # Relative error at which a fit to exact FRFs is close enough. What a loss factor or modes beyond
 # the lines add is no few modes': closer fits follow it with pairs of far poles that nearly cancel,
 # and chatter where nothing is known.
 EXACT = 1e-3
-BESIDE_SD = 0.1  # of the FRFs' sd: a fit as close as this adds nothing to it; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +80,8 @@ class CutterFrf:
         """Predicted FRFs in a plane, without noise, as modes; of measured ones see `cutter_fit`."""
         fit = rational_fit(self.frequency_hz, self.receptance, close=self._close)
         modes = as_modes(fit, self.frequency_hz)
-        if self.error(modes) > max(WORSE * fit.error, CLOSE):
+        # So many times a fit's error modes may be off by which leave far poles out; chosen
+        if self.error(modes) > max(2.0 * fit.error, CLOSE):
             # Poles far above the lines are then no modes' compliance but a part of the curve.
             modes = as_modes(fit, self.frequency_hz, far=np.inf)
         return modes
@@ -97,7 +95,8 @@ class CutterFrf:
         if self.sd is None:
             return EXACT
         size = np.linalg.norm(self.receptance, axis=(0, 1))
-        return max(EXACT, BESIDE_SD * float(np.median(np.linalg.norm(self.sd, axis=(0, 1)) / size)))
+        # A fit as close as this share of the FRFs' sd adds nothing to it; chosen
+        return max(EXACT, 0.1 * float(np.median(np.linalg.norm(self.sd, axis=(0, 1)) / size)))
 
     def error(self, modes: CutterModes) -> float:
         """Root mean square over lines of ‖H − modes‖/‖H‖."""
@@ -128,7 +127,8 @@ def as_modes(fit: RationalFit, frequency_hz: np.ndarray, far: float = FAR) -> Cu
     for pole, residue in zip(fit.poles[~away], fit.residues[~away], strict=True):
         left, sizes, right = np.linalg.svd(residue)
         second = np.max(sizes[1] * (1 / np.abs(s - pole) + 1 / np.abs(s - pole.conj())) / size)
-        for k in range(1 + int(second > SECOND)):
+        # Share of the FRF, anywhere, below which a residue's second part does not count
+        for k in range(1 + int(second > 1e-3)):
             poles.append(pole)
             shapes.append(left[:, k] * sizes[k])
             drives.append(right[k])

@@ -10,24 +10,16 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import root_scalar
 
 from planner.inference.parallel import side_by_side
-from planner.milling.machine import Machine, Monodromies, check_structure, multipliers
+from planner.milling.machine import Machine, Monodromies, check_structure, limits, multipliers
 from planner.milling.period import Period
-from planner.milling.semi_discretisation import semi_monodromies
-from planner.milling.zeroth_order import limits
 from planner.progress import Tell, quietly
 
-STEPS_TO_FLOOR = 6  # of the scan, up to the zeroth-order floor; flips may come before it
 LEAST_STEPS = 16  # of the scan in all
-EQUAL_STEPS = 24  # of the same length, before steps grow with the depth
 GROWTH = 1.045
 CHUNK = 12  # depths that are scanned at once
-REFINED = 1e-6  # relative width up to which a loss is refined
-AT_ONE = 1e-9  # |log |µ|| that is zero
-MOST_ROUNDS = 60
-NEARLY = 0.9  # a maximum of |µ| above this, between steps, is looked at more closely
-CLOSER = 9  # depths that then are looked at
 
 
 @dataclass(frozen=True)
@@ -40,8 +32,10 @@ class GrowthAtDepth:
 
 def scanned_depths(floor_m: float, most_m: float) -> np.ndarray:
     """(B,) depths from the first step to the largest."""
-    step = min(floor_m / STEPS_TO_FLOOR, most_m / LEAST_STEPS)
-    equal = step * np.arange(1, EQUAL_STEPS + 1)
+    # Steps of the scan up to the zeroth-order floor: flips may come before it
+    step = min(floor_m / 6, most_m / LEAST_STEPS)
+    # Steps of the same length, before they grow with the depth
+    equal = step * np.arange(1, 24 + 1)
     count = max(0, int(np.ceil(np.log(max(most_m / equal[-1], 1.0)) / np.log(GROWTH))))
     depths = np.concatenate([equal, equal[-1] * GROWTH ** np.arange(1, count + 1)])
     return np.append(depths[depths < most_m * (1 - 1e-9)], most_m)
@@ -72,57 +66,24 @@ def _with_peaks(at: Monodromies, seen: list[GrowthAtDepth]) -> list[GrowthAtDept
     for a, b, c in zip(seen, seen[1:], seen[2:], strict=False):
         if b.size > 0:
             break
-        if b.size > np.log(NEARLY) and b.size >= max(a.size, c.size):
-            more += levels(at, np.linspace(a.depth, c.depth, CLOSER + 2)[1:-1])
+        # A maximum of |µ| above this, between steps, is looked at more closely.
+        if b.size > np.log(0.9) and b.size >= max(a.size, c.size):
+            # So many depths then are looked at.
+            more += levels(at, np.linspace(a.depth, c.depth, 9 + 2)[1:-1])
     return sorted([*seen, *more], key=lambda level: level.depth)
 
 
-def refined(
-    at: Monodromies, low: GrowthAtDepth, high: GrowthAtDepth, width: float = REFINED
-) -> tuple[float, float]:
-    """Depth at which |µ| is one between two, and the slope of log |µ| there (Illinois rule).
+def refined(at: Monodromies, low: GrowthAtDepth, high: GrowthAtDepth, width: float = 1e-6) -> float:
+    """Depth at which |µ| is one between two, to a relative `width`."""
+    known = {low.depth: low.size, high.depth: high.size}
 
-    `width` is the relative one of the last bracket.
-    """
-    weight, last, slope = (1.0, 1.0), None, 1.0
-    for _ in range(MOST_ROUNDS):
-        a, b = low.size * weight[0], high.size * weight[1]
-        depth = high.depth - b * (high.depth - low.depth) / (b - a)
-        if not low.depth < depth < high.depth:
-            depth = (low.depth + high.depth) / 2
-        (new,) = levels(at, np.array([depth]))
-        above = new.size > 0
-        if above:
-            high, weight = new, (weight[0] / 2 if last is True else 1.0, 1.0)
-        else:
-            low, weight = new, (1.0, weight[1] / 2 if last is False else 1.0)
-        last = above
-        slope = (high.size - low.size) / (high.depth - low.depth)
-        close = width * high.depth
-        if high.depth - low.depth < close or abs(new.size) < max(AT_ONE, slope * close / 10):
-            break
-    return (low if abs(low.size) < high.size else high).depth, slope
+    def size(depth: float) -> float:
+        return known[depth] if depth in known else levels(at, np.array([depth]))[0].size
+
+    return float(root_scalar(size, bracket=(low.depth, high.depth), xtol=width * high.depth).root)
 
 
-def near(at: Monodromies, depth: float, slope: float) -> tuple[float, float] | None:
-    """The same from a depth that is nearly it, with its slope; None where that leads nowhere."""
-    (here,) = levels(at, np.array([depth]))
-    moved = -here.size / slope
-    if abs(moved) < REFINED * depth:
-        return depth + moved, slope
-    far = depth + 2 * moved
-    if not 0 < far < 2 * depth:
-        return None
-    (there,) = levels(at, np.array([far]))
-    low, high = sorted((here, there), key=lambda level: level.depth)
-    return refined(at, low, high) if low.size < 0 < high.size else None
-
-
-DEPTH_ERROR = 3e-4  # relative, up to which points per period are added
-FINER = 1.5  # factor on the points, for the check
 MANY, BLOCK = 60, 10  # speeds from which two processes share them, in blocks of so many
-ROUNDS = 5  # of adding points
-SEMI_FINER = 2.0  # factor on the steps of a semi-discretisation, whose error falls with the square
 
 
 @dataclass(frozen=True)
@@ -145,14 +106,13 @@ def losses(machine: Machine, tell: Tell = quietly) -> tuple[Loss, ...]:
     cut = machine.cut
     if cut.method == "zeroth_order":
         return zeroth_losses(machine)
-    one = full_loss if cut.method == "full_discretisation" else semi_loss
     scan = scanned_depths(machine.floor().floor_m, cut.depth_m[1])
     speeds = [float(rpm) for rpm in cut.speeds_rpm]
     if len(speeds) < MANY:
-        return tuple(one(machine, rpm, scan) for rpm in speeds)
+        return tuple(full_loss(machine, rpm, scan) for rpm in speeds)
     blocks = [speeds[i : i + BLOCK] for i in range(0, len(speeds), BLOCK)]
     found = side_by_side(
-        lambda block: [one(machine, rpm, scan) for rpm in block],
+        lambda block: [full_loss(machine, rpm, scan) for rpm in block],
         blocks,
         lambda number, count: tell("lobes", count / len(blocks)),
     )
@@ -175,44 +135,30 @@ def full_loss(machine: Machine, rpm: float, scan: np.ndarray) -> Loss:
     bracket = first_unstable(at, scan)
     if bracket is None:
         return NO_LOSS
-    depth, slope = refined(at, *bracket)
+    depth = refined(at, *bracket)
     factor, error = 1.0, np.inf
-    for _ in range(ROUNDS):
-        factor *= FINER
+    # Rounds of adding points
+    for _ in range(5):
+        # Finer: factor on the points, for the check
+        factor *= 1.5
         at = machine.monodromies(rpm, factor)
-        found = _again(at, depth, slope, scan)
+        found = _again(at, depth, scan)
         if found is None:
             return NO_LOSS
-        error, (depth, slope) = abs(found[0] - depth) / depth, found
-        if error < DEPTH_ERROR:
+        error, depth = abs(found - depth) / depth, found
+        # Depth error: relative, up to which points per period are added
+        if error < 3e-4:
             break
     return _told(machine, rpm, factor, depth, error)
 
 
-def _again(
-    at: Monodromies, depth: float, slope: float, scan: np.ndarray
-) -> tuple[float, float] | None:
+def _again(at: Monodromies, depth: float, scan: np.ndarray) -> float | None:
     """With other points: near where it was, else by another scan."""
-    found = near(at, depth, slope)
-    if found is not None:
-        return found
+    low, high = levels(at, depth * np.array([0.998, 1.002]))
+    if low.size < 0 < high.size:
+        return refined(at, low, high)
     bracket = first_unstable(at, scan)
     return None if bracket is None else refined(at, *bracket)
-
-
-def semi_loss(machine: Machine, rpm: float, scan: np.ndarray) -> Loss:
-    """By semi-discretisation, extrapolated from two numbers of steps to infinitely many."""
-    at = semi_monodromies(machine, rpm)
-    bracket = first_unstable(at, scan)
-    if bracket is None:
-        return NO_LOSS
-    depth, slope = refined(at, *bracket)
-    found = _again(semi_monodromies(machine, rpm, SEMI_FINER), depth, slope, scan)
-    if found is None:
-        return NO_LOSS
-    more = (found[0] - depth) / (SEMI_FINER**2 - 1)
-    told = _told(machine, rpm, 1.0, found[0] + more, abs(more) / depth)
-    return told
 
 
 def _told(machine: Machine, rpm: float, factor: float, depth: float, error: float) -> Loss:

@@ -10,8 +10,7 @@ from scipy.stats import norm
 from planner.milling.cut import Cut
 from planner.milling.lobes import Loss, losses
 from planner.milling.machine import Machine, multipliers
-from planner.milling.spread import moved
-from planner.milling.structure import Structure
+from planner.milling.structure import Structure, moved
 from planner.milling.uncertainty import PROBABILITY, sampled_limits
 from planner.progress import Tell, quietly, within
 
@@ -129,7 +128,6 @@ def _turned(machine: Machine, turn: float) -> Machine:
 
 SAMPLES = 40
 STEP = 1e-3  # relative, of a frequency, for slopes
-LEAST_SD = 1e-6  # of log |µ|: where nothing is uncertain
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +163,8 @@ def decide(structure: Structure, cut: Cut, rpm: float, depth_m: float) -> PoseDe
         by[i] = STEP
         shifted = Machine(moved(machine.modes, by), cut, machine.coefficients)
         slope[i] = (_margin(shifted, rpm, depth_m) - margin) / STEP
-    return PoseDecision(margin, max(sd, LEAST_SD), np.abs(poles) / (2 * np.pi), slope)
+    # Least sd of log |µ|: where nothing is uncertain
+    return PoseDecision(margin, max(sd, 1e-6), np.abs(poles) / (2 * np.pi), slope)
 
 
 def _margin(machine: Machine, rpm: float, depth_m: float) -> float:

@@ -23,8 +23,6 @@ from planner.milling.cutter_frf import CutterFrf
 from planner.milling.tool import Point, Tool
 from planner.recording.records import AXES
 
-AXIS = 1e-6  # by how much the cosine of a tool's axis with one of the FRFs' own may lack
-
 
 @dataclass(frozen=True, eq=False)
 class TwoPoints:
@@ -79,7 +77,8 @@ def _check(seen: TwoPoints, tool: Tool) -> None:
         return
     along = int(np.argmax(np.abs(tool.axis)))
     across = tuple(k for k in range(3) if k != along)
-    if abs(tool.axis[along]) < 1 - AXIS:
+    # By how much the cosine of a tool's axis with one of the FRFs' own may lack
+    if abs(tool.axis[along]) < 1 - 1e-6:
         raise InputError(
             f"The axis of {tool.name} is none of the FRFs' own; measure x, y and z at both points."
         )
@@ -108,13 +107,6 @@ def _mapping(
     return v, w
 
 
-# Of G's largest singular value at a line: what is smaller tells no rotation. Where H and G differ
-# by 1 % of that value, so do rotations by at most 1 % / (2 · 0.05) of theirs.
-LEAST = 0.05
-# Relative sd of the simulation's rotations: links and flange that it takes for rigid bend too.
-ROTATIONS_SD = 0.1
-
-
 def completed(motion: CutterFrf, simulation: Simulation, q: np.ndarray) -> TipReceptance:
     """All receptances of the tcp at q (dof,) in rad, from those of motion and a simulation."""
     g, seen = _simulated(simulation, q, motion.frequency_hz)
@@ -129,7 +121,8 @@ def completed(motion: CutterFrf, simulation: Simulation, q: np.ndarray) -> TipRe
     right[:, :, 3:] = least @ seen[:, :, 3:]
     # A simulation that misses the motions misses the rotations too, by as much at least.
     off = np.linalg.norm(own - seen[:, :, :3], axis=(1, 2)) / np.linalg.norm(own, axis=(1, 2))
-    relative = np.hypot(ROTATIONS_SD, off)
+    # Relative sd of the simulation's rotations: links and flange that it takes for rigid bend too.
+    relative = np.hypot(0.1, off)
     spread = relative[:, None, None] * np.abs(g)
     apart = np.abs(g[:, :3, :3] - seen[:, :, :3])  # sensor and tcp are not at the same place
     spread[:, :3, :3] = off[:, None, None] * apart
@@ -155,7 +148,9 @@ def regularised_inverse(g: np.ndarray) -> np.ndarray:
     """(F, n, n) of matrices: their inverse, but for what is small beside their largest part."""
     largest = np.linalg.norm(g, 2, axis=(1, 2))
     conjugate = np.conj(np.swapaxes(g, 1, 2))
-    ridge = (LEAST * largest)[:, None, None] ** 2 * np.eye(g.shape[-1])
+    # Of G's largest singular value at a line: what is smaller tells no rotation. Where H and G
+    # differ by 1 % of that value, so do rotations by at most 1 % / (2 · 0.05) of theirs.
+    ridge = (0.05 * largest)[:, None, None] ** 2 * np.eye(g.shape[-1])
     return conjugate @ np.linalg.inv(g @ conjugate + ridge)
 
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import nnls
+from scipy.stats import norm, qmc
 
 from planner.errors import InputError
 from planner.milling.cut import Cut
@@ -10,10 +12,110 @@ from planner.milling.cutter_fit import CutterFit, hidden_below
 from planner.milling.cutter_frf import EXACT, CutterFrf
 from planner.milling.cutter_modes import CutterModes, ModeFile
 from planner.milling.directional import Coefficients, mean_matrix
-from planner.milling.machine import Machine, check_structure
-from planner.milling.spread import ModeSpread, explaining, sampled
-from planner.milling.uncertainty import REPLICATES
-from planner.milling.zeroth_order import LobeCurves, curves
+from planner.milling.machine import LobeCurves, Machine, check_structure, curves
+from planner.milling.uncertainty import OPEN, REPLICATES
+
+STEP = 1e-4  # relative, of derivatives
+MOST_DAMPING = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class ModeSpread:
+    """Relative sds (m,) of m modes' frequencies, damping and sizes, and of all sizes together."""
+
+    frequency: np.ndarray
+    damping: np.ndarray
+    size: np.ndarray
+    common: float = 0.0
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """(3m + 1,) all of them."""
+        return np.concatenate([self.frequency, self.damping, self.size, [self.common]])
+
+    @classmethod
+    def of(cls, numbers: np.ndarray) -> "ModeSpread":
+        """From all of them."""
+        frequency, damping, size = np.split(numbers[:-1], 3)
+        return cls(frequency, damping, size, float(numbers[-1]))
+
+    @classmethod
+    def none(cls, count: int) -> "ModeSpread":
+        """Of so many modes of which nothing is uncertain."""
+        return cls.of(np.zeros(3 * count + 1))
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is uncertain."""
+        return bool(np.any(self.numbers > 0))
+
+
+def moved(modes: CutterModes, by: np.ndarray) -> CutterModes:
+    """Modes with relative changes (3m + 1,) of `ModeSpread.numbers`; m counts distinct poles.
+
+    A mode keeps its mass where its frequency changes; damping and sizes change by factors e^x.
+    """
+    _, group = np.unique(modes.poles, return_inverse=True)
+    frequency, damping, size = (part[group] for part in np.split(by[:-1], 3))
+    omega = np.abs(modes.poles) * np.exp(frequency)
+    own = -modes.poles.real / np.abs(modes.poles)
+    # A fit may bring a pole that is more damped: that stays, or nothing changed would change it.
+    zeta = np.minimum(own * np.exp(damping), np.maximum(own, MOST_DAMPING))
+    damped = omega * np.sqrt(1 - zeta**2)
+    factor = np.exp(size + by[-1]) * modes.poles.imag / damped
+    return replace(
+        modes,
+        poles=-zeta * omega + 1j * damped,
+        shapes=modes.shapes * factor[:, None],
+        residual=modes.residual * np.exp(by[-1]),
+    )
+
+
+def explaining(modes: CutterModes, frf: CutterFrf) -> tuple[ModeSpread, float]:
+    """Sds that explain those of an FRF, and the share of its variance that they give."""
+    count = len(np.unique(modes.poles))
+    if frf.sd is None or not np.any(frf.sd > 0):
+        return ModeSpread.none(count), 1.0
+    # Most lines of an FRF, that its sd is explained at
+    every = max(1, len(frf.frequency_hz) // 300)
+    hertz, sd = frf.frequency_hz[::every], frf.sd[..., ::every].transpose(2, 0, 1)
+    here = modes.receptance(hertz)
+    columns = []
+    for i in range(3 * count + 1):
+        by = np.zeros(3 * count + 1)
+        by[i] = STEP
+        columns.append(np.abs((moved(modes, by).receptance(hertz) - here) / STEP) ** 2)
+    scale = np.sum(np.abs(here) ** 2, axis=(1, 2))[:, None, None]
+    wanted = sd**2 / scale
+    # Line by line alike: few lines of which hardly anything is known say nothing of the others.
+    size = np.sum(wanted, axis=(1, 2))[:, None, None]
+    # Least share of the median variance over the lines: none counts as if it were known better
+    size = np.maximum(size, 1e-3 * np.median(size))
+    a = np.stack([(column / scale / size).ravel() for column in columns], axis=1)
+    wanted = (wanted / size).ravel()
+    unit = np.linalg.norm(a, axis=0)
+    unit[unit == 0] = np.inf
+    square = nnls(a / unit, wanted)[0] / unit
+    given = float(np.sum(a @ square) / np.sum(wanted))
+    # Most sd of ln frequency, damping or size: nothing is known of a mode that is less sure
+    return ModeSpread.of(np.minimum(np.sqrt(square), 0.5)), given
+
+
+def sampled(
+    modes: CutterModes, spread: ModeSpread, k: Coefficients, sds: tuple[float, float],
+    count: int, seed: int,
+) -> list[tuple[CutterModes, Coefficients]]:  # fmt: skip
+    """So many samples of modes and coefficients (relative sds of K_t, K_r), a Latin hypercube."""
+    numbers = np.append(spread.numbers, sds)
+    points = qmc.LatinHypercube(len(numbers), rng=np.random.default_rng(seed)).random(count)
+    normal = norm.ppf(points) * numbers
+    found = []
+    for row in normal:
+        # Least coefficient of the stated one: a sample of K_t is not below
+        kt, kr = 1 + np.maximum(row[-2:], 0.05 - 1)
+        found.append((moved(modes, row[:-2]), Coefficients(k.kt * kt, k.kr * kr)))
+    return found
+
 
 ROUNDING = 1e-5  # relative error of a fit that is one of rounding in a file
 SAMPLES = 200
@@ -145,3 +247,24 @@ def beyond(structure: Structure, chatter_hz: np.ndarray) -> str | None:
         f"At {count} of the speeds the cut would chatter outside the FRFs' {lines[0]:g} to "
         f"{lines[-1]:g} Hz, where the fitted modes only guess: measure there too."
     )
+
+
+def doubts(structure: Structure, cut: Cut, depth_m: np.ndarray, known: np.ndarray) -> list[str]:
+    """On limits (n,) in m, NaN or inf where there is none, and whether samples agree on them."""
+    fit, said = structure.fit, []
+    if fit is None:
+        return []
+    if not np.all(known):
+        said.append(
+            f"Lines or noise of these FRFs do not suffice at {np.sum(~known)} of {len(known)} "
+            f"speeds: they leave the limit open by more than ± {100 * OPEN:.0f} %. Measure at "
+            f"finer lines or average more hits."
+        )
+    most = float(np.max(np.where(np.isfinite(depth_m), depth_m, cut.depth_m[1])))
+    hidden = hidden_below(fit, mean_matrix(cut, Coefficients.of(cut)), most)
+    if hidden is not None:
+        said.append(
+            f"Below {hidden:.2g} Hz noise and lines of these FRFs would hide a mode that chatters "
+            f"at less: the limits hold if the structure has none there."
+        )
+    return said

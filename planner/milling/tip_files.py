@@ -19,8 +19,11 @@ from planner.frf.synthesis import pole
 from planner.milling.coupling import TipReceptance
 from planner.milling.cutter_frf import CutterFrf, read_npz, row_of
 from planner.milling.rotations import TwoPoints, two_point_receptance
-from planner.milling.smoothing import smoothed
 from planner.milling.tool import Tool
+from planner.modal.estimate_modes import identify
+from planner.modal.fit_data import Data
+from planner.modal.rank_one_fit import Entries
+from planner.modal.shape_fit import shape_fit
 from planner.recording.file_names import read_frfs
 from planner.recording.joints import JointUnits
 from planner.recording.records import AXES, FrfRecord
@@ -32,7 +35,6 @@ MEASURE = (
     "measure FRFs at two points of the tested tool, its tip and one some 30 mm behind it, both "
     "across its axis, and give them as UFF 58 with --reference naming the points"
 )
-MOST_LINES = 200_000
 
 
 def read_tip(
@@ -147,7 +149,8 @@ class TipModesTable(msgspec.Struct, forbid_unknown_fields=True):
 def _modes(path: Path, noise: float) -> TipReceptance:
     table = load_toml(path, TipModesTable, "file of modes at two points")
     low, high, count = table.lines_hz
-    if not (0 < low < high and 2 <= count <= MOST_LINES):
+    # Most lines.
+    if not (0 < low < high and 2 <= count <= 200_000):
         raise InputError(f"{path}: lines_hz has to be [from above 0, to, how many]; correct it.")
     frequency = np.linspace(low, high, count)
     iw = 2j * np.pi * frequency
@@ -169,3 +172,31 @@ def _tip_and_turn(side: tuple[Pair, ...], distance: float) -> np.ndarray:
     """(x, y, θx, θy) at the tip, the second point lying at −z of it."""
     tip_x, tip_y, back_x, back_y = (complex(*pair) for pair in side)
     return np.array([tip_x, tip_y, -(tip_y - back_y) / distance, (tip_x - back_x) / distance])
+
+
+def smoothed(tip: TipReceptance) -> TipReceptance:
+    """The same from smoothed measured values, and a remark; as it is where no sd is stated.
+
+    Also as it is, and said so, where no fit by common modes comes near the noise.
+    """
+    if not np.all(tip.sd > 0):
+        return tip
+    square = (2 * np.pi * tip.frequency_hz) ** 2
+    accelerance = -np.moveaxis(tip.measured, 0, -1) * square
+    variance = (np.moveaxis(tip.sd, 0, -1) * square) ** 2
+    data = Data(tip.frequency_hz, accelerance, variance, above=True, steady=True)
+    found, count = identify(data), len(accelerance)
+    rows, columns = np.divmod(np.arange(count**2), count)
+    fit = None if found is None else shape_fit(data, found.fit, Entries(rows, columns, count))
+    if fit is None or fit.chi2 > 1.2:  # per degree of freedom: beyond, sds would not hold
+        text = "The FRFs are used line by line: few common modes do not follow them to their noise."
+        return replace(tip, remarks=(*tip.remarks, text))
+    text = (
+        f"The FRFs are those of {fit.poles.size} common modes fitted to them, "
+        f"misfit {np.sqrt(fit.chi2):.2f} of their noise."
+    )
+    measured = np.moveaxis((-fit.response / square).reshape(accelerance.shape), -1, 0)
+    errors = (-fit.errors / square).reshape(-1, *accelerance.shape)
+    errors = np.moveaxis(errors, -1, 1)
+    sd = np.sqrt(np.sum(np.abs(errors) ** 2, axis=0))
+    return replace(tip, measured=measured, sd=sd, errors=errors, remarks=(*tip.remarks, text))

@@ -12,8 +12,6 @@ GCODE = (".nc", ".gcode", ".cnc", ".tap", ".mpf", ".ngc", ".eia", ".iso")
 APT = (".apt", ".cls", ".cl", ".aptsource")
 INCH, MM = 0.0254, 1e-3
 ARC_STEP = np.deg2rad(5.0)
-PLUNGE = 0.8  # share of a move along the tool's axis from which it is no milling
-SAME_AXIS = 1e-4  # by which the tool's axis may differ along the path
 MOST_BYTES = 50_000_000
 WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))")
 # Moves whose positions are not those of a plain path in the program's frame.
@@ -73,7 +71,8 @@ def read_toolpath(path: Path) -> Toolpath:
     kept = []
     for a, b, line in moves:
         length = np.linalg.norm(b - a)
-        if length > 0 and abs((b - a) @ spindle) < PLUNGE * length:
+        # From this share along the tool's axis on a move is a plunge, no milling.
+        if length > 0 and abs((b - a) @ spindle) < 0.8 * length:
             kept.append((a, b, line))
     if not kept:
         raise InputError(f"{path} holds no cutting moves across the tool's axis; check the file.")
@@ -196,7 +195,8 @@ def _apt(path: Path, text: str) -> tuple[list[Move], np.ndarray]:
         if len(values) == 6:
             axis = values[3:] / max(float(np.linalg.norm(values[3:])), 1e-300)
             spindle = axis if spindle is None else spindle
-            if np.linalg.norm(axis - spindle) > SAME_AXIS:
+            # By which the tool's axis may differ along the path
+            if np.linalg.norm(axis - spindle) > 1e-4:
                 raise InputError(
                     f"{path}, line {number}: the tool's axis turns, but has to be constant; give a "
                     f"path of one tool axis, or poses as CSV."

@@ -24,7 +24,6 @@ REPLICATES = 4  # Latin hypercubes, whose difference shows how far quantiles hav
 # Shares of the limit without uncertainty at which samples are looked at first.
 FIRST = np.array([0.4, 0.6, 0.75, 0.88, 1.0, 1.15, 1.4])
 MOST_SPEEDS = 100  # at which samples are looked at; between them their limits are interpolated
-QUICKLY = 1e-3  # relative width of a sample's limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +114,7 @@ def _limits(machine: Machine, rpm: np.ndarray, around: np.ndarray) -> np.ndarray
             above = scan if np.isnan(around[i]) else scan[scan > FIRST[-1] * around[i]]
             bracket = first_unstable(at, above) if len(above) else None
         if bracket is not None:
-            found[i] = refined(at, *bracket, QUICKLY)[0]
+            found[i] = refined(at, *bracket, 1e-3)
     return found
 
 

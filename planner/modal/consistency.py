@@ -21,15 +21,9 @@ from planner.modal.exchanged import (
     turning_helps,
 )
 from planner.modal.matrix_poles import MatrixPoles
-from planner.modal.row_places import turned_rows
+from planner.modal.motion_fields import turned_rows
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
-
-# A sign is called wrong where less than this share of the modes' residues has the right one.
-DOUBTED = 0.3
-# Reciprocity is remarked upon where H_ij and H_ji differ by more than this.
-RECIPROCAL = 0.15
-LEAST_MODES = 3  # that tell of signs and places
 
 
 @dataclass(frozen=True)
@@ -85,8 +79,10 @@ def check(
     sides, lines = Sides.of(matrix, found, modes), _lines(matrix, found)
     driving = tuple(_driving(matrix, sides, lines, *pair) for pair in sides.driving)
     reciprocity = tuple(_reciprocity(matrix, found, modes, *pair) for pair in _pairs(matrix))
-    enough = modes.size >= LEAST_MODES
-    wrong = tuple(point.dof for point in driving if point.modes < DOUBTED)
+    # Least modes that tell of signs and places
+    enough = modes.size >= 3
+    # A sign is called wrong where less than this share of the modes' residues has the right one.
+    wrong = tuple(point.dof for point in driving if point.modes < 0.3)
     rows = _turned_rows(sides, geometry) if enough else ()
     # At a point that both roved and stayed either may be turned; its neighbours tell.
     turned = tuple(dof for dof in wrong if dof not in rows)
@@ -194,7 +190,8 @@ def _turned(
 
 def _remarks(reciprocity: tuple[Reciprocity, ...]) -> tuple[str, ...]:
     worst = max(reciprocity, key=lambda r: r.difference, default=None)
-    if worst is None or worst.difference < RECIPROCAL:
+    # Reciprocity is remarked upon where H_ij and H_ji differ by more than this.
+    if worst is None or worst.difference < 0.15:
         return ()
     return (
         f"Between hits {worst.first.at} and {worst.second.at} H_ij and H_ji differ by "
@@ -205,7 +202,6 @@ def _remarks(reciprocity: tuple[Reciprocity, ...]) -> tuple[str, ...]:
 # An entry fits where its residues differ from what the rest of its row asks for by less than this,
 # over all modes; what turned it round differs by more than the second as stated.
 FITS, ODD = 0.3, 1.0
-MOST = 0.2  # share of entries that can be odd: beyond, what they are compared with is
 
 
 def odd_entries(sides: Sides) -> tuple[list[str], list[tuple[int, int]]]:
@@ -233,7 +229,8 @@ def odd_entries(sides: Sides) -> tuple[list[str], list[tuple[int, int]]]:
                     f"The FRFs {_named(sides, a, column)} and {_named(sides, b, column)} are "
                     "probably swapped and were left out. Check the labels."
                 )
-    few = len(sentences) <= MOST * np.count_nonzero(np.isfinite(stated))
+    # Most entries that can be odd: beyond, what they are compared with is
+    few = len(sentences) <= 0.2 * np.count_nonzero(np.isfinite(stated))
     return (sentences, wrong) if few else ([], [])
 
 

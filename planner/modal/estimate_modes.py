@@ -18,7 +18,6 @@ from planner.modal.stabilisation import Diagram, diagram, stable
 # so that it is judged by lines that hold it.
 CUT = 0.12
 LEAST_LINES = 32
-HELD = 1e-10  # of the information on the best held pole: below, rounding rules
 
 
 def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
@@ -38,7 +37,9 @@ def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
         by_chance = variance - own[k] + common[k]
         # An error of the model, too, moves a pole the farther the less the lines hold it. Real and
         # imaginary parts suffer from the same cause: one factor a mode.
-        beyond = np.maximum(moved.reshape(2, m).T[k] ** 2 - by_chance, 0.0) / variance
+        beyond = np.maximum(moved.reshape(2, m).T[k] ** 2 - by_chance, 0.0)
+        # A pole that exact FRFs hold has no variance to inflate.
+        beyond = np.divide(beyond, variance, out=np.zeros_like(beyond), where=variance > 0)
         factor[k] = np.maximum(factor[k], 1 + np.max(beyond, axis=1))
     return factor
 
@@ -72,7 +73,8 @@ def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndar
     point = evaluate(data.lines.part(part), response, weight, refined.poles)
     unit = np.sqrt(np.maximum(np.diag(refined.pole_covariance), 1e-300))
     turned = np.outer(unit, unit)
-    covariance = np.linalg.pinv(point.normal * turned, rcond=HELD, hermitian=True) * turned
+    # Of the information on the best held pole: below, rounding rules
+    covariance = np.linalg.pinv(point.normal * turned, rcond=1e-10, hermitian=True) * turned
     return -covariance @ point.gradient, covariance
 
 
@@ -110,7 +112,7 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | Non
         start = strongest(data)
     if start.size == 0:
         return None
-    fitted = fit(data, start)
+    fitted = fit(data, data.with_one_above(start))
     modes = modes_of_fit(data, fitted, sets)
     error = np.linalg.norm(data.response - model(data, fitted.refined))
     relative = float(error / np.linalg.norm(data.response))

@@ -13,12 +13,10 @@ import numpy as np
 
 from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_poles import MatrixPoles
+from planner.modal.motion_fields import RowPrediction, predicted_rows
 from planner.modal.residues import realign
-from planner.modal.row_places import Foretold, foretold
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
-
-LEAST_COMPLETE = 3  # rows measured at all columns, that tell how the columns move
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +57,8 @@ class Sides:
         phase between the two sides is free: columns as real as can be leave real rows.
         """
         complete = np.all(np.isfinite(self.table), axis=(1, 2))
-        if np.count_nonzero(complete) < LEAST_COMPLETE:
+        # Least complete: rows measured at all columns, that tell how the columns move
+        if np.count_nonzero(complete) < 3:
             return None
         _, count, modes = self.table.shape
         columns = np.zeros((count, modes), complex)
@@ -83,7 +82,7 @@ SURPRISED, EXPLAINED, CLEARER, TURNED, NEXT = 2.0, 0.2, 2.0, 0.8, 1.0
 
 @dataclass(frozen=True)
 class Node:
-    """A node's rows (k,) of what is foretold, in the order of their directions."""
+    """A node's rows (k,) of what is predicted, in the order of their directions."""
 
     name: str
     directions: tuple[str, ...]
@@ -97,7 +96,7 @@ def exchanged_nodes(
 
     Only nodes that were measured in the same directions.
     """
-    found = foretold(dofs, shapes, geometry)
+    found = predicted_rows(dofs, shapes, geometry)
     if found is None:
         return None
     nodes = _nodes([dofs[k].positive for k in found.index])
@@ -131,20 +130,20 @@ def _nodes(dofs: Sequence[Dof]) -> list[Node]:
     ]
 
 
-def _surprise(found: Foretold, nodes: Sequence[Node]) -> np.ndarray:
+def _surprise(found: RowPrediction, nodes: Sequence[Node]) -> np.ndarray:
     """(n,) of nodes, over all modes and directions."""
     each = np.sum(found.surprise, axis=1)
     return np.array([np.sum(each[node.rows]) for node in nodes])
 
 
-def _exchanged(found: Foretold, one: Node, other: Node) -> Foretold:
+def _exchanged(found: RowPrediction, one: Node, other: Node) -> RowPrediction:
     """As if the rows of two nodes had been exchanged."""
     values = found.values.copy()
     values[np.r_[one.rows, other.rows]] = found.values[np.r_[other.rows, one.rows]]
     return replace(found, values=values)
 
 
-def _gains(found: Foretold, nodes: Sequence[Node]) -> np.ndarray:
+def _gains(found: RowPrediction, nodes: Sequence[Node]) -> np.ndarray:
     """(n, n) fall of −2 log likelihood where two nodes are exchanged, −∞ where they can't be."""
     gains = np.full((len(nodes), len(nodes)), -np.inf)
     for directions in {node.directions for node in nodes}:
@@ -154,7 +153,7 @@ def _gains(found: Foretold, nodes: Sequence[Node]) -> np.ndarray:
     return gains
 
 
-def _gains_alike(found: Foretold, rows: np.ndarray) -> np.ndarray:
+def _gains_alike(found: RowPrediction, rows: np.ndarray) -> np.ndarray:
     """The same (n, n) of nodes with rows (n, k) in the same directions."""
     values, pull = found.values[rows], (found.precision @ found.values)[rows]
     joint = found.precision[rows[:, :, None, None], rows].transpose(0, 2, 1, 3)  # (n, n, k, k)
@@ -171,7 +170,7 @@ def _gains_alike(found: Foretold, rows: np.ndarray) -> np.ndarray:
     return -(2 * slope + curve)
 
 
-def _turned(found: Foretold, node: Node) -> float:
+def _turned(found: RowPrediction, node: Node) -> float:
     """The same where signs of the node are turned, in whichever directions explain most."""
     pull = found.precision @ found.values
     best = -np.inf

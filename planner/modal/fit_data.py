@@ -8,9 +8,6 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.modal.residues import Lines, laplace
 
-# Chance, in standard normal quantiles, that noise alone passes as a mode somewhere in the band.
-QUANTILE = 5.0
-
 
 @dataclass(frozen=True, eq=False)
 class Data:
@@ -23,8 +20,9 @@ class Data:
     time from the pulse to the end of the record (see `residues`). `force_share` and
     `force_window_s` say how the noise of the force spoils whole columns (see `Frf`). `pooled`: an
     unknown variance is taken as a level for each entry times one profile of lines. `near`: modes
-    may lie close below the band. `steady`: nothing changes between hits, so that
-    poles close to each other are modes, however alike.
+    may lie close below the band. `above`: a pole above the lines stands for all modes there.
+    `steady`: nothing changes between hits, so that poles close to each other are modes, however
+    alike.
     """
 
     frequency_hz: np.ndarray  # (F,)
@@ -37,6 +35,7 @@ class Data:
     force_window_s: float = 0.0
     pooled: bool = False
     near: bool = False
+    above: bool = False
     steady: bool = False
 
     @cached_property
@@ -54,6 +53,17 @@ class Data:
     def to_poles(self, values: np.ndarray) -> np.ndarray:
         """From the plane of the lines to rad/s."""
         return values if self.step_s is None else np.log(values) / self.step_s
+
+    def is_above(self, poles: np.ndarray) -> np.ndarray:
+        """(m,) bool: which poles stand for the modes above the lines."""
+        return self.above & (poles.imag > 2 * np.pi * self.frequency_hz[-1])
+
+    def with_one_above(self, poles: np.ndarray) -> np.ndarray:
+        """Poles (m,) to start from, with one just above the lines where none is."""
+        if not self.above or not poles.size or np.any(self.is_above(poles)):
+            return poles
+        ratio = float(np.median(-poles.real / np.abs(poles)))
+        return np.append(poles, 2 * np.pi * 1.05 * self.frequency_hz[-1] * (1j - ratio))
 
     def allowed(self, values: np.ndarray) -> bool:
         """Near the band, and decaying as recorded (under the window)."""
@@ -102,7 +112,9 @@ class Data:
     def threshold(self) -> float:
         """Fall of χ² that a mode (pole and residues) reaches by chance with negligible odds."""
         k = 2 * self.entries + 2
-        return k * (1 - 2 / (9 * k) + QUANTILE * np.sqrt(2 / (9 * k))) ** 3
+        # Chance, in standard normal quantiles, that noise alone passes as a mode somewhere in the
+        # band.
+        return k * (1 - 2 / (9 * k) + 5.0 * np.sqrt(2 / (9 * k))) ** 3
 
 
 def too_few_lines(

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import find_peaks, peak_widths
 
 from planner.errors import InputError, RefusedError
 from planner.modal.estimate_modes import PoleIdentification, identify
@@ -13,26 +14,13 @@ from planner.modal.modes import ModalModel, Mode
 from planner.modal.residues import rank_one
 from planner.recording.records import Channel, TimeRecord
 
-# A hit stands out of the force channel's own noise by this factor and reaches this share of the
-# largest one.
-HIT_FACTOR, HIT_SHARE = 20.0, 0.15
 # The decay starts where the force has fallen to this share of its peak, at latest after that time.
 PULSE_END, PULSE_LONGEST_S = 0.02, 0.3
 LEAST_DECAY_S = 1.0
-# Samples above half the peak that a pulse needs for its amplitude to mean anything.
-LEAST_PULSE_SAMPLES = 4
-# A channel responds if its energy in the band after the hit exceeds that at the end this much, in
-# units of the scatter of such a ratio, or if the modes found explain this share of it.
-LEAST_EXPLAINED = 0.2
-# Decays longer than this many samples are cut: their tail is noise.
-LONGEST = 8192
 # The decay is taken to last while its blocks hold this much more energy than the record's median.
 BLOCK_S, ALIVE = 1.0, 1.5
-LEAST_PROBABILITY = 0.5
 MAX_ORDER = 30  # higher ones do not help with a handful of channels
 MARGIN, LEAST_LINES = 0.15, 6  # beyond the band that is fitted too; that suffice
-# MAC above which neighbours within a bandwidth are one mode.
-SAME_SHAPE = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,12 +47,13 @@ def analyse_record(
     an unknown force channel and RefusedError where no mode can be found. Returned beside the modes
     is all that led to them (stabilisation diagram, fit).
     """
-    remarks = list(record.remarks)
+    remarks = [*record.remarks, *(fault.text for fault in record.faults)]
     force = _force(record, force_channel)
     decays = _decays(record, force, remarks)
     band = band_hz or _band(decays)
     decays, found = _identify_sound(record, decays, band, remarks)
-    sure = [mode for mode in found.modes if mode.probability >= LEAST_PROBABILITY]
+    # Least probability.
+    sure = [mode for mode in found.modes if mode.probability >= 0.5]
     kept = [mode for mode in sure if band[0] <= mode.frequency_hz <= band[1]]
     modes = _merge(kept, remarks)
     if not modes:
@@ -101,17 +90,10 @@ def _force(record: TimeRecord, name: str | None) -> Channel | None:
 def _hits(force: np.ndarray, apart: int = 1) -> np.ndarray:
     """Samples at which pulses peak, `apart` samples from each other at least."""
     size = np.abs(force - np.median(force))
-    noise = max(float(np.median(size)), 1e-12 * float(np.max(size, initial=0.0)))
-    limit = max(HIT_FACTOR * noise, HIT_SHARE * float(np.max(size, initial=0.0)))
-    above = np.flatnonzero(size > limit)
-    hits: list[int] = []
-    for index in above:
-        if hits and index - hits[-1] < apart:
-            if size[index] > size[hits[-1]]:
-                hits[-1] = int(index)
-        else:
-            hits.append(int(index))
-    return np.array(hits, int)
+    most = float(np.max(size, initial=0.0))
+    noise = max(float(np.median(size)), 1e-12 * most)
+    # Out of the channel's own noise, and a good share of the largest.
+    return find_peaks(np.r_[0.0, size, 0.0], max(20 * noise, 0.15 * most), distance=apart)[0] - 1
 
 
 def _decays(record: TimeRecord, force: Channel | None, remarks: list[str]) -> _Decays:
@@ -134,7 +116,8 @@ def _decays(record: TimeRecord, force: Channel | None, remarks: list[str]) -> _D
     ends = [*starts[1:], values.shape[1]]
     margin = round(0.05 * rate)  # the foot of the next pulse
     length = min(e - s for s, e in zip(starts, ends, strict=True)) - margin
-    length = max(8, min(length, LONGEST, _lifetime(values, starts, length, rate)))
+    # Decays longer than this many samples are cut: their tail is noise.
+    length = max(8, min(length, 8192, _lifetime(values, starts, length, rate)))
     samples = np.stack([values[:, s : s + length] for s in starts if s + length <= values.shape[1]])
     names = tuple(c.name for c in responses)
     if not np.all(np.isfinite(samples)):
@@ -170,18 +153,11 @@ def _pulse_end(force: np.ndarray, hit: int, rate: float) -> int:
 
 
 def _remark_on_pulse(force: Channel, hits: np.ndarray, rate: float, remarks: list[str]) -> None:
-    size = np.abs(force.samples - np.median(force.samples))
-    widths = []
-    for hit in hits:
-        low = high = int(hit)
-        while low > 0 and size[low - 1] > 0.5 * size[hit]:
-            low -= 1
-        while high + 1 < size.size and size[high + 1] > 0.5 * size[hit]:
-            high += 1
-        widths.append(high - low + 1)
-    if np.median(widths) < LEAST_PULSE_SAMPLES:
+    widths = peak_widths(np.abs(force.samples - np.median(force.samples)), hits)[0]
+    # Samples above half the peak that a pulse needs for its amplitude to mean anything.
+    if np.median(widths) < 4:
         remarks.append(
-            f"The hammer pulse in {force.name} is under-sampled ({np.median(widths):g} samples"
+            f"The hammer pulse in {force.name} is under-sampled ({np.median(widths):.0f} samples"
             f" above half its peak at {rate:g} Hz): its amplitude is useless and was not used."
         )
     if force.unit and force.unit != "N":
@@ -203,20 +179,19 @@ def _identify_sound(
     if found is None or not found.modes:
         raise RefusedError(_nothing(record, band))
     explained = _explained(found, band)
-    sound = explained >= LEAST_EXPLAINED * np.max(explained)
-    if not np.all(sound):
-        for name, share in zip(np.array(decays.names)[~sound], explained[~sound], strict=True):
-            remarks.append(
-                f"Sensor {name} does not follow the hits (the modes explain {100 * share:.0f} % of"
-                " it): it was left out; check the sensor and its cable."
-            )
-        names = tuple(np.array(decays.names)[sound].tolist())
-        decays = _Decays(decays.samples[sound], names, decays.rate_hz)
-        scale = scale[sound]
-        found = identify_decays(decays.samples / scale, decays.rate_hz, band)
-        if found is None:
-            raise RefusedError(_nothing(record, band))
-    return decays, _rescaled(found, scale)
+    # A channel responds if its energy in the band after the hit exceeds that at the end this much,
+    # in units of the scatter of such a ratio, or if the modes found explain this share of it.
+    sound = explained >= 0.2 * np.max(explained)
+    if np.all(sound):
+        return decays, _rescaled(found, scale)
+    for name, share in zip(np.array(decays.names)[~sound], explained[~sound], strict=True):
+        remarks.append(
+            f"Sensor {name} does not follow the hits (the modes explain {100 * share:.0f} % of"
+            " it): it was left out; check the sensor and its cable."
+        )
+    names = tuple(np.array(decays.names)[sound].tolist())
+    fewer = _Decays(decays.samples[sound], names, decays.rate_hz)
+    return _identify_sound(record, fewer, band, remarks)
 
 
 def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarray:
@@ -256,7 +231,8 @@ def _merge(modes: list[Mode], remarks: list[str]) -> tuple[Mode, ...]:
 
 def _same(a: Mode, b: Mode) -> bool:
     width = max(a.damping_ratio * a.frequency_hz, b.damping_ratio * b.frequency_hz)
-    return abs(a.frequency_hz - b.frequency_hz) < width and mac(a.shape, b.shape) > SAME_SHAPE
+    # MAC above which neighbours within a bandwidth are one mode.
+    return abs(a.frequency_hz - b.frequency_hz) < width and mac(a.shape, b.shape) > 0.95
 
 
 def _merged(group: list[Mode], remarks: list[str]) -> Mode:

@@ -24,7 +24,6 @@ from planner.recording.repeats import untilted
 # What is worth telling: FRFs that differ by this share, with such odds against chance.
 SHARE, CHANCE = 0.03, 1e-3
 SHARED_OUT = 4000  # times that hits are shared out among the levels at random
-NEAR, ALIKE = 0.1, 0.5  # log frequency and MAC within which it is the same mode
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,10 +179,11 @@ def _level(
 
 def _same(mode: Mode, found: tuple[Mode, ...]) -> Mode | None:
     """The mode of one level that is a mode of the whole pose: near in frequency, alike in shape."""
+    # Near and alike: log frequency and MAC within which it is the same mode
     near = [
         other
         for other in found
-        if abs(np.log(other.frequency_hz / mode.frequency_hz)) < NEAR
-        and mac(other.shape, mode.shape) > ALIKE
+        if abs(np.log(other.frequency_hz / mode.frequency_hz)) < 0.1
+        and mac(other.shape, mode.shape) > 0.5
     ]
     return min(near, key=lambda other: abs(other.frequency_hz - mode.frequency_hz), default=None)

@@ -22,8 +22,6 @@ from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 from planner.recording.spectra import FIRST_LINE
 
-LEFT_OUT = 1e8  # times its variance: of a residue that does not fit the others
-
 
 @dataclass(frozen=True, eq=False)
 class MatrixModes:
@@ -80,7 +78,8 @@ def _put_right(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> Ma
         named = [(roved, stayed) for stayed, roved in named]
     turned = [(r in checks.turned_rows) != (s in checks.turned) for r, s in named]
     sign = np.where(turned, -1.0, 1.0)[:, None]
-    doubt = np.where([pair in checks.odd for pair in named], LEFT_OUT, 1.0)[:, None]
+    # A residue that does not fit the others counts with so many times its variance.
+    doubt = np.where([pair in checks.odd for pair in named], 1e8, 1.0)[:, None]
     fit = found.fit
     residue, variance = fit.residue * sign, fit.residue_variance * doubt
     return replace(found, fit=replace(fit, residue=residue, residue_variance=variance))

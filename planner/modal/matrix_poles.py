@@ -7,16 +7,12 @@ import numpy as np
 from planner.frf.matrix import FrfMatrix
 from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
-from planner.modal.matrix_selection import established, first_variance, judged
+from planner.modal.matrix_selection import first_variance, judged, select_modes
 from planner.modal.plscf import PoleSet, plscf, row_errors
 from planner.modal.set_poles import SetPoles
 from planner.modal.stabilisation import Diagram, diagram, stable
 
 MARGIN = 0.05  # of the band, beyond its edges
-MAX_ORDER = 36
-MOST_REFERENCES = 6  # at once: the order of the polynomial counts for each of them
-LEAST_LINES = 16
-ABOVE = 1.05  # times the last line: where the pole starts that stands for modes above
 # Of rows that fit the denominator of all the worse than the median by more than this, the weight is
 # taken down, so many times over; fewer rows than these cannot tell.
 ODD, REWEIGHED, LEAST_ROWS = 3.0, 3, 6
@@ -55,35 +51,30 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     """
     f = matrix.frequency_hz
     chosen = (f >= band_hz[0] / (1 + MARGIN)) & (f <= band_hz[1] * (1 + MARGIN))
-    if np.count_nonzero(chosen) < LEAST_LINES:
+    # Least lines.
+    if np.count_nonzero(chosen) < 16:
         raise too_few_lines(chosen, f, band_hz)
     rows, columns = np.nonzero(matrix.measured)
     response = matrix.accelerance[rows, columns][:, None, chosen]
     rate = matrix.exponential_rate_1_s
-    data = Data(f[chosen], response, None, rate, tail_s=matrix.tail_s, pooled=True, near=True)
+    data = Data(
+        f[chosen], response, None, rate, tail_s=matrix.tail_s, pooled=True, near=True, above=True
+    )
     # A record cut off while it rings leaves ripples, which polynomials take for poles.
     smooth = matrix.ended or matrix
     orders, found = _diagram(smooth, chosen)
     start = np.array([line.pole for line in stable(found)]) + smooth.exponential_rate_1_s
     if not start.size:
         return None
-    start = _with_one_above(start, f[chosen][-1])
+    start = data.with_one_above(start)
     sets = _sets(matrix, rows, columns)
     felt = len(matrix.responses) >= len(matrix.references)
     places = (rows, columns) if felt else (columns, rows)
-    fit, variance = established(data, sets, first_variance(data, start), start, places)
+    fit, variance = select_modes(data, sets, first_variance(data, start), start, places)
     if not fit.poles.size:
         return None
     scale, weak, presence = judged(data, fit, variance)
     return MatrixPoles(data, fit, found, rows, columns, sets, scale, weak, presence, orders[-1])
-
-
-def _with_one_above(poles: np.ndarray, last_hz: float) -> np.ndarray:
-    """Beside the poles one above the last line, for all modes that lie there."""
-    if np.max(poles.imag) / (2 * np.pi) > last_hz:
-        return poles
-    ratio = float(np.median(-poles.real / np.abs(poles)))
-    return np.append(poles, 2 * np.pi * ABOVE * last_hz * (1j - ratio))
 
 
 def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Diagram]:
@@ -96,7 +87,8 @@ def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Di
     block = table[complete][:, columns]
     level = np.mean(np.abs(block) ** 2, axis=(1, 2))
     weight = np.ones(block.shape[::2]) / np.maximum(level, 1e-300)[:, None]
-    orders = ladder(max(2, min(MAX_ORDER, block.shape[-1] // 3)))
+    # Max order.
+    orders = ladder(max(2, min(36, block.shape[-1] // 3)))
     frequency = matrix.frequency_hz[chosen]
     weight = _without_odd_rows(frequency, block, orders[-1], weight)
     sets: tuple[PoleSet, ...] = plscf(frequency, block, orders, weight)
@@ -121,7 +113,8 @@ def _references(measured: np.ndarray) -> np.ndarray:
     """Columns of measured (o, i) used together: as many FRFs as possible in complete rows."""
     columns = list(np.argsort(-np.sum(measured, axis=0), kind="stable"))
     best, size = columns[:1], 0
-    for count in range(1, min(len(columns), MOST_REFERENCES) + 1):
+    # Most references at once: the order of the polynomial counts for each of them
+    for count in range(1, min(len(columns), 6) + 1):
         complete = int(np.sum(np.all(measured[:, columns[:count]], axis=1))) * count
         if complete > size:
             best, size = columns[:count], complete

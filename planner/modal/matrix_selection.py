@@ -8,19 +8,15 @@ from planner.modal.fit_data import Data
 from planner.modal.mode_selection import MAX_DAMPING, excess, falls, presences, running_mean
 from planner.modal.refine import refine
 from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
-from planner.modal.set_search import Places, searched_again
-from planner.modal.split_modes import REACH, around, explains, thinned, unsplit
+from planner.modal.set_search import Places, reestimated_sets
+from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
 
 # Share of the response at its frequency that a mode must be: one of the diagram's stable lines,
 # and one that only the fit's error tells of. Chosen on simulated plates and aeroplanes.
 PRESENT, PRESENT_ADDED = 0.03, 0.2
-MOST_ADDED = 6
-ROUGH_ROUNDS = 2  # of the first fit, whose weights do not know yet how sets differ
-PASSES = 4  # of leaving out and adding
 # A pole that only the error tells of is no more damped than this, and lies above so many lines.
 DAMPING_ADDED, LINES_BELOW = 0.1, 6
 SETTLING = 2  # rounds of a fit that has been fitted before, to other lines or but for a few sets
-MOST_FAILED = 2  # candidates in a row that are no modes: weaker ones are not tried
 
 
 def first_variance(data: Data, poles: np.ndarray) -> np.ndarray:
@@ -45,21 +41,23 @@ def _variance(data: Data, fitted: np.ndarray, modes: int) -> np.ndarray:
     return flat * (0.9 * profile + 0.1) / lost + floor
 
 
-def established(
+def select_modes(
     data: Data, sets: tuple[np.ndarray, ...], variance: np.ndarray, poles: np.ndarray,
     places: Places,
 ) -> tuple[SetPoles, np.ndarray]:  # fmt: skip
     """Fit with every set's own poles, weak modes left out and missing ones added."""
     fit = _fit(data, sets, variance, poles, rounds=0)
-    fit = _fit(data, sets, variance, fit.poles, fit.own, ROUGH_ROUNDS)
+    # Rough rounds of the first fit, whose weights do not know yet how sets differ
+    fit = _fit(data, sets, variance, fit.poles, fit.own, 2)
     searched = False
-    for _ in range(PASSES):
+    # Passes of leaving out and adding
+    for _ in range(4):
         variance = _variance(data, fit.fitted, fit.poles.size)
         # Not before: sets would be moved to where they imitate the modes that a fit lacks.
         if searched:
             fit, variance = _settled(data, sets, fit, places)
         left = _part_of(fit, _standing(data, fit, variance))
-        poles, own = unsplit(data, sets, left, variance, places)
+        poles, own = merged_modes(data, sets, left, variance, places)
         # What a fit lacks is looked for where it has no mode too many.
         if poles.size == fit.poles.size:
             if searched:
@@ -82,7 +80,7 @@ def _settled(
 ) -> tuple[SetPoles, np.ndarray]:
     """The fit, and its variance, after those sets have been searched again that fit badly."""
     variance = _variance(data, fit.fitted, fit.poles.size)
-    own = searched_again(data, sets, fit, variance, places)
+    own = reestimated_sets(data, sets, fit, variance, places)
     if own is None:
         return fit, variance
     fit = _fit(data, sets, variance, fit.poles, own, SETTLING)
@@ -105,8 +103,7 @@ def _fit(
 def _standing(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
     """(m,) bool: which poles are modes, or stand for those above the last line."""
     _, weak, presence = judged(data, fit, variance)
-    above = fit.poles.imag > 2 * np.pi * data.frequency_hz[-1]
-    return above | (weak <= 1) & (presence >= PRESENT)
+    return data.is_above(fit.poles) | (weak <= 1) & (presence >= PRESENT)
 
 
 def _part_of(fit: SetPoles, kept: np.ndarray) -> SetPoles:
@@ -158,9 +155,11 @@ def _missing(
     poles, fall = falls(data, weight, weight * error)
     failed, step = 0, data.frequency_hz[1] - data.frequency_hz[0]
     fall[poles.imag / (2 * np.pi) < LINES_BELOW * step] = 0.0
-    for _ in range(MOST_ADDED):
+    # Most added.
+    for _ in range(6):
         best = int(np.argmax(fall))
-        if fall[best] <= data.threshold or failed == MOST_FAILED:
+        # Most failed: candidates in a row that are no modes: weaker ones are not tried
+        if fall[best] <= data.threshold or failed == 2:
             break
         pole = complex(poles[best])
         found = _tried(data, sets, fit, variance, pole)

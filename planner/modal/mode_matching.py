@@ -5,13 +5,14 @@ an unexpected mode, in units of −2 log likelihood. Ordered matchings keep the 
 modes; free ones may exchange them.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from planner.inference.assignment import least_cost
-
-# Matchings are summed over subsets of the measured modes; beyond this many, the dearest are out.
-MOST = 12
-HOPELESS = -40.0  # gain below which a match is left out of the sum (odds of 2e-9)
+from planner.modal.mac import mac
+from planner.modal.modes import Mode
 
 
 def best(gain: np.ndarray, ordered: bool = False) -> np.ndarray:
@@ -86,8 +87,11 @@ def _chances_free(gain: np.ndarray) -> np.ndarray:
     labels, modes = gain.shape
     out = np.zeros((labels, modes))
     largest = np.max(gain, axis=0, initial=-np.inf)
-    columns = np.sort(np.argsort(-largest)[:MOST])
-    columns = columns[largest[columns] > HOPELESS]
+    # Matchings are summed over subsets of the measured modes; beyond this many, the dearest are
+    # out.
+    columns = np.sort(np.argsort(-largest)[:12])
+    # Hopeless: gain below which a match is left out of the sum (odds of 2e-9)
+    columns = columns[largest[columns] > -40.0]
     odds = np.exp(np.clip(gain[:, columns], -400.0, 80.0) / 2)
     n = len(columns)
     taken = (np.arange(2**n)[:, None] >> np.arange(n)) & 1 == 1  # (subsets, modes)
@@ -123,3 +127,153 @@ def _gather(weight: np.ndarray, odds: np.ndarray, taken: np.ndarray) -> np.ndarr
         free = np.flatnonzero(~taken[:, j])
         out[free] += weight[free | 1 << j] * o
     return out
+
+
+# Log odds that neighbours' modes crossed: without any sign of it, with shapes that changed
+# places completely (swapped − kept MAC = 1), and with a guide that crosses at the same place.
+# Fitted to ways of a KR10 of graded symmetry, truth seeds 100 to 139.
+ODDS_NONE, ODDS_SWAPPED, ODDS_GUIDE = -9.0, 9.0, 2.0
+
+
+Row = Sequence[Mode | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Poses from a root to ever farther ones: `order` (n,), and each one's `parent` (−1: root)."""
+
+    order: np.ndarray
+    parent: np.ndarray
+
+    @classmethod
+    def of(cls, x: np.ndarray, root: int) -> "Tree":
+        """The shortest tree of poses at x (n, d)."""
+        from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree  # 0.2 s
+
+        apart = np.linalg.norm(x[:, None] - x[None], axis=2) + 1e-9  # 0 would be no edge
+        order, parent = breadth_first_order(minimum_spanning_tree(apart), root, directed=False)
+        return cls(order, np.where(parent < 0, -1, parent))
+
+    def nearest_above(self, i: int, known: np.ndarray) -> int:
+        """The first pose above i that is known (n,), −1 if none is."""
+        above = int(self.parent[i])
+        while above >= 0 and not known[above]:
+            above = int(self.parent[above])
+        return above
+
+
+def name_chances(
+    found: Sequence[Row], guided: np.ndarray, x: np.ndarray, reference: int
+) -> np.ndarray:
+    """(n, k, k): chance that name a is at place b of the order of frequency.
+
+    Along a way between two poses modes keep their places and exchange their shapes where they come
+    near each other (they veer: von Neumann and Wigner 1929), unless nothing couples them: then they
+    cross, keep their shapes and exchange their places. Each exchange of shapes has a chance of
+    having been a crossing; chances go down a tree of neighbours.
+
+    `found[i][b]` is the mode at place b of pose i, None if it was not found; guided (n, k) the
+    place that the guide gives to every name; x (n, d), scaled. At the `reference` the names are
+    where the guide has them.
+    """
+    n, k = guided.shape
+    tree = Tree.of(x, reference)
+    unit = max(1, x.shape[1]) ** 0.5
+    crossed = _guide_crossings(guided, tree, x)
+    known = np.array([[m is not None for m in row] for row in found]).reshape(n, k)
+    chance = np.zeros((n, k, k))
+    chance[reference] = np.eye(k)[guided[reference]]
+    for i in tree.order[1:]:
+        chance[i] = chance[tree.parent[i]]
+        for b in range(k - 1):
+            pair = known[:, b] & known[:, b + 1]
+            above = tree.nearest_above(i, pair)
+            if not pair[i] or above < 0:
+                continue
+            middle = (x[i] + x[above]) / 2
+            apart = np.linalg.norm(crossed[b] - middle, axis=1) / unit
+            # Displaced: how far from the truth's a guide's crossing may be, in x per √d
+            near = np.max(np.exp(-((apart / 0.4) ** 2) / 2), initial=0.0)
+            odds = ODDS_NONE + ODDS_SWAPPED * _swapped(found[above], found[i], b)
+            cross = 1 / (1 + np.exp(-odds - ODDS_GUIDE * near))
+            chance[i][:, b : b + 2] @= np.array([[1 - cross, cross], [cross, 1 - cross]])
+    return chance
+
+
+def _guide_crossings(guided: np.ndarray, tree: Tree, x: np.ndarray) -> list[np.ndarray]:
+    """For each two neighbouring places where in x (·, d) the guide has them exchange names."""
+    k = guided.shape[1]
+    out: list[list[np.ndarray]] = [[] for _ in range(k - 1)]
+    for i in tree.order[1:]:
+        above = tree.parent[i]
+        before, after = np.argsort(guided[above]), np.argsort(guided[i])
+        for b in range(k - 1):
+            if set(before[: b + 1]) != set(after[: b + 1]):
+                out[b].append((x[above] + x[i]) / 2)
+    return [np.array(places).reshape(len(places), x.shape[1]) for places in out]
+
+
+def _swapped(before: Row, after: Row, b: int) -> float:
+    """How far the shapes at places b and b+1 have changed places: −1 not, 1 completely.
+
+    Mean MAC with the other's place less that with its own, as a share of what it can be.
+    """
+    low, high, low_now, high_now = before[b], before[b + 1], after[b], after[b + 1]
+    if low is None or high is None or low_now is None or high_now is None:
+        return -1.0
+    swap = mac(low.shape, high_now.shape) + mac(high.shape, low_now.shape)
+    kept = mac(low.shape, low_now.shape) + mac(high.shape, high_now.shape)
+    alike = mac(low.shape, high.shape) + mac(low_now.shape, high_now.shape)
+    # Least apart: 2 − MAC − MAC of two modes that can be told apart by their shapes
+    return float(np.clip((swap - kept) / max(2 - alike, 0.5), -1.0, 1.0))
+
+
+NEIGHBOURS, GUIDE_WEIGHT = 6, 0.5  # shapes that are compared; the guide's weight among them
+
+
+def mixture(
+    shape: np.ndarray, certain: np.ndarray, guide: np.ndarray, x: np.ndarray, length: float
+) -> np.ndarray:
+    """Expected shapes (n, k, 3, 3): the guide's and those of the nearest poses, as Σ w s sᴴ.
+
+    Args:
+        shape: Unit shapes (n, k, 3) of the modes that carry a label; NaN where none does.
+        certain: Probability (n, k) that they carry it rightly.
+        guide: The guide's shapes (n, k, 3).
+        x: Poses (n, d), in coordinates scaled to the workspace.
+        length: Distance, per √d, over which shapes stay alike.
+    """
+    n = len(certain)
+    size = np.linalg.norm(x[:, None] - x[None], axis=2) / max(1, x.shape[1]) ** 0.5
+    np.fill_diagonal(size, np.inf)
+    near = np.argsort(size, axis=1, kind="stable")[:, : min(NEIGHBOURS, n - 1)]  # (n, neighbours)
+    nearness = np.exp(-((np.take_along_axis(size, near, axis=1) / length) ** 2) / 2)
+    filled = np.nan_to_num(guide)
+    turn = _rotations(np.broadcast_to(filled[:, None], filled[near].shape), filled[near])
+    known = np.isfinite(shape[near][..., 0])
+    theirs = np.where(known, certain[near] * nearness[..., None], 0.0)
+    turned = np.nan_to_num(shape[near]) @ np.swapaxes(turn, -1, -2)
+    own = GUIDE_WEIGHT * np.isfinite(guide[..., 0])
+    out = own[..., None, None] * _projector(filled)
+    out = out + np.sum(theirs[..., None, None] * _projector(turned), axis=1)
+    return out / np.maximum(own + np.sum(theirs, axis=1), 1e-12)[..., None, None]
+
+
+def _projector(shape: np.ndarray) -> np.ndarray:
+    """s sᴴ (…, 3, 3) of unit shapes (…, 3)."""
+    size = np.linalg.norm(shape, axis=-1, keepdims=True)
+    unit = np.divide(shape, size, out=np.zeros_like(shape), where=size > 0)
+    return unit[..., :, None] * unit[..., None, :].conj()
+
+
+def _rotations(here: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Orthogonal (…, 3, 3) that best carry the guide's shapes there (…, k, 3) to those here.
+
+    Signs of shapes are arbitrary, so they are made to agree first (Schönemann 1966).
+    """
+    phase = np.sum(here.conj() * there, axis=-1)
+    phase = np.where(np.abs(phase) > 1e-12, phase / np.maximum(np.abs(phase), 1e-12), 1.0)
+    product = np.swapaxes(here * phase[..., None], -1, -2) @ there.conj()
+    # A little of the identity decides directions in which no guided mode moves.
+    left, _, right = np.linalg.svd(product.real + 1e-3 * np.eye(3))
+    return left @ right

@@ -1,5 +1,6 @@
 """Which poles are modes: fit, leave out what the data do not need, add what they still miss."""
 
+import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -64,8 +65,6 @@ MAX_ROUNDS = 12
 MAX_DAMPING = 0.3
 # Neighbours closer than this (half bandwidths, share of frequency) and alike by MAC are one mode.
 TWIN_WIDTHS, TWIN_SHARE, TWIN_MAC = 1.5, 0.02, 0.95
-# Least noise relative to the FRF: below it rounding rules.
-FLOOR = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +97,7 @@ def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
         grown = _refine(data, poles, current)
         if _worth(data, current, grown):
             current = _prune(data, grown)
-    return current if data.steady else _unsplit(data, current)
+    return current if data.steady else _merged_twins(data, current)
 
 
 def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
@@ -135,7 +134,8 @@ def _scatter(data: Data, refined: Refined, power: np.ndarray) -> np.ndarray:
     if data.pooled:
         local = flat * np.mean(local / flat, axis=(0, 1))
     # A little of the overall level keeps quiet stretches from being trusted without limit.
-    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + FLOOR**2 * power
+    # Least noise relative to the FRF: below it rounding rules.
+    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + 1e-10**2 * power
 
 
 def running_mean(values: np.ndarray, half: int) -> np.ndarray:
@@ -205,7 +205,7 @@ def _prune(data: Data, current: PoleFit) -> PoleFit:
     return current
 
 
-def _unsplit(data: Data, current: PoleFit) -> PoleFit:
+def _merged_twins(data: Data, current: PoleFit) -> PoleFit:
     """One pole for twins of one shape: hit directions that disagree split a mode in two.
 
     Between two hits a mode moves a little (warmth, amplitude, a clamp that settles); its second
@@ -245,7 +245,7 @@ def weakness(data: Data, current: PoleFit) -> np.ndarray:
     found = data.threshold * scale / np.maximum(refined.significance, 1e-300)
     blurred = 2 * np.sqrt(scale) * np.maximum(sd[:m], sd[m:]) / decay
     damped = -refined.poles.real / (MAX_DAMPING * np.abs(refined.poles))
-    return np.max([found, blurred, damped], axis=0)
+    return np.where(data.is_above(refined.poles), 0.0, np.max([found, blurred, damped], axis=0))
 
 
 def scales(data: Data, current: PoleFit) -> np.ndarray:
@@ -294,6 +294,7 @@ def presences(data: Data, poles: np.ndarray, residue: np.ndarray) -> np.ndarray:
     """
     lines = [int(np.argmin(np.abs(data.frequency_hz - p.imag / (2 * np.pi)))) for p in poles]
     ones = unit(data.lines, data.to_plane(poles))[np.arange(poles.size), lines]
-    whole = np.linalg.norm(data.response[..., lines].reshape(-1, poles.size), axis=0)
-    own = np.linalg.norm(residue.reshape(-1, poles.size) * ones, axis=0)
+    each = math.prod(residue.shape[:-1]), poles.size  # of no pole, too
+    whole = np.linalg.norm(data.response[..., lines].reshape(each), axis=0)
+    own = np.linalg.norm(residue.reshape(each) * ones, axis=0)
     return own / np.maximum(whole, 1e-300)

@@ -4,9 +4,13 @@ Between neighbours a structure moves smoothly: Matérn fields over the places, e
 itself, and, where trace lines join the points, slender beams of one cross-section along the lines:
 their flexibility is the covariance, so that a motion is the likelier the less it bends them, and
 points on a straight line move alike along it.
+
+How a point should move in all modes is predicted from the others, each left out in turn: a row that
+is the opposite of that was measured with a turned sign.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,10 +21,6 @@ from planner.recording.geometry import Geometry
 # holds its points and lets them turn.
 LENGTHS = (1.0, 1.5, 2.2, 3.3, 5.0, 8.0)
 CARRIES = (2.0, 4.0, 8.0, 16.0)
-# Of a beam one spacing long, over its bending stiffness: along itself and in torsion. Tubes and
-# bars ten times as long as wide; torsion as of closed sections.
-AXIAL, TORSION = 600.0, 0.8
-BED_TURNS = 1e-6  # of its bending stiffness: holds turns that no beam holds
 NUGGET = 0.03  # of the motion: rows err by this
 
 
@@ -64,7 +64,8 @@ def _of_beams(dofs: Sequence[Dof], direction: np.ndarray, geometry: Geometry) ->
     moves = np.arange(len(stiffness)) % 6 < 3
     fields = []
     for reach in CARRIES:
-        held = stiffness + np.diag(np.where(moves, 12 / reach**4, BED_TURNS))
+        # Share of the bending stiffness: holds turns that no beam holds
+        held = stiffness + np.diag(np.where(moves, 12 / reach**4, 1e-6))
         fields.append(np.linalg.inv(held)[np.ix_(chosen, chosen)])
     return fields
 
@@ -78,7 +79,9 @@ def _beam(vector: np.ndarray) -> np.ndarray:
     side /= np.linalg.norm(side)
     turn = np.kron(np.eye(4), np.stack([axis, side, np.cross(axis, side)]))
     stiffness = np.zeros((12, 12))
-    for at, value in (((0, 6), AXIAL / length), ((3, 9), TORSION / length)):
+    # Of a beam one spacing long, over its bending stiffness: along itself and in torsion. Tubes and
+    # bars ten times as long as wide; torsion as of closed sections.
+    for at, value in (((0, 6), 600.0 / length), ((3, 9), 0.8 / length)):
         stiffness[np.ix_(at, at)] += value * np.array([[1, -1], [-1, 1]])
     for at, sign in (((1, 5, 7, 11), 1), ((2, 4, 8, 10), -1)):
         b, c = 6 * length * sign, length**2
@@ -87,9 +90,7 @@ def _beam(vector: np.ndarray) -> np.ndarray:
     return turn.T @ stiffness @ turn
 
 
-KNOWN = 0.1  # a point is known whose sd is less than this share of the mode's usual motion
 LEAST_KNOWN = 8  # degrees of freedom, that foretell others
-LEAST_AROUND = 0.05  # of the mean square, that points are taken to move by around any point
 
 
 def expected(
@@ -147,11 +148,12 @@ def _from_neighbours(
         near[known, np.arange(single.size)] = 0.0
         weight, usual = np.sum(near, axis=1), np.full(len(near), np.mean(square))
         around = np.divide(near @ square, weight, out=usual.copy(), where=weight > 0)
-        variance *= around + LEAST_AROUND * usual
+        # Least around of the mean square, that points are taken to move by around any point
+        variance *= around + 0.05 * usual
         scale = float(np.mean(np.abs(off) ** 2 / variance[known]))
         unlikely = np.sum(np.log(variance[known])) + single.size * np.log(max(scale, 1e-300))
         if unlikely < best:
-            # Whom no known point is related to, nothing is foretold of.
+            # Whom no known point is related to, nothing is predicted of.
             best, found = float(unlikely), (mean, np.where(weight > 0, scale * variance, np.inf))
     if found is not None:
         # What was measured, as far as it was, may say that this point is not like the others.
@@ -161,4 +163,104 @@ def _from_neighbours(
 
 def _known(motion: np.ndarray, sd: np.ndarray) -> np.ndarray:
     """(n,) bool: points whose motion, relative to the mode's usual one, is well measured."""
-    return sd < KNOWN * np.maximum(np.abs(motion), 1.0)
+    # Known: a point is known whose sd is less than this share of the mode's usual motion
+    return sd < 0.1 * np.maximum(np.abs(motion), 1.0)
+
+
+LEAST_ROWS, LEAST_MODES = 8, 3
+# A row is turned where the squared difference to what is predicted is less than this, with the sign
+# turned, and more than this as stated, relative to the row's own square, and where turning another
+# row brings less than SECOND as much. Chosen on panels, frames and bolted pieces, none of whose
+# right rows came near; the clearest was another row where that brought 0.86 as much, never below.
+TURNED, STATED, SECOND = 0.35, 2.0, 0.8
+MOST = 0.1  # share of rows that can be wrong: beyond, the geometry is
+
+
+@dataclass(frozen=True, eq=False)
+class RowPrediction:
+    """Rows that have a place: `index` (n,) of them, values (n, m), precision (n, n) over rows."""
+
+    index: np.ndarray
+    values: np.ndarray
+    precision: np.ndarray
+
+    @property
+    def surprise(self) -> np.ndarray:
+        """(n, m) difference to what the others foretell, squared, over its variance."""
+        return (self.precision @ self.values) ** 2 / np.diag(self.precision)[:, None]
+
+    @property
+    def gain(self) -> np.ndarray:
+        """(n,) fall of −2 log likelihood where a row is turned."""
+        slope = np.sum(self.values * (self.precision @ self.values), axis=1)
+        return 4 * (slope - np.sum(self.values**2, axis=1) * np.diag(self.precision))
+
+    def turning(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) relative squared difference to what is predicted: as stated, and turned."""
+        off = (self.precision @ self.values) / np.diag(self.precision)[:, None]
+        power = np.maximum(np.sum(self.values**2, axis=1), 1e-300)
+        turned = np.sum((2 * self.values - off) ** 2, axis=1)
+        return np.sum(off**2, axis=1) / power, turned / power
+
+
+def predicted_rows(
+    dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry
+) -> RowPrediction | None:
+    """What the places predict of rows (n, m) real, NaN where unknown; None where they are few.
+
+    Each mode is over its usual error, each row left out in turn, by the likeliest of several
+    fields: smooth modes count more.
+    """
+    index = np.array(
+        [
+            k for k, dof in enumerate(dofs)
+            if geometry.at(dof.node) is not None and np.all(np.isfinite(shapes[k]))
+        ], int,
+    )  # fmt: skip
+    if index.size < LEAST_ROWS or shapes.shape[1] < LEAST_MODES:
+        return None
+    values = shapes[index] / np.maximum(np.sqrt(np.mean(shapes[index] ** 2, axis=0)), 1e-300)
+    best, found = -np.inf, None
+    for covariance in motion_fields([dofs[k] for k in index], geometry):
+        precision = np.linalg.inv(covariance + NUGGET**2 * np.eye(index.size))
+        spread = np.diag(precision)
+        square = (precision @ values) ** 2 / spread[:, None]
+        # The usual error, not the mean: wrong rows are among them. No error is less than a row's.
+        usual = np.median(square, axis=0) / 0.455
+        usual = np.maximum(usual, 0.1 * np.median(usual))
+        likely = float(np.sum(np.log(spread[:, None] / usual) - np.minimum(square / usual, 9.0)))
+        if likely > best:
+            best, found = likely, RowPrediction(index, values / np.sqrt(usual), precision)
+    return found
+
+
+def turned_rows(dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry) -> tuple[int, ...]:
+    """Rows (indices) whose sign is turned; the clearest is turned before the next is looked for."""
+    shapes, turned = shapes.copy(), []
+    size = np.sum(shapes**2 / np.nanmean(shapes**2, axis=0), axis=1)
+    for _ in range(int(MOST * len(dofs)) + 1):
+        found = predicted_rows(dofs, shapes, geometry)
+        if found is None:
+            return ()
+        # Least motion of the mean over all rows: points that hardly move say nothing
+        row = _clearest(found, size > 0.3**2 * np.nanmean(size))
+        if row is None or row in turned:
+            return tuple(turned)
+        turned.append(row)
+        shapes[row] *= -1
+    return ()
+
+
+def _clearest(found: RowPrediction, moves: np.ndarray) -> int | None:
+    """The row (index) that is clearly turned, None where none is or another might be instead."""
+    gain = found.gain
+    k = int(np.argmax(gain))
+    stated, turned = found.turning()
+    if turned[k] > TURNED or stated[k] < STATED or not moves[found.index[k]]:
+        return None
+    values = found.values.copy()
+    values[k] *= -1
+    after = RowPrediction(found.index, values, found.precision).gain
+    # Another row might be turned instead if little is left for it once this one is turned.
+    rival = (gain > SECOND * gain[k]) & (after < gain / 2)
+    return int(found.index[k]) if np.count_nonzero(rival) <= 1 else None

@@ -22,22 +22,15 @@ from planner.modal.residues import realign
 from planner.modal.stabilisation import Diagram, Line, diagram, stable
 
 MAX_ORDER = 60
-PERIODS = 1.0  # of the lowest frequency that the lags of one side of the Hankel matrix span
 BLOCKS = (12, 80)  # least and most lags
-MOST_ENTRIES = 900  # rows of the Hankel matrix
-OVERSAMPLED = 2.5  # times the band's upper edge: records are thinned to no less
 SEGMENTS = 8  # parts of the record whose own poles tell the standard deviations
 LEAST_CYCLES = 200  # of the lowest mode, or the correlations mean little
-LEAST_PARTS = 4  # that show a mode
 NOTHING = (
     "No mode stands out of the responses between {:g} and {:g} Hz: record longer, at least some "
     f"{LEAST_CYCLES} periods of the lowest mode, or state the band."
 )
-# Neighbours within a bandwidth that are so alike (MAC) are one mode, the less damped.
-SAME = 0.9
 SHARE, LEAST_ORDERS, MOST_DAMPING = 0.6, 6, 0.15  # of a line of the diagram that is a mode
 TONE = 2.2  # kurtosis around a pole: 1.5 for a sine, 3 for noise
-TONE_BAND, TONE_LINES = 0.01, 4  # around a pole: share of its frequency, and at least so many lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +64,9 @@ def operating_modes(
     if not lines:
         raise RefusedError(NOTHING.format(*band))
     parts = _of_parts(values, rate, band, lines)
+    # Parts of the record that show a mode, at least
     modes = _once(
-        _mode(line, own, size)
-        for line, own in zip(lines, parts, strict=True)
-        if len(own) >= LEAST_PARTS
+        _mode(line, own, size) for line, own in zip(lines, parts, strict=True) if len(own) >= 4
     )
     if not modes:
         raise RefusedError(NOTHING.format(*band))
@@ -89,11 +81,12 @@ def _once(modes: Iterable[Mode]) -> tuple[Mode, ...]:
     kept: list[Mode] = []
     for mode in sorted(modes, key=lambda mode: mode.damping_ratio):
         width = 2 * mode.damping_ratio * mode.frequency_hz
+        # Neighbours within a bandwidth that are so alike (MAC) are one mode, the less damped.
         twins = [
             other
             for other in kept
             if abs(other.frequency_hz - mode.frequency_hz) < width
-            and mac(other.shape, mode.shape) > SAME
+            and mac(other.shape, mode.shape) > 0.9
         ]
         if not twins:
             kept.append(mode)
@@ -102,7 +95,8 @@ def _once(modes: Iterable[Mode]) -> tuple[Mode, ...]:
 
 def _thinned(values: np.ndarray, rate: float, highest: float) -> tuple[np.ndarray, float]:
     """Fewer samples where the band ends far below half the rate."""
-    factor = int(rate / (OVERSAMPLED * highest))
+    # Oversampled: times the band's upper edge: records are thinned to no less
+    factor = int(rate / (2.5 * highest))
     if factor < 2:
         return values, rate
     return scipy.signal.decimate(values, factor, ftype="fir", axis=1), rate / factor
@@ -112,8 +106,10 @@ def _diagram(
     values: np.ndarray, rate: float, band: tuple[float, float], most: int = MAX_ORDER
 ) -> Diagram:
     channels = values.shape[0]
-    lags = int(np.clip(PERIODS * rate / band[0], *BLOCKS))
-    lags = max(6, min(lags, MOST_ENTRIES // channels, values.shape[1] // 8))
+    # Periods of the lowest frequency that the lags of one side of the Hankel matrix span
+    lags = int(np.clip(1.0 * rate / band[0], *BLOCKS))
+    # Most entries: rows of the Hankel matrix
+    lags = max(6, min(lags, 900 // channels, values.shape[1] // 8))
     left, size, _ = scipy.linalg.svd(_hankel(values, lags), full_matrices=False)
     top = min(most, size.size - 1, channels * (lags - 1))
     sets = [
@@ -160,7 +156,8 @@ def _kurtosis(values: np.ndarray, rate: float, frequency: float) -> float:
     n = values.shape[1]
     spectrum = np.fft.rfft(values, axis=1)
     hz = np.fft.rfftfreq(n, 1 / rate)
-    width = max(TONE_BAND * frequency, TONE_LINES * rate / n)
+    # Tone band and tone lines around a pole: share of its frequency, and at least so many lines
+    width = max(0.01 * frequency, 4 * rate / n)
     spectrum[:, np.abs(hz - frequency) > width] = 0.0
     narrow = np.fft.irfft(spectrum, n, axis=1)
     power = np.mean(narrow**2, axis=1)

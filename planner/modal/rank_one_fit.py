@@ -13,12 +13,10 @@ import numpy as np
 
 ROUNDS = 60  # of alternating and of Gauss-Newton steps
 ROUGH, STILL = 1e-3, 1e-6  # a step below, relative to the shape, is the last: while weights change
-RIDGE = 1e-11
 # Relative to all entries, an error that each is given at first: none rules alone.
 START_SHARE = 0.03
 REWEIGHED, SPREAD_ROUNDS = 4, 30  # times that weights follow what no shape explains; its steps
 SETTLED = 0.03  # relative change of the variance, below which it is settled
-LEAST_FREE = 1.0  # degrees of freedom, with fewer of which nothing is left over to tell
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +109,8 @@ def fit_shape(
         covariance = problem.covariance(jacobian, 1 / spread)
         taken = np.sum((jacobian.conj() @ covariance) * jacobian, axis=1).real / spread
         free = residue.size - float(np.sum(taken))
-        if free < LEAST_FREE:
+        # Least free: degrees of freedom, with fewer of which nothing is left over to tell
+        if free < 1.0:
             spread, proportional = noise, np.zeros(noise.size)
             break
         square = np.abs(left) ** 2 * residue.size / free
@@ -220,7 +219,8 @@ def _fitted(
         slope = jacobian.conj().T @ (weight * problem.left(found))
         slope[n:] -= found[n:] / (2 * problem.gain**2)
         # A ridge far below all that is determined: a scale that is free then stays where it is.
-        normal[np.arange(n), np.arange(n)] += RIDGE * np.trace(normal[:n, :n]).real / n
+        # Ridge.
+        normal[np.arange(n), np.arange(n)] += 1e-11 * np.trace(normal[:n, :n]).real / n
         step = np.linalg.solve(normal, slope)
         found = _shortened(problem, weight, found, step)
         if np.linalg.norm(step) < still * np.linalg.norm(found):
@@ -270,7 +270,6 @@ def _ratio(top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
 
 
 FREE_GAIN = 0.2  # sd that leaves a row's gain to what is measured
-LEAST_SD = 0.002  # of a gain in one mode: residues agree no better than this
 # Student's t over the normal quantile, both at 97.5 %, by degrees of freedom. One degree would give
 # 6.5, which would call every shape unknown.
 STUDENT = (2.2, 2.2, 1.62, 1.42, 1.31)
@@ -304,7 +303,8 @@ def _difference(shapes: Sequence[FittedShape], i: int, j: int) -> tuple[float, f
         return None
     # The prior draws a difference towards zero; what was measured does not.
     apart = apart[kept] * (known[kept] + prior) / known[kept]
-    noise = 1 / known[kept] + LEAST_SD**2
+    # Least sd of a gain in one mode: residues agree no better than this
+    noise = 1 / known[kept] + 0.002**2
     weight = 1 / noise
     mean, total = np.sum(weight * apart) / np.sum(weight), np.sum(weight)
     beyond = np.sum(weight * (apart - mean) ** 2) - (kept.sum() - 1)

@@ -18,8 +18,6 @@ from planner.modal.residues import Lines, Residues, basis, basis_slope, unpack
 MAX_ITERATIONS = 30
 # Few lines around a resonance are fitted nearly quadratically: the damping may vanish at once.
 DAMPING = Damping(first=1e-3, least=0.0, most=1e8, lighter=0.1, heavier=10.0)
-STILL = 1e-3  # standard deviations by which the poles move in a step that is the last
-NO_GAIN = 1e-9  # of χ²: what a step gains by rounding alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +93,9 @@ def _settled(before: Iterate[ReducedFit], parts: np.ndarray, point: ReducedFit) 
     """
     sds = np.abs(parts - before.x) * np.sqrt(np.maximum(np.diag(before.at.normal), 0.0))
     gain = abs(before.at.chi2 - point.chi2)
-    small = np.max(sds) < STILL or gain < NO_GAIN * before.at.chi2
+    # Still: standard deviations by which the poles move in a step that is the last
+    # A share of χ² that a step gains by rounding alone
+    small = np.max(sds) < 1e-3 or gain < 1e-9 * before.at.chi2
     return bool(small and before.damping < DAMPING.first)
 
 
@@ -222,7 +222,8 @@ def _finish(
     entries, p = point.coefficients.shape
     covariance = np.linalg.pinv(point.normal, hermitian=True)
     spread = np.einsum("eka,ab,ekb->ek", point.sensitivity, covariance, point.sensitivity)
-    variance = np.einsum("ekk->ek", point.inverse) + spread
+    # Of rounding, where lines without noise leave curvatures almost singular, variances below 0
+    variance = np.maximum(np.einsum("ekk->ek", point.inverse) + spread, 0.0)
     residues = unpack(point.coefficients.reshape(*shape, p), m)
     return Refined(
         poles,

@@ -19,9 +19,6 @@ from planner.modal.residues import (
     unpack,
 )
 
-RIDGE = 1e-13  # of the residues' normal matrix: keeps poles that coincide apart from rounding
-AT_ONCE = 30_000  # values of one column for all poles and sets of a block, to stay in the cache
-
 
 @dataclass(frozen=True, eq=False)
 class SetData:
@@ -73,7 +70,8 @@ class SetPoints:
 def set_points(data: SetData, poles: np.ndarray) -> SetPoints:
     """Evaluate sets at their poles (k, m)."""
     k, m = poles.shape
-    block = max(1, AT_ONCE // max(1, m * data.lines.x.size))
+    # At once: values of one column for all poles and sets of a block, to stay in the cache
+    block = max(1, 30_000 // max(1, m * data.lines.x.size))
     parts = [_block(data, poles[i : i + block], slice(i, i + block)) for i in range(0, k, block)]
     return SetPoints(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
@@ -85,7 +83,8 @@ def _block(data: SetData, poles: np.ndarray, which: slice) -> tuple[np.ndarray, 
     norm = np.sqrt(np.maximum(np.einsum("kcc->kc", gram), 1e-300))
     gram /= norm[:, :, None] * norm[:, None, :]
     cross = values @ both.transpose(0, 2, 1) / norm[:, None]
-    inverse = np.linalg.inv(gram[:, :p, :p] + RIDGE * p * np.eye(p))
+    # Ridge of the residues' normal matrix: keeps poles that coincide apart from rounding
+    inverse = np.linalg.inv(gram[:, :p, :p] + 1e-13 * p * np.eye(p))
     found = cross[..., :p] @ inverse
     turned = -inverse @ gram[:, :p, p:]
     curve = gram[:, p:, p:] + gram[:, p:, :p] @ turned

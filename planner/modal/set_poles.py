@@ -26,10 +26,6 @@ from planner.modal.set_points import (
 ROUNDS = 4  # each a Gauss-Newton step of every set and of what is common
 # Farther from the common pole no set's strays: share of its frequency; half bandwidths in damping.
 FARTHEST, FARTHEST_DAMPING = 0.015, 2.0
-SETTLED = 0.1  # standard deviations of the common poles: a step below is the last
-STILL = 0.01  # half bandwidths: sets' own poles that move less are at rest
-UNTOLD = 1e-6  # of the information of a pole known as roughly as it may stray
-LONGEST_STEP = 1.0  # of half a bandwidth, of a common pole in one round
 
 
 class StrayedError(ValueError):
@@ -86,7 +82,8 @@ def fit_sets(
         point = set_points(part, _complex(own))
         spread = _spread(point, own, common)
         moved, covariance = _common(point, own, spread)
-        longest = np.tile(LONGEST_STEP * np.abs(common[:m]), 2)
+        # Longest step of a common pole in one round: half a bandwidth
+        longest = np.tile(1.0 * np.abs(common[:m]), 2)
         step = np.clip(moved - common, -longest, longest)
         common = common + step
         astray = [not data.allowed(pole[None]) for pole in _complex(common)]
@@ -94,8 +91,10 @@ def fit_sets(
             raise StrayedError(np.array(astray))
         before = own
         own = _own(point, own, common, spread)
-        still = np.abs(own - before) < STILL * np.tile(np.abs(common[:m]), 2)
-        if np.all(still) and np.all(np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))):
+        # Still: half bandwidths: sets' own poles that move less are at rest
+        still = np.abs(own - before) < 0.01 * np.tile(np.abs(common[:m]), 2)
+        # Settled: standard deviations of the common poles: a step below is the last
+        if np.all(still) and np.all(np.abs(step) < 0.1 * np.sqrt(np.diag(covariance))):
             break
     return _finish(part, data.lines, own, common, spread, covariance)
 
@@ -111,7 +110,8 @@ def _spread(point: SetPoints, own: np.ndarray, common: np.ndarray) -> np.ndarray
         return np.zeros(common.size)
     far = farthest(common)
     # What a set does not tell is told so little that it counts for nothing.
-    inverse = np.linalg.inv(point.normal + np.diag(UNTOLD / far**2))
+    # Of the information of a pole known as roughly as it may stray
+    inverse = np.linalg.inv(point.normal + np.diag(1e-6 / far**2))
     alone = own - np.einsum("kab,kb->ka", inverse, point.gradient)
     least = (1e-6 * far) ** 2  # finer than that no set's pole is known
     weight = 1 / np.maximum(np.einsum("kaa->ka", inverse), least)

@@ -2,8 +2,8 @@
 
 Of two close modes that drift by more than they lie apart, a set may be fitted with one pole on the
 other's peak, or with the two exchanged. Such a set fits worse than the others around these modes,
-or its residues do not go with how the modes take part at the references, which all sets share.
-Its poles are then looked for on a grid, one mode after the other, each mode excited as in all sets.
+or its residues do not go with how the modes take part at the references, which all sets share. Its
+poles are then looked for on a grid, one mode after the other, each mode excited as in all sets.
 """
 
 from dataclasses import dataclass
@@ -17,22 +17,13 @@ from planner.modal.set_poles import FARTHEST, SetPoles
 
 # Row and column of each entry, columns being those of the few references.
 Places = tuple[np.ndarray, np.ndarray]
-# A set is searched where its error around a mode is so many times that of the usual set, or where
-# its residues leave so many times their variance of how the mode takes part (and of what is usual).
-WORSE, APART = 1.5, 9.0
-GAIN = 16.0  # of χ², from which what was found takes the place of what was there
-COST = 0.1  # of that gain, by which χ² with residues left free may rise: an FRF may be spoiled
 # Poles are looked for up to so many sds of the sets' poles, and half bandwidths, from the common
 # ones; the lines looked at reach so many half bandwidths farther.
 FAR, FAR_HALVES, REACH = 4.0, 2.0, 4.0
-STEP, MOST = 0.5, 40  # trials lie so many half bandwidths apart, at most so many to either side
-SWEEPS = 2  # over the modes of a set, on the coarse grid
 FINE = (0.2, 0.06, 0.02)  # half bandwidths: steps of the refinement
-ROBUST_ROUNDS = 5
-RIDGE = 1e-9
 
 
-def searched_again(
+def reestimated_sets(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray, places: Places
 ) -> np.ndarray | None:
     """Poles (k, m) of all sets, those of badly fitted sets as found anew; None where none are."""
@@ -40,13 +31,10 @@ def searched_again(
     off = _off(data, sets, fit, variance) | _apart(sets, fit, places, taking_part)
     own, moved = fit.own.copy(), False
     for modes in _together(data, fit):
-        lines = np.flatnonzero(np.any([_near(data, fit, j) for j in modes], axis=0))
         for s in np.flatnonzero(off[:, modes].any(axis=1)):
-            shares = taking_part[places[1][sets[s]]][:, modes]
-            values = _less_others(data, fit, sets[s], fit.own[s], modes, lines)
+            rows, shares = places[0][sets[s]], taking_part[places[1][sets[s]]][:, modes]
             found = _Neighbourhood.of(
-                data.lines.part(lines), values, variance[np.ix_(sets[s], lines)],
-                places[0][sets[s]], shares, _Poles.of(fit, int(s), modes),
+                data, fit, variance, rows, shares, sets[s], int(s), modes
             ).best()  # fmt: skip
             if found is not None:
                 own[s, modes] = found
@@ -66,7 +54,8 @@ def participation(fit: SetPoles, places: Places) -> np.ndarray:
     for k, each in enumerate(np.moveaxis(table, -1, 0)):
         usual = float(np.median(np.linalg.norm(each, axis=1)))
         weight, right = np.ones(len(each)), found[:, k]
-        for _ in range(ROBUST_ROUNDS):
+        # Robust rounds.
+        for _ in range(5):
             right = np.linalg.svd(weight[:, None] * each, full_matrices=False)[2][0]
             left = np.linalg.norm(each - np.outer(each @ right.conj(), right), axis=1)
             weight = 1 / np.sqrt(left + 0.1 * usual + 1e-300)
@@ -106,7 +95,7 @@ def _together(data: Data, fit: SetPoles) -> list[np.ndarray]:
 def _off(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray
 ) -> np.ndarray:
-    """(k, m) bool: sets that fit worse around a mode than the others do."""
+    """(k, m) bool: sets whose error around a mode is half as much again as that of the usual."""
     square = np.abs(data.response[:, 0] - fit.fitted) ** 2 / variance
     off = np.zeros((len(sets), fit.poles.size), bool)
     for j in range(fit.poles.size):
@@ -114,7 +103,7 @@ def _off(
         if lines.any():
             each = np.mean(square[:, lines], axis=1)
             error = np.array([np.mean(each[chosen]) for chosen in sets])
-            off[:, j] = error > WORSE * np.median(error)
+            off[:, j] = error > 1.5 * np.median(error)
     return off
 
 
@@ -132,35 +121,8 @@ def _apart(
     left = fit.residue - (along / np.maximum(power, 1e-300))[rows] * theirs
     square = weight * np.abs(left) ** 2
     apart = np.array([np.mean(square[chosen], axis=0) for chosen in sets])
-    return apart > APART * np.maximum(np.median(apart, axis=0), 1.0)
-
-
-def _less_others(
-    data: Data, fit: SetPoles, chosen: np.ndarray, own: np.ndarray, modes: np.ndarray,
-    lines: np.ndarray,
-) -> np.ndarray:  # fmt: skip
-    """(e, F) responses of one set (entries `chosen`, poles `own`) less all modes but some."""
-    others = np.setdiff1d(np.arange(own.size), modes)
-    part, residue = data.lines.part(lines), fit.residue[np.ix_(chosen, others)]
-    up, down = unit(part, own[others]), unit(part, own[others].conj())
-    return data.response[:, 0][np.ix_(chosen, lines)] - residue @ up - residue.conj() @ down
-
-
-@dataclass(frozen=True, eq=False)
-class _Poles:
-    """Poles (n,) of some modes: common ones, those of a set, variance of the imaginary part."""
-
-    common: np.ndarray
-    own: np.ndarray
-    spread: np.ndarray
-    reach: np.ndarray
-
-    @classmethod
-    def of(cls, fit: SetPoles, s: int, modes: np.ndarray) -> "_Poles":
-        """Of one set; in any case a pole may move by half its bandwidth."""
-        common = fit.poles[modes]
-        spread = np.maximum(fit.spread[fit.poles.size + modes], common.real**2)
-        return cls(common, fit.own[s, modes], spread, _reach(fit)[modes])
+    # Beyond so many times their variance, and what is usual.
+    return apart > 9.0 * np.maximum(np.median(apart, axis=0), 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +131,8 @@ class _Neighbourhood:
 
     `values` (e, 2F) real, then imaginary parts, free of a straight line (`far`, orthonormal);
     `level` (e,) their variance where `profile` (F,) is one; `rows` (e,) which rows they are of,
-    `shares` (e, n) how the modes take part there.
+    `shares` (e, n) how the modes take part there. Poles (n,): `common` ones, the set's `own`, how
+    far they are looked for, `spread` of their imaginary parts.
     """
 
     lines: Lines
@@ -179,31 +142,46 @@ class _Neighbourhood:
     far: np.ndarray
     rows: np.ndarray
     shares: np.ndarray
-    poles: _Poles
+    common: np.ndarray
+    own: np.ndarray
+    reach: np.ndarray
+    spread: np.ndarray
 
     @classmethod
     def of(
-        cls, lines: Lines, response: np.ndarray, variance: np.ndarray, rows: np.ndarray,
-        shares: np.ndarray, poles: _Poles,
+        cls, data: Data, fit: SetPoles, variance: np.ndarray, rows: np.ndarray, shares: np.ndarray,
+        entries: np.ndarray, s: int, modes: np.ndarray,
     ) -> "_Neighbourhood":  # fmt: skip
-        """From responses and variance (e, F)."""
+        """Of set s with its entries, rows (e,) and shares (e, n), around some modes (indices)."""
+        chosen = np.flatnonzero(np.any([_near(data, fit, j) for j in modes], axis=0))
+        lines, common = data.lines.part(chosen), fit.poles[modes]
+        others = np.setdiff1d(np.arange(fit.poles.size), modes)
+        residue, own = fit.residue[np.ix_(entries, others)], fit.own[s, others]
+        response = data.response[:, 0][np.ix_(entries, chosen)] - residue @ unit(lines, own)
+        response = response - residue.conj() @ unit(lines, own.conj())
+        variance = variance[np.ix_(entries, chosen)]
+        # In any case a pole may move by half its bandwidth.
+        spread = np.maximum(fit.spread[fit.poles.size + modes], common.real**2)
         profile = np.sqrt(variance[0, 0] / variance[0])
         line = np.stack([np.ones(lines.x.size), np.linspace(-1, 1, lines.x.size)]) * profile
         far = np.linalg.qr(stack(np.concatenate([line, 1j * line])).T)[0]
         values = stack(response * profile)
-        level = variance[:, 0] / 2
         return cls(
-            lines, profile, level, values - values @ far @ far.T, far, rows, shares, poles
+            lines, profile, variance[:, 0] / 2, values - values @ far @ far.T, far, rows, shares,
+            common, fit.own[s, modes], _reach(fit)[modes], spread,
         )  # fmt: skip
 
     def best(self) -> np.ndarray | None:
         """Poles (n,) that fit clearly better than those of now, None where there are none."""
-        common, reach = self.poles.common, self.poles.reach
+        common, reach = self.common, self.reach
         poles, half = common, np.abs(common.real)
-        for _ in range(SWEEPS if poles.size > 1 else 1):
+        # Sweeps over the modes of a set, on the coarse grid
+        for _ in range(2 if poles.size > 1 else 1):
             before = poles
             for a in range(poles.size):
-                count = min(MOST, int(np.ceil(reach[a] / (STEP * half[a]))))
+                # Step and most: trials lie so many half bandwidths apart, at most so many to either
+                # side
+                count = min(40, int(np.ceil(reach[a] / (0.5 * half[a]))))
                 shift = np.linspace(-reach[a], reach[a], 2 * count + 1)
                 poles = self._along(poles, a, common[a] - poles[a] + 1j * shift)
             if np.array_equal(poles, before):
@@ -212,10 +190,12 @@ class _Neighbourhood:
             for a in range(poles.size):
                 for way in (1j, 1.0):
                     poles = self._along(poles, a, way * step * half[a] * np.arange(-2, 3))
-        last = np.stack([poles, self.poles.own])
+        last = np.stack([poles, self.own])
         bound, free = self._bound(last), self._free(last)
         gain = bound[1] - bound[0]
-        return poles if gain > GAIN and free[0] - free[1] < COST * gain else None
+        # Gain of χ², from which what was found takes the place of what was there
+        # Share of that gain by which χ² with residues left free may rise: an FRF may be spoiled
+        return poles if gain > 16.0 and free[0] - free[1] < 0.1 * gain else None
 
     def _along(self, poles: np.ndarray, a: int, shift: np.ndarray) -> np.ndarray:
         """The best of poles (n,) with one of them moved by each of `shift`."""
@@ -237,7 +217,7 @@ class _Neighbourhood:
         """(t,) χ² without any mode, (t, 2n, 2n) and (t, 2n, e) products of the modes' columns."""
         columns = stack(basis(self.lines, poles, False) * self.profile)
         columns = columns - columns @ self.far @ self.far.T
-        pull = np.sum((poles.imag - self.poles.common.imag) ** 2 / self.poles.spread, axis=1)
+        pull = np.sum((poles.imag - self.common.imag) ** 2 / self.spread, axis=1)
         total = pull + np.sum(self.values**2 / self.level[:, None])
         return total, columns @ columns.transpose(0, 2, 1), columns @ self.values.T
 
@@ -262,6 +242,7 @@ class _Neighbourhood:
 def _explained(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
     """(t,) fall of χ² by least squares from normal (t, c, c) and right (t, c, k)."""
     size = np.maximum(np.sqrt(np.einsum("taa->ta", normal)), 1e-300)
-    normal = normal / size[:, :, None] / size[:, None] + RIDGE * np.eye(size.shape[1])
+    # Ridge.
+    normal = normal / size[:, :, None] / size[:, None] + 1e-9 * np.eye(size.shape[1])
     right = right / size[..., None]
     return np.sum(right * np.linalg.solve(normal, right), axis=(1, 2))

@@ -7,7 +7,7 @@ import numpy as np
 from planner.modal.fit_data import Data
 from planner.modal.residues import unit
 from planner.modal.set_poles import SetPoles, StrayedError, fit_sets
-from planner.modal.set_search import Places, searched_again
+from planner.modal.set_search import Places, reestimated_sets
 
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
 # this share of the frequency, or within a bandwidth.
@@ -19,18 +19,16 @@ MERGED_ROUNDS = 8  # of a fit whose sets have to part from where two poles were
 # Around a pole so many half bandwidths, and at least so many lines either way, are fitted to judge
 # it.
 REACH, LINES_AROUND = 12.0, 12
-MOST_LINES = 240  # of which that needs no more: of a fine grid, one line in so many
-# Lines farther from every resonance than this many half bandwidths are thinned when poles of sets
-# are fitted: one in so many is kept. Until the last fit fewer are enough, and so many lines in a
-# half bandwidth: on simulated sets frequencies then differ by tenths of their sds.
-NEAR, THINNED = 10.0, 3
 NEAR_FIRST, THINNED_FIRST, ENOUGH = 6.0, 5, 2.0
 
 
 def thinned(data: Data, poles: np.ndarray, every: bool = False) -> np.ndarray:
     """Lines near a resonance (some of them, where they are many; or `every` one), and others."""
     f, step = data.frequency_hz, data.frequency_hz[1] - data.frequency_hz[0]
-    reach, one_far = (NEAR, THINNED) if every else (NEAR_FIRST, THINNED_FIRST)
+    # Lines farther from every resonance than this many half bandwidths are thinned when poles of
+    # sets are fitted: one in so many is kept. Until the last fit fewer are enough, and so many
+    # lines in a half bandwidth: on simulated sets frequencies then differ by tenths of their sds.
+    reach, one_far = (10.0, 3) if every else (NEAR_FIRST, THINNED_FIRST)
     index = np.arange(f.size)
     kept = index % one_far == 0
     for pole in poles:
@@ -59,7 +57,8 @@ def around(
     reach = max(REACH * abs(pole.real) / (2 * np.pi), LINES_AROUND * step)
     lines = thinned(data, np.append(fit.poles, pole))
     lines = lines[np.abs(data.frequency_hz[lines] - centre) < reach]
-    lines = lines[:: 1 + lines.size // MOST_LINES]
+    # Of a fine grid, one line in so many: more than these lines are not needed
+    lines = lines[:: 1 + lines.size // 240]
     response = data.response[..., lines]
     part = replace(data, frequency_hz=data.frequency_hz[lines], response=response, near=False)
     near = np.abs(fit.poles.imag / (2 * np.pi) - centre) < reach
@@ -89,7 +88,7 @@ def _in_most(
     return bool(np.median(each) > APART)
 
 
-def unsplit(
+def merged_modes(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
     places: Places,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
@@ -163,7 +162,7 @@ def _as_one(
             # Where it is one mode, only sets that fitted it badly are explained better by two.
             if _in_most(local, sets, one, more, variance[:, lines]):
                 return None
-            own = searched_again(local, sets, one, variance[:, lines], places)
+            own = reestimated_sets(local, sets, one, variance[:, lines], places)
             if own is None:
                 return None
             one = fit_sets(local, sets, variance[:, lines], one.poles, MERGED_ROUNDS, own)

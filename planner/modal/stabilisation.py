@@ -9,9 +9,6 @@ from planner.modal.plscf import PoleSet
 # One order to the next a physical pole moves less than this (share of its frequency, of its own
 # bandwidth, and 1 − MAC of its participation).
 FREQUENCY_STEP, BANDWIDTH_STEP, MAC_STEP = 0.01, 1.0, 0.3
-# Orders that a pole may be missing before its line counts as ended.
-GAP = 3
-MAX_DAMPING = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +59,8 @@ def diagram(sets: tuple[PoleSet, ...], band_hz: tuple[float, float]) -> Diagram:
     growing: list[list[tuple[int, complex, np.ndarray]]] = []
     for index, entry in enumerate(sets):
         poles, participation = _plausible(entry, band_hz)
-        open_lines = [g for g in growing if index - g[-1][0] <= GAP]
+        # Orders that a pole may be missing before its line counts as ended.
+        open_lines = [g for g in growing if index - g[-1][0] <= 3]
         pairs = _pair(open_lines, poles, participation)
         taken = {pole for _, pole in pairs}
         for line, pole in pairs:
@@ -84,7 +82,8 @@ def _plausible(entry: PoleSet, band_hz: tuple[float, float]) -> tuple[np.ndarray
     size = np.abs(entry.poles)
     frequency = size / (2 * np.pi)
     keep = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
-    keep &= -entry.poles.real < MAX_DAMPING * size
+    # Max damping.
+    keep &= -entry.poles.real < 0.3 * size
     return entry.poles[keep], entry.participation[keep]
 
 

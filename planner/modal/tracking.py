@@ -17,18 +17,14 @@ import numpy as np
 
 from planner.inference import triangular
 from planner.inference.assignment import least_cost
-from planner.modal.label_permutations import mixture, name_chances
 from planner.modal.mac import match_gain, unexpected_cost
-from planner.modal.mode_matching import best, chances
+from planner.modal.mode_matching import best, chances, mixture, name_chances
 from planner.modal.modes import Mode
 
 # Log frequency: how far an unfitted guide may be off, by how much its error varies over the
 # workspace, and what is left between neighbours; the distance over which it varies (per √d).
 OFFSET_SD, VARIATION_SD, LOCAL_SD, LENGTH = 0.25, 0.08, 0.01, 0.4
-TYPICAL_SD = 0.1  # of log frequency, for which the cost of a missing mode was chosen
-DAMPING_SD = 0.6  # of log damping ratio around a label's median
 MISSING_COST, SHAPE_WEIGHT = 9.0, 8.0
-MAX_ROUNDS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +125,8 @@ def _matched(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray, order
     gains: list[np.ndarray] = []
     seen: list[list[np.ndarray]] = [chosen]
     certain = np.ones(expected.shape)
-    for _ in range(MAX_ROUNDS):
+    # Max rounds.
+    for _ in range(8):
         belief = _Belief.of(poses, chosen, certain, expected, guide, x)
         gains = [belief.gain(i, modes) for i, modes in enumerate(poses)]
         chosen = [best(gain, ordered) for gain in gains]
@@ -223,9 +220,11 @@ class _Belief:
         own = np.nan_to_num([mode.frequency_sd_hz / mode.frequency_hz for mode in modes])
         spread = self.sd[i][:, None] ** 2 + own**2
         # The sharper the expectation, the less likely is a stranger to meet it.
-        cost = (log_hz - self.log_hz[i][:, None]) ** 2 / spread + np.log(spread / TYPICAL_SD**2)
+        # Typical sd of log frequency, for which the cost of a missing mode was chosen
+        cost = (log_hz - self.log_hz[i][:, None]) ** 2 / spread + np.log(spread / 0.1**2)
         zeta = np.log([max(mode.damping_ratio, 1e-6) for mode in modes])
-        cost += np.nan_to_num((zeta - self.log_damping[:, None]) / DAMPING_SD) ** 2
+        # Damping sd of log damping ratio around a label's median
+        cost += np.nan_to_num((zeta - self.log_damping[:, None]) / 0.6) ** 2
         shape = np.array([mode.shape for mode in modes])
         known = np.isfinite(shape).all(axis=1)
         shape[~known] = 1.0

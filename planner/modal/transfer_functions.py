@@ -22,7 +22,6 @@ MAX_ORDER = 40
 # Each part of the band spans an octave and is fitted with half an octave more on either side.
 SPAN, OVERLAP = 2.0, 2.0**0.5
 LEAST_LINES = 64  # of a part
-LEAST_IN_BAND = 8
 # A line of the diagram that is a mode: part of the range of orders that it spans, share of them
 # that have it, scatter in bandwidths over the upper ones, damping, and part of the response at
 # its frequency.
@@ -51,7 +50,8 @@ def modes_from_transfer_functions(
     step = frequency[1] - frequency[0]
     band = band_hz or (8 * float(step), float(frequency[-1]) / 1.2)
     inside = (frequency >= band[0]) & (frequency <= band[1])
-    if np.count_nonzero(inside) < LEAST_IN_BAND:
+    # Least in band.
+    if np.count_nonzero(inside) < 8:
         raise too_few_lines(inside, frequency, band)
     modes = [m for part in _parts(band, step) for m in _part(frequency, response, part)]
     if not modes:

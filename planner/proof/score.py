@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.diagnosis.thresholds import ARTEFACTS
+from planner.effects.chain import ARTEFACTS
 from planner.robot.config import DiagnoseTable
 
 MATTERS = DiagnoseTable().matters  # of |H|: what a diagnosis need not explain

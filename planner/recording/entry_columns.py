@@ -217,7 +217,7 @@ def _names(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> list[s
     names = [c.title or (not by_place and stated.name_of(c.own)) or c.last for c in columns]
     same = _grouped(names, columns)
     distinct = [
-        _differing(column.path, [c.path for c in same[name]]) if len(same[name]) > 1 else name
+        _differing(column, same[name], columns) if len(same[name]) > 1 else name
         for name, column in zip(names, columns, strict=True)
     ]
     for alike in _grouped(distinct, columns).values():
@@ -236,12 +236,19 @@ def _grouped(names: Sequence[str], columns: Sequence[EntryColumn]) -> dict[str, 
     return found
 
 
-def _differing(path: tuple[str, ...], same: Sequence[tuple[str, ...]]) -> str:
-    """The last level at which places with one name differ."""
-    depth = 1
-    while depth < min(map(len, same)) and len({p[-depth] for p in same}) == 1:
+def _differing(
+    column: EntryColumn, same: Sequence[EntryColumn], columns: Sequence[EntryColumn]
+) -> str:
+    """The last level at which places with one name differ, with what is below it.
+
+    A group that holds one column names that by itself.
+    """
+    path, depth = column.path, 1
+    while depth < min(len(c.path) for c in same) and len({c.path[-depth] for c in same}) == 1:
         depth += 1
-    return path[-depth] if path else ""
+    stem = path[: len(path) + 1 - depth]
+    alone = sum(c.path[: len(stem)] == stem for c in columns) == 1
+    return stem[-1] if stem and alone else " ".join(path[-depth:])
 
 
 def _common_step(file: Path, steps: Mapping[str, float]) -> float | None:

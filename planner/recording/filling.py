@@ -56,8 +56,7 @@ def _cut(record: TimeRecord, first: int, last: int, which: str) -> TimeRecord:
     )
     channels = (replace(c, samples=c.samples[first:end].copy()) for c in record.channels)
     faults = (*record.faults, Fault("filled", text, refuse=False))
-    remarks = (*record.remarks, text)
-    return replace(record, channels=tuple(channels), remarks=remarks, faults=faults)
+    return replace(record, channels=tuple(channels), faults=faults)
 
 
 def lost_samples(record: TimeRecord) -> tuple[Fault, ...]:

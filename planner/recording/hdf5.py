@@ -1,5 +1,7 @@
 """HDF5 files (MATLAB's v7.3 among them): one dataset a channel, nothing taken from elsewhere."""
 
+import mmap
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +33,7 @@ def read_hdf5(path: Path) -> tuple[Record, ...]:
     import h5py
 
     try:
+        _check_texts(path)
         with h5py.File(path, "r") as file:
             _check(path, file)
             root = _Reader(path).group(file)
@@ -41,6 +44,24 @@ def read_hdf5(path: Path) -> tuple[Record, ...]:
             f"{path} is not a readable HDF5 file ({type(error).__name__}); export it again."
         ) from None
     return records_of(path, root)
+
+
+def _check_texts(path: Path) -> None:
+    """Raise InputError where free space among texts has size 0: the library never ends there.
+
+    Heaps of texts: signature and version, size, then parts of number, count, size (16 bytes) and
+    data. Part 0 is free space, whose size counts these 16.
+    """
+    with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        for heap in re.finditer(rb"GCOL\x01\0\0\0", data):
+            end = heap.start() + int.from_bytes(data[heap.end() : heap.end() + 8], "little")
+            at = heap.end() + 8
+            while at + 16 <= min(end, len(data)):
+                number = int.from_bytes(data[at : at + 2], "little")
+                size = int.from_bytes(data[at + 8 : at + 16], "little")
+                if not number and size < 16:
+                    raise InputError(f"{path} is damaged where its texts lie; export it again.")
+                at += 16 + -(-size // 8) * 8 if number else size
 
 
 def _check(path: Path, file: "h5py.File") -> None:

@@ -10,7 +10,16 @@ from planner.errors import AxisNotStatedError, InputError
 from planner.recording.column_names import hit_direction
 from planner.recording.dof import Dof
 from planner.recording.points import SENSOR, UNTOLD, StatedPoints
-from planner.recording.records import AXES, Channel, Fault, FrfRecord, Hit, Record, TimeRecord
+from planner.recording.records import (
+    AXES,
+    NOTICED,
+    Channel,
+    Fault,
+    FrfRecord,
+    Hit,
+    Record,
+    TimeRecord,
+)
 
 
 def hits_from(
@@ -101,17 +110,18 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
     if stated.names.anywhere and not any(told):
         axis, hit_point = AXES[0], hit_point + UNTOLD
     name = _axis(record, force, axis, remarks)
+    if unlabelled := without_unit(record):
+        remarks.append(f"Left out, as their unit is not known: {unlabelled}.")
     return Hit(
         source,
         name,
         record.sampling_rate_hz,
         force.samples,
         samples,
-        remarks=tuple(remarks),
         simulated=record.simulated,
         hit_point=hit_point,
         responses=tuple(order),
-        faults=(*record.faults, *left_out),
+        faults=(*record.faults, *(Fault(NOTICED, t, refuse=False) for t in remarks), *left_out),
     )
 
 
@@ -246,6 +256,11 @@ def _in_the_file(source: Path) -> str:
 
 def _name(direction: int) -> str:
     return ("-" if direction < 0 else "+") + AXES[abs(direction) - 1]
+
+
+def without_unit(record: TimeRecord) -> str:
+    """Names of the channels of which neither unit nor type say what they are; "" where none."""
+    return ", ".join(c.name for c in record.channels if c.quantity == "unknown")
 
 
 def describe(record: TimeRecord) -> str:

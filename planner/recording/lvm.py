@@ -27,13 +27,24 @@ ABSCISSA, COMMENT = "X_Value", "Comment"
 
 @dataclass
 class _Segment:
-    """A block of rows, what its header says of each column, and the columns' names."""
+    """A block of rows, what its header says of each column, and the columns' names.
+
+    Not `announced` is what may follow an empty line, under the header of the block before.
+    """
 
     head: dict[str, str]  # what the file's header says
     stated: dict[str, list[str]]
     names: list[str]
     first_row: int
+    announced: bool = True
     rows: list[list[str]] = field(default_factory=list)
+
+    @property
+    def cut_off(self) -> bool:
+        """Whether its header ends, or states samples, and no row follows."""
+        samples = self.stated.get("Samples", [])[1:]
+        whole = self.names and set(samples) <= {"0", ""}
+        return self.announced and not self.rows and not whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +72,8 @@ def read_lvm(path: Path) -> tuple[Record, ...]:
     head: dict[str, str] = {}
     for segment in _segments(text):
         head = segment.head
+        if segment.cut_off:
+            raise InputError(f"{path} ends within a header; the file is cut off, export it again.")
         channels = list(_channels(path, segment))
         if parts and _goes_on(parts[-1], channels):
             parts[-1] = [_joined(a, b) for a, b in zip(parts[-1], channels, strict=True)]
@@ -89,7 +102,9 @@ def _segments(text: str) -> Iterator[_Segment]:
             current.rows.append(cells)
         elif current and current.rows:  # it ends with an empty line, or where a header begins
             yield current
-            current = None if any(cells) else _Segment(head, block, current.names, number + 1)
+            current = (
+                None if any(cells) else _Segment(head, block, current.names, number + 1, False)
+            )
             block = {first: cells} if any(cells) else block
         elif first == ABSCISSA:
             current = _Segment(head, block, cells, number + 1)
@@ -98,6 +113,8 @@ def _segments(text: str) -> Iterator[_Segment]:
         elif any(cells):
             block = block if current is None else {}
             block[first], current = cells, None
+    if special or (block and not current):
+        current = _Segment(head, block, [], 0)
     if current:
         yield current
 
@@ -186,6 +203,8 @@ def _number(path: Path, tag: str, text: str) -> float:
 
 def _date(date: str, time: str) -> np.datetime64 | None:
     day, clock = date.replace("/", "-"), time.replace(",", ".")[:18]  # to ns
+    if not re.fullmatch(r"[\d:.]*", clock):  # NumPy warns of time zones, which the format has not
+        return None
     try:
         return np.datetime64(f"{day}T{clock}", "ns")
     except ValueError:

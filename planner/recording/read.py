@@ -1,5 +1,6 @@
 """Reading a recording, whatever its format: one reader per format, chosen by the file's name."""
 
+import hashlib
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
@@ -8,6 +9,7 @@ from threading import Lock
 
 import numpy as np
 
+from planner import file_content
 from planner.errors import InputError
 from planner.recording import plausible
 from planner.recording.entries import check_size, tree_of
@@ -184,11 +186,9 @@ def hits_in(path: Path) -> tuple[float | None, ...]:
 
 def version(path: Path) -> tuple[int, ...]:
     """What changes when a file does, or the table of scales beside it. Raises OSError."""
-    stats = [path.stat()]
     if path.suffix.lower() == WAV and scales_beside(path).is_file():
-        stats.append(scales_beside(path).stat())
-    each = ((s.st_ino, s.st_size, s.st_mtime_ns, s.st_ctime_ns) for s in stats)
-    return tuple(number for one in each for number in one)
+        return *file_content.mark(path), *file_content.mark(scales_beside(path))
+    return file_content.mark(path)
 
 
 def content(path: Path) -> bytes:
@@ -196,8 +196,15 @@ def content(path: Path) -> bytes:
 
     Raises InputError where what it needs is missing or wrong, OSError where it cannot be read.
     """
-    data = path.read_bytes()
+    data = file_content.read(path)
     return self_contained(path, data) if path.suffix.lower() == WAV else data
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of `content`, and raises as that does."""
+    if path.suffix.lower() == WAV:
+        return hashlib.sha256(content(path)).hexdigest()
+    return file_content.sha256(path)
 
 
 def _read(path: Path) -> ReadFile:

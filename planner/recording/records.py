@@ -12,6 +12,7 @@ from planner.recording.points import SENSOR, TCP, UNTOLD, Layout, StatedPoints
 from planner.recording.pulse import Pulse, find_pulse
 
 AXES = ("x", "y", "z")
+NOTICED = "noticed"  # kind of a fault that is no reason, but what the reader has to say
 OF_TOOL = tuple(Dof(SENSOR, axis) for axis in AXES)
 
 
@@ -106,7 +107,6 @@ class Hit:
     force_n: np.ndarray  # (n,)
     acceleration_m_s2: np.ndarray  # (r, n)
     repeat: int = 1
-    remarks: tuple[str, ...] = ()
     simulated: bool = False
     hit_point: str = TCP
     responses: tuple[Dof, ...] = OF_TOOL

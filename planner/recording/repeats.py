@@ -171,14 +171,18 @@ class _Few:
 
 
 def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float]) -> float:
-    """How alike a hit's FRF and those of `others` along its axis are, in size too; 0: none such."""
+    """How alike a hit's FRF and the likest of `others` along its axis are, in size too; 0: none.
+
+    Some of the others may be wrong, so that their mean would be like none of them.
+    """
     same = [o for o in others if o.axis_index == hit.axis_index and _comparable(o, hit)]
     if not same:
         return 0.0
     frf, *theirs = _frfs((hit, *same), band_hz)
-    centre = _centre(np.array(theirs))
-    sizes = np.linalg.norm(frf), np.linalg.norm(centre)
-    return _likeness(frf, centre) * float(min(sizes) / max(*sizes, SILENCE))
+    own = float(np.linalg.norm(frf))
+    sizes = [(own, float(np.linalg.norm(one))) for one in theirs]
+    shares = [min(pair) / max(*pair, SILENCE) for pair in sizes]
+    return max(_likeness(frf, one) * share for one, share in zip(theirs, shares, strict=True))
 
 
 @dataclass(frozen=True, eq=False)

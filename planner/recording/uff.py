@@ -210,23 +210,20 @@ def _time_record(path: Path, sets: list[dict[str, Any]]) -> TimeRecord:
         raise InputError(f"{path} mixes records of different sampling; export one hit, one rate.")
     common = {int(s["ref_dir"]) for s in sets if int(s["ref_dir"])}
     hit_nodes = {int(s["ref_node"]) for s in sets if int(s["ref_dir"]) and int(s["ref_node"])}
-    channels, remarks = [], []
+    channels = []
     for s in sets:
         quantity, unit, factor = _unit(path, s)
         direction, node = int(s["rsp_dir"]), int(s["rsp_node"])
         if quantity == "force":
             direction = int(s["ref_dir"]) or (common.pop() if len(common) == 1 else direction)
             node = int(s["ref_node"]) or (hit_nodes.pop() if len(hit_nodes) == 1 else node)
-        if not unit:
-            label = str(s["ordinate_axis_units_lab"]).strip()
-            remarks.append(f"The unit {label or 'of a record'} is not known.")
         name = str(s["rsp_ent_name"]).strip()
         name = name if name.upper() != "NONE" else f"{quantity} {direction:+d}"
         samples = np.asarray(s["data"], dtype=float) * factor
         channels.append(Channel(name, quantity, unit, direction, samples, str(node)))
     rate = _rate(path, sets[0])
     together, cut = aligned(path, channels, [float(s["x"][0]) for s in sets], rate)
-    return TimeRecord(path, rate, together, (*remarks, *cut), _simulated(sets))
+    return TimeRecord(path, rate, together, cut, _simulated(sets))
 
 
 def _rate(path: Path, s: dict[str, Any]) -> float:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from planner.diagnosis.linear.predict import ThreefoldSimilarity
+    from planner.diagnosis.diagnose import ThreefoldSimilarity
     from planner.measurement.agreement import Similarity
 
 

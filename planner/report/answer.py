@@ -33,6 +33,16 @@ class Answer:
         """For the engineer, units in every column; None where there is nothing to say."""
         return None
 
+    def _repr_html_(self) -> str:
+        """What notebooks show."""
+        import io
+
+        from rich.console import Console
+
+        console = Console(file=io.StringIO(), record=True, width=100)
+        console.print(self.text() or "")
+        return console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")
+
 
 def plain(value: Any) -> Any:
     """Builtin values of anything that an answer holds."""

@@ -13,7 +13,7 @@ from rich.text import Text
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Entry
 from planner.campaign.from_urdf import Guess, Guessed
-from planner.campaign.log_words import act
+from planner.campaign.taking_back import act
 from planner.check.remark import CheckRemark
 from planner.report.answer import Answer
 from planner.report.text import command_line, table

@@ -53,7 +53,7 @@ def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -
         report=str(file),
         bytes=len(data),
         measurements=len(state.used),
-        simulated=any(m.simulated for m in state.recorded),
+        simulated=state.simulated,
         diagnosis=str(kept) if kept else None,
         seconds=time.perf_counter() - started,
     )

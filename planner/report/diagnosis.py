@@ -9,13 +9,16 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planner.design.discrimination import LIKELY
 from planner.design.extra_sensor import ExtraSensor
-from planner.design.next_hit import NextHit, in_words
-from planner.diagnosis.thresholds import TIED, UNKNOWN
+from planner.design.next_hit import NextHit
+from planner.effects.effect import Operator
+from planner.errors import InputError
+from planner.fit.posterior import RobotPosterior
 from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
-from planner.report.established_effects import EstablishedEffect, drift_of, established_effects
-from planner.report.mismatch import MismatchPlaces, MismatchShares, TwoMisfits
+from planner.report.established_effects import EstablishedEffect, established_effects
+from planner.report.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
 from planner.report.place_names import place_names, with_names
 from planner.report.text import (
     SIMULATED,
@@ -28,10 +31,9 @@ from planner.report.text import (
 from planner.words import probable
 
 if TYPE_CHECKING:
-    from planner.diagnosis.diagnose import Explained
-    from planner.diagnosis.linear_diagnosis import Diagnosis
+    from planner.diagnosis.diagnose import Diagnosis
     from planner.diagnosis.odd_pose import OddPose
-    from planner.diagnosis.verdict import Ranked
+    from planner.robot.robot import Robot
 
 SHOWN = 6  # candidates in the table
 VERDICTS = {
@@ -75,8 +77,8 @@ class DiagnosisReport(Answer):
 
     `undecided` are those that the recordings cannot tell apart; `sets` name, for what was found,
     the effects any one of which may stand in its place; `next_sensor` is where one more sensor
-    would part what is tied, `odd_pose` is the one at odds with all others. `explained` holds the
-    fits.
+    would part what is tied, `odd_pose` is the one at odds with all others. `closest` are the
+    effects of the best fit, `diagnosis` holds all of them.
     """
 
     verdict: str
@@ -98,17 +100,18 @@ class DiagnosisReport(Answer):
     urdf: Path | None = field(default=None, metadata=NOT_IN_JSON)
     campaign_robot: Path | None = field(default=None, metadata=NOT_IN_JSON)
     plots: tuple[str, ...] = ()
+    closest: tuple[EffectAtPlace, ...] = field(default=(), metadata=NOT_IN_JSON)
     next: NextHit | None = None
     next_sensor: ExtraSensor | None = None
     odd_pose: "OddPose | None" = None
     seconds: float = 0.0
-    explained: "Explained | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
+    diagnosis: "Diagnosis | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     @property
-    def diagnosis(self) -> "Diagnosis":
-        """The fits of linear effects behind the answer."""
-        assert self.explained is not None
-        return self.explained.judged.diagnosis
+    def found(self) -> "Diagnosis":
+        """What is behind the answer."""
+        assert self.diagnosis is not None
+        return self.diagnosis
 
     def predict(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """FRFs of the simulation with what was found, with their uncertainty.
@@ -120,22 +123,20 @@ class DiagnosisReport(Answer):
         Returns:
             Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N.
         """
-        from planner.diagnosis.linear.predict import predicted
-
-        found = self.diagnosis
-        return predicted(found.problem, found.best, q, frequency_hz, found.temper)
+        return self.found.robot.predicted(q, frequency_hz)
 
     def with_predictions(self, poses: Sequence[str], q: np.ndarray, npz: Path) -> "DiagnosisReport":
         """The same once FRFs at poses q (n, dof) in rad (m) are in the npz file.
 
         Raises InputError where it cannot be written.
         """
-        from planner.frf.frequency_lines import frequency_lines
+        from planner.frf.synthesis import frequency_lines
         from planner.report.predictions import save_frfs
 
-        lines = frequency_lines(self.diagnosis.problem.band_hz)
+        search = self.found.search
+        lines = frequency_lines(search.band_hz)
         mean, sd = self.predict(q, lines)
-        joints = self.diagnosis.problem.simulation.robot.joints
+        joints = search.prior.repertoire.stiff.robot.joints
         save_frfs(npz, lines, mean, sd, poses, joints, q)
         return replace(self, npz=str(npz))
 
@@ -144,25 +145,23 @@ class DiagnosisReport(Answer):
 
         Raises InputError where they cannot be written.
         """
-        from planner.diagnosis.linear_diagnosis import Candidate, of_its_own
-        from planner.diagnosis.write_explained import write_explained
+        from planner.fit.identified import as_identification
+        from planner.fit.write_robot import write_robot
         from planner.report.diagnosis_plots import diagnosis_figures
         from planner.report.plot_files import Pictures
 
-        assert self.explained is not None
-        found, robot = self.diagnosis, self.diagnosis.problem.simulation.robot
-        parts = found.best.effect.parts()
-        told = of_its_own(found.best, found.temper)
-        places = {(e.name, e.at or None) for e in told}
-        # As the answer has it, so that file and table agree.
-        said = [(c, {(e.effect, e.at) for e in c.effects}) for c in self.candidates]
-        share = sum(c.probability for c, its in said if its == (places or {("none", None)}))
-        path = write_explained(folder, robot, found, Candidate(parts, share, found.best))
+        found = self.found
+        robot = found.search.prior.repertoire.stiff.robot
+        _make_room(folder, robot)
+        model, result = as_identification(found.robot)
+        made = write_robot(folder / "robot.toml", model.simulation.robot, result)
         mark = SIMULATED_TITLE if self.simulated else ""
-        figures = diagnosis_figures(found, self.explained.recorded.poses, mark)
+        figures = diagnosis_figures(found, mark)
         plots = Pictures(folder).write(figures, robot.name)["plots"]
-        urdf = path.parent / robot.urdf_path.name
-        written = replace(self, robot=str(path), urdf=urdf, plots=plots)
+        said = *self.remarks, *made.remarks, *_unwritten(found)
+        written = replace(
+            self, robot=str(made.robot_toml), urdf=made.urdf, plots=plots, remarks=said
+        )
         (folder / "diagnosis.json").write_bytes(encoded(written))  # for planner report
         return written
 
@@ -195,11 +194,10 @@ class DiagnosisReport(Answer):
     @property
     def verdict_text(self) -> str:
         """The verdict in words; where nothing describes it all, what comes nearest too."""
-        known = [c for c in self.candidates if c.effect not in (UNKNOWN, "none")]
         first = self.candidates[0] if self.candidates else None
-        if self.verdict != "unexplained" or not known or first is None:
+        if self.verdict != "unexplained" or not self.closest or first is None:
             return VERDICTS[self.verdict]
-        near = in_words([(e.effect, e.at) for e in known[0].effects], known[0].probability)
+        near = " and ".join(f"{e.effect.replace('_', ' ')} at {e.at}" for e in self.closest)
         near = with_names(near, self.place_names)
         agrees = self.fit.explained.frac
         return (
@@ -238,56 +236,58 @@ class DiagnosisReport(Answer):
         return made
 
 
-def diagnosis_report(explained: "Explained") -> DiagnosisReport:
-    """Of a diagnosis."""
-    from planner.diagnosis.linear.predict import agreement
-    from planner.diagnosis.residual_location import where
+def _make_room(folder: Path, robot: "Robot") -> None:
+    """Make place for a robot's files in `folder`: earlier ones go, those that were given stay."""
+    files = folder.absolute() / "robot.toml", folder.absolute() / robot.urdf_path.name
+    given = {robot.path.resolve(), robot.urdf_path.resolve()}
+    if given & {file.resolve() for file in files}:
+        raise InputError(f"--out {folder} holds the robot that was given; name another folder.")
+    try:
+        for file in files:
+            file.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be written ({error.strerror}); name another.") from None
 
-    recorded, judged, whole = explained.recorded, explained.judged, explained.whole
-    found, fitted = judged.diagnosis, judged.fitted
-    misfit = TwoMisfits(found.refitted.per_value, found.best.per_value)
-    drift = None if found.best.effect.at else drift_of(explained)
-    if drift is not None:
-        fitted = agreement(drift.problem, drift.refitted, drift.best)
-        misfit = TwoMisfits(drift.refitted.per_value, drift.best.per_value)
-    place = where(found.problem, found.refitted)
-    aside = tuple(recorded.poses[i] for i in judged.aside)
-    names = place_names(found.problem.simulation.robot)
-    return DiagnosisReport(
-        verdict=whole.verdict,
-        findings=established_effects(explained, names),
-        place_names=names,
-        candidates=tuple(RankedExplanation.of(c.places, c.probability) for c in whole.candidates),
-        undecided=tuple(c.places for c in found.undecided),
-        sets=alternatives(whole.candidates),
-        where=MismatchPlaces(
-            place.bands_hz(),
-            tuple(dict.fromkeys(recorded.poses[i] for i in place.poses())),
-            place.directions(),
-        ),
-        fit=ThreeSimilarities.of(fitted),
-        held_out=HeldOutSimilarities.at(aside, judged.held_out),
-        misfit=misfit,
-        shares=MismatchShares.of(found, drift),
-        refused=tuple(RefusedFile(*entry) for entry in recorded.refused),
-        remarks=tuple(recorded.remarks),
-        simulated=recorded.simulated,
-        odd_pose=explained.odd,
-        explained=explained,
+
+def _unwritten(found: "Diagnosis") -> tuple[str, ...]:
+    """A remark for each effect that robot.toml has no entry for."""
+    structure, gone = found.best.structure, []
+    for effect, own in zip(structure.effects, structure.own, strict=True):
+        psi, values = found.best.at.x[own], found.robot.values(effect)
+        written = effect.inertia(psi), effect.losses(psi), effect.tables(values), effect.springs
+        if type(effect).impedance is not Operator.impedance and not any(written):
+            gone.append(" at ".join(effect.name).replace("_", " "))
+    return tuple(
+        f"robot.toml has no entry for {name}: the robot that was written does without it."
+        for name in gone
     )
 
 
-def alternatives(candidates: Sequence["Ranked"]) -> tuple[tuple[EffectAtPlace, ...], ...]:
-    """Effects of the likeliest candidate with those that others, nearly as likely, have instead."""
-    likely = [c.places for c in candidates if c.probability > TIED]
-    if not likely:
-        return ()
-    out = []
-    for place in likely[0]:
-        rest = set(likely[0]) - {place}
-        others = [set(places) - rest for places in likely[1:] if rest <= set(places)]
-        instead = [next(iter(other)) for other in others if len(other) == 1]
-        instead = [other for other in instead if other[0] not in ("none", UNKNOWN)]
-        if instead and place[0] not in ("none", UNKNOWN):
-            out.append(tuple(EffectAtPlace(*one) for one in (place, *instead)))
-    return tuple(out)
+def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> DiagnosisReport:
+    """Of a diagnosis."""
+    recorded, verdict = found.recorded, found.verdict
+    robot = found.search.prior.repertoire.stiff.robot
+    matters, names = robot.config.diagnose.matters, place_names(robot)
+    place = Residuals.of(found.refitted, found.search.band_hz, matters)
+    sides = (RobotPosterior.of(f).misfits(matters)[0] for f in (found.refitted, found.best))
+    aside = tuple(recorded.poses[i] for i in found.aside)
+    undecided = [c for c in verdict.candidates if c.probability > LIKELY]
+    return DiagnosisReport(
+        verdict=verdict.verdict,
+        findings=established_effects(found, undecided, names),
+        place_names=names,
+        candidates=tuple(RankedExplanation.of(c.places, c.probability) for c in verdict.candidates),
+        undecided=tuple(c.places for c in undecided) if len(undecided) > 1 else (),
+        sets=tuple(tuple(EffectAtPlace(*one) for one in members) for members in verdict.sets),
+        where=MismatchPlaces.of(place, recorded.poses),
+        fit=ThreeSimilarities.of(found.fitted),
+        held_out=HeldOutSimilarities.at(aside, found.held_out),
+        misfit=TwoMisfits(*sides),
+        shares=MismatchShares.of(found),
+        refused=tuple(RefusedFile(*entry) for entry in recorded.refused),
+        remarks=(*recorded.remarks, *found.remarks),
+        simulated=recorded.simulated,
+        odd_pose=odd,
+        closest=tuple(EffectAtPlace(*e.place) for e in verdict.effects if e.counts),
+        diagnosis=found,
+    )

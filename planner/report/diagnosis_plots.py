@@ -9,16 +9,14 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.fit import Fit
-from planner.diagnosis.linear.predict import ALL
-from planner.diagnosis.linear_diagnosis import Diagnosis
-from planner.diagnosis.residual_location import Where, where
+from planner.diagnosis.diagnose import Diagnosis
 from planner.recording.points import TOOL
 from planner.report.frf_map import frf_map
 from planner.report.frf_plots import AXES
+from planner.report.mismatch import Residuals, simulated
 from planner.report.plot_text import plain_text, write_values
 
+LINES = 256  # a pose
 UNIT = "mean square residual (1: just matters)"
 LEAST, MOST_SHOWN = 1e-3, 1000.0  # residuals: of the scale
 MOST = 4  # poses whose FRFs are shown, those that differed most
@@ -29,18 +27,20 @@ GIVEN = {"label": "as given", "color": "tab:blue", "ls": ":", "lw": 1.1}
 SIDES = (GIVEN, REFITTED, EXPLAINED)
 
 
-def diagnosis_figures(found: Diagnosis, names: Sequence[str], mark: str = "") -> dict[str, Figure]:
+def diagnosis_figures(found: Diagnosis, mark: str = "") -> dict[str, Figure]:
     """Residuals by band, pose and direction; FRF maps; direct FRFs of the worst poses.
 
     Of several sensors and hit points, FRFs are those of the first ones.
     """
-    before, after = where(found.problem, found.refitted), where(found.problem, found.best)
+    names, search = found.recorded.poses, found.search
+    matters = search.prior.repertoire.stiff.robot.config.diagnose.matters
+    before, after = (Residuals.of(f, search.band_hz, matters) for f in (found.refitted, found.best))
     figures = {"residuals": _residuals(before, after, names, mark)}
-    misfit = found.problem.misfit(Effect(""), ALL)
-    measured = np.where(misfit.measured.used, np.abs(misfit.measured.accelerance), np.nan)
-    lines = misfit.measured.frequency_hz
-    sides = [_simulated(found, f) for f in (None, found.refitted, found.best)]
-    number, layout = np.arange(1.0, len(names) + 1), found.problem.layout
+    data = search.data(LINES)
+    measured = np.where(data.measured.used, np.abs(data.measured.accelerance), np.nan)
+    lines = data.measured.frequency_hz
+    sides = [np.abs(h) for h in simulated(found, data)]
+    number, layout = np.arange(1.0, len(names) + 1), data.measured.layout
     if layout != TOOL:
         mark = f"{mark}{layout.sensors[0]}, hit at {layout.hits[0]}: "
     for i, axis in enumerate(AXES):
@@ -55,11 +55,6 @@ def diagnosis_figures(found: Diagnosis, names: Sequence[str], mark: str = "") ->
         curves = [h[k] for h in sides]
         figures[f"frf_{name}"] = _overlay(lines[k], measured[k], curves, f"{mark}Pose {names[k]}")
     return figures
-
-
-def _simulated(found: Diagnosis, fit: Fit | None) -> np.ndarray:
-    misfit = found.problem.misfit(Effect("") if fit is None else fit.effect, ALL)
-    return np.abs(misfit.response(misfit.mean if fit is None else fit.x)[0])
 
 
 def _figure(width: float, height: float) -> Figure:
@@ -85,7 +80,7 @@ def _overlay(
     return figure
 
 
-def _residuals(before: Where, after: Where, names: Sequence[str], mark: str) -> Figure:
+def _residuals(before: Residuals, after: Residuals, names: Sequence[str], mark: str) -> Figure:
     figure = _figure(9.0, 6.5)
     (bands, poses), (left, right) = figure.subplots(2, 2)
     middle = (before.edges_hz[1:] + before.edges_hz[:-1]) / 2

@@ -117,7 +117,7 @@ def _program(campaign: Campaign, kind: str, folder: Path, rows: Sequence[PoseRow
         raise InputError(
             f"{campaign.directory} has no open proposal; ask planner next first, or name --poses."
         )
-    simulated = any(m.simulated for m in state.recorded)
+    simulated = state.simulated
     text = program(kind, campaign.cell.robot, f"planner_{name}", drive, simulated)
     files = {f"{identifier(f'planner_{name}', 'C_')}{SUFFIXES[kind]}": text}
     return ExportedFiles(kind, _write(folder, files), tuple(d.pose for d in drive), simulated)

@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.events import Amplitude, MeasuredMode, Question
-from planner.campaign.hit_habits import HitMiss, habits
+from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.modes import ModeAnswer
 from planner.report.predictions import ExpectedMode
@@ -23,12 +23,15 @@ if TYPE_CHECKING:
     from planner.campaign.model import Model
 
 
-def _cells(mode: ModeAnswer) -> tuple[str, ...]:
-    """A row of the table."""
+NOT_USED = "  Nothing changed: these hits are used once you say that they are right."
+
+
+def _cells(mode: ModeAnswer, other: str) -> tuple[str, ...]:
+    """A row of the table; `other` where the mode is none that is predicted."""
     expected = mode.expected
     known = isinstance(expected, ExpectedMode)
     return (
-        "other" if mode.label is None else str(mode.label),
+        other if mode.label is None else str(mode.label),
         with_sd(mode.frequency_hz, mode.frequency_sd_hz, ".3f"),
         with_sd(expected.frequency_hz, expected.sd_hz) if known else with_sd(None, None),
         with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd),
@@ -72,7 +75,7 @@ class PoseImport(Answer):
     remarks: tuple[str, ...]
     amplitude: Amplitude | None
     simulated: bool
-    hit_errors: tuple[HitMiss, ...] = ()
+    hit_errors: tuple[HitErrorEstimate, ...] = ()
     question: "AskedOfPose | None" = None
 
     @classmethod
@@ -93,7 +96,7 @@ class PoseImport(Answer):
             remarks=report.remarks,
             amplitude=measurement.amplitude if measurement else None,
             simulated=bool(measurement and measurement.simulated),
-            hit_errors=report.misses(model),
+            hit_errors=report.hit_errors(model),
             question=AskedOfPose.of(report.question, report.pose),
         )
 
@@ -109,7 +112,9 @@ class PoseImport(Answer):
             *("mode", "frequency (Hz)", "expected (Hz)", "damping (%)"),
         )
         for mode in self.modes:
-            made.add_row(*_cells(mode))
+            made.add_row(*_cells(mode, "–" if self.question else "other"))
+        if self.question:
+            return [made, *remarks(self.remarks), Text(NOT_USED)]
         both = zip(self.frequency_sd_percent_before, self.frequency_sd_percent, strict=True)
         change = ", ".join(
             f"{significant(before)} → {significant(after)} %" for before, after in both
@@ -154,7 +159,7 @@ class PoseImport(Answer):
 class ImportedPoses(Answer):
     """Answer of `import`, one entry a pose in recording order.
 
-    `habits`: what all hits of the campaign have in common.
+    `habits`: what all hits of the campaign have in common, told once some are new.
     """
 
     poses: tuple[PoseImport, ...]
@@ -165,12 +170,13 @@ class ImportedPoses(Answer):
     def of(cls, reports: "tuple[ImportReport, ...]", simulated: bool = False) -> "ImportedPoses":
         """Of what `Campaign.import_paths` gave; hits are told by what all of them taught."""
         model = reports[-1].model
-        every = [hit for pose in model.misses for hit in pose.hits]
+        every = [hit for pose in model.hit_errors for hit in pose.hits]
         poses = tuple(PoseImport.of(report, model) for report in reports)
-        return cls(poses, habits(every), simulated or any(pose.simulated for pose in poses))
+        common = systematic_errors(every) if any(pose.accepted for pose in poses) else ()
+        return cls(poses, common, simulated or any(pose.simulated for pose in poses))
 
     @property
-    def hit_errors(self) -> tuple[HitMiss, ...]:
+    def hit_errors(self) -> tuple[HitErrorEstimate, ...]:
         """Of all accepted hits."""
         return tuple(hit for pose in self.poses for hit in pose.hit_errors)
 

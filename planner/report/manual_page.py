@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import astuple
 from pathlib import Path
 
-from planner.campaign.example import EXAMPLE
 from planner.campaign.file_entries import FILES, tables_of
+from planner.campaign.store import EXAMPLE
 from planner.errors import InputError
 from planner.report.page import rendered
 

@@ -25,6 +25,7 @@ from planner.recording.dof import Dof
 from planner.recording.filling import lost_samples
 from planner.recording.folder import CHANNELS, TABLE, files_in, joint_columns, read_recordings
 from planner.recording.geometry import read_geometry
+from planner.recording.hits import without_unit
 from planner.recording.points import ANYWHERE, PointNames
 from planner.recording.read import READERS, read
 from planner.recording.records import Channel, TimeRecord
@@ -282,7 +283,10 @@ def operating_report(
     dofs = tuple(_dof(channel) for channel in channels)
     sign = np.array([dof.sign for dof in dofs])
     found = operating_modes(sign[:, None] * samples, record.sampling_rate_hz, band_hz)
-    told = [*record.remarks, *(fault.text for fault in lost_samples(record)), UNSCALED]
+    faults = (*record.faults, *lost_samples(record))
+    told = [*record.remarks, *(fault.text for fault in faults), UNSCALED]
+    if unlabelled := without_unit(record):
+        told.append(f"Of no known unit: {unlabelled}.")
     if found.tones_hz:
         tones = ", ".join(f"{hz:.4g}" for hz in found.tones_hz)
         told.append(f"Tones, not modes, at {tones} Hz: what turns or hums there was left out.")

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.campaign.events import Amplitude
-from planner.campaign.hit_habits import HitMiss, habits
+from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.errors import RefusedFile
 from planner.recording.dof import Dof
 from planner.report.answer import NOT_IN_JSON, Answer
@@ -141,7 +141,7 @@ class ModesReport(Answer):
     exports: tuple[str, ...] | Unset = UNSET
     plots: tuple[str, ...] = ()
     rrd: str | None = None
-    hit_errors: tuple[HitMiss, ...] | Unset = UNSET
+    hit_errors: tuple[HitErrorEstimate, ...] | Unset = UNSET
     habits: tuple[str, ...] | Unset = UNSET
     survey: "Survey | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
@@ -227,9 +227,9 @@ def survey_report(found: "Survey") -> ModesReport:
         )
         others = tuple(answer(mode, None, None) for mode in tracks.unexpected[i])
         poses.append(SurveyedPose(name, modes, others))
-    hits = tuple(hit for pose in found.misses.poses for hit in pose.hits)
+    hits = tuple(hit for pose in found.hit_errors.poses for hit in pose.hits)
     return ModesReport(
         poses=tuple(poses), modes=poses[0].modes, band_hz=found.band_hz, refused=found.refused,
-        remarks=found.remarks, simulated=found.simulated, hit_errors=hits, habits=habits(hits),
-        survey=found,
+        remarks=found.remarks, simulated=found.simulated, hit_errors=hits,
+        habits=systematic_errors(hits), survey=found,
     )  # fmt: skip

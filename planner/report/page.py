@@ -11,8 +11,8 @@ import numpy as np
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.config import CampaignConfig
-from planner.campaign.log_words import act
 from planner.campaign.state import CampaignState, Measurement, taken_back
+from planner.campaign.taking_back import act
 from planner.design.stopping import percent
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP

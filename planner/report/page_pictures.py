@@ -84,7 +84,7 @@ def frf_pictures(campaign: Campaign, worst: Sequence[str]) -> dict[str, Any]:
         return {"frfs": [], "frfs_left": 0}
     lines, modes = campaign.frequency_lines, campaign.cell.config.modes
     q = campaign.cell.robot.joints.internal([m.joints_deg for m in shown])
-    mean, sd = campaign.frf(q, lines)
+    mean, sd = campaign.frf_at(q, lines)
     expected = campaign.model.predict(q)
     drawn = []
     for i, m in enumerate(shown):

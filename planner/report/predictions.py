@@ -89,7 +89,7 @@ def predictions(
     Raises InputError where that cannot be written.
     """
     angles, lines = np.array(q), campaign.frequency_lines
-    prediction, (mean, sd) = campaign.predict(angles), campaign.frf(angles)
+    prediction, (mean, sd) = campaign.model.predict(angles), campaign.frf_at(angles)
     outside = ~inside(campaign.cell, angles)
     save_frfs(npz, lines, mean, sd, names, campaign.cell.robot.joints, angles, outside)
     poses = (

@@ -10,7 +10,6 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
-from planner.campaign.repeated_pose import RepeatedPose
 from planner.design.stopping import Forecast
 from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer, plain
@@ -18,6 +17,7 @@ from planner.report.predictions import ExpectedMode
 from planner.report.text import command_line, table
 
 if TYPE_CHECKING:
+    from planner.campaign.model import RepeatedPose
     from planner.design.sensor_places import BetterPlaces
 
 
@@ -57,7 +57,7 @@ class ProposalsReport(Answer):
     proposals: tuple[ProposedPose, ...]
     joint_names: tuple[str, ...]
     forecast: Forecast
-    repeat: RepeatedPose | None
+    repeat: "RepeatedPose | None"
     remarks: tuple[str, ...] = ()
     places: "BetterPlaces | None" = None
     joint_units: Any = msgspec.UNSET
@@ -120,7 +120,7 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
 
     robot, model = campaign.cell.robot, campaign.model
     q = robot.joints.internal([p.joints_deg for p in found])
-    expected = campaign.predict(q)
+    expected = campaign.model.predict(q)
     return ProposalsReport(
         tuple(
             ProposedPose(p, ExpectedMode.all_of(expected, i), axes_in_the_room(robot, q[i]))
@@ -128,7 +128,7 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
         ),
         tuple(campaign.cell.robot.joint_names),
         model.forecast,
-        RepeatedPose.of(model),
+        model.repeat(),
         tuple(campaign.cell.remarks),
         places=places_for(model, campaign.state, found[0]),
         joint_units=campaign.cell.robot.joints.declared,

@@ -1,6 +1,5 @@
 """Answer of `replay`: each step of the log and whether computing it again gave the same."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.compare.counterfactual import OtherAcquisition
+from planner.progress import Tell
 from planner.recording.joints import JointUnits
 from planner.replay import Step, replay
 from planner.report.answer import Answer
@@ -99,7 +99,7 @@ def replayed(
     until: int | None,
     rrd: Path | None,
     viewer: bool,
-    progress: Callable[[str], None],
+    progress: Tell,
     acquisition: str | None = None,
 ) -> ReplayReport:
     """Compute every step of the log again, up to entry `until`, and show it in Rerun.
@@ -110,14 +110,15 @@ def replayed(
     from planner.report.rerun.story import Story
 
     steps = []
-    simulated = any(m.simulated for m in campaign.state.recorded)
+    simulated = campaign.state.simulated
     with Story(campaign.cell, rrd, viewer, simulated) as story:
         for step in replay(campaign, until, acquisition):
-            progress(f"{step.entry.seq} of {len(campaign.entries)} {step.detail}")
+            last = until or len(campaign.entries)
+            progress(f"entry {step.entry.seq}, {step.detail}", step.entry.seq / last)
             story.tell(step.entry, step.model, step.measured)
             steps.append(ReplayedStep.of(step))
     if acquisition is not None:
-        progress(f"playing {acquisition} on what was measured")
+        progress(f"playing {acquisition} on what was measured", 1.0)
     return ReplayReport(
         campaign=str(campaign.directory),
         steps=tuple(steps),

@@ -7,15 +7,15 @@ import msgspec
 from rich.console import Group
 from rich.text import Text
 
-from planner.check.checked import (
+from planner.check.examine import (
     CheckedJoint,
     CheckedLink,
     CheckedPose,
+    Examination,
     checked_joints,
     checked_links,
     checked_poses,
 )
-from planner.check.examine import Examination
 from planner.check.remark import SEVERITIES, CheckRemark
 from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer

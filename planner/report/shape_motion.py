@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.modal.matrix_modes import MatrixModes
-from planner.modal.shape_motion import motions, moved
+from planner.modal.modes import motions, moved
 from planner.recording.geometry import Geometry
 
 FRAMES, FRAME_MS = 24, 50

@@ -10,10 +10,9 @@ from rich.text import Text
 
 from planner.campaign.cut_source import Asked, structure_of
 from planner.milling.cut import Cut, load_cut
-from planner.milling.doubts import doubts
 from planner.milling.lobes import Loss, losses
 from planner.milling.machine import multiplier
-from planner.milling.structure import Structure, beyond
+from planner.milling.structure import Structure, beyond, doubts
 from planner.milling.uncertainty import PROBABILITY, SampledLimits, sampled_limits
 from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer

@@ -114,7 +114,7 @@ def map_report(
         wanted_share=share,
         left_out=left_out,
         remarks=_left_out(left_out, campaign.frequency_lines),
-        simulated=any(m.simulated for m in campaign.state.recorded),
+        simulated=campaign.state.simulated,
         joint_units=joints.declared,
     )  # fmt: skip
     if not pictures.wanted:

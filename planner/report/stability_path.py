@@ -11,9 +11,8 @@ from planner.campaign.cut_advice import FeedAdvice, TurnAdvice, turn_advice
 from planner.campaign.cut_source import Asked, outside, structures_of_file
 from planner.campaign.toolpath_poses import Travelled, Way
 from planner.milling.cut import Cut
-from planner.milling.doubts import doubts
 from planner.milling.path import TURNS_DEG, PathLimits, along, by_feed
-from planner.milling.structure import Structure, beyond
+from planner.milling.structure import Structure, beyond, doubts
 from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.plot_files import Pictures

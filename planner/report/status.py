@@ -262,7 +262,7 @@ def status(campaign: Campaign) -> StatusReport:
     return StatusReport(
         campaign=str(campaign.directory),
         robot=believed.robot,
-        simulated=any(m.simulated for m in state.recorded),
+        simulated=state.simulated,
         measurements=tuple(MeasuredPoseStatus.of(m, m.pose in state.starred) for m in measured),
         open=tuple(state.proposals[pose] for pose in state.open),
         skipped=tuple(SkippedProposal(p, r) for p, r in state.skipped.items()),

@@ -282,13 +282,3 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 LISTS = "compliance", "payload", "resonator", "harmonic"  # that effects add to
-
-
-def without_effects(config: RobotConfig) -> RobotConfig:
-    """The config as its file has it: the lists without what effects add."""
-    own = {
-        name: getattr(config, name)[:-count]
-        for name in LISTS
-        if (count := sum(len(getattr(e, name)) for e in config.effects))
-    }
-    return msgspec.structs.replace(config, **own)

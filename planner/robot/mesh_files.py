@@ -14,6 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
+from planner import file_content
 from planner.errors import InputError
 
 PACKAGE_FILE = "package.xml"
@@ -120,7 +121,7 @@ def copy_meshes(text: bytes | str, urdf: Path, target: Path) -> None:
 
 def urdf_source(urdf: Path) -> bytes:
     """The URDF's text. Raises OSError where it cannot be read, InputError for unexpanded xacro."""
-    text = urdf.read_bytes()
+    text = file_content.read(urdf)
     return _expanded(urdf) if urdf.suffix == ".xacro" or _is_xacro(text) else text
 
 

@@ -12,17 +12,12 @@ from planner.errors import InputError
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout, PointNames
 from planner.robot.config import Compliance, PointTable, RobotConfig
-from planner.robot.config_file import (
-    check_entries,
-    check_own_springs,
-    load_config,
-    with_effects,
-)
+from planner.robot.config_file import check_entries, check_own_springs, load_config
 from planner.robot.controller_axes import with_axes
 from planner.robot.linkage import Linkage
 from planner.robot.points import PREFIX, check_points, names_of, with_points
 from planner.robot.shapes import UnusableShape, leave_out_unusable
-from planner.robot.urdf import build_model, parse_urdf, read_urdf
+from planner.robot.urdf import build_model, read_urdf
 from planner.robot.urdf_elements import state_inertias
 
 LEVER_M = 0.3  # half the length of a carriage, chosen
@@ -53,6 +48,12 @@ class Robot:
     joints: JointUnits
     left_out: tuple[UnusableShape, ...] = ()  # shapes of the URDF that cannot be used
 
+    def __repr__(self) -> str:
+        joints, springs = len(self.joints.names), len(self.config.compliance)
+        return (
+            f"Robot({self.config.name!r}: {joints} joints, {springs} springs, {str(self.path)!r})"
+        )
+
     @classmethod
     def load(cls, robot_toml: Path | str) -> "Robot":
         """Read robot.toml and its URDF. Raises InputError naming file, entry and remedy."""
@@ -63,14 +64,6 @@ class Robot:
         """Of what robot.toml says, or would say if it stood there."""
         urdf = _resolved(robot_toml, config.urdf)
         return cls._built(config, robot_toml, urdf, read_urdf(urdf, robot_toml, config.held))
-
-    def described(self, config: RobotConfig, urdf_text: str) -> "Robot":
-        """The robot that its two files describe with this config and text in their stead.
-
-        `config` is as the file has it: its lists are without what its effects add.
-        """
-        root = parse_urdf(urdf_text, self.urdf_path, self.config.held)
-        return self._built(with_effects(config, self.path), self.path, self.urdf_path, root)
 
     @classmethod
     def _built(

@@ -3,11 +3,10 @@
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 
-import msgspec
 import numpy as np
 import pinocchio as pin
 
-from planner.robot.config import LinkTable, RobotConfig
+from planner.robot.config import LinkTable
 from planner.robot.moments import LINK, symmetric
 
 TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
@@ -100,9 +99,3 @@ def state_inertias(root: ElementTree.Element, tables: Sequence[LinkTable]) -> No
             moments = symmetric(table.inertia_kg_m2 or (0.0,) * 6, LINK)
             centre = np.array(table.centre_m or (0.0,) * 3)
             write_inertia(links[table.link], pin.Inertia(table.mass_kg, centre, moments))
-
-
-def without_stated_inertias(config: RobotConfig) -> RobotConfig:
-    """The config for a URDF that has the stated inertias in it: of [[link]] the sds stay."""
-    tables = (LinkTable(t.link, sd_percent=t.sd_percent, guessed=t.guessed) for t in config.link)
-    return msgspec.structs.replace(config, link=tuple(tables))

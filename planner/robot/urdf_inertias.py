@@ -20,7 +20,7 @@ def urdf_with_inertias(
 ) -> tuple[str, dict[str, float]]:
     """Text of the URDF after change (B, 10) of the bodies' inertias, which `bodies` names.
 
-    What [[link]] of robot.toml states is in it (see `urdf_elements.without_stated_inertias`).
+    What [[link]] of robot.toml states is in it (a robot.toml beside it must not state them).
     Bodies, their frames and the ten numbers are those of `ElasticModel.inertia`. Of the links
     that make up a body the heaviest takes the change, or the share of it that leaves a link which
     matter can form; shares below 1 are returned by body.

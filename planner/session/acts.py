@@ -53,7 +53,7 @@ def arrive(station: Station, course: Course) -> Course:
     except NoPoseLeftError as error:
         station.say(str(error))
         return replace(course, stop="no pose left")
-    station.teller.note()
+    station.rerun_queue.note()
     if course.left:  # what lies there before the robot can have moved
         campaign.show(course.left, station.inbox.present())
     page = page_without_hits(
@@ -61,7 +61,7 @@ def arrive(station: Station, course: Course) -> Course:
     )
     page = page_with_hits(page, (), (), TakingBack.of(campaign), station.auto, course)
     station.screen.show(page.page)
-    station.teller.tell()
+    station.rerun_queue.show()
     before = station.pose_before(proposal.pose)
     visit = PoseInProgress(proposal, page, time.monotonic(), before)
     return replace(course, visit=visit, left=proposal.pose)
@@ -147,7 +147,7 @@ def _refuse(station: Station, visit: PoseInProgress, files: Collection[Path]) ->
         return
     stated = {path: _as_stated(station, visit, path) for path in chosen}
     station.campaign.refuse(visit.proposal.pose, chosen, visit.reasons(chosen), stated)
-    station.teller.note()
+    station.rerun_queue.note()
     numbers = [str(v.number) for v in visit.verdicts if v.path in chosen]
     said = f"{counted(len(numbers), 'hit')} set aside ({', '.join(numbers)})"
     station.say(f"{said}; hit again ([u] takes that back).")
@@ -178,7 +178,7 @@ def import_waiting(
         station.say(str(error), "red")
         bad = {station.mark(path) for path in files} if station.auto else set()
         return replace(course, aside=course.aside | bad)
-    station.teller.note(reports)
+    station.rerun_queue.note(reports)
     for report in reports:
         if report.question is not None and report.question.disagree and course.here:
             return _right(station, course, report)
@@ -190,7 +190,7 @@ def import_waiting(
         course = replace(course, aside=course.aside | set(left.values()))
         course = _imported(station, course, report)
     if not any(report.measurement and report.measurement.modes for report in reports):
-        station.teller.tell()
+        station.rerun_queue.show()
         return course
     return replace(course, visit=None, here=frozenset())
 
@@ -208,7 +208,7 @@ def _right(station: Station, course: Course, report: ImportReport) -> Course:
     """The engineer said before that hits which contradict others are right."""
     with station.screen.working("refitting"):
         station.campaign.confirm(report.pose)
-    station.teller.note()
+    station.rerun_queue.note()
     station.say(f"The hits of {report.pose} are used, as you said.")
     return replace(measured(station, course, report.pose), visit=None, here=frozenset())
 
@@ -216,7 +216,7 @@ def _right(station: Station, course: Course, report: ImportReport) -> Course:
 def undo(station: Station, course: Course) -> Course:
     """Take back the last act of the engineer."""
     taken = station.campaign.undo(decisions_only=True)
-    station.teller.note()
+    station.rerun_queue.note()
     station.screen.forget()
     station.say(UndoneAct.of(taken).text())
     return course.undone(station.campaign.state)
@@ -225,7 +225,7 @@ def undo(station: Station, course: Course) -> Course:
 def _redo(station: Station, course: Course) -> Course:
     """Let hold again what was taken back last."""
     again = station.campaign.redo()
-    station.teller.note()
+    station.rerun_queue.note()
     station.screen.forget()
     station.say(RedoneAct.of(again).text())
     event = again[0].event
@@ -244,17 +244,17 @@ def answer(station: Station, course: Course, key: str | None, other: str) -> Cou
     if key in ENTER:
         with station.screen.working("refitting"):
             campaign.confirm(pose)
-            station.teller.note()
+            station.rerun_queue.note()
         station.say(f"The hits of {pose} are used.")
         answered = measured(station, answered, pose)
     elif key == "r":
         campaign.refuse_held(pose)
-        station.teller.note()
+        station.rerun_queue.note()
         station.say(f"The hits of {pose} are set aside; hit again ([u] takes that back).")
     elif key == "o" and other:
         with station.screen.working(IMPORTING):
             report = campaign.move(pose, other)
-        station.teller.note([report])
+        station.rerun_queue.note([report])
         answered = _after(station, answered, report)
     elif key == "u":
         answered = undo(station, answered)
@@ -263,7 +263,7 @@ def answer(station: Station, course: Course, key: str | None, other: str) -> Cou
     else:
         station.say(session_text.not_now(key), "dim") if key else None
         return course
-    station.teller.tell()
+    station.rerun_queue.show()
     return answered
 
 
@@ -286,7 +286,7 @@ def _to_their_poses(station: Station, course: Course, visit: PoseInProgress) -> 
     for pose, late in visit.late_by_pose.items():
         with station.screen.working(IMPORTING):
             reports = station.campaign.import_paths(late, pose)
-        station.teller.note(reports)
+        station.rerun_queue.note(reports)
         names = ", ".join(path.name for path in late)
         station.say(f"{counted(len(late), 'file')} moved to {pose}: {names}.")
         for report in reports:
@@ -299,13 +299,15 @@ def _right_here(station: Station, course: Course, visit: PoseInProgress) -> Cour
     if visit.late:
         files = [station.inbox.digest(path) for path in sorted(visit.late)]
         station.campaign.place(visit.proposal.pose, files)
-        station.teller.note()
+        station.rerun_queue.note()
     return replace(course, here=course.here | visit.unsure)
 
 
 def interrupted(station: Station) -> str:
     """Which acts of the engineer an interruption left in the log, in a sentence."""
-    said = [ACTS[type(event)](event) for event in station.teller.gained() if type(event) in ACTS]
+    said = [
+        ACTS[type(event)](event) for event in station.rerun_queue.gained() if type(event) in ACTS
+    ]
     if not said:
         return "Stopped: nothing that was begun is in the log; hits that were not imported wait."
     there = ", ".join(dict.fromkeys(said))

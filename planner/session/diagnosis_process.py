@@ -13,8 +13,6 @@ from planner.inference import parallel
 from planner.report.diagnosis import DiagnosisReport
 
 LEAST = 3  # measured poses from which a diagnosis is asked for
-NICE = 10  # the session goes first
-CONSISTENT = "The simulation, once refitted, explains the recordings to within their noise."
 UNEXPLAINED = (
     "The robot differs from the simulation, and none of the effects that planner knows explains it."
 )
@@ -75,7 +73,7 @@ class DiagnosisProcess:
             return FAILED
         said = " ".join(finding.text for finding in found.findings)
         if found.verdict == "consistent":
-            return CONSISTENT
+            return "The simulation, once refitted, explains the recordings to within their noise."
         return f"{UNEXPLAINED} {said}".strip() if found.verdict == "unexplained" else said
 
 
@@ -84,9 +82,9 @@ def diagnose_measured(directory: Path) -> DiagnosisReport:
     from planner.api import diagnose_material
     from planner.campaign.material import material
 
-    return replace(diagnose_material(material(directory, None, 0.0)), explained=None)
+    return replace(diagnose_material(material(directory, None, 0.0)), diagnosis=None)
 
 
 def _begin() -> None:
-    os.nice(NICE)
+    os.nice(10)  # the session goes first
     parallel._begin()

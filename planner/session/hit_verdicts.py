@@ -13,7 +13,7 @@ from planner.recording.repeat_sizes import other_size
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
 from planner.recording.sampling import sampled_otherwise
 from planner.recording.spectra import driving_point
-from planner.session.table import FolderTable
+from planner.session.inbox import FolderTable
 
 # As like as hits of one pose are (0.98 and more on the true robots of the tests); at poses that a
 # campaign proposes one after the other it is below 0.9. Chosen between.
@@ -53,7 +53,7 @@ class HitVerdict:
 
 @dataclass(frozen=True, eq=False)
 class PoseBefore:
-    """The pose measured last in a session and what was hit there; "" before the first."""
+    """The pose hit last before this one, and its hits; "" before the first."""
 
     pose: str = ""
     hits: tuple[Hit, ...] = ()

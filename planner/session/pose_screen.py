@@ -13,7 +13,8 @@ from rich.text import Text
 from planner.campaign.events import Proposal
 from planner.recording.joints import JointUnits
 from planner.report.text import with_sd
-from planner.session.fitted_lines import Said, fitted
+from planner.session.screen import Said, fitted
+from planner.words import command
 
 WIDTH, HEIGHT = 80, 22  # of the smallest terminal, less a line for work and the cursor's
 LAST = 4  # verdicts that are shown
@@ -101,7 +102,7 @@ class PosePage:
         parts += [Said([None, _said(text)], 5) for text in self.streams[-LAST:]]
         parts += [_unfinished(*one) for one in self.unfinished[-2:]]
         parts += [Said([None, _said(self.progress)], 6)] if self.progress else []
-        paths = _end(str(self.folder)), str(self.folder)
+        paths = _end(command(self.folder)), command(self.folder)
         where = [_said(f"waiting for hits in {path}", "dim") for path in paths]
         parts.append(Said([None, *where], 4))
         parts.append(Said([Text(self.keys, style="reverse")]))

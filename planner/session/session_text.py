@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.campaign.events import HitRecord, Question
-from planner.campaign.hit_habits import habits
+from planner.campaign.hit_errors import systematic_errors
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.modal.modes import Mode
@@ -19,11 +19,10 @@ from planner.session.pose_screen import PosePage, remedy_first
 from planner.words import counted, short_name, significant
 
 HELP = """\
-a, Enter  import the hits that wait          r  set bad hits aside, do not import them
-R         set all waiting hits aside
-k         skip this pose; asks why           n  never offer this pose again
-b, h      late hits: of the pose named, or of this one; h: unsure hits are right too
-s         mark this pose with a star (★)     u, U  take back the last act; redo it
+a, Enter  import the hits that wait      r, R  set bad hits, or all, aside
+k         skip this pose; asks why       n     never offer this pose again
+b, h      late hits are of the pose named, or of this one; h: unsure ones too
+s         mark this pose with a star (★) u, U  take back the last act; redo it
 q         quit; everything is on disk, and planner watch goes on from here"""
 NONE_BAD = "No hit is to be repeated: press r again, or R, to set all that wait aside."
 NOTHING_NEW = "Nothing to import yet: no new recording is whole and usable."
@@ -89,7 +88,7 @@ def _refused(hit: HitRecord) -> str:
 
 def _missed(report: ImportReport) -> list[RenderableType]:
     """Hit by hit, how it missed, and what the hits so far have in common."""
-    hits = report.misses()
+    hits = report.hit_errors()
     if not hits:
         return []
     rows = _table("hit", "tilt of its direction", "beside the point")
@@ -97,8 +96,8 @@ def _missed(report: ImportReport) -> list[RenderableType]:
         column.no_wrap = True
     for hit in hits:
         rows.add_row(*hit.cells)
-    every = [hit for pose in report.model.misses for hit in pose.hits]
-    return [Text(""), rows, *(Text(habit, style="bold") for habit in habits(every))]
+    every = [hit for pose in report.model.hit_errors for hit in pose.hits]
+    return [Text(""), rows, *(Text(habit, style="bold") for habit in systematic_errors(every))]
 
 
 def question_panel(question: Question, pose: str, other: str) -> RenderableType:
@@ -147,9 +146,21 @@ def incomplete(page: PosePage) -> str:
 
 
 def result_line(report: ImportReport) -> str:
-    """What came out against what was expected, in one sentence."""
+    """What came out, and how far at most it is off what was expected; the panel has each mode."""
     said = f"{report.pose}: {_in(report)}"
-    return f"{said}; {against_expected(report.pose, report.model, report.model_before)}"
+    labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
+    if labelled is None:
+        return f"{said}; no modes"
+    found = [(k, m) for k, m in enumerate(labelled.modes) if m is not None]
+    said = f"{said}; {', '.join(f'{m.frequency_hz:.2f}' for _, m in found)} Hz"
+    if report.model_before is None or not found:
+        return said
+    expected = report.model_before.predict(labelled.q[None])
+    means, sds = expected.frequency_hz[0], expected.frequency_sd_hz[0]
+    off = max((_sds_off(m, means[k], sds[k]) for k, m in found), key=abs)
+    missing = len(labelled.modes) - len(found)
+    lacks = f", {counted(missing, 'mode')} not found" if missing else ""
+    return f"{said}, at most {abs(off):.1f} sd off what was expected{lacks}"
 
 
 def against_expected(pose: str, model: Model, before: Model | None) -> str:
@@ -163,15 +174,14 @@ def against_expected(pose: str, model: Model, before: Model | None) -> str:
         said = f"mode {k + 1} not found" if mode is None else f"{mode.frequency_hz:.2f} Hz"
         if expected is not None:
             there, sd = expected.frequency_hz[0, k], expected.frequency_sd_hz[0, k]
-            off = "" if mode is None else _off_by(mode, there, sd)
+            off = "" if mode is None else f", {_sds_off(mode, there, sd):+.1f} sd"
             said = f"{said} (expected {there:.2f}{off})"
         each.append(said)
     return ", ".join(each)
 
 
-def _off_by(mode: Mode, expected_hz: float, sd_hz: float) -> str:
-    off = (mode.frequency_hz - expected_hz) / np.hypot(sd_hz, mode.frequency_sd_hz)
-    return f", {off:+.1f} sd"
+def _sds_off(mode: Mode, expected_hz: float, sd_hz: float) -> float:
+    return float((mode.frequency_hz - expected_hz) / np.hypot(sd_hz, mode.frequency_sd_hz))
 
 
 def progress_line(

@@ -1,6 +1,8 @@
 """What a session works with: campaign, folder, screen, keys and what runs beside it."""
 
 import time
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,18 +10,58 @@ from rich.text import Text
 
 from planner.campaign.arrivals import stated_otherwise
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Confirmed, Imported, Proposal
+from planner.campaign.events import (
+    AnyEvent,
+    Confirmed,
+    Entry,
+    FilesPlaced,
+    FilesShown,
+    Imported,
+    Proposal,
+    Refused,
+)
+from planner.campaign.importing import ImportReport
+from planner.campaign.model import Model
 from planner.campaign.state import taken_back
-from planner.dataset.screened_files import Source
+from planner.dataset.measure import MeasuredPose
+from planner.dataset.screened_files import Source, read_one
+from planner.report.rerun.story import Story
 from planner.session.course import Course
 from planner.session.diagnosis_process import DiagnosisProcess
 from planner.session.hit_verdicts import PoseBefore, Verdicts
 from planner.session.inbox import Inbox
 from planner.session.keys import Keys
 from planner.session.screen import Screen
-from planner.session.teller import Teller
 
-POLL_S = 0.2
+
+class RerunQueue:
+    """Keeps each new entry with the model right after it until there is time to show it."""
+
+    def __init__(self, campaign: Campaign, story: Story):
+        self._campaign, self._story = campaign, story
+        self._noted = len(campaign.entries)
+        self._waiting: deque[tuple[Entry, Model, MeasuredPose | None]] = deque()
+
+    def note(self, reports: Sequence[ImportReport] = ()) -> None:
+        """Keep what the log gained."""
+        found = {report.pose: report.measured for report in reports}
+        for entry in self._campaign.entries[self._noted :]:
+            event = entry.event
+            if isinstance(event, FilesShown | FilesPlaced):  # nothing that pictures show
+                continue
+            measured = found.get(event.pose) if isinstance(event, Imported) else None
+            self._waiting.append((entry, self._campaign.model, measured))
+        self._noted = len(self._campaign.entries)
+
+    def show(self) -> None:
+        """Show it; what an interruption left over is shown the next time."""
+        while self._waiting:
+            self._story.tell(*self._waiting[0])
+            self._waiting.popleft()
+
+    def gained(self) -> list[AnyEvent]:
+        """What the log on disk holds since it was noted last."""
+        return [entry.event for entry in Campaign(self._campaign.directory).entries[self._noted :]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +76,7 @@ class Station:
     inbox: Inbox
     screen: Screen
     keys: Keys
-    teller: Teller
+    rerun_queue: RerunQueue
     verdicts: Verdicts
     auto: bool
     hits_per_pose: int | None
@@ -66,22 +108,25 @@ class Station:
         return any(not stated_otherwise(Source.of(row), hit) for hit in hits)
 
     def pose_before(self, pose: str) -> PoseBefore:
-        """The pose measured last, other than this one, and what was hit there."""
+        """Where the robot was before this pose, and the usable hits there, refused or not."""
         entries, state = self.campaign.entries, self.campaign.state
         undone = taken_back(entries)
         for entry in reversed(entries):
             event = entry.event
-            if entry.seq in undone or not isinstance(event, Imported | Confirmed):
+            if entry.seq in undone or not isinstance(event, Imported | Confirmed | Refused):
                 continue
             known = state.hit_at(event.pose)
-            if known is not None and event.pose != pose:
-                sources = self.campaign.recordings.sources(known)
-                return PoseBefore(event.pose, tuple(h for s in sources for h in s.read()[0]))
+            records = [hit for at, hit in state.refused.values() if at == event.pose]
+            records += known.accepted if known is not None else ()
+            if records and event.pose != pose:
+                kept, band = self.campaign.recordings, self.campaign.cell.config.modes.band_hz
+                read = (read_one(kept.source(record), band)[1] for record in records)
+                return PoseBefore(event.pose, tuple(hit for hits in read for hit in hits))
         return PoseBefore()
 
     def key(self) -> str | None:
-        """The next key, or None after POLL_S."""
-        return self.keys.get(POLL_S)
+        """The next key, or None after a moment."""
+        return self.keys.get(timeout_s=0.2)
 
     @property
     def late(self) -> bool:

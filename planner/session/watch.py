@@ -26,15 +26,11 @@ from planner.session.acts import (
 from planner.session.course import Course, PoseInProgress
 from planner.session.diagnosis_process import LEAST, DiagnosisProcess
 from planner.session.hit_verdicts import HitVerdict, Part, Verdicts
-from planner.session.inbox import Inbox
+from planner.session.inbox import FolderTable, Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys
 from planner.session.page import TakingBack, page_with_hits
 from planner.session.screen import Screen
-from planner.session.station import Station
-from planner.session.table import FolderTable
-from planner.session.teller import Teller
-
-QUIET_S = 0.6  # a file that stood still for so long is whole: a verdict comes within a second
+from planner.session.station import RerunQueue, Station
 
 
 @dataclass(frozen=True)
@@ -59,15 +55,16 @@ def watch(
     viewer: bool = False,
     explain: bool = False,
     keys: Keys | None = None,
-    quiet_s: float = QUIET_S,
+    quiet_s: float = 0.6,
     limit_s: float | None = None,
 ) -> SessionSummary:
     """Run a session until quit, target, no pose left, or `limit_s`.
 
     As many hits as campaign.toml's [cost] hits_per_axis make a pose, unless `hits_per_pose` says
-    otherwise. `auto` imports without asking, as does a session without a keyboard. `explain`
-    diagnoses after each import, beside the session, and says what the simulation lacks. Nobody else
-    can act in the campaign meanwhile: InputError names who does.
+    otherwise. A file is whole that stood still for `quiet_s`: a verdict comes within a second.
+    `auto` imports without asking, as does a session without a keyboard. `explain` diagnoses after
+    each import, beside the session, and says what the simulation lacks. Nobody else can act in the
+    campaign meanwhile: InputError names who does.
     """
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the one the analyser exports into.")
@@ -88,7 +85,7 @@ def watch(
         )  # fmt: skip
         inbox = Inbox(folder, quiet_s, verdicts.unfit)
         return _run(Station(
-            campaign, inbox, Screen(console), source, Teller(campaign, story), verdicts,
+            campaign, inbox, Screen(console), source, RerunQueue(campaign, story), verdicts,
             auto or isinstance(source, NoKeys), hits_per_pose, explaining, LEAST, started,
             None if limit_s is None else started + limit_s,
         ))  # fmt: skip
@@ -100,10 +97,12 @@ def _run(station: Station) -> SessionSummary:
     try:
         for remark in campaign.cell.remarks:
             station.say(remark, "yellow")
+        with station.screen.working("fitting the model to what was measured"):
+            _ = campaign.model
         say_last_import(station)
         while not course.stop:
             course = _step(station, course)
-        station.teller.tell()
+        station.rerun_queue.show()
         if course.stop != "quit":
             with console.status("finding what the simulation lacks"):
                 station.say_diagnosis(wait=True)
@@ -111,7 +110,7 @@ def _run(station: Station) -> SessionSummary:
         course = replace(course, stop="quit", ended=interrupted(station))
     finally:
         with suppress(KeyboardInterrupt):
-            station.teller.tell()
+            station.rerun_queue.show()
     if course.ended:
         console.print(Text(course.ended))
     console.print(Text(f"Session ended: {course.stop}. Go on with the same command."))
@@ -203,9 +202,10 @@ def _shown(
 
     Of files that a table lists it says the pose.
     """
-    pose, known = visit.proposal.pose, station.campaign.state.shown
+    pose, state = visit.proposal.pose, station.campaign.state
     digests = {path: station.inbox.digest(path) for path in whole}
-    shown = {path: known[digest] for path, digest in digests.items() if digest in known}
+    known = {path: digest for path, digest in digests.items() if digest in state.shown}
+    shown = {path: state.came(digest, pose) for path, digest in known.items()}
     rows = ((path, station.verdicts.table.row(path)) for path in whole)
     shown |= {path: row.pose for path, row in rows if row is not None}
     verdicts = station.verdicts.of(whole, visit.before, here, numbers, shown, pose)
@@ -213,10 +213,10 @@ def _shown(
     for verdict in verdicts:
         if verdict.path not in shown and digests[verdict.path]:
             new.setdefault(verdict.came or pose, {})[digests[verdict.path]] = None
-    for at, files in new.items():
-        station.campaign.show(at, tuple(files))
+    for of, files in new.items():
+        station.campaign.show(of, tuple(files), pose if of != pose else "")
     if new:
-        station.teller.note()
+        station.rerun_queue.note()
     return verdicts
 
 

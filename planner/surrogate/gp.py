@@ -14,6 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from planner.errors import InputError
+from planner.inference import triangular
 from planner.surrogate.importance import Gaussians, Score, Stage, normal_points, sample
 from planner.surrogate.kernels import parse
 from planner.surrogate.predictive import Predictive
@@ -31,6 +32,7 @@ STAGES = 32, 64, 128
 # θ is the better known the more points there are: samples kept, by this at most. At 500 generated
 # poses 4 samples err and cover as 8 do.
 MOST_FEWER = 8
+IN_CACHE = 2**15  # elements of matrices: of more, most time goes into memory
 NO_FIT = (
     "No Gaussian process fits the measured modes; set aside poses that are measured twice "
     "or far off with `planner withdraw`."
@@ -43,28 +45,15 @@ SINGULAR_REMARK = (
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """What an output's data say at each of k samples: L (k, n, n) and K⁻¹(y − mean) (k, n).
+    """What an output's data say at each of k samples: L⁻¹ (k, n, n) and K⁻¹(y − mean) (k, n).
 
     K = LLᵀ is the covariance of the n points that hold a value; `jitter`, relative to the prior
     variance, had to be added to K.
     """
 
-    factor: np.ndarray
+    whiten: np.ndarray
     weights: np.ndarray
     jitter: float
-
-    def divided(self, columns: np.ndarray) -> np.ndarray:
-        """L⁻¹ columns (k, n, q)."""
-        from scipy.linalg import solve_triangular
-
-        pairs = zip(self.factor, columns, strict=True)
-        return np.array([solve_triangular(f, c, lower=True, check_finite=False) for f, c in pairs])
-
-    @property
-    def whiten(self) -> np.ndarray:
-        """L⁻¹ (k, n, n)."""
-        n = self.factor.shape[1]
-        return self.divided(np.broadcast_to(np.eye(n), (len(self.factor), n, n)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,19 +99,15 @@ class Posterior:
 
     def _solved(self, j: int, jitter: float) -> Solved:
         """LinAlgError where a covariance is singular."""
-        from scipy.linalg import cho_solve
-
         known = self.known(j)
         low, mask, variance = (v[j, known] for v in (self.low, self.mask, self.variance))
         data = jitter, self.x[known], low, mask, variance, self.prior.bias_sd[j]
-        factor = np.array(
-            [
-                np.linalg.cholesky(data_covariance(np, self.kernel, theta, *data, slope_sd))
-                for theta, slope_sd in zip(self.theta[j], self.slope_sd[j], strict=True)
-            ]
-        )
-        weights = np.array([cho_solve((one, True), self.y[j, known]) for one in factor])
-        return Solved(factor, weights, jitter)
+        each = zip(self.theta[j], self.slope_sd[j], strict=True)
+        covariances = (data_covariance(np, self.kernel, t, *data, slope) for t, slope in each)
+        # By NumPy: SciPy takes long to import, and loaded late its BLAS has more than one thread.
+        whiten = np.array([triangular.inverse(np.linalg.cholesky(k)) for k in covariances])
+        weights = np.swapaxes(whiten, 1, 2) @ (whiten @ self.y[j, known])[..., None]
+        return Solved(whiten, weights[..., 0], jitter)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -190,12 +175,14 @@ class Posterior:
     def _prior(
         self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
     ) -> np.ndarray:
-        """Prior covariance (k, a, b); one sample after the other, which takes little memory."""
+        """Prior covariance (k, a, b), so many samples at once as the processor's cache holds."""
         delta, bias = parse(self.kernel, self.x.shape[1]), self.prior.bias_sd[j] ** 2
-        linear = np.outer(la, lb)
-        both = zip(self.theta[j], self.slope_sd[j], strict=True)
-        return np.array(
-            [delta.covariance(np, t, xa, xb) + (bias + slope**2 * linear) for t, slope in both]
+        linear, theta = np.outer(la, lb), self.theta[j]
+        square = self.slope_sd[j][:, None, None] ** 2
+        some = max(1, IN_CACHE // max(linear.size, 1))
+        parts = (slice(i, i + some) for i in range(0, len(theta), some))
+        return np.concatenate(
+            [delta.covariance(np, theta[p], xa, xb) + (bias + square[p] * linear) for p in parts]
         )
 
     def own(self, j: int, x: np.ndarray, low: np.ndarray) -> np.ndarray:
@@ -207,7 +194,7 @@ class Posterior:
         """Prior covariance (k, n, q) with the n points that hold a value, and L⁻¹ times it."""
         known = self.known(j)
         found = self._prior(j, self.x[known], self.low[j, known], x, low)
-        return found, self.solved(j).divided(found)
+        return found, self.solved(j).whiten @ found
 
     def known(self, j: int) -> np.ndarray:
         """Which of the training points hold a value of output j."""

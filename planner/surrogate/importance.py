@@ -11,8 +11,8 @@ from functools import cache
 
 import numpy as np
 
-from planner import cache_folder, content_hash
-from planner.dataset.store import Store
+from planner import content_hash
+from planner.dataset.store import user_store
 from planner.inference.log_space import log_sum, shares
 
 MOST_SHARED = 0.95  # points of one output are too few to stand for a narrower one
@@ -33,16 +33,9 @@ def normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
     libraries = content_hash.libraries("numpy", "scipy")
     asked = f"{samples} {dimensions} {seed}"
     key = content_hash.digest("normal points", content_hash.program("surrogate"), libraries, asked)
-    points = _store().result(key, np.ndarray, lambda: _normal_points(samples, dimensions, seed))
+    points = user_store().result(key, np.ndarray, lambda: _normal_points(samples, dimensions, seed))
     points.flags.writeable = False  # all who ask get the same array
     return points
-
-
-def _store() -> Store:
-    try:
-        return Store(cache_folder.folder("points"))
-    except RuntimeError:  # a user without a home
-        return Store(None)
 
 
 def _normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.surrogate.kernels import parse
 
-PADDED_SIZES = (16, 24, 32, 48, 64, 96, 128, 256, 512)  # each is compiled once
+PADDED_SIZES = (16, 32, 64, 128, 256, 512)  # each is compiled once
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import msgspec
 import numpy as np
+from rich.text import Text
 
 from planner.report.answer import NOT_IN_JSON, Answer, encoded
 
@@ -33,6 +34,17 @@ def test_an_answer_is_json_that_every_reader_takes():
     }
     assert whole.to_json() == told
     assert whole.text() is None
+
+
+def test_a_notebook_shows_what_the_screen_does():
+    @dataclass(frozen=True)
+    class Told(Answer):
+        def text(self):
+            return Text("mode 1 at 8.1 Hz", style="bold")
+
+    shown = Told()._repr_html_()
+    assert "8.1" in shown
+    assert "font-weight: bold" in shown
 
 
 def test_a_key_appears_once_it_is_set():

@@ -8,7 +8,7 @@ import pytest
 
 from planner import AskTell, Robot, Simulation
 from planner.campaign.campaign import Campaign
-from planner.campaign.example import EXAMPLE, write_example
+from planner.campaign.store import EXAMPLE, write_example
 from planner.dynamics.simulation import Elasticity
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
@@ -125,9 +125,12 @@ def test_angles_outside_the_limits_are_refused():
 
 
 def test_a_campaign_has_rows_too(tmp_path):
-    campaign = Campaign.new(tmp_path / "cell", TOML, EXAMPLE / "campaign.toml")
+    campaign = Campaign.new(str(tmp_path / "cell"), str(TOML), str(EXAMPLE / "campaign.toml"))
+    assert "0 poses measured, 0 proposed" in repr(campaign)
+    with pytest.raises(InputError, match="joint_2"):
+        campaign.predict(joints_deg=[0, 200, 0, 0, 0, 0])
     assert campaign.records() == []
-    rows = campaign.predict_records(np.deg2rad(UNSEEN))
+    rows = campaign.predict_records(joints_deg=UNSEEN)
     assert [(r["pose"], r["mode"]) for r in rows] == [(p, k) for p in (1, 2) for k in range(1, 5)]
     assert rows[4]["joint_1_deg"] == pytest.approx(-30)
 

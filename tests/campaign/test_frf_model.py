@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.campaign import frf_prediction
 from planner.campaign.campaign import Campaign
-from planner.campaign.frf_model import ErrorByZone, LeftOut, local_size
+from planner.campaign.frf_model import ErrorByZone, FrfModel, LeftOut, local_size
 from planner.dataset.store import Store
 from planner.demo import NAME, shipped
 from planner.frf.metrics import agreement, direct_mean
@@ -25,7 +24,7 @@ def left_out(rng, error: float, true: np.ndarray) -> LeftOut:
     noise = rng.standard_normal(true.shape) + 1j * rng.standard_normal(true.shape)
     off = error / np.sqrt(2) * noise * local_size(true, HERTZ)
     nothing, used = np.zeros(true.shape), np.ones(true.shape, dtype=bool)
-    return LeftOut(HERTZ, true, true + off, nothing, nothing, used)
+    return LeftOut(HERTZ, true, true + off, nothing, used)
 
 
 @pytest.fixture
@@ -117,13 +116,13 @@ def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
     campaign.import_paths((source / "recordings",), "A11")
     q = campaign.cell.candidates.q[:1]
     assert not campaign.model.knows_frfs
-    first = campaign.frf(q)
+    first = campaign.frf_at(q)
 
     def refused(*given):
         raise AssertionError("worked out again")
 
-    monkeypatch.setattr(frf_prediction, "frf_model_of", refused)
-    again = Campaign(tmp_path / "c", store).frf(q)
+    monkeypatch.setattr(FrfModel, "of", refused)
+    again = Campaign(tmp_path / "c", store).frf_at(q)
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from planner.campaign.build import build
 from planner.campaign.campaign import Campaign
-from planner.campaign.hit_habits import HitMiss, habits
+from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.dataset.store import Store
 from planner.replay import replay
 from planner.report.imports import ImportedPoses
@@ -23,7 +23,7 @@ def imported(cell: MissedCell, folder):
 
 def told_of(cell: MissedCell, model):
     """Told, sds and truth (n, 4) of all hits of a campaign."""
-    parts = [cell.misses(pose.pose, pose.hits) for pose in model.misses]
+    parts = [cell.misses(pose.pose, pose.hits) for pose in model.hit_errors]
     return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
 
 
@@ -63,7 +63,7 @@ def test_it_is_replayed_identically(cell):
     _, campaign, _ = cell
     steps = list(replay(campaign))
     assert {step.check for step in steps} <= {"identical", "kept"}
-    for again, first in zip(steps[-1].model.misses, campaign.model.misses, strict=True):
+    for again, first in zip(steps[-1].model.hit_errors, campaign.model.hit_errors, strict=True):
         for a, b in zip(again.hits, first.hits, strict=True):
             assert a.tilt_deg == pytest.approx(b.tilt_deg, abs=1e-9)
             assert a.offset_mm == pytest.approx(b.offset_mm, abs=1e-9)
@@ -71,14 +71,16 @@ def test_it_is_replayed_identically(cell):
 
 def test_what_hits_have_in_common_is_said():
     def hit(name, tilt, offset):
-        return HitMiss("f", name, tilt, (0.2, 0.2), offset, (1.0, 1.0))
+        return HitErrorEstimate("f", name, tilt, (0.2, 0.2), offset, (1.0, 1.0))
 
     z = [hit("+z", (2.3 + k, 0.1), (4.0 + k, -0.5)) for k in (-0.1, 0.0, 0.1)]
-    assert habits(z) == ("Your z hits land 4 ± 1 mm towards +x and tilt by 2.3 ± 0.2° towards +x.",)
-    assert habits([hit("-x", (0.1, -2.0), (0.0, 0.0))] * 2) == (
-        "Your -x hits tilt by 2.0 ± 0.2° towards −z.",
+    assert systematic_errors(z) == (
+        "Your z hits land 4 ± 1 mm towards +x and tilt by 2.3 ± 0.2° towards +x.",
     )
-    assert habits([hit("+y", (0.3, 0.3), (1.0, 1.0))] * 3) == ()
+    assert systematic_errors([hit("-x", (0.1, -2.0), (0.0, 0.0))] * 2) == (
+        "Your −x hits tilt by 2.0 ± 0.2° towards −z.",
+    )
+    assert systematic_errors([hit("+y", (0.3, 0.3), (1.0, 1.0))] * 3) == ()
 
 
 CELLS = (("kr10", 1, 51), ("irb6640", 1, 52), ("kr210", 3, 53))

@@ -1,12 +1,12 @@
 """Files that come again: in use, refused, held, shown at another pose; acts that are redone."""
 
+import hashlib
 import json
 import shutil
 
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.store import sha256
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from planner.replay import replay
@@ -96,7 +96,9 @@ def test_a_newer_file_takes_the_place_of_the_one_in_use(cell, tmp_path):
     def used():
         (measured,) = Campaign(folder).state.used
         contents = {hit.sha256 for hit in measured.accepted}
-        return len(measured.accepted), *(sha256(b) in contents for b in (before, one.read_bytes()))
+        return len(measured.accepted), *(
+            hashlib.sha256(b).hexdigest() in contents for b in (before, one.read_bytes())
+        )
 
     assert used() == (9, False, True)
     # The old one comes again, and the new one is taken back.
@@ -165,7 +167,7 @@ def test_what_was_shown_at_a_pose_is_not_imported_at_another_by_its_folder(cell)
     folder, _, pose, made = cell
     files = sorted((made / "data").iterdir())
     campaign = Campaign(folder)
-    campaign.show(pose.pose, [sha256(path.read_bytes()) for path in files])
+    campaign.show(pose.pose, [hashlib.sha256(path.read_bytes()).hexdigest() for path in files])
     campaign.skip(pose.pose)
     other = campaign.next()[0].pose
     for more in ((), ("--pose", other)):

@@ -6,19 +6,19 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from planner.campaign.misses import CampaignMisses
+from planner.campaign.hit_error_estimates import CampaignHitErrors
 from planner.fit.hit_misses import VisitMisses
 from planner.measurement.nuisances import Tolerances
 
 HAND = Tolerances()
 
 
-def campaign(times: float, discrepancy: float) -> CampaignMisses:
+def campaign(times: float, discrepancy: float) -> CampaignHitErrors:
     """Nine hits that miss by so many times what hands do."""
     sd = np.repeat([HAND.angle_rad, HAND.offset_m], 2)
     mean = times * sd * np.random.default_rng(2).choice([-1.0, 1.0], (9, 4))
     told = SimpleNamespace(discrepancy=discrepancy, visits=(VisitMisses(mean, np.eye(36)),))
-    return CampaignMisses((), cast(Any, told), HAND, (4.0, 60.0))
+    return CampaignHitErrors((), cast(Any, told), HAND, (4.0, 60.0))
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,11 @@ import pytest
 from planner import content_hash
 from planner.campaign import build as build_module
 from planner.campaign.campaign import Campaign
+from planner.campaign.model import Model
 from planner.campaign.store import CONFIG
 from planner.dataset.store import Store
 from planner.demo import NAME, shipped
+from planner.fit.fitted import FitRecord
 from planner.replay import replay
 from planner.report.status import status
 from tests.support.outside import planner
@@ -145,7 +147,8 @@ def test_replay_takes_no_model_that_was_kept(folder, store, monkeypatch):
     def refused(*given):
         raise AssertionError("a kept model was asked for")
 
-    monkeypatch.setattr(Store, "get", lambda self, key, kind: refused() if kind is bytes else None)
+    kept = (Model, FitRecord)
+    monkeypatch.setattr(Store, "get", lambda self, key, kind: refused() if kind in kept else None)
     steps = list(replay(Campaign(folder, store)))
     assert {step.check for step in steps} <= {"identical", "close", "kept"}
     assert len(steps[-1].model.labelled) == len(POSES)

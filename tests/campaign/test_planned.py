@@ -91,7 +91,9 @@ def test_every_answer_marks_them(tmp_path):
     assert "tilted (outside)" in list(rows.columns[0].cells)
     assert "here" in list(rows.columns[0].cells)
     marks = {
-        row["pose"]: row["outside"] for row in campaign.predict_records(np.array([here, tilted]))
+        row["pose"]: row["outside"]
+        for row in campaign.predict_records(joints_deg=np.rad2deg([here, tilted]))
+        for row in campaign.predict_records(joints_deg=np.rad2deg([here, tilted]))
     }
     assert marks == {1: False, 2: True}
     assert str(report.text().renderables[1]) == outside_remark(["tilted"])

@@ -130,40 +130,72 @@ def replaced(old: str, new: str, count: int = -1):
     return lambda text: text.replace(old, new, count)
 
 
+def added(lines: str):
+    """The text with a table in place of the one of that name, if there is one."""
+    table = lines.split("\n", maxsplit=1)[0]
+
+    def change(text: str) -> str:
+        parts = [part for part in text.split("\n\n") if table not in part]
+        return "\n\n".join([*parts, lines]) + "\n"
+
+    return change
+
+
+STIFF = "stiffness = 60000.0"
+BAND = "band_hz = [5.0, 110.0]"
+# What is wrong in a file, and a part of the sentence that says so.
 CONFIGURATIONS = {
     "robot/robot.toml": {
-        "no urdf": replaced('urdf = "arm.urdf"', 'urdf = "none.urdf"'),
-        "unknown frame": replaced('tcp_frame = "tool"', 'tcp_frame = "nose"'),
-        "unknown joint": replaced('joint = "joint_a1"', 'joint = "joint_9"'),
-        "negative stiffness": replaced("stiffness = 60000.0", "stiffness = -1.0"),
-        "stiffness a word": replaced("stiffness = 60000.0", 'stiffness = "high"'),
-        "number without end": replaced("stiffness = 60000.0", f"stiffness = {'6' * 5000}"),
-        "key misspelt": replaced("damping = ", "dampening = ", 1),
-        "axis no unit vector": replaced("axis = [0, 0, 1]", "axis = [0, 0, 3]"),
-        "axis of two": replaced("axis = [0, 0, 1]", "axis = [0, 0]"),
-        "half": lambda text: text[: len(text) // 2].rsplit("=", 1)[0],
-        "nothing elastic": lambda text: text.split("[[compliance]]")[0],
-        "empty": lambda text: "",
-        "binary": lambda text: "\x00\x01\x02",
+        "no urdf file": (replaced('urdf = "arm.urdf"', 'urdf = "none.urdf"'), "none.urdf"),
+        "no urdf": (replaced('urdf = "arm.urdf"\n', ""), "urdf is missing; add it."),
+        "urdf of no file system": (
+            replaced('urdf = "arm.urdf"', 'urdf = "a\\u0000.urdf"'),
+            "correct the entry urdf",
+        ),
+        "unknown frame": (replaced('tcp_frame = "tool"', 'tcp_frame = "nose"'), "nose"),
+        "unknown joint": (replaced('joint = "joint_a1"', 'joint = "joint_9"'), "joint_9"),
+        "negative stiffness": (replaced(STIFF, "stiffness = -1.0"), "stiffness"),
+        "stiffness a word": (
+            replaced(STIFF, 'stiffness = "high"'),
+            "[[compliance]] stiffness must be a number, not",
+        ),
+        "number without end": (replaced(STIFF, f"stiffness = {'6' * 5000}"), "thousands of digits"),
+        "key misspelt": (
+            replaced("damping = ", "dampening = ", 1),
+            '[[compliance]] has no entry "dampening"; "damping" may be meant.',
+        ),
+        "axis no unit vector": (replaced("axis = [0, 0, 1]", "axis = [0, 0, 3]"), "axis"),
+        "axis of two": (replaced("axis = [0, 0, 1]", "axis = [0, 0]"), "axis"),
+        "half": (lambda text: text[: len(text) // 2].rsplit("=", 1)[0], "robot.toml"),
+        "nothing elastic": (lambda text: text.split("[[compliance]]")[0], "compliance"),
+        "empty": (lambda text: "", "is missing; add it."),
+        "binary": (lambda text: "\x00\x01\x02", "robot.toml"),
     },
     "robot/arm.urdf": {
-        "half": lambda text: text[: len(text) // 2],
-        "another format": lambda text: "<mujoco/>",
-        "empty": lambda text: "",
-        "joint that slides": replaced('type="revolute"', 'type="prismatic"', 1),
-        "axis a word": replaced('<axis xyz="0 1 0"/>', '<axis xyz="0 one 0"/>', 1),
+        "half": (lambda text: text[: len(text) // 2], "arm.urdf"),
+        "another format": (lambda text: "<mujoco/>", "arm.urdf"),
+        "empty": (lambda text: "", "arm.urdf"),
+        "joint that slides": (replaced('type="revolute"', 'type="prismatic"', 1), ""),
+        "axis a word": (replaced('<axis xyz="0 1 0"/>', '<axis xyz="0 one 0"/>', 1), "arm.urdf"),
     },
     "plan/campaign.toml": {
-        "key misspelt": replaced("joints_deg", "angles"),
-        "five joints": replaced("[[-40, 40], ", "["),
-        "beyond a limit": replaced("[-40, 40]", "[-400, 40]"),
-        "upside down": replaced("[-40, 40]", "[40, -40]"),
-        "number without end": replaced("count = 4", f"count = {'4' * 5000}"),
-        "no mode": replaced("count = 4", "count = 0"),
-        "band upside down": replaced("[5.0, 110.0]", "[110.0, 5.0]"),
-        "unknown acquisition": replaced("integrated_variance", "crystal_ball"),
-        "unknown table": lambda text: text + "[surprise]\nx = 1\n",
-        "empty": lambda text: "",
+        "key misspelt": (replaced("cou", "cuo"), '[modes] has no entry "cuont"; "count" may be'),
+        "table misspelt": (replaced("[modes]", "[mdes]"), 'no entry "mdes"; "modes" may be meant.'),
+        "unknown table": (lambda text: text + "[surprise]\nx = 1\n", "surprise"),
+        "a word": (replaced("count = 4", 'count = "four"'), "must be a whole number, not"),
+        "number without end": (replaced("count = 4", f"count = {'4' * 5000}"), "thousands"),
+        "no mode": (replaced("count = 4", "count = 0"), "[modes] count"),
+        "five joints": (replaced("[[-40, 40], ", "["), "5 ranges"),
+        "a range of words": (replaced("[[-40, 40]", '[["a", 40]'), "joints_deg must be a number"),
+        "beyond a limit": (replaced("[-40, 40]", "[-400, 40]"), "joints_deg of joint_a1"),
+        "upside down": (replaced("[[-40, 40]", "[[40, -40]"), "range 1 is [40, -40]; give finite"),
+        "band upside down": (replaced(BAND, "band_hz = [40.0, 8.0]"), "band_hz is [40, 8]"),
+        "unknown acquisition": (replaced("integrated_variance", "ei"), "there is no acquisition"),
+        "no number": (added("[stop]\nfrequency_sd_percent = nan"), "frequency_sd_percent"),
+        "no end": (added("[goal]\njoints_deg = [[0, inf, 0, 0, 0, 0]]"), "joints_deg"),
+        "goal of five": (added("[goal]\njoints_deg = [[1, 2, 3, 4, 5]]"), "[goal] joints_deg"),
+        "zone of one": (added("[[forbidden]]\njoints_deg = [[1, 2]]"), "[[forbidden]]"),
+        "empty": (lambda text: "", "is missing; add it."),
     },
 }
 
@@ -175,12 +207,20 @@ def test_configurations(bench, tmp_path, file, what):
     root, *_ = bench
     for folder in ("robot", "plan"):
         shutil.copytree(root / folder, tmp_path / folder)
-    text = (tmp_path / file).read_text()
-    (tmp_path / file).write_text(CONFIGURATIONS[file][what](text))
+    text, (change, words) = (tmp_path / file).read_text(), CONFIGURATIONS[file][what]
+    (tmp_path / file).write_text(change(text))
+    assert (tmp_path / file).read_text() != text
     robot, plan = tmp_path / "robot" / "robot.toml", tmp_path / "plan" / "campaign.toml"
     answer = call("new", tmp_path / "bad", "--robot", robot, "--campaign", plan, "--json")
-    expect_one_sentence(*answer)
+    expect_one_sentence(*answer, words)
     assert not (tmp_path / "bad").exists()
+
+
+def test_a_folder_instead_of_its_robot(bench, tmp_path):
+    robot = bench[0] / "robot" / "robot.toml"
+    for folder in (robot.parent, robot.parent.parent):
+        expect_one_sentence(*call("check", folder), f"is a folder; name {robot}.")
+    expect_one_sentence(*call("check", bench[0] / "plan"), "name a robot.toml in it")
 
 
 @pytest.mark.parametrize(
@@ -202,6 +242,7 @@ def test_configurations(bench, tmp_path, file, what):
         "modes POSES",
         "new CELL --robot ROOT/robot/robot.toml",
         "frobnicate",
+        *("new", "import", "check"),
     ],
 )
 def test_usage(bench, command):
@@ -210,7 +251,9 @@ def test_usage(bench, command):
     words = command.split()
     for name, place in places.items():
         words = [word.replace(name, str(place)) for word in words]
-    expect_one_sentence(*call(*words))
+    # A missing argument points to the command's own help.
+    helped = f"see planner {command} --help." if command in ("import", "check") else ""
+    expect_one_sentence(*call(*words), helped)
 
 
 @pytest.mark.parametrize("suffix", ["uff", "mat", "csv"])

@@ -69,6 +69,29 @@ def test_a_measurement_is_set_aside_and_taken_back(tmp_path):
     assert two["frequency_sd_percent"] != pytest.approx(replayed["frequency_sd_percent"])
 
 
+def test_a_proposal_keeps_its_name_and_place_until_it_is_measured(tmp_path):
+    robot, campaign_toml, truth = make_cell(tmp_path)
+    cell = tmp_path / "cell"
+    told("new", cell, "--robot", robot, "--campaign", campaign_toml)
+    told("import", cell, record(truth, tmp_path / "own", "P001", ASKED[0].tolist()))
+
+    def sent() -> tuple[str, list[float]]:
+        (proposal,) = told("next", cell)["proposals"]
+        return proposal["pose"], proposal["joints_deg"]
+
+    second = sent()
+    assert second[0] == "P002"  # P001 is a pose of the engineer's own
+    told("import", cell, record(truth, tmp_path / "second", *second))
+    third = sent()
+    late = record(truth, tmp_path / "late", *second, seed=1)
+    told("import", cell, *sorted((late / "data").iterdir())[:3], "--pose", second[0])
+    assert sent() == third  # where the robot was sent
+    told("import", cell, record(truth, tmp_path / "third", *third))
+    told("undo", cell)
+    assert sent() == third
+    assert told("replay", cell)["reproduced"]
+
+
 def test_what_the_simulation_learned_of_each_joint_stands_beside_what_was_stated(tmp_path):
     robot, campaign_toml, truth = make_cell(tmp_path)
     cell = tmp_path / "cell"

@@ -12,7 +12,7 @@ import pytest
 import typer
 
 from planner.campaign.config import CampaignConfig
-from planner.campaign.example import EXAMPLE
+from planner.campaign.store import EXAMPLE
 from planner.cli.app import app
 from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESCRIPTIONS, DESIGNS

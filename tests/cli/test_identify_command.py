@@ -87,7 +87,7 @@ def test_the_robot_that_is_written_is_the_one_identified(cell, done):
     assert answer["out"] == str(out)
     assert (out.parent / tomllib.loads(out.read_text())["urdf"]).is_file()
     robot = Robot.load(out)
-    recorded = Dataset.read(folder, robot.joint_names, BAND_HZ)
+    recorded = Dataset.read(folder, robot, BAND_HZ)
     again = fit_similarity(Simulation(robot), recorded.frfs, recorded.q)
     assert again.frac == pytest.approx(answer["written"]["frac"], abs=1e-6)
     assert again.frobenius == pytest.approx(answer["written"]["frobenius"], abs=1e-6)

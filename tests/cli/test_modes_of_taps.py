@@ -1,6 +1,7 @@
 """`planner modes` of time histories of any points: one sensor, a roving hammer, a roving sensor."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -160,3 +161,39 @@ def test_a_record_sampled_too_slowly_for_the_band_names_both(tmp_path, capsys):
     assert code == 3
     assert "its FRFs end at 460.8 Hz, before the end of the band of 600 to 900 Hz" in err
     assert "--band-hz" in err
+
+
+def test_what_readers_notice_of_hits_is_told(tmp_path, capsys):
+    """Channels that begin apart, of no known unit; a pulse that not all channels have."""
+    one = tap(PLATE, 0, (0,), np.random.default_rng(6))
+    write_csv(tmp_path / "tap.csv", one, "acceleration_z_m_s2", "hit: +z")
+    rows = np.loadtxt(tmp_path / "tap.csv", delimiter=",", comments="#", skiprows=2)
+    head = "# hit: +z\nTime (s),force_n,Time (s),acceleration_z_m_s2,other"
+
+    def written(late):
+        both = np.column_stack([rows[:-late, :2], rows[late:][:, [0, 2, 2]]])
+        np.savetxt(tmp_path / "late.csv", both, delimiter=",", header=head, comments="")
+        return tmp_path / "late.csv"
+
+    late = round(0.01 / (rows[1, 0] - rows[0, 0]))
+    code, answer, err = modes(capsys, written(late))
+    assert (code, err) == (0, "")
+    assert any("acceleration_z_m_s2 begin" in text for text in answer["remarks"])
+    assert any("unit is not known: other." in text for text in answer["remarks"])
+    code, _, err = modes(capsys, written(len(rows) // 2))
+    assert code == 3
+    assert "s apart" in err
+
+
+def test_short_records_of_one_sensor_give_modes_or_a_sentence(tmp_path, capsys):
+    one = tap(PLATE, 0, (0,), np.random.default_rng(2))
+    for kept in (120, 160, 180, 200, 220, 260, 300, 340, 380, 420):
+        cut = replace(
+            one, force_n=one.force_n[:kept], acceleration_m_s2=one.acceleration_m_s2[:, :kept]
+        )
+        path = write_csv(tmp_path / f"{kept}.csv", cut, "acceleration_z_m_s2", "hit: +z")
+        code, _, err = modes(capsys, path)
+        assert code in (0, 3), (kept, err)
+        assert code == 0 or err.startswith(
+            ("No mode could be found", "No modes could be identified")
+        )

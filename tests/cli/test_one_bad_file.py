@@ -138,25 +138,6 @@ def test_meshes_are_copied_into_the_new_folder_only(tmp_path):
     assert sorted(p.name for p in tmp_path.glob("*.stl")) == ["far.stl"]
 
 
-@pytest.mark.parametrize(
-    ("what", "line"),
-    [("frequency_sd_percent", "[stop]\nfrequency_sd_percent = nan"),
-     ("joints_deg", "[goal]\njoints_deg = [[0, inf, 0, 0, 0, 0]]"),
-     ("[goal] joints_deg", "[goal]\njoints_deg = [[1, 2, 3, 4, 5]]"),
-     ("[[forbidden]]", "[[forbidden]]\njoints_deg = [[1, 2]]")],
-)  # fmt: skip
-def test_what_no_campaign_can_be_is_refused_before_there_is_a_folder(bench, tmp_path, what, line):
-    root, _ = bench
-    text = (root / "plan" / "campaign.toml").read_text()
-    kept = [part for part in text.split("\n\n") if line.split("\n")[0] not in part]
-    plan = tmp_path / "campaign.toml"
-    plan.write_text("\n\n".join(kept) + f"\n{line}\n")
-    robot = root / "robot" / "robot.toml"
-    code, _, err = call("new", tmp_path / "bad", "--robot", robot, "--campaign", plan)
-    assert (code, what in err) == (2, True), err
-    assert not (tmp_path / "bad").exists()
-
-
 def test_a_byte_order_mark_is_no_fault(bench, tmp_path):
     root, _ = bench
     for folder in ("robot", "plan"):

@@ -10,9 +10,9 @@ from planner.cli import progress
 @pytest.mark.parametrize("quiet", [False, True])
 def test_long_work_is_told_in_lines(quiet, monkeypatch, capsys):
     monkeypatch.setattr(progress, "FIRST_S", 0.02)
-    with progress.bars(quiet) as tell:
-        tell("runs", 3, 40)
+    with progress.telling("comparing", quiet) as tell:
+        tell("runs", 0.25)
         time.sleep(0.3)
     said = capsys.readouterr()
     assert said.out == ""
-    assert ("runs, 3 of 40 (0 s)" in said.err) == (not quiet)
+    assert ("comparing: runs, 25 % (0 s)" in said.err) == (not quiet)

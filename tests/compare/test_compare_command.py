@@ -18,7 +18,7 @@ from planner.compare.bench import assemble, cell_of, decide
 from planner.compare.resume import recorded
 from planner.compare.run import run
 from planner.compare.tasks import Task
-from planner.dataset.recordings import recordings_in
+from planner.dataset.visits import recordings_in
 from planner.robot.robot import Robot
 from tests.support.outside import PLANNER, planner
 from tests.support.pools import make_pool

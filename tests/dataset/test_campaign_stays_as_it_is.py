@@ -12,6 +12,7 @@ from planner.campaign.material import material
 from planner.cli.run import run
 from planner.demo import NAME, Pool, shipped
 from planner.errors import InputError
+from planner.progress import quietly
 
 
 def content(folder: Path) -> dict[str, tuple[str, int]]:
@@ -45,7 +46,7 @@ def test_recordings_in_use_and_nothing_else(campaign):
     before = content(campaign.directory)
     given = material(campaign.directory, None, 0.0)
     robot = campaign.cell.robot
-    recorded = given.read(robot.joint_names, campaign.cell.config.modes.band_hz, lambda text: None)
+    recorded = given.read(robot, campaign.cell.config.modes.band_hz, quietly)
     assert len(recorded.ended_frfs) == len(recorded.modes) == len(recorded.columns) == 2
     used = campaign.state.used
     assert recorded.poses == tuple(m.pose for m in used)

@@ -4,18 +4,20 @@ import csv
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from planner.dataset.dataset import LAID, Dataset, Recording, Visit
 from planner.dataset.measure import OVER
-from planner.dataset.recordings import recordings_in
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
+from planner.dataset.visits import recordings_in
 from planner.errors import InputError, RefusedError
 from planner.frf.estimator import estimate
 from planner.recording.joints import JointUnits
+from planner.recording.points import PointNames
 from tests.support.simulated_hits import make_hit
 
 BAND_HZ = (4.0, 60.0)
@@ -52,9 +54,14 @@ def folder(tmp_path_factory):
     return root
 
 
+def joints(*names: str):
+    """A robot as far as recordings are read with it."""
+    return SimpleNamespace(joints=JointUnits.of(names), points=PointNames(), config=None)
+
+
 @pytest.fixture(scope="module")
 def read(folder):
-    return Dataset.read(folder, ("J1",), BAND_HZ, store=NOTHING_KEPT)
+    return Dataset.read(folder, joints("J1"), BAND_HZ, store=NOTHING_KEPT)
 
 
 def test_poses_and_visits_in_the_order_of_recording(read):
@@ -156,9 +163,9 @@ def test_nothing_usable_is_said_with_its_reason(tmp_path):
     (tmp_path / "a.csv").write_text("hello\n")
     (tmp_path / "recordings.csv").write_text("pose,J1_deg,hit,file\nA,1,+x,a.csv\n")
     with pytest.raises(RefusedError, match=r"no pose has a hit that can be used.*a\.csv"):
-        Dataset.read(tmp_path, ("J1",), BAND_HZ, store=NOTHING_KEPT)
+        Dataset.read(tmp_path, joints("J1"), BAND_HZ, store=NOTHING_KEPT)
     with pytest.raises(InputError, match="no column J2_deg"):
-        Dataset.read(tmp_path, ("J2",), BAND_HZ, store=NOTHING_KEPT)
+        Dataset.read(tmp_path, joints("J2"), BAND_HZ, store=NOTHING_KEPT)
 
 
 def listed(folder: Path, pose: str, angle: float) -> None:
@@ -204,7 +211,7 @@ def test_a_stream_is_a_file_of_several_hits_and_its_bad_ones_are_named(tmp_path)
         write_hit(tmp_path / f"{axis}.csv", whole)
         rows.append(f"A,0,+{axis},1,{axis}.csv")
     (tmp_path / "recordings.csv").write_text("\n".join(rows))
-    found = Dataset.read(tmp_path, ["a"], BAND_HZ, store=NOTHING_KEPT)
+    found = Dataset.read(tmp_path, joints("a"), BAND_HZ, store=NOTHING_KEPT)
     assert Counter(h.axis_index for h in found.visits[0].hits) == {0: 3, 1: 2, 2: 3}
     ((name, reason),) = found.refused
     assert "y.csv (hit 2 at 4.0" in name

@@ -1,130 +1,127 @@
-"""What a measurement would tell apart, beside what it does tell apart."""
+"""The hit, and the place of one more sensor, that part what a diagnosis leaves tied."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from planner.design.discrimination import best_hit, separation
-from planner.diagnosis.effects import library
-from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
-from planner.diagnosis.linear.predict import misfit_at
-from planner.diagnosis.linear.problem import FINE
-from planner.diagnosis.linear_diagnosis import Problem
+from planner.design.discrimination import Tied, separation
+from planner.design.extra_sensor import WORTH, extra_sensor
+from planner.design.next_hit import next_hit
+from planner.diagnosis.diagnose import searching
+from planner.diagnosis.search import FITTED
 from planner.dynamics.simulation import Simulation
+from planner.fit.fitted import converged, settled
+from planner.fit.misfit import FrfMisfit
+from planner.fit.search import Search
+from planner.fit.structure import RobotStructure
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot
-from tests.support.known_robots import KR210
+from planner.truth.deviation import Deviation, Spring
+from planner.truth.load import load_truth
+from tests.support.arm_with_points import poses, write_arm
 
-LINES = np.linspace(6.0, 60.0, 96)
-SD = 2e-4
-
-
-def measured(h, sd, rng, columns=(True, True, True)):
-    """FRF (3, 3, F) with noise of one sd, unknown where a column was not hit."""
-    noise = rng.standard_normal((2, *h.shape)) * sd / np.sqrt(2)
-    known = np.broadcast_to(np.array(columns)[None, :, None], h.shape)
-    seen = np.where(known, h + noise[0] + 1j * noise[1], np.nan)
-    variance, coherence = np.where(known, sd**2, np.nan), np.full(h.shape, np.nan)
-    hits = tuple(3 * int(c) for c in columns)
-    return Frf(LINES, seen, variance, coherence, hits, (LINES[0], LINES[-1]))
+LINES = np.linspace(5.0, 80.0, 64)
+SOFT = tuple(Spring("base", axis, 6e6, 2e3) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+PLACES = {"soft_base at base": ("base_compliance", "base"),
+          "transverse_compliance at joint_1": ("transverse_compliance", "joint_1")}  # fmt: skip
 
 
-def response(problem, found, q):
-    """What a fit says (3, 3, F) at a pose."""
-    return misfit_at(problem, found.effect, q[None], LINES).response(found.x)[0][0]
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """An arm on a floor that gives way: alike from the tool is a first joint that tilts."""
 
+    truth: Any
+    search: Search
 
-def two_candidates(tmp_path_factory, exact):
-    """Two candidates fitted to recordings in which neither is; with exact hits or a hand's."""
-    simulation = Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("robot"))))
-    q = KR210.poses(3, 5)
-    rng = np.random.default_rng(0)
-    frfs = tuple(measured(h, SD, rng) for h in simulation.accelerance(q, LINES))
-    problem = Problem(frfs, q, simulation, (6.0, 60.0), exact=exact)
-    all_ = {(e.name, e.at): e for e in library(simulation)}
-    chosen = [all_[("added_mass", at)] for at in ("link_5", "link_6")]
-    return problem, [settle(problem, fit(problem, effect), FINE) for effect in chosen]
+    def frf(self, q: np.ndarray, seed: int) -> Frf:
+        """Measured at q (4,)."""
+        rng, h = np.random.default_rng(seed), self.truth.accelerance(q, LINES)
+        sd = np.full(h.shape, 0.02 * np.sqrt(np.mean(np.abs(h) ** 2)))
+        noise = sd * (rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape)) / np.sqrt(2)
+        unknown = np.full(h.shape, np.nan)
+        return Frf(LINES, h + noise, sd**2, unknown, (1, 1, 1), (5.0, 80.0))
+
+    def candidates(self) -> tuple[Tied, ...]:
+        """Both explanations, settled."""
+        data, prior = self.search.data(FITTED), self.search.prior
+        found, built = [], prior.repertoire.as_built()
+        every = {effect.label: effect for effect in prior.repertoire.effects}
+        for label, place in PLACES.items():
+            structure = RobotStructure(prior, (*built, every[label]), data.sensors)
+            misfit = FrfMisfit(structure, data, self.search.tolerances)
+            fit = converged(settled(misfit, misfit(structure.mean), rounds=3))
+            found.append(Tied((place,), 0.5, fit))
+        return tuple(found)
+
+    def found(self, tied: tuple[Tied, ...]) -> Any:
+        """What of a diagnosis proposals look at."""
+        names = tuple(f"P{i + 1}" for i in range(len(self.search.q)))
+        recorded = SimpleNamespace(poses=names, q=self.search.q, visits=(1,), level_n=[60.0, 247.0])
+        return SimpleNamespace(recorded=recorded, search=self.search, best=tied[0].fit)
 
 
 @pytest.fixture(scope="module")
-def tied(tmp_path_factory):
-    return two_candidates(tmp_path_factory, False)
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Cell:
+    toml = write_arm(tmp_path_factory.mktemp("arm"))
+    made = Cell(load_truth(toml, Deviation(extra=SOFT)), None)  # pyright: ignore
+    q = poses(2, 3)
+    frfs = [made.frf(row, k) for k, row in enumerate(q)]
+    return replace(made, search=searching(frfs, q, Simulation(Robot.load(toml))))
 
 
 @pytest.fixture(scope="module")
-def tied_by_exact_hits(tmp_path_factory):
-    return two_candidates(tmp_path_factory, True)
+def tied(cell: Cell) -> tuple[Tied, ...]:
+    found = cell.candidates()
+    assert len(found) == 2
+    return found
 
 
-def test_the_same_candidate_twice_cannot_be_told_apart(tied):
-    problem, (first, _) = tied
-    found = separation(problem, [first, first], [0.5, 0.5], KR210.poses(2, 9), 1.0)
-    np.testing.assert_allclose(found, 0.0, atol=1e-9)
+def test_what_is_the_same_is_told_apart_by_nothing(tied: tuple[Tied, ...]) -> None:
+    q = poses(2, 9)
+    assert not separation(tied[:1], q).any()
+    assert separation([tied[0], tied[0]], q) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_one_candidate_has_no_rival(tied):
-    problem, (first, _) = tied
-    assert not separation(problem, [first], [1.0], KR210.poses(2, 9), 1.0).any()
+def test_the_hit_that_is_proposed_tells_more_than_the_worst(
+    cell: Cell, tied: tuple[Tied, ...]
+) -> None:
+    """By what measuring there does to the odds, all refitted."""
+    q = poses(8, 11)
+    gain = separation(tied, q).max(axis=1)
+    assert gain.min() >= 0
+    offered = {f"Q{i}": row for i, row in enumerate(q)}
+    found = next_hit(cell.found(tied), tied, offered)
+    assert found is not None
+    assert found.pose == f"Q{int(np.argmax(gain))}"
+    assert found.log_odds == pytest.approx(gain.max())
+    assert found.force_n == (240.0,)
+    assert "base compliance at base (50 %) from transverse compliance at joint_1" in found.sentence
+    before = tied[0].fit.evidence - tied[1].fit.evidence
+    odds = []
+    for k in (int(np.argmax(gain)), int(np.argmin(gain))):
+        q_more = np.vstack([cell.search.q, q[k]])
+        frfs = (*cell.search.frfs, cell.frf(q[k], 7))
+        base, joint = replace(cell, search=replace(cell.search, frfs=frfs, q=q_more)).candidates()
+        odds.append(base.fit.evidence - joint.fit.evidence - before)
+    assert odds[0] > odds[1]
+    assert odds[0] > 1.0
+    assert next_hit(cell.found(tied), tied, {}) is None
+    assert next_hit(cell.found(tied), tied[:1], offered) is None
 
 
-# Fits bend, and stand on fewer lines than were reckoned with; where hits may miss, the rough
-# expectation is the farther above, and only says which hits are tried.
-@pytest.mark.parametrize(("hits", "least"), [("tied_by_exact_hits", 0.6), ("tied", 0.5)])
-def test_what_is_expected_happens(request, hits, least):
-    """A hit is added that one of the two predicts, and both are fitted anew."""
-    problem, (light, heavy) = request.getfixturevalue(hits)
-    moved = np.concatenate([heavy.x[:-1], heavy.x[-1:] + 1.0])
-    true = replace(heavy, x=moved)
-    poses, rng = KR210.poses(4, 9), np.random.default_rng(1)
-    expected = separation(problem, [true, light], [1 - 1e-9, 1e-9], poses, 1.0)
-    ratios = []
-    for row, told in zip(poses, expected, strict=True):
-        for axis in (0, 2):
-            columns = np.arange(3) == axis
-            frf = measured(response(problem, true, row), 1e-9, rng, columns)
-            frf = replace(
-                frf, variance=np.where(columns[:, None], SD**2, np.nan) + 0 * frf.variance
-            )
-            q = np.vstack([problem.q, row])
-            more = replace(problem, frfs=(*problem.frfs, frf), q=q)
-            before, after = (settle(p, light, FINE) for p in (problem, more))
-            happened = value(after) - value(before)
-            ratios.append(happened / told[axis])
-    print(np.round(ratios, 2))
-    assert least < np.median(ratios) < 1.4
-    assert np.ptp(np.log(ratios)) < np.log(4)
-
-
-def value(found: Fit) -> float:
-    """χ²/2 with the prior's part."""
-    return found.misfit(found.x).value
-
-
-@pytest.mark.parametrize("rate", [0.0, 2.0])
-def test_what_is_tried_is_what_happens_without_noise(tied, rate):
-    problem, (light, heavy) = tied
-    rng = np.random.default_rng(1)
-    there = [misfit_at(problem, heavy.effect, q[None], LINES, rate) for q in problem.q]
-    shown = [measured(one.response(heavy.x)[0][0], SD, rng) for one in there]
-    problem = replace(problem, frfs=tuple(replace(f, exponential_rate_1_s=rate) for f in shown))
-    true = replace(heavy, x=np.concatenate([heavy.x[:-1], heavy.x[-1:] + 1.0]))
-    poses = KR210.poses(12, 9)
-    before = [carried_on(problem, f, f.effect) for f in (true, light)]
-    best = best_hit(problem, before, [1 - 1e-9, 1e-9], poses, 1.0)
-    h = misfit_at(problem, true.effect, poses[best.pose][None], LINES, rate)
-    h = h.response(before[0].x)[0][0]
-    columns = np.arange(3) == best.axis
-    frf = measured(h, 1e-12, np.random.default_rng(0), columns)
-    variance = np.where(columns[:, None], SD**2, np.nan) + 0 * frf.variance
-    frf = replace(frf, variance=variance, exponential_rate_1_s=rate)
-    more = replace(problem, frfs=(*problem.frfs, frf), q=np.vstack([problem.q, poses[best.pose]]))
-    after = [carried_on(more, f, f.effect) for f in before]
-    gained = [a.log_evidence(1.0) - b.log_evidence(1.0) for a, b in zip(after, before, strict=True)]
-    assert best.log_odds == pytest.approx(gained[0] - gained[1], rel=0.1)
-
-
-def test_the_same_candidate_twice_is_not_told_apart_by_trying(tied):
-    problem, (light, _) = tied
-    same = best_hit(problem, [light, light], [0.5, 0.5], KR210.poses(2, 9), 1.0)
-    assert abs(same.log_odds) < 1e-6
+def test_a_sensor_at_the_foot_parts_floor_and_first_joint(
+    cell: Cell, tied: tuple[Tied, ...]
+) -> None:
+    found = extra_sensor(cell.found(tied), tied, {})
+    assert found is not None
+    assert found.point == "foot"  # the floor moves it, the joint does not
+    assert found.log_odds > found.log_odds_without + WORTH
+    assert "A sensor at foot would tell base compliance at base" in found.sentence
+    row = cell.search.q[["P1", "P2"].index(found.pose)]
+    alone = separation(tied, row[None], ("foot",))
+    assert alone[0]["xyz".index(found.hit)] == pytest.approx(found.log_odds)
+    assert extra_sensor(cell.found(tied), tied[:1], {}) is None
+    assert extra_sensor(cell.found(tied), (tied[0], tied[0]), {}) is None

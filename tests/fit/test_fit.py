@@ -52,8 +52,8 @@ def set_to(structure: RobotStructure, x: np.ndarray, kind: str, first: int, *val
 
 
 EVERYTHING = (
-    "soft_base at base", "shifting_base at base", "bending_link at link_2",
-    "added_mass at link_3", "local_resonator at link_4", "angle_dependent_spring at joint_2",
+    "soft_base at base", "shifting_base at base", "link_flexibility at link_2",
+    "added_mass at link_3", "local_resonator at link_4", "angle_dependent_stiffness at joint_2",
     "structural_damping at joints",
 )  # fmt: skip
 
@@ -64,7 +64,7 @@ def test_slopes_are_the_derivatives(prior, few):
     rng = np.random.default_rng(0)
     x = structure.mean + 0.1 * structure.sd * rng.standard_normal(structure.size)
     assert misfit.possible(x)
-    about = misfit._about(misfit.nothing_open(), x)
+    about = misfit.about(misfit.nothing_open(), x)
     h, columns, _ = misfit.columns(x, about)
     for i, name in enumerate(structure.names[: structure.chain.start]):
         step = 1e-5 * structure.sd[i] * np.eye(structure.size)[i]
@@ -116,7 +116,7 @@ def test_a_soft_base_a_bending_link_and_a_hose_are_found_together(case):
     found = case.posterior()
     judged = Judged.of(case, found)
     kinds = {name.split(" at ")[0] for name in judged.named}
-    assert {"soft_base", "bending_link", "local_resonator"} <= kinds
+    assert {"soft_base", "link_flexibility", "local_resonator"} <= kinds
     assert judged.rmse_percent < 0.3
     assert judged.frac > 0.998
     assert abs(judged.scale - 1) < 2.5 * judged.scale_sd < 0.1

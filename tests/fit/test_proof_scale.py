@@ -18,7 +18,7 @@ from tests.support.fitted_cases import ARMS, Case, Judged, everyday, harder
 
 FIRST = int(os.environ.get("FITS_SEED", "5100"))
 EVERYDAY, HARDER = int(os.environ.get("FITS", "50")), int(os.environ.get("HARDER", "15"))
-NAMES = {"soft base": ("soft_base", "shifting_base"), "bending link": ("bending_link",),
+NAMES = {"soft base": ("soft_base", "shifting_base"), "bending link": ("link_flexibility",),
          "hose": ("local_resonator",)}  # fmt: skip
 
 

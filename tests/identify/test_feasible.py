@@ -4,20 +4,19 @@ import numpy as np
 import pytest
 
 from planner.dynamics.simulation import Simulation
-from planner.effects.parameters import Priors, parametrise
-from planner.fit.inertias import pseudo_inertia
-from planner.identification.feasible_inertias import Barrier
+from planner.effects.parameters import Priors
+from planner.effects.table import Repertoire
+from planner.fit.inertias import BodyNumbers, pseudo_inertia
+from planner.fit.structure import RobotPrior, RobotStructure
 from planner.robot.robot import Robot
 from tests.support.known_robots import kr10_folder
 
 
 @pytest.fixture(scope="module")
-def barrier(tmp_path_factory) -> Barrier:
+def bodies(tmp_path_factory) -> BodyNumbers:
     simulation = Simulation(Robot.load(kr10_folder(tmp_path_factory.mktemp("robot"))))
-    p = parametrise(simulation, Priors(mass=0.05, inertia=0.05, com_m=0.01))
-    found = Barrier.around(simulation.elastic.inertia, p)
-    assert found is not None
-    return found
+    repertoire = Repertoire.of(simulation, Priors(mass=0.05, inertia=0.05, com_m=0.01))
+    return RobotStructure(RobotPrior(repertoire)).bodies
 
 
 def test_pseudo_inertia_of_points_is_their_sum_of_squares():
@@ -33,26 +32,22 @@ def test_pseudo_inertia_of_points_is_their_sum_of_squares():
     np.testing.assert_allclose(pseudo_inertia(inertia), one.T @ (mass[:, None] * one))
 
 
-def test_nothing_is_lost_at_the_nominal_bodies(barrier):
-    size = barrier.slope.shape[0] * barrier.slope.shape[1]
-    value, gradient, _ = barrier(np.zeros(size))
+def test_nothing_is_lost_at_the_nominal_bodies(bodies):
+    value, gradient, _ = bodies.barrier(np.zeros(bodies.size))
     assert value == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(gradient, 0.0, atol=1e-12)
 
 
-def test_derivatives_are_those_of_differences(barrier):
-    size = barrier.slope.shape[0] * barrier.slope.shape[1]
-    phi = 0.2 * np.random.default_rng(1).normal(size=size)
-    _, gradient, hessian = barrier(phi)
-    for i in range(size):
-        step = 1e-6 * np.eye(size)[i]
-        up, down = barrier(phi + step), barrier(phi - step)
-        assert gradient[i] == pytest.approx((up[0] - down[0]) / 2e-6, rel=1e-5, abs=1e-7)
-        np.testing.assert_allclose(hessian[i], (up[1] - down[1]) / 2e-6, rtol=1e-4, atol=1e-6)
+def test_the_slope_is_that_of_differences(bodies):
+    phi = 0.2 * np.random.default_rng(1).normal(size=bodies.size)
+    _, gradient, _ = bodies.barrier(phi)
+    for i in range(bodies.size):
+        step = 1e-6 * np.eye(bodies.size)[i]
+        up, down = bodies.barrier(phi + step)[0], bodies.barrier(phi - step)[0]
+        assert gradient[i] == pytest.approx((up - down) / 2e-6, rel=1e-4, abs=1e-6)
 
 
-def test_what_no_matter_can_form_is_infinitely_far(barrier):
-    size = barrier.slope.shape[0] * barrier.slope.shape[1]
-    direction = np.random.default_rng(2).normal(size=size)
-    values = [barrier(t * direction)[0] for t in (0.1, 0.2, 0.3, 1000.0)]
+def test_what_no_matter_can_form_is_infinitely_far(bodies):
+    direction = np.random.default_rng(2).normal(size=bodies.size)
+    values = [bodies.barrier(t * direction)[0] for t in (0.1, 0.2, 0.3, 1000.0)]
     assert values[0] < values[1] < values[2] < values[3] == np.inf

@@ -8,8 +8,7 @@ from planner.campaign.decision import Decision
 from planner.errors import InputError
 from planner.milling.lobes import losses
 from planner.milling.path import along, by_feed, decide
-from planner.milling.spread import ModeSpread
-from planner.milling.structure import Structure
+from planner.milling.structure import ModeSpread, Structure
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way
 
 RPM = 10000.0
@@ -34,11 +33,6 @@ def test_at_the_limit_it_is_even_and_surer_the_farther():
     assert probability[1] == pytest.approx(0.85, abs=0.06)
     assert probability[0] > 0.97
     assert probability[4] < 0.03
-
-
-def test_what_is_known_is_sure():
-    found = decide(Structure(one_mode(), ModeSpread.of(np.zeros(4))), cut(), RPM, 0.9 * limit())
-    assert found.probability > 1 - 1e-9
 
 
 def test_slope_names_the_mode_on_which_it_hangs():

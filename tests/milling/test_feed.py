@@ -36,11 +36,6 @@ def test_a_feed_along_the_path():
     assert np.array([one.feed for one in found]) == pytest.approx(wanted)
 
 
-def test_a_feed_that_stays_in_the_tcps_frame():
-    given = cut(axis=AXIS)
-    assert cuts_at(given, turned([0, 90, 180]), np.zeros((3, 3)), NAMES) == [given] * 3
-
-
 def test_what_has_no_direction_is_refused():
     plunge = cut(feed=(0.0, 0.0, 1.0), feed_in="base", axis=AXIS)
     with pytest.raises(InputError, match="along the tool's axis"):

@@ -9,6 +9,7 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.demo import play
+from planner.progress import quietly
 from planner.truth.load import load_truth
 from tests.support.milling_cases import cut
 from tests.support.true_limits import limit_pair
@@ -27,7 +28,7 @@ def test_limits_at_poses_never_measured(tmp_path: Path):
     made = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(made)
     truth = load_truth(SHIPPED / "robot" / "robot.toml", made.DEVIATION)
-    play(tmp_path / "campaign", 4, False, lambda text: None)
+    play(tmp_path / "campaign", 4, False, quietly)
     campaign = Campaign(tmp_path / "campaign")
     angles = {}
     with open(SHIPPED / "recordings" / "recordings.csv", encoding="utf-8") as file:
@@ -36,7 +37,7 @@ def test_limits_at_poses_never_measured(tmp_path: Path):
     for pose in campaign.state.measurements:
         del angles[pose]
     q, lines = np.deg2rad(np.array(list(angles.values()))), campaign.frequency_lines
-    mean, sd = campaign.frf(q)
+    mean, sd = campaign.frf_at(q)
     given = cut(
         diameter_m=0.018, kt_n_m2=8.8e8, kr_n_m2=0.52e8, spindle_rpm=(500.0, 4000.0, 8),
         depth_m=(0.0, 0.02, 100),

@@ -125,7 +125,7 @@ def pairs_of(folder: Path, seed: int) -> tuple[list[LimitPair], list[float]]:
     hit(truth, deviation, offered[:MEASURED], folder / "hits", seed)
     campaign.import_paths((folder / "hits",))
     q, lines = offered[MEASURED:], campaign.frequency_lines
-    mean, sd = campaign.frf(q)
+    mean, sd = campaign.frf_at(q)
     given = cut(
         diameter_m=0.025, kt_n_m2=8.8e8, kr_n_m2=2.0e8, milling="down", radial_immersion=0.5,
         axis=(0.0, 0.0, -1.0), spindle_rpm=(600.0, 3600.0, 6), depth_m=(0.0, 0.05, 200),

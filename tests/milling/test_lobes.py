@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from planner.milling.lobes import losses
-from planner.milling.machine import multiplier
-from planner.milling.zeroth_order import limits
+from planner.milling.machine import limits, multiplier
 from tests.support.milling_cases import (
     MULTIPLIERS,
     ONE_MODE,

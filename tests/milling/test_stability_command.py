@@ -161,3 +161,23 @@ def test_wrong_sources_are_refused_in_a_sentence(files, capsys, name: str):
     if name.startswith("junk"):
         source.write_bytes(bytes(range(256)) * 8)
     refused(["stability", str(source), "--cut", str(cut)], capsys)
+
+
+def test_one_wrong_line_of_exact_frfs_is_no_crash(files, tmp_path, capsys):
+    """A pole of which nothing but noise-free lines tell has no variance."""
+    hz, table = np.arange(0.5, 60.0, 0.5), {"frequency_hz": np.arange(0.5, 60.0, 0.5)}
+    modes = (17.0, 0.022, 0.8, 0.5), (31.0, 0.017, -0.4, 0.85), (52.0, 0.031, 0.2, -0.3)
+    for i, j in ("xx", "xy", "yx", "yy"):
+        h = sum(
+            dict(x=x, y=y)[i] * dict(x=x, y=y)[j] / 80 * hz**2 / (hz**2 - 2j * z * f * hz - f**2)
+            for f, z, x, y in modes
+        )
+        table |= {f"accelerance_{i}{j}_re": h.real, f"accelerance_{i}{j}_im": h.imag}
+    for part in ("re", "im"):
+        table[f"accelerance_yy_{part}"][83] *= 1000
+    frfs, cut = tmp_path / "frfs.csv", files[1]
+    rows = np.column_stack(list(table.values()))
+    np.savetxt(frfs, rows, fmt="%.12g", delimiter=",", header=",".join(table), comments="")
+    cut.write_text(CUT.replace("[10000, 20000, 2]", "[1200, 2400, 4]"))
+    assert run(["stability", str(frfs), "--cut", str(cut)]) == 0
+    capsys.readouterr()

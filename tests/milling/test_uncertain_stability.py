@@ -10,12 +10,18 @@ from planner.errors import InputError
 from planner.frf.quantities import convert
 from planner.milling.cutter_frf import CutterFrf, of_accelerance
 from planner.milling.cutter_modes import CutterModes, real_modes
-from planner.milling.doubts import doubts
 from planner.milling.lobes import losses
-from planner.milling.spread import ModeSpread, explaining, moved, sampled
-from planner.milling.structure import Structure, of_frf
+from planner.milling.rational_fit import rational_fit
+from planner.milling.structure import (
+    ModeSpread,
+    Structure,
+    doubts,
+    explaining,
+    moved,
+    of_frf,
+    sampled,
+)
 from planner.milling.uncertainty import sampled_limits
-from planner.modal.rational_fit import rational_fit
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way
 from tests.support.semi_discretisation import semi_growth
 
@@ -37,28 +43,6 @@ def crossed() -> CutterModes:
     drives = modes.drives @ np.array([[1.0, 0.2], [-0.1, 1.0]])
     shapes = modes.shapes + 0.1 * random.standard_normal((4, 2))
     return CutterModes(modes.poles, shapes, drives, 5e-9 * np.array([[1.0, 0.2], [0.1, 0.8]]))
-
-
-def test_rational_fit_finds_poles_residues_and_rest():
-    modes = crossed()
-    h = modes.receptance(LINES).transpose(1, 2, 0)
-    fit = rational_fit(LINES, h)
-    np.testing.assert_allclose(np.sort_complex(fit.poles), np.sort_complex(modes.poles), rtol=1e-6)
-    np.testing.assert_allclose(fit.rest, modes.residual, rtol=1e-5)
-    np.testing.assert_allclose(fit.response(LINES), h, rtol=1e-6, atol=1e-15)
-    assert fit.error < 1e-6
-
-
-def test_rational_fit_of_noisy_frfs_is_as_good_as_their_noise():
-    random = np.random.default_rng(4)
-    h = two_each_way().receptance(LINES).transpose(1, 2, 0)
-    size = 0.01 * np.linalg.norm(h, axis=(0, 1)) / 2 / np.sqrt(2)
-    noise = random.standard_normal((2, *h.shape)) * size
-    fit = rational_fit(LINES, h + noise[0] + 1j * noise[1])
-    strong = np.array([456.78, 1448.89, 516.52, 1408.45])
-    nearest = [np.min(np.abs(np.abs(fit.poles) / (2 * np.pi) / f - 1)) for f in strong]
-    assert np.max(nearest) < 2e-3
-    assert fit.error < 0.011
 
 
 @pytest.mark.parametrize("method", ["full_discretisation", "zeroth_order"])
@@ -226,16 +210,6 @@ def test_a_pole_that_hardly_swings_hides_no_uncertainty():
     assert found.common > 0.02
 
 
-def test_few_lines_that_are_unknown_do_not_make_all_unsure():
-    modes = two_each_way()
-    plane = tip(modes).in_plane(cut())
-    share = np.where(np.arange(len(LINES)) < 0.04 * len(LINES), 0.5, 0.02)
-    frf = type(plane)(plane.name, LINES, plane.receptance, share * np.abs(plane.receptance))
-    found, _ = explaining(modes, frf)
-    assert 0.01 < found.common < 0.03
-    assert np.all(found.size < 0.06)
-
-
 def test_what_is_known_exactly_has_one_limit():
     given = cut()
     structure = Structure(one_mode(), ModeSpread.of(np.zeros(4)))
@@ -256,20 +230,6 @@ def test_robust_depth_is_that_of_the_coefficients_alone():
     assert np.all(both.robust() < depth)
     assert np.all(np.diag(both.probability(depth * 0.5)) > 0.98)
     assert np.all(np.diag(both.probability(depth * 2)) < 0.1)
-
-
-def test_samples_between_speeds_follow_what_is_expected(monkeypatch):
-    """Looked at at a few speeds only, robust depths keep the dips of the limit between them."""
-    from planner.milling import uncertainty
-
-    monkeypatch.setattr(uncertainty, "MOST_SPEEDS", 4)
-    given = cut(spindle_rpm=(9300.0, 10700.0, 10))
-    structure = Structure(one_mode(), ModeSpread.of(np.array([0.0, 0.0, 0.0, 0.1])))
-    found = losses(structure.machine(given))
-    drawn = sampled_limits(structure.samples(given, 20), found)
-    depth = np.array([loss.depth_m for loss in found])
-    share = drawn.robust() / depth
-    np.testing.assert_allclose(share, share[0], rtol=0.01)
 
 
 def test_mean_of_uncertain_frfs_is_fitted_by_modes_as_close_as_its_sd_asks():

@@ -40,7 +40,7 @@ def worst_percent(campaign: Campaign, truth: Truth) -> float:
     """Root mean square error of the worst mode at poses never hit."""
     unseen = poses(12, 5)
     true_hz = np.array([truth.modes(q, 3)[0] for q in unseen])
-    off = np.log(campaign.predict(unseen).frequency_hz / true_hz)
+    off = np.log(campaign.model.predict(unseen).frequency_hz / true_hz)
     return float(100 * np.sqrt(np.mean(off**2, axis=0)).max())
 
 

@@ -7,22 +7,13 @@ import numpy as np
 import pytest
 
 from planner.dataset.dataset import Dataset
-from planner.dynamics.gradient import laplace, motion_slopes, moved, response, response_turned
+from planner.dynamics.gradient import laplace, response, response_turned
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
+from planner.fit.identify import identify
 from planner.frf.frf import Frf
-from planner.identification.effort import QUICK
-from planner.identification.identify import identify
 from planner.measurement.measured_frfs import matrices_at
-from planner.measurement.nuisances import (
-    Part,
-    Tolerances,
-    basis,
-    blocks,
-    marginal,
-    marginal_of,
-    real_rows,
-)
+from planner.measurement.nuisances import Tolerances
 from planner.recording.points import Layout
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation, Spring
@@ -88,25 +79,6 @@ def test_a_sensor_weighs_where_it_is(tmp_path: Path) -> None:
     assert np.abs(h[1, 3:] - bare).max() < 1e-4 * np.abs(bare).max()
 
 
-def test_blocks_leave_open_what_the_whole_does(toml: Path) -> None:
-    simulation, s, rng = Simulation(Robot.load(toml)), laplace(HZ[None, ::5]), _rng()
-    matrices = simulation.elastic.with_slopes(poses(1), WIDE)
-    h, turned = response_turned(matrices, simulation.elasticity, s)
-    slope = motion_slopes(moved(matrices, simulation.elasticity, s), simulation.elasticity)
-    whole = real_rows(basis(h, turned, s, Tolerances())[0])
-    residual = rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape)
-    dense = marginal(real_rows(residual)[0], real_rows(slope[0]), whole)
-    parts = [
-        Part(b.of(residual)[0], b.of(slope[0]), real_rows(b.basis[0]), b.numbers)
-        for b in blocks(h, turned, s, Tolerances())
-    ]
-    assert len(parts) == 6
-    found = marginal_of(parts, len(whole), slope.shape[1])
-    for name in ("chi2", "gradient", "normal", "log_volume", "eta"):
-        one, other = np.asarray(getattr(found, name)), np.asarray(getattr(dense, name))
-        assert np.abs(one - other).max() <= 1e-9 * np.abs(other).max(), name
-
-
 def test_slopes_by_joint_angles_hold_between_points(toml: Path) -> None:
     simulation, q, step = Simulation(Robot.load(toml)), poses(1), 1e-5
     s = laplace(HZ[None, ::5])
@@ -115,8 +87,8 @@ def test_slopes_by_joint_angles_hold_between_points(toml: Path) -> None:
         matrices = simulation.elastic.matrices(q + off, layout=WIDE)
         return response(matrices, simulation.elasticity, s)
 
-    turned = response_turned(simulation.elastic.with_slopes(q, WIDE), simulation.elasticity, s)[1]
-    by_angle = turned.by_angle
+    matrices = simulation.elastic.with_slopes(q, WIDE)
+    by_angle = response_turned(matrices, simulation.elasticity, s)[1].by_angle
     assert by_angle is not None
     for joint, unit in list(enumerate(np.eye(4)))[1:]:  # turning about the vertical changes nothing
         measured = (h(step * unit) - h(-step * unit)) / (2 * step)
@@ -134,7 +106,7 @@ def test_hits_elsewhere_and_sensors_that_rove(toml: Path, tmp_path: Path) -> Non
     # A base that gives a little: the foot moves.
     soft = Deviation(extra=(Spring("base", (1.0, 0.0, 0.0), 4e6, 1e3),))
     truth = record(tmp_path / "hits", toml, stays, Secret(soft))
-    found = Dataset.read(tmp_path / "hits", robot.joint_names, (4.0, 90.0), points=robot.points)
+    found = Dataset.read(tmp_path / "hits", robot, (4.0, 90.0))
     assert not found.refused
     assert found.sensors == ("sensor", "elbow", "shoulder", "foot")
     first, second = found.frfs
@@ -159,7 +131,7 @@ def test_a_dead_channel_leaves_the_other_sensors_of_its_hits(toml: Path, tmp_pat
     robot, sensors = Robot.load(toml), ("sensor", "elbow")
     stays = [(f"P{i}", q, "tcp", sensors) for i, q in enumerate(poses(2))]
     record(tmp_path / "hits", toml, stays, Secret(Deviation(3)), dead={"P1": 4})
-    found = Dataset.read(tmp_path / "hits", robot.joint_names, (4.0, 90.0), points=robot.points)
+    found = Dataset.read(tmp_path / "hits", robot, (4.0, 90.0))
     assert not found.refused
     assert [frf.layout.sensors for frf in found.frfs] == [sensors, ("sensor",)]
     whole, lacking = found.measured
@@ -176,11 +148,11 @@ def test_springs_are_identified_from_hits_away_from_the_tool(toml: Path, tmp_pat
     ]
     truth = record(tmp_path / "hits", toml, stays, Secret(Deviation(3, stiffness=0.2, damping=0.1)))
     robot = Robot.load(toml)
-    found = Dataset.read(tmp_path / "hits", robot.joint_names, (4.0, 90.0), points=robot.points)
+    found = Dataset.read(tmp_path / "hits", robot, (4.0, 90.0))
+    exact = Tolerances(angle_rad=1e-3, offset_m=1e-4, position_m=1e-4)
     told = identify(
-        found.one_hit_frfs, found.q, Simulation(robot), starts=1, effort=QUICK,
-        tolerances=Tolerances(angle_rad=1e-3, offset_m=1e-4, position_m=1e-4),
-    )  # fmt: skip
+        found.one_hit_frfs, found.q, Simulation(robot), extend=False, tolerances=exact
+    ).identified
     assert told.misfit < 1.3
     for estimate, spring in zip(told.estimates, truth.springs, strict=False):
         off = np.log(estimate.value / spring.stiffness)

@@ -17,8 +17,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.diagnosis.effects import library
+from planner.diagnosis.diagnose import PRIORS
 from planner.dynamics.simulation import Simulation
+from planner.effects.table import Repertoire, diagnosed
 from planner.proof.score import Share, share
 from planner.robot.robot import Robot
 from tests.support.arm_with_points import write_arm
@@ -32,7 +33,7 @@ MORE_OFTEN = 0.10  # by which four sensors name effect and place more often, or 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_concealed_has_a_name(kind: str, tmp_path: Path) -> None:
     simulation = Simulation(Robot.load(write_arm(tmp_path)))
-    named = {(effect.name, effect.at) for effect in library(simulation)}
+    named = {e.name for e in Repertoire.of(simulation, PRIORS, diagnosed(simulation)).effects}
     places = {concealed(kind, np.random.default_rng(seed)).place for seed in range(6)}
     assert places <= named
     assert len(places) > 1 or kind == "base"

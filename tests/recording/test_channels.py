@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.frf.estimator import estimate
-from planner.frf.reciprocity import unreciprocal
+from planner.frf.frf import unreciprocal
 from planner.recording.channel_faults import by_good_sensors
 from planner.recording.dof import Dof
 from planner.recording.screening import screen

@@ -11,7 +11,7 @@ from planner.errors import InputError
 from planner.recording.hits import hits_from
 from planner.recording.read import hits_in, read
 from planner.recording.records import FrfRecord
-from tests.support.containers import MANY_HITS, ONE_HIT, late_h5, lvm_file, tdms
+from tests.support.containers import MANY_HITS, ONE_HIT, SPECIAL, late_h5, lvm_file, tdms
 from tests.support.lvm_files import lvm
 from tests.support.simulated_hits import make_hit
 
@@ -42,7 +42,7 @@ def test_a_hit_is_read_from_any_container(tmp_path, what):
     same(hit, HITS[0])
     assert hit.axis == HITS[0].axis
     assert max(1, len(hits_in(tmp_path / name))) == 1
-    assert not hit.remarks
+    assert not hit.faults
 
 
 @pytest.mark.parametrize("what", MANY_HITS)
@@ -74,7 +74,7 @@ def test_channels_that_begin_apart_are_laid_over_each_other(tmp_path, what, by):
     write(path, by)
     (hit,) = hits_from(read(path), "+x")
     same(hit, LONG, skip=by)
-    assert "begin" in hit.remarks[0]
+    assert "begin" in hit.faults[0].text
 
 
 def test_what_is_no_part_of_a_hit_is_left_out_and_said(tmp_path):
@@ -88,7 +88,7 @@ def test_what_is_no_part_of_a_hit_is_left_out_and_said(tmp_path):
     tdms(tmp_path / "more.tdms", HITS[:1], extra)
     (hit,) = hits_from(read(tmp_path / "more.tdms"))
     same(hit, HITS[0])
-    assert hit.remarks == ("Left out, as no part of a hit: slow/Temperature (60).",)
+    assert [f.text for f in hit.faults] == ["Left out, as no part of a hit: slow/Temperature (60)."]
 
 
 def test_frfs_of_a_measuring_program_are_read(tmp_path):
@@ -126,6 +126,23 @@ def mat_of(**entries):
     return lambda path: scipy.io.savemat(path, entries)
 
 
+def cut_after(word, count):
+    """A file of three hits that ends after a word's occurrence."""
+    parts = lvm(HITS).split(word)
+    return lambda path: path.write_text(word.join(parts[:count]) + word)
+
+
+def damaged_heap(path):
+    """HDF5 whose free space among its texts has no size."""
+    ONE_HIT["HDF5: channels in rows"][1](path, HITS)
+    data = bytearray(path.read_bytes())
+    at = data.index(b"GCOL") + 16
+    while any(data[at : at + 2]):
+        at += 16 + -(-int.from_bytes(data[at + 8 : at + 16], "little") // 8) * 8
+    data[at + 8 : at + 16] = bytes(8)
+    path.write_bytes(data)
+
+
 UNIT_TWICE = {
     "values": np.ones(99),
     "quantity": {"label": "g", "unit_transformation": {"factor": 9.8}},
@@ -148,11 +165,20 @@ REFUSED = {
     "a hit among others with what is no number": (
         ".mat", lambda path: MANY_HITS["MAT: an array of structs"][1](path, [HITS[0], NAN]),
         "sample 11 is not a finite"),
+    "HDF5: a damaged heap of texts": (".h5", damaged_heap, "damaged where its texts lie"),
     "LVM: spectra": (".lvm", changed("X_Dimension\tTime", "X_Dimension\tFrequency"), "over Hz"),
     "LVM: a word": (".lvm", changed(*WORD), f"row {WORD_ROW}: Hammer is x"),
     "LVM: fewer rows than stated": (".lvm", changed("Samples\t512", "Samples\t513"), "cut off"),
     "LVM: two rates": (".lvm", changed("\t0.001953\t", "\t0.000977\t", x="No"), "different rates"),
-    "LVM: a header alone": (".lvm", lambda path: path.write_text(lvm(HITS)[:300]), "no data"),
+    "LVM: cut within a later header": (
+        ".lvm", cut_after("Y_Unit_Label", 2), "within a header"),
+    "LVM: cut before the rows": (
+        ".lvm", cut_after("Comment", 2), "within a header"),
+    "LVM: cut within a special block": (
+        ".lvm", lambda path: path.write_text(f"{lvm(HITS[:1])}\n{SPECIAL[:40]}"),
+        "within a header"),
+    "LVM: a header alone": (
+        ".lvm", lambda path: path.write_text(lvm(HITS)[:300]), "within a header"),
 }  # fmt: skip
 
 
@@ -163,6 +189,12 @@ def test_what_is_not_understood_is_said(tmp_path, what):
     write(path)
     with pytest.raises(InputError, match=words):
         read(path)
+
+
+def test_a_date_that_is_none_is_no_date(tmp_path):
+    (tmp_path / "zone.lvm").write_text(lvm(HITS[:1]).replace("08:00:30.25", "08:00:30-25"))
+    (hit,) = hits_from(read(tmp_path / "zone.lvm"))
+    same(hit, HITS[0])
 
 
 def test_segments_that_go_on_are_one_record(tmp_path):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from planner.campaign.example import EXAMPLE
+from planner.campaign.store import EXAMPLE
 from planner.check.remark import CheckRemark
 from planner.cli.run import run
 from planner.report.robot_check import _summary

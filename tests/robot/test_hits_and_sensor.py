@@ -5,22 +5,21 @@ import pytest
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
-from planner.diagnosis.linear.problem import tolerances_of
-from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
+from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
 from tests.support.known_robots import KR10
 
 
 def test_a_steady_hand_and_a_good_sensor_are_stated_in_robot_toml(tmp_path):
     path = KR10.write(tmp_path)
-    usual = tolerances_of(Simulation(Robot.load(path)))
+    usual = Tolerances.of(Robot.load(path).config)
     assert usual.angle_rad == pytest.approx(np.deg2rad(2.0))
     assert usual.offset_m == pytest.approx(5e-3)
     path.write_text(
         path.read_text() + "\n[hits]\nangle_sd_deg = 0.5\n[sensor]\nposition_sd_mm = 2\n"
     )
-    stated = tolerances_of(Simulation(Robot.load(path)))
+    stated = Tolerances.of(Robot.load(path).config)
     assert stated.angle_rad == pytest.approx(np.deg2rad(0.5))
     assert stated.offset_m == usual.offset_m
     assert stated.position_m == pytest.approx(2e-3)
@@ -39,7 +38,7 @@ def test_a_campaign_goes_before_its_robot(tmp_path):
     campaign = tmp_path / "campaign.toml"
     campaign.write_text(KR10.campaign() + "\n[hits]\nangle_sd_deg = 1.0\n")
     cell = Cell.load(path, load_campaign_config(campaign))
-    assert tolerances_of(Simulation(cell.robot)).angle_rad == pytest.approx(np.deg2rad(1.0))
+    assert Tolerances.of(cell.robot.config).angle_rad == pytest.approx(np.deg2rad(1.0))
     campaign.write_text(KR10.campaign() + "\n[sensor]\ngain_sd_percent = -2\n")
     with pytest.raises(InputError, match=r"campaign.toml: \[sensor\] gain_sd_percent"):
         load_campaign_config(campaign)

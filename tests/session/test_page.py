@@ -12,11 +12,10 @@ from rich.text import Text
 from planner.campaign.events import HitRecord, Proposal
 from planner.recording.joints import JointUnits
 from planner.session.course import Course
-from planner.session.fitted_lines import Said, fitted
 from planner.session.hit_verdicts import HitVerdict
 from planner.session.page import TakingBack, page_with_hits
 from planner.session.pose_screen import JudgedHit, PosePage, keys_that_do, remedy_first
-from planner.session.screen import Screen
+from planner.session.screen import Said, Screen, fitted
 from planner.session.session_text import refusals
 from planner.words import short_name
 

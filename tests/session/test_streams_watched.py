@@ -1,16 +1,14 @@
 """Streams of hits in a watched folder: judged hit by hit, whatever the format."""
 
-from planner.session.watch import watch
-from tests.session.test_session import Script, cell, screen, wait  # noqa: F401
 from tests.support.outside import HAMMER, record
 from tests.support.streams import joined, write_wav
 
 
-def test_streams_wait_for_their_scales_and_are_judged_hit_by_hit(cell):  # noqa: F811
-    campaign, truth, tmp_path = cell
+def test_streams_wait_for_their_scales_and_are_judged_hit_by_hit(cell, session, tmp_path):
+    campaign, truth, inbox = cell
     proposal = campaign.next()[0]
     made = record(truth, tmp_path / "made", proposal.pose, proposal.joints_deg)
-    inbox, rate = tmp_path / "inbox", round(HAMMER.sampling_rate_hz)
+    rate = round(HAMMER.sampling_rate_hz)
     for axis in "xyz":
         samples = joined(made, f"p{axis}")
         if axis == "x":  # the second hit rebounds
@@ -19,7 +17,6 @@ def test_streams_wait_for_their_scales_and_are_judged_hit_by_hit(cell):  # noqa:
         write_wav(inbox / f"{axis}.wav", samples, f"+{axis}", rate_hz=rate)
     table = (inbox / "channels.csv").read_text()
     (inbox / "channels.csv").unlink()
-    console = screen()
 
     def scale(text):
         if "says nothing of scale" not in " ".join(text.split()):
@@ -27,13 +24,10 @@ def test_streams_wait_for_their_scales_and_are_judged_hit_by_hit(cell):  # noqa:
         (inbox / "channels.csv").write_text(table)
         return True
 
-    script = Script(console, [
-        (scale, "s"), (wait("3 hits in x.wav: 2 good"), "a"), (wait("Hits are missing"), "a"),
-        (wait("P001: 8 hits in"), "q"),
-    ])  # fmt: skip
-    watch(campaign, inbox, console=console, keys=script, hits_per_pose=9, quiet_s=0.05,
-          limit_s=40)  # fmt: skip
-    text = " ".join(console.export_text().split())
+    text = session(
+        campaign, inbox, (scale, "s"), ("3 hits in x.wav: 2 good", "a"), ("Hits are missing", "a"),
+        ("P001: 8 hits in", "q"), limit_s=40,
+    ).flat  # fmt: skip
     assert "3 hits in y.wav: 3 good" in text
     assert "refused x.wav (hit 2 at 2.47 s)" in text
     assert len(campaign.state.used[0].accepted) == 8

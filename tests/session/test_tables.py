@@ -1,32 +1,25 @@
 """Tables of recordings that come into the watched folder: in subfolders, and without joints."""
 
 import csv
-import io
 import shutil
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
-from planner.session.keys import NoKeys
-from planner.session.table import FolderTable
-from planner.session.watch import watch
+from planner.session.inbox import FolderTable
 from tests.support.hit_csv import write_csv
 from tests.support.outside import call, make_cell, record
 
 
 @pytest.fixture
-def cell(tmp_path):
+def posed(cell, tmp_path):
     """A campaign with a proposed pose, what was recorded there, and a folder to watch."""
-    robot, campaign_toml, truth = make_cell(tmp_path)
-    campaign = Campaign.new(tmp_path / "cell", robot, campaign_toml)
+    campaign, truth, inbox = cell
     pose = campaign.next()[0]
-    made = record(truth, tmp_path / "made", pose.pose, pose.joints_deg)
-    (tmp_path / "inbox").mkdir()
-    return campaign, pose, made, tmp_path / "inbox"
+    return campaign, pose, record(truth, tmp_path / "made", pose.pose, pose.joints_deg), inbox
 
 
 def without(folder, unwanted):
@@ -46,30 +39,23 @@ def without(folder, unwanted):
         writer.writerows(rows)
 
 
-def session(campaign, inbox, limit_s=5):
-    console = Console(width=100, record=True, file=io.StringIO(), force_terminal=False)
-    watch(campaign, inbox, console=console, keys=NoKeys(), auto=True, hits_per_pose=9,
-          quiet_s=0.05, limit_s=limit_s)  # fmt: skip
-    return " ".join(console.export_text().split())
-
-
-def test_a_table_in_a_subfolder_gives_the_readback(cell):
-    campaign, pose, made, inbox = cell
+def test_a_table_in_a_subfolder_gives_the_readback(posed, session):
+    campaign, pose, made, inbox = posed
     shutil.copytree(made, inbox / "left_station" / pose.pose)
-    session(campaign, inbox)
+    session(campaign, inbox, limit_s=5)
     stood = campaign.state.measurements[pose.pose].joints_deg
     assert 0 < np.max(np.abs(np.subtract(stood, pose.joints_deg))) <= 0.011
     assert {h.repeat for h in campaign.state.used[0].accepted} == {1, 2, 3}
 
 
 @pytest.mark.parametrize("by", ["session", "import"])
-def test_a_table_without_joints_is_of_proposed_poses(cell, by):
+def test_a_table_without_joints_is_of_proposed_poses(posed, session, by):
     """Axis and pose come from it, the joints from the proposal."""
-    campaign, pose, made, inbox = cell
+    campaign, pose, made, inbox = posed
     without(made, lambda name: name.endswith("_deg"))
     shutil.copytree(made, inbox / "export")
     if by == "session":
-        assert "along which axis" not in session(campaign, inbox)
+        assert "along which axis" not in session(campaign, inbox, limit_s=5).flat
     else:
         assert call("import", campaign.directory, inbox)[0] == 0
     (measured,) = Campaign(campaign.directory).state.used
@@ -77,8 +63,8 @@ def test_a_table_without_joints_is_of_proposed_poses(cell, by):
     assert len(measured.accepted) == 9
 
 
-def test_a_table_of_another_pose_without_joints_says_what_it_lacks(cell):
-    campaign, pose, made, _ = cell
+def test_a_table_of_another_pose_without_joints_says_what_it_lacks(posed, session):
+    campaign, pose, made, _ = posed
     without(made, lambda name: name.endswith("_deg"))
     table = made / TABLE
     table.write_text(table.read_text().replace(f"{pose.pose},", "P077,"))
@@ -87,52 +73,52 @@ def test_a_table_of_another_pose_without_joints_says_what_it_lacks(cell):
     assert "No joint angles are known for pose P077; give recordings.csv columns of" in said
 
 
-def test_hits_of_another_pose_by_their_table_are_not_counted_here(cell):
-    campaign, pose, made, inbox = cell
+def test_hits_of_another_pose_by_their_table_are_not_counted_here(posed, session):
+    campaign, pose, made, inbox = posed
     table = made / TABLE
     table.write_text(table.read_text().replace(f"{pose.pose},", "X1,"))
     shutil.copytree(made, inbox / "export")
-    said = session(campaign, inbox)
+    said = session(campaign, inbox, limit_s=5).flat
     assert "not from here: of X1 by recordings.csv" in said
     assert "all hits are in" not in said
     assert [m.pose for m in campaign.state.used] == ["X1"]
 
 
-def test_a_left_over_file_of_the_pose_before_is_left_out_alone(cell, tmp_path):
-    campaign, pose, made, inbox = cell
+def test_a_left_over_file_of_the_pose_before_is_left_out_alone(posed, session, tmp_path):
+    campaign, pose, made, inbox = posed
     campaign.import_paths((made,))
     second = campaign.next()[0]
     truth = make_cell(tmp_path / "again")[2]
     there = record(truth, inbox / "there", second.pose, second.joints_deg)
     (left,) = (there / "data").glob("*z_3.uff")
     shutil.copy(next((made / "data").glob("*z_1.uff")), left)
-    said = session(campaign, inbox, limit_s=6)
+    said = session(campaign, inbox, limit_s=6).flat
     assert f"it was imported before as a recording of pose {pose.pose} and cannot" in said
     assert [len(m.accepted) for m in campaign.state.used] == [9, 8]
 
 
-def test_an_angle_that_no_joint_reaches_is_said_at_once_and_read_again(cell):
-    campaign, pose, made, inbox = cell
+def test_an_angle_that_no_joint_reaches_is_said_at_once_and_read_again(posed, session):
+    campaign, pose, made, inbox = posed
     right = (made / TABLE).read_text()
     stated = right.splitlines()[1].split(",")[1]
     (made / TABLE).write_text(right.replace(f",{stated},", ",624.87,"))
     shutil.copytree(made, inbox / "export")
-    assert "at 624.87° is outside its limits" in session(campaign, inbox, limit_s=2)
+    assert "at 624.87° is outside its limits" in session(campaign, inbox, limit_s=2).flat
     robot = campaign.cell.robot
     table = FolderTable(inbox, robot.joints, robot.points, campaign.cell.check_pose)
     path = inbox / "export" / TABLE
     assert (table.follow(), [where for where, _ in table.waiting]) == (set(), [path])
     path.write_text(right)
     assert (table.follow(), table.waiting, table.follow()) == ({path}, [], set())
-    session(campaign, inbox)
+    session(campaign, inbox, limit_s=5)
     assert [m.pose for m in campaign.state.used] == [pose.pose]
 
 
-def test_a_table_without_one_of_the_joints_is_not_followed_and_says_why(cell):
-    campaign, _, made, inbox = cell
+def test_a_table_without_one_of_the_joints_is_not_followed_and_says_why(posed, session):
+    campaign, _, made, inbox = posed
     without(made, lambda name: name == "joint_a2_deg")
     shutil.copytree(made, inbox / "export")
-    said = session(campaign, inbox, limit_s=2)
+    said = session(campaign, inbox, limit_s=2).flat
     assert "cannot be used: recordings.csv" in said
     assert "has no column joint_a2_deg" in said
     assert not campaign.state.used

@@ -3,6 +3,7 @@
 import os
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -134,7 +135,10 @@ def test_hits_keep_their_number_whatever_becomes_readable_before_them(bench):
     assert bench.of()["a"].number == 2
 
 
-def test_what_is_no_recording_is_ignored_once_and_half_a_file_is_waited_for(bench):
+def test_what_is_no_recording_is_ignored_once_and_half_a_file_is_waited_for(bench, monkeypatch):
+    now = [0.0]
+    clock = SimpleNamespace(monotonic=lambda: now[0], time=time.time)
+    monkeypatch.setattr("planner.session.inbox.time", clock)
     whole = bench.hit("whole", "+x")
     data, inbox = whole.read_bytes(), bench.folder / "inbox"
     inbox.mkdir()
@@ -144,14 +148,14 @@ def test_what_is_no_recording_is_ignored_once_and_half_a_file_is_waited_for(benc
     (inbox / "force.uff").write_bytes(data[: marks[1] + 6] + b"\n")  # ends with a whole dataset
     box = Inbox(inbox, 0.02, bench.verdicts.unfit)
     box.scan(none_known)
-    time.sleep(0.08)  # text is given three times as long
+    now[0] += 0.08  # text is given three times as long
     found, waiting = box.scan(none_known)
     assert found == []
     assert {path.name: why for path, why in waiting} == dict.fromkeys(
         ["notes.txt", "half.uff", "force.uff"], "is still being written"
     )
     assert box.ignored() == []
-    time.sleep(0.2)
+    now[0] += 0.2
     found, waiting = box.scan(none_known)
     assert [path.name for path in found] == ["force.uff"]  # read, and to be refused
     assert [path.name for path, _ in waiting] == ["half.uff"]
@@ -161,7 +165,7 @@ def test_what_is_no_recording_is_ignored_once_and_half_a_file_is_waited_for(benc
     (inbox / "half.uff").write_bytes(data)
     os.utime(inbox / "half.uff")
     box.scan(none_known)
-    time.sleep(0.05)
+    now[0] += 0.05
     assert "half.uff" in [path.name for path in box.scan(none_known)[0]]
 
 

@@ -67,7 +67,7 @@ def test_tables_and_mat_hold_the_same_numbers(named, tmp_path):
     with (tmp_path / "modes.csv").open() as file:
         modes = list(csv.DictReader(file))
     used = named.state.used
-    predicted = named.predict(np.deg2rad([m.joints_deg for m in used]))
+    predicted = named.predict(joints_deg=[m.joints_deg for m in used])
     np.testing.assert_allclose(mat["mode_frequency_hz"], predicted.frequency_hz)
     rows = [r for r in modes if r["source"] == "predicted"]
     np.testing.assert_allclose([float(r["frequency_hz"]) for r in rows],
@@ -90,7 +90,7 @@ def test_the_models_file_says_what_the_campaign_says(named, tmp_path, monkeypatc
     q = named.cell.candidates.q[7:12]
     places = named.cell.robot.forward_batch(q)[1][:, :2]
     hz, sd, damping = loaded["at"](places)
-    expected = named.predict(q)
+    expected = named.model.predict(q)
     assert np.median(np.abs(hz / expected.frequency_hz - 1)) < 1e-3
     np.testing.assert_allclose(hz, expected.frequency_hz, rtol=0.01)
     np.testing.assert_allclose(sd, expected.frequency_sd_hz, rtol=0.15)

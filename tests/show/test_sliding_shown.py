@@ -10,8 +10,7 @@ import pinocchio as pin
 import pytest
 from rich.console import Console
 
-from planner.campaign.cell import Cell
-from planner.campaign.check import plan_of
+from planner.campaign.cell import Cell, plan_of
 from planner.campaign.config import load_campaign_config
 from planner.campaign.events import Proposal
 from planner.check.examine import examine

@@ -29,7 +29,8 @@ FACTORS = {
     "× 2": 2.0,
     "÷ 2": 0.5,
 }
-FAULTS = (*FACTORS, "turned by 90°", "swapped axes", "wrong sign", "force's sign")
+SLIGHTEST = "× 2", "÷ 2", "a channel × 2"
+FAULTS = (*FACTORS, "a channel × 2", "turned by 90°", "swapped axes", "wrong sign", "force's sign")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +85,8 @@ def fault(name: str, rng: np.random.Generator) -> np.ndarray:
     one, axis = np.eye(3), int(rng.integers(3))
     if name in FACTORS:
         return FACTORS[name] * one
+    if name == "a channel × 2":
+        return one + np.outer(one[axis], one[axis])
     if name == "turned by 90°":
         sign = rng.choice([-1.0, 1.0])
         return np.round(Rotation.from_rotvec(sign * np.pi / 2 * one[axis]).as_matrix())

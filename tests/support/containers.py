@@ -51,6 +51,16 @@ def _nested(hit: Hit) -> dict[str, Any]:
     return {"test": {"hit": hit.axis, "time": times(hit), "force": force, "acc": felt}}
 
 
+def _axes_of_one(hit: Hit) -> dict[str, Any]:
+    """Fields named x, y, z beside a field y that is the force's value."""
+    felt = dict(zip("xyz", hit.acceleration_m_s2 / G, strict=True))
+    force = {"y": hit.force_n, "unit": "N"}
+    return {
+        "rec": {"Fs": hit.sampling_rate_hz, "F": force, "A": {**felt, "unit": "g"}},
+        "hit": hit.axis,
+    }
+
+
 def _channels(hit: Hit) -> dict[str, Any]:
     each = [
         {"name": n, "unit": u, "data": v, "samplerate": hit.sampling_rate_hz}
@@ -254,6 +264,7 @@ def lvm_file(count: int = 1, **options: Any) -> Writer:
 
 ONE_HIT: dict[str, tuple[str, Writer]] = {
     "MAT: structs in structs": ("a.mat", mat(_nested)),
+    "MAT: fields of one name in two structs": ("v.mat", mat(_axes_of_one)),
     "MAT: a list of channels": ("b.mat", mat(_channels)),
     "MAT: signals of a measuring program": ("c.mat", mat(_program, do_compression=True)),
     "MAT: one signal of many columns": ("d.mat", mat(_program_matrix)),

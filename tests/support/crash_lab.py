@@ -22,7 +22,7 @@ import numpy as np
 from planner.campaign.events import Imported
 from planner.campaign.journal import Journal
 from planner.campaign.state import CampaignState, fold
-from planner.campaign.store import read_kept, recording_path
+from planner.campaign.store import check_kept, recording_path
 from planner.cli.run import STOPPED, run
 from planner.errors import PlannerError
 from planner.truth.deviation import Deviation
@@ -136,7 +136,7 @@ def lost(cell: Cell, before: tuple, command: Command, outcome: Outcome) -> list[
     for hit in (*imported, *(hit for _, hit in state.refused.values())):
         path = recording_path(cell.campaign, hit.sha256, hit.suffix)
         try:
-            read_kept(path, hit.sha256, hit.file)
+            check_kept(path, hit.sha256, hit.file)
         except PlannerError as error:
             found.append(str(error))
     hashes = Counter(hit.sha256 for m in state.recorded for hit in m.hits)
@@ -285,7 +285,7 @@ def damage(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     asked, whole = undamaged(cell, log)
     kind = str(rng.choice(["log", "recording", "cache"], p=[0.5, 0.3, 0.2]))
     recordings = sorted((cell.campaign / "recordings").glob("*.uff"))
-    kept = sorted(p for name in ("models", "poses") for p in (cache / name).glob("*"))
+    kept = sorted(p for p in (cache / "results").glob("*") if p.is_file())
     among = {"log": [cell.log], "recording": recordings, "cache": kept}[kind]
     path = among[int(rng.integers(len(among)))]
     content, entries_before = path.read_bytes(), entries(cell)

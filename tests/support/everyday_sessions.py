@@ -16,9 +16,9 @@ import numpy as np
 from rich.console import Console
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.store import sha256
 from planner.dataset.screened_files import Source
 from planner.errors import PlannerError
+from planner.file_content import sha256
 from planner.replay import replay
 from planner.session.watch import watch
 from planner.truth.deviation import Deviation
@@ -87,7 +87,7 @@ class Engineer:
             (read,), _ = Source(path, path.name).read()
             path.unlink()
             path = write_csv(path.with_suffix(".csv"), read, stated=False)
-        self.at[sha256(path.read_bytes())] = joints_deg
+        self.at[sha256(path)] = joints_deg
         return path
 
     def export(self, path: Path) -> None:
@@ -169,9 +169,9 @@ class Engineer:
     def late_here(self) -> str:
         """The right answer about late hits; "": none is right for all, or there are none."""
         state = self.campaign.state
-        digests = {sha256(path.read_bytes()) for path in self.inbox.iterdir()}
+        digests = {sha256(path) for path in self.inbox.iterdir()}
         used = {h.sha256 for m in state.recorded for h in m.hits} | state.refused.keys()
-        waiting = [(d, state.shown[d]) for d in digests - used if d in state.shown]
+        waiting = [(d, state.came(d, self.at_pose)) for d in digests - used if d in state.shown]
         late = [(d, pose) for d, pose in waiting if pose != self.at_pose]
         here = state.proposals[self.at_pose].joints_deg
         if late and all(self.from_there(d, here) for d, _ in late):
@@ -215,7 +215,7 @@ class Engineer:
         """A command between two sessions: a pose is skipped, an act taken back, a folder given."""
         state, rng = self.campaign.state, self.rng
         act = str(rng.choice(["undo", "redo", "skip", "import", "nothing"]))
-        digests = {sha256(path.read_bytes()) for path in self.inbox.iterdir()}
+        digests = {sha256(path) for path in self.inbox.iterdir()}
         used = {h.sha256 for m in state.recorded for h in m.hits}
         try:
             if act == "undo":

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.campaign.hit_habits import HitMiss
+from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.model import Model
 from planner.truth.arms import ARMS
 from planner.truth.cases import PEAK_N
@@ -36,7 +36,7 @@ class MissedCell:
     q: dict[str, np.ndarray]
     aims: dict[str, list[Aim]]
 
-    def misses(self, pose: str, hits: tuple[HitMiss, ...]) -> tuple[np.ndarray, ...]:
+    def misses(self, pose: str, hits: tuple[HitErrorEstimate, ...]) -> tuple[np.ndarray, ...]:
         """Told, its sds, and true misses (n, 4) of a pose's hits, in the order of the files."""
         pairs = [(h.tilt_deg, h.offset_mm, h.tilt_sd_deg, h.offset_sd_mm) for h in hits]
         told = np.array([[*tilt, *offset] for tilt, offset, _, _ in pairs])

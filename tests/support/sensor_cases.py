@@ -190,9 +190,7 @@ def _told_by_the_tool(
 def told(folder: Path, sensors: int, count: int) -> tuple[DiagnosisReport, Dataset]:
     """Diagnosis of the first poses of a case by the tool's sensor, or by all."""
     robot = Robot.load(folder / "robot" / "robot.toml")
-    read = Dataset.read(
-        folder / "hits", robot.joint_names, robot.config.band_hz, points=robot.points
-    )
+    read = Dataset.read(folder / "hits", robot)
     some = read.corrected(read.visits[:count])
     if sensors == 1:
         some = some.channels_of(SENSOR)

@@ -1,21 +1,89 @@
-"""A small robot with something concealed, hit a few times: diagnosed in seconds by the command."""
+"""A small robot with something concealed, hit a few times: diagnosed in a minute."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from planner.truth.deviation import Deviation
+from planner.truth.deviation import (
+    AttachedMass,
+    AttachedResonator,
+    BentLink,
+    Deviation,
+    Feedback,
+    Spring,
+    StiffnessRipple,
+)
 from planner.truth.handling import LABORATORY, Handling
 from planner.truth.hits import Hammer, write_predict, write_recordings
 from planner.truth.load import load_truth
-from planner.truth.secret import Artefact, HitVisit, Secret, hit_poses
-from tests.support.known_robots import KR10
+from planner.truth.secret import Artefact, HitVisit, Secret, StiffnessDrift, hit_poses
+from tests.support.arm_with_points import NODES, poses, write_arm
 
 # Springs, dampers and bodies never are as stated; nobody is to call that a finding.
 SCATTER = Deviation(5, stiffness=0.1, damping=0.15, inertia=0.03, com_m=0.003)
-POSES, SEED = 4, 1
-HAMMER = Hammer(peak_n=150.0, noise=0.01)
+POSES, SEED, TCP_NODE = 5, 1, 17
+HAMMER = Hammer(peak_n=250.0, noise=0.004)
+BASE = {"x": 1.4e6, "y": 1.1e6}  # N·m/rad
+SOFT = tuple(
+    Spring("base", (float(axis == "x"), float(axis == "y"), 0.0), k, 3e-4 * k)
+    for axis, k in BASE.items()
+)
+TURNED = Rotation.from_euler("zyx", [15.0, -10.0, 5.0], degrees=True).as_matrix()
+GAIN, WINDOW_S, HOSE_HZ, HOSE_KG, MASS_KG = 0.7, 0.5, 21.0, 3.0, 25.0
+
+
+@dataclass(frozen=True)
+class Concealed:
+    """What is wrong with a robot and its measuring chain, and by which effects at which places."""
+
+    places: tuple[tuple[str, str], ...] = ()
+    change: Mapping[str, object] = field(default_factory=dict)  # of SCATTER
+    rest: Mapping[str, object] = field(default_factory=dict)  # of the secret
+
+    def __or__(self, other: "Concealed") -> "Concealed":
+        both = {**self.change, **other.change}, {**self.rest, **other.rest}
+        return Concealed((*self.places, *other.places), *both)
+
+
+def _artefact(effect: str, at: str, **change: object) -> Concealed:
+    return Concealed(((effect, at),), rest={"artefact": replace(Artefact(), **change)})
+
+
+CONCEALED = {
+    "nothing": Concealed(),
+    "soft base": Concealed((("base_compliance", "base"),), {"extra": SOFT}),
+    "bending link": Concealed(
+        (("link_flexibility", "link_2"),), {"beams": (BentLink("l2", (1.6e6, 2e6), 1.6e6, 3e-4),)}
+    ),
+    "added mass": Concealed(
+        (("added_mass", "link_3"),), {"added": (AttachedMass("l3", (0.2, 0.15, 0.1), MASS_KG),)}
+    ),
+    "hose": Concealed(
+        (("local_resonator", "link_3"),),
+        {
+            "resonators": (
+                AttachedResonator("l3", (0.1, 0.1, 0), (0, 0.6, 0.8), HOSE_KG, HOSE_HZ, 0.03),
+            )
+        },
+    ),
+    "turned sensor": _artefact("sensor_rotation", "sensor", rotation=TURNED),
+    "polarity": _artefact("polarity", "sensor_z", gain=(1.0, 1.0, -1.0)),
+    "gain": _artefact("sensor_gain", "sensor_y", gain=(1.0, GAIN, 1.0)),
+    "window": _artefact("exponential_window", "sensor", window_s=WINDOW_S),
+    "drift": Concealed((("drift", "campaign"),), rest={"drift": StiffnessDrift(-0.15)}),
+    "angle": Concealed(
+        (("angle_dependent_stiffness", "joint_2"),),
+        {"harmonics": (StiffnessRipple("a2", 2, 0.35, 0.2),)},
+    ),
+    # A controller that breaks reciprocity: nothing that only holds or weighs does.
+    "outsider": Concealed(
+        (("unknown", ""),), {"feedback": (Feedback(driven="a2", sensed="a3", gain=2e5),)}
+    ),
+}  # fmt: skip
+CONCEALED["base and gain"] = CONCEALED["soft base"] | CONCEALED["gain"]
 
 
 @dataclass(frozen=True)
@@ -28,40 +96,27 @@ class SmallCase:
 
 
 def small_case(
-    folder: Path,
-    deviation: Deviation = SCATTER,
-    artefact: Artefact | None = None,
-    handling: Handling = LABORATORY,
+    folder: Path, of: Concealed, handling: Handling = LABORATORY, count: int = POSES
 ) -> SmallCase:
-    """A KR10 with six springs, hit once along each axis at POSES poses.
-
-    Its robot.toml knows the gravity that the truth has, so that nothing differs but what is
-    concealed, and what `handling` leaves open.
-    """
-    robot_toml = KR10.write(folder / "robot")
-    stated = robot_toml.read_text()
-    robot_toml.write_text(f"geometric_stiffness = true\n{stated}")
-    truth = load_truth(robot_toml, deviation)
-    angles_deg = np.round(np.rad2deg(KR10.poses(POSES + 1, SEED)), 4)
-    shots = [(f"+{axis}", HAMMER.peak_n) for axis in "xyz"]
+    """An arm of four joints, hit once along each axis at a few poses."""
+    tcp = f'[[point]]\nname = "tcp"\nnode = {TCP_NODE}\n'
+    robot_toml, q = write_arm(folder / "robot", tcp), poses(count + 1, SEED)
     own = np.random.default_rng(SEED)
+    secret = Secret(replace(SCATTER, **of.change), chain=handling.chain(own), **of.rest)
+    truth, shots = load_truth(robot_toml, secret.deviation), [(f"+{a}", 250.0) for a in "xyz"]
     visits = []
-    for i, q in enumerate(np.deg2rad(angles_deg[:POSES])):
-        off = np.deg2rad(handling.readback_deg) * own.standard_normal(len(q))
-        visits.append(HitVisit(q + off, shots, i / POSES, handling.aims([0, 1, 2], own)))
-    secret = Secret(deviation, artefact=artefact or Artefact(), chain=handling.chain(own))
+    for i, row in enumerate(q[:count]):
+        off = np.deg2rad(handling.readback_deg) * own.standard_normal(len(row))
+        visits.append(HitVisit(row + off, shots, i / count, handling.aims([0, 1, 2], own)))
     found = hit_poses(truth, secret, visits, HAMMER, np.random.default_rng(SEED))
     rows = [
-        (f"P{i + 1}", q, 1, hit)
-        for i, (q, hits) in enumerate(zip(angles_deg[:POSES], found, strict=True))
+        (f"P{i + 1}", np.rad2deg(row), 1, hit)
+        for i, (row, hits) in enumerate(zip(q, found, strict=False))
         for hit in hits
     ]
     folder /= "recordings"
-    write_recordings(folder, truth.joint_names, rows, HAMMER, "small case")
-    unused = [("H1", np.deg2rad(angles_deg[POSES]))]
+    write_recordings(
+        folder, truth.joint_names, rows, HAMMER, "small case", NODES | {"tcp": TCP_NODE}
+    )
+    unused = [("H1", q[count])]
     return SmallCase(robot_toml, folder, write_predict(folder, truth.joint_names, unused))
-
-
-def unlike(**change: object) -> Deviation:
-    """SCATTER with something else beside it."""
-    return replace(SCATTER, **change)

@@ -23,7 +23,7 @@ from planner.campaign.mode_motion import (
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
 from planner.modal.matrix_modes import MatrixModes
-from planner.modal.shape_motion import motions, moved
+from planner.modal.modes import motions, moved
 from planner.recording.geometry import Geometry
 from planner.recording.points import Layout
 from planner.report.plot_text import plain_text, write_values

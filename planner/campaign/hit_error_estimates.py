@@ -1,0 +1,217 @@
+"""Errors of a campaign's hits as its simulation tells them, and its modes without these."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.campaign.hit_errors import HitErrorEstimate, Pair, PoseHitErrors
+from planner.campaign.labels import LabelledPose
+from planner.campaign.log_conversion import to_mode
+from planner.campaign.low_fidelity import LowFidelity, learn
+from planner.campaign.state import Measurement
+from planner.dataset.hit_columns import HitColumns, PoseHits
+from planner.dynamics.simulation import Simulation
+from planner.fit.hit_misses import Misses, SolvedPoses, VisitHits, VisitMisses, tell_misses
+from planner.fit.learned import Learned
+from planner.fit.posterior import FOLLOWED
+from planner.frf.frf import Frf
+from planner.measurement.nuisances import ACROSS, HIT_NUMBERS, OF_HIT, Tolerances
+from planner.modal.modes import Mode
+from planner.modal.residues import laplace, residue_changes
+from planner.recording.joints import JointUnits
+from planner.recording.records import AXES
+
+# Root mean square of the misses, in their sds before any data, from which they are not a hand's but
+# what the simulation lacks: on an arm whose floor gave way unknown to it, it was 8 to 12; chosen.
+NO_HAND = 4.0
+AROUND = 0.5, 1.6  # of the band's edges: where other poles matter in it
+UNIT = Tolerances(angle_rad=1.0, offset_m=1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Visited:
+    """A pose with hits: its name, accepted files, joint angles (dof,) in rad, hits, the tool's FRF.
+
+    The FRF is the average of all hits.
+    """
+
+    pose: str
+    files: tuple[str, ...]
+    q: np.ndarray
+    columns: HitColumns
+    frf: Frf
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignHitErrors:
+    """What is told of all poses with hits; `told` is None where there are none."""
+
+    visited: tuple[Visited, ...]
+    told: Misses | None
+    tolerances: Tolerances
+    band_hz: tuple[float, float]
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the simulation is right enough to tell how hits missed."""
+        if self.told is None or self.told.discrepancy > FOLLOWED:
+            return False
+        sd = np.repeat([self.tolerances.angle_rad, self.tolerances.offset_m], 2)
+        away = np.concatenate([visit.mean / sd for visit in self.told.visits])
+        return bool(np.sqrt(np.mean(away**2)) < NO_HAND)
+
+    @property
+    def poses(self) -> tuple[PoseHitErrors, ...]:
+        """Hit by hit; none where the simulation is too wrong to tell."""
+        if self.told is None or not self.trusted:
+            return ()
+        both = zip(self.visited, self.told.visits, strict=True)
+        return tuple(_pose(visited, told) for visited, told in both)
+
+    def corrected(self, labelled: LabelledPose, measured: Measurement) -> LabelledPose:
+        """A measured pose's labelled modes with residues as `without_misses` gives them."""
+        modes = [to_mode(mode) for mode in measured.modes]
+        exact = {mode.frequency_hz: mode for mode in self.without_misses(measured.pose, modes)}
+        found = (None if mode is None else exact[mode.frequency_hz] for mode in labelled.modes)
+        return replace(labelled, modes=tuple(found))
+
+    def without_misses(self, pose: str, modes: Sequence[Mode]) -> list[Mode]:
+        """Modes with residues as hits without a miss would give them.
+
+        What stays unsure is in their sds. Poles and shapes of response do not depend on where and
+        how the robot is hit. Where the simulation is too wrong to tell, residues are as measured.
+        """
+        names = [visited.pose for visited in self.visited]
+        if self.told is None or pose not in names or not modes:
+            return list(modes)
+        visited, told = self.visited[names.index(pose)], self.told.visits[names.index(pose)]
+        if not self.trusted:
+            return [_unsure(mode, visited.columns, self.tolerances) for mode in modes]
+        return self._moved(modes, visited, told)
+
+    def _moved(self, modes: Sequence[Mode], visited: Visited, told: VisitMisses) -> list[Mode]:
+        assert self.told is not None
+        frf, simulation = visited.frf, self.told.simulation
+        lines = laplace(frf.frequency_hz, frf.exponential_rate_1_s, frf.tail_s)
+        solved = SolvedPoses.of(simulation, visited.q[None])
+        basis = solved.misses(0, lines, UNIT)
+        changes = _changes(visited.columns, told, basis, frf.frequency_hz)
+        poles = np.array([mode.pole for mode in modes])
+        outside = _outside(solved.poles[0], self.band_hz)
+        moved = residue_changes(frf, poles, outside, self.band_hz, changes)
+        # Of the real and of the imaginary part each.
+        spread = np.sqrt(np.sum(np.abs(moved[1:]) ** 2, axis=0) / 2)
+        return [
+            replace(
+                mode,
+                residue=mode.residue - moved[0, k],
+                residue_sd=np.hypot(mode.residue_sd, spread[k]),
+            )
+            for k, mode in enumerate(modes)
+        ]
+
+
+def estimate(
+    visited: Sequence[Visited], learned: Learned | None, t: Tolerances, band_hz: tuple[float, float]
+) -> CampaignHitErrors:
+    """Misses of the hits of all poses, by the simulation as it was identified from them."""
+    those = tuple(one for one in visited if len(one.columns.axis))
+    if learned is None or not those:
+        return CampaignHitErrors((), None, t, band_hz)
+    visits = [VisitHits(one.q, one.columns) for one in those]
+    told = tell_misses(learned.posterior, visits)
+    return CampaignHitErrors(those, told, t, band_hz)
+
+
+def estimate_by(
+    nominal: Simulation,
+    visited: Sequence[Visited],
+    whole: Sequence[Frf],
+    t: Tolerances,
+    band_hz: tuple[float, float],
+) -> CampaignHitErrors:
+    """As `estimate`, by a simulation that is identified from the FRFs of all points first."""
+    q = np.array([one.q for one in visited])
+    learned = learn(LowFidelity(1, nominal, t), whole, q, band_hz).learned
+    return estimate(visited, learned, t, band_hz)
+
+
+def visits_of(
+    joints: JointUnits,
+    used: Sequence[Measurement],
+    hits: Sequence[PoseHits],
+    frfs: Sequence[Frf],
+) -> tuple[Visited, ...]:
+    """Measurements as visits, with their hits and the tool's FRFs."""
+    return tuple(
+        Visited(
+            m.pose,
+            tuple(hit.file for hit in m.accepted),
+            joints.internal(m.joints_deg),
+            h.columns,
+            f,
+        )
+        for m, h, f in zip(used, hits, frfs, strict=True)
+    )
+
+
+def _pose(visited: Visited, told: VisitMisses) -> PoseHitErrors:
+    columns = visited.columns
+    sd = np.sqrt(np.diagonal(told.covariance)).reshape(-1, OF_HIT)
+    hits = []
+    for i, (axis, sign) in enumerate(zip(columns.axis, columns.sign, strict=True)):
+        # A hit along −axis: the response is over the force along +axis, and so is its direction.
+        hits.append(
+            HitErrorEstimate(
+                visited.files[columns.file[i]],
+                ("+" if sign > 0 else "-") + AXES[axis],
+                _pair(sign * np.rad2deg(told.mean[i, :2])),
+                _pair(np.rad2deg(sd[i, :2])),
+                _pair(1e3 * told.mean[i, 2:]),
+                _pair(1e3 * sd[i, 2:]),
+            )
+        )
+    return PoseHitErrors(visited.pose, tuple(hits))
+
+
+def _pair(values: np.ndarray) -> Pair:
+    return float(values[0]), float(values[1])
+
+
+def _changes(
+    columns: HitColumns, told: VisitMisses, basis: np.ndarray, frequency_hz: np.ndarray
+) -> np.ndarray:
+    """(1 + 12, 3, 3, F): what the mean misses add to the FRF, and one sd of each unsure part."""
+    share = columns.shared_at(frequency_hz)
+    out = np.zeros((1 + HIT_NUMBERS, 3, 3, len(frequency_hz)), dtype=complex)
+    whole = np.zeros((HIT_NUMBERS, told.mean.size))
+    for i, axis in enumerate(columns.axis):
+        out[0, :, axis] += np.einsum("k,kif,f->if", told.mean[i], basis[axis], share[i])
+        at = OF_HIT * axis + np.arange(OF_HIT)
+        whole[at, OF_HIT * i + np.arange(OF_HIT)] = np.mean(share[i])
+    values, vectors = np.linalg.eigh(whole @ told.covariance @ whole.T)
+    roots = vectors * np.sqrt(np.maximum(values, 0.0))
+    for axis in range(3):
+        part = roots[OF_HIT * axis : OF_HIT * axis + OF_HIT]
+        out[1:, :, axis] = np.einsum("kj,kif->jif", part, basis[axis])
+    return out
+
+
+def _outside(poles: np.ndarray, band_hz: tuple[float, float]) -> np.ndarray:
+    size, (low, high) = np.abs(poles) / (2 * np.pi), band_hz
+    near = (size > AROUND[0] * low) & (size < AROUND[1] * high) & (poles.imag > 0)
+    return poles[near & ((size < low) | (size > high))]
+
+
+def _unsure(mode: Mode, columns: HitColumns, t: Tolerances) -> Mode:
+    """As measured; its sds hold the hits' unknown directions.
+
+    What a hit beside the point does cannot be said without a simulation.
+    """
+    sd = mode.residue_sd.copy()
+    for axis, across in enumerate(ACROSS):
+        count = max(int(np.sum(columns.axis == axis)), 1)
+        power = np.nansum(np.abs(mode.residue[:, list(across)]) ** 2, axis=1)
+        sd[:, axis] = np.hypot(sd[:, axis], t.angle_rad * np.sqrt(power / (2 * count)))
+    return replace(mode, residue_sd=sd)

@@ -1,1 +1,0 @@
-"""Joints that are not linear: their laws, and the fits to recorded hits in time."""

@@ -1,1 +1,0 @@
-"""Fits of linear effects to FRFs, and the search among them."""

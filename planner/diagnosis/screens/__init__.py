@@ -1,1 +1,0 @@
-"""What is looked for before and beside the linear effects, one screen a file."""

@@ -1,1 +1,0 @@
-"""The engine before `planner.fit`, which the diagnosis in `planner.diagnosis` still runs on."""

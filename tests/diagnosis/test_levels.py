@@ -1,0 +1,147 @@
+"""Joints that are not linear are named from hits of different force; linear robots are not."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.dataset.dataset import Dataset
+from planner.dataset.visits import Visit
+from planner.diagnosis.levels import Levels, level_laws
+from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import CAD_INERTIAS
+from planner.effects.table import Repertoire
+from planner.fit.fitted import converged, settled
+from planner.fit.gauss_newton import minimised
+from planner.fit.misfit import FrfMisfit
+from planner.fit.search import Search
+from planner.fit.structure import RobotPrior, RobotStructure
+from planner.measurement.nuisances import Tolerances
+from planner.recording.records import Hit
+from planner.robot.robot import Robot
+from planner.truth.arms import ARMS
+from planner.truth.cases import DAMPING_S, PEAK_N
+from planner.truth.deviation import Deviation
+from planner.truth.handling import EVERYDAY
+from planner.truth.hits import AXES, Hammer
+from planner.truth.laws import Backlash, Friction, Hardening, JointLaw
+from planner.truth.load import load_truth
+from planner.truth.nonlinear import Port
+from planner.truth.other_laws import QuadraticDamping
+from planner.truth.scene import Scene
+from planner.truth.secret import HitVisit, Secret, hit_poses
+
+Made = tuple[Robot, Dataset, JointLaw | None]
+POSES, LEVELS = 4, (0.4, 1.0, 2.5)
+# Of a joint's stiffness and its angle under a middling hit.
+LAWS: dict[str, Callable[[float, float], JointLaw]] = {
+    "hardening": lambda k, angle: Hardening(0.8 * k, 0.5 * angle),
+    "softening": lambda k, angle: Hardening(-0.4 * k, 0.5 * angle),
+    "friction": lambda k, angle: Friction(0.5 * k, 0.1 * k * angle),
+    "backlash": lambda k, angle: Backlash(0.5 * k, 0.3 * angle),
+    "oil": lambda k, angle: QuadraticDamping(1e-3 * k / (100 * angle), 1e3 * angle),
+}
+
+
+def made(
+    folder: Path, seed: int, law: str = "", joint: str = "", levels: tuple[float, ...] = LEVELS
+) -> Made:
+    """A robot whose springs and bodies are not quite as stated, hit by hand; its law, if any."""
+    rng, peak_n = np.random.default_rng(seed), PEAK_N["kr10"]
+    arm = replace(ARMS["kr10"], damping_s=DAMPING_S)
+    toml = arm.write(folder / "robot", 1)
+    deviation = Deviation(seed, stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)
+    truth, (low, high) = load_truth(toml, deviation), np.deg2rad(np.array(arm.joints_deg)).T
+    poses, hammer = rng.uniform(low, high, (POSES, 6)), Hammer(peak_n, 0.008, noise=0.01)
+    scene = Scene(arm, truth, 1, poses, peak_n)
+    bends = LAWS[law](scene.stiffness(joint), scene.angle(joint)) if law else None
+    ports = (Port(bends, joint=joint),) if bends else ()
+    secret = Secret(deviation, ports, chain=EVERYDAY.chain(rng))
+    shots = [(f"+{axis}", peak_n * level) for axis in "xyz" for level in levels]
+    axes = [AXES.index(axis[1]) for axis, _ in shots]
+    planned = [HitVisit(q, shots, i / POSES, EVERYDAY.aims(axes, rng)) for i, q in enumerate(poses)]
+    visits = [
+        Visit(
+            f"P{i}", q, i / POSES,
+            tuple(Hit(Path("hit"), h.axis, hammer.sampling_rate_hz, h.force_n, h.acceleration_m_s2)
+                  for h in hits),
+        )
+        for i, (q, hits) in enumerate(
+            zip(poses, hit_poses(truth, secret, planned, hammer, rng), strict=True)
+        )
+    ]  # fmt: skip
+    robot = Robot.load(toml)
+    return robot, Dataset.of_visits(visits, robot.config.band_hz), bends
+
+
+def seen(robot: Robot, recorded: Dataset) -> Levels:
+    """What levels tell beside a linear fit of the averages: logarithms first, then the FRFs."""
+    prior = RobotPrior(Repertoire.of(Simulation(robot), CAD_INERTIAS))
+    tolerances = Tolerances.of(robot.config, robot.joints.slides)
+    search = Search(prior, recorded.ended_frfs, recorded.q, recorded.band_hz, tolerances)
+    structure = RobotStructure(prior)
+    misfit = FrfMisfit(structure, search.data(28), tolerances, None)
+    at, misfit = minimised(misfit, structure.mean, 15), misfit.with_rho(0.1)
+    return level_laws(recorded, converged(settled(misfit, minimised(misfit, at.x, 8))))
+
+
+@pytest.mark.parametrize(("seed", "levels"), [(0, LEVELS), (1, LEVELS), (2, (1.0,))])
+def test_a_linear_robot_is_proportional(tmp_path: Path, seed: int, levels: tuple[float, ...]):
+    found = seen(*made(tmp_path, seed, levels=levels)[:2])
+    assert found.laws == ()
+    assert not found.unexplained
+
+
+@pytest.mark.parametrize(
+    ("law", "joint", "effect", "numbers"),
+    [
+        ("hardening", "joint_2", "nonlinear_stiffness", ("stiffness_change", "angle")),
+        ("softening", "joint_3", "nonlinear_stiffness", ("stiffness_change", "angle")),
+        ("friction", "joint_2", "friction", ("presliding_stiffness", "coulomb_torque")),
+        ("backlash", "joint_3", "backlash", ("lost_stiffness", "half_gap")),
+    ],
+)
+def test_a_law_is_named_with_its_numbers(
+    tmp_path: Path, law: str, joint: str, effect: str, numbers: tuple[str, str]
+):
+    robot, recorded, truth = made(tmp_path, 5, law, joint)
+    found = seen(robot, recorded)
+    assert [(one.effect, one.at) for one in found.laws] == [(effect, joint)]
+    told = found.laws[0].parameters
+    for name, true in zip(numbers, vars(truth).values(), strict=True):
+        value, sd, unit = told[name]
+        assert value == pytest.approx(true, abs=3 * sd)
+        assert sd < 0.2 * abs(true)
+        assert unit == {"coulomb_torque": "N·m", "half_gap": "rad", "angle": "rad"}.get(
+            name, "N·m/rad"
+        )
+    assert found.candidates[0][:2] == (effect, joint)
+    assert found.candidates[0][2] > 0.9
+    assert sum(p for *_, p in found.candidates) == pytest.approx(1)
+    assert found.explained > 0.8
+    assert not found.unexplained
+
+
+def test_what_no_library_law_describes_is_unexplained(tmp_path: Path):
+    found = seen(*made(tmp_path, 7, "oil", "joint_2")[:2])
+    assert found.laws == ()
+    assert found.unexplained
+    assert found.candidates[0][:2] == ("unknown", "joint_2")
+
+
+def test_what_no_joint_explains_is_unexplained(tmp_path: Path):
+    """The hardest hits of each pose are answered in other directions: contact, loose parts."""
+    robot, recorded, _ = made(tmp_path, 1)
+    rng, visits = np.random.default_rng(0), []
+    for visit in recorded.visits:
+        mixed = [np.eye(3), np.eye(3), np.eye(3) + 0.15 * rng.standard_normal((3, 3))]
+        hits = tuple(
+            replace(h, acceleration_m_s2=mixed[recorded.level(h)] @ h.acceleration_m_s2)
+            for h in visit.hits
+        )
+        visits.append(replace(visit, hits=hits))
+    found = seen(robot, recorded.corrected(visits))
+    assert found.laws == ()
+    assert found.unexplained

@@ -1,0 +1,232 @@
+"""Modes of random systems with known poles, found without being told anything."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.errors import RefusedError
+from planner.modal.estimate_modes import estimate_modes
+from planner.modal.mac import mac
+from tests.support.modal_systems import System, as_frf, exact_frf, noisy, random_system
+
+LINES = np.arange(2.0, 80.0, 0.2)
+BAND = (4.0, 60.0)
+
+
+def frequencies(model) -> np.ndarray:
+    return np.array([mode.frequency_hz for mode in model.modes])
+
+
+def dampings(model) -> np.ndarray:
+    return np.array([mode.damping_ratio for mode in model.modes])
+
+
+def hits(model, system: System) -> list[int | None]:
+    """For each true mode the found one within half a bandwidth or 1 %, None if there is none."""
+    out = []
+    for f, zeta in zip(system.frequency_hz, system.damping_ratio, strict=True):
+        away = np.abs(frequencies(model) / f - 1)
+        k = int(np.argmin(away))
+        out.append(k if away[k] < max(0.005, 0.5 * zeta) and k not in out else None)
+    return out
+
+
+@pytest.mark.parametrize("columns", [(0,), (0, 2), (0, 1, 2)])
+@pytest.mark.parametrize("modes", [1, 4, 9])
+def test_clean_data_is_recovered_exactly(columns, modes):
+    system = random_system(np.random.default_rng(modes), modes, complexity=0.3)
+    model = estimate_modes(as_frf(LINES, exact_frf(system, LINES), columns=columns), BAND)
+    assert len(model.modes) == modes
+    np.testing.assert_allclose(frequencies(model), system.frequency_hz, rtol=1e-6)
+    np.testing.assert_allclose(dampings(model), system.damping_ratio, rtol=1e-6)
+    assert model.fit_error < 1e-6
+    hit = list(columns)
+    for mode, residue in zip(model.modes, system.residues, strict=True):
+        size = np.max(np.abs(residue))
+        np.testing.assert_allclose(mode.residue[:, hit], residue[:, hit], atol=1e-6 * size)
+        missed = [c for c in range(3) if c not in columns]
+        assert np.all(np.isnan(mode.residue[:, missed]))
+        assert np.all(np.isnan(mode.residue_sd[:, missed]))
+        assert mac(mode.shape, np.linalg.svd(residue)[0][:, 0]) > 1 - 1e-6
+
+
+@pytest.mark.parametrize("rate", [0.5, 3.0])
+@pytest.mark.parametrize("columns", [(1,), (0, 1, 2)])
+def test_exponential_window_is_corrected_exactly(rate, columns):
+    system = random_system(np.random.default_rng(7), 4, damping=(0.003, 0.03), complexity=0.3)
+    h = exact_frf(system, LINES, rate)
+    model = estimate_modes(as_frf(LINES, h, columns=columns, rate_1_s=rate), BAND)
+    np.testing.assert_allclose(frequencies(model), system.frequency_hz, rtol=1e-7)
+    np.testing.assert_allclose(dampings(model), system.damping_ratio, rtol=1e-6)
+    hit = list(columns)
+    for mode, residue in zip(model.modes, system.residues, strict=True):
+        size = np.max(np.abs(residue))
+        np.testing.assert_allclose(mode.residue[:, hit], residue[:, hit], atol=1e-6 * size)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_intervals_cover_the_truth(known):
+    """95 % intervals of frequency, damping and residues, 1-5 % noise, variance told or not."""
+    scores, residue_scores, lost, spurious = [], [], 0, 0
+    for seed in range(30):
+        rng = np.random.default_rng(100 + seed)
+        system = random_system(rng, int(rng.integers(2, 7)), complexity=0.2)
+        h, variance = noisy(exact_frf(system, LINES), rng.uniform(0.01, 0.05), rng)
+        model = estimate_modes(as_frf(LINES, h, variance if known else None), BAND)
+        found = hits(model, system)
+        lost += found.count(None)
+        spurious += len(model.modes) - sum(k is not None for k in found)
+        for i, k in enumerate(found):
+            if k is None:
+                continue
+            mode = model.modes[k]
+            scores.append((mode.frequency_hz - system.frequency_hz[i]) / mode.frequency_sd_hz)
+            scores.append((mode.damping_ratio - system.damping_ratio[i]) / mode.damping_sd)
+            error = mode.residue - system.residues[i]
+            residue_scores += list((np.stack([error.real, error.imag]) / mode.residue_sd).ravel())
+    assert lost <= 1
+    assert spurious <= 1
+    assert 0.90 < np.mean(np.abs(scores) < 1.96) < 0.98
+    assert 0.90 < np.mean(np.abs(residue_scores) < 1.96) < 0.98
+
+
+def test_close_modes_are_told_apart():
+    """Pairs 1 to 2 % apart with differing shapes, 1-3 % damping, 2 % noise."""
+    found = total = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        system = random_system(rng, 4, damping=(0.01, 0.03), pair=rng.uniform(0.01, 0.02))
+        h, variance = noisy(exact_frf(system, LINES), 0.02, rng)
+        model = estimate_modes(as_frf(LINES, h, variance), BAND)
+        for i, k in enumerate(hits(model, system)):
+            total += 1
+            if k is None:
+                continue
+            right = abs(model.modes[k].frequency_hz / system.frequency_hz[i] - 1) < 0.003
+            found += right and abs(model.modes[k].damping_ratio / system.damping_ratio[i] - 1) < 0.1
+        assert len(model.modes) == 4
+    assert found >= 0.97 * total
+
+
+def test_modes_outside_the_band_do_not_become_modes_in_it():
+    inside = random_system(np.random.default_rng(3), 3, (10.0, 40.0), damping=(0.01, 0.03))
+    outside = System(
+        np.array([3.0, 62.0, 150.0]),
+        np.full(3, 0.02),
+        np.concatenate([inside.residues[:1]] * 3) * np.array([5.0, 3.0, 10.0])[:, None, None],
+    )
+    whole = System(
+        *(
+            np.concatenate([getattr(inside, n), getattr(outside, n)])
+            for n in ("frequency_hz", "damping_ratio", "residues")
+        )
+    )
+    rng = np.random.default_rng(4)
+    h, variance = noisy(exact_frf(whole, LINES), 0.01, rng)
+    model = estimate_modes(as_frf(LINES, h, variance), (8.0, 50.0))
+    assert len(model.modes) == 3
+    np.testing.assert_allclose(frequencies(model), inside.frequency_hz, rtol=2e-3)
+    np.testing.assert_allclose(dampings(model), inside.damping_ratio, rtol=0.1)
+
+
+def test_scatter_between_lines_unlike_the_stated_variance_enlarges_the_sd():
+    rng = np.random.default_rng(5)
+    system = random_system(rng, 3, damping=(0.01, 0.03))
+    h, variance = noisy(exact_frf(system, LINES), 0.05, rng)
+    honest = estimate_modes(as_frf(LINES, h, variance), BAND)
+    boasting = estimate_modes(as_frf(LINES, h, variance / 100), BAND)
+    assert len(boasting.modes) == 3
+    for a, b in zip(honest.modes, boasting.modes, strict=True):
+        assert b.frequency_sd_hz == pytest.approx(a.frequency_sd_hz, rel=0.5)
+    assert any("enlarged" in remark for remark in boasting.remarks)
+
+
+def test_sds_do_not_hang_on_the_band():
+    """Lines cut off to check the model may be all that hold a mode near the band's edge."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        system = random_system(rng, 5, (8.0, 60.0), damping=(0.01, 0.04))
+        h, variance = noisy(exact_frf(system, LINES), 0.003, rng)
+        first, last = system.frequency_hz[[0, -1]]
+        lows, highs = first * rng.uniform(0.5, 0.9, 8), last * rng.uniform(1.1, 1.25, 8)
+        bands = zip(lows, highs, strict=True)
+        models = [estimate_modes(as_frf(LINES, h, variance), band) for band in bands]
+        lowest = [m.modes[int(np.argmin(np.abs(frequencies(m) - first)))] for m in models]
+        sds = [mode.frequency_sd_hz for mode in lowest]
+        assert np.max(sds) < 2 * np.min(sds)
+
+
+def truncated(system: System, tail_s: float) -> np.ndarray:
+    """Accelerance from records of an impulse that end `tail_s` after it, mode by mode."""
+    s = 2j * np.pi * LINES
+    out = np.zeros((3, 3, LINES.size), complex)
+    for pole, r in zip(system.poles, system.residues, strict=True):
+        for p, c in ((pole, r), (pole.conj(), r.conj())):
+            # Decay p²c·e^{pt} cut off at tail_s; the impulse part s + p is not affected.
+            part = p**2 * (1 - np.exp((p - s) * tail_s)) / (s - p) + s + p
+            out += c[..., None] * part
+    return out
+
+
+@pytest.mark.parametrize("tail_s", [0.9, 2.0])
+def test_records_that_end_early_are_exact(tail_s):
+    system = random_system(np.random.default_rng(9), 4, damping=(0.003, 0.02), complexity=0.2)
+    frf = replace(as_frf(LINES, truncated(system, tail_s)), tail_s=tail_s)
+    model = estimate_modes(frf, BAND)
+    np.testing.assert_allclose(frequencies(model), system.frequency_hz, rtol=1e-7)
+    np.testing.assert_allclose(dampings(model), system.damping_ratio, rtol=1e-6)
+    for mode, residue in zip(model.modes, system.residues, strict=True):
+        np.testing.assert_allclose(mode.residue, residue, atol=1e-6 * np.max(np.abs(residue)))
+
+
+def test_hit_directions_that_disagree_do_not_split_a_mode():
+    """Frequencies 0.3 % higher in the z column: as many modes as there are, each in between."""
+    lost = extra = 0
+    for seed in range(10):
+        rng = np.random.default_rng(50 + seed)
+        system = random_system(rng, 4, damping=(0.005, 0.03), complexity=0.1)
+        moved = System(system.frequency_hz * 1.003, system.damping_ratio, system.residues)
+        h = exact_frf(system, LINES)
+        h[:, 2] = exact_frf(moved, LINES)[:, 2]
+        h, variance = noisy(h, 0.005, rng)
+        model = estimate_modes(as_frf(LINES, h, variance), BAND)
+        found = hits(model, system)
+        lost += found.count(None)
+        extra += len(model.modes) - sum(k is not None for k in found)
+    assert lost <= 1
+    assert extra <= 1
+
+
+def test_ripple_makes_no_likely_modes():
+    """A 3 % ripple over the FRFs (cable, double hit) that no modal model explains."""
+    likely = 0
+    for seed in range(10):
+        rng = np.random.default_rng(80 + seed)
+        system = random_system(rng, 4, damping=(0.005, 0.03))
+        h, variance = noisy(exact_frf(system, LINES), 0.005, rng)
+        ripple = 1 + 0.03 * np.sin(LINES * rng.uniform(0.3, 2.0) + rng.uniform(0, 6))
+        model = estimate_modes(as_frf(LINES, h * ripple, variance), BAND)
+        found = hits(model, system)
+        assert None not in found
+        likely += sum(m.probability > 0.5 for m in model.modes) - 4
+    assert likely <= 2
+
+
+def test_noise_alone_is_refused():
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        h = rng.normal(size=(3, 3, LINES.size)) + 1j * rng.normal(size=(3, 3, LINES.size))
+        with pytest.raises(RefusedError, match="No mode"):
+            estimate_modes(as_frf(LINES, h, np.full(h.shape, 2.0)), BAND)
+
+
+def test_too_few_lines_are_refused():
+    system = random_system(np.random.default_rng(0), 2)
+    h = exact_frf(system, LINES)
+    with pytest.raises(RefusedError, match="usable frequency lines"):
+        estimate_modes(as_frf(LINES[::10], h[..., ::10]), (20.0, 22.0))
+    with pytest.raises(RefusedError, match="usable frequency lines"):
+        estimate_modes(as_frf(LINES, h, columns=()), BAND)
+    with pytest.raises(RefusedError, match="usable frequency lines"):
+        estimate_modes(as_frf(LINES, 0 * h), BAND)

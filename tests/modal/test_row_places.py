@@ -1,0 +1,117 @@
+"""Turned signs and exchanged points, told by how their neighbours move."""
+
+import re
+
+import numpy as np
+import pytest
+
+from planner.modal.consistency import check
+from planner.modal.exchanged import exchanged_nodes
+from planner.modal.matrix_modes import modes_of_matrix
+from planner.modal.motion_fields import turned_rows
+from planner.recording.dof import Dof
+from planner.recording.geometry import Geometry
+from tests.support.rough_hammer_sets import geometry_of, rough_set, spoiled
+from tests.support.struck_structures import dof_of, unit_mass_shapes
+from tests.support.structures import plate
+
+
+@pytest.fixture(scope="module")
+def sheet():
+    """Points, shapes with rows that err by 3 %, places."""
+    structure = plate(9, 6, (0.7, 0.4), 0.003)
+    rng = np.random.default_rng(8)
+    shapes = unit_mass_shapes(structure)[1][:, 3:13].real
+    shapes = shapes * (1 + 0.03 * rng.normal(size=(len(shapes), 1)))
+    names = tuple(str(n) for n in structure.position_m)
+    lines = tuple((str(a), str(b)) for a, b in structure.lines)
+    place = Geometry(names, np.array(list(structure.position_m.values())), lines)
+    return [dof_of(structure, k) for k in range(len(shapes))], shapes, place
+
+
+@pytest.mark.parametrize("lines", [True, False])
+@pytest.mark.parametrize("rows", [(), (0,), (22,), (53,), (4, 20, 40)])
+def test_turned_rows_are_told(sheet, rows, lines):
+    dofs, shapes, place = sheet
+    turned = shapes.copy()
+    turned[list(rows)] *= -1
+    known = place if lines else Geometry(place.nodes, place.position_m)
+    assert set(turned_rows(dofs, turned, known)) == set(rows)
+
+
+@pytest.mark.parametrize("pair", [None, (0, 53), (10, 30), (22, 23)])
+def test_two_exchanged_points_are_told(sheet, pair):
+    dofs, shapes, place = sheet
+    exchanged = shapes.copy()
+    if pair is not None:
+        exchanged[list(pair)] = shapes[list(pair[::-1])]
+    told = exchanged_nodes(dofs, exchanged, place)
+    assert set(told or ()) == {dofs[k].node for k in pair or ()}
+
+
+def test_one_of_two_exchanged_pairs_is_told(sheet):
+    dofs, shapes, place = sheet
+    mixed = shapes.copy()
+    mixed[[10, 30, 4, 49]] = shapes[[30, 10, 49, 4]]
+    told = exchanged_nodes(dofs, mixed, place)
+    assert told is not None
+    assert set(told) in ({dofs[10].node, dofs[30].node}, {dofs[4].node, dofs[49].node})
+
+
+def test_three_mixed_up_points_are_not_told_as_two(sheet):
+    """Nor are signs turned at a node, in one direction or in all."""
+    dofs, shapes, place = sheet
+    mixed, turned = shapes.copy(), shapes.copy()
+    mixed[[10, 30, 41]] = shapes[[30, 41, 10]]
+    turned[22] *= -1
+    for wrong in (mixed, turned):
+        assert exchanged_nodes(dofs, wrong, place) is None
+
+
+@pytest.fixture(scope="module")
+def frame():
+    """Nodes measured along x, y and z; poles, and the modes that were established."""
+    case = rough_set(3040, kind="frame")
+    found = modes_of_matrix(case.matrix, case.band_hz, geometry_of(case)).found
+    hz = np.abs(found.fit.poles) / (2 * np.pi)
+    low, high = case.band_hz
+    return case, found, np.flatnonzero((hz > low) & (hz < high) & (found.weak <= 1))
+
+
+@pytest.mark.parametrize("pair", [(3, 15), (21, 24), (2, 19), "reference"])
+def test_exchanged_nodes_of_a_frame_are_told(frame, pair):
+    """One of them alone, under the other's name, explains most: both explain clearly more."""
+    case, found, modes = frame
+    if pair == "reference":
+        pair = case.structure.nodes[case.references[0]], 19
+    owner = np.array(case.structure.nodes)
+    order = np.arange(owner.size)
+    one, two = (np.flatnonzero(owner == node) for node in pair)
+    order[one], order[two] = two, one
+    matrix, poles = spoiled(case, found, order, np.ones((owner.size, 3)))
+    checks = check(matrix, poles, modes, geometry_of(case))
+    (fault,) = checks.faults
+    assert re.match(rf"Nodes ({pair[0]} and {pair[1]}|{pair[1]} and {pair[0]}) are", fault)
+    touched = [dof for dof in case.matrix.references if dof.node in {str(node) for node in pair}]
+    assert list(checks.untied) == touched
+    assert check(case.matrix, found, modes, geometry_of(case)).faults == ()
+
+
+def test_points_of_unknown_place_and_few_modes_say_nothing(sheet):
+    dofs, shapes, place = sheet
+    turned = shapes.copy()
+    turned[22] *= -1
+    elsewhere = Geometry(tuple(f"9{n}" for n in place.nodes), place.position_m)
+    assert turned_rows(dofs, turned, elsewhere) == ()
+    assert turned_rows(dofs, turned[:, :2], place) == ()
+    unknown = turned.copy()
+    unknown[22] = np.nan
+    assert turned_rows(dofs, unknown, place) == ()
+
+
+def test_directions_are_told_apart(sheet):
+    dofs, shapes, place = sheet
+    both = [*dofs, *(Dof(dof.node, "x") for dof in dofs)]
+    moved = np.concatenate([shapes, shapes[:, ::-1]])
+    moved[60] *= -1
+    assert turned_rows(both, moved, place) == (60,)
