@@ -133,6 +133,10 @@ class Operator(ABC):
     absorbed: ClassVar[bool] = False
     # Of the measuring chain: no physics, and prediction does without it.
     artefact: ClassVar[bool] = False
+    # Has freedom enough to imitate what the shape of a named effect lacks: where it is, not what.
+    general: ClassVar[bool] = False
+    # Several may be at the same place.
+    several: ClassVar[bool] = False
 
     @property
     def label(self) -> str:

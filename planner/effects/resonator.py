@@ -37,6 +37,7 @@ class LinkResonator(Operator):
     band_hz: tuple[float, float] = (1.0, 100.0)
 
     kind = "local_resonator"
+    several = True
 
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """s² m Jₚᵀ [1 + (T − 1) d dᵀ] Jₚ with the transmissibility T of spring and damper."""
