@@ -178,6 +178,14 @@ class Operator(ABC):
         """Where fits with it begin, by its first-order columns; springs are tried as they are."""
         return (Start(self, self.mean, np.inf),)
 
+    def elsewhere(self, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
+        """Where it begins, as one like it has ψ at another place."""
+        return self.starts(motions, gain)[0]
+
+    def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Where fits may begin as well as at ψ."""
+        return ()
+
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """Changes of the first numbers of ψ at which it is no more, to first order."""
         return np.zeros(0)
