@@ -190,7 +190,7 @@ def _alive(process: int) -> bool:
 
 
 def _copy_robot(robot_toml: Path, target: Path) -> None:
-    """Copy robot.toml, its URDF with the meshes that this names, and TOML files beside it (a cut's).
+    """Copy robot.toml, its URDF with the meshes that this names, and a cut.toml beside it.
 
     A URDF that lies elsewhere comes to lie beside robot.toml, and is expanded where it is xacro.
     """
