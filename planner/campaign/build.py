@@ -17,9 +17,11 @@ from planner.dataset.hit_columns import PoseHits
 from planner.design.parameter_sensitivity import FrfNoise
 from planner.frf.frf import Frf
 from planner.surrogate.average import Average
+from planner.surrogate.frequency_models import MODELS
 from planner.surrogate.gp import STAGES
 from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, fit_surrogate
 
+LEARNED_AT = 200  # candidates, where a model learns the simulation
 # Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
 # that are none.
 MISSED, STRAY = float(np.log(0.1)), float(np.log(0.01))
@@ -73,6 +75,7 @@ def build(
         primary=best.primary,
         residues=False,
         identified=best.low.taught,
+        kernel=cell.config.surrogate.kernel,
     )
     if hits_of is not None:
         frf_of = _OfOneHit(frf_of, hits_of)
@@ -98,6 +101,17 @@ class _OfOneHit:
         return found or self.frf_of(measurement, table)
 
 
+def elsewhere(
+    cell: Cell, low: LowFidelity, model: str = ""
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Where a model of frequencies learns the simulation: features, frequencies in Hz."""
+    if not MODELS[model or cell.config.surrogate.model].elsewhere:
+        return None
+    candidates = cell.candidates
+    q, x = candidates.q[:LEARNED_AT], candidates.features[:LEARNED_AT]
+    return x, low.frequencies(q).frequency_hz
+
+
 @dataclass(frozen=True, eq=False)
 class _Guided:
     """Labels and frequencies as one low fidelity makes them."""
@@ -121,7 +135,10 @@ class _Guided:
         seen = observations(cell, labelled)
         seen = seen if tuned is None else tuned.into(seen)
         known = low.discrepancy if labelled else None
-        primary = fit_primary(seen, known, low.belief)
+        primary = fit_primary(
+            seen, known, low.belief, model=cell.config.surrogate.model,
+            kernel=cell.config.surrogate.kernel, elsewhere=elsewhere(cell, low),
+        )  # fmt: skip
         return cls(low, used, labelled, seen, primary)
 
     @property

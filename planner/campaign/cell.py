@@ -23,6 +23,7 @@ from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import singularity
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
+from planner.surrogate.frequency_models import check_choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +49,10 @@ class Cell:
         `robot` is the one of robot_toml, where it was loaded already.
         """
         check_name(config.acquisition.name, "campaign.toml, [acquisition] name")
+        chosen, simulated = config.surrogate, config.fidelity.simulation != "none"
+        check_choice(chosen.model, chosen.kernel, simulated, "campaign.toml, [surrogate]")
         robot = _handled(robot or Robot.load(robot_toml), config)
-        simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
+        simulation = Simulation(robot) if simulated else None
         with _of_campaign_toml():
             workspace = Workspace.from_table(config.workspace, robot)
         _check_angles(robot, config)

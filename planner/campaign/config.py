@@ -91,6 +91,17 @@ class FidelityTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     simulation: Literal["updated", "frozen", "none"] = "updated"
 
 
+class SurrogateTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which `model` predicts natural frequencies between measured poses, and its GPs' `kernel`.
+
+    A kernel (bias, linear, quadratic, cubic, rbf or matern52) is that of the damping ratios too;
+    without one it is matern52, and for damping what the measurements choose.
+    """
+
+    model: str = "default"
+    kernel: str | None = None
+
+
 class StopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """When the campaign may end: frequency RMSE over the workspace (%), with a `probability`."""
 
@@ -121,6 +132,7 @@ class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     modes: ModesTable = ModesTable()
     acquisition: AcquisitionTable = AcquisitionTable()
     fidelity: FidelityTable = FidelityTable()
+    surrogate: SurrogateTable = SurrogateTable()
     stop: StopTable = StopTable()
     goal: GoalTable = GoalTable()
     cost: CostTable = CostTable()

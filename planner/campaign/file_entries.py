@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import msgspec
 from msgspec import inspect as types
 
-from planner.campaign.config import AcquisitionTable, CampaignConfig
+from planner.campaign.config import AcquisitionTable, CampaignConfig, SurrogateTable
 from planner.milling.cut import Cut
 from planner.milling.tool_file import ToolTable
 from planner.robot.config import RobotConfig
@@ -39,7 +39,7 @@ class SchemaChoice:
 class SchemaTable:
     """A table of a file; "" for what stands at its top. `about` may have several sentences.
 
-    `choices` are what its `name` may be, where that is one of several.
+    `choices` are what its `name` or `model` may be, where that is one of several.
     """
 
     name: str
@@ -66,7 +66,11 @@ def tables_of(kind: type[msgspec.Struct], name: str = "") -> Iterator[SchemaTabl
 
 
 def _choices(kind: type[msgspec.Struct]) -> tuple[SchemaChoice, ...]:
-    """Acquisitions, where the table names one."""
+    """Acquisitions or models, where the table names one."""
+    if kind is SurrogateTable:
+        from planner.surrogate.frequency_models import MODELS
+
+        return tuple(SchemaChoice(name, model.sentence) for name, model in MODELS.items())
     if kind is not AcquisitionTable:
         return ()
     from planner.design.propose import ACQUISITIONS, DESCRIPTIONS, DESIGNS

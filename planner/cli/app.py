@@ -97,6 +97,9 @@ def status_(
         ),
     ] = None,
     format_: Annotated[str, typer.Option("--format", help="Of the picture: png or svg.")] = "png",
+    models: Annotated[
+        bool, typer.Option("--models", help="Try every [surrogate] model, poses left out.")
+    ] = False,
     as_json: AsJson = False,
 ) -> int:
     """What has been measured, what is open, how sure the model is and whether it may be.
@@ -104,11 +107,15 @@ def status_(
     Example: planner status cell7 --plot pictures
     """
     from planner.campaign.campaign import Campaign
+    from planner.cli.progress import telling
     from planner.report.plot_files import Pictures
     from planner.report.status import status
 
     campaign, pictures = Campaign(directory), Pictures(plot, format_)
     answer = status(campaign).with_pictures(pictures, campaign.directory.name)
+    if models:
+        with telling("models", quiet=as_json) as progress:
+            answer = answer.with_models(progress)
     return respond(answer, as_json)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
-from rich.console import Group
+from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
@@ -31,6 +31,8 @@ from planner.words import by_reason, counted, local_time, significant
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
+    from planner.campaign.model_comparison import LeftOutModel
+    from planner.progress import Tell
 
 
 @dataclass(frozen=True)
@@ -177,6 +179,7 @@ class StatusReport(Answer):
     springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
     waits_for: str = ""  # what lacks until the target is reached
     frf_sd_percent: tuple[float, ...] = ()  # of predicted FRFs, and of their common scale
+    models: tuple["LeftOutModel", ...] | msgspec.UnsetType = msgspec.UNSET  # where asked for
     model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
@@ -194,6 +197,13 @@ class StatusReport(Answer):
         figure = left_out_figure(*found_without(self.model()), title)
         return replace(self, **pictures.write({"leave_one_out": figure}, name))
 
+    def with_models(self, progress: "Tell") -> "StatusReport":
+        """The same once every model of `[surrogate]` has predicted poses left out."""
+        from planner.campaign.model_comparison import compared_models
+
+        assert self.model is not None
+        return replace(self, models=compared_models(self.model(), tell=progress))
+
     def text(self) -> Group:
         """Measured poses as a table, then all else line by line."""
         measured = table(
@@ -203,6 +213,7 @@ class StatusReport(Answer):
         for pose in self.measurements:
             measured.add_row(*pose.cells)
         springs = [springs_table(self.springs), Text(f"  {NOT_KNOWN}")] if self.springs else []
+        springs += [] if self.models is msgspec.UNSET else models_text(self.models)
         parts = [measured, *springs, Text("\n".join(self._lines())), *drawn(self.plots)]
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
@@ -285,6 +296,27 @@ def status(campaign: Campaign) -> StatusReport:
         frf_sd_percent=believed.frf_sd_percent,
         model=lambda: campaign.model,
     )
+
+
+def models_text(rows: "Sequence[LeftOutModel]") -> list[RenderableType]:
+    """Models side by side, and which one predicts poses left out best."""
+    if not rows:
+        return [Text("Models can be compared once two poses are measured.")]
+    columns = "model", "RMSE (%)", "in 95 %", "log density", "log evidence", "fit (s)"
+    made = table("Natural frequencies of each pose, predicted from the others alone", *columns)
+    for row in rows:
+        evidence = "" if row.log_evidence is None else f"{row.log_evidence:.1f}"
+        made.add_row(
+            row.model + (" ★" if row.campaign else ""), significant(row.rmse_percent),
+            f"{100 * row.coverage95:.0f} %", f"{row.log_density:.1f}", evidence,
+            significant(row.seconds),
+        )  # fmt: skip
+    best, used = rows[0], next((row for row in rows if row.campaign), rows[0])
+    better = best.log_density - used.log_density
+    said = f"Likeliest for poses left out: {best.model}, {best.about}."
+    if best is not used:
+        said += f" The campaign's own (★) is less likely by a factor of e^{better:.1f}."
+    return [made, Text(said)]
 
 
 def model_beside(campaign: Campaign, found: Mapping[str, Any]) -> str:

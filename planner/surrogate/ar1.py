@@ -5,13 +5,13 @@ simulation is deterministic and costs milliseconds, so the low-fidelity level is
 modelled. An output without simulation is a plain GP: the same with no ρ·y_L.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.surrogate.gp import Posterior, fit
 from planner.surrogate.kernels import Kernel, parse
-from planner.surrogate.training_data import Prior, TrainingData, pad
+from planner.surrogate.training_data import Prior, TrainingData, pad, widened
 
 
 @dataclass(frozen=True)
@@ -92,11 +92,13 @@ def fit_ar1(
     kept: int = 32,
     kernel: str = "matern52",
     thorough: bool = False,
+    sees_low: bool = False,
 ) -> AR1:
     """Fit m outputs; per output its prior with and without simulation, and y_L's `centre` (m,).
 
     `thorough` looks for each output's most probable hyperparameters first: tens of milliseconds
-    an output, which pays where there are many hyperparameters or many points.
+    an output, which pays where there are many hyperparameters or many points. With `sees_low` the
+    kernel's last column is the centred y_L over its sd.
     """
     uses_low = _uses_low(data, centre)
     centre = np.where(uses_low, np.nan_to_num(centre), 0.0)
@@ -106,14 +108,17 @@ def fit_ar1(
     low = np.where(uses_low[None, :], np.where(blind, centre[None, :], data.low), 0.0)
     sd = np.hypot(np.where(np.isnan(data.sd), 0.0, data.sd), blind * unknown_sd[None, :])
     padded = pad(TrainingData(data.x, data.y - low, sd, low - centre[None, :]), uses_low)
-    prior = _stack(priors, uses_low, parse(kernel, data.x.shape[1]))
-    start = None
+    prior = _stack(priors, uses_low, parse(kernel, data.x.shape[1] + sees_low))
+    scale, start, plain = None, None, padded.x
+    if sees_low:
+        scale = unknown_sd
+        padded = replace(padded, x=widened(padded.x, padded.low, scale))
     if thorough:
         from planner.surrogate.likelihood import laplace  # by JAX, which takes a second to import
 
         start = laplace(kernel, padded, prior)
     posterior = fit(padded, prior, samples, kept, kernel, 2 if thorough else 1, start)
-    return AR1(posterior, uses_low, centre, unknown_sd)
+    return AR1(replace(posterior, x=plain, low_scale=scale), uses_low, centre, unknown_sd)
 
 
 def _uses_low(data: TrainingData, centre: np.ndarray) -> np.ndarray:

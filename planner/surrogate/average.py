@@ -108,15 +108,17 @@ def fit_hedged(
     kept: int = 32,
     belief: float = PRIOR_BELIEF,
     fit_fused: Callable[..., AR1] = fit_ar1,
+    kernel: str = "matern52",
 ) -> Average:
     """AR1, and a GP that ignores the simulation; arguments as of `fit_ar1`.
 
     `belief` is the simulation's probability before these data.
     `fit_fused` fits with the simulation, arguments as of `fit_ar1`.
     """
-    fused = fit_fused(data, with_low, without_low, centre, samples, kept)
+    how = samples, kept, kernel
+    fused = fit_fused(data, with_low, without_low, centre, *how)
     nothing = np.full(len(centre), np.nan)
-    alone = fit_ar1(_blind(data), with_low, without_low, nothing, samples, kept)
+    alone = fit_ar1(unsimulated(data), with_low, without_low, nothing, *how)
     evidence = np.array([m.posterior.log_evidence for m in (fused, alone)])
     odds = evidence + np.log([[belief], [1 - belief]])
     # Without a measurement there is nothing to doubt the simulation by.
@@ -137,7 +139,7 @@ def fit_shapes(
     With `blind` those that ignore the simulation stand beside them, as likely before the data.
     """
     sides = [(data, centre)]
-    sides += [(_blind(data), np.full(len(centre), np.nan))] if blind else []
+    sides += [(unsimulated(data), np.full(len(centre), np.nan))] if blind else []
     models = tuple(
         fit_ar1(seen, with_low, without_low, there, 64, 16, kernel)
         for seen, there in sides
@@ -148,7 +150,7 @@ def fit_shapes(
     return Average(models, shares(evidence, axis=0), whole)
 
 
-def _blind(data: TrainingData) -> TrainingData:
+def unsimulated(data: TrainingData) -> TrainingData:
     """The data without the simulation."""
     return replace(data, low=np.full_like(data.low, np.nan))
 
@@ -160,13 +162,15 @@ def fit_plain_or_free(
     centre: np.ndarray,
     samples: int = 256,
     kept: int = 32,
+    kernel: str = "matern52",
 ) -> AR1:
     """AR1 averaged over how plain the discrepancy is; arguments as of `fit_ar1`.
 
     A simulation that is off by an offset alone needs no discrepancy that depends on the pose and no
     slope. Outputs without simulation are GPs as ever.
     """
-    free = fit_ar1(data, with_low, without_low, centre, samples, kept)
+    how = samples, kept, kernel
+    free = fit_ar1(data, with_low, without_low, centre, *how)
     asked = free.uses_low & free.posterior.mask.any(axis=1)
     if not asked.any():
         return free
@@ -174,7 +178,7 @@ def fit_plain_or_free(
     models = [free, fit_ar1(data, plain, without_low, centre, PLAIN_SAMPLES, kept, "bias")]
     if max(prior.slope_sd for prior in with_low) > GENTLE_SLOPE_SD:
         gentle = tuple(replace(p, slope_sd=min(p.slope_sd, GENTLE_SLOPE_SD)) for p in with_low)
-        models.append(fit_ar1(data, gentle, without_low, centre, samples, kept))
+        models.append(fit_ar1(data, gentle, without_low, centre, *how))
     return _samples_of_all(models, asked)
 
 

@@ -18,7 +18,7 @@ from planner.inference import triangular
 from planner.surrogate.importance import Gaussians, Score, Stage, normal_points, sample
 from planner.surrogate.kernels import parse
 from planner.surrogate.predictive import Predictive
-from planner.surrogate.training_data import Padded, Prior, data_covariance, thinned
+from planner.surrogate.training_data import Padded, Prior, data_covariance, thinned, widened
 
 JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance
 SURELY = 100.0  # times n² ε: noise, relative to the variance, that keeps a covariance regular
@@ -75,6 +75,7 @@ class Posterior:
     kernel: str
     log_evidence: np.ndarray  # (m,) log p(y | model), θ averaged out
     jitter: float  # relative to the prior variance, that θ was sampled with
+    low_scale: np.ndarray | None = None  # (m,) where kernels see low over it, beside x
 
     _found: dict[int, Solved] = field(default_factory=dict, init=False, repr=False)
 
@@ -101,7 +102,7 @@ class Posterior:
         """LinAlgError where a covariance is singular."""
         known = self.known(j)
         low, mask, variance = (v[j, known] for v in (self.low, self.mask, self.variance))
-        data = jitter, self.x[known], low, mask, variance, self.prior.bias_sd[j]
+        data = jitter, self.seen(j, self.x[known], low), low, mask, variance, self.prior.bias_sd[j]
         each = zip(self.theta[j], self.slope_sd[j], strict=True)
         covariances = (data_covariance(np, self.kernel, t, *data, slope) for t, slope in each)
         # By NumPy: SciPy takes long to import, and loaded late its BLAS has more than one thread.
@@ -176,8 +177,9 @@ class Posterior:
         self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
     ) -> np.ndarray:
         """Prior covariance (k, a, b), so many samples at once as the processor's cache holds."""
-        delta, bias = parse(self.kernel, self.x.shape[1]), self.prior.bias_sd[j] ** 2
-        linear, theta = np.outer(la, lb), self.theta[j]
+        linear, xa, xb = np.outer(la, lb), self.seen(j, xa, la), self.seen(j, xb, lb)
+        delta, bias = parse(self.kernel, xa.shape[1]), self.prior.bias_sd[j] ** 2
+        theta = self.theta[j]
         square = self.slope_sd[j][:, None, None] ** 2
         some = max(1, IN_CACHE // max(linear.size, 1))
         parts = (slice(i, i + some) for i in range(0, len(theta), some))
@@ -188,7 +190,14 @@ class Posterior:
     def own(self, j: int, x: np.ndarray, low: np.ndarray) -> np.ndarray:
         """Prior variances (k, q) of output j."""
         linear = self.prior.bias_sd[j] ** 2 + self.slope_sd[j][:, None] ** 2 * low**2
-        return parse(self.kernel, self.x.shape[1]).variance(np, self.theta[j], x) + linear
+        x = self.seen(j, x, low)
+        return parse(self.kernel, x.shape[1]).variance(np, self.theta[j], x) + linear
+
+    def seen(self, j: int, x: np.ndarray, low: np.ndarray) -> np.ndarray:
+        """Coordinates (q, d) as the kernel of output j takes them."""
+        if self.low_scale is None:
+            return x
+        return widened(x, low[None], self.low_scale[j : j + 1])[0]
 
     def cross(self, j: int, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Prior covariance (k, n, q) with the n points that hold a value, and L⁻¹ times it."""
@@ -214,7 +223,7 @@ def fit(
     InputError if the covariance stays singular whatever is added to its diagonal.
     """
     m, p = prior.theta_mean.shape
-    c = len(padded.x)
+    c = padded.y.shape[1]
     first, more = padded, []
     if start is None and c > AT_ONCE:
         first, *more = [thinned(padded, size) for size in STAGES]

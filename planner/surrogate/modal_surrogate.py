@@ -11,14 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
-from planner.surrogate.ar1 import OutputPrior, fit_ar1
-from planner.surrogate.average import (
-    PRIOR_BELIEF,
-    Average,
-    fit_hedged,
-    fit_plain_or_free,
-    fit_shapes,
-)
+from planner.surrogate.ar1 import OutputPrior
+from planner.surrogate.average import PRIOR_BELIEF, Average, fit_hedged, fit_shapes
+from planner.surrogate.frequency_models import DEFAULT, KERNEL, MODELS, FrequencyData
 from planner.surrogate.frf_bands import ModalPrediction
 from planner.surrogate.training_data import TrainingData
 
@@ -40,7 +35,6 @@ FITTED_NUGGET = 1e-3  # of ln f beside an identified simulation
 # states: median of the scatter, its log-sd, and the share of the latter's square that modes have
 # in common, chosen on generated cells.
 VISIT_SCATTER, VISIT_SCATTER_SPREAD, VISIT_SCATTER_SHARED = 0.003, 1.0, 0.7
-SAMPLES, KEPT = 256, 32
 RESIDUE_SAMPLES, RESIDUE_KEPT = 64, 8
 
 
@@ -56,6 +50,15 @@ class ModalObservations:
     residue: np.ndarray  # (n, k, 3, 3)
     residue_sd: np.ndarray
     simulated: SimulatedModes
+
+    def at(self, poses: np.ndarray | slice) -> "ModalObservations":
+        """Those of some poses."""
+        return ModalObservations(*(values[poses] for values in vars(self).values()))
+
+
+def simulated_log(seen: ModalObservations) -> np.ndarray:
+    """ln f (n, k) of the simulation, NaN where it has none."""
+    return _log(seen.simulated.frequency_hz)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +168,9 @@ def fit_primary(
     discrepancy: np.ndarray | None = None,
     belief: float = PRIOR_BELIEF,
     visits: bool = True,
+    model: str = DEFAULT,
+    kernel: str | None = None,
+    elsewhere: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Average:
     """Fit ln f of every label.
 
@@ -175,6 +181,9 @@ def fit_primary(
         belief: probability of the simulation before these frequencies.
         visits: whether the scatter from visit to visit is looked for, in all modes together. If
             not, this is the model of campaigns that began before it was.
+        model, kernel: names in `frequency_models.MODELS` and `kernels.KERNELS`.
+        elsewhere: poses (N, d) and the simulation's frequencies (N, k) in Hz there, for models that
+            learn the simulation too.
     """
     k = seen.frequency_hz.shape[1]
     y, low = _log(seen.frequency_hz), _log(seen.simulated.frequency_hz)
@@ -182,19 +191,22 @@ def fit_primary(
     alone = FREQUENCY_PRIOR_ALONE
     if visits:
         with_low, alone = [_scattering(prior) for prior in with_low], _scattering(alone)
-    return fit_hedged(
+    data = FrequencyData(
         TrainingData(seen.x, y, seen.frequency_sd_hz / np.exp(y), low),
         tuple(with_low),
         (alone,) * k,
         _centre(low, np.full(k, FREQUENCY_PRIOR_ALONE.mean)),
-        SAMPLES,
-        KEPT,
+        None if elsewhere is None else (elsewhere[0], _log(elsewhere[1])),
         belief,
-        fit_plain_or_free if visits else fit_ar1,
+        visits,
+        kernel or KERNEL,
     )
+    return MODELS[model].fit(data)
 
 
-def fit_damping(seen: ModalObservations, identified: bool = False) -> Average:
+def fit_damping(
+    seen: ModalObservations, identified: bool = False, kernel: str | None = None
+) -> Average:
     """Fit log ζ of every label: no simulation knows it that was not `identified`.
 
     A simulation that was is believed as far as the measured damping ratios bear it out, beside
@@ -207,7 +219,7 @@ def fit_damping(seen: ModalObservations, identified: bool = False) -> Average:
         (DAMPING_PRIOR_IDENTIFIED,) * y.shape[1],
         (DAMPING_PRIOR,) * y.shape[1],
         _centre(low, np.full(y.shape[1], np.nan)),
-        DAMPING_KERNELS,
+        (kernel,) if kernel else DAMPING_KERNELS,
         blind=identified and bool(np.isfinite(y).any()),  # nothing measured is no reason to doubt
     )
 
@@ -218,6 +230,7 @@ def fit_surrogate(
     residues: bool = True,
     identified: bool = False,
     visits: bool = True,
+    kernel: str | None = None,
 ) -> Surrogate:
     """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
 
@@ -227,13 +240,13 @@ def fit_surrogate(
         residues: whether residues are fitted too, which takes two thirds of the time.
         identified: whether the simulation was identified from these measurements' own FRFs and fits
             them, so that damping and residues are nearly its own.
-        visits: as of `fit_primary`.
+        visits, kernel: as of `fit_primary`; a kernel that is named is the damping's, too.
     """
     if primary is None:
-        primary = fit_primary(seen, visits=visits)
+        primary = fit_primary(seen, visits=visits, kernel=kernel)
     scale = _scale(seen)
     residue = _fit_residues(seen, scale, identified) if residues else None
-    return Surrogate(primary, fit_damping(seen, identified), residue, scale, visits)
+    return Surrogate(primary, fit_damping(seen, identified, kernel), residue, scale, visits)
 
 
 def _fit_residues(seen: ModalObservations, scale: np.ndarray, identified: bool) -> Average:

@@ -93,7 +93,14 @@ def thinned(data: Padded, size: int) -> Padded:
     rows = np.array([_spread(mask, size) for mask in data.mask])
     each = np.arange(len(rows))[:, None]
     picked = (v[each, rows] for v in (data.y, data.variance, data.low, data.mask))
-    return Padded(data.x[rows], *picked)
+    x = np.broadcast_to(data.x, (len(rows), *data.x.shape[-2:]))
+    return Padded(x[each, rows], *picked)
+
+
+def widened(x: Any, low: Any, scale: np.ndarray) -> np.ndarray:
+    """Coordinates (m, c, d + 1): x (c, d), and low (m, c) over its scale (m,)."""
+    own = low[..., None] / scale[:, None, None]
+    return np.concatenate([np.broadcast_to(x, (*low.shape, x.shape[-1])), own], axis=-1)
 
 
 def _spread(mask: np.ndarray, size: int) -> np.ndarray:

@@ -1,0 +1,117 @@
+"""Every model of natural frequencies, each measured pose predicted from the others alone.
+
+The modes, their labels and the simulation are those of the campaign's own model, the simulation
+identified from all poses: that helps all models that use it alike.
+"""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planner.campaign.build import elsewhere
+from planner.inference.parallel import side_by_side
+from planner.progress import Tell, quietly
+from planner.surrogate.average import Average
+from planner.surrogate.frequency_models import MODELS
+from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, simulated_log
+
+if TYPE_CHECKING:
+    from planner.campaign.model import Model
+
+INSIDE = 1.96  # sds of the interval that holds 95 %
+
+
+@dataclass(frozen=True)
+class LeftOutModel:
+    """How a model predicts measured frequencies from the other poses.
+
+    `log_density` is that of all values of ln f left out one by one, `log_evidence` that of all
+    together, None where hyperparameters are not averaged; `seconds` a fit to all poses takes.
+    """
+
+    model: str
+    about: str
+    rmse_percent: float
+    coverage95: float
+    log_density: float
+    log_evidence: float | None
+    seconds: float
+    campaign: bool = False
+
+
+def compared_models(
+    model: "Model", names: Sequence[str] = (), tell: Tell = quietly
+) -> tuple[LeftOutModel, ...]:
+    """All that can be used, the likeliest for poses left out first; () with fewer than two poses."""
+    n, config = len(model.seen.x), model.cell.config
+    usable = [m for m in names or MODELS if model.low.simulation or not MODELS[m].simulation]
+    if n < 2:
+        return ()
+    items = [(name, left) for name in usable for left in range(-1, n)]
+    points = {name: elsewhere(model.cell, model.low, name) for name in usable}
+    fit = partial(
+        _without, model.seen, model.low.discrepancy, model.low.belief, config.surrogate.kernel,
+        points,
+    )  # fmt: skip
+    done = side_by_side(fit, items, lambda i, k: tell(items[i][0], k / len(items)))
+    found = dict(zip(items, done, strict=True))
+    rows = [
+        _row(name, model.seen, found[name, -1], [found[name, i] for i in range(n)])
+        for name in usable
+    ]
+    rows = [replace(row, campaign=row.model == config.surrogate.model) for row in rows]
+    return tuple(sorted(rows, key=lambda row: -row.log_density))
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """Mean and sd (m,) of ln f at the pose left out; evidence of all, seconds of the fit."""
+
+    mean: np.ndarray
+    sd: np.ndarray
+    log_evidence: float | None
+    seconds: float
+
+
+def _without(
+    seen: ModalObservations,
+    discrepancy: np.ndarray | None,
+    belief: float,
+    kernel: str | None,
+    points: dict[str, tuple[np.ndarray, np.ndarray] | None],
+    item: tuple[str, int],
+) -> _Fitted:
+    """A model fitted without one pose (−1: to all), and what it says there."""
+    (name, left), started = item, time.perf_counter()
+    kept = np.arange(len(seen.x)) != left
+    primary = fit_primary(
+        seen.at(kept), discrepancy, belief, model=name, kernel=kernel, elsewhere=points[name]
+    )
+    there = seen.at(slice(max(left, 0), max(left, 0) + 1))
+    mean, sd = primary.predict(there.x, simulated_log(there), nugget=True)
+    evidence = float(primary.log_evidence.sum()) if type(primary) is Average else None
+    return _Fitted(mean[0], sd[0], evidence, time.perf_counter() - started)
+
+
+def _row(
+    name: str, seen: ModalObservations, whole: _Fitted, each: Sequence[_Fitted]
+) -> LeftOutModel:
+    measured = np.log(seen.frequency_hz)
+    off = np.array([one.mean for one in each]) - measured
+    sd = np.hypot([one.sd for one in each], seen.frequency_sd_hz / seen.frequency_hz)
+    known = np.isfinite(off)
+    off, sd = off[known], sd[known]
+    density = -0.5 * np.sum((off / sd) ** 2 + np.log(2 * np.pi * sd**2))
+    return LeftOutModel(
+        name,
+        MODELS[name].sentence,
+        float(100 * np.sqrt(np.mean(np.expm1(off) ** 2))),
+        float(np.mean(np.abs(off) <= INSIDE * sd)),
+        float(density),
+        whole.log_evidence,
+        whole.seconds,
+    )
