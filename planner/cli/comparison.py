@@ -18,8 +18,13 @@ def compare(
         Path, typer.Argument(metavar="RECORDINGS", help=f"{RECORDED}: the pool.")
     ],
     strategies: Annotated[
-        str, typer.Option(metavar="A,B,…", help="random, sobol, maximin_lhs, default, variance, …")
-    ],
+        str | None,
+        typer.Option(metavar="A,B,…", help="random, sobol, maximin_lhs, default, variance, …"),
+    ] = None,
+    models: Annotated[
+        str | None,
+        typer.Option(metavar="A,B,…", help="default, gp, ar1, nargp, mfdgp, multitask, none."),
+    ] = None,
     robot: RobotOption = None,
     repeats: Annotated[int, typer.Option(min=1, max=10_000, help="Seeds.")] = 20,
     initial: Annotated[
@@ -46,6 +51,8 @@ def compare(
 ) -> int:
     """Compare sampling strategies: error by number of measurements, on poses not used.
 
+    `--models` compares models of the frequencies, as `[surrogate] model` names them.
+
     Example: planner compare exports --robot robot/robot.toml --strategies random,default
     """
     from planner.campaign import store
@@ -69,7 +76,7 @@ def compare(
     with telling("comparing", quiet=as_json) as progress:
         poses = recorded(listed, loaded.joints, config.modes, workers, progress)
         bench, remarks = assemble(loaded, config, poses)
-        study = Study.plan(bench, strategies, repeats, initial, budget)
+        study = Study.plan(bench, strategies, models, repeats, initial, budget)
         found, damaged = conduct(bench, study, folder, scheduler, workers, progress)
     answer = comparison(bench, study, found, poses, (*remarks, *damaged))
     answer = answer.with_pictures(out, rrd, bench.key)

@@ -2,7 +2,9 @@
 
 import threading
 import time
+from dataclasses import replace
 
+import msgspec
 import numpy as np
 from threadpoolctl import threadpool_limits
 
@@ -39,7 +41,7 @@ def run(bench: Bench, task: Task) -> Run:
 
 
 def _run(bench: Bench, task: Task) -> Run:
-    cell = cell_of(bench)
+    cell = _cell(bench, task)
     used = NESTED[INITIAL_DESIGN](cell.candidates.features, task.budget, task.seed)[: task.initial]
     rest = [i for i in planned(cell, task) if i not in used]
     return play(bench, used.tolist(), rest[: task.budget - task.initial], task)
@@ -48,7 +50,7 @@ def _run(bench: Bench, task: Task) -> Run:
 def play(bench: Bench, used: list[int], then: list[int], task: Task) -> Run:
     """A run: first the poses `used`, then those of `then`, then what the strategy proposes."""
     wall, process = time.perf_counter(), time.process_time()
-    cell = cell_of(bench)
+    cell = _cell(bench, task)
     counts, scores, recall = [], [], in_memory()
     while True:
         model, state = _fitted(bench, cell, used, task.seed, recall)
@@ -63,8 +65,16 @@ def play(bench: Bench, used: list[int], then: list[int], task: Task) -> Run:
     rmse_percent, r2, coverage95 = zip(*scores, strict=True)
     return Run(
         task.strategy, task.seed, names, tuple(counts), rmse_percent, r2, coverage95, minutes,
-        *seconds,
+        *seconds, task.model,
     )  # fmt: skip
+
+
+def _cell(bench: Bench, task: Task) -> PoolCell:
+    cell = cell_of(bench)
+    if not task.model:
+        return cell
+    table = msgspec.structs.replace(cell.config.surrogate, model=task.model)
+    return replace(cell, config=msgspec.structs.replace(cell.config, surrogate=table))
 
 
 def _minutes(bench: Bench, cell: PoolCell, used: list[int]) -> tuple[float, ...]:

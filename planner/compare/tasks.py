@@ -9,6 +9,7 @@ from planner.compare.bench import Bench
 from planner.design.propose import check_name
 from planner.design.space_filling import NESTED
 from planner.errors import InputError
+from planner.surrogate.frequency_models import check_choice
 from planner.words import counted
 
 DEFAULT = "default"  # the strategy that `next` uses
@@ -16,12 +17,16 @@ BUDGET, LEFT = 15, 2  # measurements; poses that must be left to judge by
 
 
 class Task(msgspec.Struct, frozen=True):
-    """One run: a strategy (an acquisition's name) from the initial poses of a seed to a budget."""
+    """One run: a strategy (an acquisition's name) from the initial poses of a seed to a budget.
+
+    `model` is a name of `[surrogate] model`, "" the campaign's own.
+    """
 
     strategy: str
     seed: int
     initial: int
     budget: int
+    model: str = ""
 
     def key(self, bench: Bench) -> str:
         """Hash of all that the run's numbers hang on."""
@@ -44,29 +49,39 @@ class Run(msgspec.Struct, frozen=True):
     minutes: tuple[float, ...]
     wall_seconds: float
     process_seconds: float
+    model: str = ""
 
 
 @dataclass(frozen=True)
 class Study:
-    """Strategies by the names that the user gave, with the acquisition that each one is."""
+    """Strategies by the names that the user gave, with the acquisition and model of each."""
 
     strategies: dict[str, str]
+    models: dict[str, str]
     repeats: int
     initial: int
     budget: int
 
     @classmethod
     def plan(
-        cls, bench: Bench, strategies: str, repeats: int, initial: int, budget: int | None
-    ) -> "Study":
+        cls, bench: Bench, strategies: str | None, models: str | None, repeats: int, initial: int,
+        budget: int | None,
+    ) -> "Study":  # fmt: skip
         """From the command line; InputError where it cannot be done with this pool."""
-        asked = [name.strip() for name in strategies.split(",") if name.strip()]
-        if not asked:
-            raise InputError("--strategies names none; give some, for example random,default.")
-        named = {s: bench.config.acquisition.name if s == DEFAULT else s for s in asked}
-        for name in named.values():
+        if strategies is None and models is None:
+            raise InputError("Nothing is compared: give --strategies A,B or --models A,B.")
+        asked = _names("--strategies", strategies, "random,default", [DEFAULT])
+        chosen = _names("--models", models, "default,gp,ar1", [""])
+        table = bench.config.surrogate
+        for model in chosen:
+            simulated = bench.config.fidelity.simulation != "none"
+            check_choice(model or table.model, table.kernel, simulated, "--models")
+        each = [(s, bench.config.acquisition.name if s == DEFAULT else s) for s in asked]
+        for _, name in each:
             if name not in NESTED:
                 check_name(name)
+        one = len(asked) == 1 and models is not None
+        pairs = {m if one else f"{s}/{m}".strip("/"): (name, m) for s, name in each for m in chosen}
         most = len(bench.measurements) - LEFT
         if budget is None and initial > most:
             less = f"give --initial {most} at most, or " if most > 0 else ""
@@ -85,11 +100,23 @@ class Study:
             raise InputError(
                 f"--initial {initial} is more than --budget {budget}; give fewer initial poses."
             )
-        return cls(named, repeats, initial, budget)
+        strategies_of = {name: acquisition for name, (acquisition, _) in pairs.items()}
+        models_of = {name: model for name, (_, model) in pairs.items()}
+        return cls(strategies_of, models_of, repeats, initial, budget)
 
     @property
     def tasks(self) -> tuple[Task, ...]:
         """All runs, seed by seed; strategies that are the same acquisition share theirs."""
-        names = dict.fromkeys(self.strategies.values())
-        seeds = range(self.repeats)
-        return tuple(Task(name, s, self.initial, self.budget) for s in seeds for name in names)
+        pairs = dict.fromkeys((self.strategies[n], self.models[n]) for n in self.strategies)
+        return tuple(
+            Task(name, seed, self.initial, self.budget, model)
+            for seed in range(self.repeats)
+            for name, model in pairs
+        )
+
+
+def _names(option: str, given: str | None, example: str, default: list[str]) -> list[str]:
+    found = [name.strip() for name in (given or "").split(",") if name.strip()]
+    if given is not None and not found:
+        raise InputError(f"{option} names none; give some, for example {example}.")
+    return found or default

@@ -50,13 +50,14 @@ class FailedRun:
 
 @dataclass(frozen=True, eq=False)
 class ComparisonReport(Answer):
-    """Answer of `compare`; `acquisitions` says which one each strategy is."""
+    """Answer of `compare`; `acquisitions` says which one each strategy is, `models` its model."""
 
     strategies: Mapping[str, StrategyCurve]
     measurements_to_one_percent: Mapping[str, int | None]
     minutes_to_one_percent: Mapping[str, float | None]
     paired: PairedStrategies
     acquisitions: Mapping[str, str]
+    models: Mapping[str, str]
     robot: str
     pool: int
     repeats: int
@@ -183,6 +184,7 @@ def comparison(
         minutes_to_one_percent={name: curve.minutes_to_goal for name, curve in curves.items()},
         paired=PairedStrategies(baseline, against),
         acquisitions=study.strategies,
+        models={name: m or bench.config.surrogate.model for name, m in study.models.items()},
         robot=bench.robot.name,
         pool=len(bench.measurements),
         repeats=study.repeats,
@@ -203,7 +205,8 @@ def _by_name(
     """Curves by the names that the user gave."""
     curves = {}
     for name, strategy in study.strategies.items():
-        runs = [r for r in found.values() if isinstance(r, Run) and r.strategy == strategy]
+        asked = strategy, study.models[name]
+        runs = [r for r in found.values() if isinstance(r, Run) and (r.strategy, r.model) == asked]
         if not runs:
             raise InputError(f"Every run of {name} failed: {failed[0].reason}")
         curves[name] = Curves.of(runs)
