@@ -115,6 +115,15 @@ def test_more_repeats_take_up_those_that_are_there(pool, out, first):
     assert len(list((out / "runs").iterdir())) == 9
 
 
+def test_models_are_compared_as_strategies_are(pool, tmp_path):
+    asked = command(pool, tmp_path, "--strategies", "random", "--models", "gp,ar1,none", "--json")
+    found = json.loads(planner(*asked).stdout)
+    assert found["models"] == {"gp": "gp", "ar1": "ar1", "none": "none"}
+    assert set(found["acquisitions"].values()) == {"random"}
+    last = {n: c["frequency_rmse_percent"][-1] for n, c in found["strategies"].items()}
+    assert last["ar1"] < last["none"] < last["gp"]  # 4 poses, a simulation that is 5 % off
+
+
 def test_ctrl_c_keeps_what_is_finished(pool, tmp_path):
     long = command(pool, tmp_path, "--repeats", "500")
     # Tests that a shell runs in the background inherit that Ctrl-C is ignored.
@@ -183,6 +192,8 @@ def test_other_versions_of_the_program_are_refused(bench):
     [
         (("--strategies", "astrology"), "astrology"),
         (("--strategies", ","), "--strategies names none"),
+        (("--models", "kriging"), 'there is no model "kriging"; choose one of default, gp'),
+        (("--models", "gp,ar1", "--simulation", "none"), '"ar1" needs a simulation'),
         (("--budget", "11"), "--budget 11"),
         (("--initial", "9"), "--initial 9"),
         (("--simulation", "frosted"), "frosted"),

@@ -1,0 +1,131 @@
+"""Every model of `[surrogate] model` is held to one contract."""
+
+import pickle
+from functools import cache
+
+import numpy as np
+import pytest
+
+from planner.design.propose import ACQUISITIONS, workspace_outputs
+from planner.dynamics.vibration import SimulatedModes
+from planner.errors import InputError
+from planner.surrogate.average import Average
+from planner.surrogate.frequency_models import MODELS, check_choice
+from planner.surrogate.modal_surrogate import (
+    ModalObservations,
+    Surrogate,
+    fit_primary,
+    fit_surrogate,
+)
+
+POSES, MODES = 14, 2
+WITHOUT_GP = "none"
+every = pytest.mark.parametrize("name", MODELS)
+
+
+def simulated(x: np.ndarray) -> SimulatedModes:
+    """Modes of a simulation whose frequencies are 3 % off, and more where x_0 is large."""
+    hz = 20 * np.stack([np.exp(-0.2 * x[:, 0]), 2 * np.exp(-0.3 * x[:, 1] ** 2)], axis=1)
+    shape = (*hz.shape, 3, 3)
+    return SimulatedModes(hz, np.full_like(hz, 0.02), np.full(shape, 1e-5 + 0j))
+
+
+def true_hz(x: np.ndarray) -> np.ndarray:
+    return simulated(x).frequency_hz * np.exp(0.03 + 0.02 * np.sin(3 * x[:, :1]))
+
+
+def seen(n: int = POSES, missing: bool = False) -> ModalObservations:
+    rng = np.random.default_rng(3)
+    x = 0.8 * rng.random((n, 2))
+    hz = true_hz(x) * np.exp(1e-3 * rng.standard_normal((n, MODES)))
+    hz[: int(missing), 0] = np.nan
+    low = simulated(x)
+    sd = 0.1 * low.damping_ratio, np.full(low.residue.shape, 1e-7)
+    return ModalObservations(x, hz, 1e-3 * hz, low.damping_ratio, sd[0], low.residue, sd[1], low)
+
+
+@cache
+def fitted(name: str) -> Average:
+    return fit(name, seen())
+
+
+def fit(name: str, data: ModalObservations, kernel: str | None = None) -> Average:
+    elsewhere = np.random.default_rng(0).random((60, 2))
+    hz = simulated(elsewhere).frequency_hz
+    return fit_primary(data, model=name, kernel=kernel, elsewhere=(elsewhere, hz))
+
+
+def predicted(model: Average, x: np.ndarray, nugget: bool) -> tuple[np.ndarray, np.ndarray]:
+    return model.predict(x, np.log(simulated(x).frequency_hz), nugget)
+
+
+@every
+def test_measured_poses_are_met_and_new_visits_lie_in_the_intervals(name: str) -> None:
+    new = np.vstack([seen().x, 0.8 * np.random.default_rng(9).random((60, 2))])
+    mean, sd = predicted(fitted(name), new, nugget=True)
+    off = np.abs(mean - np.log(true_hz(new)))
+    assert np.mean(off <= 1.96 * np.hypot(sd, 1e-3)) >= 0.85
+    assert np.median(off[:POSES]) < (0.05 if name == WITHOUT_GP else 0.004)
+
+
+@every
+def test_far_from_all_poses_it_is_less_sure(name: str) -> None:
+    data = seen()
+    near, far = (predicted(fitted(name), x, False)[1] for x in (data.x, np.array([[2.5, 2.5]])))
+    assert np.all(far >= np.median(near, axis=0))
+    if name != WITHOUT_GP:
+        assert np.all(far > 2 * np.median(near, axis=0))
+
+
+@every
+def test_acquisitions_ask_for_a_pose_away_from_those_measured(name: str) -> None:
+    rng, data = np.random.default_rng(1), seen()
+    surrogate = fit_surrogate(data, primary=fitted(name), residues=False)
+    candidates = np.vstack([data.x, rng.random((40, 2))])
+    outputs, poses = workspace_outputs(surrogate, candidates, simulated(candidates))
+    for acquisition in ("variance", "integrated_variance", "mutual_information"):
+        gain = ACQUISITIONS[acquisition](outputs, poses)
+        assert np.isfinite(gain).all()
+        if name != WITHOUT_GP:
+            assert int(np.argmax(gain)) >= POSES
+
+
+@every
+def test_few_poses_and_missing_modes_are_no_reason_to_fail(name: str) -> None:
+    x = np.random.default_rng(2).random((5, 2))
+    for data in (seen(0), seen(1), seen(2), seen(5, missing=True)):
+        mean, sd = predicted(fit(name, data), x, nugget=True)
+        assert np.isfinite(mean).all()
+        assert np.all(sd > 0)
+
+
+@every
+def test_a_kept_model_is_the_same(name: str) -> None:
+    x = np.random.default_rng(2).random((5, 2))
+    again = pickle.loads(pickle.dumps(fitted(name)))
+    np.testing.assert_array_equal(predicted(again, x, True), predicted(fitted(name), x, True))
+
+
+@pytest.mark.parametrize("name", ["gp", "ar1", "nargp", "default"])
+def test_a_kernel_that_is_named_is_used(name: str) -> None:
+    one = fit(name, seen(), "rbf")
+    assert all("matern52" not in p.kernel for p in one.posteriors)
+    assert any("rbf" in p.kernel for p in one.posteriors)
+
+
+def test_without_a_simulation_the_campaign_s_weight_of_it_is_zero() -> None:
+    surrogate = Surrogate(fitted("gp"), fitted("gp"), None, np.ones(MODES))
+    assert not surrogate.frequency_trust.any()
+
+
+@pytest.mark.parametrize(
+    ("model", "kernel", "simulated", "said"),
+    [
+        ("krigging", None, True, r'there is no model "krigging"; choose one of default, gp, ar1'),
+        ("gp", "cosine", True, r'there is no kernel "cosine"; choose one of bias'),
+        ("nargp", None, False, r'"nargp" needs a simulation.* choose one of default, gp'),
+    ],
+)
+def test_names_that_cannot_be_used_are_refused(model, kernel, simulated, said) -> None:
+    with pytest.raises(InputError, match=r"campaign.toml, \[surrogate\].*" + said):
+        check_choice(model, kernel, simulated, "campaign.toml, [surrogate]")
