@@ -22,6 +22,7 @@ from planner.design.reductions import repeat_gain
 from planner.design.stopping import Forecast, forecast
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf.frf import Frf
+from planner.surrogate.frequency_models import Predicting
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
 from planner.surrogate.modal_surrogate import (
     ModalObservations,
@@ -293,6 +294,12 @@ class Model:
         """What the engineer should know of the model: doubts about the simulation."""
         found = [self.low.remark] if self.low.remark else []
         found += self.surrogate.remarks
+        if isinstance(self.surrogate.primary, Predicting):
+            found.append(
+                f"The model {self.cell.config.surrogate.model} does not say how poses go together: "
+                f"proposals, forecasts and the test of poses left out are those of ar1; planner "
+                f"status --models tests it itself."
+            )
         if self.labelled and self.low.simulation is not None:
             left = [str(k + 1) for k, w in enumerate(self.surrogate.frequency_trust) if w < 0.5]
             if left:

@@ -191,7 +191,10 @@ CONFIGURATIONS = {
         "upside down": (replaced("[[-40, 40]", "[[40, -40]"), "range 1 is [40, -40]; give finite"),
         "band upside down": (replaced(BAND, "band_hz = [40.0, 8.0]"), "band_hz is [40, 8]"),
         "unknown acquisition": (replaced("integrated_variance", "ei"), "there is no acquisition"),
-        "unknown model": (added('[surrogate]\nmodel = "kriging"'), 'no model "kriging"; choose one'),
+        "unknown model": (
+            added('[surrogate]\nmodel = "kriging"'),
+            'no model "kriging"; choose one',
+        ),
         "unknown kernel": (added('[surrogate]\nkernel = "cosine"'), 'there is no kernel "cosine"'),
         "no number": (added("[stop]\nfrequency_sd_percent = nan"), "frequency_sd_percent"),
         "no end": (added("[goal]\njoints_deg = [[0, inf, 0, 0, 0, 0]]"), "joints_deg"),

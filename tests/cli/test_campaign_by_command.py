@@ -5,6 +5,7 @@ import tomllib
 import numpy as np
 import pytest
 
+from planner.surrogate.frequency_models import MODELS
 from tests.support.outside import call, make_cell, record, told
 from tests.support.robots import JOINTS_DEG
 
@@ -46,6 +47,12 @@ def test_a_measurement_is_set_aside_and_taken_back(tmp_path):
     said = " ".join(call("status", cell)[1].split())
     assert "RMSE over the workspace is about" in said
     assert "is told once" not in said
+    models = told("status", cell, "--models")["models"]
+    assert {m["model"] for m in models} == set(MODELS)
+    assert [m["model"] for m in models if m["campaign"]] == ["default"]
+    density = {m["model"]: m["log_density"] for m in models}
+    assert [m["model"] for m in models] == sorted(density, key=lambda name: -density[name])
+    assert density["gp"] < density["ar1"]  # three poses tell little without the simulation
     true = np.array([truth.modes(np.deg2rad(q), 4)[0] for q in ASKED])
     off = [np.sqrt(np.mean((p[..., 0] / true - 1) ** 2)) for p in (after[0], after[-1])]
     assert off[1] < min(0.01, off[0] / 2)

@@ -24,7 +24,7 @@ from planner.surrogate.models.nargp import NARGP, perdikaris, widened
 
 # NARGP's climb begins with so many of the measured points, which costs next to nothing, goes on
 # with more, and ends with all.
-SOME_POINTS, STARTS = (250, 900), 8
+SOME_POINTS, STARTS = (250, 900), 32
 SURFACE_TRAINING = Training(4000, 4000, inducing=200)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
+from scipy.stats import qmc
 
 from planner.inference.quasi_newton import RELATIVE_TOLERANCE, Peak, maximise
 from planner.surrogate.kernels import parse
@@ -21,6 +22,8 @@ from planner.surrogate.training_data import capacity
 # Of log θ: amplitudes and length scales from 1e-3 to 1e5 in units of y's and x's own scale.
 LOWEST, HIGHEST = float(np.log(1e-3)), float(np.log(1e5))
 LENGTH = 0.4  # length scales from which a climb begins, times √d; x is scaled to about [0, 1]
+# Of starts everywhere: length scales of x, amplitudes over y's scale.
+LENGTHS, AMPLITUDES = (0.02, 2.0), (0.2, 5.0)
 LEAST_NOISE = 1e-4  # sd over y's scale, where the noise is fitted
 JITTER = 1e-8  # variance over y's scale squared, as GPy adds it
 # Noise that is known and small leaves K + τ²I so ill-conditioned far from the peak that a first
@@ -120,9 +123,11 @@ def fit_growing(
         part = Samples(samples.x[some], samples.y[some], samples.sd[some])
         hill = _Hill.of(part, kernel, None, units, isotropic=False)
         if not peaks:
-            ends = hill.roughly(starts, seed=0)
+            ends = [hill.climb(z, *ROUGHLY) for z in hill.everywhere(starts)]
         else:
-            ends = [hill.climb(peak.x, FEW_STEPS, FTOL) for peak in peaks[:MOST_PEAKS]]
+            # The likeliest of few points may be the seventh of all: only the last step is dear.
+            rest = peaks if count < len(order) else peaks[:MOST_PEAKS]
+            ends = [hill.climb(peak.x, FEW_STEPS, FTOL) for peak in rest]
         peaks = _likeliest(ends)
     return at_hyperparameters(samples, kernel, peaks[0].x, units)
 
@@ -171,6 +176,16 @@ class _Hill:
         """The middle, and normal around it (count, …)."""
         normal = np.random.default_rng(seed).standard_normal((count - 1, len(self.kept)))
         return self.middle + np.vstack([np.zeros(len(self.kept)), normal])
+
+    def everywhere(self, count: int) -> np.ndarray:
+        """Evenly over all that is plausible (count, …), by Halton's sequence: of climbs from the
+        middle alone the likeliest may be far from the greatest likelihood."""
+        kernel = parse(self.kernel, self.data[0].shape[1])
+        low, high = np.tile(np.log(LENGTHS), (kernel.size, 1)).T
+        low[list(kernel.amplitudes)], high[list(kernel.amplitudes)] = np.log(AMPLITUDES)
+        low[1], high[1] = np.log(NOISES[-1]), np.log(NOISES[0])
+        even = qmc.Halton(len(self.kept), rng=0).random(count)
+        return low[self.kept] + even * (high - low)[self.kept]
 
     def roughly(self, starts: int, seed: int, noise: float | None = None) -> list[Peak]:
         """Where climbs from several starts end roughly."""
