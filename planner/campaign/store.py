@@ -14,7 +14,7 @@ from planner import file_content
 from planner.campaign.config import load_campaign_config
 from planner.campaign.journal import sync_folder, write_synced
 from planner.errors import InputError
-from planner.robot.xacro_source import urdf_source
+from planner.robot.mesh_files import urdf_source
 from planner.toml_file import read_toml_text
 
 LOG = "log.jsonl"
