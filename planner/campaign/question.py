@@ -225,10 +225,7 @@ def _asked(pose: str, off_percent: float, fits: Mistake | None) -> Question:
     if fits is not None and fits.about == "chain":
         text = f"At {pose}, {fits.what} Are these hits right as they are?"
     elif fits is not None and fits.about == "readback":
-        text = (
-            f"These hits {fits.what} If it was typed wrong, correct recordings.csv and import "
-            f"again. Are the angles right as they are?"
-        )
+        text = f"These hits {fits.what} Are the angles right as they are?"
     else:
         instead = fits.what if fits else "fit no other known pose either"
         text = (
