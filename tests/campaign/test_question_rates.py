@@ -74,9 +74,7 @@ class Asker:
             return ""
         mistakes = [Mistake(there, "", name) for name, there in others.items()]
         mistakes += [Mistake(opposite(q, i), "", about="readback") for i in range(len(q))]
-        mistakes += elsewhere(
-            self.joints, self.expected, frf, tuple(self.joints.stated(q[None])[0])
-        )
+        mistakes += elsewhere(self.joints, self.expected, frf, tuple(self.joints.shown(q)))
         faults = (*TURNED, *AGAINST, *scaled(self.expected.ratio(q, frf)))
         mistakes += [Mistake(q, "", about="chain", fault=fault) for fault in faults]
         found = stated.instead(mistakes)
