@@ -60,11 +60,11 @@ class IdentifiedModel:
     bounds: np.ndarray
 
     @property
-    def at_bounds(self) -> float:
-        """Share in % of the parameters that lie at a bound."""
+    def at_bounds(self) -> int:
+        """How many parameters lie at a bound, or beyond."""
         low, high = np.log(self.bounds).T
         place = (np.log(self.values) - low) / (high - low)
-        return float(100 * np.mean((place < AT_BOUND) | (place > 1 - AT_BOUND)))
+        return int(np.sum((place < AT_BOUND) | (place > 1 - AT_BOUND)))
 
     @property
     def ratios(self) -> np.ndarray:

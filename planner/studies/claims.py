@@ -66,17 +66,17 @@ class Bound:
         sign, mean = (1.0 if self.below is None else -1.0), float(each.mean())
         worst = float(min(sign * each) * sign)
         if sign * worst <= sign * self.limit:
-            return NOT, f"{worst:.3g} on the worst seed is {self.false_if}"
+            return NOT, f"no: {worst:.3g} on the worst seed is {self.false_if}"
         if sign * mean - sd <= sign * self.limit:
-            return NOT, f"{mean:.3g} is less than the spread ({sd:.2g}) from {self.limit:g}"
+            return NOT, f"no: {mean:.3g} is within the spread ({sd:.2g}) of {self.limit:g}"
         if len(each) < 2:
-            return IN_KIND, f"{mean:.3g} on one seed, which has no spread"
+            return IN_KIND, f"in kind: {mean:.3g} on one seed, which has no spread"
         if self.in_full is None:
-            return HOLDS, f"{worst:.3g} on the worst seed is not {self.false_if}"
+            return HOLDS, f"yes: {worst:.3g} on the worst seed is not {self.false_if}"
         side = "≥" if self.below is None else "≤"
         if sign * mean >= sign * self.in_full:
-            return HOLDS, f"{mean:.3g} in the mean is {side} {self.in_full:g}"
-        return IN_KIND, f"{mean:.3g} in the mean; in full from {side} {self.in_full:g}"
+            return HOLDS, f"yes: {mean:.3g} in the mean is {side} {self.in_full:g}"
+        return IN_KIND, f"in kind: {mean:.3g} in the mean, in full from {side} {self.in_full:g}"
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 from rich.console import Group, RenderableType
+from rich.padding import Padding
 from rich.text import Text
 
 from planner.errors import InputError
@@ -189,6 +190,6 @@ def _claims(answer: StudyAnswer) -> list[RenderableType]:
         parts.append(Text.assemble(*head))
         for figure in claim.figures:
             name, paper, here, spread, false_if, reason = figure.cells
-            told = f"{here} ({spread}); the paper: {paper}; false if {false_if}; {reason}"
-            parts.append(Text(f"    {name}: {told}"))
+            told = f"{here} ({spread}); the paper {paper}; false if {false_if}; {reason}"
+            parts.append(Padding(Text(f"{name}: {told}"), (0, 0, 0, 4)))
     return parts
