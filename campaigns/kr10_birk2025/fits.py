@@ -115,37 +115,28 @@ def fitted(
     """
     nominal, ours = stated(name), name.endswith("ours")
     frfs, q = [hits.struck.frfs[i] for i in rows], hits.struck.q[rows]
-    priors = CAD_INERTIAS if ours else paper_priors(nominal)
-    if name in SEARCHED:
-        generations = FEW_GENERATIONS if small else SEARCHED[name]
-        values = within_bounds(nominal, priors, frfs, q, (), generations)
-        return _bounded(hits, nominal, priors, values, np.nan)
-    found = identify(
-        frfs,
-        q,
-        nominal,
-        priors,
-        band_hz=BAND_HZ,
-        tolerances=None if ours else EXACT_HITS,
-        extend=ours,
-    ).identified
-    values = np.array([e.value for e in found.estimates])
-    if ours:
-        agreed = (_agreement(hits, found.simulation, band) for band in (BAND_HZ, FULL_HZ))
-        return IdentifiedModel(found.simulation, *agreed, found.misfit, values, np.empty((0, 2)))
-    starts = [values] if searched is None else [values, searched]
-    values = within_bounds(nominal, priors, frfs, q, starts, FEW_STEPS if small else STEPS)
-    return _bounded(hits, nominal, priors, values, found.misfit)
-
-
-def _bounded(
-    hits: PathHits, nominal: Simulation, priors: Priors, values: np.ndarray, misfit: float
-) -> IdentifiedModel:
-    p = parametrise(nominal, priors)
-    simulation = nominal.changed(p.elasticity(np.log(values)))
-    agreed = (_agreement(hits, simulation, band) for band in (BAND_HZ, FULL_HZ))
+    priors, misfit = CAD_INERTIAS if ours else paper_priors(nominal), np.nan
+    starts, steps = [], FEW_GENERATIONS if small else SEARCHED.get(name, 0)
+    if name not in SEARCHED:
+        tolerances = None if ours else EXACT_HITS
+        found = identify(
+            frfs, q, nominal, priors, band_hz=BAND_HZ, tolerances=tolerances, extend=ours
+        ).identified
+        values, misfit = np.array([e.value for e in found.estimates]), found.misfit
+        if ours:
+            return _model(hits, found.simulation, misfit, values, np.empty((0, 2)))
+        starts = [values] if searched is None else [values, searched]
+        steps = FEW_STEPS if small else STEPS
+    values, p = within_bounds(nominal, priors, frfs, q, starts, steps), parametrise(nominal, priors)
     bounds = np.array([(x.lower, x.upper) for x in p.parameters])
-    return IdentifiedModel(simulation, *agreed, misfit, values, bounds)
+    return _model(hits, nominal.changed(p.elasticity(np.log(values))), misfit, values, bounds)
+
+
+def _model(
+    hits: PathHits, simulation: Simulation, misfit: float, values: np.ndarray, bounds: np.ndarray
+) -> IdentifiedModel:
+    limited, full = (_agreement(hits, simulation, band) for band in (BAND_HZ, FULL_HZ))
+    return IdentifiedModel(simulation, limited, full, misfit, values, bounds)
 
 
 def within_bounds(

@@ -6,16 +6,11 @@ Tables 1 and 2 (`fits`); figures are the paper's, Global FRAC and Frobenius simi
 chain leave open integrated out. The paper's outlook asks where to measure: D-optimal points answer.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
-from matplotlib.figure import Figure
 
-from planner.frf.metrics import Agreement
 from planner.progress import Tell, within
-from planner.studies import drawing
 from planner.studies.claims import Bound, ClaimRule, judge
-from planner.studies.report import Paper, Report, Table
+from planner.studies.report import Paper, Report
 
 from .data import BAND_HZ, PATHS, PathHits, load
 from .fits import (
@@ -28,6 +23,19 @@ from .fits import (
     percent,
     stated,
 )
+from .pictures import (
+    BOTH,
+    MAIN,
+    NAN,
+    Run,
+    campbell,
+    design_table,
+    direction_table,
+    directions_figure,
+    on_path,
+    table_4,
+    table_5,
+)
 
 PAPER = Paper(
     "Birk, Kipfmüller, Kotschenreuther", 2025,
@@ -36,14 +44,6 @@ PAPER = Paper(
 )  # fmt: skip
 SEEDS = 11, 12, 13  # each another robot and other hits
 FEW = 3  # points, of which it is asked how far they suffice
-BOTH, MAIN = ("12P", "24P"), ("12P", "24P", "24P, ours")
-BANDS = "≤ 200 Hz", "≤ 800 Hz"
-NAN = float("nan")
-PAPER_4 = {"12P": (40.8, 19.1, 22.6), "24P": (70.5, 44.9, 36.9)}  # Table 4, %
-PAPER_5 = {  # FRAC and Frobenius similarity by path (Table 5), %
-    "12P": ((41.8, 19.6), (46.7, 22.3), (33.9, 15.6)),
-    "24P": ((75.0, 48.9), (70.1, 44.2), (66.2, 41.7)),
-}
 RULES = (
     ClaimRule.of(
         "24P reproduces FRFs far better than 12P, by both metrics and in both bands (Table 4).",
@@ -109,15 +109,6 @@ RULES = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """Hits on one robot, the models identified from nine points, and designs."""
-
-    hits: PathHits
-    models: dict[str, IdentifiedModel]
-    designs: list[Design]
-
-
 def study(progress: Tell, small: bool = False) -> Report:
     """FRAC and Frobenius similarity by path, direction and band, and which poses suffice."""
     seeds = SEEDS[:1] if small else SEEDS
@@ -127,18 +118,18 @@ def study(progress: Tell, small: bool = False) -> Report:
         runs.append(_run(seed, small, tell))
     each = [figures(run) for run in runs]
     together = {name: [one[name] for one in each] for name in each[0]}
-    directions = _direction_table(runs[0])
+    directions = direction_table(runs[0])
     return Report(
         PAPER,
         f"SIMULATED: a KR10 in MuJoCo on three paths, {len(runs[0].hits.path)} points, nine hits "
         "each with everyday errors; its links bend, its gears stiffen in steps and rub, its table "
         "gives way, stated stiffnesses are off by ± 40 %, inertias by 12 %: no parameters of 12P "
         f"or 24P are its own. Robots: {len(runs)}; tables and pictures of the first.",
-        (_table_4(runs[0]), _table_5(runs[0]), directions, _design_table(runs[0])),
+        (table_4(runs[0]), table_5(runs[0]), directions, design_table(runs[0])),
         judge(RULES, together, _notes(runs)),
         {
-            "birk2025_campbell": _campbell(runs[0]),
-            "birk2025_directions": _directions_figure(directions),
+            "birk2025_campbell": campbell(runs[0]),
+            "birk2025_directions": directions_figure(directions),
         },
     )
 
@@ -194,7 +185,7 @@ def figures(run: Run) -> dict[str, float]:
     others = np.setdiff1d(np.arange(len(run.hits.path)), nine)
     frac, similar = ({n: percent(models[n].limited)[i] for n in models} for i in (0, 1))
     full = {n: percent(models[n].full)[0] for n in models}
-    paths = np.array([[percent(_on(run, n, p))[0] for p in PATHS] for n in BOTH])
+    paths = np.array([[percent(on_path(run, n, p))[0] for p in PATHS] for n in BOTH])
     there = {n: percent(models[n].limited[nine])[0] for n in BOTH}
     aside = {n: percent(models[n].limited[others]) for n in models}
     lost = {n: there[n] - aside[n][0] for n in BOTH}
@@ -225,11 +216,6 @@ def figures(run: Run) -> dict[str, float]:
     return dict(zip(names, map(float, values), strict=True))
 
 
-def _on(run: Run, name: str, path: str) -> Agreement:
-    """A model's agreement with one path up to 200 Hz."""
-    return run.models[name].limited[run.hits.path == path]
-
-
 def _notes(runs: list[Run]) -> dict[str, str]:
     first = runs[0]
     ratios = ", ".join(f"{v:.1f}" for v in first.models["24P"].ratios)
@@ -240,7 +226,7 @@ def _notes(runs: list[Run]) -> dict[str, str]:
         high += square[:, frf.frequency_hz > BAND_HZ[1]].sum(axis=1)
     shares = ", ".join(f"{100 * v:.0f}" for v in high / total)
     worst = ", ".join(
-        f"{n} {min(PATHS, key=lambda p, n=n: percent(_on(first, n, p))[0])}" for n in BOTH
+        f"{n} {min(PATHS, key=lambda p, n=n: percent(on_path(first, n, p))[0])}" for n in BOTH
     )
     return {
         "FRAC ≤ 200 Hz over that ≤ 800 Hz, 12P, points": "FRAC is a correlation over all lines, "
@@ -255,85 +241,3 @@ def _notes(runs: list[Run]) -> dict[str, str]:
         "FRAC elsewhere beyond the paper's nine, points": "D-optimal points are chosen for "
         "parameters, not for what is predicted elsewhere, and lie close together",
     }
-
-
-def _table_4(run: Run) -> Table:
-    """All points, both bands."""
-    rows = []
-    for name, model in run.models.items():
-        theirs = PAPER_4.get(name, (NAN,) * 3)
-        rows.append((name, *percent(model.limited), *percent(model.full), *theirs))
-    columns = ("model", "FRAC ≤ 200 Hz, %", "Frobenius", "FRAC ≤ 800 Hz, %", "Frobenius",
-               "paper: FRAC ≤ 200", "Frobenius", "FRAC ≤ 800")  # fmt: skip
-    return Table("birk2025_table_4", "Table 4: all points", columns, tuple(rows))
-
-
-def _table_5(run: Run) -> Table:
-    """Path by path below 200 Hz."""
-    rows = []
-    for name in run.models:
-        for path, theirs in zip(PATHS, PAPER_5.get(name, ((NAN, NAN),) * 3), strict=True):
-            agreed = percent(_on(run, name, path))
-            rows.append((f"{name}, {path}", *agreed, *theirs))
-    columns = "model, path", "FRAC, %", "Frobenius, %", "paper: FRAC, %", "Frobenius, %"
-    return Table("birk2025_table_5", "Table 5: by path, ≤ 200 Hz", columns, tuple(rows))
-
-
-def _direction_table(run: Run) -> Table:
-    """Model, path, band and direction of the direct FRFs (Figure A1 has part of it)."""
-    rows = []
-    for name in MAIN:
-        model = run.models[name]
-        for band, agreement in zip(BANDS, (model.limited, model.full), strict=True):
-            for path in ("all", *PATHS):
-                some = agreement[(run.hits.path == path) | (path == "all")]
-                values = np.r_[np.diagonal(some.global_frac), np.diagonal(some.frobenius)]
-                rows.append((f"{name}, {path}, {band}", *map(float, 100 * values)))
-    columns = "model, path, band", "FRAC x, %", "y", "z", "Frobenius x, %", "y", "z"
-    return Table("birk2025_directions", "By path, direction and band", columns, tuple(rows))
-
-
-def _design_table(run: Run) -> Table:
-    """Which points determine how many parameters, and how well a fit to them predicts."""
-    names = run.hits.names
-    rows = [
-        (d.name, float(len(d.rows)), float(d.determined), d.frac,
-         " ".join(names[i] for i in d.rows))
-        for d in run.designs
-    ]  # fmt: skip
-    columns = ("points", "count", "parameters determined", "FRAC at all others, %", "which")
-    return Table("birk2025_where", "Where to measure for 24P: which poses determine what, ≤ 200 Hz",
-                 columns, tuple(rows))  # fmt: skip
-
-
-def _campbell(run: Run) -> Figure:
-    """Figures 8 and 9: S1, hit and response y, over frequency and place along the path."""
-    rows = np.flatnonzero(run.hits.path == PATHS[0])
-    lines, struck = np.linspace(*BAND_HZ, 240), run.hits.struck
-    measured = [
-        np.interp(lines, struck.frfs[i].frequency_hz, np.abs(struck.frfs[i].accelerance[1, 1]))
-        for i in rows
-    ]
-    maps = {"measured (simulated)": np.array(measured)}
-    for name in MAIN:
-        maps[name] = np.abs(run.models[name].simulation.accelerance(struck.q[rows], lines)[:, 1, 1])
-    figure = drawing.new((12.0, 4.2), "Figures 8 and 9: path S1, hit and response y")
-    panels = figure.subplots(1, len(maps), sharey=True)
-    number = np.arange(len(rows)) + 1
-    drawing.maps(figure, panels, {n: (number, lines, m.T) for n, m in maps.items()}, 45)
-    for panel in panels:
-        panel.set_xlabel("point of the path")
-    panels[0].set_ylabel("frequency (Hz)")
-    return figure
-
-
-def _directions_figure(table: Table) -> Figure:
-    figure = drawing.new((9.0, 4.4), "Global FRAC by direction and band")
-    rows = [row for row in table.rows if ", all, " in str(row[0])]
-    values = np.array([row[1:4] for row in rows], dtype=float)
-    panel = figure.subplots()
-    drawing.bars(panel, [str(r[0]).replace(", all, ", "\n") for r in rows], ("x", "y", "z"),
-                 values, "Global FRAC (%)")  # fmt: skip
-    panel.set_ylim(0, 100)
-    panel.legend(fontsize=9)
-    return figure

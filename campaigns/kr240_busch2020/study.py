@@ -181,12 +181,17 @@ def _notes(
 ) -> dict[str, str]:  # fmt: skip
     fused = np.mean(together["least R² of fused modes over all steps"])
     said = " ".join(one[1].said for one in runs.values() if 1 in one and one[1].said)
-    return {
+    told = {
         "R² of NARGP beyond 105°": "the greatest likelihood of the training need not extrapolate; "
         f"modes fused over the same simulation reach {fused:.3f} at least",
         "least R² of NARGP with every 1st to 3rd experiment": "more experiments do not help where "
         "the kernel cannot carry a peak on",
-    } | ({NAMED: said, "times that the dress pack is named": said} if said else {})
+    } | dict.fromkeys((NAMED, "times that the dress pack is named"), said)
+    if all(1 in run for run in runs.values()):
+        return told
+    names = [name for rule in RULES for name in rule.figures]
+    absent = [n for n in names if not np.isfinite(together.get(n, [np.nan])).all()]
+    return told | dict.fromkeys(absent, "the small study leaves it out")
 
 
 def _robot_table(runs: dict[int, dict[int, BeyondPrediction]], seen: dict[int, Sweep]) -> Table:

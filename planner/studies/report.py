@@ -190,6 +190,7 @@ def _claims(answer: StudyAnswer) -> list[RenderableType]:
         parts.append(Text.assemble(*head))
         for figure in claim.figures:
             name, paper, here, spread, false_if, reason = figure.cells
-            told = f"{here} ({spread}); the paper {paper}; false if {false_if}; {reason}"
+            theirs = "" if paper == "–" else f"the paper: {paper}; "
+            told = f"{here} ({spread}); {theirs}false if {false_if}; {reason}"
             parts.append(Padding(Text(f"{name}: {told}"), (0, 0, 0, 4)))
     return parts
