@@ -10,9 +10,10 @@ from planner.studies import drawing
 from planner.studies.report import Table
 
 from .data import BAND_HZ, PATHS, PathHits
-from .fits import Design, IdentifiedModel, percent
+from .fits import SEARCHED, Design, IdentifiedModel, percent
 
 BOTH, MAIN = ("12P", "24P"), ("12P", "24P", "24P, ours")
+ORDER = (*MAIN, *SEARCHED)
 BANDS = "≤ 200 Hz", "≤ 800 Hz"
 NAN = float("nan")
 PAPER_4 = {"12P": (40.8, 19.1, 22.6), "24P": (70.5, 44.9, 36.9)}  # Table 4, %
@@ -39,8 +40,8 @@ def on_path(run: Run, name: str, path: str) -> Agreement:
 def table_4(run: Run) -> Table:
     """All points, both bands."""
     rows = []
-    for name, model in run.models.items():
-        theirs = PAPER_4.get(name, (NAN,) * 3)
+    for name in ORDER:
+        model, theirs = run.models[name], PAPER_4.get(name, (NAN,) * 3)
         rows.append((name, *percent(model.limited), *percent(model.full), *theirs))
     columns = ("model", "FRAC ≤ 200 Hz, %", "Frobenius", "FRAC ≤ 800 Hz, %", "Frobenius",
                "paper: FRAC ≤ 200", "Frobenius", "FRAC ≤ 800")  # fmt: skip
@@ -50,7 +51,7 @@ def table_4(run: Run) -> Table:
 def table_5(run: Run) -> Table:
     """Path by path below 200 Hz."""
     rows = []
-    for name in run.models:
+    for name in ORDER:
         for path, theirs in zip(PATHS, PAPER_5.get(name, ((NAN, NAN),) * 3), strict=True):
             agreed = percent(on_path(run, name, path))
             rows.append((f"{name}, {path}", *agreed, *theirs))
@@ -115,5 +116,5 @@ def directions_figure(table: Table) -> Figure:
     drawing.bars(panel, [str(r[0]).replace(", all, ", "\n") for r in rows], ("x", "y", "z"),
                  values, "Global FRAC (%)")  # fmt: skip
     panel.set_ylim(0, 100)
-    panel.legend(fontsize=9)
+    drawing.legend(figure, panel)
     return figure
