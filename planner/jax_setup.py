@@ -1,8 +1,8 @@
 """JAX as the compiled functions here want it, with nothing changed for anybody else.
 
 `compiled` replaces jax.jit: while such a function runs, JAX computes in float64 and refuses to
-broadcast arrays of different rank; what was configured before holds again afterwards, and the
-results are NumPy arrays.
+broadcast arrays of different rank, and BLAS has one thread; what was configured before holds again
+afterwards, and the results are NumPy arrays.
 """
 
 import os
@@ -17,6 +17,7 @@ from typing import Any, Literal
 import jax
 import numpy as np
 from jax.experimental.compilation_cache import compilation_cache
+from threadpoolctl import ThreadpoolController
 
 from planner import cache_folder
 
@@ -71,11 +72,11 @@ def compiled(
         def call(*args: Any) -> Any:
             key = tuple(_signature(one) for one in args)
             if key in seen:
-                with numerics():
+                with _blas().limit(limits=1), numerics():
                     return _numpy(jitted()(*args))
             if any(isinstance(one, jax.core.Tracer) for one in args):
                 return jitted()(*args)
-            with _compiling, numerics():
+            with _compiling, _blas().limit(limits=1), numerics():
                 run = jitted()
                 with _kept_on_disk():
                     found = _numpy(run(*args))
@@ -85,6 +86,17 @@ def compiled(
         return call
 
     return decorate
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """Of SciPy's, which XLA calls: loaded later, it would not know of limits that hold already.
+
+    Its threads wait for each other a hundred times longer than small matrices take.
+    """
+    import scipy.linalg  # noqa: F401
+
+    return ThreadpoolController()
 
 
 def _signature(argument: Any) -> Any:

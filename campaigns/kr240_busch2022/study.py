@@ -12,12 +12,10 @@ import numpy as np
 from planner.progress import Tell, within
 from planner.studies.claims import Bound, ClaimRule, judge
 from planner.studies.report import Paper, Report, Table, r_squared
-from planner.surrogate.models.ar1_nargp import fit_ar1_nargp
+from planner.surrogate.models.averaged import fit_ar1_nargp, fit_gp, fit_recursive
 from planner.surrogate.models.fidelity_levels import Exact, Samples
 from planner.surrogate.models.likelihood_gp import Normalisation, fit_likelihood
 from planner.surrogate.models.nargp import fit_nargp, kennedy_ohagan
-from planner.surrogate.models.recursive_ar1 import fit_recursive
-from planner.surrogate.models.single_output_gp import fit_gp
 
 from .data import (
     COMPARED,

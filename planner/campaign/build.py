@@ -16,8 +16,8 @@ from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.hit_columns import PoseHits
 from planner.design.parameter_sensitivity import FrfNoise
 from planner.frf.frf import Frf
+from planner.surrogate.average import Average
 from planner.surrogate.gp import STAGES
-from planner.surrogate.hedged import HedgedAR1
 from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, fit_surrogate
 
 # Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
@@ -72,7 +72,7 @@ def build(
         best.seen,
         primary=best.primary,
         residues=False,
-        taught=best.low.taught,
+        identified=best.low.taught,
     )
     if hits_of is not None:
         frf_of = _OfOneHit(frf_of, hits_of)
@@ -106,7 +106,7 @@ class _Guided:
     used: tuple[Measurement, ...]
     labelled: tuple[LabelledPose, ...]
     seen: ModalObservations
-    primary: HedgedAR1
+    primary: Average
 
     @classmethod
     def by(

@@ -69,9 +69,9 @@ def _choices(kind: type[msgspec.Struct]) -> tuple[SchemaChoice, ...]:
     """Acquisitions, where the table names one."""
     if kind is not AcquisitionTable:
         return ()
-    from planner.design.propose import ACQUISITIONS, DESIGNS, TOLD
+    from planner.design.propose import ACQUISITIONS, DESCRIPTIONS, DESIGNS
 
-    return tuple(SchemaChoice(name, TOLD[name]) for name in (*ACQUISITIONS, *DESIGNS))
+    return tuple(SchemaChoice(name, DESCRIPTIONS[name]) for name in (*ACQUISITIONS, *DESIGNS))
 
 
 def _about(kind: type) -> str:

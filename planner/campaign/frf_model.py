@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from planner.fit.posterior import RobotPosterior
 from planner.measurement.measured_frfs import Measured, common_band, stack
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
-from planner.surrogate.left_out_modes import left_out_modes
+from planner.surrogate.leave_one_out import left_out_modes
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model

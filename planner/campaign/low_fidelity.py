@@ -20,7 +20,7 @@ from planner.fit.structure import RobotPrior
 from planner.frf import synthesis
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
-from planner.surrogate.hedged import PRIOR_BELIEF
+from planner.surrogate.average import PRIOR_BELIEF
 
 BELIEVED = 0.99  # in a simulation that fits the recordings
 # Of ln f: what is left where the simulation explains the recordings, and where not, in shares of

@@ -15,7 +15,7 @@ from planner.campaign.events import Proposal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.design.hit_axes import axis_shares
-from planner.design.propose import INFORMED, TOLD, Pick, Travel
+from planner.design.propose import DESCRIPTIONS, INFORMED, Pick, Travel
 from planner.design.propose import propose as choose
 from planner.design.sensor_places import BetterPlaces, better_places
 from planner.design.space_filling import DESIGNS
@@ -160,4 +160,4 @@ def _reason(model: Model, index: int, acquisition: str) -> str:
         distance = np.linalg.norm(x - model.cell.candidates.features[index], axis=1)
         near = model.labelled[int(np.argmin(distance))].pose
         text += f" here, nearest measured pose {near}"
-    return f"{TOLD[acquisition]} ({acquisition.replace('_', ' ')}); {text}"
+    return f"{DESCRIPTIONS[acquisition]} ({acquisition.replace('_', ' ')}); {text}"

@@ -14,7 +14,7 @@ from planner import file_content
 from planner.campaign.config import load_campaign_config
 from planner.campaign.journal import sync_folder, write_synced
 from planner.errors import InputError
-from planner.robot.xacro_source import urdf_source
+from planner.robot.mesh_files import urdf_source
 from planner.toml_file import read_toml_text
 
 LOG = "log.jsonl"
@@ -190,7 +190,7 @@ def _alive(process: int) -> bool:
 
 
 def _copy_robot(robot_toml: Path, target: Path) -> None:
-    """Copy robot.toml, its URDF with the meshes that this names, and other TOML files beside it.
+    """Copy robot.toml, its URDF with the meshes that this names, and a cut.toml beside it.
 
     A URDF that lies elsewhere comes to lie beside robot.toml, and is expanded where it is xacro.
     """
@@ -209,7 +209,8 @@ def _copy_robot(robot_toml: Path, target: Path) -> None:
     copy.write_bytes(text)
     copy_meshes(text, urdf, copy)
     for file in source.glob("*.toml"):
-        shutil.copyfile(file, target / file.name)
+        if file.name != CONFIG:  # which the campaign has of its own
+            shutil.copyfile(file, target / file.name)
     place = copy.relative_to(target).as_posix()
     if place != Path(named).as_posix():
         document = tomlkit.parse(robot_toml.read_text(encoding="utf-8-sig"))

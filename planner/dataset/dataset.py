@@ -254,12 +254,12 @@ class Dataset:
         """Names of all points where a sensor was, in the order of recording."""
         return together([frf.layout for frf in self.frfs]).sensors
 
-    def heard_by(self, sensor: str, hit_point: str | None = None) -> "Dataset":
+    def channels_of(self, sensor: str, hit_point: str | None = None) -> "Dataset":
         """Hits as one triaxial sensor has them: those that it heard, of one hit point or of all."""
         some = []
         for visit in self.visits:
             own = (h for h in visit.hits if hit_point is None or h.hit_point == hit_point)
-            hits = tuple(one for hit in own if (one := hit.heard_by(sensor)) is not None)
+            hits = tuple(one for hit in own if (one := hit.channels_of(sensor)) is not None)
             if hits:
                 some.append(replace(visit, hits=hits))
         return self.corrected(some)
@@ -273,7 +273,7 @@ class Dataset:
         count: Counter[tuple[str, str]] = Counter()
         for visit in self.visits:
             count.update({(h.hit_point, s) for h in visit.hits for s in h.layout.sensors
-                          if h.heard_by(s) is not None})  # fmt: skip
+                          if h.channels_of(s) is not None})  # fmt: skip
         if set(count) <= {(TCP, SENSOR)} and self.sensors in ((SENSOR,), ()):
             return self
         if not count:
@@ -281,7 +281,7 @@ class Dataset:
         most = max(count.values())
         ends = [pair for pair, visits in count.items() if visits == most]
         hit_point, sensor = (TCP, SENSOR) if (TCP, SENSOR) in ends else ends[0]
-        return self.heard_by(sensor, hit_point)
+        return self.channels_of(sensor, hit_point)
 
     # -- by force level ------------------------------------------------------------------------
 

@@ -12,11 +12,11 @@ from planner.dataset.store import user_store
 from planner.errors import PlannerError, RefusedError, RefusedFile
 from planner.frf.exported import exported
 from planner.frf.matrix import FrfMatrix, matrix_of
-from planner.recording.excited_band import excited_band
 from planner.recording.geometry import read_geometry
 from planner.recording.points import ANYWHERE
 from planner.recording.read import read
 from planner.recording.records import FrfRecord, Hit, Record, TimeRecord
+from planner.recording.spectra import excited_band
 
 
 @dataclass(frozen=True, eq=False)

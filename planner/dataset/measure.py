@@ -211,7 +211,7 @@ class MeasuredPose:
 
 def of_tool(hits: tuple[Hit, ...]) -> tuple[Hit, ...]:
     """Hits at the tcp as the sensor there has them."""
-    heard = (hit.heard_by(SENSOR) for hit in hits if hit.hit_point == TCP)
+    heard = (hit.channels_of(SENSOR) for hit in hits if hit.hit_point == TCP)
     return tuple(hit for hit in heard if hit is not None)
 
 

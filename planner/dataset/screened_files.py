@@ -183,7 +183,7 @@ def _refuse_others(
     verdicts: list[FileVerdict], hits: list[tuple[Hit, ...]], records: list[FrfRecord]
 ) -> None:
     """Refuse what cannot be averaged with most hits of the pose: FRFs, and other sampling rates."""
-    from planner.recording.sampling_rates import sampled_otherwise
+    from planner.recording.sampling import sampled_otherwise
 
     own = [number for number, found in enumerate(hits) for _ in found]
     said = sampled_otherwise([hit for found in hits for hit in found])
@@ -209,8 +209,8 @@ def read_one(
 ) -> tuple[FileVerdict, tuple[Hit, ...], list[FrfRecord]]:
     """One file, judged by itself: the verdict, its usable hits, its FRFs."""
     from planner.recording.channel_faults import by_good_sensors
-    from planner.recording.driving_point import driving_point
     from planner.recording.screening import ScreeningLimits, screen
+    from planner.recording.spectra import driving_point
 
     try:
         found, frfs = source.read()

@@ -7,8 +7,7 @@ import msgspec
 import numpy as np
 
 from planner.design.discrimination import Tied, separation
-from planner.design.next_hit import evenly, in_words
-from planner.design.odds import as_ratio
+from planner.design.next_hit import as_ratio, evenly, in_words
 from planner.diagnosis.diagnose import Diagnosis
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP

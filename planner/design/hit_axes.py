@@ -9,8 +9,7 @@ import numpy as np
 
 from planner.design.cost import Cost
 from planner.design.frequency_posterior import ALL_AXES, AXES, FrequencyOutputs, Poses
-from planner.design.parameter_information import SUBSETS, Axes, parameter_reduction
-from planner.design.variance_reduction import reduction_by_label
+from planner.design.reductions import SUBSETS, Axes, parameter_reduction, reduction_by_label
 
 LEAST_SHARE = 0.05  # of a mode's information: below it the mode may not be found at all
 

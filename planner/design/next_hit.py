@@ -7,12 +7,12 @@ import msgspec
 import numpy as np
 
 from planner.design.discrimination import Tied, separation
-from planner.design.odds import as_ratio
 from planner.diagnosis.diagnose import Diagnosis
 from planner.recording.joints import JointUnits
 from planner.words import probable
 
 MOST_POSES = 40  # of those offered, evenly taken
+MOST_ODDS = 1e4  # what is said of a robot is never surer
 
 
 @dataclass(frozen=True)
@@ -93,3 +93,10 @@ def in_words(places: Sequence[tuple[str, str | None]], probability: float) -> st
         for name, at in places
     ]
     return f"{' and '.join(said)} ({probable(probability)})"
+
+
+def as_ratio(log_odds: float) -> str:
+    """Natural logarithm of odds as "30 : 1", as an engineer reads them."""
+    if log_odds > np.log(MOST_ODDS):
+        return f"more than {MOST_ODDS:g} : 1"
+    return f"about {float(f'{np.exp(max(log_odds, 0.0)):.2g}'):g} : 1"

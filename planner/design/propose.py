@@ -5,17 +5,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.design.acquisitions import (
+    goal,
+    integrated_variance,
+    mixed,
+    mutual_information,
+    parameter_variance,
+    variance,
+)
 from planner.design.cost import Cost, shortest_tour
 from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses, Target
-from planner.design.goal import goal
 from planner.design.hit_axes import best_axes
-from planner.design.integrated_variance import integrated_variance
-from planner.design.mixed import mixed
-from planner.design.mutual_information import mutual_information
-from planner.design.parameter_information import d_information, parameter_information
+from planner.design.reductions import parameter_information
 from planner.design.space_filling import DESIGNS
 from planner.design.stability import stability
-from planner.design.variance import variance
 from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
 from planner.surrogate.modal_surrogate import Surrogate
@@ -26,8 +29,8 @@ ACQUISITIONS: dict[str, Score] = {
     "variance": variance,
     "integrated_variance": integrated_variance,
     "mutual_information": mutual_information,
-    "parameter_information": parameter_information,
-    "d_information": d_information,
+    "parameter_information": parameter_variance,
+    "d_information": parameter_information,
     "mixed": mixed,
     "goal": goal,
     "stability": stability,
@@ -68,7 +71,7 @@ class Travel:
 
 
 # In words, for who chooses one.
-TOLD = {
+DESCRIPTIONS = {
     "variance": "the pose whose frequencies are least sure",
     "integrated_variance": "the pose that makes all of the workspace surest",
     "mutual_information": "the pose that tells most of all the others",

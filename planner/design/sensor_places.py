@@ -1,6 +1,6 @@
 """Where another sensor, or hits at another point too, tell most of the simulation per minute.
 
-I-optimal in the linearised model (Chaloner & Verdinelli 1995), as `parameter_information` is.
+I-optimal in the linearised model (Chaloner & Verdinelli 1995), as `parameter_variance` is.
 """
 
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ import numpy as np
 
 from planner.design.cost import Cost
 from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses
-from planner.design.parameter_information import parameter_reduction
 from planner.design.parameter_sensitivity import OpenParameters
+from planner.design.reductions import parameter_reduction
 from planner.recording.points import SENSOR, TCP, Layout
 
 TINY = 1e-12  # share of the variance that is always left

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from planner.design.acquisitions import mixed
 from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Margins, Poses
-from planner.design.mixed import mixed
 
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(15)
 LEAST_SHARE = 1e-6  # of a variance: what measuring may leave of it

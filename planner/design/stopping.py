@@ -138,12 +138,13 @@ def left_out(posterior: "Posterior", count: int) -> tuple[int, float]:
     """
     squares, poses = [], 0
     for k in range(count):
-        known = np.flatnonzero(posterior.mask[k])
+        known = posterior.known(k)
         poses = max(poses, len(known))
         if len(known) < 2:
             continue
-        variance = 1 / np.sum(posterior.whitening(k) ** 2, axis=1)
-        residual = posterior.solved(k).weights[:, known] * variance
+        solved = posterior.solved(k)
+        variance = 1 / np.sum(solved.whiten**2, axis=1)
+        residual = solved.weights * variance
         mixed = np.mean(variance, axis=0) + np.var(residual, axis=0)
         squares.append(np.mean(residual, axis=0) ** 2 / mixed)
     if not squares:
@@ -153,8 +154,8 @@ def left_out(posterior: "Posterior", count: int) -> tuple[int, float]:
 
 def _means_apart(posterior: "Posterior", k: int, poses: "Poses") -> np.ndarray:
     """How far the mean of each hyperparameter sample (s, u) is from that of all."""
-    cross, _ = posterior._cross(k, poses.x, poses.low[:, k])
-    means = (posterior.solved(k).weights[:, None, posterior.known(k)] @ cross)[:, 0]
+    cross, _ = posterior.cross(k, poses.x, poses.low[:, k])
+    means = (posterior.solved(k).weights[:, None] @ cross)[:, 0]
     return means - means.mean(axis=0)
 
 

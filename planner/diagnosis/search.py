@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.effects.effect import Operator, Start
-from planner.effects.resonator import LinkResonator
 from planner.fit.data import FrfData
 from planner.fit.fitted import (
     StructureFit,
@@ -155,7 +154,7 @@ class Explorer:
         misfit = replace(base.misfit, data=dense)
         motions, gain = misfit.first_order(base.at.x, base.at.own)
         free, every = effects_free(base.structure), base.structure.prior.repertoire.effects
-        again = (e for e in every if isinstance(e, LinkResonator) and e not in free)
+        again = (e for e in every if e.several and e not in free)
         far = size_of(base) >= CLOSE
         tried = (e for e in (*free, *again) if far or _pulled(base, e))
         starts = (e.starts(motions, gain) for e in tried)

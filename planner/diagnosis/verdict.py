@@ -22,12 +22,11 @@ SURE = 0.9  # probability from which an effect's size counts as beyond what matt
 EXPLAINS = 2.0  # times what matters: a discrepancy up to which nothing else is wanted
 # Effects without a name of their own imitate what a named one's shape lacks: they count from so
 # many times what matters on, and so much of all that is gained.
-VAGUE, OF_ALL = 3.0, 0.05
+GENERAL, OF_ALL = 3.0, 0.05
 BENT = 2.0  # times what levels differ by, from which a linear effect beside a law is told
 LINES = 40  # of the band, on which sizes are told
 Place = tuple[str, str | None]
 UNKNOWN, NONE = ("unknown", None), ("none", None)
-NAMELESS = "frequency_dependent_joint", "between_links", "ground_contact"
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +96,7 @@ def judged(
         pairs = zip(effects, beside, strict=True)
         effects = [replace(e, counts=e.counts and apart) for e, apart in pairs]
     named = [e for e in effects if e.counts]
-    nameless = any(e.place[0] in NAMELESS for e in named)
+    nameless = any(e.operator.general for e in named)
     left = (size_of(best) > EXPLAINS * matters or nameless) and not laws
     unknown = left or bool(levels and levels.unexplained) or UNKNOWN in heard
     there = named or heard or laws
@@ -139,10 +138,9 @@ def _weighed(
         if effect in built(best):
             probability = float(expit(nats - RARE))
         # Its size is as well known as its amplitude is.
-        vague = effect.name[0] in NAMELESS
-        least = matters * (VAGUE if vague else 1.0)
+        least = matters * (GENERAL if effect.general else 1.0)
         sure = norm.cdf((change - least) / (change / np.sqrt(2 * max(nats, 1.0)) + 1e-12))
-        there = nats > max(LEAST, OF_ALL * gained if vague else 0.0)
+        there = nats > max(LEAST, OF_ALL * gained if effect.general else 0.0)
         counts = there and (effect.absorbed or sure >= SURE)
         found.append(NamedEffect(effect, float(nats), change, float(probability), bool(counts)))
     return sorted(found, key=lambda e: -e.change)

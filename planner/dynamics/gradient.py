@@ -95,26 +95,9 @@ def response_gradient(
     inertias: Inertias | None = None,
     added: Sequence[Impedance] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The first two of `response_parts`."""
-    return response_parts(matrices, elasticity, s, mass, inertias, added)[:2]
-
-
-def response_parts(
-    matrices: Matrices,
-    elasticity: Elasticity,
-    s: np.ndarray,
-    mass: np.ndarray | None = None,
-    inertias: Inertias | None = None,
-    added: Sequence[Impedance] = (),
-) -> tuple[np.ndarray, np.ndarray, Turned]:
-    """Accelerance (n, 3s, 3h, F) at s (n, F), its derivatives (n, P, 3s, 3h, F), and `Turned`.
-
-    The parameters are ln stiffness (e), ln damping (e), ln loss factor (e, only if one is not 0),
-    those of `inertias` (B · p, only if given), and those of all that is `added` to Z.
-    """
+    """Accelerance (n, 3s, 3h, F) at s (n, F), and its derivatives as of `motion_slopes`."""
     motion = moved(matrices, elasticity, s, mass, added)
-    slope = motion_slopes(motion, elasticity, inertias, added)
-    return motion.accelerance, slope, Turned((motion,))
+    return motion.accelerance, motion_slopes(motion, elasticity, inertias, added)
 
 
 def moved(
@@ -145,7 +128,11 @@ def motion_slopes(
     inertias: Inertias | None = None,
     added: Sequence[Impedance] = (),
 ) -> np.ndarray:
-    """Derivatives (n, P, 3s, 3h, F) of a motion's accelerance: see `response_parts`."""
+    """Derivatives (n, P, 3s, 3h, F) of a motion's accelerance.
+
+    The parameters are ln stiffness (e), ln damping (e), ln loss factor (e, only if one is not 0),
+    those of `inertias` (B · p, only if given), and those of all that is `added` to Z.
+    """
     # All derivatives are products with the sensors' motions, by which the chain shows them.
     x_hit, x_sensor, s = motion.x_hit, motion.scaled(motion.x_sensor), motion.s
     e, lossy = x_hit.shape[1], bool(elasticity.loss_factor.any())

@@ -133,6 +133,10 @@ class Operator(ABC):
     absorbed: ClassVar[bool] = False
     # Of the measuring chain: no physics, and prediction does without it.
     artefact: ClassVar[bool] = False
+    # Has freedom enough to imitate what the shape of a named effect lacks: where it is, not what.
+    general: ClassVar[bool] = False
+    # Several may be at the same place.
+    several: ClassVar[bool] = False
 
     @property
     def label(self) -> str:
@@ -173,6 +177,14 @@ class Operator(ABC):
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """Where fits with it begin, by its first-order columns; springs are tried as they are."""
         return (Start(self, self.mean, np.inf),)
+
+    def elsewhere(self, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
+        """Where it begins, as one like it has ψ at another place."""
+        return self.starts(motions, gain)[0]
+
+    def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Where fits may begin as well as at ψ."""
+        return ()
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """Changes of the first numbers of ψ at which it is no more, to first order."""

@@ -59,6 +59,7 @@ class BetweenLinks(LinkSpring):
     """A cable, a strut, a balancer."""
 
     kind = "between_links"
+    general = True
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
@@ -70,6 +71,7 @@ class GroundContact(LinkSpring):
     """Something outside that touches a link."""
 
     kind = "ground_contact"
+    general = True
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""

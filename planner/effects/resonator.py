@@ -20,6 +20,7 @@ from planner.effects.effect import (
     turning,
 )
 
+LIGHTER = np.log(6.0)  # it is begun once more by so much
 SCREENED = 30  # frequencies over the band
 SCREEN_DAMPING = 0.04  # so that none falls between them
 DIRECTION_SD = 0.5  # of a direction about the one it begins with: about 0 it shrinks to nothing
@@ -37,6 +38,7 @@ class LinkResonator(Operator):
     band_hz: tuple[float, float] = (1.0, 100.0)
 
     kind = "local_resonator"
+    several = True
 
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """s² m Jₚᵀ [1 + (T − 1) d dᵀ] Jₚ with the transmissibility T of spring and damper."""
@@ -98,6 +100,15 @@ class LinkResonator(Operator):
         start[0] = np.log(np.clip(abs(sizes[most]), 0.2 * usual, 5 * usual))
         start[1], start[3:6] = np.log(hertz), ways[:, most]
         return Start(self.towards(ways[:, most]), start, nats, moved)
+
+    def elsewhere(self, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
+        """It keeps frequency and damping."""
+        found = self.at_frequency(float(np.exp(psi[1])), motions, gain)
+        return replace(found, psi=np.array([*found.psi[:2], psi[2], *found.psi[3:]]))
+
+    def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
+        """A light one, too: it changes little and can only help."""
+        return (psi - LIGHTER * np.eye(psi.size)[0],)
 
     def towards(self, way: np.ndarray) -> "LinkResonator":
         """The same with its direction expected about `way` (3,)."""

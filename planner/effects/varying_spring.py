@@ -114,6 +114,7 @@ class FrequencyDependentJoint(VaryingSpring):
     band_hz: tuple[float, float] = (1.0, 100.0)
 
     kind = "frequency_dependent_joint"
+    general = True
 
     def shares(self, poses: PosedBodies) -> list[list[np.ndarray]]:
         """See `VaryingSpring.shares`."""

@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.effects.effect import Gain, Motions, Operator, Start
-from planner.effects.resonator import LinkResonator
+from planner.effects.effect import Operator, Start
 from planner.effects.springs import BendingLink
 from planner.fit.data import FrfData
 from planner.fit.fitted import (
@@ -45,7 +44,6 @@ OPERATORS, FINALISTS, ENDS = 5, 4, 2  # how many are tried, followed, settled
 # Sizes: with all lines at first; up to which nothing need be missing; from which one begins afresh.
 CLOSE, EXPLAINED, UNEXPLAINED = 0.01, 0.008, 0.03
 FRESH = 10.0  # nats that this must gain
-LIGHTER = np.log(6.0)  # a resonator is begun once more by so much
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +173,7 @@ class Search:
         free = effects_free(best.structure)
         again = [  # something else may hang on the same link
             e for e in self.prior.repertoire.effects
-            if isinstance(e, LinkResonator) and e not in free
+            if e.several and e not in free
         ]  # fmt: skip
         starts = [s for e in (*free, *again) for s in e.starts(motions, gain)]
         starts.sort(key=lambda s: -s.nats)
@@ -246,7 +244,7 @@ class Search:
                 e for e in effects_free(base.structure)
                 if type(e) is type(effect) and e.at != effect.at.split("#")[0]
             ]  # fmt: skip
-            starts = [_elsewhere(e, psi, motions, gain) for e in others]
+            starts = [e.elsewhere(psi, motions, gain) for e in others]
             ends = self._compete(base, starts, best.evidence)
             if ends and ends[0].evidence > best.evidence + SAME:
                 self.tell(f"{effect.label} → {ends[0].structure.effects[-1].label}")
@@ -297,11 +295,12 @@ def placed(
             x = structure.carried(base.structure, base.at.x + start.moved)
             x = np.clip(x, structure.least, structure.mean + REACH * structure.sd)
         x[structure.own[-1]] = start.psi
-        if not isinstance(effect, LinkResonator):
-            return [(x, 4)]
-        light = x.copy()
-        light[structure.own[-1].start] -= LIGHTER  # a light one changes little: it can only help
-        return [(x, TRIED), (light, TRIED)]
+        others = []
+        for psi in effect.beside(start.psi):
+            z = x.copy()
+            z[structure.own[-1]] = psi
+            others.append((z, TRIED))
+        return [(x, TRIED if others else 4), *others]
     new = [i for i, p in enumerate(structure.parameters) if set(p.blocks) & set(effect.springs)]
     stiff = [i for i in new if i < structure.stiffnesses]
     x[stiff] = structure.mean[stiff] + structure.sd[stiff]
@@ -319,13 +318,3 @@ def placed(
         z[stiff] = np.clip(softest, low, high)
         starts.append(z)
     return [(one, TRIED) for one in starts]
-
-
-def _elsewhere(effect: Operator, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
-    """Where one like another begins at its own place; a resonator keeps its frequency."""
-    if not isinstance(effect, LinkResonator):
-        return effect.starts(motions, gain)[0]
-    found = effect.at_frequency(float(np.exp(psi[1])), motions, gain)
-    start = found.psi.copy()
-    start[2] = psi[2]
-    return replace(found, psi=start)

@@ -13,7 +13,7 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.recording.points import TOOL, Layout
 from planner.recording.records import Hit
-from planner.recording.sampling_rates import same_rate
+from planner.recording.sampling import same_rate
 
 LEAST_QUIET = 8  # samples before the pulse that tell offset and noise
 FADED = 1e-3  # of the noise that a window leaves: fainter noise is the digits' own

@@ -11,7 +11,7 @@ from planner.frf.quantities import convert
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.rational_fit import CLOSE, RationalFit, rational_fit
-from planner.recording.frf_files import read_frfs
+from planner.recording.file_names import read_frfs
 from planner.recording.records import AXES, FrfRecord
 
 SEEN = 1e-9  # share of a direction in the plane of the cut that does not count

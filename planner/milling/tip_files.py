@@ -24,7 +24,7 @@ from planner.modal.estimate_modes import identify
 from planner.modal.fit_data import Data
 from planner.modal.rank_one_fit import Entries
 from planner.modal.shape_fit import shape_fit
-from planner.recording.frf_files import read_frfs
+from planner.recording.file_names import read_frfs
 from planner.recording.joints import JointUnits
 from planner.recording.records import AXES, FrfRecord
 from planner.toml_file import load_toml

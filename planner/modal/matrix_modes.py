@@ -19,8 +19,8 @@ from planner.modal.motion_fields import expected
 from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, fit_shape, row_gain
 from planner.modal.residues import realign
 from planner.recording.dof import Dof
-from planner.recording.excited_band import FIRST_LINE
 from planner.recording.geometry import Geometry
+from planner.recording.spectra import FIRST_LINE
 
 
 @dataclass(frozen=True, eq=False)

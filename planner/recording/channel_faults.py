@@ -73,7 +73,7 @@ def by_good_sensors(hit: Hit) -> tuple[Hit, tuple[Fault, ...]]:
         for node, fault in zip(named, found, strict=True)
         if fault
     )
-    return hit.as_heard(good), told
+    return hit.with_channels(good), told
 
 
 def _of_acceleration(hit: Hit, row: int) -> Fault | None:

@@ -1,4 +1,4 @@
-"""Where an FRF was felt and hit as its file's name says, for those who ask for it.
+"""FRFs of files, and where each was felt and hit as its name says, for those who ask for it.
 
 "anything_yx" is the response along y to a hit along x, "H3_1" or "H31" the response at node 3 to a
 hit at node 1, "3y_1x" both; signs may stand before an axis.
@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 from planner.errors import InputError
 from planner.recording.column_names import hit_direction
+from planner.recording.folder import files_in
+from planner.recording.read import READERS, read
 from planner.recording.records import FrfRecord
 
 _AXES = re.compile(r"(?:^|[^a-z])([+-]?[xyz])_?([+-]?[xyz])$", re.IGNORECASE)
@@ -58,3 +60,15 @@ def placed_by_name(record: FrfRecord, name: str) -> FrfRecord:
 
 def _nodes(own: tuple[str, ...], named: str, count: int) -> tuple[str, ...]:
     return tuple(named if node in ("", "0") else node for node in own or ("",) * count)
+
+
+def read_frfs(path: Path, from_names: bool = False) -> tuple[FrfRecord, ...]:
+    """FRFs of a file or folder; with `from_names` what they lack of places is in files' names.
+
+    Raises InputError in one sentence, also where there are none.
+    """
+    files = files_in(path, READERS) if path.is_dir() else [path]
+    found = [r for file in files for r in read(file) if isinstance(r, FrfRecord)]
+    if not found:
+        raise InputError(f"{path} holds no FRFs; export FRFs, or name hits to planner modes.")
+    return tuple(placed_by_name(r, r.source.name) if from_names else r for r in found)

@@ -1,14 +1,14 @@
 """Where the points of a test lie: nodes and trace lines of universal files."""
 
-import io
-import warnings
-from contextlib import redirect_stdout
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from planner.recording.uff import opened
 
 # Datasets: nodes (15 and 2411), trace lines (82), units (164).
 NODES, TRACES, UNITS = (15, 2411), 82, 164
@@ -66,16 +66,10 @@ def _trace(numbers: list[int]) -> list[tuple[str, str]]:
 
 def _sets(path: Path) -> list[dict[str, Any]]:
     """Datasets of geometry; what cannot be read is left out: it is no measurement."""
-    import pyuff
-
     found: list[Any] = []
-    with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
-        warnings.simplefilter("ignore")
-        file = pyuff.UFF(str(path))
-        for index, kind in enumerate(file.get_set_types()):
+    with opened(path) as (file, kinds):
+        for index, kind in enumerate(kinds):
             if kind in (*NODES, TRACES, UNITS):
-                try:
+                with suppress(Exception):
                     found.append(file.read_sets(index))
-                except Exception:
-                    continue
     return found

@@ -17,7 +17,7 @@ from planner.errors import InputError
 from planner.recording.column_names import bare, direction_in, hit_direction, time_unit, unit_text
 from planner.recording.records import Channel, Record, TimeRecord
 from planner.recording.sampling import UNEVEN, aligned, sampling_rate
-from planner.recording.stated import RATES, STEPS
+from planner.recording.stated import RATES, STEPS, number
 from planner.recording.units import lookup
 
 _AT = re.compile(r"acceleration_(.+)_[xyz]$")
@@ -123,25 +123,15 @@ def _stated_rates(path: Path, named: Named) -> dict[str, float]:
     """Rates in Hz that attributes state, by their names."""
     found = {}
     for key, text in named.attributes.items():
-        if _letters(bare(key)) in RATES:
-            found[key] = _positive(path, key, str(text), "frequency")
-        elif _letters(bare(key)) in STEPS:
-            found[key] = 1 / _positive(path, key, str(text), "time")
+        name = _letters(bare(key))
+        if name in RATES or name in STEPS:
+            value = number(str(text), unit_text(key)) or 0.0
+            if not 1e-9 < value < 1e9:
+                raise InputError(
+                    f"{path}: {key} {text} is no rate in Hz nor step in s; correct it."
+                )
+            found[key] = value if name in RATES else 1 / value
     return found
-
-
-def _positive(path: Path, key: str, text: str, quantity: str) -> float:
-    """A rate in Hz or a step in s, with its unit or without."""
-    match = re.fullmatch(r"\s*([-+\d.eE]+)\s*([a-zA-Zµμ]*)\s*", text)
-    unit = lookup(match[2] or unit_text(key)) if match else None
-    factor = unit.factor if unit and unit.quantity == quantity else 1.0
-    try:
-        value = float(match[1]) * factor if match else float("nan")
-    except ValueError:
-        value = float("nan")
-    if not 1e-9 < value < 1e9:
-        raise InputError(f"{path}: {key} {text} is no rate in Hz nor step in s; correct it.")
-    return value
 
 
 def _channel(name: str, values: np.ndarray, named: Named) -> Channel:

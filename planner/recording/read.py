@@ -1,8 +1,11 @@
 """Reading a recording, whatever its format: one reader per format, chosen by the file's name."""
 
 import hashlib
-from collections.abc import Callable
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 
@@ -15,7 +18,7 @@ from planner.recording.filling import without_filling
 from planner.recording.hdf5 import read_hdf5
 from planner.recording.lvm import read_lvm
 from planner.recording.mat5 import is_version_5, read_mat5
-from planner.recording.read_files import ReadFile, ReadFiles
+from planner.recording.named_columns import Named, to_records
 from planner.recording.records import FrfRecord, Record, TimeRecord
 from planner.recording.stream import cut_into_hits
 from planner.recording.tdms import read_tdms
@@ -24,6 +27,52 @@ from planner.recording.uff import read_uff
 from planner.recording.wav import WAV, read_wav, scales_beside, self_contained
 
 MAX_BYTES = 512 * 1024 * 1024
+
+
+@dataclass(frozen=True, eq=False)
+class ReadFile:
+    """The records of a file as they are, and cut into hits."""
+
+    whole: tuple[Record, ...]
+    hits: tuple[Record, ...]
+
+    @property
+    def nbytes(self) -> int:
+        """What its numbers take up."""
+        arrays = {id(a): a.nbytes for r in (*self.whole, *self.hits) for a in _arrays(r)}
+        return sum(arrays.values())
+
+
+class ReadFiles:
+    """The files read last, as many as `most_bytes` hold, the last one in any case."""
+
+    def __init__(self, most_bytes: int):
+        self._most_bytes, self._lock = most_bytes, Lock()
+        self._files: OrderedDict[Hashable, ReadFile] = OrderedDict()
+
+    def get(self, key: Hashable) -> ReadFile | None:
+        """What was read under a key; None where it is not remembered."""
+        with self._lock:
+            if key in self._files:
+                self._files.move_to_end(key)
+            return self._files.get(key)
+
+    def put(self, key: Hashable, file: ReadFile) -> None:
+        """Remember a file, and forget those that were asked for longest ago."""
+        with self._lock:
+            self._files[key] = file
+            while sum(f.nbytes for f in self._files.values()) > self._most_bytes:
+                if len(self._files) == 1:
+                    return
+                self._files.popitem(last=False)
+
+
+def _arrays(record: Record) -> list[np.ndarray]:
+    if isinstance(record, FrfRecord):
+        return [record.frequency_hz, record.values, record.coherence]
+    return [channel.samples for channel in record.channels]
+
+
 REMEMBERED = ReadFiles(256 * 1024 * 1024)  # a file of many hits is read once, not once a hit
 
 
@@ -35,7 +84,7 @@ def read_mat(path: Path) -> tuple[Record, ...]:
     visible = {name: v for name, v in entries.items() if name and not name.startswith("__")}
     arrays = {name for name, value in visible.items() if isinstance(value, np.ndarray)}
     if {"yspec", "npts", "freq", "tfun"} <= arrays:
-        return (_logged_spectra(path, visible),)
+        return to_records(path, _logged_spectra(path, visible))
     return records_of(path, tree_of(visible))
 
 
@@ -58,7 +107,7 @@ def _older(path: Path) -> dict[str, object] | None:
         ) from None
 
 
-def _logged_spectra(path: Path, entries: dict[str, object]) -> FrfRecord:
+def _logged_spectra(path: Path, entries: dict[str, object]) -> Named:
     """Transfer functions as the Cambridge data logger (now pydvma) saves them.
 
     `yspec` (lines, channels) is the half spectrum of `npts` samples at `freq` Hz; `tfun` tells
@@ -81,18 +130,10 @@ def _logged_spectra(path: Path, entries: dict[str, object]) -> FrfRecord:
             f"{path} holds spectra of {values.shape[1]} lines that are not the transfer functions "
             f"of {samples:g} samples at {rate_hz:g} Hz; export transfer functions."
         )
-    unknown = (0,) * len(values)
-    return FrfRecord(
-        path,
-        np.arange(values.shape[1]) * rate_hz / samples,
-        values,
-        unknown,
-        unknown,
-        "unknown",
-        "",
-        np.full(values.shape, np.nan),
-        ("The file states no units, directions or coherence.",),
-    )
+    lines = np.arange(values.shape[1]) * rate_hz / samples
+    columns = {f"channel {number}": row for number, row in enumerate(values, 1)}
+    remarks = ("The file states no units, directions or coherence.",)
+    return Named({"frequency_hz": lines, **columns}, remarks=remarks)
 
 
 def _read_txt(path: Path) -> tuple[Record, ...]:

@@ -130,14 +130,14 @@ class Hit:
         sensors = self.layout.sensors
         return [3 * sensors.index(d.node) + abs(d.number) - 1 for d in self.responses]
 
-    def heard_by(self, sensor: str) -> "Hit | None":
+    def channels_of(self, sensor: str) -> "Hit | None":
         """The hit as one triaxial sensor has it, x, y, z; None where it has not all three."""
         if self.responses == tuple(Dof(sensor, axis) for axis in AXES):
             return self
         found = [i for axis in AXES for i, d in enumerate(self.responses) if d == Dof(sensor, axis)]
-        return self.as_heard(found) if len(found) == len(AXES) else None
+        return self.with_channels(found) if len(found) == len(AXES) else None
 
-    def as_heard(self, rows: list[int]) -> "Hit":
+    def with_channels(self, rows: list[int]) -> "Hit":
         """The hit as some of its channels have it."""
         out = self.taken_out_m_s2
         return replace(

@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.recording.band_spectra import band_spectra
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.records import AXES, Fault, Hit
 from planner.recording.repeat_sizes import other_size, other_sizes, outvoted
-from planner.recording.sampling_rates import same_rate
+from planner.recording.sampling import same_rate
 from planner.recording.screening import SILENCE
+from planner.recording.spectra import band_spectra
 
 # Likeness of repeats: below the first, and by so much below what is usual, they are unlike; above
 # the last they are the same. Chosen.

@@ -1,4 +1,4 @@
-"""When channels were sampled: rates from times, and channels that do not begin together."""
+"""When channels and hits were sampled: rates, and channels that do not begin together."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,12 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.records import Channel
+from planner.recording.records import Channel, Hit
 
 UNEVEN = 1e-3  # share of a step by which sampling times may scatter beside their rounding
 MOST_DIGITS = 15
 LEAST_SAMPLES = 8
 SLOWEST_S = 1e6  # between two samples
+# Relative. Times that are rounded to a hundredth of a step, or to six digits, tell the rate of some
+# hundred samples better than that; rates that analysers offer lie a percent or more apart. Chosen.
+ALIKE = 1e-4
 
 
 def sampling_rate(path: Path, time_s: np.ndarray) -> float:
@@ -96,3 +99,20 @@ def aligned(
         for channel, at in zip(channels, skip, strict=True)
     )
     return tuple(cut), tuple(remarks)
+
+
+def same_rate(one: Hit, other: Hit) -> bool:
+    """Whether two hits were sampled alike, as far as a rounded time column can tell."""
+    return abs(one.sampling_rate_hz / other.sampling_rate_hz - 1) <= ALIKE
+
+
+def sampled_otherwise(hits: Sequence[Hit]) -> tuple[str, ...]:
+    """Per hit, at which other rate than most of them it was sampled; "" where it was not."""
+    if not hits:
+        return ()
+    usual = max(hits, key=lambda hit: sum(same_rate(hit, other) for other in hits))
+    return tuple(
+        "" if same_rate(hit, usual) else
+        f"sampled at {hit.sampling_rate_hz:.7g} Hz, the others at {usual.sampling_rate_hz:.7g} Hz"
+        for hit in hits
+    )  # fmt: skip

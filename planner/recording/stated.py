@@ -92,8 +92,8 @@ def rescaled(attributes: Attributes) -> str:
 
 def axis_of(path: Path, attributes: Attributes) -> Axis:
     """What samples stand at. Raises InputError where it is stated twice and differently."""
-    steps = [n for _, v in _of_keys(attributes, STEPS) if (n := _number(v)) is not None and n]
-    rates = [n for _, v in _of_keys(attributes, RATES) if (n := _number(v)) is not None and n]
+    steps = [n for _, v in _of_keys(attributes, STEPS) if (n := number(v)) is not None and n]
+    rates = [n for _, v in _of_keys(attributes, RATES) if (n := number(v)) is not None and n]
     quantity, factor = _abscissa(attributes)
     found = [1 / rate for rate in rates] + [step * factor for step in steps]
     for step in found[1:]:
@@ -124,7 +124,7 @@ def _start(attributes: Attributes, factor: float) -> tuple[float | None, float |
     """Offset and date of the first sample; as LabVIEW means them they add up."""
     values = [value for _, value in _of_keys(attributes, _STARTS)]
     dates = (date for value in values if (date := _date(value)) is not None)
-    numbers = (n for value in values if (n := _number(value)) is not None)
+    numbers = (n for value in values if (n := number(value)) is not None)
     offset = next(numbers, None)
     return None if offset is None else offset * factor, next(dates, None)
 
@@ -141,15 +141,15 @@ def _date(value: object) -> float | None:
     return float((value - np.datetime64(0, "s")) / np.timedelta64(1, "us") * 1e-6)
 
 
-def _number(value: object) -> float | None:
-    """A number, or a text of one with its unit ("51.2 kHz", "0.1 ms"), in SI."""
+def number(value: object, unit: str = "") -> float | None:
+    """A number, or a text of one with its unit ("51.2 kHz", "0.1 ms") or in `unit`, in SI."""
     if isinstance(value, int | float):
         return float(value)
-    found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([a-zA-Zµ]*)\s*", str(value))
-    unit = lookup(found[2]) if found and found[2] else None
+    found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*([a-zA-Zµμ]*)\s*", str(value))
     if not found or found[1].count(".") > 1 or found[1].strip("+-.") == "":
         return None
-    return float(found[1]) * (unit.factor if unit else 1.0)
+    known = lookup(found[2] or unit)
+    return float(found[1]) * (known.factor if known else 1.0)
 
 
 def _of_keys(attributes: Attributes, keys: set[str]) -> Iterator[tuple[str, object]]:

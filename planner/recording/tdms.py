@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from logging.handlers import BufferingHandler
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,14 +33,14 @@ def read_tdms(path: Path) -> tuple[Record, ...]:
                 f"{path} is not a readable TDMS file ({type(error).__name__}); export it again."
             ) from None
     if warned:
-        raise InputError(f"{path} is cut off ({warned[0]}); export it again.")
+        raise InputError(f"{path} is cut off ({warned[0].getMessage()}); export it again.")
     return records_of(path, root)
 
 
 def _root(path: Path) -> EntryTree:
     from nptdms import TdmsFile
 
-    with TdmsFile.open(path, raw_timestamps=True) as file:
+    with open(path, "rb") as opened, TdmsFile.open(opened, raw_timestamps=True) as file:
         groups = file.groups()
         check_size(path, sum(8 * len(c) for group in groups for c in group.channels()))
         found = {
@@ -72,9 +73,10 @@ def _stated(properties: Mapping[str, Any]) -> dict[str, object]:
 
 
 @contextmanager
-def _warnings() -> Iterator[list[str]]:
+def _warnings() -> Iterator[list[logging.LogRecord]]:
     """What the library warns of: a file that is cut off, of which it then gives what there is."""
-    kept = _Kept()
+    kept = BufferingHandler(1000)
+    kept.setLevel(logging.WARNING)
     logger = logging.getLogger("nptdms")
     logger.addHandler(kept)
     for name in list(logging.root.manager.loggerDict):
@@ -82,17 +84,6 @@ def _warnings() -> Iterator[list[str]]:
             for handler in logging.getLogger(name).handlers:
                 handler.setLevel(logging.WARNING if handler is kept else logging.CRITICAL)
     try:
-        yield kept.texts
+        yield kept.buffer
     finally:
         logger.removeHandler(kept)
-
-
-class _Kept(logging.Handler):
-    """Keeps what a library warns of."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self.texts: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.texts.append(record.getMessage())

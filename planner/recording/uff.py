@@ -2,9 +2,10 @@
 
 import io
 import warnings
-from contextlib import redirect_stdout
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from planner.errors import ForeignFileError, InputError
 from planner.recording.records import Channel, FrfRecord, Record, TimeRecord
 from planner.recording.sampling import aligned, sampling_rate
 from planner.recording.units import MOTIONS, Unit, lookup, lookup_ratio
+
+if TYPE_CHECKING:
+    import pyuff
 
 # UFF 58, record 8 and 9: specific data types.
 _QUANTITY = {8: "displacement", 11: "velocity", 12: "acceleration", 13: "force", 9: "force",
@@ -52,9 +56,18 @@ def read_uff(path: Path) -> tuple[Record, ...]:
     return tuple(records)
 
 
-def _sets(path: Path) -> list[dict[str, Any]]:
+@contextmanager
+def opened(path: Path) -> Iterator[tuple["pyuff.UFF", list[int]]]:
+    """A universal file and the kinds of its datasets, without the parser's chatter."""
     import pyuff
 
+    with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
+        warnings.simplefilter("ignore")
+        file = pyuff.UFF(str(path))
+        yield file, [int(kind) for kind in file.get_set_types()]
+
+
+def _sets(path: Path) -> list[dict[str, Any]]:
     with open(path, "rb") as file:
         if b"-1" not in file.read(HEAD).split():
             raise ForeignFileError(f"{path} is no universal file (no dataset in it); export again.")
@@ -63,10 +76,7 @@ def _sets(path: Path) -> list[dict[str, Any]]:
     if not end.endswith(b"-1"):  # the parser would leave out the dataset that is cut off
         raise InputError(f"{path} does not end with a whole dataset; export it again.")
     try:
-        with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
-            warnings.simplefilter("ignore")
-            file = pyuff.UFF(str(path))
-            kinds = [int(kind) for kind in file.get_set_types()]
+        with opened(path) as (file, kinds):
             if not kinds:
                 raise ForeignFileError(
                     f"{path} is no universal file (no dataset in it); export again."

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from planner.report.plot_text import plain_text
-from planner.robot.drawing import RobotLines, robot_lines
 from planner.robot.link_bodies import LinkBody
 from planner.robot.robot import Robot
+from planner.robot.skeleton import RobotLines, robot_lines
 
 LINK, SHAPE, OBSTACLE, MASS = "0.25", "tab:blue", "tab:brown", "tab:orange"
 AXIS_COLOURS = "tab:red", "tab:green", "tab:blue"  # x, y, z, as CAD programs have them

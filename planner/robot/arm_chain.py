@@ -10,8 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.robot.held_joints import SLIDING, TURNING
-from planner.robot.urdf import numbers
+from planner.robot.urdf_elements import SLIDING, TURNING, limits_of
 
 # Names of the frame where a tool is bolted on or hits, the likeliest first.
 TOOLS = ("tcp", "tool_center_point", "tool0", "tool", "ee_link", "flange", "end_effector", "ee")
@@ -73,7 +72,7 @@ class _Tree:
 
     def moves(self, joint: ElementTree.Element) -> bool:
         """Whether a joint moves by itself."""
-        return _free(joint) and _range(joint) > 0
+        return _free(joint) and float(np.ptp(_limits(joint))) > 0
 
     @cached_property
     def paths(self) -> list[list[str]]:
@@ -125,20 +124,9 @@ def _free(joint: ElementTree.Element) -> bool:
     return joint.get("type") in (*TURNING, *SLIDING) and joint.find("mimic") is None
 
 
-def _range(joint: ElementTree.Element) -> float:
-    """Between the limits, in rad or m."""
-    low, high = _limits(joint)
-    return high - low
-
-
 def _limits(joint: ElementTree.Element) -> tuple[float, float]:
-    limit = joint.find("limit")
-    if joint.get("type") == "continuous":
-        return -np.pi, np.pi
-    if limit is None:
-        return 0.0, 0.0
-    ends = [float(numbers(limit.get(key, "0"))[0]) for key in ("lower", "upper")]
-    return min(ends), max(ends)
+    turns_on = joint.get("type") == "continuous"
+    return limits_of(joint) or ((-np.pi, np.pi) if turns_on else (0.0, 0.0))
 
 
 def _entry(joint: ElementTree.Element) -> str:

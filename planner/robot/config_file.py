@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from planner.errors import InputError
 from planner.recording.joints import JointUnits
 from planner.robot.config import (
+    BASE,
     LISTS,
     LOSS_FACTOR_BELOW,
     Compliance,
@@ -18,7 +20,11 @@ from planner.robot.config import (
     RobotConfig,
     SensorTable,
 )
+from planner.robot.moments import LINK, PAYLOAD, symmetric
 from planner.toml_file import load_toml
+
+if TYPE_CHECKING:
+    from planner.robot.robot import Robot
 
 LARGEST_SD_PERCENT = 1000.0  # a factor of 11 either way: beyond, nothing is stated
 # Of springs (N·m/rad, N/m) and dampers: 10⁷ times a heavy robot's.
@@ -41,11 +47,9 @@ def with_effects(config: RobotConfig, path: Path) -> RobotConfig:
     whole = msgspec.structs.replace(config, **added)
     _check_compliances(whole, path)
     for block in whole.resonator:
-        if not min(block.mass, block.frequency_hz, block.damping_ratio) > 0:
-            raise InputError(
-                f"{path}: the resonator at {block.joint} needs a mass, frequency_hz and "
-                f"damping_ratio above 0; correct them."
-            )
+        for name in ("mass", "frequency_hz", "damping_ratio"):
+            where = f"{path}: {name} of the resonator at {block.joint}"
+            _within(where, getattr(block, name), most=np.inf)
     return whole
 
 
@@ -57,39 +61,38 @@ def check_sds(table: HitsTable | SensorTable | ReadbackTable | DiagnoseTable, wh
             raise InputError(f"{where} {name} is {value}; it must lie between 0 and 100.")
 
 
-def _check_percent(value: float | None, where: str) -> None:
-    if value is not None and not 0 < value <= LARGEST_SD_PERCENT:
-        raise InputError(
-            f"{where} is {value}; it must lie above 0 and at most at {LARGEST_SD_PERCENT:g}."
-        )
+def _within(
+    where: str, value: float | None, unit: str = "", *, zero: bool = False, most: float = 1e5
+) -> None:
+    """Raise InputError where a stated number is not above 0 (`zero`: or 0) and up to `most`."""
+    if value is None or 0 < value <= most or (zero and value == 0):
+        return
+    least = f"at least 0{unit}" if zero else f"above 0{unit}"
+    raise InputError(f"{where} is {value}; it must be {least} and at most {most:g}.")
+
+
+def _finite(where: str, values: Sequence[float], most: float, what: str) -> None:
+    """Raise InputError where a number is not finite or absurdly large."""
+    if not all(abs(value) < most for value in values):
+        raise InputError(f"{where} is {list(values)}; give {what}.")
 
 
 def _check(config: RobotConfig, path: Path) -> None:
     _check_compliances(config, path)
-    _check_percent(config.stiffness_sd_percent, f"{path}: stiffness_sd_percent")
-    _check_percent(config.stiffness_bias_sd_percent, f"{path}: stiffness_bias_sd_percent")
+    for name in ("stiffness_sd_percent", "stiffness_bias_sd_percent"):
+        _within(f"{path}: {name}", getattr(config, name), most=LARGEST_SD_PERCENT)
     _check_payloads(config, path)
     _check_links(config, path)
     _check_obstacles(config, path)
-    check_sds(config.hits, f"{path}: [hits]")
-    check_sds(config.sensor, f"{path}: [sensor]")
-    check_sds(config.readback, f"{path}: [readback]")
-    check_sds(config.diagnose, f"{path}: [diagnose]")
-    if not 0 < config.controller.speed_percent <= 100:
-        raise InputError(
-            f"{path}: [controller] speed_percent is {config.controller.speed_percent}; it must lie "
-            f"above 0 and at most at 100."
-        )
+    for name in ("hits", "sensor", "readback", "diagnose"):
+        check_sds(getattr(config, name), f"{path}: [{name}]")
+    _within(f"{path}: [controller] speed_percent", config.controller.speed_percent, most=100)
     margin = config.collision.margin_m
-    if not 0 <= margin < 1:
-        raise InputError(
-            f"{path}: [collision] margin_m is {margin}; it must be at least 0 m and below 1 m."
-        )
+    _within(f"{path}: [collision] margin_m", margin, " m", zero=True, most=1)
     low, high = config.band_hz
     if not 0 < low < high < float("inf"):
         raise InputError(f"{path}: band_hz {[low, high]} must rise from above 0 Hz; correct it.")
-    if not all(abs(g) < 100 for g in config.gravity):
-        raise InputError(f"{path}: gravity {list(config.gravity)} is not in m/s²; correct it.")
+    _finite(f"{path}: gravity", config.gravity, 100, "m/s²")
 
 
 def _check_compliances(config: RobotConfig, path: Path) -> None:
@@ -97,16 +100,8 @@ def _check_compliances(config: RobotConfig, path: Path) -> None:
     for number, block in enumerate(config.compliance, 1):
         entry = f"{path}: [[compliance]] number {number} ({block.joint})"
         k, c = ("N/m", "N·s/m") if block.slide else ("N·m/rad", "N·m·s/rad")
-        if not 0 < block.stiffness <= LARGEST_STIFFNESS:
-            raise InputError(
-                f"{entry} has stiffness {block.stiffness}; it must be above 0 {k} and at most "
-                f"{LARGEST_STIFFNESS:g} (leave out what does not give)."
-            )
-        if not 0 <= block.damping <= LARGEST_STIFFNESS:
-            raise InputError(
-                f"{entry} has damping {block.damping}; it must be 0 {c} or more, and at most "
-                f"{LARGEST_STIFFNESS:g}."
-            )
+        _within(f"{entry}: stiffness", block.stiffness, f" {k}", most=LARGEST_STIFFNESS)
+        _within(f"{entry}: damping", block.damping, f" {c}", zero=True, most=LARGEST_STIFFNESS)
         length = sum(a * a for a in block.axis) ** 0.5
         if not abs(length - 1) < 1e-3:
             raise InputError(f"{entry} has an axis of length {length:.4g}; give a unit vector.")
@@ -115,7 +110,8 @@ def _check_compliances(config: RobotConfig, path: Path) -> None:
                 f"{entry} has loss_factor {block.loss_factor}; it must be at least 0 and "
                 f"below {LOSS_FACTOR_BELOW:g}."
             )
-        _check_percent(block.stiffness_sd_percent, f"{entry}: stiffness_sd_percent")
+        percent = block.stiffness_sd_percent
+        _within(f"{entry}: stiffness_sd_percent", percent, most=LARGEST_SD_PERCENT)
         same = first.setdefault(block.tie or f"\0{number}", block)
         for key in ("stiffness", "damping", "loss_factor", "stiffness_sd_percent"):
             if getattr(same, key) != getattr(block, key):
@@ -146,12 +142,9 @@ def check_own_springs(
 def _check_payloads(config: RobotConfig, path: Path) -> None:
     for number, block in enumerate(config.payload, 1):
         entry = f"{path}: [[payload]] number {number} ({block.link})"
-        if not 0 < block.mass < 1e5:
-            raise InputError(f"{entry} has mass {block.mass}; it must be above 0 kg.")
-        if not all(abs(value) < 1e2 for value in block.com_m):
-            raise InputError(f"{entry} has com_m {list(block.com_m)}; give 3 lengths in m.")
-        xx, yy, zz, xy, xz, yz = block.inertia
-        moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        _within(f"{entry}: mass", block.mass, " kg")
+        _finite(f"{entry}: com_m", block.com_m, 1e2, "3 lengths in m")
+        moments = symmetric(block.inertia, PAYLOAD)
         finite = bool(np.all(np.isfinite(moments)))
         if not finite or np.linalg.eigvalsh(moments)[0] < -1e-9 * np.abs(moments).max():
             raise InputError(
@@ -166,7 +159,7 @@ def _check_links(config: RobotConfig, path: Path) -> None:
         entry = f"{path}: [[link]] number {number} ({table.link})"
         if named.index(table.link) != number - 1:
             raise InputError(f"{entry} states a link that an earlier one states; keep one of them.")
-        _check_percent(table.sd_percent, f"{entry}: sd_percent")
+        _within(f"{entry}: sd_percent", table.sd_percent, most=LARGEST_SD_PERCENT)
         stated = (table.mass_kg, table.centre_m, table.inertia_kg_m2)
         if all(value is None for value in stated):
             if table.sd_percent is None:
@@ -174,12 +167,9 @@ def _check_links(config: RobotConfig, path: Path) -> None:
             continue
         if table.mass_kg is None or table.centre_m is None or table.inertia_kg_m2 is None:
             raise InputError(f"{entry} needs mass_kg, centre_m and inertia_kg_m2; give all three.")
-        if not 0 < table.mass_kg < 1e5:
-            raise InputError(f"{entry} has mass_kg {table.mass_kg}; it must be above 0 kg.")
-        if not all(abs(value) < 1e2 for value in table.centre_m):
-            raise InputError(f"{entry} has centre_m {list(table.centre_m)}; give 3 lengths in m.")
-        xx, xy, xz, yy, yz, zz = table.inertia_kg_m2
-        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        _within(f"{entry}: mass_kg", table.mass_kg, " kg")
+        _finite(f"{entry}: centre_m", table.centre_m, 1e2, "3 lengths in m")
+        moments = np.linalg.eigvalsh(symmetric(table.inertia_kg_m2, LINK))
         if moments[0] < 0 or moments[0] + moments[1] < moments[2] * (1 - 1e-6):
             raise InputError(
                 f"{entry} has inertia_kg_m2 {list(table.inertia_kg_m2)}, which no body can have; "
@@ -195,13 +185,46 @@ def _check_obstacles(config: RobotConfig, path: Path) -> None:
                 f'{path}: [[obstacle]] number {number} is named "{block.name}" like an earlier '
                 f"one; give every obstacle a name of its own."
             )
-        if not all(0 < size < 1e4 for size in block.size_m):
+        entry = f"{path}: [[obstacle]] {block.name}"
+        for size in block.size_m:
+            _within(f"{entry}: size_m", size, " m", most=1e4)
+        _finite(f"{entry}: center_m", block.center_m, 1e4, "finite numbers")
+        _finite(f"{entry}: rpy_deg", block.rpy_deg, 1e4, "finite numbers")
+
+
+def check_entries(robot: "Robot") -> None:
+    """Raise InputError where robot.toml names what there is not, or a joint has no range."""
+    for entry, name, number in (
+        ("tcp_frame", robot.config.tcp_frame, robot.tcp_id),
+        ("sensor_frame", robot.config.sensor_frame, robot.sensor_id),
+    ):
+        if robot.model.frames[number].parentJoint == 0:
             raise InputError(
-                f"{path}: [[obstacle]] {block.name} has sizes {list(block.size_m)}; "
-                f"give three lengths above 0 m."
+                f'{robot.path}: {entry} "{name}" is fixed to the base and never moves; name a '
+                f"frame on the tool."
             )
-        if not all(abs(value) < 1e4 for value in (*block.center_m, *block.rpy_deg)):
+    for block in robot.config.compliance:
+        if block.joint not in (*robot.joint_names, BASE) and not robot.carries(block.joint):
+            fault = f"is no actuated joint of {robot.urdf_path.name}, nor a link with one beyond"
+            if block.joint in robot.linkage.names:
+                fault = "follows another (<mimic>), with which it gives"
             raise InputError(
-                f"{path}: [[obstacle]] {block.name} has center_m {list(block.center_m)} and "
-                f"rpy_deg {list(block.rpy_deg)}; give finite numbers."
+                f'{robot.path}: [[compliance]] joint "{block.joint}" {fault}; name one of '
+                f"{', '.join(robot.joint_names)}."
             )
+    for block in (*robot.config.resonator, *robot.config.harmonic):
+        if block.joint not in robot.joint_names:
+            raise InputError(
+                f'{robot.path}: [[effects]] joint "{block.joint}" is no actuated joint of '
+                f"{robot.urdf_path.name}; it has {', '.join(robot.joint_names)}."
+            )
+    for block in robot.config.payload:
+        robot.frame_id("[[payload]] link", block.link)
+    for table in robot.config.link:
+        robot.frame_id("[[link]] link", table.link)
+    bad = np.flatnonzero(~(robot.lower_rad < robot.upper_rad))
+    if bad.size:
+        raise InputError(
+            f"{robot.urdf_path}: {robot.joint_names[bad[0]]} has no range between its limits; "
+            f"give lower and upper in {'m' if robot.joints.slides[bad[0]] else 'rad'}."
+        )

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from planner.robot.link_inertias import link_inertia
 from planner.robot.robot import Robot
 from planner.robot.shapes import leave_out_unreadable, shape_corners
+from planner.robot.urdf_elements import link_inertia, vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
             continue
         frame = robot.model.frames[robot.model.getFrameId(name, pin.FrameType.BODY)]
         joint = names[frame.parentJoint]
-        inertia = link_inertia(link) if link.find("inertial") is not None else pin.Inertia.Zero()
+        inertia = link_inertia(link)
         corners = np.array([*shapes.get(name, []), *_carried(root, name), np.zeros(3)])
         found.append(
             LinkBody(
@@ -107,9 +107,9 @@ def lowest_m(robot: Robot, q: np.ndarray, joints: Sequence[str]) -> float:
 
 def _carried(root: ElementTree.Element, link: str) -> list[np.ndarray]:
     """Origins of the joints that a link carries, in its frame."""
-    found = []
-    for joint in root.findall("joint"):
-        parent, origin = joint.find("parent"), joint.find("origin")
-        if parent is not None and parent.get("link") == link and origin is not None:
-            found.append(np.array([float(v) for v in origin.get("xyz", "0 0 0").split()]))
-    return found
+    carried = (joint for joint in root.findall("joint") if joint.find("origin") is not None)
+    return [
+        vector(joint, "origin", "xyz")
+        for joint in carried
+        if (parent := joint.find("parent")) is not None and parent.get("link") == link
+    ]

@@ -7,9 +7,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from planner.robot.followers import follows
-from planner.robot.held_joints import SLIDING
-from planner.robot.urdf import joint_axis
+from planner.robot.urdf_elements import SLIDING, joint_axis
+from planner.robot.urdf_joints import follows
 
 T = TypeVar("T")
 

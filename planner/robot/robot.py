@@ -12,14 +12,13 @@ from planner.errors import InputError
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout, PointNames
 from planner.robot.config import Compliance, PointTable, RobotConfig
-from planner.robot.config_file import check_own_springs, load_config
+from planner.robot.config_file import check_entries, check_own_springs, load_config
 from planner.robot.controller_axes import with_axes
-from planner.robot.link_inertias import state_inertias
 from planner.robot.linkage import Linkage
 from planner.robot.points import PREFIX, check_points, names_of, with_points
-from planner.robot.robot_entries import check_entries
 from planner.robot.shapes import UnusableShape, leave_out_unusable
 from planner.robot.urdf import build_model, read_urdf
+from planner.robot.urdf_elements import state_inertias
 
 LEVER_M = 0.3  # half the length of a carriage, chosen
 # A link and the joint that carries it may share a name; the link is meant.

@@ -12,7 +12,8 @@ import numpy as np
 import pinocchio as pin
 
 from planner.robot.mesh_files import find_mesh
-from planner.robot.urdf import numbers, quiet
+from planner.robot.urdf import quiet
+from planner.robot.urdf_elements import numbers, place_of
 
 LARGEST_M = 1e4  # of a shape
 FEW = 3  # names in a sentence
@@ -66,7 +67,7 @@ def build_geometry(model: pin.Model, root: ElementTree.Element, kind: str) -> pi
         for place, part in enumerate(link.findall(kind)):
             shape = _shape(part)
             if shape is not None:
-                at = frame.placement * pin.SE3(*_origin(part))
+                at = frame.placement * place_of(part)
                 named = f"{name}_{place}"
                 made = pin.GeometryObject(named, frame.parentJoint, number, at, shape)
                 geometry.addGeometryObject(made)
@@ -99,9 +100,8 @@ def shape_corners(root: ElementTree.Element) -> dict[str, list[np.ndarray]]:
         for part in link.findall("collision") or link.findall("visual"):
             box = _box(part)
             if box is not None:
-                rotation, place = _origin(part)
                 for signs in np.ndindex(2, 2, 2):
-                    corners.append(place + rotation @ np.where(signs, box[1], box[0]))
+                    corners.append(place_of(part).act(np.where(signs, box[1], box[0])))
     return found
 
 
@@ -176,11 +176,3 @@ def _box(part: ElementTree.Element) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     shape.computeLocalAABB()
     return np.array(shape.aabb_local.min_), np.array(shape.aabb_local.max_)
-
-
-def _origin(part: ElementTree.Element) -> tuple[np.ndarray, np.ndarray]:
-    origin = part.find("origin")
-    if origin is None:
-        return np.eye(3), np.zeros(3)
-    turn = pin.rpy.rpyToMatrix(numbers(origin.get("rpy", "0 0 0")))
-    return turn, numbers(origin.get("xyz", "0 0 0"))

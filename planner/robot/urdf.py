@@ -1,4 +1,7 @@
-"""URDF files: read, checked, and parsed by Pinocchio without chatter on the terminal."""
+"""URDF files: read, checked, and parsed by Pinocchio without chatter on the terminal.
+
+Of a xacro file, from which URDFs are made, what it expands to is read.
+"""
 
 import os
 import re
@@ -13,12 +16,10 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
-from planner.robot.followers import follows, join_followers, narrow_leaders
-from planner.robot.held_joints import SLIDING, TURNING, fix, held_places
-from planner.robot.xacro_source import urdf_source
+from planner.robot.mesh_files import urdf_source
+from planner.robot.urdf_joints import settle_joints
 
 LARGEST, FARTHEST_M = 1e7, 1e3  # kg, kg·m, kg·m² of what turns; between joints: no robot has it
-FIXED = ("fixed",)
 
 
 def read_urdf(urdf: Path, robot_toml: Path, held: Mapping[str, float]) -> ElementTree.Element:
@@ -43,7 +44,7 @@ def read_urdf(urdf: Path, robot_toml: Path, held: Mapping[str, float]) -> Elemen
 def parse_urdf(text: bytes | str, urdf: Path, held: Mapping[str, float]) -> ElementTree.Element:
     """The same of a URDF's text; errors name the file `urdf`."""
     root = _root(text, urdf)
-    if not _settle_joints(root, urdf, held):
+    if not settle_joints(root, urdf, held):
         raise InputError(f"{urdf} has no joint that moves; name the URDF of a robot arm.")
     return root
 
@@ -67,22 +68,6 @@ def _root(text: bytes | str, urdf: Path) -> ElementTree.Element:
     return root
 
 
-def _settle_joints(root: ElementTree.Element, urdf: Path, held: Mapping[str, float]) -> int:
-    """Hold, join and complete the joints; returns how many move."""
-    joints = {joint.get("name", ""): joint for joint in root.findall("joint")}
-    places = held_places(joints, held, urdf)
-    join_followers(joints, places, urdf)
-    for name, place in places.items():
-        fix(joints[name], place, urdf)
-    moving = [joint for joint in joints.values() if joint.get("type") not in FIXED]
-    for joint in (joint for joint in moving if follows(joint) is None):
-        _complete(joint, urdf)
-    narrow_leaders(joints, urdf)
-    for joint in (joint for joint in moving if follows(joint) is not None):
-        _complete(joint, urdf)
-    return len(moving)
-
-
 def build_model(text: str, urdf: Path) -> pin.Model:
     """Pinocchio's model; InputError with the parser's own words where it refuses or skips."""
     with quiet() as said:
@@ -96,12 +81,6 @@ def build_model(text: str, urdf: Path) -> pin.Model:
             raise InputError(f"{urdf} is not a usable URDF ({_complaint(said())}); correct it.")
     _check_inertias(model, urdf)
     return model
-
-
-def joint_axis(joint: ElementTree.Element) -> np.ndarray:
-    """Unit axis (3,) of a joint in its own frame."""
-    axis = numbers(_axis_text(joint))
-    return axis / np.linalg.norm(axis)
 
 
 @contextmanager
@@ -130,45 +109,6 @@ def _complaint(chatter: str) -> str:
     """What the parser found, and (its second line) in which joint or link."""
     lines = re.findall(r"Error:\s*(.+)", chatter)[:2]
     return ", ".join(dict.fromkeys(line.split(".  ")[0].strip().rstrip(".") for line in lines))
-
-
-def _axis_text(joint: ElementTree.Element) -> str:
-    element = joint.find("axis")
-    return "1 0 0" if element is None else element.get("xyz", "1 0 0")
-
-
-def numbers(text: str) -> np.ndarray:
-    """Numbers of an attribute, three NaN where it holds anything else."""
-    try:
-        return np.array([float(v) for v in text.split()])
-    except ValueError:
-        return np.full(3, np.nan)
-
-
-def _complete(joint: ElementTree.Element, urdf: Path) -> None:
-    """Check a moving joint's type, axis and limits; give a continuous one limits of ±180°."""
-    name, kind, limit = joint.get("name", "?"), joint.get("type"), joint.find("limit")
-    if kind not in (*TURNING, *SLIDING):
-        raise InputError(
-            f"{urdf}: joint {name} is of type {kind}, but only revolute, continuous and prismatic "
-            f"joints move here; make it a fixed joint."
-        )
-    axis = numbers(_axis_text(joint))
-    if axis.shape != (3,) or not 1e-6 < np.linalg.norm(axis) < np.inf:
-        raise InputError(
-            f'{urdf}: joint {name} has axis "{_axis_text(joint)}"; give 3 numbers, not all 0.'
-        )
-    if kind == "continuous":
-        speed = "3.14" if limit is None else limit.get("velocity", "3.14")
-        joint.set("type", "revolute")
-        for old in joint.findall("limit"):
-            joint.remove(old)
-        ElementTree.SubElement(
-            joint, "limit", lower=str(-np.pi), upper=str(np.pi), velocity=speed, effort="0"
-        )
-    elif limit is None:
-        unit = "m" if kind in SLIDING else "rad"
-        raise InputError(f"{urdf}: {kind} joint {name} has no <limit>; add its range in {unit}.")
 
 
 def _check_tree(root: ElementTree.Element, urdf: Path) -> None:
@@ -201,8 +141,8 @@ def _check_inertias(model: pin.Model, urdf: Path) -> None:
         list(model.names)[1:], list(model.inertias)[1:], list(model.jointPlacements)[1:],
         strict=True,
     ):  # fmt: skip
-        numbers = np.array(inertia.toDynamicParameters())
-        if not np.all(np.abs([*numbers, *inertia.lever]) < LARGEST):
+        values = np.array(inertia.toDynamicParameters())
+        if not np.all(np.abs([*values, *inertia.lever]) < LARGEST):
             raise InputError(
                 f"{urdf}: the links that turn with {name} have mass {inertia.mass:.4g} kg and "
                 f"centre of mass {_said(inertia.lever)} m; give kg, m and kg·m²."

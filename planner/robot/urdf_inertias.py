@@ -6,12 +6,12 @@ import numpy as np
 import pinocchio as pin
 
 from planner.robot.config import BASE
-from planner.robot.link_inertias import link_inertia, state_inertias, write_inertia
+from planner.robot.mesh_files import urdf_source
+from planner.robot.moments import PINOCCHIO, symmetric
 from planner.robot.robot import Robot
+from planner.robot.urdf_elements import link_inertia, state_inertias, write_inertia
 from planner.robot.virtual_joints import OUTER, SMALL, body_inertia
-from planner.robot.xacro_source import urdf_source
 
-ORDER = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]  # of moments in Pinocchio's ten numbers
 SAFE = 0.99  # of the largest share of a change that leaves a body possible
 
 
@@ -98,7 +98,7 @@ def _seen_from(placement: pin.SE3, values: np.ndarray) -> np.ndarray:
     moved = toward @ _spread(values) @ toward.T
     second = moved[:3, :3]
     moments = np.trace(second) * np.eye(3) - second
-    return np.array([moved[3, 3], *moved[:3, 3], *(moments[ij] for ij in ORDER)])
+    return np.array([moved[3, 3], *moved[:3, 3], *(moments[ij] for ij in PINOCCHIO)])
 
 
 def _spread(values: np.ndarray) -> np.ndarray:
@@ -106,9 +106,7 @@ def _spread(values: np.ndarray) -> np.ndarray:
 
     Wensing, Kim & Slotine 2018, eq. 12.
     """
-    moments = np.zeros((3, 3))
-    for (i, j), value in zip(ORDER, values[4:], strict=True):
-        moments[i, j] = moments[j, i] = value
+    moments = symmetric(values[4:], PINOCCHIO)
     second = np.trace(moments) / 2 * np.eye(3) - moments
     return np.block([[second, values[1:4, None]], [values[None, 1:4], values[:1, None]]])
 

@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from planner.errors import InputError
 from planner.robot.config import BASE
+from planner.robot.moments import PAYLOAD, PINOCCHIO, symmetric
 from planner.robot.points import PREFIX
 from planner.robot.robot import Robot
 
@@ -226,9 +227,7 @@ def _add_joint(
 def _body(values: np.ndarray) -> pin.Inertia:
     if values[0] != 0:
         return pin.Inertia.FromDynamicParameters(values)
-    xx, xy, yy, xz, yz, zz = values[4:]
-    moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return pin.Inertia(0.0, np.zeros(3), moments)
+    return pin.Inertia(0.0, np.zeros(3), symmetric(values[4:], PINOCCHIO))
 
 
 def body_inertia(robot: Robot, joint: int) -> np.ndarray:
@@ -237,8 +236,7 @@ def body_inertia(robot: Robot, joint: int) -> np.ndarray:
     for block in robot.config.payload:
         frame = robot.model.frames[robot.frame_id("[[payload]] link", block.link)]
         if frame.parentJoint == joint:
-            xx, yy, zz, xy, xz, yz = block.inertia
-            moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            moments = symmetric(block.inertia, PAYLOAD)
             body = pin.Inertia(block.mass, np.array(block.com_m, dtype=float), moments)
             total = total + frame.placement.act(body)
     return np.array(total.toDynamicParameters())
@@ -255,6 +253,6 @@ def inertia_basis() -> np.ndarray:
         cross = np.cross(np.eye(3)[axis], np.eye(3)).T  # column k is e_axis × e_k
         basis[1 + axis, :3, 3:] = -cross
         basis[1 + axis, 3:, :3] = cross
-    for number, (i, j) in enumerate([(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)], 4):
+    for number, (i, j) in enumerate(PINOCCHIO, 4):
         basis[number, 3 + i, 3 + j] = basis[number, 3 + j, 3 + i] = 1.0
     return basis

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from planner.dataset.screened_files import FileVerdict, Source, not_averaged, read_one, when
-from planner.recording.driving_point import driving_point
 from planner.recording.force_levels import far_below, peak_n
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import version
 from planner.recording.records import Hit
 from planner.recording.repeat_sizes import other_size
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
-from planner.recording.sampling_rates import sampled_otherwise
+from planner.recording.sampling import sampled_otherwise
+from planner.recording.spectra import driving_point
 from planner.session.inbox import FolderTable
 
 # As like as hits of one pose are (0.98 and more on the true robots of the tests); at poses that a

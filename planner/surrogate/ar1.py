@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.surrogate.gp import Posterior, Prior, fit
+from planner.surrogate.gp import Posterior, fit
 from planner.surrogate.kernels import Kernel, parse
-from planner.surrogate.training_data import TrainingData, pad
+from planner.surrogate.training_data import Prior, TrainingData, pad
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def fit_ar1(
     prior = _stack(priors, uses_low, parse(kernel, data.x.shape[1]))
     start = None
     if thorough:
-        from planner.surrogate.marginal import laplace  # by JAX, which takes a second to import
+        from planner.surrogate.likelihood import laplace  # by JAX, which takes a second to import
 
         start = laplace(kernel, padded, prior)
     posterior = fit(padded, prior, samples, kept, kernel, 2 if thorough else 1, start)

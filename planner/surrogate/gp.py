@@ -8,7 +8,6 @@ averaged (see `importance`).
 
 from contextlib import nullcontext
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,12 +15,10 @@ from threadpoolctl import threadpool_limits
 
 from planner.errors import InputError
 from planner.inference import triangular
-from planner.surrogate.data_covariance import lower_half, prior_covariance
 from planner.surrogate.importance import Gaussians, Score, Stage, normal_points, sample
-from planner.surrogate.kernels import Kernel, parse
-from planner.surrogate.likelihood import log_likelihoods
+from planner.surrogate.kernels import parse
 from planner.surrogate.predictive import Predictive
-from planner.surrogate.training_data import Padded, thinned
+from planner.surrogate.training_data import Padded, Prior, data_covariance, thinned
 
 JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance
 SURELY = 100.0  # times n² ε: noise, relative to the variance, that keeps a covariance regular
@@ -32,10 +29,10 @@ SILENT_JITTER = 1e-10  # of the prior variance; a larger one is reported
 # evidence is that of so many points.
 AT_ONCE = 64
 STAGES = 32, 64, 128
-BLOCK_ELEMENTS = 2**18  # of covariances that are factorised together
 # θ is the better known the more points there are: samples kept, by this at most. At 500 generated
 # poses 4 samples err and cover as 8 do.
 MOST_FEWER = 8
+IN_CACHE = 2**15  # elements of matrices: of more, most time goes into memory
 NO_FIT = (
     "No Gaussian process fits the measured modes; set aside poses that are measured twice "
     "or far off with `planner withdraw`."
@@ -47,37 +44,16 @@ SINGULAR_REMARK = (
 
 
 @dataclass(frozen=True, eq=False)
-class Prior:
-    """Prior of m outputs: mean (m,), sd of b and ρ' (m,), θ's mean and sd (m, p).
-
-    `nugget_shared` (m,) is the share of log τ's variance that the outputs have in common; (1,): all
-    alike.
-    """
-
-    mean: np.ndarray
-    bias_sd: np.ndarray
-    slope_sd: np.ndarray
-    theta_mean: np.ndarray
-    theta_sd: np.ndarray
-    nugget_shared: np.ndarray = field(default_factory=lambda: np.zeros(1))
-
-
-@dataclass(frozen=True, eq=False)
 class Solved:
-    """What an output's data say at each of k samples: L (k, c, c) and K⁻¹(y − mean) (k, c).
+    """What an output's data say at each of k samples: L⁻¹ (k, n, n) and K⁻¹(y − mean) (k, n).
 
-    K = LLᵀ is their covariance, L as `triangular.in_bands` has it; `jitter`, relative to the prior
+    K = LLᵀ is the covariance of the n points that hold a value; `jitter`, relative to the prior
     variance, had to be added to K.
     """
 
-    factor: np.ndarray
+    whiten: np.ndarray
     weights: np.ndarray
     jitter: float
-
-    @cached_property
-    def whiten(self) -> np.ndarray:
-        """L⁻¹ (k, c, c): of many points only what looks at its entries asks for it."""
-        return triangular.inverses(self.factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,38 +85,29 @@ class Posterior:
 
     def solved(self, j: int) -> Solved:
         """Of output j; InputError where no jitter makes its covariances regular."""
-        if j not in self._found:
-            for jitter in JITTERS[JITTERS.index(self.jitter) :]:
-                try:
-                    # The same digits wherever those of many points are worked out again.
-                    with threadpool_limits(1) if len(self.x) > AT_ONCE else nullcontext():
-                        factor = self._factor(j, jitter)
-                except np.linalg.LinAlgError:
-                    continue
-                y = np.broadcast_to(self.y[j][:, None], (len(factor), len(self.x), 1))
-                white = triangular.divided(factor, y)
-                weights = triangular.divided_by_transposed(factor, white)[..., 0]
-                self._found[j] = Solved(factor, weights, jitter)
+        for jitter in JITTERS[JITTERS.index(self.jitter) :] if j not in self._found else ():
+            try:
+                # The same digits wherever those of many points are worked out again.
+                with threadpool_limits(1) if len(self.x) > AT_ONCE else nullcontext():
+                    self._found[j] = self._solved(j, jitter)
                 break
-            else:
-                raise InputError(NO_FIT)
+            except np.linalg.LinAlgError:
+                continue
+        if j not in self._found:
+            raise InputError(NO_FIT)
         return self._found[j]
 
-    def _factor(self, j: int, jitter: float) -> np.ndarray:
-        """Cholesky factors `in_bands` (k, c, c); LinAlgError where a covariance is singular."""
-        kept, rows = len(self.theta[j]), np.flatnonzero(self.mask[j])
-        held = slice(rows[-1] + 1 if len(rows) else 0)
-        found = np.zeros((kept, len(self.x), len(self.x)))
-        # What does not count is decoupled: padding at the end is left as it is.
-        np.einsum("kii->ki", found)[:, held.stop :] = 1.0
-        own = self.low[j, held], self.mask[j, held], self.variance[j, held], self.prior.bias_sd[j]
-        few = max(1, BLOCK_ELEMENTS // max(held.stop, 1) ** 2)
-        for start in range(0, kept if len(rows) else 0, few):
-            block = slice(start, start + few)
-            slope_sd, theta = self.slope_sd[j, block], self.theta[j, block]
-            k = lower_half(self.kernel, self.x[held], *own, slope_sd, jitter, theta)
-            found[block, held, held] = triangular.in_bands(np.linalg.cholesky(k))
-        return found
+    def _solved(self, j: int, jitter: float) -> Solved:
+        """LinAlgError where a covariance is singular."""
+        known = self.known(j)
+        low, mask, variance = (v[j, known] for v in (self.low, self.mask, self.variance))
+        data = jitter, self.x[known], low, mask, variance, self.prior.bias_sd[j]
+        each = zip(self.theta[j], self.slope_sd[j], strict=True)
+        covariances = (data_covariance(np, self.kernel, t, *data, slope) for t, slope in each)
+        # By NumPy: SciPy takes long to import, and loaded late its BLAS has more than one thread.
+        whiten = np.array([triangular.inverse(np.linalg.cholesky(k)) for k in covariances])
+        weights = np.swapaxes(whiten, 1, 2) @ (whiten @ self.y[j, known])[..., None]
+        return Solved(whiten, weights[..., 0], jitter)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -154,7 +121,7 @@ class Posterior:
         if j in self._found or self.mask[j].sum() == 0:
             return self.solved(j).jitter
         noise = np.exp(2 * self.theta[j, :, 1, None]) + self.variance[j, known]
-        whole = noise + self._own(j, self.x[known], self.low[j, known])
+        whole = noise + self.own(j, self.x[known], self.low[j, known])
         # So much more than rounding makes of n points, and a factor has to exist (Demmel 1989).
         enough = SURELY * noise.shape[1] ** 2 * np.finfo(float).eps
         if np.all(noise.min(axis=1) > enough * whole.max(axis=1)):
@@ -184,21 +151,20 @@ class Posterior:
 
     def predictive(self, j: int, x: np.ndarray, low: np.ndarray) -> Predictive:
         """Output j, noise-free, at x (q, d) with centred low (q,), one Gaussian per sample."""
-        cross, white = self._cross(j, x, low)
-        weights = self.solved(j).weights[:, None, self.known(j)]
-        means = self.prior.mean[j] + (weights @ cross)[:, 0]
-        own = self._own(j, x, low) - np.sum(white**2, axis=1)
+        cross, white = self.cross(j, x, low)
+        means = self.prior.mean[j] + (self.solved(j).weights[:, None] @ cross)[:, 0]
+        own = self.own(j, x, low) - np.sum(white**2, axis=1)
         return Predictive(np.full(len(means), 1 / len(means)), means, np.sqrt(np.maximum(own, 0.0)))
 
     def covariance(
         self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Posterior covariance (k, a, b), variances (k, a), (k, b) of output j, per sample."""
-        _, wa = self._cross(j, xa, la)
-        _, wb = self._cross(j, xb, lb)
+        _, wa = self.cross(j, xa, la)
+        _, wb = self.cross(j, xb, lb)
         prior = self._prior(j, xa, la, xb, lb)
-        va = self._own(j, xa, la) - np.sum(wa**2, axis=1)
-        vb = self._own(j, xb, lb) - np.sum(wb**2, axis=1)
+        va = self.own(j, xa, la) - np.sum(wa**2, axis=1)
+        vb = self.own(j, xb, lb) - np.sum(wb**2, axis=1)
         covariance = prior - np.swapaxes(wa, 1, 2) @ wb
         return covariance, np.maximum(va, 0.0), np.maximum(vb, 0.0)
 
@@ -206,52 +172,33 @@ class Posterior:
         """Mean nugget variance (m,)."""
         return np.mean(np.exp(2 * self.theta[:, :, 1]), axis=1)
 
-    def slopes(self, j: int) -> np.ndarray:
-        """Posterior mean (k,) of ρ' of output j, per sample."""
-        return self.slope_sd[j] ** 2 * (self.solved(j).weights @ (self.low[j] * self.mask[j]))
-
     def _prior(
         self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
     ) -> np.ndarray:
-        bias = float(self.prior.bias_sd[j])
-        return prior_covariance(self.kernel, self.theta[j], self.slope_sd[j], bias, xa, la, xb, lb)
+        """Prior covariance (k, a, b), so many samples at once as the processor's cache holds."""
+        delta, bias = parse(self.kernel, self.x.shape[1]), self.prior.bias_sd[j] ** 2
+        linear, theta = np.outer(la, lb), self.theta[j]
+        square = self.slope_sd[j][:, None, None] ** 2
+        some = max(1, IN_CACHE // max(linear.size, 1))
+        parts = (slice(i, i + some) for i in range(0, len(theta), some))
+        return np.concatenate(
+            [delta.covariance(np, theta[p], xa, xb) + (bias + square[p] * linear) for p in parts]
+        )
 
-    @property
-    def _delta(self) -> Kernel:
-        return parse(self.kernel, self.x.shape[1])
+    def own(self, j: int, x: np.ndarray, low: np.ndarray) -> np.ndarray:
+        """Prior variances (k, q) of output j."""
+        linear = self.prior.bias_sd[j] ** 2 + self.slope_sd[j][:, None] ** 2 * low**2
+        return parse(self.kernel, self.x.shape[1]).variance(np, self.theta[j], x) + linear
 
-    def _own(self, j: int, x: np.ndarray, low: np.ndarray) -> np.ndarray:
-        """Prior variances (k, q)."""
-        prior = self.prior
-        linear = prior.bias_sd[j] ** 2 + self.slope_sd[j][:, None] ** 2 * low**2
-        return self._delta.variance(np, self.theta[j], x) + linear
-
-    def _cross(self, j: int, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Prior covariance (k, n, q) with the training points, and L⁻¹ times it.
-
-        Padding is left out here: n counts the points that hold a value.
-        """
+    def cross(self, j: int, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Prior covariance (k, n, q) with the n points that hold a value, and L⁻¹ times it."""
         known = self.known(j)
-        cross = self._prior(j, self.x[known], self.low[j][known], x, low)
-        factor = self.solved(j).factor
-        if isinstance(known, slice):
-            return cross, triangular.divided(factor[:, known, known], cross)
-        whole = np.zeros((len(cross), len(self.x), len(x)))  # what holds no value is decoupled
-        whole[:, known] = cross
-        return cross, triangular.divided(factor, whole)[:, known]
+        found = self._prior(j, self.x[known], self.low[j, known], x, low)
+        return found, self.solved(j).whiten @ found
 
-    def known(self, j: int) -> slice | np.ndarray:
+    def known(self, j: int) -> np.ndarray:
         """Which of the training points hold a value of output j."""
-        rows = np.flatnonzero(self.mask[j])
-        # A slice of large arrays is a view, which costs nothing.
-        return slice(0, len(rows)) if self.mask[j][: len(rows)].all() else rows
-
-    def whitening(self, j: int) -> np.ndarray:
-        """L⁻¹ (k, n, n) of output j between the points that hold a value."""
-        known, whole = self.known(j), self.solved(j).whiten
-        if isinstance(known, slice):
-            return whole[:, known, known]
-        return whole[:, known[:, None], known[None, :]]
+        return np.flatnonzero(self.mask[j])
 
 
 def fit(
@@ -261,7 +208,7 @@ def fit(
     """Posterior of all outputs; y and low of `padded` as they are, prior mean taken off here.
 
     `samples` of θ from the prior and as many in each of `rounds`; `start`, in units of the prior,
-    is where the first round looks, as `marginal.laplace` finds. Of more than AT_ONCE points, θ is
+    is where the first round looks, as `likelihood.laplace` finds. Of more than AT_ONCE points, θ is
     sampled in stages (`growing`), and fewer samples are kept.
 
     InputError if the covariance stays singular whatever is added to its diagonal.
@@ -296,6 +243,6 @@ def _theta(prior: Prior, z: np.ndarray) -> np.ndarray:
 
 def _score(kernel: str, data: Padded, prior: Prior, jitter: float) -> Score:
     """Log likelihoods (m, s) of some data at z (m, s, p), in units of the prior."""
-    y = (data.y - prior.mean[:, None]) * data.mask
-    own = y, prior.bias_sd, prior.slope_sd, jitter
-    return lambda z: log_likelihoods(kernel, data, *own, _theta(prior, z))
+    from planner.surrogate.likelihood import log_likelihoods  # by JAX, which is slow to import
+
+    return lambda z: log_likelihoods(kernel, data, prior, jitter, _theta(prior, z))

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.inference.normal import below
+from planner.surrogate.average import mixed
+from planner.surrogate.frf_bands import ModalPrediction
 from planner.surrogate.gp import Posterior
+from planner.surrogate.modal_surrogate import ModalObservations, Surrogate
 
 LEVELS = (0.5, 0.8, 0.9, 0.95)
 
@@ -43,13 +45,16 @@ class LeaveOneOut:
 
 def leave_one_out(posterior: Posterior, measurements: int) -> LeaveOneOut:
     """Of the first `measurements` (n) rows that the posterior was fitted to."""
+    from scipy.special import ndtr  # 0.1 s, which predictions do not need
+
     shape = (measurements, len(posterior.mask))
     error, sd, rank = (np.full(shape, np.nan) for _ in range(3))
     for j in range(shape[1]):
-        known = np.flatnonzero(posterior.mask[j][:measurements])
-        white = posterior.solved(j).whiten
-        precision = np.sum(white**2, axis=1)[:, known]  # (k, i): diagonal of K⁻¹
-        off, spread = posterior.solved(j).weights[:, known] / precision, 1 / np.sqrt(precision)
+        known = posterior.known(j)
+        known = known[known < measurements]
+        count, solved = len(known), posterior.solved(j)
+        precision = np.sum(solved.whiten**2, axis=1)[:, :count]  # (k, i): diagonal of K⁻¹
+        off, spread = solved.weights[:, :count] / precision, 1 / np.sqrt(precision)
         needed = 0.5 * (off / spread) ** 2 + np.log(spread) + 0.5 * np.log(2 * np.pi)
         w = np.exp(needed - needed.max(axis=0))
         w = np.minimum(w, np.sqrt(len(w)) * w.mean(axis=0))
@@ -57,8 +62,52 @@ def leave_one_out(posterior: Posterior, measurements: int) -> LeaveOneOut:
         mean = np.sum(w * off, axis=0)
         error[known, j] = mean
         sd[known, j] = np.sqrt(np.sum(w * (spread**2 + (off - mean) ** 2), axis=0))
-        rank[known, j] = np.sum(w * below(off / spread), axis=0)
+        rank[known, j] = np.sum(w * ndtr(off / spread), axis=0)
     return LeaveOneOut(error, sd, rank)
+
+
+def left_out_modes(surrogate: Surrogate, seen: ModalObservations) -> ModalPrediction:
+    """Modes (n, k) at the n measured poses, each without its own; `surrogate` has residues.
+
+    In closed form, by the likelier of hedged models. What was not found at a pose is predicted.
+    """
+    n, k = seen.frequency_hz.shape
+    plain = surrogate.predict(seen.x, seen.simulated)
+    assert surrogate.residue is not None
+    frequency = _without([surrogate.primary.posterior], np.ones((1, k)), np.log(seen.frequency_hz))
+    fits = surrogate.damping
+    weights = fits.weights[fits.counted]
+    damping = _without(list(fits.posteriors), weights, np.log(seen.damping_ratio))
+    hertz = _log_normal(frequency, plain.frequency_hz, plain.frequency_sd_hz)
+    zeta = _log_normal(damping, plain.damping_ratio, plain.damping_sd)
+    scale = surrogate.scale[:, None, None]
+    parts = np.stack([seen.residue.real, seen.residue.imag], axis=-1) / scale[..., None]
+    parts[np.isnan(seen.residue)] = np.nan
+    mean, sd = _without(
+        [surrogate.residue.posterior], np.ones((1, 18 * k)), parts.reshape(n, 18 * k)
+    )
+    mean, sd = (v.reshape(n, k, 3, 3, 2) for v in (mean, sd))
+    known = np.isfinite(mean).all(axis=-1)
+    residue = np.where(known, scale * (mean[..., 0] + 1j * mean[..., 1]), plain.residue)
+    both = np.where(known, scale * np.sqrt(np.mean(sd**2, axis=-1)), plain.residue_sd)
+    return ModalPrediction(*hertz, *zeta, residue, both)
+
+
+def _without(
+    posteriors: list[Posterior], weights: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and sd (n, m) of y (n, m) left out, models (a, m) by weight; NaN where y is."""
+    found = [leave_one_out(posterior, len(y)) for posterior in posteriors]
+    return mixed(weights, np.array([y - f.error for f in found]), np.array([f.sd for f in found]))
+
+
+def _log_normal(
+    left_out: tuple[np.ndarray, np.ndarray], plain: np.ndarray, plain_sd: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    mean, sd = left_out
+    known = np.isfinite(mean)
+    value = np.where(known, np.exp(mean), plain)
+    return value, np.where(known, value * sd, plain_sd)
 
 
 def report(residuals: LeaveOneOut, poses: tuple[str, ...], outputs: tuple[str, ...]) -> list[str]:

@@ -12,10 +12,14 @@ import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
+from planner.surrogate.average import (
+    PRIOR_BELIEF,
+    Average,
+    fit_hedged,
+    fit_plain_or_free,
+    fit_shapes,
+)
 from planner.surrogate.frf_bands import ModalPrediction
-from planner.surrogate.hedged import PRIOR_BELIEF, HedgedAR1, fit_hedged
-from planner.surrogate.kernel_average import KernelAverage, either, fit_shapes
-from planner.surrogate.plain_discrepancy import fit_plain_or_free
 from planner.surrogate.training_data import TrainingData
 
 # Stiffnesses off by ±30 % move frequencies by 15 %; EMA repeats a frequency to about 0.1 %.
@@ -28,8 +32,8 @@ LARGEST_LOG_SD = 10.0  # of a logarithm: exponentials of larger ones overflow
 RESIDUE_PRIOR = OutputPrior(bias_sd=0.2, slope_sd=0.5, amplitude=0.2, nugget=0.02)
 RESIDUE_PRIOR_ALONE = OutputPrior(bias_sd=0.7, slope_sd=0.0, amplitude=0.5, nugget=0.02)
 # Beside a simulation that was identified from these very recordings and fits them.
-DAMPING_PRIOR_TAUGHT = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nugget=0.02)
-RESIDUE_PRIOR_TAUGHT = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
+DAMPING_PRIOR_IDENTIFIED = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nugget=0.02)
+RESIDUE_PRIOR_IDENTIFIED = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
 TYPICAL_RESIDUE = 1e-5  # m/(N·s), a robot's, where neither data nor simulation say anything
 FITTED_NUGGET = 1e-3  # of ln f beside an identified simulation
 # Visits to a pose scatter by 0 to 1 % of ln f (temperature, clamping, readback) beyond what EMA
@@ -58,9 +62,9 @@ class ModalObservations:
 class Surrogate:
     """The fitted models; immutable."""
 
-    primary: HedgedAR1  # log f of every label
-    damping: KernelAverage  # log ζ of every label
-    residue: HedgedAR1 | None  # real and imaginary parts, scaled; None: they were not asked for
+    primary: Average  # log f of every label
+    damping: Average  # log ζ of every label
+    residue: Average | None  # real and imaginary parts, scaled; None: they were not asked for
     scale: np.ndarray  # (k,) m/(N·s)
     visits: bool = True  # whether the scatter from visit to visit is learned
 
@@ -84,16 +88,17 @@ class Surrogate:
     @property
     def frequency_trust(self) -> np.ndarray:
         """(k,) weight of the simulation in each label's frequency."""
-        return np.where(self.primary.uses_low, self.primary.weight, 1 - self.primary.weight)
+        fused = self.primary.models[0]
+        return np.where(fused.uses_low, self.primary.weights[0], 0.0)
 
-    def with_residues(self, seen: ModalObservations, taught: bool = False) -> "Surrogate":
+    def with_residues(self, seen: ModalObservations, identified: bool = False) -> "Surrogate":
         """The same with the residues fitted too, which may be exacter than those it has `seen`."""
         scale = _scale(seen)
-        return replace(self, residue=_fit_residues(seen, scale, taught), scale=scale)
+        return replace(self, residue=_fit_residues(seen, scale, identified), scale=scale)
 
     def frequency_inputs(self, simulated: SimulatedModes) -> np.ndarray:
         """Centred low fidelity (q, k) of the frequency outputs."""
-        return self.primary.split(_log(simulated.frequency_hz))[1]
+        return self.primary.likeliest.split(_log(simulated.frequency_hz))[1]
 
     def predict(
         self, x: np.ndarray, simulated: SimulatedModes, visit: bool = True
@@ -160,7 +165,7 @@ def fit_primary(
     discrepancy: np.ndarray | None = None,
     belief: float = PRIOR_BELIEF,
     visits: bool = True,
-) -> HedgedAR1:
+) -> Average:
     """Fit ln f of every label.
 
     Args:
@@ -189,31 +194,29 @@ def fit_primary(
     )
 
 
-def fit_damping(seen: ModalObservations, taught: bool = False) -> KernelAverage:
-    """Fit log ζ of every label: no simulation knows it that was not `taught`.
+def fit_damping(seen: ModalObservations, identified: bool = False) -> Average:
+    """Fit log ζ of every label: no simulation knows it that was not `identified`.
 
     A simulation that was is believed as far as the measured damping ratios bear it out, beside
     what they say alone: brakes and friction leave nothing of C = βK in some robots.
     """
     y = _log(seen.damping_ratio)
-    count = y.shape[1]
-    low = _log(seen.simulated.damping_ratio) if taught else np.full_like(y, np.nan)
-    data = TrainingData(seen.x, y, seen.damping_sd / np.exp(y), low)
-    centre = _centre(low, np.full(count, np.nan))
-    with_low, without_low = (DAMPING_PRIOR_TAUGHT,) * count, (DAMPING_PRIOR,) * count
-    fitted = fit_shapes(data, with_low, without_low, centre, DAMPING_KERNELS)
-    if not taught or not np.isfinite(y).any():  # nothing measured is no reason to doubt
-        return fitted
-    nothing = np.full(count, np.nan)
-    alone = replace(data, low=np.full_like(y, np.nan))
-    return either(fitted, fit_shapes(alone, with_low, without_low, nothing, DAMPING_KERNELS))
+    low = _log(seen.simulated.damping_ratio) if identified else np.full_like(y, np.nan)
+    return fit_shapes(
+        TrainingData(seen.x, y, seen.damping_sd / np.exp(y), low),
+        (DAMPING_PRIOR_IDENTIFIED,) * y.shape[1],
+        (DAMPING_PRIOR,) * y.shape[1],
+        _centre(low, np.full(y.shape[1], np.nan)),
+        DAMPING_KERNELS,
+        blind=identified and bool(np.isfinite(y).any()),  # nothing measured is no reason to doubt
+    )
 
 
 def fit_surrogate(
     seen: ModalObservations,
-    primary: HedgedAR1 | None = None,
+    primary: Average | None = None,
     residues: bool = True,
-    taught: bool = False,
+    identified: bool = False,
     visits: bool = True,
 ) -> Surrogate:
     """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
@@ -222,25 +225,25 @@ def fit_surrogate(
         seen: modes by label at n poses, and the simulation's there.
         primary: what `fit_primary` gave, where it was called already.
         residues: whether residues are fitted too, which takes two thirds of the time.
-        taught: whether the simulation was identified from these measurements' own FRFs and fits
+        identified: whether the simulation was identified from these measurements' own FRFs and fits
             them, so that damping and residues are nearly its own.
         visits: as of `fit_primary`.
     """
     if primary is None:
         primary = fit_primary(seen, visits=visits)
     scale = _scale(seen)
-    residue = _fit_residues(seen, scale, taught) if residues else None
-    return Surrogate(primary, fit_damping(seen, taught), residue, scale, visits)
+    residue = _fit_residues(seen, scale, identified) if residues else None
+    return Surrogate(primary, fit_damping(seen, identified), residue, scale, visits)
 
 
-def _fit_residues(seen: ModalObservations, scale: np.ndarray, taught: bool) -> HedgedAR1:
+def _fit_residues(seen: ModalObservations, scale: np.ndarray, identified: bool) -> Average:
     """Fit the real and imaginary parts of every label's residues, in units of `scale`."""
     k, wide = len(scale), np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
     low = _parts(seen.simulated.residue) / wide
     return fit_hedged(
         TrainingData(seen.x, _parts(seen.residue) / wide, parts_sd / wide, low),
-        (RESIDUE_PRIOR_TAUGHT if taught else RESIDUE_PRIOR,) * (18 * k),
+        (RESIDUE_PRIOR_IDENTIFIED if identified else RESIDUE_PRIOR,) * (18 * k),
         (RESIDUE_PRIOR_ALONE,) * (18 * k),
         np.zeros(18 * k),
         RESIDUE_SAMPLES,

@@ -1,10 +1,13 @@
-"""Training data of many outputs over one set of poses, padded to few sizes to compile rarely."""
+"""Training data of many outputs over one set of poses, their prior, and their covariance."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-PADDED_SIZES = (16, 24, 32, 48, 64, 96, 128, 256, 512)  # each is compiled once
+from planner.surrogate.kernels import parse
+
+PADDED_SIZES = (16, 32, 64, 128, 256, 512)  # each is compiled once
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +33,37 @@ class Padded:
     variance: np.ndarray  # (m, c)
     low: np.ndarray  # (m, c)
     mask: np.ndarray  # (m, c)
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Prior of m outputs: mean (m,), sd of b and ρ' (m,), θ's mean and sd (m, p).
+
+    `nugget_shared` (m,) is the share of log τ's variance that the outputs have in common; (1,): all
+    alike.
+    """
+
+    mean: np.ndarray
+    bias_sd: np.ndarray
+    slope_sd: np.ndarray
+    theta_mean: np.ndarray
+    theta_sd: np.ndarray
+    nugget_shared: np.ndarray = field(default_factory=lambda: np.zeros(1))
+
+
+def data_covariance(
+    xp: Any, kernel: str, theta: Any, jitter: Any, x: Any, low: Any, mask: Any, variance: Any,
+    bias: Any, slope: Any,
+) -> Any:  # fmt: skip
+    """Covariance (c, c) of one output's data at θ (p,); what does not count is decoupled.
+
+    By `xp`, NumPy or jax.numpy; `jitter` is relative to the prior variance.
+    """
+    delta = parse(kernel, x.shape[1]).covariance(xp, theta, x, x)
+    known = delta + (bias**2 + slope**2 * low[:, None] * low[None, :])
+    noise = variance + xp.exp(2 * theta[1]) + jitter * (xp.exp(2 * theta[0]) + bias**2)
+    alone = xp.where(mask > 0, noise, 1.0)
+    return known * (mask[:, None] * mask[None, :]) + alone[:, None] * xp.eye(len(x))
 
 
 def capacity(n: int) -> int:

@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
-from planner.design.variance_reduction import reduction
-from planner.surrogate.gp import Posterior, Prior
+from planner.design.reductions import reduction
+from planner.surrogate.gp import Posterior
 from planner.surrogate.kernels import matern52
+from planner.surrogate.training_data import Prior
 from tests import support
 
 PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)

@@ -9,9 +9,9 @@ import time
 import numpy as np
 import pytest
 
+from planner.surrogate.models.averaged import fit_gp
 from planner.surrogate.models.fidelity_levels import Samples
 from planner.surrogate.models.multitask import fit_multitask
-from planner.surrogate.models.single_output_gp import fit_gp
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
 from tests.support.known_robots import KNOWN_ROBOTS

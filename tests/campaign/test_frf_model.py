@@ -10,7 +10,7 @@ from planner.campaign.frf_model import ErrorByZone, FrfModel, LeftOut, local_siz
 from planner.dataset.store import Store
 from planner.demo import NAME, shipped
 from planner.frf.metrics import agreement, direct_mean
-from planner.surrogate.left_out_modes import left_out_modes
+from planner.surrogate.leave_one_out import left_out_modes
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.frf_campaigns import FrfScore, make
 from tests.support.surrogates import observed

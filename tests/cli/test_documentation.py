@@ -15,7 +15,7 @@ from planner.campaign.config import CampaignConfig
 from planner.campaign.store import EXAMPLE
 from planner.cli.app import app
 from planner.cli.run import run
-from planner.design.propose import ACQUISITIONS, DESIGNS, TOLD
+from planner.design.propose import ACQUISITIONS, DESCRIPTIONS, DESIGNS
 from planner.milling.cut import Cut, load_cut
 from planner.milling.tool_file import ToolTable, load_tool
 from planner.report.manual_page import manual
@@ -101,12 +101,12 @@ def test_the_manual_quotes_files_that_are_right(tmp_path, capsys):
 
 
 def test_every_acquisition_is_told_in_schema_and_manual(tmp_path, capsys):
-    assert set(TOLD) == {*ACQUISITIONS, *DESIGNS}
+    assert set(DESCRIPTIONS) == {*ACQUISITIONS, *DESIGNS}
     assert run(["schema", "campaign"]) == 0
     schema = capsys.readouterr().out
     assert run(["manual", "--out", str(tmp_path / "manual.html")]) == 0
     manual = (tmp_path / "manual.html").read_text()
-    for name, about in TOLD.items():
+    for name, about in DESCRIPTIONS.items():
         assert f"{name}: {about.split()[0]}" in schema
         assert about in html.unescape(manual)
 

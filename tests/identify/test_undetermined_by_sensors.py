@@ -89,7 +89,7 @@ def test_four_sensors_leave_fewer_parameters_open(tmp_path: Path, capsys) -> Non
     robot, all_ = Robot.load(toml), recorded(tmp_path / "hits", toml, 41)
     open_: dict[tuple[int, int], int] = {}
     for poses in POSES:
-        for heard in (all_, all_.heard_by("sensor")):
+        for heard in (all_, all_.channels_of("sensor")):
             found = told(robot, heard, poses)
             count = len(heard.sensors)
             open_[count, poses] = sum(not e.identifiable for e in found.estimates)

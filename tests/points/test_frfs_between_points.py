@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planner.dataset.dataset import Dataset
-from planner.dynamics.gradient import laplace, response, response_parts
+from planner.dynamics.gradient import laplace, response, response_turned
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.fit.identify import identify
@@ -87,9 +87,8 @@ def test_slopes_by_joint_angles_hold_between_points(toml: Path) -> None:
         matrices = simulation.elastic.matrices(q + off, layout=WIDE)
         return response(matrices, simulation.elasticity, s)
 
-    by_angle = response_parts(simulation.elastic.with_slopes(q, WIDE), simulation.elasticity, s)[
-        2
-    ].by_angle
+    matrices = simulation.elastic.with_slopes(q, WIDE)
+    by_angle = response_turned(matrices, simulation.elasticity, s)[1].by_angle
     assert by_angle is not None
     for joint, unit in list(enumerate(np.eye(4)))[1:]:  # turning about the vertical changes nothing
         measured = (h(step * unit) - h(-step * unit)) / (2 * step)

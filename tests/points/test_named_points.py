@@ -41,8 +41,8 @@ def test_nodes_of_several_sensors_become_points_in_their_own_axes() -> None:
     assert [str(d) for d in hit.responses] == ["base:x", "elbow:x", "elbow:y", "elbow:z"]
     assert hit.acceleration_m_s2[:, 0].tolist() == [-1.0, 3.0, 2.0, -4.0]
     assert hit.rows == [0, 3, 4, 5]
-    assert hit.heard_by("base") is None
-    alone = hit.heard_by("elbow")
+    assert hit.channels_of("base") is None
+    alone = hit.channels_of("elbow")
     assert alone is not None
     assert alone.acceleration_m_s2[:, 0].tolist() == [3.0, 2.0, -4.0]
 

@@ -8,7 +8,7 @@ import scipy.io
 from planner.errors import InputError
 from planner.recording.hits import hits_from
 from planner.recording.mat5 import read_mat5
-from planner.recording.read import read
+from planner.recording.read import READERS, hits_in, read, version
 from planner.recording.screening import screen
 from tests.support.bad_input import write_h5, write_mat
 from tests.support.odd_recordings import ODD
@@ -21,6 +21,20 @@ def columns() -> dict[str, np.ndarray]:
     time_s = np.arange(hit.force_n.size) / RATE_HZ
     each = dict(zip(names, hit.acceleration_m_s2, strict=True))
     return {"time_s": time_s, "force_n": hit.force_n, **each}
+
+
+@pytest.mark.parametrize("content", [None, b"", bytes(300), b"no hit at all\n", b"1 2\n" * 20])
+@pytest.mark.parametrize("suffix", READERS)
+def test_every_reader_refuses_what_is_no_recording(tmp_path, suffix, content):
+    path = tmp_path / f"hit{suffix}"
+    if content is not None:
+        path.write_bytes(content)
+        assert version(path) == version(path)
+    with pytest.raises(InputError, match="hit") as refused:
+        read(path)
+    assert str(refused.value).endswith(".")
+    assert "\n" not in str(refused.value)
+    assert hits_in(path) == ()
 
 
 @pytest.mark.timeout(10)  # some of them hung: all take well below 1 s

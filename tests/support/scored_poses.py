@@ -33,7 +33,7 @@ def conditioned_variance(outputs, k, c, low_c):
     x = np.vstack([post.x[known], c[None]])
     low = np.append(post.low[k][known], low_c)
     for s in range(len(post.theta[k])):
-        whiten = post.solved(k).whiten[s][np.ix_(known, known)]
+        whiten = post.solved(k).whiten[s]
         noisy = np.linalg.inv(whiten.T @ whiten)  # covariance of what was measured, with noise
         cross = post._prior(k, post.x[known], low[:-1], c[None], low[-1:])[s]
         own = post._prior(k, c[None], low[-1:], c[None], low[-1:])[s] + outputs.noise[k]

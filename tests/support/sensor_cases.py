@@ -193,7 +193,7 @@ def told(folder: Path, sensors: int, count: int) -> tuple[DiagnosisReport, Datas
     read = Dataset.read(folder / "hits", robot)
     some = read.corrected(read.visits[:count])
     if sensors == 1:
-        some = some.heard_by(SENSOR)
+        some = some.channels_of(SENSOR)
     return diagnose(some, robot), some
 
 

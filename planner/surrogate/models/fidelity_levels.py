@@ -7,7 +7,6 @@ from typing import Protocol
 import numpy as np
 
 from planner.errors import InputError
-from planner.surrogate.predictive import Predictive
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,24 +47,6 @@ class Exact:
         """Its value (q,), with sd 0."""
         value = np.asarray(self.function(x), dtype=float)
         return value, np.zeros_like(value)
-
-
-class AveragedModel:
-    """A fitted model of one output whose hyperparameters are averaged.
-
-    `log_evidence` is log p(y | model) of the expensive samples.
-    """
-
-    log_evidence: float
-
-    def predictive(self, x: np.ndarray) -> Predictive:
-        """The noise-free output at x (q, d), one Gaussian per sample of the hyperparameters."""
-        raise NotImplementedError
-
-    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Median and sd (q,) of the noise-free output at x (q, d)."""
-        mixture = self.predictive(x)
-        return mixture.median, mixture.sd
 
 
 def spread(y: np.ndarray) -> float:

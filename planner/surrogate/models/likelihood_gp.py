@@ -2,7 +2,7 @@
 
 y ~ N(0, K + τ² I); log p(y | θ) = −½ yᵀ(K + τ²I)⁻¹y − ½ log|K + τ²I| − (n/2) log 2π (Rasmussen &
 Williams 2006, eq. 5.8) is climbed from several starts, the best taken; no prior, no averaging.
-Predictions are eqs. 2.23 and 2.24 there. With few points this is over-confident (`single_output_gp`
+Predictions are eqs. 2.23 and 2.24 there. With few points this is over-confident (`averaged`
 averages instead): it is here because the papers do so.
 """
 
@@ -11,12 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
-from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
 from planner.inference.quasi_newton import RELATIVE_TOLERANCE, Peak, maximise
 from planner.surrogate.kernels import parse
+from planner.surrogate.likelihood import log_likelihood
 from planner.surrogate.models.fidelity_levels import Samples, spread
-from planner.surrogate.models.multitask import pull
 from planner.surrogate.training_data import capacity
 
 # Of log θ: amplitudes and length scales from 1e-3 to 1e5 in units of y's and x's own scale.
@@ -142,8 +141,8 @@ class _Hill:
     """A log-likelihood over the parameters z that are climbed: θ = z[own], z = θ[kept]."""
 
     kernel: str
-    padded: np.ndarray
-    y: np.ndarray
+    count: int
+    data: tuple[np.ndarray, ...]  # as `log_likelihood` wants them, padded to few sizes
     own: np.ndarray
     kept: np.ndarray
     middle: np.ndarray
@@ -162,7 +161,11 @@ class _Hill:
         lower, upper = np.full(len(kept), LOWEST), np.full(len(kept), HIGHEST)
         lower[1] = np.log(LEAST_NOISE if noise is None else noise)
         upper[1] = 0.0 if noise is None else lower[1]
-        return cls(kernel, _padded(x), y, own, kept, middle, lower, upper)
+        more = capacity(len(x)) - len(x)
+        mask, none = np.pad(np.ones(len(x)), (0, more)), np.zeros(capacity(len(x)))
+        x, y = np.pad(x, [(0, more), (0, 0)]), np.pad(y, (0, more))
+        data = x, y, none, mask, none + JITTER, np.zeros(()), np.zeros(())
+        return cls(kernel, len(samples.y), data, own, kept, middle, lower, upper)
 
     def starts(self, count: int, seed: int) -> np.ndarray:
         """The middle, and normal around it (count, …)."""
@@ -181,8 +184,9 @@ class _Hill:
 
     def density(self, z: np.ndarray) -> tuple[float, np.ndarray]:
         """log p(y) and its slope in z."""
-        value, slope = _log_likelihood(self.kernel, z[self.own], self.padded, self.y)
-        return value, np.bincount(self.own, slope)
+        value, slope = log_likelihood(self.kernel, z[self.own], 0.0, *self.data)
+        constant = 0.5 * self.count * np.log(2 * np.pi)
+        return float(value) - constant, np.bincount(self.own, slope)
 
     def climb(
         self, z: np.ndarray, steps: int = MOST_STEPS, ftol: float = RELATIVE_TOLERANCE,
@@ -221,31 +225,3 @@ def _covariance(kernel: str, theta: np.ndarray, x: np.ndarray) -> np.ndarray:
     k = parse(kernel, x.shape[1]).covariance(np, theta, x, x)
     noise = np.exp(2 * theta[1]) + JITTER
     return k + noise * np.eye(len(x))
-
-
-def _log_likelihood(
-    kernel: str, theta: np.ndarray, padded: np.ndarray, y: np.ndarray
-) -> tuple[float, np.ndarray]:
-    """log p(y | θ) and its slope (p,), by ∂/∂K = ½ (α αᵀ − K⁻¹) (Rasmussen & Williams, eq. 5.9).
-
-    −∞ where the covariance is no longer positive definite. The first len(y) rows of `padded` are x.
-    """
-    n, size = len(y), len(padded)
-    root, failed = dpotrf(_covariance(kernel, theta, padded[:n]), lower=1, overwrite_a=1)
-    if failed:
-        return -np.inf, np.zeros(len(theta))
-    alpha = dpotrs(root, y, lower=1)[0]
-    value = -0.5 * y @ alpha - np.log(root.diagonal()).sum() - 0.5 * n * np.log(2 * np.pi)
-    inverse = dpotri(root, lower=1)[0]  # its lower triangle, beside zeros
-    slope_k = np.zeros((size, size))
-    slope_k[:n, :n] = -np.tril(inverse)  # k is symmetric: twice the lower triangle will do
-    slope_k[:n, :n].flat[:: n + 1] *= 0.5
-    slope_k[:n, :n] += 0.5 * alpha[:, None] * alpha
-    slope = np.array(pull(kernel, theta, padded, slope_k))
-    slope[1] += 2 * np.exp(2 * theta[1]) * slope_k.trace()
-    return float(value), slope
-
-
-def _padded(x: np.ndarray) -> np.ndarray:
-    """x (c, d) with zeros below, so that few sizes are compiled."""
-    return np.concatenate([x, np.zeros((capacity(len(x)) - len(x), x.shape[1]))])

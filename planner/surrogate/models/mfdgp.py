@@ -15,16 +15,17 @@ prediction integrates over f_1(x) by quadrature, where the paper draws samples o
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from jax.example_libraries.optimizers import adam
 from jax.scipy.linalg import solve_triangular
 
 from planner import jax_setup
-from planner.surrogate.kernels import linear, parse, rbf
+from planner.surrogate.kernels import Kernel, parse
 from planner.surrogate.models.fidelity_levels import Samples
 from planner.surrogate.models.likelihood_gp import Normalisation
 from planner.surrogate.models.nargp import NODES, WEIGHTS
@@ -36,53 +37,39 @@ START_NOISE = 0.1  # sd over the output's, held in the first stage
 START_SPREAD = 0.1  # of q(L⁻¹u) at the start, held in the first stage
 MOST_TO_BEGIN = 1500  # points from which q(u) begins
 DRAWS, MOST_DRAWN = 256, 20_000  # of f_1 in the bound that is told: at a point, and in all
-DECAY_1, DECAY_2, SMALL = 0.9, 0.999, 1e-8  # of Adam
 
 
-class Covarying(Protocol):
-    """What kernels are asked for here; see `planner.surrogate.kernels.Kernel`."""
+@dataclass(frozen=True, eq=False)
+class TiedKernel:
+    """A kernel whose θ is `rows` times fewer numbers, some of which stand in it several times."""
+
+    whole: Kernel
+    rows: np.ndarray
+
+    @classmethod
+    def of(cls, expression: str, d: int) -> "TiedKernel":
+        """A plain kernel over d columns."""
+        return cls(parse(expression, d), np.eye(parse(expression, d).size))
+
+    @classmethod
+    def cutajar(cls, d: int) -> "TiedKernel":
+        """k_ρ(x) (σ² f f' + k_f(f, f')) + k_δ(x) over the columns (x_1 … x_d, f).
+
+        θ = (log σ_ρ, log τ, d scales of k_ρ, log σ, scale of k_f, log σ_δ, d scales of k_δ).
+        """
+        below, one = f"[{d}:{d + 1}]", np.eye(2 * d + 5)
+        text = f"rbf[:{d}]*linear{below}+rbf[:{d}]*rbf{below}+rbf[:{d}]"
+        shared = one[2 : d + 2]
+        rows = [one[0] + one[d + 2], one[1], *shared, 0 * one[0], one[0], *shared, *one[d + 3 :]]
+        return cls(parse(text, d + 1), np.array(rows))
 
     def covariance(self, xp: Any, theta: Any, xa: Any, xb: Any) -> Any:
-        """(a, b) of xa (a, d), xb (b, d)."""
-        ...
+        """See `Kernel.covariance`."""
+        return self.whole.covariance(xp, self.rows @ theta, xa, xb)
 
     def variance(self, xp: Any, theta: Any, x: Any) -> Any:
-        """Its diagonal (a,)."""
-        ...
-
-
-@dataclass(frozen=True)
-class CutajarKernel:
-    """k_ρ(x) (σ² f f' + k_f(f, f')) + k_δ(x) over the columns (x_1 … x_d, f).
-
-    θ = (log σ_ρ, log τ, d scales of k_ρ, log σ, scale of k_f, log σ_δ, d scales of k_δ).
-    """
-
-    d: int
-
-    def covariance(self, xp: Any, theta: Any, xa: Any, xb: Any) -> Any:
-        """See `Covarying`."""
-        d = self.d
-        size, bend, own = (xp.exp(2 * theta[i]) for i in (0, 2 + d, 4 + d))
-        pose, last = xp.exp(theta[2 : 2 + d]), xp.exp(theta[5 + d : 5 + 2 * d])
-        below_a, below_b = xa[:, d:], xb[:, d:]
-        bent = rbf(xp, below_a / xp.exp(theta[3 + d]), below_b / xp.exp(theta[3 + d]))
-        below = bend * linear(xp, below_a, below_b) + bent
-        shared = rbf(xp, xa[:, :d] / pose[None, :], xb[:, :d] / pose[None, :])
-        return size * shared * below + own * rbf(
-            xp, xa[:, :d] / last[None, :], xb[:, :d] / last[None, :]
-        )
-
-    def variance(self, xp: Any, theta: Any, x: Any) -> Any:
-        """See `Covarying`."""
-        size, bend, own = (xp.exp(2 * theta[i]) for i in (0, 2 + self.d, 4 + self.d))
-        return size * (bend * x[:, self.d] ** 2 + 1) + own
-
-    def start(self) -> np.ndarray:
-        """θ to begin with."""
-        log = np.log
-        length = [log(LENGTH * self.d**0.5)] * self.d
-        return np.array([0.0, log(START_NOISE), *length, 0.0, 0.0, log(START_OWN), *length])
+        """See `Kernel.variance`."""
+        return self.whole.variance(xp, self.rows @ theta, x)
 
 
 class Layer(NamedTuple):
@@ -149,8 +136,9 @@ def fit_mfdgp(
         np.sum((measured.x[:, None] - cheap.x[None]) ** 2, axis=-1), axis=1
     )  # the cheap value nearest to a measured point begins as its f_1
     wide = np.column_stack([measured.x, y_low[near]])
-    one, two = parse("rbf", d), CutajarKernel(d)
-    starts = one.prior(1.0, START_NOISE, LENGTH, 0.0, 0.0)[0], two.start()
+    one, two = TiedKernel.of("rbf", d), TiedKernel.cutajar(d)
+    first = one.whole.prior(1.0, START_NOISE, LENGTH, 0.0, 0.0)[0]
+    starts = first, np.array([*first, 0.0, 0.0, np.log(START_OWN), *first[2:]])
     z_low = choose_inducing(one, starts[0], cheap.x, how.inducing)
     z_high = choose_inducing(two, starts[1], wide, how.inducing)
     data = TwoLevelData(cheap.x, y_low, measured.x, y_high, z_low, z_high)
@@ -167,7 +155,7 @@ def fit_mfdgp(
     return MFDGP(layers, data, high_units, value)
 
 
-def choose_inducing(k: Covarying, theta: np.ndarray, x: np.ndarray, count: int) -> np.ndarray:
+def choose_inducing(k: TiedKernel, theta: np.ndarray, x: np.ndarray, count: int) -> np.ndarray:
     """`count` rows of x at most, each where those before leave most variance unexplained.
 
     See Burt et al. 2020.
@@ -188,7 +176,7 @@ def choose_inducing(k: Covarying, theta: np.ndarray, x: np.ndarray, count: int) 
 
 
 def _at_the_data(
-    k: Covarying, theta: np.ndarray, z: np.ndarray, x: np.ndarray, y: np.ndarray
+    k: TiedKernel, theta: np.ndarray, z: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> Layer:
     """A layer whose q(u) begins where the data are: m = L⁻¹ K_zx (K_xx + τ²I)⁻¹ y.
 
@@ -203,7 +191,7 @@ def _at_the_data(
     return Layer(theta, np.linalg.solve(root, smooth), START_SPREAD * np.eye(len(z)))
 
 
-def _marginal(kernel: Covarying, layer: Layer, z: Array, x: Array) -> tuple[Array, Array]:
+def _marginal(kernel: TiedKernel, layer: Layer, z: Array, x: Array) -> tuple[Array, Array]:
     """Mean and variance (q,) of f at x (q, d) under q(u)."""
     own = kernel.variance(jnp, layer.theta, x)
     covariance = kernel.covariance(jnp, layer.theta, z, z)
@@ -237,7 +225,7 @@ def _bound(
     """The bound from a batch `low` (b,) and `high` (b',) of points and ε (s, b')."""
     first, second = layers
     d = data.x_low.shape[1]
-    one, two = parse("rbf", d), CutajarKernel(d)
+    one, two = TiedKernel.of("rbf", d), TiedKernel.cutajar(d)
     mean, variance = _marginal(one, first, data.z_low, data.x_low[low])
     total = jnp.mean(_expected(first, data.y_low[low], mean, variance)) * len(data.y_low)
     x = data.x_high[high]
@@ -281,30 +269,23 @@ def _climbed(
         noise = jax.random.normal(three, (draws, min(batch, n_high)))
         return -_bound(now, data, low, high, noise)
 
-    def step(i: Array, state: tuple) -> tuple:
-        now, first, second = state
-        slope = jax.grad(negative)(now, jax.random.fold_in(key, i))
-        first = jax.tree.map(lambda m, g: DECAY_1 * m + (1 - DECAY_1) * g, first, slope)
-        second = jax.tree.map(lambda v, g: DECAY_2 * v + (1 - DECAY_2) * g**2, second, slope)
-        t = i + 1.0
-        size = rate * jnp.sqrt(1 - DECAY_2**t) / (1 - DECAY_1**t)
-        now = jax.tree.map(
-            lambda p, m, v, f: p - f * size * m / (jnp.sqrt(v) + SMALL), now, first, second, moving
-        )
-        return now, first, second
+    begun, updated, layers_of = adam(rate)
 
-    zeros = jax.tree.map(jnp.zeros_like, layers)
-    return jax.lax.fori_loop(0, steps, step, (layers, zeros, zeros))[0]
+    def step(i: Any, state: Any) -> Any:
+        slope = jax.grad(negative)(layers_of(state), jax.random.fold_in(key, i))
+        return updated(i, jax.tree.map(jnp.multiply, slope, moving), state)
+
+    return layers_of(jax.lax.fori_loop(0, steps, step, begun(layers)))
 
 
 @jax_setup.compiled()
 def _predicted(layers: tuple[Layer, Layer], data: TwoLevelData, x: Array) -> tuple[Array, Array]:
     """Mean and variance (q,) of f_2, integrated over f_1(x)."""
     d = data.x_low.shape[1]
-    below, unsure = _marginal(parse("rbf", d), layers[0], data.z_low, x)
+    below, unsure = _marginal(TiedKernel.of("rbf", d), layers[0], data.z_low, x)
     nodes = below[None, :] + jnp.sqrt(unsure)[None, :] * NODES[:, None]
     wide = jnp.column_stack([jnp.tile(x, (len(NODES), 1)), nodes.reshape(-1)])
-    parts = _marginal(CutajarKernel(d), layers[1], data.z_high, wide)
+    parts = _marginal(TiedKernel.cutajar(d), layers[1], data.z_high, wide)
     mean, variance = (part.reshape(len(NODES), -1) for part in parts)
     middle = WEIGHTS @ mean
     return middle, WEIGHTS @ (variance + (mean - middle[None, :]) ** 2)

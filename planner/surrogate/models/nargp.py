@@ -7,7 +7,7 @@ A prediction is the integral over the level below, by Gauss–Hermite quadrature
 variance, where the paper and emukit use Monte Carlo: the same integral without its noise.
 AR1 as published (Kennedy & O'Hagan 2000), y = ρ·l(x) + δ(x), is the same with another kernel: ρ is
 integrated over a normal prior whose width is climbed, which with a linear kernel in l is one GP.
-AR1 in front, and averaged hyperparameters, are in `ar1_nargp`.
+AR1 in front, and averaged hyperparameters, are in `averaged`.
 """
 
 from collections.abc import Callable

@@ -1,0 +1,89 @@
+"""Acquisitions: exact against a refit, deterministic, never the same place twice."""
+
+import numpy as np
+import pytest
+
+from planner.design.acquisitions import integrated_variance
+from planner.design.propose import ACQUISITIONS, propose
+from planner.design.space_filling import DESIGNS
+from planner.errors import InputError
+from planner.surrogate.modal_surrogate import fit_surrogate
+from tests.support.scored_poses import X, conditioned_variance, over, with_parameters
+from tests.support.surrogates import observed, simulated
+
+NAMES = [*ACQUISITIONS, *DESIGNS]
+
+
+@pytest.fixture(scope="module")
+def surrogate():
+    return fit_surrogate(observed(5, 0))
+
+
+def test_integrated_variance_is_that_of_an_actual_refit(surrogate):
+    outputs, poses = over(surrogate, X, 30)
+    low = poses.low
+    score = integrated_variance(outputs, poses[:4])
+    for i in range(4):
+        drop = 0.0
+        for k in range(4):
+            _, _, before = outputs.covariance(k, poses[:1], outputs.workspace.poses)
+            after = conditioned_variance(outputs, k, X[i], low[i, k])
+            drop += outputs.weights[k] * (np.mean(before) - after)
+        assert score[i] == pytest.approx(drop, rel=1e-6)
+
+
+def test_planned_poses_count_as_if_measured(surrogate):
+    outputs, poses = over(surrogate, X, 30)
+    outputs, low = outputs.planning(poses.one(40)), poses.low
+    _, _, variance = outputs.covariance(1, poses[:1], outputs.workspace.poses)
+    assert np.mean(variance) == pytest.approx(
+        conditioned_variance(outputs, 1, X[40], low[40, 1]), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize("name", ACQUISITIONS)
+def test_a_score_belongs_to_its_candidate_alone(surrogate, name):
+    """More candidates than are taken at a time, in another order: the same score for each."""
+    outputs, poses = with_parameters(surrogate, np.random.default_rng(8).random((300, 2)))
+    order = np.random.default_rng(9).permutation(300)
+    score = ACQUISITIONS[name](outputs, poses)
+    again = ACQUISITIONS[name](outputs, poses[order])
+    np.testing.assert_allclose(again, score[order], rtol=1e-9)
+    assert (score > 0).all()
+    assert ACQUISITIONS[name](outputs, poses[:0]).shape == (0,)
+
+
+def test_variance_is_what_prediction_says_but_for_doubt_about_hyperparameters(surrogate):
+    outputs, poses = over(surrogate, X, 30)
+    _, sd = surrogate.primary.predict(X, np.log(simulated(X).frequency_hz))
+    total = np.mean(sd**2, axis=1)
+    score = ACQUISITIONS["variance"](outputs, poses)
+    assert (score <= total * (1 + 1e-9)).all()
+    assert np.corrcoef(score, total)[0, 1] > 0.9
+
+
+def test_a_planned_pose_is_known_to_within_its_noise(surrogate):
+    outputs, poses = over(surrogate, X, 30)
+    outputs = outputs.planning(poses.one(40))
+    for k in range(4):
+        assert outputs.variance(k, poses.one(40))[0] <= outputs.noise[k]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_strategy_returns_distinct_reachable_poses(surrogate, name):
+    taken = X[:20]
+    first = propose(name, surrogate, X, simulated(X), 5, taken, seed=3)
+    again = propose(name, surrogate, X, simulated(X), 5, taken, seed=3)
+    assert [p.index for p in first] == [p.index for p in again]
+    assert len({p.index for p in first}) == 5
+    assert all(p.index >= 20 for p in first)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_when_nothing_is_left_nothing_is_proposed(surrogate, name):
+    assert propose(name, surrogate, X[:3], simulated(X[:3]), 1, X[:3], seed=0) == ()
+
+
+def test_unknown_names_are_refused(surrogate):
+    with pytest.raises(InputError, match="integrated_variance"):
+        propose("crystal_ball", surrogate, X, simulated(X), 1, None, seed=0)

@@ -1,0 +1,308 @@
+"""Closed forms against what they claim: refits, determinants, finite differences, brute force."""
+
+import numpy as np
+import pytest
+
+from planner.design import reductions as module
+from planner.design.acquisitions import goal, mixed, mutual_information
+from planner.design.cost import Cost, shortest_tour
+from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
+from planner.design.hit_axes import axis_shares, best_axes
+from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
+from planner.design.propose import ACQUISITIONS, Travel, propose
+from planner.design.reductions import SUBSETS, parameter_reduction, reduction, repeat_gain
+from planner.design.stopping import forecast, left_out, mean_squares
+from planner.dynamics.simulation import Simulation
+from planner.effects.parameters import Priors, parametrise
+from planner.fit.frequency_uncertainty import log_frequency_slope
+from planner.robot.robot import Robot
+from planner.surrogate.modal_surrogate import fit_surrogate
+from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
+from tests.support.scored_poses import X, conditioned_variance, over, with_parameters
+from tests.support.surrogates import observed, simulated
+
+
+@pytest.fixture(scope="module")
+def surrogate():
+    return fit_surrogate(observed(6, 0))
+
+
+@pytest.fixture(scope="module")
+def open_(tmp_path_factory):
+    """An arm's simulation with 12 springs and uncertain inertias."""
+    path = make_arm(tmp_path_factory.mktemp("arm"), transverse=True)
+    simulation = Simulation(Robot.load(path))
+    p = parametrise(simulation, Priors(mass=0.05, inertia=0.05, com_m=0.01))
+    prior = np.diag(np.concatenate([p.log_sd**2, np.ones(len(p.nuisances))]))
+    return OpenParameters(simulation, p, prior, FrfNoise(0.01, 0.01, 0.5), BAND_HZ)
+
+
+def some_q(n, seed=0):
+    low, high = np.deg2rad(np.transpose(JOINTS_DEG))
+    return np.random.default_rng(seed).uniform(low, high, (n, 6))
+
+
+@pytest.mark.parametrize("name", ACQUISITIONS)
+def test_planning_a_pose_leaves_less_to_gain_there(surrogate, name):
+    outputs, poses = with_parameters(surrogate, X)
+    score = ACQUISITIONS[name](outputs, poses)
+    assert score.shape == (len(X),)
+    assert np.isfinite(score).all()
+    best = poses.one(int(np.argmax(score)))
+    after = ACQUISITIONS[name](outputs.planning(best), best)
+    assert after[0] < score.max()
+
+
+def test_parameters_are_refitted_as_foretold(surrogate):
+    """Σ' of a linear regression with the measurement's rows added, and its mean variance."""
+    outputs, poses = with_parameters(surrogate, X)
+    sigma = outputs.covariance_root @ outputs.covariance_root.T
+    target = outputs.workspace
+    names = "parameter_information", "d_information"
+    score, told = (ACQUISITIONS[name](outputs, poses[:5]) for name in names)
+    for i in range(5):
+        refit = np.linalg.inv(np.linalg.inv(sigma) + poses.information[i].sum(axis=0))
+        gain = 0.0
+        for k in range(4):
+            s = outputs.trust[k] * target.poses.slope[:, k]
+            each = np.einsum("up,pr,ur->u", s, sigma - refit, s)
+            gain += each @ target.importance[:, k]
+        assert score[i] == pytest.approx(gain, rel=1e-6)
+        # Six parameters move four modes at twenty poses: the whole determinant counts.
+        ratio = np.linalg.slogdet(sigma)[1] - np.linalg.slogdet(refit)[1]
+        assert told[i] == pytest.approx(ratio / 2, rel=1e-6)
+        planned = outputs.planning(poses.one(i))
+        np.testing.assert_allclose(
+            planned.covariance_root @ planned.covariance_root.T, refit, atol=1e-9
+        )
+
+
+def test_of_many_candidates_the_best_are_exact(surrogate, monkeypatch):
+    outputs, poses = over(surrogate, X, 30)
+    exact = reduction(outputs, poses, outputs.workspace)
+    monkeypatch.setattr(module, "MANY_CANDIDATES", 10)
+    monkeypatch.setattr(module, "BEST_CANDIDATES", 20)
+    screened = reduction(outputs, poses, outputs.workspace)
+    best = np.argsort(exact)[-15:]
+    np.testing.assert_allclose(screened[best], exact[best], rtol=1e-12)
+    np.testing.assert_allclose(screened, exact, rtol=1e-3, atol=1e-6 * exact.max())
+    assert np.any(screened != exact)
+
+
+def test_more_axes_tell_more(surrogate):
+    outputs, poses = with_parameters(surrogate, X)
+    pose = poses.one(3)
+    gain = [parameter_reduction(outputs, pose, outputs.workspace, axes)[0] for axes in SUBSETS]
+    for i, a in enumerate(SUBSETS):
+        for j, b in enumerate(SUBSETS):
+            if set(a) < set(b):
+                assert gain[i] < gain[j]
+
+
+def test_mixed_and_goal_add_up(surrogate):
+    outputs, poses = with_parameters(surrogate, X)
+    target = outputs.workspace
+    both = reduction(outputs, poses, target) + parameter_reduction(outputs, poses, target)
+    np.testing.assert_allclose(mixed(outputs, poses), both)
+    np.testing.assert_allclose(goal(outputs, poses), both)
+    plain, flat = over(surrogate, X, 20)
+    np.testing.assert_allclose(mixed(plain, flat), ACQUISITIONS["integrated_variance"](plain, flat))
+
+
+def test_a_goal_draws_the_proposal_to_itself(surrogate):
+    outputs, poses = over(surrogate, X, 30)
+    there = Target.evenly(poses.one(77))
+    at_goal = FrequencyOutputs.of(surrogate, outputs.workspace, there)
+    best = int(np.argmax(goal(at_goal, poses)))
+    assert np.linalg.norm(X[best] - X[77]) < 0.15
+
+
+def test_weights_say_which_mode_counts(surrogate):
+    low = surrogate.frequency_inputs(simulated(X))
+    poses = Poses.plain(X, low)
+    only = Target.evenly(poses[:30], np.array([0, 0, 1.0, 0]))
+    outputs = FrequencyOutputs.of(surrogate, only)
+    score = ACQUISITIONS["integrated_variance"](outputs, poses[:3])
+    for i in range(3):
+        _, _, before = outputs.covariance(2, poses[:1], only.poses)
+        drop = np.mean(before) - conditioned_variance(outputs, 2, X[i], low[i, 2])
+        assert score[i] == pytest.approx(drop, rel=1e-6)
+
+
+def test_mutual_information_is_a_difference_of_entropies(surrogate):
+    outputs, poses = over(surrogate, X, 10)
+    score = mutual_information(outputs, poses[:12])
+
+    def information(i, k, s):
+        """½ log |A| |B| / |A ∪ B| of the noisy values at c and at the rest of the workspace."""
+        rest = np.array([j for j in range(10) if j != i])
+        both = poses[np.append(rest, i)]
+        cov = outputs.covariance(k, both, both)[0][s] + outputs.noise[k] * np.eye(len(rest) + 1)
+        whole, parts = np.linalg.slogdet(cov)[1], np.linalg.slogdet(cov[:-1, :-1])[1]
+        return 0.5 * (parts + np.log(cov[-1, -1]) - whole)
+
+    samples = range(outputs.posterior.theta.shape[1])
+    for i in (0, 4, 9, 11):
+        expected = (
+            np.mean([[information(i, k, s) for s in samples] for k in range(4)], axis=1)
+            @ outputs.weights
+        )
+        assert score[i] == pytest.approx(expected, rel=1e-6)
+
+
+def test_repeating_is_a_refit_with_half_the_variance(surrogate):
+    outputs, _ = over(surrogate, X, 30)
+    post, n = outputs.posterior, 6
+    variance = np.full((n, 4), 1e-7)
+    gain, target = repeat_gain(outputs, variance), outputs.workspace
+    for i in (0, 5):
+        drop = 0.0
+        for k in range(4):
+            known = np.flatnonzero(post.mask[k])
+            cross = post._prior(
+                k, post.x[known], post.low[k][known], target.poses.x, target.poses.low[:, k]
+            )
+            for s in range(len(post.theta[k])):
+                whiten = post.solved(k).whiten[s]
+                noisy = np.linalg.inv(whiten.T @ whiten)
+                less = noisy.copy()
+                less[i, i] -= 1e-7 / 2
+                white = [np.sum(cross[s] * np.linalg.solve(c, cross[s]), 0) for c in (less, noisy)]
+                drop += (white[0] - white[1]) @ target.importance[:, k] / len(post.theta[k])
+        assert gain[i] == pytest.approx(drop, rel=1e-4)
+
+
+def moved(open_, x):
+    """The simulation at x, springs and inertias."""
+    p = open_.parametrisation
+    count = len(p.parameters)
+    changed = open_.simulation.changed(p.elasticity(x[:count]), p.inertia_change(x[count:]))
+    return held(changed, open_)
+
+
+def held(changed, open_):
+    """The same in the posture in which the robot sags now: that hardly moves with the springs."""
+    changed.elastic = changed.elastic.carried_by(open_.simulation.elasticity.stiffness)
+    return changed
+
+
+def test_slopes_are_the_derivatives_of_ln_f(open_):
+    q, p = some_q(2), open_.parametrisation
+    slope = log_frequency_slope(open_.simulation, p, q, open_.simulation.modes(q, 4))
+    x, count = np.concatenate([p.mean, np.zeros(len(p.nuisances))]), len(p.parameters)
+
+    def log_hz(at):
+        return np.log(moved(open_, at).modes(q, 4).frequency_hz)
+
+    for i in (0, 3, 11, count, count + 7, len(x) - 1):
+        step = np.zeros(len(x))
+        step[i] = 1e-5
+        by_difference = (log_hz(x + step) - log_hz(x - step)) / 2e-5
+        np.testing.assert_allclose(slope[:, :, i], by_difference, atol=1e-6)
+
+
+def test_information_is_that_of_the_frf_line_by_line(open_):
+    """Against finite differences of the simulated FRF on every line that would be recorded."""
+    q, p = some_q(1, 3), open_.parametrisation
+    lines = np.arange(BAND_HZ[0], BAND_HZ[1], open_.noise.step_hz)
+    x, count = np.concatenate([p.mean, np.zeros(len(p.nuisances))]), len(p.parameters)
+    h = open_.simulation.accelerance(q, lines)[0]
+    sd = np.hypot(open_.noise.relative * np.abs(h), open_.noise.floor)
+    rows, chosen = [], (0, 1, 2, 12, count + 3)
+    for i in chosen:
+        values = []
+        for sign in (1, -1):
+            at = x.copy()
+            at[i] += sign * 1e-5
+            values.append(moved(open_, at).accelerance(q, lines)[0])
+        rows.append(np.sqrt(2) * (values[0] - values[1]) / 2e-5 / sd)
+    found = open_.information(q)[0]
+    for axis in range(3):
+        j = np.array([row[:, axis].ravel() for row in rows])
+        expected = (j @ j.conj().T).real
+        got = found[axis][np.ix_(chosen, chosen)]
+        scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+        # Few lines around each resonance stand for all: right to a few percent in what is told
+        # of most, to 40 % in what is told of one whose mode lies beside the band.
+        off = np.abs(got - expected) / scale
+        assert off.max() < 0.45
+        assert np.median(off) < 0.025
+
+
+def test_forecast_speaks_of_its_own_samples(surrogate):
+    outputs, poses = over(surrogate, X, 64)
+    squares = mean_squares(outputs)
+    total = np.sum([outputs.variance(k, poses[:64]) / 64 / 4 for k in range(4)])
+    assert np.mean(squares) >= 0.8 * total  # and the doubt about hyperparameters besides
+    best = poses.one(int(np.argmax(mixed(outputs, poses))))
+    found = forecast(outputs, best, 1.0, 0.95)
+    assert 0 < found.rmse_percent < found.bound_percent
+    assert found.gain_percent > 0
+    assert "One more measurement would gain about" in found.text
+    assert forecast(outputs, None, 1e3, 0.95).reached == 1
+    assert forecast(outputs, None, 1e-9, 0.95).reached == 0
+
+
+def test_left_out_residuals_are_those_of_refits(surrogate):
+    """Leave one out by solving without it, at the hyperparameters held."""
+    post, squares = surrogate.primary.posterior, []
+    for k in range(4):
+        known = np.flatnonzero(post.mask[k])
+        for i in range(len(known)):
+            means, variances = [], []
+            for s in range(len(post.theta[k])):
+                whiten = post.solved(k).whiten[s]
+                noisy = np.linalg.inv(whiten.T @ whiten)
+                y = noisy @ post.solved(k).weights[s]
+                rest = np.arange(len(known)) != i
+                pull = np.linalg.solve(noisy[np.ix_(rest, rest)], noisy[rest, i])
+                means.append(y[i] - pull @ y[rest])
+                variances.append(noisy[i, i] - pull @ noisy[rest, i])
+            squares.append(np.mean(means) ** 2 / (np.mean(variances) + np.var(means)))
+    poses, size = left_out(post, 4)
+    assert poses == 6
+    assert size == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-6)
+
+
+def test_the_best_gain_per_minute_is_near_and_tours_are_short(surrogate):
+    q = np.random.default_rng(5).uniform(-1, 1, (len(X), 6))
+    slow = Cost(np.full(6, 1e-3), per_pose=0.0, per_hit=1e-6)
+    picks = [
+        propose(
+            "integrated_variance", surrogate, X, simulated(X), 1, None, 0,
+            travel=Travel(Cost(np.full(6, speed), per_pose=0.0, per_hit=1e-6), q, q[0]),
+        )[0]
+        for speed in (1e-3, 1e-2)
+    ]  # fmt: skip
+    assert picks[0].index == picks[1].index == 0  # where it stands: no minutes
+    order, legs = shortest_tour(slow, q[:8], q[100])
+    given = sum(slow.travel(q[i + 1 : i + 2], q[i])[0] for i in range(7))
+    given += slow.travel(q[:1], q[100])[0]
+    assert sorted(order.tolist()) == list(range(8))
+    assert legs.sum() < given
+
+
+def test_what_is_not_allowed_is_not_proposed(surrogate):
+    allowed = X[:, 0] < 0.3
+    for name in ("integrated_variance", "maximin_lhs"):
+        picks = propose(name, surrogate, X, simulated(X), 5, None, 0, allowed=allowed)
+        assert all(allowed[p.index] for p in picks)
+
+
+def test_axes_are_saved_where_one_shows_every_mode(surrogate):
+    outputs, poses = over(surrogate, X, 30)
+    cost = Cost(np.ones(6), per_pose=1.0, per_hit=0.25, hits_per_axis=4)
+    along_x = np.tile([0.8, 0.1, 0.1], (4, 1))
+    hidden = along_x.copy()
+    hidden[2] = [0.01, 0.5, 0.49]  # mode 3 does not show along x
+    assert best_axes(outputs, poses.one(60), along_x, cost, 0.0)[0] == (0,)
+    assert best_axes(outputs, poses.one(60), hidden, cost, 0.0)[0] in ((1,), (2,))
+    free = Cost(np.ones(6), per_pose=1.0, per_hit=1e-9)
+    assert best_axes(outputs, poses.one(60), along_x, free, 0.0)[0] == (0, 1, 2)
+
+
+def test_shares_of_the_axes_add_up():
+    rng = np.random.default_rng(3)
+    residue = rng.standard_normal((5, 2, 3, 3)) + 1j * rng.standard_normal((5, 2, 3, 3))
+    residue[1, 1] = np.nan
+    np.testing.assert_allclose(axis_shares(residue).sum(axis=2), 1.0)

@@ -1,0 +1,103 @@
+"""Slopes that optimisers follow, jitter that is told, and models that become simpler ones."""
+
+import numpy as np
+import pytest
+
+from planner.surrogate import gp, likelihood
+from planner.surrogate.ar1 import OutputPrior, fit_ar1
+from planner.surrogate.average import fit_hedged, fit_shapes
+from planner.surrogate.kernels import parse
+from planner.surrogate.models.multitask import fit_multitask
+from planner.surrogate.training_data import TrainingData
+
+GRID = np.random.default_rng(8).random((30, 2))
+PRIOR = OutputPrior(bias_sd=0.5, slope_sd=0.5, amplitude=0.3, nugget=0.02)
+
+
+def samples(n, seed=0):
+    rng = np.random.default_rng(seed)
+    x = rng.random((n, 2))
+    return x, np.sin(4 * x[:, :1]) + 0.02 * rng.standard_normal((n, 1))
+
+
+def training(n, seed=0):
+    x, y = samples(n, seed)
+    return TrainingData(x, y, np.full((n, 1), 0.02), np.full((n, 1), np.nan))
+
+
+@pytest.mark.parametrize("kernel", ["matern52", "rbf+quadratic", "rbf[0:1]*rbf[1:2]+linear"])
+def test_slope_of_the_likelihood_of_the_hyperparameters_agrees_with_finite_differences(kernel):
+    """The density that is climbed, with gaps, noise and a marginalised slope."""
+    rng = np.random.default_rng(0)
+    p, n = parse(kernel, 2).size, 9
+    low = rng.standard_normal(n)
+    mask = (np.arange(n) != 4).astype(float)
+    x, y, at = rng.random((n, 2)), rng.standard_normal(n) * mask, 0.3 * rng.standard_normal(p) - 0.5
+    data = 1e-12, x, y, low, mask, np.full(n, 0.01), 0.4, 0.7
+    _, slope = likelihood.log_likelihood(kernel, at, *data)
+    for i, unit in enumerate(1e-5 * np.eye(p)):
+        ends = [float(likelihood.log_likelihood(kernel, at + s * unit, *data)[0]) for s in (1, -1)]
+        assert float(slope[i]) == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4, abs=1e-5)
+
+
+def test_jitter_that_was_needed_is_told(monkeypatch):
+    monkeypatch.setattr(gp, "JITTERS", (0.0, 1e-7))
+    x = np.repeat(samples(1)[0], 3, axis=0)
+    data = TrainingData(x, np.ones((3, 1)), np.zeros((3, 1)), np.full((3, 1), np.nan))
+    certain = OutputPrior(bias_sd=0.5, slope_sd=0.0, amplitude=0.3, nugget=1e-12, spread=1e-9)
+    fitted = fit_ar1(data, (certain,), (certain,), np.full(1, np.nan))
+    assert fitted.posterior.remarks == (gp.SINGULAR_REMARK.format(1e-7),)
+    assert fit_ar1(training(4), (PRIOR,), (PRIOR,), np.full(1, np.nan)).posterior.remarks == ()
+
+
+def test_what_the_kernels_are_averaged_over_follows_the_data():
+    kernels = ("bias", "cubic", "matern52")
+    x = np.random.default_rng(1).random((20, 2))
+    noise = 0.02 * np.random.default_rng(2).standard_normal((20, 2))
+    y = np.stack([np.full(20, 0.3), np.sin(7 * x[:, 0])], axis=1) + noise
+    data = TrainingData(x, y, np.full((20, 2), 0.02), np.full((20, 2), np.nan))
+    found = fit_shapes(data, (PRIOR,) * 2, (PRIOR,) * 2, np.full(2, np.nan), kernels)
+    best = [kernels[i] for i in np.argmax(found.weights, axis=0)]
+    assert best == ["bias", "matern52"]
+    np.testing.assert_allclose(found.weights.sum(axis=0), 1)
+    mean, sd = found.predict(GRID, np.full((30, 2), np.nan))
+    assert np.abs(mean[:, 0] - 0.3).max() < 0.05
+    assert sd[:, 0].max() < 0.05
+
+
+def test_of_one_kernel_the_average_is_that_fit():
+    data, nothing = training(7), np.full(1, np.nan)
+    one = fit_shapes(data, (PRIOR,), (PRIOR,), nothing, ("matern52",))
+    plain = fit_ar1(data, (PRIOR,), (PRIOR,), nothing, 64, 16, "matern52")
+    low = np.full((30, 1), np.nan)
+    np.testing.assert_allclose(one.predict(GRID, low), plain.predict(GRID, low), atol=1e-12)
+    np.testing.assert_allclose(one.log_evidence, plain.posterior.log_evidence)
+
+
+def test_without_a_simulation_the_hedge_is_a_gp():
+    data, nothing = training(7), np.full(1, np.nan)
+    low = np.full((30, 1), np.nan)
+    hedged = fit_hedged(data, (PRIOR,), (PRIOR,), nothing).predict(GRID, low)
+    plain = fit_ar1(data, (PRIOR,), (PRIOR,), nothing).predict(GRID, low)
+    np.testing.assert_allclose(hedged, plain, atol=1e-12)
+
+
+def test_one_task_is_a_gp_at_its_hyperparameters():
+    x, y = samples(10)
+    fitted = fit_multitask(x, y)
+    h, kernel = fitted.hyperparameters, parse("rbf", 2)
+    b = h.task_covariance[0, 0]
+    k = b * kernel.covariance(np, h.theta, x, x) + h.noise[0] * np.eye(10)
+    cross = b * kernel.covariance(np, h.theta, x, GRID)
+    scaled = (y[:, 0] - fitted.tasks.centre[0]) / fitted.tasks.scale[0]
+    mean = fitted.tasks.centre[0] + fitted.tasks.scale[0] * cross.T @ np.linalg.solve(k, scaled)
+    variance = b * kernel.variance(np, h.theta, GRID) - np.sum(
+        cross * np.linalg.solve(k, cross), axis=0
+    )
+    np.testing.assert_allclose(fitted.predict(GRID)[0][:, 0], mean, atol=1e-5)
+    np.testing.assert_allclose(
+        fitted.predict(GRID)[1][:, 0],
+        fitted.tasks.scale[0] * np.sqrt(variance),
+        rtol=1e-3,
+        atol=1e-6,
+    )

@@ -1,0 +1,206 @@
+"""What every model of one output has to do, and what each becomes in the right limit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.surrogate.models.averaged import (
+    AR1_PRIOR,
+    GP_PRIOR,
+    fit_ar1_nargp,
+    fit_gp,
+    fit_recursive,
+)
+from planner.surrogate.models.fidelity_levels import Exact, Samples
+from tests.support.compilations import compilations
+
+GRID = np.random.default_rng(8).random((40, 2))
+SPREAD = 0.5
+# Of a simulation's grid: no noise, but perhaps what the kernel cannot follow.
+GRID_PRIOR = replace(GP_PRIOR, nugget=1e-5, length=1.0, length_spread=2.0, spread=3.0)
+
+
+def low(x):
+    return np.sin(4 * x[:, 0]) + x[:, 1]
+
+
+def high(x):
+    return 1.2 * low(x) + 0.3 * x[:, 1] + 2.0
+
+
+def exact_low():
+    return Exact(low)
+
+
+MODELS = {
+    "GP": lambda s: fit_gp(s),
+    "AR1": lambda s: fit_recursive(s, exact_low(), SPREAD),
+    "AR1 on samples": lambda s: fit_recursive(
+        s, fit_gp(Samples.of(GRID, low(GRID)), "rbf", GRID_PRIOR), SPREAD
+    ),
+    "AR1-NARGP": lambda s: fit_ar1_nargp(s, exact_low(), SPREAD),
+    "AR1-NARGP on samples": lambda s: fit_ar1_nargp(
+        s, fit_gp(Samples.of(GRID, low(GRID)), "rbf", GRID_PRIOR), SPREAD
+    ),
+}
+
+
+def samples(n, seed=0, sd=0.01):
+    rng = np.random.default_rng(seed)
+    x = rng.random((n, 2))
+    return Samples.of(x, high(x) + sd * rng.standard_normal(n), sd)
+
+
+@pytest.fixture(params=MODELS)
+def fit(request):
+    return MODELS[request.param]
+
+
+def test_any_number_of_points_works(fit):
+    for n in (1, 2, 9):
+        model = fit(samples(n))
+        mean, sd = model.predict(GRID)
+        assert mean.shape == sd.shape == (40,)
+        assert np.isfinite(mean).all()
+        assert (sd > 0).all()
+        assert np.isfinite(model.log_evidence)
+
+
+def test_duplicates_constants_and_gaps_work(fit):
+    s = samples(4)
+    doubled = Samples.of(np.vstack([s.x, s.x]), np.r_[s.y, s.y + 0.01], 0.01)
+    assert np.isfinite(fit(doubled).predict(GRID)).all()
+    constant = Samples.of(s.x, np.full(4, 3.0))
+    assert np.isfinite(fit(constant).predict(GRID)).all()
+    holed = Samples.of(s.x, np.where(np.arange(4) == 1, np.nan, s.y), s.sd)
+    assert len(holed.y) == 3
+    assert np.isfinite(fit(holed).predict(GRID)).all()
+
+
+def test_measurements_are_met_within_their_noise(fit):
+    s = samples(9, sd=0.001)
+    mean, sd = fit(s).predict(s.x)
+    np.testing.assert_allclose(mean, s.y, atol=0.03)
+    assert (sd < 0.05).all()
+
+
+def test_a_noisy_point_pulls_less(fit):
+    s = samples(8)
+    off = s.y + np.where(np.arange(8) == 3, 1.0, 0.0)
+    believed = fit(Samples.of(s.x, off, 0.01)).predict(s.x)[0][3]
+    doubted = fit(Samples.of(s.x, off, np.where(np.arange(8) == 3, 2.0, 0.01))).predict(s.x)[0][3]
+    assert abs(doubted - s.y[3]) < 0.5 * abs(believed - s.y[3])
+
+
+def test_where_zero_lies_does_not_matter(fit):
+    s = samples(7)
+    mean, sd = fit(s).predict(GRID)
+    shifted = fit(Samples.of(s.x, s.y - 5, s.sd)).predict(GRID)
+    np.testing.assert_allclose(shifted[0], mean - 5, atol=1e-6)
+    np.testing.assert_allclose(shifted[1], sd, rtol=1e-4)
+
+
+def test_the_unit_of_a_gp_does_not_matter():
+    s = samples(7)
+    mean, sd = fit_gp(s).predict(GRID)
+    other = fit_gp(Samples.of(s.x, 1000 * s.y, 1000 * s.sd)).predict(GRID)
+    np.testing.assert_allclose(other[0], 1000 * mean, rtol=1e-6)
+    np.testing.assert_allclose(other[1], 1000 * sd, rtol=1e-6)
+
+
+def test_intervals_hold(fit):
+    inside = []
+    for seed in range(4):
+        for n in (4, 8, 12):
+            mean, sd = fit(samples(n, seed, 0.002)).predict(GRID)
+            inside.append(np.mean(np.abs(mean - high(GRID)) < 1.96 * sd))
+    assert np.mean(inside) > 0.85
+
+
+def test_ar1_on_a_sampled_simulation_is_ar1_on_the_simulation_itself_once_that_is_known():
+    x = np.random.default_rng(1).random((120, 2))
+    s = samples(8)
+    learned = fit_gp(Samples.of(x, low(x)), "rbf", GRID_PRIOR)
+    a = fit_recursive(s, learned, SPREAD).predict(GRID)
+    b = fit_recursive(s, exact_low(), SPREAD).predict(GRID)
+    np.testing.assert_allclose(a[0], b[0], atol=0.01)
+    np.testing.assert_allclose(a[1], b[1], rtol=0.1, atol=1e-3)
+
+
+def test_an_uncertain_low_level_makes_the_prediction_uncertain():
+    class Unsure(Exact):
+        def predict(self, x):
+            return self.function(x), np.where(x[:, 0] > 0.5, 0.2, 0.0)
+
+    s = samples(10)
+    for fit_one in (fit_recursive, fit_ar1_nargp):
+        sure = fit_one(s, exact_low(), SPREAD).predict(GRID)[1]
+        model = fit_one(s, Unsure(low), SPREAD)
+        left, right = GRID[:, 0] < 0.4, GRID[:, 0] > 0.6
+        # A change of the simulation by 0.2 is one of about 1.2 · 0.2 here.
+        assert np.median(model.predict(GRID)[1][right]) > 0.15
+        assert np.median(model.predict(GRID)[1][left]) < 0.15
+        assert np.median(sure) < 0.1
+
+
+def test_ar1_nargp_without_a_bend_is_ar1():
+    """ℓ of the cheap level → ∞: the product kernel no longer sees it."""
+    s = samples(8)
+    mean = fit_recursive(s, exact_low(), SPREAD, "rbf").predict(GRID)[0]
+    wide = replace(AR1_PRIOR, length_spread=1e-6)
+    one = fit_recursive(s, exact_low(), SPREAD, "rbf+rbf", wide)
+    two = fit_ar1_nargp(s, exact_low(), SPREAD, "rbf[0:2]*bias+rbf[0:2]", wide)
+    np.testing.assert_allclose(one.predict(GRID)[0], two.predict(GRID)[0], atol=1e-8)
+    np.testing.assert_allclose(mean, two.predict(GRID)[0], atol=0.1)
+
+
+def test_ar1_nargp_follows_a_bent_relation_that_ar1_cannot():
+    x = np.random.default_rng(3).random((14, 1))
+    wave = Exact(lambda x: np.sin(8 * np.pi * x[:, 0]))  # Perdikaris et al. 2017, section 3.1
+
+    def bent(x):
+        return (x[:, 0] - 2**0.5) * wave.function(x) ** 2
+
+    grid = np.linspace(0, 1, 101)[:, None]
+    s = Samples.of(x, bent(x))
+    off = [
+        np.sqrt(np.mean((f(s, wave, 0.7).predict(grid)[0] - bent(grid)) ** 2))
+        for f in (fit_ar1_nargp, fit_recursive)
+    ]
+    assert off[0] < 0.25 * off[1]
+
+
+def test_evidence_is_the_integral_over_the_prior():
+    """Against plain draws from the prior, with own formulas."""
+    s = samples(5, sd=0.1)
+    rng = np.random.default_rng(0)
+    scale, centre = np.std(s.y), np.mean(s.y)
+    y, noise = (s.y - centre) / scale, s.sd / scale
+    logs = []
+    for _ in range(20000):
+        sigma, nugget = np.exp(rng.standard_normal()), 1e-3 * np.exp(rng.standard_normal())
+        scaled = s.x / (0.8 * 2**0.5 * np.exp(0.8 * rng.standard_normal(2)))
+        r = np.sqrt(5 * np.sum((scaled[:, None] - scaled[None]) ** 2, axis=-1))
+        k = sigma**2 * (1 + r + r**2 / 3) * np.exp(-r) + 1 + np.diag(noise**2 + nugget**2)
+        logs.append(-0.5 * (y @ np.linalg.solve(k, y) + np.linalg.slogdet(2 * np.pi * k)[1]))
+    expected = np.log(np.mean(np.exp(logs))) - 5 * np.log(scale)
+    assert fit_gp(s).log_evidence == pytest.approx(expected, abs=0.1)
+
+
+def test_growth_compiles_nothing():
+    fit_recursive(samples(3), exact_low(), SPREAD)
+    with compilations() as compiled:
+        for n in range(4, 16):
+            fit_recursive(samples(n), exact_low(), SPREAD)
+    assert not compiled
+
+
+def test_what_is_compiled_is_counted():
+    from planner.jax_setup import compiled as compile_it
+
+    doubled = compile_it()(lambda x: 2 * x)
+    with compilations() as compiled:
+        for size in (3, 3, 4):
+            doubled(np.ones(size))
+    assert len(compiled) == 2
