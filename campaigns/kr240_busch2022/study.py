@@ -14,8 +14,8 @@ from planner.studies.claims import Bound, ClaimRule, judge
 from planner.studies.report import Paper, Report, Table, r_squared
 from planner.surrogate.models.averaged import fit_ar1_nargp, fit_gp, fit_recursive
 from planner.surrogate.models.fidelity_levels import Exact, Samples
-from planner.surrogate.models.likelihood_gp import Normalisation, fit_likelihood
-from planner.surrogate.models.nargp import fit_nargp, kennedy_ohagan
+from planner.surrogate.models.likelihood_gp import LikelihoodGP, Normalisation, fit_likelihood
+from planner.surrogate.models.nargp import NARGP, fit_nargp, kennedy_ohagan
 
 from .data import (
     COMPARED,
@@ -24,13 +24,14 @@ from .data import (
     FREQUENCY_MODELS,
     FUSIONS,
     KERNELS,
+    OURS,
     RESIDUES,
     AnalysedPoses,
     load,
     nearest,
     split,
 )
-from .pictures import Fit, Rebuilt, figure_9, figure_12, pictures
+from .pictures import Fit, Predict, Rebuilt, figure_9, figure_12, pictures
 
 PAPER = Paper(
     "Busch, Zaeh", 2022,
@@ -199,20 +200,18 @@ def _scores(
 ) -> np.ndarray:
     """(outputs, models, 4), trained with the first `count` of the poses split off."""
     train, test = parts
-    return np.array(
-        [[_score(x, o, fit, train[:count], test) for fit in o.fits.values()] for o in outputs]
-    )
+    return np.array([[_score(x, o, name, train[:count], test) for name in o.fits] for o in outputs])
 
 
 def _score(
-    x: np.ndarray, output: Output, fit: Fit, train: np.ndarray, test: np.ndarray
+    x: np.ndarray, output: Output, name: str, train: np.ndarray, test: np.ndarray
 ) -> tuple[float, float, float, float]:
     test = test[np.isfinite(output.y[test])]
     samples = Samples.of(x[train], output.y[train], output.sd[train])
-    predict = fit(samples)
+    predict = output.fits[name](samples)
     mean, sd = predict(x[test])
     off = mean - output.y[test]
-    inside = np.abs(off) < 1.96 * np.hypot(sd, output.sd[test])
+    inside = np.abs(off) < 1.96 * np.hypot(sd, output.sd[test] if name in OURS else 0)
     own = predict(samples.x)[0] - samples.y
     r2 = float(r_squared(mean, output.y[test]))
     return (
@@ -223,10 +222,22 @@ def _score(
     )
 
 
+def _noisy(model: LikelihoodGP | NARGP) -> Predict:
+    """Its mean, and the sd of what is measured there: with the fitted noise, as GPy's `predict`."""
+    fitted = model.high if isinstance(model, NARGP) else model
+    noise = fitted.units.scale * np.exp(fitted.theta[1])
+
+    def predict(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        mean, sd = model.predict(x)
+        return mean, np.hypot(sd, noise)
+
+    return predict
+
+
 def _kernels(names: tuple[str, ...]) -> dict[str, Fit]:
     """GPs as published: each kernel alone (eqs. 4 to 8), of the greatest likelihood."""
     return {
-        name: (lambda s, kernel=name: fit_likelihood(s, kernel, isotropic=True).predict)
+        name: lambda s, kernel=name: _noisy(fit_likelihood(s, kernel, isotropic=True))
         for name in names
     }
 
@@ -236,8 +247,8 @@ def _frequency(seen: AnalysedPoses, k: int) -> Output:
     low = seen.modes.simulated.frequency_hz[:, k]
     exact, units = Exact(nearest(seen.x, low)), Normalisation.of(low)
     fits = _kernels(KERNELS[1:]) | {
-        "AR1": lambda s: fit_nargp(s, exact, units, isotropic=True, kernel=kennedy_ohagan).predict,
-        "NARGP": lambda s: fit_nargp(s, exact, units, isotropic=True).predict,
+        "AR1": lambda s: _noisy(fit_nargp(s, exact, units, isotropic=True, kernel=kennedy_ohagan)),
+        "NARGP": lambda s: _noisy(fit_nargp(s, exact, units, isotropic=True)),
         "averaged RBF": lambda s: fit_gp(s, "rbf").predict,
         "averaged AR1": lambda s: fit_recursive(s, exact, units.scale, kernel="rbf").predict,
         "AR1-NARGP": lambda s: fit_ar1_nargp(s, exact, units.scale).predict,
