@@ -8,7 +8,7 @@ condition (`given`) is not met here.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -145,8 +145,6 @@ class PaperClaim:
     why_not: str = ""
     ours: bool = False
     verdict: str = NOT
-    papers_figures: str = ""
-    spread: str = ""
     rule: str = ""
     reason: str = ""
     figures: tuple[JudgedFigure, ...] = ()
@@ -178,7 +176,8 @@ def _judged(rule: ClaimRule, figures: Figures, notes: Mapping[str, str]) -> Pape
     def each(bounds: Sequence[Bound]) -> list[JudgedFigure]:
         return [b.judged(figures.get(b.figure, ()), notes.get(b.figure, "")) for b in bounds]
 
-    judged, given = each(rule.bounds), each(rule.given)
+    judged = each(rule.bounds)
+    given = [replace(f, figure=f"given: {f.figure}") for f in each(rule.given)]
     unmet = [f for f in given if f.verdict in (NOT, UNTESTED)]
     # A figure that says no settles it, whatever could not be computed beside it.
     order = (NOT, UNTESTED, IN_KIND, HOLDS)
@@ -192,8 +191,6 @@ def _judged(rule: ClaimRule, figures: Figures, notes: Mapping[str, str]) -> Pape
         "" if verdict == HOLDS else reason,
         rule.ours,
         verdict,
-        "; ".join(f"{f.figure} {f.paper}" for f in judged if f.paper),
-        "; ".join(f.spread for f in judged),
         " or ".join(f"{f.figure} {f.false_if}" for f in judged),
         reason,
         tuple(given + judged),
