@@ -1,10 +1,16 @@
 """Claims can fail: every rule of every study on a case in which it must say no."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
+from planner.frf.metrics import agreement
 from planner.studies import registry
 from planner.studies.claims import HOLDS, IN_KIND, NOT, UNTESTED, judge
+from tests.support.studied import part
 
+DATA, FITS, PICTURES = (part("birk2025", name) for name in ("data", "fits", "pictures"))
 RULES = [(name, rule) for name in registry.NAMES for rule in registry.load(name).RULES]
 
 
@@ -83,16 +89,16 @@ TOO_KIND = {
 }
 
 
-@pytest.mark.parametrize("part", TOO_KIND)
-def test_what_was_judged_too_kindly_is_not_any_more(part):
-    (rule,) = (rule for _, rule in RULES if part in rule.sentence)
-    assert set(TOO_KIND[part]) == set(rule.figures)
-    (claim,) = judge([rule], {figure: [value] * 3 for figure, value in TOO_KIND[part].items()})
+@pytest.mark.parametrize("words", TOO_KIND)
+def test_what_was_judged_too_kindly_is_not_any_more(words):
+    (rule,) = (rule for _, rule in RULES if words in rule.sentence)
+    assert set(TOO_KIND[words]) == set(rule.figures)
+    (claim,) = judge([rule], {figure: [value] * 3 for figure, value in TOO_KIND[words].items()})
     assert claim.verdict == NOT
 
 
 @pytest.mark.parametrize(
-    ("part", "figures", "reason"),
+    ("words", "figures", "reason"),
     [
         ("sd grows", {"GP's sd at 120° over that in the training": [11.0]}, "MFDGP"),
         (
@@ -104,8 +110,48 @@ def test_what_was_judged_too_kindly_is_not_any_more(part):
         ("Cuts with another tool", {}, "not computed"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_judged_here_says_why(part, figures, reason):
-    (rule,) = (rule for _, rule in RULES if part in rule.sentence)
+def test_what_cannot_be_judged_here_says_why(words, figures, reason):
+    (rule,) = (rule for _, rule in RULES if words in rule.sentence)
     (claim,) = judge([rule], figures)
     assert claim.verdict == UNTESTED
     assert reason in claim.reason
+
+
+def made_up_birk(off):
+    """Hits on three paths and models whose FRFs are off by so much of what was measured."""
+    rng = np.random.default_rng(0)
+    path = np.repeat(["S1", "S2", "S3"], 4)
+    measured = 1 + rng.random((12, 3, 3, 40))
+    aside = np.where(np.arange(12) % 4 == 2, 2, 1)[:, None, None, None]  # worse where not fitted
+
+    def model(name):
+        simulated = measured + off[name] * aside * (rng.random(measured.shape) - 0.5)
+        agreed = agreement(measured, np.abs(simulated))
+        stiffness = np.array([3.0, 12.0, 12.0] * 6)
+        simulation = SimpleNamespace(elasticity=SimpleNamespace(stiffness=stiffness))
+        bounds = np.tile([1.0, 4.0], (2, 1))
+        values = np.array([2.0, 4.0 if name == "12P" else 3.0])
+        return FITS.IdentifiedModel(simulation, agreed, agreed, 1.0, values, bounds)
+
+    hits = DATA.PathHits(SimpleNamespace(frfs=()), path)
+    designs = [FITS.Design("", np.arange(9), 16, 80.0), FITS.Design("", np.arange(9), 17, 82.0)]
+    return PICTURES.Run(hits, {name: model(name) for name in off}, designs)
+
+
+def test_figures_of_birk_say_which_model_is_better():
+    off = {"12P": 1.2, "24P": 0.6, "24P, ours": 0.2, "12P, global search": 1.4,
+           "24P, global search": 0.9}  # fmt: skip
+    birk = registry.load("birk2025")
+    found = birk.figures(made_up_birk(off))
+    other = birk.figures(made_up_birk(off | {"12P": off["24P"], "24P": off["12P"]}))
+    for name in ("FRAC gained by 24P, points", "Frobenius gained by 24P, points",
+                 "least FRAC gained on a path, points", "Frobenius gained over the search, points",
+                 "FRAC that 12P loses more than 24P, points"):  # fmt: skip
+        assert found[name] > 0 > other[name]
+    assert found["FRAC gained by ours, points"] > 0
+    assert found["FRAC ≤ 200 Hz over that ≤ 800 Hz, 12P, points"] == 0
+    assert found["12P's parameters at a bound, of 12"] == 1
+    assert found["24P's parameters at a bound, of 24"] == 0
+    assert found["least ratio of a joint"] == 4
+    assert found["parameters determined beyond the paper's nine"] == 1
+    assert found["FRAC elsewhere beyond the paper's nine, points"] == 2
