@@ -179,7 +179,7 @@ def _notes(
     together: dict[str, list[float]], runs: dict[int, dict[int, BeyondPrediction]],
     main: BeyondPrediction,
 ) -> dict[str, str]:  # fmt: skip
-    fused = np.mean(together["least R² of fused modes over all steps"])
+    fused = min(together["least R² of fused modes over all steps"])
     said = " ".join(one[1].said for one in runs.values() if 1 in one and one[1].said)
     told = {
         "R² of NARGP beyond 105°": "the greatest likelihood of the training need not extrapolate; "
