@@ -28,6 +28,17 @@ def significant(value: float, digits: int = 2) -> str:
     return f"{rounded:.{max(0, digits - 1 - math.floor(math.log10(abs(rounded))))}f}"
 
 
+def with_sd(value: float, sd: float) -> str:
+    """A number and its sd of two digits, with one power of ten: "1.206e7 ± 0.024e7"."""
+    if not (math.isfinite(value) and sd > 0 and value):
+        return f"{value:.3g}"
+    power = math.floor(math.log10(abs(value)))
+    power = power if abs(power) > 3 else 0
+    digits = max(0, min(8, 1 - math.floor(math.log10(sd / 10**power))))
+    ten = f"e{power}" if power else ""
+    return f"{value / 10**power:.{digits}f}{ten} ± {sd / 10**power:.{digits}f}{ten}"
+
+
 def probable(probability: float) -> str:
     """A probability in %, with as many digits as still say something: "98 %", "above 99.9 %"."""
     if not 1e-3 <= probability <= 0.999:

@@ -115,6 +115,16 @@ def parameters(f: np.ndarray, zeta: np.ndarray, residue: np.ndarray) -> np.ndarr
     return np.concatenate([np.log(f), np.log(zeta), parts.ravel()])
 
 
+def stiffnesses(columns: np.ndarray) -> np.ndarray:
+    """Log modal stiffness (n, 12) of the first four modes along x, y, z, of such columns (n, 48).
+
+    ω_n² m / φ², where a residue of a real mode is φ² / (2 m ω_n) in size.
+    """
+    parts = columns[:, RESIDUE].reshape(len(columns), MODES, 3, 2)[:, :TABLED]
+    omega = np.log(2 * np.pi) + columns[:, FREQUENCY][:, :TABLED, None]
+    return (omega - np.log(2 * np.hypot(parts[..., 0], parts[..., 1]))).reshape(len(columns), -1)
+
+
 def _measured(row: tuple[Mode | None, ...]) -> np.ndarray:
     f = np.array([np.nan if m is None else m.frequency_hz for m in row])
     zeta = np.array([np.nan if m is None else m.damping_ratio for m in row])

@@ -31,6 +31,7 @@ HEARD_HZ = (4.0, 40.0)  # of the FRFs: a little beyond the band
 # A record of 5.48 s, whose lines are as far apart as those of the measured points.
 HAMMER = Hammer(sampling_rate_hz=200.0, record_s=5.48, oversampling=16)
 BEYOND_DEG = np.arange(106.0, 121.0)
+LACKS = "local_resonator", "link_3"  # what a diagnosis should say of it
 DRESS_PACK = AttachedResonator("link_3", (0.2, 0.3, -0.18), (0.0, 0.0, 1.0), 40.0, 21.0, 0.03)
 ACROSS = 2  # the tcp axis that lies across the arm's plane
 

@@ -15,11 +15,13 @@ PAPER_ALL = {"simulation": 0.345, "GP": 0.943, "MFDGP": 0.932, "NARGP": 0.992}  
 FUSED, DIAGNOSED = "fused modes", "diagnosed"
 THIN = ("GP", "NARGP", FUSED)  # with every number of experiments; MFDGP and diagnosis once
 
+Effects = tuple[tuple[str, str | None], ...]  # effect and place
+
 
 @dataclass(frozen=True, eq=False)
 class BeyondPrediction:
     """Amplitude (f, p) at BEYOND_DEG by name, the sd of the fused one, what diagnosis
-    said, and how many effects it `named`.
+    said, and the effects that it `named`.
 
     Of models as published also the amplitude at the measured angles, and sd there and beyond.
     """
@@ -30,7 +32,7 @@ class BeyondPrediction:
     trained: dict[str, np.ndarray] = field(default_factory=dict)
     trained_sd: dict[str, np.ndarray] = field(default_factory=dict)
     beyond_sd: dict[str, np.ndarray] = field(default_factory=dict)
-    named: int = 0
+    named: Effects = ()
 
 
 def scores(amplitude: np.ndarray, seen: Sweep) -> tuple[float, float]:

@@ -26,7 +26,8 @@ from planner.surrogate.models.nargp import fit_nargp, kennedy_ohagan
 
 from .data import COMPARED, FREQUENCY_MODELS, KERNELS, AnalysedPoses, nearest, split
 
-Fit = Callable[[Samples], Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]]
+Predict = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+Fit = Callable[[Samples], Predict]
 FEWEST = 3  # poses: B_3
 
 

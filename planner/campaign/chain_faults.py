@@ -1,7 +1,7 @@
 """What a measuring chain may do wrong, and how that is asked: signed axes, and factors."""
 
 from dataclasses import dataclass
-from itertools import permutations, product
+from itertools import combinations, permutations, product
 
 import numpy as np
 
@@ -19,15 +19,21 @@ class ChainFault:
     """What a chain shows is `matrix` (3, 3) times what it should, x, y, z being its channels.
 
     `scaled` are the channels that `factor` multiplies; () where axes or signs are exchanged.
+    `struck` are axes along which the hammer hit against the direction that is stated.
     """
 
     matrix: np.ndarray
     scaled: tuple[int, ...] = ()
     factor: float = 1.0
+    struck: tuple[int, ...] = ()
 
     @property
     def asked(self) -> str:
         """What looks wrong, as a question."""
+        if self.struck:
+            axes = " and ".join(AXES[i] for i in self.struck)
+            ways = " and ".join(f"−{AXES[i]}" for i in self.struck)
+            return f"hits along {axes} look struck the other way, towards {ways}?"
         return self._of_scale if self.scaled else self._of_axes
 
     @property
@@ -86,6 +92,7 @@ def _scaled(channels: tuple[int, ...]) -> tuple[ChainFault, ...]:
 
 
 TURNED = _turned()  # all 47 ways to exchange axes and signs
+AGAINST = tuple(ChainFault(np.eye(3), struck=s) for n in (1, 2) for s in combinations(range(3), n))
 SCALED = tuple(_scaled(channels) for channels in ((0, 1, 2), (0,), (1,), (2,)))
 
 

@@ -3,8 +3,8 @@
 What was found of the hits before tells which FRFs are to be expected anywhere, and how unsure that
 is. Where "something else" is likelier than the pose as stated, what that may be competes by
 evidence: another known pose, the setpoint, an angle with the other sign, axes of the sensor
-exchanged, a channel with a wrong scale. Without a simulation, or before the first measurement,
-nothing is expected.
+exchanged, a channel with a wrong scale, hits the other way, one joint elsewhere. Without a
+simulation, or before the first measurement, nothing is expected.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
-from planner.campaign.chain_faults import LEAST, NONE, TURNED, ChainFault
+from planner.campaign.chain_faults import AGAINST, LEAST, NONE, TURNED, ChainFault
 from planner.campaign.chain_question import chain_question
 from planner.campaign.events import Question
 from planner.campaign.model import Model
@@ -21,6 +22,7 @@ from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.fit.expected import LINES, SIZES, ExpectedFrfs, turned
 from planner.frf.frf import Frf
+from planner.recording.joints import JointUnits
 from planner.recording.points import TOOL
 
 LOG_ODDS = np.log(1000.0)  # against a mistake, before anything is measured
@@ -28,6 +30,8 @@ BETTER = 3.0  # times less is left by a mistake that explains them
 # Measured poses before which another structure may explain what nothing known fits: until then
 # the simulation alone tells of the chain, as before the first.
 SURE = 2
+# A joint is looked for elsewhere by 2^NEAREST to 2^(FARTHEST − 1) times as far as readbacks err.
+NEAREST, FARTHEST = 1, 7
 FOLLOWED = 3  # mistakes that are fitted, those that seem likeliest at once
 
 
@@ -35,7 +39,8 @@ FOLLOWED = 3  # mistakes that are fitted, those that seem likeliest at once
 class Mistake:
     """Where the robot may be, q (dof,) in rad, and what the chain may show, instead; in words.
 
-    A `rival` is likelier beforehand than others: it need not leave less than what is stated.
+    A `rival` is likelier beforehand than others: it need not leave less than what is stated. One
+    chosen among many that can be told apart is `rarer` by so many nats.
     """
 
     q: np.ndarray
@@ -44,6 +49,7 @@ class Mistake:
     about: str = ""
     fault: ChainFault = NONE
     rival: bool = False
+    rarer: float = 0.0
 
 
 def question(
@@ -66,6 +72,7 @@ def question(
     if not stated.doubted and not stated.instead(typed):
         return None
     mistakes = [*typed, *_poses(model, state, pose, joints_deg), *_chains(state, expected, q, frf)]
+    mistakes += elsewhere(model.cell.robot.joints, expected, frf, joints_deg)
     fits = stated.instead(mistakes)
     if fits is None and not stated.impossible:
         return None
@@ -109,18 +116,19 @@ class StatedHits:
         value, size = self.density
 
         def shown(one: Mistake) -> tuple[Frf, float]:
-            frf, volume = turned(self.frf, one.fault.matrix)
+            frf, volume = turned(self.frf, one.fault.matrix, one.fault.struck)
             return frf, volume * columns * LINES
 
         def glanced(one: Mistake) -> float:
             frf, volume = shown(one)
-            return self.expected.strange(one.q, frf) + volume
+            return self.expected.strange(one.q, frf) + volume - one.rarer
 
         found = []
         for one in sorted(mistakes, key=glanced, reverse=True)[:FOLLOWED]:
             frf, volume = shown(one)
             its, left = self.expected.density(one.q, frf)
-            gain, better = its + volume - value, (1 if one.rival else BETTER) * left <= size
+            gain = its + volume - one.rarer - value
+            better = (1 if one.rival else BETTER) * left <= size
             if gain > LOG_ODDS and (better or its + volume > self.strange > value):
                 found.append((gain, one))
         return max(found, key=lambda pair: pair[0], default=(0.0, None))[1]
@@ -157,7 +165,31 @@ def _setpoint(
     return [Mistake(there, what, about="readback", rival=True)] if typed else []
 
 
-def _either(joints, number: int, one: float, other: float) -> str:
+def elsewhere(
+    joints: JointUnits, expected: ExpectedFrfs, frf: Frf, joints_deg: tuple[float, ...]
+) -> Iterator[Mistake]:
+    """One joint where it explains the hits best, near where it is said to be."""
+    stated, same = np.array(joints_deg), joints.same()
+    steps = 2.0 ** np.arange(NEAREST, FARTHEST)
+    rarer = float(np.log(2 * steps[-1] * len(stated)))
+
+    def less(by: float, axis: np.ndarray) -> float:
+        return -expected.strange(joints.internal([stated + by * axis])[0], frf)
+
+    for i, axis in enumerate(np.diag(same)):
+        tried = np.concatenate([-steps[::-1], [0.0], steps])
+        each = [less(float(by), axis) for by in tried]
+        best = int(np.argmin(each))
+        if tried[best] == 0.0:
+            continue
+        around = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
+        by = minimize_scalar(less, bounds=around, args=(axis,), method="bounded").x
+        there = stated + by * axis
+        what = f"fit another angle far better: is {_either(joints, i, there[i], stated[i])}?"
+        yield Mistake(joints.internal([there])[0], what, about="readback", rarer=rarer)
+
+
+def _either(joints: JointUnits, number: int, one: float, other: float) -> str:
     return (
         f"{joints.names[number]} {joints.text(number, one, 2)} or {joints.text(number, other, 2)}"
     )
@@ -169,7 +201,7 @@ def _chains(
     """What the tool's chain may show instead; nothing once the engineer called it right."""
     if frf.layout.sensors != TOOL.sensors or _called_right(state):
         return
-    for fault in (*TURNED, *scaled(expected.ratio(q, frf))):
+    for fault in (*TURNED, *AGAINST, *scaled(expected.ratio(q, frf))):
         yield Mistake(q, fault.asked, about="chain", fault=fault)
 
 
@@ -193,10 +225,7 @@ def _asked(pose: str, off_percent: float, fits: Mistake | None) -> Question:
     if fits is not None and fits.about == "chain":
         text = f"At {pose}, {fits.what} Are these hits right as they are?"
     elif fits is not None and fits.about == "readback":
-        text = (
-            f"These hits {fits.what} If it was typed wrong, correct recordings.csv and import "
-            f"again. Are the angles right as they are?"
-        )
+        text = f"These hits {fits.what} Are the angles right as they are?"
     else:
         instead = fits.what if fits else "fit no other known pose either"
         text = (

@@ -177,7 +177,7 @@ class CampaignReads:
         known |= {name: m.joints_deg for name, m in state.measurements.items()}
         if pose is None or pose not in known:
             given = f"has no pose {pose}; choose" if pose else "is a campaign: say at which pose,"
-            some = ", ".join(list(known)[:5]) or "none yet"
+            some = ", ".join([*list(known)[:5], *["…"] * (len(known) > 5)]) or "none yet"
             raise InputError(f"{self.directory} {given} one of {some} with --pose.")
         return self.cell.robot.joints.internal(known[pose])
 

@@ -26,10 +26,11 @@ def hit_again(model: Model, known: Measurement, modes: Sequence[MeasuredMode]) -
     if not found:
         return ()
     hz, off, sd = max(found, key=lambda one: abs(one[1]) / one[2])
-    what = f"the mode at {hz:.2f} Hz by {100 * off:+.2f} %, {abs(off) / sd:.1f} sd of two visits"
+    what = f"the mode at {hz:.2f} Hz by {100 * off:+.2f} %"
     if abs(off) > max(DIFFERS_SD * sd, SMALLEST):
         return (
-            f"{known.pose} was hit again and differs from the hits before, {what}: the robot has "
+            f"{known.pose} was hit again and differs from the hits before, {what}, "
+            f"{abs(off) / sd:.1f} sd of two visits: the robot has "
             f"changed since. Hit another early pose again; to keep the visits apart, undo this "
             f"import and give the hits a pose name of their own.",
         )

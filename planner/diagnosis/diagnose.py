@@ -28,6 +28,7 @@ from planner.frf.frf import Frf
 from planner.measurement.agreement import Similarity, similarity_of
 from planner.measurement.nuisances import Tolerances
 from planner.progress import Tell, quietly
+from planner.words import significant
 
 # Stated springs are known as well as datasheets have them (a fifth), dampers to a factor of two;
 # masses lie elsewhere by 8 % of a body's radius of gyration: cables, oil, covers.
@@ -115,7 +116,7 @@ class Diagnosis:
         """What is there and too small to matter, in words."""
         told = [e for e in self.verdict.effects if not e.counts and e.nats > LEAST]
         return tuple(
-            f"Too small to matter ({100 * e.change:.2g} % of |H|): "
+            f"Too small to matter ({significant(100 * e.change)} % of |H|): "
             f"{self._established(e, e.probability).text}"
             for e in told
         )
@@ -176,7 +177,8 @@ def _words(law: LevelLaw) -> str:
         "nonlinear_stiffness": f"The stiffness of {law.at} goes with how far it swings: check the "
         "gear's preload and what it is mounted on.",
     }
-    return f"{said[law.effect]} Hits of different force differ by {100 * law.share:.2g} % of |H|."
+    share = significant(100 * law.share)
+    return f"{said[law.effect]} Hits of different force differ by {share} % of |H|."
 
 
 def searching(

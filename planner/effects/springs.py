@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.effects.effect import Operator, SpringPrior
+from planner.words import with_sd
 
 # Stiffness of what is not stated, in that of the stiffest spring stated at the joint (the floor: of
 # the whole robot); of bearings of which nobody would say a word.
@@ -94,5 +95,5 @@ def _stiffness(values: Mapping[str, tuple[float, float]]) -> str:
     said = []
     for name, (value, sd) in known.items():
         unit = "N/m" if " along " in name else "N·m/rad"
-        said.append(f"{name.split(' ', 1)[1]} {value:.3g} ± {sd:.1g} {unit}")
+        said.append(f"{name.split(' ', 1)[1]} {with_sd(value, sd)} {unit}")
     return ", ".join(said) if said else "the recordings do not tell yet by how much"

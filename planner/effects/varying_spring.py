@@ -12,6 +12,7 @@ import numpy as np
 
 from planner.dynamics.gradient import Impedance
 from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
+from planner.words import significant
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class AngleSpring(VaryingSpring):
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
         share = np.sqrt(sum(v**2 for v, _ in values.values()))
-        return f"The stiffness of {self.at} goes with its angle, by ± {100 * share:.2g} %."
+        return f"The stiffness of {self.at} goes with its angle, by ± {significant(100 * share)} %."
 
     def tables(self, values: Mapping[str, tuple[float, float]]) -> dict[str, list[dict[str, Any]]]:
         """Harmonics of [[effects]]."""

@@ -4,6 +4,7 @@ The posterior of the fit is the prior of one more pose, and is refitted with it:
 measured before, FRFs bend with the springs in a way that no first order follows.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -110,11 +111,13 @@ class ExpectedFrfs:
         return np.exp(np.nanmedian(off, axis=(1, 2)))
 
 
-def turned(frf: Frf, matrix: np.ndarray) -> tuple[Frf, float]:
+def turned(frf: Frf, matrix: np.ndarray, struck: Sequence[int] = ()) -> tuple[Frf, float]:
     """FRF (3, c, F) of which `matrix` (3, 3) was shown, and ln of the Jacobian of one complex value
-    of every column."""
+    of every column; hits along axes of `struck` go the other way."""
     inverse = np.linalg.inv(matrix)
     shown = np.einsum("ij,jcf->icf", inverse, frf.accelerance)
+    for axis in struck:
+        shown[:, axis::3] *= -1
     variance = np.einsum("ij,jcf->icf", inverse**2, frf.variance)
     volume = 2 * float(np.log(np.abs(np.linalg.det(inverse))))
     return replace(frf, accelerance=shown, variance=variance), volume

@@ -7,7 +7,7 @@ from planner.fit.fitted import StructureFit
 from planner.fit.identified import ExtendedModel, as_identification
 from planner.fit.posterior import RobotPosterior
 from planner.fit.result import Estimate, Identification
-from planner.words import counted
+from planner.words import counted, significant
 
 BEYOND = 2.0  # sds of the gains, from which their deviation is told
 KNOWN = 0.3  # sd of ln k to which a spring not stated is known when it is told of
@@ -62,9 +62,9 @@ class Learned:
             return ""
         more = "larger" if off > 0 else "smaller"
         return (
-            f"The recordings are {100 * abs(off):.2g} % {more} than the robot's FRFs, though gains "
-            f"of sensor and hammer are stated to {100 * allowed:.2g} %: check their sensitivities, "
-            f"and the masses in the URDF."
+            f"The recordings are {significant(100 * abs(off))} % {more} than the robot's FRFs, "
+            f"though gains of sensor and hammer are stated to {significant(100 * allowed)} %: "
+            f"check their sensitivities, and the masses in the URDF."
         )
 
     @property

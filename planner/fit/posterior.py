@@ -14,6 +14,7 @@ from planner.fit.structure import RobotStructure, exported
 from planner.inference.least_squares import inverse
 from planner.measurement.measured_frfs import Measured
 from planner.recording.points import TOOL, Layout
+from planner.words import significant
 
 # What no structure explains, in shares of |H|, up to which the simulation is followed: of a fit
 # that lacks nothing it is 0.001 to 0.015. Chosen.
@@ -162,6 +163,6 @@ class RobotPosterior:
         pairs = zip(self.structure.effects, self.found.shares, strict=True)
         return tuple(
             f"{effect.words(self.values(effect)).replace(effect.at, effect.at.split('#')[0])} "
-            f"Without that the FRFs would differ by {100 * min(share, 1.0):.2g} %."
+            f"Without that the FRFs would differ by {significant(100 * min(share, 1.0))} %."
             for effect, share in sorted(pairs, key=lambda pair: -pair[1])
         )

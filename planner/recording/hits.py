@@ -92,7 +92,11 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
     if len(forces) != 1:
         raise InputError(
             f"{source} holds {describe(record)}: a hit needs exactly one force in N; "
-            f"export force and accelerations together."
+            + (
+                f"{nameless} state no unit: name columns such as Force [N] and Acc X [m/s²]."
+                if (nameless := without_unit(record))
+                else "export force and accelerations together."
+            )
         )
     accelerations = [c for c in record.channels if c.quantity == "acceleration"]
     accelerations, left_out = _at_points(accelerations, stated)

@@ -164,8 +164,8 @@ def _soft(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
                 "too_slow",
                 f"Sampled at {hit.sampling_rate_hz:g} Hz, its FRFs end at "
                 f"{0.45 * hit.sampling_rate_hz:.4g} Hz, before the end of the band of {low:g} to "
-                f"{high:g} Hz; sample at {2.56 * high:.0f} Hz or faster, or give another band "
-                f"(--band-hz).",
+                f"{high:g} Hz; sample at {2.56 * high:.0f} Hz or faster, state the unit "
+                f"where times are in ms, or give another band (--band-hz; [modes] band_hz).",
             )
         ]
     inside = spectrum[(frequency >= low) & (frequency <= high)]

@@ -208,13 +208,15 @@ def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
     if asked.disagree or asked.about:
         right = "they are" if asked.about else "each is"
         return (
-            f"{asked.text} They are held, not used. To take the import back: "
+            f"{asked.text} They are held, not used. Where files or recordings.csv are wrong, "
+            f"correct them and import again; to take the import back: "
             f"{command('planner', 'undo', directory)}; if {right} right: {confirm}; to set all "
             f"aside: {withdraw}."
         )
+    there = command(asked.fits or "OTHER")
     return (
-        f"{asked.text} They are held, not used. If it is: {confirm}; if it is at OTHER: {confirm} "
-        f"--at OTHER; else: {withdraw}."
+        f"{asked.text} They are held, not used. If it is: {confirm}; if it is at {there}: "
+        f"{confirm} --at {there}; else: {withdraw}."
     )
 
 

@@ -167,7 +167,9 @@ def import_waiting(
     """Import the waiting hits; the pose is over when it gave modes."""
     files = [path for path in files if path not in visit.weak]
     if not files:
-        station.say(session_text.NOTHING_NEW, "yellow")
+        waiting = len(visit.late | visit.unsure)
+        asked = f"{counted(waiting, 'hit')} wait for your answer: [b] or [h]."
+        station.say(asked if waiting else session_text.NOTHING_NEW, "yellow")
         return course
     # What the import would take as good, or ask for at every pose from here on.
     _refuse(station, visit, visit.weak | (frozenset() if station.auto else visit.unsure))

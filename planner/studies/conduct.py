@@ -23,11 +23,6 @@ from planner.studies.report import (
 )
 
 FINISHED = "study.json"  # written last: a folder that has it holds a whole study
-# What decides a study's figures; another command line or page does not.
-COMPUTING = (
-    "campaign", "dataset", "design", "diagnosis", "dynamics", "frf", "identification", "inference",
-    "modal", "recording", "robot", "studies", "surrogate", "truth",
-)  # fmt: skip
 
 
 class Finished(msgspec.Struct, frozen=True):
@@ -88,8 +83,7 @@ def conduct_all(folder: Path | None, small: bool, progress: Tell) -> StudiesAnsw
 def _key(name: str, small: bool) -> str:
     own = sorted(registry.folder_of(name).glob("*.py"))
     texts = [path.read_text("utf-8") for path in own]
-    program = content_hash.program(*COMPUTING)
-    return content_hash.digest(program, *texts, "small" if small else "full")
+    return content_hash.digest(content_hash.program(), *texts, "small" if small else "full")
 
 
 def _finished(name: str, folder: Path, small: bool) -> StudyAnswer | None:

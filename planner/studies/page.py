@@ -62,7 +62,7 @@ def _count(answer: StudyAnswer, verdict: str) -> int:
 
 def _counted(answer: StudyAnswer) -> str:
     """How many claims have each verdict."""
-    each = ", ".join(f"{_count(answer, v)} {v}" for v in CLASSES)
+    each = ", ".join(f"{v} {_count(answer, v)}" for v in CLASSES)
     return f"Of {len(answer.findings)} claims: {each}."
 
 

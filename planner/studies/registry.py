@@ -30,8 +30,8 @@ def named(name: str) -> str:
         raise InputError(f"There is no study {name}; choose one of {', '.join(NAMES)} or all.")
     if importlib.util.find_spec(NEEDED) is None:
         raise InputError(
-            "Studies make their recordings with MuJoCo, which is not installed; install it with "
-            "pip install 'planner[truth]'."
+            "Studies make their recordings with MuJoCo, which is not installed; run "
+            f"{sys.executable} -m pip install 'planner[truth]'"
         )
     return name
 

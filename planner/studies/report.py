@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import numpy as np
 from rich.console import Group, RenderableType
+from rich.padding import Padding
 from rich.text import Text
 
 from planner.errors import InputError
@@ -91,7 +92,7 @@ class StudyAnswer(Answer):
     def claims(self) -> Table:
         """Claim by claim: verdict, the paper's figures and those here, rule and reason."""
         columns = f"claim of {self.short}", *COLUMNS
-        rows = tuple(claim.row for claim in self.findings)
+        rows = tuple(row for claim in self.findings for row in claim.rows)
         return Table(f"{self.study}_claims", f"Claims of {self.short}", columns, rows)
 
     def text(self) -> Group:
@@ -182,12 +183,14 @@ def _shown(entry: Table) -> RenderableType:
 
 
 def _claims(answer: StudyAnswer) -> list[RenderableType]:
-    """Claim by claim, a few lines each: seven columns are too many for a screen."""
+    """Claim by claim, a line for each figure of it: eight columns are too many for a screen."""
     parts: list[RenderableType] = [Text(f"\nClaims of {answer.short}", style="italic")]
     for claim in answer.findings:
-        sentence, verdict, paper, *rest = claim.row
-        parts.append(Text.assemble((f"{verdict}: ", COLOURS[verdict]), (sentence, "bold")))
-        labels = "here", "spread over seeds", "false if, on any seed", "reason"
-        told = {"the paper": paper} | dict(zip(labels, rest, strict=True))
-        parts += [Text(f"    {label}: {value}") for label, value in told.items()]
+        head = (f"{claim.verdict}: ", COLOURS[claim.verdict]), (claim.sentence, "bold")
+        parts.append(Text.assemble(*head))
+        for figure in claim.figures:
+            name, paper, here, spread, false_if, reason = figure.cells
+            theirs = "" if paper == "–" else f"the paper: {paper}; "
+            told = f"{here} ({spread}); {theirs}false if {false_if}; {reason}"
+            parts.append(Padding(Text(f"{name}: {told}"), (0, 0, 0, 4)))
     return parts

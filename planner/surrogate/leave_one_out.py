@@ -114,7 +114,7 @@ def report(residuals: LeaveOneOut, poses: tuple[str, ...], outputs: tuple[str, .
     """Lines for the user: coverage, and the poses that surprise most."""
     count = int(np.isfinite(residuals.rank).sum())
     if count == 0:
-        return ["Nothing is measured yet that could be left out."]
+        return ["No pose can be predicted from the others yet: too few are measured."]
     ends = LEVELS[0], LEVELS[-1]
     inside = [
         f"{count * share:.0f} lie in their {100 * level:.0f} % interval ({count * level:.0f} "

@@ -49,8 +49,11 @@ def campaign(three, tmp_path):
     return Campaign(tmp_path / "campaign")
 
 
-def claim(folder, pool, pose=WRONG, at=CLAIMED, name="X1"):
-    """A recordings folder whose table says that the hits of `pose` were made at `at`."""
+def claim(folder, pool, pose=WRONG, at=CLAIMED, name="X1", off_deg=(0.0,) * 6, other_way=""):
+    """A recordings folder whose table says that the hits of `pose` were made at `at`.
+
+    `off_deg` is added to its angles; hits along `other_way` are said to have the other direction.
+    """
     (folder / "data").mkdir(parents=True)
     with open(folder / TABLE, "w", newline="") as file:
         table = csv.writer(file)
@@ -58,8 +61,10 @@ def claim(folder, pool, pose=WRONG, at=CLAIMED, name="X1"):
         table.writerow(["pose", *joints, "hit", "repeat", "file"])
         for row in pool.rows[pose]:
             shutil.copy(row.file, folder / "data")
-            angles = pool.rows[at][0].joints_deg
-            table.writerow([name, *angles, row.hit, row.repeat, f"data/{row.file.name}"])
+            angles = np.add(pool.rows[at][0].joints_deg, off_deg)
+            sign, axis = row.hit
+            hit = f"{'-' if sign == '+' else '+'}{axis}" if axis == other_way else row.hit
+            table.writerow([name, *angles, hit, row.repeat, f"data/{row.file.name}"])
     return folder
 
 
@@ -94,6 +99,31 @@ def test_hits_of_another_pose_are_held_until_confirmed(campaign, pool, tmp_path)
     assert not again.state.held
     (fresh,) = again.import_paths((tmp_path / "wrong",))
     assert fresh.question is not None
+
+
+@pytest.mark.parametrize(
+    ("wrong", "about", "said"),
+    [
+        ({"off_deg": (0, 0, 8.0, 0, 0, 0)}, "readback", "is joint_3"),
+        ({"off_deg": (0, 0, 0, 0, 5.0, 0)}, "readback", "is joint_5"),
+        ({"other_way": "x"}, "chain", "towards −x?"),
+    ],
+)
+def test_a_misread_angle_and_hits_from_behind_are_asked_about(
+    campaign, pool, tmp_path, wrong, about, said
+):
+    (right,) = campaign.import_paths((claim(tmp_path / "right", pool, WRONG, WRONG),))
+    assert right.question is None
+    campaign.undo()
+    folder = claim(tmp_path / "wrong", pool, WRONG, WRONG, **wrong)
+    (report,) = campaign.import_paths((folder,))
+    assert report.question is not None
+    assert report.question.about == about
+    assert said in report.question.text
+    if about == "readback":
+        read = float(report.question.text.split(said)[1].split("°")[0])
+        stated = np.array(pool.rows[WRONG][0].joints_deg)
+        assert abs(read - stated[int(said[-1]) - 1]) < 0.5
 
 
 def test_hits_of_a_pose_left_unmoved_are_told_and_moved(campaign, pool, tmp_path):

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from planner.campaign.chain_faults import TURNED
+from planner.campaign.chain_faults import AGAINST, TURNED
 from planner.campaign.chain_question import Draws
-from planner.campaign.question import SURE, Mistake, StatedHits, scaled
+from planner.campaign.question import SURE, Mistake, StatedHits, elsewhere, scaled
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
@@ -23,11 +23,13 @@ from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
+from planner.recording.joints import JointUnits
 from planner.robot.robot import Robot
 from tests.support.chain_cases import fault, judged
 from tests.support.fitted_cases import ARMS, POSES, Case, everyday, harder
 
 CASES, SEED = int(os.environ.get("QUESTIONED", "100")), int(os.environ.get("QUESTION_SEED", "3000"))
+MISREAD_DEG = 3.0
 EACH = int(os.environ.get("QUESTION_EACH", "1"))
 CHAINS = (
     "× 1000", "÷ 9.81", "× 2", "a channel × 2", "wrong sign", "force's sign", "swapped axes",
@@ -55,6 +57,7 @@ class Asker:
     draws: Draws
     band_hz: tuple[float, float]
     poses: int
+    joints: JointUnits
     expected: ExpectedFrfs | None = None
 
     def of_chain(self, q: np.ndarray, frf: Frf) -> str:
@@ -63,15 +66,16 @@ class Asker:
         return "" if sums is None or judged(sums) is None else "chain"
 
     def asked(self, q: np.ndarray, frf: Frf, others: dict[str, np.ndarray]) -> str:
-        """A pose, "sign", "chain", "?" where nothing fits; "" where nothing is asked."""
+        """A pose, "readback", "chain", "?" where nothing fits; "" where nothing is asked."""
         if self.expected is None:
             return self.of_chain(q, frf)
         stated = StatedHits(self.expected, q, frf)
         if not stated.doubted:
             return ""
         mistakes = [Mistake(there, "", name) for name, there in others.items()]
-        mistakes += [Mistake(opposite(q, i), "", about="sign") for i in range(len(q))]
-        faults = (*TURNED, *scaled(self.expected.ratio(q, frf)))
+        mistakes += [Mistake(opposite(q, i), "", about="readback") for i in range(len(q))]
+        mistakes += elsewhere(self.joints, self.expected, frf, tuple(self.joints.shown(q)))
+        faults = (*TURNED, *AGAINST, *scaled(self.expected.ratio(q, frf)))
         mistakes += [Mistake(q, "", about="chain", fault=fault) for fault in faults]
         found = stated.instead(mistakes)
         if found is not None:
@@ -88,7 +92,7 @@ def answers(
     simulation = Simulation(Robot.load(case.toml))
     tolerances = Tolerances.of(simulation.robot.config, simulation.robot.joints.slides)
     prior, warm = RobotPrior(Repertoire.of(simulation, CAD_INERTIAS)), None
-    first = Asker(Draws(simulation, tolerances), case.band_hz, 0)
+    first = Asker(Draws(simulation, tolerances), case.band_hz, 0, simulation.robot.joints)
     poses, out = {f"P{k}": q for k, q in enumerate(case.q)}, []
     for n, (q, frf) in enumerate(zip(case.q, case.frfs, strict=True)):
         ask, true = first, f"P{(n + 1) % len(case.q)}"
@@ -102,10 +106,14 @@ def answers(
             strange = case.frfs[(n + 1) % len(case.q)]
             unlisted = {name: there for name, there in others.items() if name != true}
             typed = opposite(q, int(rng.integers(1, len(q))))
+            misread = q + np.deg2rad(MISREAD_DEG) * np.eye(len(q))[int(rng.integers(1, len(q)))]
+            against = replace(frf, accelerance=frf.accelerance * np.array([-1, 1, 1])[:, None])
             one = {
                 "another pose": (ask.asked(q, strange, others), true),
                 "unlisted pose": (ask.asked(q, strange, unlisted), "?"),
-                "sign of an angle": (ask.asked(typed, frf, others), "sign"),
+                "sign of an angle": (ask.asked(typed, frf, others), "readback"),
+                "an angle 3° off": (ask.asked(misread, frf, others), "readback"),
+                "x hit from behind": (ask.asked(q, against, others), "chain"),
             }
         one |= {
             name: (ask.asked(q, shown(frf, fault(name, rng)), others), "chain") for name in chains

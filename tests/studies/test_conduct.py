@@ -66,9 +66,9 @@ def test_all_studies_leave_an_index_a_page_each_and_one_table_of_claims(ran, tmp
     verdicts = ["holds", "does not hold", "holds in kind", "not testable here"]
     assert [row["verdict"] for row in rows] == 2 * verdicts
     assert all(row["reason"] for row in rows)
-    assert rows[1]["reason"] == "b: 0.4 on the worst seed, false if ≤ 0.4; the data are too few: 3"
+    assert rows[1]["reason"] == "no: 0.4 on the worst seed is ≤ 0.4; the data are too few: 3"
     assert rows[2]["claim"] == "(this program) Ours is better."
-    assert "Of 4 claims: 1 holds, 1 holds in kind, 1 does not hold, 1 not testable here." in page
+    assert "Of 4 claims: holds 1, holds in kind 1, does not hold 1, not testable here 1." in page
 
 
 def test_what_is_finished_is_not_run_again(ran, tmp_path):

@@ -1,5 +1,8 @@
 """What the papers' studies are made of: data, splits, the command's answers to bad input."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -213,6 +216,23 @@ def test_every_parameter_has_the_bounds_of_tables_1_and_2(name, count):
     if count == 24:
         low, high = priors.bounds["stiffness of joint_3 across"]
         np.testing.assert_allclose(np.deg2rad([low, high]), [1250, 40000])
+
+
+@pytest.mark.parametrize("begun", [True, False])
+def test_no_fit_leaves_the_bounds_wherever_the_truth_is(begun):
+    """A robot whose springs are far too soft for the tables, and a start that is beyond them."""
+    stated = FITS.stated("12P")
+    priors = FITS.paper_priors(stated)
+    soft = replace(stated.elasticity, stiffness=stated.elasticity.stiffness / 100)
+    hz = np.arange(5.0, 200.0, 5.0)
+    q = np.deg2rad([[0.0, -70.0, 110.0, 0.0, 50.0, 0.0]])
+    struck = SimpleNamespace(
+        frequency_hz=hz, accelerance=stated.changed(soft).accelerance(q, hz)[0]
+    )
+    starts = [np.full(12, 1e-9)] if begun else []
+    values = FITS.within_bounds(stated, priors, [struck], q, starts, 1)
+    low, high = np.array(list(priors.bounds.values())).T
+    assert np.all((values >= low * (1 - 1e-9)) & (values <= high * (1 + 1e-9)))
 
 
 def test_the_best_points_tell_most_and_one_direction_tells_less():
