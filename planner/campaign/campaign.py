@@ -30,7 +30,7 @@ from planner.campaign.events import (
 )
 from planner.campaign.journal import remove_parts
 from planner.campaign.reads import CampaignReads, as_logged
-from planner.campaign.taking_back import last_acts, last_undone
+from planner.campaign.taking_back import gave_way_to, last_acts, last_undone
 from planner.errors import InputError
 from planner.progress import Tell, quietly
 from planner.version import __version__
@@ -152,7 +152,7 @@ class Campaign(CampaignReads):
             joints_deg = place(self.cell, self.state, delivery)
             if other in self.state.held:
                 raise InputError(f"Hits of {other} wait for an answer too; answer that first.")
-            self._append(Undone(entry.seq))
+            self._append(Undone(entry.seq, gives_way=True))
             return self._import_pose(delivery, joints_deg, frozenset(s.path for s in sources))
 
     def refuse_held(self, pose: str, reason: str = REFUSED) -> None:
@@ -160,7 +160,7 @@ class Campaign(CampaignReads):
         with self._acting():
             entry, event = self._held(pose)
             # In this order: stopped in between, the hits are asked for again.
-            self._append(Undone(entry.seq))
+            self._append(Undone(entry.seq, gives_way=True))
             refused = (msgspec.structs.replace(h, accepted=False) for h in event.hits)
             asked = event.question
             why = f"{reason}; held before: {asked.text}" if asked else reason
@@ -203,6 +203,8 @@ class Campaign(CampaignReads):
                 raise InputError(f"{self.directory} holds no act that could be taken back.")
             for entry in acts:
                 self._append(Undone(entry.seq))
+                for gave_way in gave_way_to(self.entries, entry):
+                    self._append(Undone(gave_way.seq))
             return acts
 
     def redo(self) -> tuple[Entry, ...]:
@@ -286,7 +288,7 @@ class Campaign(CampaignReads):
             entry, event = self._held(held_at)
             lacking = let_go(delivery, event, self.cell.robot.joints)
             if lacking is not None:
-                self._append(Undone(entry.seq))
+                self._append(Undone(entry.seq, gives_way=True))
                 more = tuple(self.source_of(hit) for hit in lacking)
                 delivery = replace(delivery, sources=(*delivery.sources, *more))
         return delivery

@@ -206,9 +206,13 @@ class Starred(Event, frozen=True, tag="starred"):
 
 
 class Undone(Event, frozen=True, tag="undone"):
-    """The act with sequence number `act` was taken back; of an Undone: it holds again."""
+    """The act with sequence number `act` was taken back; of an Undone: it holds again.
+
+    It `gives_way` to the act that follows, and holds again once that is taken back.
+    """
 
     act: int
+    gives_way: bool = False
 
 
 AnyEvent = (

@@ -1,6 +1,6 @@
 """Entries of the log in words; what `undo` takes back, and what `redo` lets hold again."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import takewhile
 
 import msgspec
@@ -42,6 +42,13 @@ def last_acts(entries: Iterable[Entry], decisions_only: bool = False) -> tuple[E
     decision = acts[-1 - len(proposals)]
     before = fold(entries[: decision.seq - 1])
     return (decision, *(() if before.unchanged_by(decision.event) else proposals))
+
+
+def gave_way_to(entries: Sequence[Entry], act: Entry) -> tuple[Entry, ...]:
+    """The Undone entries of what an act took the place of, the last one first."""
+    undone, before = taken_back(entries), reversed(entries[: act.seq - 1])
+    gave_way = takewhile(lambda e: isinstance(e.event, Undone) and e.event.gives_way, before)
+    return tuple(e for e in gave_way if e.seq not in undone)
 
 
 def last_undone(entries: Iterable[Entry]) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:

@@ -147,6 +147,13 @@ def test_hits_of_a_pose_left_unmoved_are_told_and_moved(campaign, pool, tmp_path
     assert not campaign.state.held
     assert true in campaign.state.measurements
     assert joints[stated] == campaign.state.proposals[stated].joints_deg
+    campaign.undo()
+    assert campaign.state.held[stated].question == report.question
+    assert true not in campaign.state.measurements
+    campaign.withdraw(stated)
+    assert not campaign.state.held
+    campaign.undo()
+    assert campaign.state.held[stated].question == report.question
 
 
 @pytest.mark.parametrize("typed_deg", [0.0, 3.0, 30.0])
