@@ -62,7 +62,8 @@ def test_noise_is_refused():
 def test_ruler_grid_against_peaks_picked_by_eye(shared_data):
     (frfs,) = read(shared_data / "ruler_grid" / "ruler_grid_acc_3.mat")
     assert isinstance(frfs, FrfRecord)
-    assert frfs.frequency_hz[1] == pytest.approx(0.6104, abs=1e-4)
+    first = frfs.frequency_hz[frfs.frequency_hz > 0][0]  # nothing uses the line at 0 Hz
+    assert first == pytest.approx(0.6104, abs=1e-4)
     modal = modes_from_transfer_functions(frfs, "accelerance", (15.0, 2000.0))
     found = np.array([m.frequency_hz for m in modal.modes])
     peaks = np.array(BY_EYE_HZ)

@@ -60,4 +60,4 @@ def test_gaps_and_nothing_at_all():
     assert np.isnan(found.error[2]).all()
     assert np.isfinite(np.delete(found.sd, 2, axis=0)).all()
     none = TrainingData(*(a[:0] for a in vars(training).values()))
-    assert "Nothing" in report(leave_one_out(fit(none).posterior, 0), (), ("mode 1",))[0]
+    assert "too few" in report(leave_one_out(fit(none).posterior, 0), (), ("mode 1",))[0]
