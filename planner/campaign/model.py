@@ -22,6 +22,7 @@ from planner.design.reductions import repeat_gain
 from planner.design.stopping import Forecast, forecast
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf.frf import Frf
+from planner.robot.place_names import place_names, with_names
 from planner.surrogate.frequency_models import Predicting
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
 from planner.surrogate.modal_surrogate import (
@@ -292,7 +293,8 @@ class Model:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What the engineer should know of the model: doubts about the simulation."""
-        found = [self.low.remark] if self.low.remark else []
+        low = with_names(self.low.remark, place_names(self.cell.robot))
+        found = [low] if low else []
         found += self.surrogate.remarks
         if isinstance(self.surrogate.primary, Predicting):
             found.append(

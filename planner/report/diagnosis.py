@@ -19,7 +19,6 @@ from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
 from planner.report.established_effects import EstablishedEffect, established_effects
 from planner.report.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
-from planner.report.place_names import place_names, with_names
 from planner.report.text import (
     SIMULATED,
     SIMULATED_TITLE,
@@ -28,6 +27,7 @@ from planner.report.text import (
     remarks,
     table,
 )
+from planner.robot.place_names import place_names, with_names
 from planner.words import probable
 
 if TYPE_CHECKING:

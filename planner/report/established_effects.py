@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from planner.design.next_hit import in_words
-from planner.report.place_names import with_names
+from planner.robot.place_names import with_names
 from planner.words import probable
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ from planner.report.diagnosis import DiagnosisReport, EffectAtPlace, RankedExpla
 from planner.report.diagnosis_plots import _overlay, _residuals
 from planner.report.kept_diagnosis import two_answers
 from planner.report.mismatch import MismatchShares, Residuals
-from planner.report.place_names import place_names, with_names
 from planner.report.plot_text import ink
 from planner.report.refitted_springs import RefittedSpring
+from planner.robot.place_names import place_names, with_names
 from planner.robot.robot import Robot
 from planner.words import probable
 from tests.support.plain_arm import make_plain_arm
