@@ -74,7 +74,9 @@ class Asker:
             return ""
         mistakes = [Mistake(there, "", name) for name, there in others.items()]
         mistakes += [Mistake(opposite(q, i), "", about="readback") for i in range(len(q))]
-        mistakes += elsewhere(self.joints, self.expected, frf, tuple(self.joints.shown(q)))
+        if self.poses >= SURE:
+            stated = tuple(self.joints.shown(q))
+            mistakes += elsewhere(self.joints, self.expected, frf, stated)
         faults = (*TURNED, *AGAINST, *scaled(self.expected.ratio(q, frf)))
         mistakes += [Mistake(q, "", about="chain", fault=fault) for fault in faults]
         found = stated.instead(mistakes)
