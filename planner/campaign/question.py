@@ -28,7 +28,7 @@ from planner.recording.points import TOOL
 LOG_ODDS = np.log(1000.0)  # against a mistake, before anything is measured
 BETTER = 3.0  # times less is left by a mistake that explains them
 # Measured poses before which another structure may explain what nothing known fits: until then
-# the simulation alone tells of the chain, as before the first, and no joint is looked for elsewhere.
+# the simulation alone tells of the chain, as before the first; no joint is looked for elsewhere.
 SURE = 2
 # A joint is looked for elsewhere by 2^NEAREST to 2^(FARTHEST − 1) times as far as readbacks err.
 NEAREST, FARTHEST = 1, 7
