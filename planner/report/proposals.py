@@ -15,6 +15,7 @@ from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import command_line, table
+from planner.words import counted
 
 if TYPE_CHECKING:
     from planner.campaign.model import RepeatedPose
@@ -28,6 +29,7 @@ class ProposedPose(Answer):
     proposal: Proposal
     expected: tuple[ExpectedMode, ...]
     room: tuple[str, ...] = ()  # which way +x, +y and +z of the tool point there
+    hits_per_axis: int = field(default=1, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
         """The proposal's own keys, "expected", and "axes_in_the_room"."""
@@ -43,7 +45,8 @@ class ProposedPose(Answer):
         for k, mode in enumerate(self.expected):
             expected.add_row(str(k + 1), *mode.cells)
         x, y, z = proposal.position_m
-        hits = f"hit along {', '.join(proposal.hits)} of the tcp frame"
+        times = counted(self.hits_per_axis, "hit")
+        hits = f"{times} along each of {', '.join(proposal.hits)} of the tcp frame"
         place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {hits}; {proposal.reason}"
         ways = ", ".join(f"+{axis} {way}" for axis, way in zip("xyz", self.room, strict=False))
         seen = [Text(f"There, seen from the base: {ways}")] if ways else []
@@ -119,11 +122,12 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
     from planner.robot.room_directions import axes_in_the_room
 
     robot, model = campaign.cell.robot, campaign.model
+    each = campaign.cell.config.cost.hits_per_axis
     q = robot.joints.internal([p.joints_deg for p in found])
     expected = campaign.model.predict(q)
     return ProposalsReport(
         tuple(
-            ProposedPose(p, ExpectedMode.all_of(expected, i), axes_in_the_room(robot, q[i]))
+            ProposedPose(p, ExpectedMode.all_of(expected, i), axes_in_the_room(robot, q[i]), each)
             for i, p in enumerate(found)
         ),
         tuple(campaign.cell.robot.joint_names),
