@@ -140,6 +140,10 @@ class PosePage:
             angles.add_row(self.joints.names[i], Text(text, style="bold"))
         return angles
 
+    def _has(self, axis: str | None) -> bool:
+        """Whether as many hits as are asked for came along an axis ("+x")."""
+        return bool(axis) and self.counts.get(axis[-1], 0) >= self.per_axis
+
     def _hits(self) -> Table:
         made = Table(box=None, header_style="bold", pad_edge=False)
         made.add_column(f"hit along, axes of {self.frame}")
@@ -152,10 +156,13 @@ class PosePage:
             row = Text(f"{axis}  {count}/{self.per_axis}  {marks}", style=style)
             way = f"  +{axis} {ways[axis]}" if ways else ""
             made.add_row(row.append(way, style="not bold"))
-        again = [hit for hit in self.hits if hit.kind == "repeat"]
+        # Where an axis has its hits, a bad one more is nothing to do again.
+        again = [hit for hit in self.hits if hit.kind == "repeat" and not self._has(hit.axis)]
         if again:
             axes = ", ".join(dict.fromkeys(hit.axis or "?" for hit in again))
-            made.add_row(Text(f"{len(again)} to be repeated ({axes})", style=COLOURS["repeat"]))
+            made.add_row(
+                Text(f"hit again along {axes}: {len(again)} of no use", style=COLOURS["repeat"])
+            )
         unsure = sum(hit.kind == "unsure" for hit in self.hits)
         if unsure:
             made.add_row(Text(f"{unsure} held: right?", style=COLOURS["unsure"]))
