@@ -1,5 +1,6 @@
 """Rebuilding a campaign from its log, step by step, and checking each step."""
 
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -125,7 +126,8 @@ def _check(
         return (*_compare(numbers[0], numbers[1], names), None)
     if isinstance(event, Imported) and model is not None:
         return _check_import(campaign, event, before, model)
-    return "kept", type(event).__name__.lower(), None
+    kind = re.sub(r"(?<!^)(?=[A-Z])", " ", type(event).__name__).lower()
+    return "kept", kind, None
 
 
 def _check_import(
