@@ -22,6 +22,7 @@ from planner.robot.config import (
 )
 from planner.robot.moments import LINK, PAYLOAD, symmetric
 from planner.toml_file import load_toml
+from planner.words import command
 
 if TYPE_CHECKING:
     from planner.robot.robot import Robot
@@ -33,6 +34,9 @@ LARGEST_STIFFNESS = 1e14
 
 def load_config(path: Path) -> RobotConfig:
     """Read and check robot.toml; InputError with one sentence where it is wrong."""
+    if path.suffix == ".urdf":
+        begin = command("planner", "new", "DIR", "--urdf", path)
+        raise InputError(f"{path} is a URDF; robot.toml is made of it by {begin} --mass-kg M.")
     config = load_toml(path, RobotConfig, "robot.toml")
     _check(config, path)
     return with_effects(config, path)
