@@ -43,11 +43,12 @@ class ChainFault:
         near = abs(np.log(size / unit)) < AS_UNIT
         times = f"{unit:.3g} times" if near else f"about {size:.1g} times"
         times = times.replace("1e+03", "1000")
-        way = "large" if self.factor > 1 else "small"
+        way, other = ("large", "small") if self.factor > 1 else ("small", "large")
         whole = len(self.scaled) == len(AXES)
         what = "accelerations are" if whole else f"channel {AXES[self.scaled[0]]} is"
         known = f" ({UNITS[unit]})" if near else ""
-        return f"{what} {times} too {way}: units or sensitivity{known}?"
+        force = f", or forces too {other}" if whole else ""
+        return f"{what} {times} too {way}: units or sensitivity{known}{force}?"
 
     @property
     def _of_axes(self) -> str:
