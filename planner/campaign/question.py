@@ -146,11 +146,6 @@ def _poses(
     for name, there in known.items():
         what = f"repeat those of {name}" if state.hit_at(name) else f"fit {name} far better"
         yield Mistake(joints.internal([there])[0], what, name)
-    for i, angle in enumerate(joints_deg):
-        other = tuple(-a if k == i else a for k, a in enumerate(joints_deg))
-        if abs(angle) > joints.same()[i]:
-            what = f"fit the other sign of an angle: is {_either(joints, i, -angle, angle)}?"
-            yield Mistake(joints.internal([other])[0], what, about="readback")
 
 
 def _setpoint(
@@ -169,7 +164,7 @@ def _setpoint(
 def elsewhere(
     joints: JointUnits, expected: ExpectedFrfs, frf: Frf, joints_deg: tuple[float, ...]
 ) -> Iterator[Mistake]:
-    """One joint where it explains the hits best, near where it is said to be."""
+    """An angle of the other sign; one joint where it explains the hits best, near its angle."""
     stated, same = np.array(joints_deg), joints.same()
     steps = 2.0 ** np.arange(NEAREST, FARTHEST)
     rarer = float(np.log(2 * steps[-1] * len(stated)))
@@ -178,6 +173,10 @@ def elsewhere(
         return -expected.strange(joints.internal([stated + by * axis])[0], frf)
 
     for i, axis in enumerate(np.diag(same)):
+        if abs(stated[i]) > same[i]:
+            other = stated * np.where(axis > 0, -1, 1)
+            what = f"fit the other sign of an angle: is {_either(joints, i, other[i], stated[i])}?"
+            yield Mistake(joints.internal([other])[0], what, about="readback")
         tried = np.concatenate([-steps[::-1], [0.0], steps])
         each = [less(float(by), axis) for by in tried]
         best = int(np.argmin(each))

@@ -73,10 +73,9 @@ class Asker:
         if not stated.doubted:
             return ""
         mistakes = [Mistake(there, "", name) for name, there in others.items()]
-        mistakes += [Mistake(opposite(q, i), "", about="readback") for i in range(len(q))]
         if self.poses >= SURE:
-            stated = tuple(self.joints.shown(q))
-            mistakes += elsewhere(self.joints, self.expected, frf, stated)
+            angles = tuple(self.joints.shown(q))
+            mistakes += elsewhere(self.joints, self.expected, frf, angles)
         faults = (*TURNED, *AGAINST, *scaled(self.expected.ratio(q, frf)))
         mistakes += [Mistake(q, "", about="chain", fault=fault) for fault in faults]
         found = stated.instead(mistakes)
