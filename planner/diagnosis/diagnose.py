@@ -12,12 +12,12 @@ from planner.diagnosis.finding import Finding
 from planner.diagnosis.levels import LevelLaw, Levels, level_laws
 from planner.diagnosis.search import FITTED, LEAST, Explored, Explorer
 from planner.diagnosis.tone import screen_tone
-from planner.diagnosis.verdict import NamedEffect, Verdict, judged
+from planner.diagnosis.verdict import NamedEffect, Verdict, judged, likeliest
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire, diagnosed
 from planner.errors import InputError
-from planner.fit.fitted import StructureFit, evidence_of, settled
+from planner.fit.fitted import StructureFit, settled
 from planner.fit.held_out import set_aside
 from planner.fit.identify import TOO_SOFT
 from planner.fit.misfit import FrfMisfit
@@ -43,6 +43,10 @@ class ThreefoldSimilarity:
     nominal: Similarity
     refitted: Similarity
     explained: Similarity
+
+    def worse(self, matters: float) -> bool:
+        """Whether what explains predicts worse than the robot refitted, by what matters of |H|."""
+        return self.refitted.frobenius - self.explained.frobenius > matters
 
 
 @dataclass(frozen=True)
@@ -150,12 +154,12 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
     heard = [(f.effect, f.at) for f in screened]
     matters = robot.config.diagnose.matters
     tell("comparing hits of different force", 0.85)
-    likeliest = max(explored.settled, key=evidence_of)
-    levels = level_laws(recorded, likeliest) if recorded.visits else None
+    fits, aside = (explored.plain, likeliest(explored)), set_aside(recorded.q)
+    levels = level_laws(recorded, fits[1]) if recorded.visits else None
     tell("judging", 0.9)
-    verdict = judged(explored, matters, between(recorded.q), heard, levels)
-    aside = set_aside(recorded.q)
-    fits = explored.plain, verdict.best
+    held_out = _held_out(search, fits, aside) if aside else None
+    worse = held_out is not None and held_out.worse(matters)
+    verdict = judged(explored, matters, between(recorded.q), heard, levels, worse)
     return Diagnosis(
         recorded,
         search,
@@ -165,7 +169,7 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
         levels,
         _agreement(fits, fits),
         aside,
-        _held_out(search, fits, aside) if aside else None,
+        held_out,
     )
 
 

@@ -78,14 +78,15 @@ def judged(
     q: np.ndarray,
     heard: Sequence[Place] = (),
     levels: Levels | None = None,
+    worse: bool = False,
 ) -> Verdict:
     """Of what was explored, of effects `heard` in the signals, and of laws of force `levels`.
 
     Sizes are told at q (n, dof) in rad, poses that were not measured. Averages over levels are bent
-    by a joint's law: beside one only what changes FRFs by more than levels do is told.
+    by a joint's law: beside one only what changes FRFs by more than levels do is told. What
+    predicts poses set aside `worse` than the robot as stated explains nothing.
     """
-    weights = probabilities(explored.settled)
-    best = max(explored.settled, key=lambda f: weights[key_of(f)])
+    weights, best = probabilities(explored.settled), likeliest(explored)
     effects = _weighed(explored, best, weights, matters, q)
     laws = levels.laws if levels else ()
     if levels and laws:
@@ -97,7 +98,7 @@ def judged(
         effects = [replace(e, counts=e.counts and apart) for e, apart in pairs]
     named = [e for e in effects if e.counts]
     nameless = any(e.operator.general for e in named)
-    left = (size_of(best) > EXPLAINS * matters or nameless) and not laws
+    left = (size_of(best) > EXPLAINS * matters or nameless or worse) and not laws
     unknown = left or bool(levels and levels.unexplained) or UNKNOWN in heard
     there = named or heard or laws
     verdict = "unexplained" if unknown else "explained" if there else "consistent"
@@ -105,6 +106,12 @@ def judged(
     if levels and laws and not unknown:
         candidates = _with_laws(candidates, levels)
     return Verdict(verdict, tuple(effects), candidates, _sets(named, weights), best)
+
+
+def likeliest(explored: Explored) -> StructureFit:
+    """The likeliest set of effects, as fitted."""
+    weights = probabilities(explored.settled)
+    return max(explored.settled, key=lambda f: weights[key_of(f)])
 
 
 def probabilities(fits: Sequence[StructureFit]) -> dict[frozenset[Place], float]:
