@@ -184,6 +184,8 @@ def elsewhere(
             continue
         around = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
         by = minimize_scalar(less, bounds=around, args=(axis,), method="bounded").x
+        if abs(by) < steps[0]:
+            continue
         there = stated + by * axis
         what = f"fit another angle far better: is {_either(joints, i, there[i], stated[i])}?"
         yield Mistake(joints.internal([there])[0], what, about="readback", rarer=rarer)
