@@ -164,7 +164,11 @@ def _setpoint(
 def elsewhere(
     joints: JointUnits, expected: ExpectedFrfs, frf: Frf, joints_deg: tuple[float, ...]
 ) -> Iterator[Mistake]:
-    """An angle of the other sign; one joint where it explains the hits best, near its angle."""
+    """An angle of the other sign; one joint where it explains the hits best, near its angle.
+
+    `joints_deg` (dof,) as stated: degrees, of slides mm. Each joint's place is found by a search
+    along it alone, of the density of hits that are hardly what is expected.
+    """
     stated, same = np.array(joints_deg), joints.same()
     steps = 2.0 ** np.arange(NEAREST, FARTHEST)
     rarer = float(np.log(2 * steps[-1] * len(stated)))

@@ -14,7 +14,6 @@ from planner.milling.cutter_modes import CutterModes, ModeFile
 from planner.milling.directional import Coefficients, mean_matrix
 from planner.milling.machine import LobeCurves, Machine, check_structure, curves
 from planner.milling.uncertainty import OPEN, REPLICATES
-from planner.words import significant
 
 STEP = 1e-4  # relative, of derivatives
 MOST_DAMPING = 0.95
@@ -190,8 +189,7 @@ def _measured(fit: CutterFit, plane: CutterFrf, cut: Cut) -> Structure:
     told = plane.frequency_hz > (hidden_below(fit, mean, floor) or 0.0)
     check_band(plane, curves(plane.frequency_hz, fit.receptance(told), mean), told)
     count = len(np.unique(fit.modes.poles))
-    share = significant(100 * fit.error)
-    said = f"{count} modes fitted to {plane.name} leave {share} % of the accelerance."
+    said = f"{count} modes fitted to {plane.name} leave {100 * fit.error:.2g} % of the accelerance."
     noisy = fit if fit.error > ROUNDING else None
     return Structure(fit.modes, ModeSpread.none(count), plane, (*plane.remarks, said), noisy)
 
