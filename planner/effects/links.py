@@ -28,6 +28,8 @@ class LinkSpring(Operator):
     scale_n_m: float = 1.0
     damping_s: float = 1e-3
 
+    general = True
+
     def port(self, poses: PosedBodies) -> np.ndarray:
         """(n, 3, e): how springs move the place, of those between both ends."""
         ports = poses.carried(self.joint, np.array(self.place_m))
@@ -59,7 +61,6 @@ class BetweenLinks(LinkSpring):
     """A cable, a strut, a balancer."""
 
     kind = "between_links"
-    general = True
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
@@ -71,7 +72,6 @@ class GroundContact(LinkSpring):
     """Something outside that touches a link."""
 
     kind = "ground_contact"
-    general = True
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
