@@ -2,7 +2,7 @@
 
 Measuring at c lowers the GP's variance at u by cov(u, c)²/(var(c) + noise) (Sacks et al. 1989; Cohn
 1996). The posterior covariance is a kernel of x plus an inner product of few features (the
-simulation's slope and bias, minus what was measured and what is planned), so that a compiled loop
+simulation's slope and bias, minus what was measured and what is planned), so that a loop
 over blocks of candidates makes it, squares it and sums it without keeping it.
 
 With covariance Σ = L Lᵀ of the simulation's parameters and Fisher information F of a hit, Σ becomes
@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses, Target
+from planner.design.squared_covariances import squared_covariances
 from planner.inference.parallel import side_by_side
 
 MANY_CANDIDATES = 20_000  # from which all but the best are done in single precision
@@ -59,8 +60,6 @@ def _label(
     outputs: FrequencyOutputs, target: Target, precision: type[np.floating], poses: Poses, k: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reduction (n,) by label k and the variance (n,) of measuring it, mean over the samples."""
-    from planner.design.squared_covariances import squared_covariances  # by JAX: slow to import
-
     weight = target.importance[:, k]
     if not weight.any() or not len(poses):
         return np.zeros(len(poses)), np.ones(len(poses))
