@@ -11,8 +11,8 @@ BLOCK = 128  # candidates at a time: their covariances with the target stay in t
 
 
 def squared_covariances(
-    kernel: str, precision: type[np.floating], thetas: np.ndarray, x: np.ndarray, a: np.ndarray,
-    xu: np.ndarray, b: np.ndarray, weight: np.ndarray,
+    kernel: str, thetas: np.ndarray, x: np.ndarray, a: np.ndarray, xu: np.ndarray, b: np.ndarray,
+    weight: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Σ_u weight_u cov(c, u)² (s, n) at θ (s, p) of n candidates c with the target's points u.
 
@@ -20,7 +20,6 @@ def squared_covariances(
     a (s, n, r) and b (s, u, r).
     """
     delta, out = parse(kernel, x.shape[1]), np.empty(a.shape[:2])
-    x, a, b, thetas, xu, weight = (v.astype(precision) for v in (x, a, b, thetas, xu, weight))
     for start in range(0, len(x), BLOCK):
         block = slice(start, start + BLOCK)
         for theta, own, there, done in zip(thetas, a, b, out, strict=True):
