@@ -1,9 +1,12 @@
 """What a measuring chain may do wrong, and how that is asked: signed axes, and factors."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, permutations, product
 
 import numpy as np
+from scipy.linalg import polar
+from scipy.spatial.transform import Rotation
 
 from planner.recording.points import AXES
 
@@ -34,7 +37,10 @@ class ChainFault:
             axes = " and ".join(AXES[i] for i in self.struck)
             ways = " and ".join(f"−{AXES[i]}" for i in self.struck)
             return f"hits along {axes} look struck the other way, towards {ways}?"
-        return self._of_scale if self.scaled else self._of_axes
+        if self.scaled:
+            return self._of_scale
+        exchanged = np.array_equal(np.abs(self.matrix).sum(axis=1), np.ones(3))
+        return self._of_axes if exchanged else self._of_turn
 
     @property
     def _of_scale(self) -> str:
@@ -49,6 +55,15 @@ class ChainFault:
         known = f" ({UNITS[unit]})" if near else ""
         force = f", or forces too {other}" if whole else ""
         return f"{what} {times} too {way}: units or sensitivity{known}{force}?"
+
+    @property
+    def _of_turn(self) -> str:
+        turn = Rotation.from_matrix(self.matrix).as_rotvec(degrees=True)
+        axis, degrees = AXES[int(np.argmax(np.abs(turn)))], np.linalg.norm(turn)
+        return (
+            f"the sensor looks turned by {degrees:.0f}° since, mostly about its {axis} axis: was "
+            f"it taken off, or is it loose?"
+        )
 
     @property
     def _of_axes(self) -> str:
@@ -90,6 +105,22 @@ def _scaled(channels: tuple[int, ...]) -> tuple[ChainFault, ...]:
         diagonal[list(channels)] = factor
         found.append(ChainFault(np.diag(diagonal), channels, float(factor)))
     return tuple(found)
+
+
+def fitted(matrix: np.ndarray) -> Iterator[ChainFault]:
+    """What comes near to `matrix` (3, 3), by which hits show what is expected of them.
+
+    All channels by one factor, or one of them; a sensor that turned.
+    """
+    for channels in ((0, 1, 2), (0,), (1,), (2,)):
+        factor = float(np.median(np.diag(matrix)[list(channels)]))
+        if factor > 0 and abs(np.log(factor)) > LEAST:
+            diagonal = np.ones(3)
+            diagonal[list(channels)] = factor
+            yield ChainFault(np.diag(diagonal), channels, factor)
+    rotation, _ = polar(matrix)
+    if np.linalg.det(rotation) > 0:
+        yield ChainFault(rotation)
 
 
 TURNED = _turned()  # all 47 ways to exchange axes and signs

@@ -3,7 +3,8 @@
 What was found of the hits before tells which FRFs are to be expected anywhere, and how unsure that
 is. Where "something else" is likelier than the pose as stated, what that may be competes by
 evidence: another known pose, the setpoint, an angle with the other sign, axes of the sensor
-exchanged, a channel with a wrong scale, hits the other way, one joint elsewhere. Without a
+exchanged, a channel with a wrong scale, a sensor that turned, hits the other way, one joint
+elsewhere. Without a
 simulation, or before the first measurement, nothing is expected.
 """
 
@@ -14,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from planner.campaign.chain_faults import AGAINST, LEAST, NONE, TURNED, ChainFault
+from planner.campaign.chain_faults import AGAINST, NONE, TURNED, ChainFault, fitted
 from planner.campaign.chain_question import chain_question
 from planner.campaign.events import Question
 from planner.campaign.model import Model
@@ -27,6 +28,7 @@ from planner.recording.points import TOOL
 
 LOG_ODDS = np.log(1000.0)  # against a mistake, before anything is measured
 BETTER = 3.0  # times less is left by a mistake that explains them
+SPOILS = SIZES[1]  # size of what is left, below which nothing need be asked
 # Measured poses before which another structure may explain what nothing known fits: until then
 # the simulation alone tells of the chain, as before the first; no joint is looked for elsewhere.
 SURE = 2
@@ -108,8 +110,8 @@ class StatedHits:
 
     @property
     def doubted(self) -> bool:
-        """Whether a mistake may explain it better."""
-        return self.impossible or self.density[1] >= BETTER * SIZES[-1]
+        """Whether so much is left that a mistake would spoil what is known."""
+        return self.impossible or self.density[1] >= SPOILS
 
     def instead(self, mistakes: Sequence[Mistake]) -> Mistake | None:
         """The mistake that explains the hits, by evidence and size; None where none does."""
@@ -207,7 +209,7 @@ def _chains(
     """What the tool's chain may show instead; nothing once the engineer called it right."""
     if frf.layout.sensors != TOOL.sensors or _called_right(state):
         return
-    for fault in (*TURNED, *AGAINST, *scaled(expected.ratio(q, frf))):
+    for fault in (*TURNED, *AGAINST, *fitted(expected.shown(q, frf))):
         yield Mistake(q, fault.asked, about="chain", fault=fault)
 
 
@@ -215,16 +217,6 @@ def _called_right(state: CampaignState) -> bool:
     """Whether the engineer was asked of the chain before, and used the hits."""
     asked = (m.question for m in state.measurements.values() if m.question is not None)
     return any(question.about == "chain" for question in asked)
-
-
-def scaled(ratio: np.ndarray) -> Iterator[ChainFault]:
-    """All channels by one factor, or one of them, by `ratio` (3,) of measured to expected."""
-    for channels in ((0, 1, 2), (0,), (1,), (2,)):
-        factor = float(np.median(ratio[list(channels)]))
-        if abs(np.log(factor)) > LEAST:
-            diagonal = np.ones(3)
-            diagonal[list(channels)] = factor
-            yield ChainFault(np.diag(diagonal), channels, factor)
 
 
 def _asked(pose: str, off_percent: float, fits: Mistake | None) -> Question:

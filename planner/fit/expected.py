@@ -103,12 +103,20 @@ class ExpectedFrfs:
         away = np.where(m.used, m.accelerance - h, 0.0)
         return float(np.linalg.norm(away) / np.linalg.norm(np.where(m.used, h, 0.0)))
 
-    def ratio(self, q: np.ndarray, frf: Frf) -> np.ndarray:
-        """(r,): by what factor a channel's FRFs are larger than expected (median of lines)."""
+    def shown(self, q: np.ndarray, frf: Frf) -> np.ndarray:
+        """(3s, 3s) real: what the sensors show, as a matrix of what is expected of them.
+
+        By least squares over hits and lines, each line as much as another.
+        """
         misfit = self._misfit(q, frf, STRANGE)
         m, h = misfit.data.measured, misfit.motion(misfit.structure.mean, None).accelerance
-        off = np.where(m.used, np.log(np.abs(m.accelerance / h)), np.nan)[0]
-        return np.exp(np.nanmedian(off, axis=(1, 2)))
+        used = m.used.all(axis=1, keepdims=True)  # hits that all sensors felt
+        size = np.linalg.norm(h, axis=(1, 2), keepdims=True)
+        expected, measured = (
+            np.where(used, one / size, 0.0)[0].reshape(h.shape[1], -1).view(float)
+            for one in (h, m.accelerance)
+        )
+        return np.linalg.lstsq(expected.T, measured.T)[0].T
 
 
 def turned(frf: Frf, matrix: np.ndarray, struck: Sequence[int] = ()) -> tuple[Frf, float]:

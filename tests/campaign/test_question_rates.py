@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from planner.campaign.chain_faults import AGAINST, TURNED
+from planner.campaign.chain_faults import AGAINST, TURNED, fitted
 from planner.campaign.chain_question import Draws
-from planner.campaign.question import SURE, Mistake, StatedHits, elsewhere, scaled
+from planner.campaign.question import SURE, Mistake, StatedHits, elsewhere
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
@@ -76,7 +76,7 @@ class Asker:
         if self.poses >= SURE:
             angles = tuple(self.joints.shown(q))
             mistakes += elsewhere(self.joints, self.expected, frf, angles)
-        faults = (*TURNED, *AGAINST, *scaled(self.expected.ratio(q, frf)))
+        faults = (*TURNED, *AGAINST, *fitted(self.expected.shown(q, frf)))
         mistakes += [Mistake(q, "", about="chain", fault=fault) for fault in faults]
         found = stated.instead(mistakes)
         if found is not None:

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from planner.design import reductions as module
 from planner.design.acquisitions import goal, mixed, mutual_information
 from planner.design.cost import Cost, shortest_tour
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
