@@ -54,7 +54,8 @@ class ChainFault:
         what = "accelerations are" if whole else f"channel {AXES[self.scaled[0]]} is"
         known = f" ({UNITS[unit]})" if near else ""
         force = f", or forces too {other}" if whole else ""
-        return f"{what} {times} too {way}: units or sensitivity{known}{force}?"
+        load = ", or a tool that robot.toml lacks" if whole and self.factor < 1 else ""
+        return f"{what} {times} too {way}: units or sensitivity{known}{force}{load}?"
 
     @property
     def _of_turn(self) -> str:

@@ -54,7 +54,8 @@ def left_out(model: "Model") -> LeftOutValues:
 
     found, poses = found_without(model)
     modes = tuple(f"the frequency of mode {k + 1}" for k in range(model.surrogate.count))
-    values, said = int(np.isfinite(found.rank).sum()), tuple(report(found, poses, modes))
+    values = int(np.isfinite(found.rank).sum()) if len(poses) > 1 else 0
+    said = tuple(report(found, poses, modes))
     if not values:
         return LeftOutValues(0, None, (), (), said)
     coverage = dict(zip(map(str, LEVELS), found.coverage().tolist(), strict=True))

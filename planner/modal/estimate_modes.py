@@ -276,7 +276,7 @@ def _remarks(found: PoleIdentification, doubtful: tuple[Mode, ...]) -> tuple[str
     excess = float(np.median(found.fit.excess)) / found.data.correlated
     if found.data.variance is not None and excess >= 4:
         remarks.append(
-            f"The fit misses the FRFs by {np.sqrt(excess):.1f} times their scatter between hits:"
+            f"The fit misses the FRFs by {np.sqrt(excess):.2g} times their scatter between hits:"
             " standard deviations were enlarged accordingly."
         )
     if doubtful:

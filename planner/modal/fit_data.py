@@ -117,6 +117,9 @@ class Data:
         return k * (1 - 2 / (9 * k) + 5.0 * np.sqrt(2 / (9 * k))) ** 3
 
 
+BAND = "--band-hz, or [modes] band_hz of a campaign"
+
+
 def too_few_lines(
     usable: np.ndarray, frequency_hz: np.ndarray, band_hz: tuple[float, float]
 ) -> RefusedError:
@@ -130,7 +133,7 @@ def too_few_lines(
     else:
         return RefusedError(
             f"Only {np.count_nonzero(usable)} usable frequency lines lie in the band of {band}, of "
-            f"FRFs between {first:g} and {last:g} Hz: give another band with --band-hz, "
+            f"FRFs between {first:g} and {last:g} Hz: give another band ({BAND}), "
             f"record longer or hit with a harder tip."
         )
-    return RefusedError(f"{off} in which modes are looked for; give another with --band-hz.")
+    return RefusedError(f"{off} in which modes are looked for; give another ({BAND}).")

@@ -19,6 +19,7 @@ from planner.recording.folder import read_poses
 from planner.recording.records import PoseRow
 from planner.report.answer import Answer
 from planner.robot.collision import Collisions
+from planner.robot.config import ControllerTable
 from planner.robot.controller_program import (
     PROGRAMS,
     SUFFIXES,
@@ -31,6 +32,10 @@ from planner.robot.robot import Robot
 
 DATA = ("uff", "mat", "csv", "model")
 KINDS = (*PROGRAMS, *DATA)
+AS_URDF = (
+    "Angles are the URDF's own: robot.toml has no [controller]. Compare one pose with the robot's "
+    "panel before it drives; where signs or zeros differ, state them there."
+)
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,7 @@ class ExportedFiles(Answer):
     simulated: bool
     loader: str | None = None
     error_percent: tuple[float, ...] | None = None
+    remarks: tuple[str, ...] = ()
 
     def text(self) -> Group:
         """The files, and how well a model's holds."""
@@ -50,7 +56,7 @@ class ExportedFiles(Answer):
         if self.error_percent:
             each = ", ".join(f"mode {k} {e:.2g} %" for k, e in enumerate(self.error_percent, 1))
             lines.append(Text(f"Interpolating errs by (rms; part of the sds): {each}."))
-        return Group(*lines)
+        return Group(*lines, *map(Text, self.remarks))
 
 
 def export(
@@ -120,7 +126,9 @@ def _program(campaign: Campaign, kind: str, folder: Path, rows: Sequence[PoseRow
     simulated = state.simulated
     text = program(kind, campaign.cell.robot, f"planner_{name}", drive, simulated)
     files = {f"{identifier(f'planner_{name}', 'C_')}{SUFFIXES[kind]}": text}
-    return ExportedFiles(kind, _write(folder, files), tuple(d.pose for d in drive), simulated)
+    names = tuple(d.pose for d in drive)
+    told = (AS_URDF,) if campaign.cell.robot.config.controller == ControllerTable() else ()
+    return ExportedFiles(kind, _write(folder, files), names, simulated, remarks=told)
 
 
 def _uff(found: Collected) -> dict[str, Any]:

@@ -113,7 +113,7 @@ def _log_normal(
 def report(residuals: LeaveOneOut, poses: tuple[str, ...], outputs: tuple[str, ...]) -> list[str]:
     """Lines for the user: coverage, and the poses that surprise most."""
     count = int(np.isfinite(residuals.rank).sum())
-    if count == 0:
+    if count == 0 or len(poses) < 2:
         return ["No pose can be predicted from the others yet: too few are measured."]
     ends = LEVELS[0], LEVELS[-1]
     inside = [
