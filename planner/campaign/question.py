@@ -30,7 +30,7 @@ LOG_ODDS = np.log(1000.0)  # against a mistake, before anything is measured
 BETTER = 3.0  # times less is left by a mistake that explains them
 # Measured poses before which another structure may explain what nothing known fits: until then
 # the simulation alone tells of the chain, as before the first. One more before a joint is looked
-# for elsewhere: of 90 third poses with good hits 3 fitted another angle better, of 270 later ones 2.
+# for elsewhere: of 90 third poses with good hits 3 fitted another angle better, of 270 later 2.
 SURE, SETTLED = 2, 3
 # A joint is looked for elsewhere by 2^NEAREST to 2^(FARTHEST − 1) times as far as readbacks err.
 NEAREST, FARTHEST = 1, 7
