@@ -28,6 +28,9 @@ from planner.frf.frf import Frf
 from planner.measurement.agreement import Similarity, similarity_of
 from planner.measurement.nuisances import Tolerances
 from planner.progress import Tell, quietly
+from planner.recording.force_levels import pulse_s
+from planner.robot.config import HammerTable
+from planner.robot.joint_laws import LawTable
 from planner.words import significant
 
 # Stated springs are known as well as datasheets have them (a fifth), dampers to a factor of two;
@@ -102,14 +105,43 @@ class Diagnosis:
         heard = [
             Established(f.effect, f.at, 1.0, None, f.parameters, f.text) for f in self.screened
         ]
-        told = self.verdict.verdict == "explained" and self.levels
         laws = [
             Established(
                 law.effect, law.at, self._share(law), law.share, law.parameters, _words(law)
             )
-            for law in (told.laws if told else ())
+            for law in self._laws
         ]
         return *heard, *laws, *(self._established(e, e.probability) for e in self.verdict.findings)
+
+    @property
+    def _laws(self) -> tuple[LevelLaw, ...]:
+        told = self.verdict.verdict == "explained" and self.levels
+        return told.laws if told else ()
+
+    @cached_property
+    def laws(self) -> tuple[LawTable, ...]:
+        """Of joints that are not linear, as robot.toml has them, beside `robot`'s springs.
+
+        Without those that would take away more than a spring has.
+        """
+        elastic, stiffness = (
+            self.robot.simulation.elastic,
+            self.robot.simulation.elasticity.stiffness,
+        )
+        tables = [law.table for law in self._laws if law.table is not None]
+        return tuple(t for t in tables if stiffness[elastic.own_spring(t.joint)] + t.weakest > 0)
+
+    @cached_property
+    def simulation(self) -> Simulation:
+        """The robot with all that was found, and the pulse of the hits."""
+        found, config = self.robot.simulation, self.robot.simulation.robot.config
+        joints = {law.joint for law in self.laws}
+        laws = (*(law for law in config.law if law.joint not in joints), *self.laws)
+        hammer = config.hammer
+        if self.laws:
+            hits = [pulse_s(hit) for visit in self.recorded.visits for hit in visit.hits]
+            hammer = HammerTable(pulse_ms=1e3 * float(np.median(hits)))
+        return found.with_laws(laws, hammer)
 
     def _share(self, law: LevelLaw) -> float:
         place = law.effect, law.at
