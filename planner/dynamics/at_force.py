@@ -25,7 +25,7 @@ from planner.robot.joint_laws import LawTable
 
 PER_PERIOD = 10  # instants of the highest frequency of the band
 # Time constants of the slowest decay, for which a swing is followed; instants, at most.
-FADED, LONGEST = 3.0, 4000
+FADED, LONGEST = 4.0, 4000
 ROUNDS, SETTLED = 60, 1e-4  # of the fixed point: most, and the change of k that ends it
 
 
@@ -41,21 +41,6 @@ def accelerance_at_force(
     springs = springs_at_force(simulation, each, np.repeat(force_n, 3))
     solved = _poles(each, springs, each.sensor)
     return np.moveaxis(accelerance(solved, frequency_hz).reshape(n, 3, 3, -1), 1, 2)
-
-
-def change_at_force(
-    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray
-) -> np.ndarray:
-    """By how much (n, 3, 3, F) the accelerance is another than that of springs as stated.
-
-    0 where no force is stated (NaN), or the robot has no laws. Raises as `accelerance_at_force`.
-    """
-    change = np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
-    known = np.flatnonzero(np.isfinite(force_n))
-    if known.size and simulation.robot.config.law:
-        there = accelerance_at_force(simulation, q[known], force_n[known], frequency_hz)
-        change[known] = there - simulation.accelerance(q[known], frequency_hz)
-    return change
 
 
 def modes_at_force(
