@@ -9,6 +9,7 @@ own; modes are those of the three hits together.
 from collections.abc import Sequence
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 
 from planner.dynamics.simulation import Elasticity, Simulation
@@ -54,61 +55,83 @@ def modes_at_force(
 
 def springs_at_force(simulation: Simulation, m: Matrices, force_n: np.ndarray) -> Elasticity:
     """Stiffness and damping (n, e) that laws come nearest to after hits of peak force_n (n,)."""
-    config = simulation.robot.config
-    own = [simulation.elastic.own_spring(law.joint) for law in config.law]
-    ports = np.broadcast_to(
-        np.eye(simulation.elastic.size)[own], (len(force_n), len(own), m.mass.shape[1])
-    )
-    stated = simulation.elasticity
-    shape = len(force_n), simulation.elastic.size
-    springs = replace(
-        stated,
-        stiffness=np.broadcast_to(stated.stiffness, shape),
-        damping=np.broadcast_to(stated.damping, shape),
-    )
-    step_s = 1 / (PER_PERIOD * config.band_hz[1])
+    laws = simulation.robot.config.law
+    own = [simulation.elastic.own_spring(law.joint) for law in laws]
+    springs = stated = _each(simulation.elasticity, len(force_n))
     for _ in range(ROUNDS):
-        before = springs
-        motions = _swings(_poles(m, before, ports), force_n, config.hammer.pulse_ms / 1e3, step_s)
-        springs = _nearest(stated, config.law, own, motions)
-        if np.allclose(springs.stiffness, before.stiffness, rtol=SETTLED, atol=0.0):
+        before, (swing, speed) = springs, _after(simulation, m, springs, own, force_n)
+        stiffness, damping = stated.stiffness.copy(), stated.damping.copy()
+        for j, (law, spring) in enumerate(zip(laws, own, strict=True)):
+            shares = _solved(*_products(law, swing[:, j], speed[:, j]))
+            stiffness[:, spring] += law.k * (shares[:, 0] - law.in_spring)
+            damping[:, spring] += law.k * (shares[:, 1] - law.in_damper_s)
+        if not np.all(stiffness > 0):
+            raise InputError("A joint has no stiffness left at this force; state a smaller one.")
+        springs = Elasticity(stiffness, np.maximum(damping, 0.0), stated.loss_factor)
+        if np.allclose(stiffness, before.stiffness, rtol=SETTLED, atol=0.0):
             break
     return springs
 
 
-def _nearest(
-    stated: Elasticity, laws: Sequence[LawTable], own: Sequence[int],
-    motions: tuple[np.ndarray, np.ndarray],
-) -> Elasticity:  # fmt: skip
-    """Springs (n, e) along swings and speeds (n, laws, h, T)."""
-    swing, speed = motions
-    stiffness = np.tile(stated.stiffness, (len(swing), 1))
-    damping = np.tile(stated.damping, (len(swing), 1))
-    for j, (law, spring) in enumerate(zip(laws, own, strict=True)):
-        share, damper_s = linear_of(law, swing[:, j], speed[:, j])
-        stiffness[:, spring] += law.k * (share - law.in_spring)
-        damping[:, spring] += law.k * (damper_s - law.in_damper_s)
-    if not np.all(stiffness > 0):
-        raise InputError("A joint has no stiffness left at this force; state a smaller one.")
-    return Elasticity(stiffness, np.maximum(damping, 0.0), stated.loss_factor)
+def averaged(
+    simulation: Simulation, q: np.ndarray, axes: np.ndarray, force_n: np.ndarray
+) -> Simulation:
+    """The same where its springs have of the laws what h hits have on average, as fits to them.
 
-
-def linear_of(law: LawTable, swing: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Spring (n,) and damper (n,) in s, in shares of k, that come nearest to a law's torque.
-
-    Along swings (n, h, T) in rad (m) from rest, and speeds in rad/s.
+    Of hits at q (h, dof) in rad along axes (h,) 0 to 2 of the tool, with peak force_n (h,).
     """
+    config, springs = simulation.robot.config, simulation.elasticity
+    own = [simulation.elastic.own_spring(law.joint) for law in config.law]
+    sums = [(np.zeros((2, 2)), np.zeros(2)) for _ in own]
+    for pose in np.unique(q, axis=0):
+        here = np.flatnonzero(np.all(q == pose, axis=1))
+        m = simulation.elastic.matrices(pose).at(np.zeros(len(here), dtype=int))
+        m = replace(m, hit=m.hit[np.arange(len(here)), axes[here]][:, None])
+        swing, speed = _after(simulation, m, _each(springs, len(here)), own, force_n[here])
+        for j, law in enumerate(config.law):
+            found = _products(law, swing[:, j], speed[:, j])
+            sums[j] = tuple(s + one.sum(axis=0) for s, one in zip(sums[j], found, strict=True))
+    both = (_solved(*one).tolist() for one in sums)
+    laws = [
+        msgspec.structs.replace(law, in_spring=spring, in_damper_s=damper)
+        for law, (spring, damper) in zip(config.law, both, strict=True)
+    ]
+    return simulation.with_laws(laws, config.hammer)
+
+
+def _products(law: LawTable, swing: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of swing and speed (n, h, T) with each other (n, 2, 2), and with a law's torque (n, 2)."""
     torque, state, before = np.zeros_like(swing), *np.zeros((2, *swing.shape[:2]))
     for i in range(swing.shape[2]):
         state = law.step(state, before, swing[..., i], np.array(law.a))
         torque[..., i], before = state, swing[..., i]
     both = np.stack([swing, speed], axis=1).reshape(len(swing), 2, -1)
-    size = np.linalg.norm(both, axis=2, keepdims=True) + np.finfo(float).tiny
-    both = both / size
-    gram = both @ np.swapaxes(both, 1, 2)
-    told = both @ torque.reshape(len(swing), -1, 1)
-    found = (np.linalg.pinv(gram, hermitian=True) @ told / size)[..., 0]
-    return found[:, 0], found[:, 1]
+    flat = torque.reshape(len(swing), -1, 1)
+    return both @ np.swapaxes(both, 1, 2), (both @ flat)[..., 0]
+
+
+def _solved(gram: np.ndarray, product: np.ndarray) -> np.ndarray:
+    """(…, 2) spring and damper (s), in shares of k, that come nearest to a law's torque."""
+    size = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1)) + np.finfo(float).tiny
+    scaled = gram / size[..., None] / size[..., None, :]
+    return (np.linalg.pinv(scaled, hermitian=True) @ (product / size)[..., None])[..., 0] / size
+
+
+def _each(springs: Elasticity, count: int) -> Elasticity:
+    """For each of so many poses the same."""
+    stiffness, damping = (np.tile(v, (count, 1)) for v in (springs.stiffness, springs.damping))
+    return Elasticity(stiffness, damping, springs.loss_factor)
+
+
+def _after(
+    simulation: Simulation, m: Matrices, springs: Elasticity, own: Sequence[int],
+    force_n: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Swings and speeds of springs of joints after hits, as of `_swings`."""
+    config, size = simulation.robot.config, m.mass.shape[1]
+    ports = np.broadcast_to(np.eye(size)[own], (len(force_n), len(own), size))
+    step_s = 1 / (PER_PERIOD * config.band_hz[1])
+    return _swings(_poles(m, springs, ports), force_n, config.hammer.pulse_ms / 1e3, step_s)
 
 
 def _poles(m: Matrices, springs: Elasticity, seen: np.ndarray) -> Poles:

@@ -119,9 +119,9 @@ def read_poses(path: Path, joints: JointUnits | Sequence[str]) -> tuple[PoseRow,
     return tuple(rows)
 
 
-def peak_forces(rows: Sequence[PoseRow]) -> np.ndarray:
-    """(n,) in N at which predictions are wanted, NaN where none is stated."""
-    return np.array([row.peak_force_n or np.nan for row in rows])
+def peak_forces(rows: Sequence[PoseRow], others_n: float | None = None) -> np.ndarray:
+    """(n,) in N at which predictions are wanted; `others_n`, else NaN, where none is stated."""
+    return np.array([row.peak_force_n or others_n or np.nan for row in rows])
 
 
 def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:
