@@ -12,7 +12,7 @@ from planner.recording.force_levels import peak_n
 from planner.surrogate.frf_bands import ModalPrediction
 
 if TYPE_CHECKING:
-    from planner.campaign.campaign import Campaign
+    from planner.campaign.reads import CampaignReads
 
 UNCHANGED = (
     "peak_force_n changes nothing: robot.toml states no [[law]] of a joint that is not linear "
@@ -27,7 +27,7 @@ class ForceModel:
     simulation: Simulation | None
 
     @classmethod
-    def of(cls, campaign: "Campaign") -> "ForceModel":
+    def of(cls, campaign: "CampaignReads") -> "ForceModel":
         """Springs that were identified have what the campaign's own hits have of the laws."""
         low = campaign.model.low
         simulation = low.simulation

@@ -27,6 +27,7 @@ from planner.robot.joint_laws import LawTable
 PER_PERIOD = 10  # instants of the highest frequency of the band
 # Time constants of the slowest decay, for which a swing is followed; instants, at most.
 FADED, LONGEST = 4.0, 4000
+TOGETHER = 60  # poses, for which swings are held in memory
 ROUNDS, SETTLED = 60, 1e-4  # of the fixed point: most, and the change of k that ends it
 
 
@@ -55,6 +56,11 @@ def modes_at_force(
 
 def springs_at_force(simulation: Simulation, m: Matrices, force_n: np.ndarray) -> Elasticity:
     """Stiffness and damping (n, e) that laws come nearest to after hits of peak force_n (n,)."""
+    if len(force_n) > TOGETHER:
+        parts = np.array_split(np.arange(len(force_n)), -(-len(force_n) // TOGETHER))
+        each = [springs_at_force(simulation, m.at(part), force_n[part]) for part in parts]
+        both = (np.concatenate([getattr(one, v) for one in each]) for v in ("stiffness", "damping"))
+        return Elasticity(*both, simulation.elasticity.loss_factor)
     laws = simulation.robot.config.law
     own = [simulation.elastic.own_spring(law.joint) for law in laws]
     springs = stated = _each(simulation.elasticity, len(force_n))
@@ -82,19 +88,19 @@ def averaged(
     """
     config, springs = simulation.robot.config, simulation.elasticity
     own = [simulation.elastic.own_spring(law.joint) for law in config.law]
-    sums = [(np.zeros((2, 2)), np.zeros(2)) for _ in own]
+    grams, products = np.zeros((len(own), 2, 2)), np.zeros((len(own), 2))
     for pose in np.unique(q, axis=0):
         here = np.flatnonzero(np.all(q == pose, axis=1))
         m = simulation.elastic.matrices(pose).at(np.zeros(len(here), dtype=int))
         m = replace(m, hit=m.hit[np.arange(len(here)), axes[here]][:, None])
         swing, speed = _after(simulation, m, _each(springs, len(here)), own, force_n[here])
         for j, law in enumerate(config.law):
-            found = _products(law, swing[:, j], speed[:, j])
-            sums[j] = tuple(s + one.sum(axis=0) for s, one in zip(sums[j], found, strict=True))
-    both = (_solved(*one).tolist() for one in sums)
+            gram, product = _products(law, swing[:, j], speed[:, j])
+            grams[j] += gram.sum(axis=0)
+            products[j] += product.sum(axis=0)
     laws = [
         msgspec.structs.replace(law, in_spring=spring, in_damper_s=damper)
-        for law, (spring, damper) in zip(config.law, both, strict=True)
+        for law, (spring, damper) in zip(config.law, _solved(grams, products).tolist(), strict=True)
     ]
     return simulation.with_laws(laws, config.hammer)
 

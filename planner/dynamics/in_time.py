@@ -88,6 +88,7 @@ def _marched(
         turned = grow * turned + older * torque[:, None]
         free = force_n[:, None, None] * np.sum(felt[..., :3] * struck, axis=1).real
         free -= np.einsum("nkjl,nklh->njh", felt[..., 3:], turned).real
+        now = free
         for _ in range(CORRECTED):
             now = free - gives @ torque
             each = [law.step(states[:, j], before[:, j], now[:, j], np.array(law.a))

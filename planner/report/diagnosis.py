@@ -12,7 +12,7 @@ from rich.text import Text
 from planner.design.discrimination import LIKELY
 from planner.design.extra_sensor import ExtraSensor
 from planner.design.next_hit import NextHit
-from planner.dynamics.at_force import change_at_force
+from planner.dynamics.in_time import change_at_force
 from planner.effects.effect import Operator
 from planner.errors import InputError
 from planner.fit.posterior import RobotPosterior

@@ -103,7 +103,8 @@ class PredictionReport(Answer):
         said = outside_remark([pose.pose for pose in self.poses if pose.outside])
         told = [Text(said, style="yellow")] if said else []
         told += remarks(self.remarks)
-        return Group(made, *told, Text(f"FRFs (m/s²/N) with sd: {self.npz}"))
+        sd = " with sd" if self.robot is UNSET else ""
+        return Group(made, *told, Text(f"FRFs (m/s²/N){sd}: {self.npz}"))
 
 
 def predictions(

@@ -118,7 +118,7 @@ class LawTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_def
         cls, joint: str, slides: bool, step: Step, k: float, a: float, linear: tuple[float, float]
     ) -> "LawTable":
         """With k and a in the units of a joint that slides or turns; what is `linear` of k = 1."""
-        kinds = {dead_zone: "backlash", dahl: "friction", bouc_wen: "friction"}
+        kinds: dict[Step, str] = {dead_zone: "backlash", dahl: "friction", bouc_wen: "friction"}
         kind = kinds.get(step, "hardening" if k > 0 else "softening")
         hysteresis = "bouc_wen" if step is bouc_wen else "dahl"
         stiffness, bend = cls.entries(kind, slides)
