@@ -9,6 +9,7 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.exponential_window import screen_window
 from planner.diagnosis.finding import Finding
+from planner.diagnosis.found_laws import straightened, with_laws
 from planner.diagnosis.levels import LevelLaw, Levels, level_laws
 from planner.diagnosis.search import FITTED, LEAST, Explored, Explorer
 from planner.diagnosis.tone import screen_tone
@@ -28,8 +29,6 @@ from planner.frf.frf import Frf
 from planner.measurement.agreement import Similarity, similarity_of
 from planner.measurement.nuisances import Tolerances
 from planner.progress import Tell, quietly
-from planner.recording.force_levels import pulse_s
-from planner.robot.config import HammerTable
 from planner.robot.joint_laws import LawTable
 from planner.words import significant
 
@@ -119,29 +118,15 @@ class Diagnosis:
         return told.laws if told else ()
 
     @cached_property
-    def laws(self) -> tuple[LawTable, ...]:
-        """Of joints that are not linear, as robot.toml has them, beside `robot`'s springs.
-
-        Without those that would take away more than a spring has.
-        """
-        elastic, stiffness = (
-            self.robot.simulation.elastic,
-            self.robot.simulation.elasticity.stiffness,
-        )
-        tables = [law.table for law in self._laws if law.table is not None]
-        return tuple(t for t in tables if stiffness[elastic.own_spring(t.joint)] + t.weakest > 0)
-
-    @cached_property
     def simulation(self) -> Simulation:
         """The robot with all that was found, and the pulse of the hits."""
-        found, config = self.robot.simulation, self.robot.simulation.robot.config
-        joints = {law.joint for law in self.laws}
-        laws = (*(law for law in config.law if law.joint not in joints), *self.laws)
-        hammer = config.hammer
-        if self.laws:
-            hits = [pulse_s(hit) for visit in self.recorded.visits for hit in visit.hits]
-            hammer = HammerTable(pulse_ms=1e3 * float(np.median(hits)))
-        return found.with_laws(laws, hammer)
+        return with_laws(self.robot.simulation, self._laws, self.recorded)
+
+    @property
+    def laws(self) -> tuple[LawTable, ...]:
+        """Of joints that are not linear, as robot.toml has them, beside `robot`'s springs."""
+        told = [law.table for law in self._laws]
+        return tuple(law for law in self.simulation.robot.config.law if law in told)
 
     def _share(self, law: LevelLaw) -> float:
         place = law.effect, law.at
@@ -188,6 +173,15 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
     tell("comparing hits of different force", 0.85)
     fits, aside = (explored.plain, likeliest(explored)), set_aside(recorded.q)
     levels = level_laws(recorded, fits[1]) if recorded.visits else None
+    if levels and levels.laws and recorded.most_heard is recorded:
+        # A linear fit follows from pose to pose what a law has there on average, by effects that
+        # are none: what the law adds is taken out before all is fitted again.
+        there = with_laws(RobotPosterior.of(fits[1]).simulation, levels.laws, recorded)
+        recorded = straightened(recorded, there)
+        search = searching(recorded.ended_frfs, recorded.q, simulation, _order(recorded))
+        steps = replace(search, tell=lambda text: tell(f"fitting, without laws: {text}", 0.87))
+        explored = Explorer(steps).explored()
+        fits, aside = (explored.plain, likeliest(explored)), set_aside(recorded.q)
     tell("judging", 0.9)
     held_out = _held_out(search, fits, aside) if aside else None
     worse = held_out is not None and held_out.worse(matters)
