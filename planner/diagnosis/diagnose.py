@@ -35,6 +35,7 @@ from planner.words import significant
 # Stated springs are known as well as datasheets have them (a fifth), dampers to a factor of two;
 # masses lie elsewhere by 8 % of a body's radius of gyration: cables, oil, covers.
 PRIORS = replace(CAD_INERTIAS, stiffness_factor=1.2, damping_factor=2.0, elsewhere=0.08)
+ROUNDS = 2  # of laws by a linear fit, and that fit beside the laws
 MOST_BETWEEN = 8  # poses between measured ones, at which sizes are told
 
 
@@ -165,23 +166,11 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
     stated = RobotStructure(search.prior)
     if not FrfMisfit(stated, search.data(1), search.tolerances).possible(stated.mean):
         raise InputError(TOO_SOFT)
-    steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
-    explored = Explorer(steps).explored()
     screened = tuple(f for f in (window, screen_tone(recorded)) if f is not None)
     heard = [(f.effect, f.at) for f in screened]
     matters = robot.config.diagnose.matters
-    tell("comparing hits of different force", 0.85)
+    recorded, search, explored, levels = _explored(recorded, search, simulation, tell)
     fits, aside = (explored.plain, likeliest(explored)), set_aside(recorded.q)
-    levels = level_laws(recorded, fits[1]) if recorded.visits else None
-    if levels and levels.laws and recorded.most_heard is recorded:
-        # A linear fit follows from pose to pose what a law has there on average, by effects that
-        # are none: what the law adds is taken out before all is fitted again.
-        there = with_laws(RobotPosterior.of(fits[1]).simulation, levels.laws, recorded)
-        recorded = straightened(recorded, there)
-        search = searching(recorded.ended_frfs, recorded.q, simulation, _order(recorded))
-        steps = replace(search, tell=lambda text: tell(f"fitting, without laws: {text}", 0.87))
-        explored = Explorer(steps).explored()
-        fits, aside = (explored.plain, likeliest(explored)), set_aside(recorded.q)
     tell("judging", 0.9)
     held_out = _held_out(search, fits, aside) if aside else None
     worse = held_out is not None and held_out.worse(matters)
@@ -197,6 +186,33 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
         aside,
         held_out,
     )
+
+
+def _explored(
+    recorded: Dataset, search: Search, simulation: Simulation, tell: Tell
+) -> tuple[Dataset, Search, Explored, Levels | None]:
+    """What explains the recordings, and what force levels tell of joints that are not linear.
+
+    Then the recordings are returned, and searched, as they are without that: a linear fit follows
+    what a law has on average, from pose to pose, by effects that are not there.
+    """
+
+    def explored() -> Explored:
+        steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
+        return Explorer(steps).explored()
+
+    found, levels, straight = explored(), None, recorded
+    for _ in range(ROUNDS if recorded.visits else 0):
+        tell("comparing hits of different force", 0.85)
+        told = level_laws(recorded, likeliest(found))
+        levels = told if levels is None or told.laws else levels
+        if not told.laws or recorded.most_heard is not recorded:
+            break
+        there = RobotPosterior.of(likeliest(found)).simulation
+        straight = straightened(recorded, with_laws(there, told.laws, recorded))
+        search = searching(straight.ended_frfs, straight.q, simulation, _order(straight))
+        found = explored()
+    return straight, search, found, levels
 
 
 def _words(law: LevelLaw) -> str:
