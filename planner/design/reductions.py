@@ -2,23 +2,18 @@
 
 Measuring at c lowers the GP's variance at u by cov(u, c)²/(var(c) + noise) (Sacks et al. 1989; Cohn
 1996). The posterior covariance is a kernel of x plus an inner product of few features (the
-simulation's slope and bias, minus what was measured and what is planned), so that a compiled loop
+simulation's slope and bias, minus what was measured and what is planned), so that a loop
 over blocks of candidates makes it, squares it and sums it without keeping it.
 
 With covariance Σ = L Lᵀ of the simulation's parameters and Fisher information F of a hit, Σ becomes
 L (I + G)⁻¹ Lᵀ, G = Lᵀ F L, in the linearised model (Fedorov 1972; Chaloner & Verdinelli 1995).
 """
 
-from collections.abc import Sequence
-from functools import partial
-
 import numpy as np
 
 from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses, Target
-from planner.inference.parallel import side_by_side
+from planner.design.squared_covariances import squared_covariances
 
-MANY_CANDIDATES = 20_000  # from which all but the best are done in single precision
-BEST_CANDIDATES = 1_000  # that are then done in double precision
 POSES_PER_CHUNK = 64  # which bounds the memory taken
 
 Axes = tuple[int, ...]
@@ -36,31 +31,15 @@ def reduction(outputs: FrequencyOutputs, poses: Poses, target: Target) -> np.nda
 def reduction_by_label(
     outputs: FrequencyOutputs, poses: Poses, target: Target
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The part of each label in it (k, n), and the variance of a measurement there (k, n).
-
-    Of many candidates only the best are done in double precision: single precision errs by 1e-7 of
-    the prior covariance, which ranks the others well enough.
-    """
-    labels, double = range(outputs.count), partial(_label, outputs, target, np.float64)
-    if len(poses) <= MANY_CANDIDATES:
-        return _both([double(poses, k) for k in labels])
-    single = partial(_label, outputs, target, np.float32, poses)
-    gained, variance = _both(side_by_side(single, labels))
-    best = np.argpartition(np.sum(gained, axis=0), -BEST_CANDIDATES)[-BEST_CANDIDATES:]
-    gained[:, best], _ = _both(side_by_side(partial(double, poses[best]), labels))
-    return gained, variance
-
-
-def _both(by_label: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """The part of each label in it (k, n), and the variance of a measurement there (k, n)."""
+    by_label = [_label(outputs, target, poses, k) for k in range(outputs.count)]
     return np.array([r for r, _ in by_label]), np.array([v for _, v in by_label])
 
 
 def _label(
-    outputs: FrequencyOutputs, target: Target, precision: type[np.floating], poses: Poses, k: int
+    outputs: FrequencyOutputs, target: Target, poses: Poses, k: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reduction (n,) by label k and the variance (n,) of measuring it, mean over the samples."""
-    from planner.design.squared_covariances import squared_covariances  # by JAX: slow to import
-
     weight = target.importance[:, k]
     if not weight.any() or not len(poses):
         return np.zeros(len(poses)), np.ones(len(poses))
@@ -68,7 +47,7 @@ def _label(
     b, _ = _features(outputs, k, target.poses, sign=1.0)
     scale, post = va + outputs.noise[k], outputs.posterior
     rest = target.poses.x, b, weight
-    done = squared_covariances(post.kernel, precision, post.theta[k], poses.x, a, *rest)
+    done = squared_covariances(post.kernel, post.theta[k], poses.x, a, *rest)
     return np.mean(done / scale, axis=0), np.mean(scale, axis=0)
 
 

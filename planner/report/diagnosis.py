@@ -184,7 +184,8 @@ class DiagnosisReport(Answer):
         parts += [Text(f"  {finding.text}") for finding in self.findings]
         parts.append(Text(self.where.sentence))
         parts += [Text(self.odd_pose.sentence, style="bold")] if self.odd_pose else []
-        made = table("What was considered", "effect", "at", "probability")
+        heading = "What was considered (an effect can be part of several)"
+        made = table(heading, "effect", "at", "probability")
         for c in self.candidates[:SHOWN]:
             at = with_names(c.at or "–", self.place_names)
             made.add_row(c.effect.replace("_", " "), at, probable(c.probability))

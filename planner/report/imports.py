@@ -77,6 +77,7 @@ class PoseImport(Answer):
     simulated: bool
     hit_errors: tuple[HitErrorEstimate, ...] = ()
     question: "AskedOfPose | None" = None
+    expected: tuple[ExpectedMode, ...] = ()  # of held hits at the pose that is stated
 
     @classmethod
     def of(cls, report: "ImportReport", model: "Model | None" = None) -> "PoseImport":
@@ -98,6 +99,7 @@ class PoseImport(Answer):
             simulated=bool(measurement and measurement.simulated),
             hit_errors=report.hit_errors(model),
             question=AskedOfPose.of(report.question, report.pose),
+            expected=_expected(report) if report.question else (),
         )
 
     def parts(self) -> list[RenderableType]:
@@ -114,7 +116,9 @@ class PoseImport(Answer):
         for mode in self.modes:
             made.add_row(*_cells(mode, "–" if self.question else "other"))
         if self.question:
-            return [made, *remarks(self.remarks), Text(NOT_USED)]
+            there = ", ".join(with_sd(mode.frequency_hz, mode.sd_hz) for mode in self.expected)
+            said = Text(f"  Expected at {self.pose}: {there} Hz.")
+            return [made, said, *remarks(self.remarks), Text(NOT_USED)]
         both = zip(self.frequency_sd_percent_before, self.frequency_sd_percent, strict=True)
         change = ", ".join(
             f"{significant(before)} → {significant(after)} %" for before, after in both
@@ -226,14 +230,21 @@ def _answer(
     return ModeAnswer.of(mode, label=label, label_probability=sure, expected=expected)
 
 
+def _expected(report: "ImportReport") -> tuple[ExpectedMode, ...]:
+    """What the model before expected of the modes at the pose, in their order."""
+    if report.measurement is None:
+        return ()
+    joints = report.model.cell.robot.joints
+    before = report.model_before.predict(joints.internal([report.measurement.joints_deg]))
+    return tuple(ExpectedMode.all_of(before, 0))
+
+
 def _labelled_modes(report: "ImportReport") -> tuple[ModeAnswer, ...]:
     """Modes of the pose with their label and expectation; unlikely ones only where labelled."""
     if report.measurement is None:
         return ()
     labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
-    joints = report.model.cell.robot.joints
-    before = report.model_before.predict(joints.internal([report.measurement.joints_deg]))
-    expected = ExpectedMode.all_of(before, 0)
+    expected = _expected(report)
     labels = {m.frequency_hz: k for k, m in enumerate(labelled.modes) if m} if labelled else {}
     sure = labelled.probability if labelled else ()
     found = []

@@ -92,7 +92,6 @@ class RobotCheckReport(Answer):
                 place = ", ".join(f"{v:.3g}" for v in link.com_m) if link.mass_kg else "–"
                 mass = f"{link.mass_kg:.4g}" if link.inertial else "–"
                 mass += f" ± {link.mass_sd_kg:.2g}" if link.mass_sd_kg else ""
-                mass += " (guessed)" if link.guessed else ""
                 cells = link.joint or "–", mass, place, str(link.collision_shapes)
                 masses.add_row(Text(link.link), *cells)
         most = SHOWN_TO * self.band_hz[1]

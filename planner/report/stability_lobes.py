@@ -60,7 +60,7 @@ class StabilityReport(Answer):
                 number(self.chatter_hz[i], ".1f"),
                 self.kind[i] or "stable",
             )
-        lines = list(self.remarks)
+        lines = [text for kind, text in KINDS.items() if kind in self.kind] + list(self.remarks)
         if self.multiplier is not msgspec.UNSET:
             verdict = "stable" if self.multiplier < 1 else "not stable"
             lines.append(f"At the point |µ| = {self.multiplier:.6f}: {verdict}.")
@@ -70,6 +70,10 @@ class StabilityReport(Answer):
         return Group(said, SIMULATED) if self.simulated else said
 
 
+KINDS = {
+    "hopf": "hopf: chatter at a frequency of its own, beside multiples of the tooth passing.",
+    "flip": "flip: chatter at odd multiples of half the tooth-passing frequency.",
+}
 LOBES = "Where a line has a gap every depth that was asked for is stable."
 LOBES_SHARE = 0.2  # of the time, where samples follow
 

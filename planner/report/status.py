@@ -1,5 +1,6 @@
 """Answer of `status`: what was measured, what is open, how sure the model is."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -32,6 +33,7 @@ from planner.words import by_reason, counted, local_time, significant
 if TYPE_CHECKING:
     from planner.campaign.model import Model
     from planner.campaign.model_comparison import LeftOutModel
+    from planner.campaign.state import CampaignState
     from planner.progress import Tell
 
 
@@ -262,14 +264,24 @@ class StatusReport(Answer):
         return lines + [f"refused {one}" for one in told]
 
 
+def _still_refused(state: "CampaignState") -> tuple[RefusedHit, ...]:
+    """Refused hits of which no corrected file was accepted since."""
+    every = [(m.pose, hit) for m in state.recorded for hit in m.hits]
+    accepted = {(pose, h.file, h.part, h.response) for pose, h in every if h.accepted}
+    refused = [*((pose, h) for pose, h in every if not h.accepted), *state.refused.values()]
+    return tuple(
+        RefusedHit(pose, h.file, h.reason)
+        for pose, h in refused
+        if (pose, h.file, h.part, h.response) not in accepted
+    )
+
+
 def status(campaign: Campaign) -> StatusReport:
     """Of a campaign as it is now."""
     state = campaign.state
     believed = campaign.of_model("status", ModelStatus, ModelStatus.of)
     measured = state.measured
-    refused = [RefusedHit(m.pose, h.file, h.reason) for m in state.recorded for h in m.hits
-               if not h.accepted]  # fmt: skip
-    refused += [RefusedHit(pose, h.file, h.reason) for pose, h in state.refused.values()]
+    refused = _still_refused(state)
     return StatusReport(
         campaign=str(campaign.directory),
         robot=believed.robot,
@@ -277,7 +289,7 @@ def status(campaign: Campaign) -> StatusReport:
         measurements=tuple(MeasuredPoseStatus.of(m, m.pose in state.starred) for m in measured),
         open=tuple(state.proposals[pose] for pose in state.open),
         skipped=tuple(SkippedProposal(p, r) for p, r in state.skipped.items()),
-        refused=tuple(refused),
+        refused=refused,
         frequency_sd_percent=believed.frequency_sd_percent,
         target_frequency_sd_percent=believed.target_frequency_sd_percent,
         done=believed.done,
@@ -312,10 +324,10 @@ def models_text(rows: "Sequence[LeftOutModel]") -> list[RenderableType]:
             significant(row.seconds),
         )  # fmt: skip
     best, used = rows[0], next((row for row in rows if row.campaign), rows[0])
-    better = best.log_density - used.log_density
+    powers = (best.log_density - used.log_density) / math.log(10)
     said = f"Likeliest for poses left out: {best.model}, {best.about}."
     if best is not used:
-        said += f" The campaign's own (★) is less likely by a factor of e^{better:.1f}."
+        said += f" The campaign's own (★) is less likely by {powers:.1f} powers of ten."
     return [made, Text(said)]
 
 

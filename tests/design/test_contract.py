@@ -77,18 +77,6 @@ def test_parameters_are_refitted_as_foretold(surrogate):
         )
 
 
-def test_of_many_candidates_the_best_are_exact(surrogate, monkeypatch):
-    outputs, poses = over(surrogate, X, 30)
-    exact = reduction(outputs, poses, outputs.workspace)
-    monkeypatch.setattr(module, "MANY_CANDIDATES", 10)
-    monkeypatch.setattr(module, "BEST_CANDIDATES", 20)
-    screened = reduction(outputs, poses, outputs.workspace)
-    best = np.argsort(exact)[-15:]
-    np.testing.assert_allclose(screened[best], exact[best], rtol=1e-12)
-    np.testing.assert_allclose(screened, exact, rtol=1e-3, atol=1e-6 * exact.max())
-    assert np.any(screened != exact)
-
-
 def test_more_axes_tell_more(surrogate):
     outputs, poses = with_parameters(surrogate, X)
     pose = poses.one(3)
