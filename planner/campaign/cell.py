@@ -142,7 +142,7 @@ class Cell:
 
     def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
         """The pose in rad (m); InputError if the robot cannot stand there."""
-        return _checked_pose(self.robot, joints_deg, where)
+        return checked_pose(self.robot, joints_deg, where)
 
     def poses(self, joints_deg: ArrayLike) -> np.ndarray:
         """Poses (n, dof) in degrees (mm), or one of them, as q in rad (m); checked each."""
@@ -161,7 +161,7 @@ def _of_campaign_toml() -> Iterator[None]:
         raise InputError(f"campaign.toml: {error}") from None
 
 
-def _checked_pose(robot: Robot, joints_deg: Sequence[float], where: str) -> np.ndarray:
+def checked_pose(robot: Robot, joints_deg: Sequence[float], where: str) -> np.ndarray:
     """The pose (dof,) in rad (m); InputError if the robot cannot stand there."""
     joints = robot.joints
     if len(joints_deg) != len(robot.joint_names):
@@ -194,7 +194,7 @@ def _check_angles(robot: Robot, config: CampaignConfig) -> None:
         ("[cut] joints_deg", config.cut.joints_deg if config.cut else None),
     ):
         for number, pose in enumerate(poses or (), 1):
-            _checked_pose(robot, pose, f"campaign.toml, {where}, pose {number}")
+            checked_pose(robot, pose, f"campaign.toml, {where}, pose {number}")
     for zone in config.forbidden:
         if zone.joints_deg is not None and len(zone.joints_deg) != len(robot.joint_names):
             raise InputError(

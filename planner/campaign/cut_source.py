@@ -27,7 +27,7 @@ class Asked:
 
     With `tool` the FRFs are coupled to it first, as `couple` does: `reference` is the tested one,
     `robot` whose simulation tells how the tip turns, `noise` the relative sd of FRFs whose file
-    states none.
+    states none. `peak_force_n` is that of hits for which a campaign's joints are linearised.
     """
 
     source: Path
@@ -40,6 +40,7 @@ class Asked:
     robot: Path | None = None
     noise: float = 0.0
     from_names: bool = False  # FRFs' places from the names of their files
+    peak_force_n: float | None = None
 
     @property
     def wanted(self) -> tuple[float, float] | None:
@@ -57,6 +58,17 @@ class Asked:
                 f"--point {self.point}: the speed must be 1 rpm or more, the depth 0 to 1 m."
             )
         return rpm, depth
+
+    @property
+    def campaign(self) -> "Campaign":
+        """The source, with the stated force; InputError where a force would change nothing."""
+        from planner.campaign.at_force import UNCHANGED
+        from planner.campaign.campaign import Campaign
+
+        opened = Campaign(self.source)
+        if self.peak_force_n is not None and not opened.cell.robot.config.law:
+            raise InputError(f"--{UNCHANGED.replace('_', '-', 2)}")
+        return opened.struck_with(self.peak_force_n)
 
     def check(self) -> None:
         """InputError where options of a tool are given without one."""
@@ -125,12 +137,15 @@ def structure_of(asked: Asked, cut: Cut) -> Structure:
     """From modes, FRFs, or a campaign at a pose."""
     source, change = asked.source, ToolChange.of(asked, cut)
     if is_campaign(source):
-        from planner.campaign.campaign import Campaign
-
-        campaign = Campaign(source)
+        campaign = asked.campaign
         q = campaign.stands(asked.pose)
         (found,) = at_poses(campaign, (str(asked.pose),), q[None], cut, change)
         return _with(found, outside(campaign, (str(asked.pose),), q[None]))
+    if asked.peak_force_n is not None:
+        raise InputError(
+            f"--peak-force-n goes with a campaign, which {source} is not; predict its FRFs at that "
+            f"force and name the npz."
+        )
     no_pose(cut, source)
     if change is not None:
         return _coupled(asked, change, asked.pose, cut)

@@ -1,9 +1,10 @@
 """What a campaign folder says: its log, the state and the model that follow from it."""
 
+import copy
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import msgspec
 import numpy as np
@@ -30,6 +31,7 @@ from planner.version import __version__
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from planner.campaign.at_force import ForceModel
     from planner.campaign.cell import Cell
     from planner.campaign.model import Model
     from planner.dataset.dataset import Dataset
@@ -53,6 +55,7 @@ class CampaignReads:
         self._cells: dict[str, Cell] = {}
         self._models: dict[tuple[str, int], Model] = {}
         self._folded: tuple[tuple[Entry, ...], CampaignState] = (), fold(())
+        self._force_n: float | None = None
 
     def __repr__(self) -> str:
         state = self.state
@@ -267,16 +270,32 @@ class CampaignReads:
         """
         return self.frf_at(self.cell.poses(joints_deg), frequency_hz)
 
+    def struck_with(self, force_n: float | None) -> Self:
+        """The same campaign, whose `frf_at` linearises joints' laws for hits of a peak force."""
+        other = copy.copy(self)
+        other._force_n = force_n
+        return other
+
+    @property
+    def at_force(self) -> "ForceModel":
+        """What a stated force changes; worked out at each call."""
+        from planner.campaign.at_force import ForceModel
+
+        return ForceModel.of(self)
+
     def frf_at(
         self, q: np.ndarray, frequency_hz: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """As `frf`, at poses q (n, dof) in rad; what was worked out for it is kept."""
         lines, model = self.frequency_lines if frequency_hz is None else frequency_hz, self.model
         known = model.knows_frfs
-        found = model.frf(np.atleast_2d(q), lines)
+        q = np.atleast_2d(q)
+        mean, sd = model.frf(q, lines)
         if not known:
             self._kept.put(self._key("model", self.state.used), model)
-        return found
+        if self._force_n is None:
+            return mean, sd
+        return mean + self.at_force.frf_change(q, np.full(len(q), self._force_n), lines, False), sd
 
     def records(self) -> list[dict[str, Any]]:
         """All measured modes, one row each: what pandas.DataFrame takes."""

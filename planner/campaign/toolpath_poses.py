@@ -74,7 +74,7 @@ class Travelled:
                 f"program (G-code, APT)."
             )
         change = ToolChange.of(asked, cut)
-        campaign = Campaign(asked.source)
+        campaign = asked.campaign
         if is_toolpath(way.path):
             names, q, feeds = _program(campaign.cell.robot, way, cut)
             return cls(campaign, change, cut, names, q, feeds)

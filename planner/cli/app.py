@@ -171,29 +171,49 @@ def watch(
 
 @app.command()
 def predict(
-    directory: Directory,
+    source: Annotated[
+        Path, typer.Argument(metavar="DIR|ROBOT_TOML", help="Campaign folder, or a robot alone.")
+    ],
     poses: Annotated[
-        Path, typer.Argument(metavar="POSES_CSV", help="pose, joint_…_deg, slides: …_mm")
+        Path,
+        typer.Argument(metavar="POSES_CSV", help="pose, joint_…_deg, slides: …_mm[, peak_force_n]"),
     ],
     out: Annotated[Path | None, typer.Option(metavar="FILE.npz", help="Where FRFs go.")] = None,
+    peak_force_n: Annotated[
+        float | None,
+        typer.Option(
+            "--peak-force-n", metavar="N", min=1e-3,
+            help="Of hits, where POSES_CSV states none: joints may not be linear ([[law]]).",
+        ),
+    ] = None,
     as_json: AsJson = False,
-) -> int:
+) -> int:  # fmt: skip
     """Modes and FRFs, with uncertainty, at given poses.
 
     Example: planner predict cell7 poses.csv --out frfs.npz
     """
     from planner.campaign.campaign import Campaign
+    from planner.campaign.cell import checked_pose
     from planner.cli.progress import telling
-    from planner.recording.folder import read_poses
-    from planner.report.predictions import predictions
+    from planner.recording.folder import peak_forces, read_poses
+    from planner.report.predictions import predictions, robot_predictions
+    from planner.robot.robot import Robot
 
     with telling("predicting", quiet=as_json) as progress:
-        campaign = Campaign(directory)
+        if source.is_file():
+            robot = Robot.load(source)
+            rows = read_poses(poses, robot.joints)
+            npz = out or source.parent / "predictions" / f"{poses.stem}.npz"
+            q = [checked_pose(robot, r.joints_deg, f"{poses}, row {r.row}") for r in rows]
+            names, force_n = [row.pose for row in rows], peak_forces(rows, peak_force_n)
+            return respond(robot_predictions(robot, names, q, npz, force_n), as_json)
+        campaign = Campaign(source)
         cell, rows = campaign.cell, read_poses(poses, campaign.cell.robot.joints)
         q = [cell.check_pose(row.joints_deg, f"{poses}, row {row.row}") for row in rows]
         npz = out or campaign.directory / "predictions" / f"{poses.stem}.npz"
         progress(f"{len(rows)} poses", 0.0)
-        answer = predictions(campaign, [row.pose for row in rows], q, npz)
+        force_n = peak_forces(rows, peak_force_n)
+        answer = predictions(campaign, [row.pose for row in rows], q, npz, force_n)
     return respond(answer, as_json)
 
 

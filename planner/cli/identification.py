@@ -99,7 +99,7 @@ def diagnose(
     from planner.api import diagnose_material
     from planner.campaign.material import material
     from planner.cli.progress import telling
-    from planner.recording.folder import read_poses
+    from planner.recording.folder import peak_forces, read_poses
     from planner.report.modal_analysis import check_options
     from planner.report.status import model_beside
 
@@ -113,7 +113,8 @@ def diagnose(
         if predict:
             q = nominal.joints.internal([row.joints_deg for row in wanted])
             npz = _target(out, predict, given.recordings)
-            answer = answer.with_predictions([row.pose for row in wanted], q, npz)
+            force_n = peak_forces(wanted)
+            answer = answer.with_predictions([row.pose for row in wanted], q, npz, force_n)
         if out is not None:
             answer = answer.write(out)
     if given.campaign is not None and robot is None:

@@ -50,6 +50,15 @@ def stability(
     noise: Annotated[
         float, typer.Option(metavar="PERCENT", min=0.0, help="With --tool: of FRFs without sd.")
     ] = 0.0,
+    peak_force_n: Annotated[
+        float | None,
+        typer.Option(
+            "--peak-force-n",
+            metavar="N",
+            min=1e-3,
+            help="Of a campaign: linearise joints that are not linear ([[law]]) for such hits.",
+        ),
+    ] = None,
     point: Annotated[
         str | None, typer.Option(metavar="RPM,DEPTH_M", help="How stable is this very point?")
     ] = None,
@@ -72,7 +81,17 @@ def stability(
     from planner.report.plot_files import Pictures
 
     asked = Asked(
-        source, cut, pose, point, samples, tool, reference, robot, noise / 100, from_names
+        source,
+        cut,
+        pose,
+        point,
+        samples,
+        tool,
+        reference,
+        robot,
+        noise / 100,
+        from_names,
+        peak_force_n,
     )
     pictures = Pictures(plot, format_, rrd)
     check(path, origin, turns, poses, map_, pose)

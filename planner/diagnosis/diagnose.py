@@ -9,6 +9,7 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.exponential_window import screen_window
 from planner.diagnosis.finding import Finding
+from planner.diagnosis.found_laws import straightened, with_laws
 from planner.diagnosis.levels import LevelLaw, Levels, level_laws
 from planner.diagnosis.search import FITTED, LEAST, Explored, Explorer
 from planner.diagnosis.tone import screen_tone
@@ -28,11 +29,13 @@ from planner.frf.frf import Frf
 from planner.measurement.agreement import Similarity, similarity_of
 from planner.measurement.nuisances import Tolerances
 from planner.progress import Tell, quietly
+from planner.robot.joint_laws import LawTable
 from planner.words import significant
 
 # Stated springs are known as well as datasheets have them (a fifth), dampers to a factor of two;
 # masses lie elsewhere by 8 % of a body's radius of gyration: cables, oil, covers.
 PRIORS = replace(CAD_INERTIAS, stiffness_factor=1.2, damping_factor=2.0, elsewhere=0.08)
+ROUNDS = 2  # of laws by a linear fit, and that fit beside the laws
 MOST_BETWEEN = 8  # poses between measured ones, at which sizes are told
 
 
@@ -102,14 +105,29 @@ class Diagnosis:
         heard = [
             Established(f.effect, f.at, 1.0, None, f.parameters, f.text) for f in self.screened
         ]
-        told = self.verdict.verdict == "explained" and self.levels
         laws = [
             Established(
                 law.effect, law.at, self._share(law), law.share, law.parameters, _words(law)
             )
-            for law in (told.laws if told else ())
+            for law in self._laws
         ]
         return *heard, *laws, *(self._established(e, e.probability) for e in self.verdict.findings)
+
+    @property
+    def _laws(self) -> tuple[LevelLaw, ...]:
+        told = self.verdict.verdict == "explained" and self.levels
+        return told.laws if told else ()
+
+    @cached_property
+    def simulation(self) -> Simulation:
+        """The robot with all that was found, and the pulse of the hits."""
+        return with_laws(self.robot.simulation, self._laws, self.recorded)
+
+    @property
+    def laws(self) -> tuple[LawTable, ...]:
+        """Of joints that are not linear, as robot.toml has them, beside `robot`'s springs."""
+        told = [law.table for law in self._laws]
+        return tuple(law for law in self.simulation.robot.config.law if law in told)
 
     def _share(self, law: LevelLaw) -> float:
         place = law.effect, law.at
@@ -148,14 +166,11 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
     stated = RobotStructure(search.prior)
     if not FrfMisfit(stated, search.data(1), search.tolerances).possible(stated.mean):
         raise InputError(TOO_SOFT)
-    steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
-    explored = Explorer(steps).explored()
     screened = tuple(f for f in (window, screen_tone(recorded)) if f is not None)
     heard = [(f.effect, f.at) for f in screened]
     matters = robot.config.diagnose.matters
-    tell("comparing hits of different force", 0.85)
+    recorded, search, explored, levels = _explored(recorded, search, simulation, tell)
     fits, aside = (explored.plain, likeliest(explored)), set_aside(recorded.q)
-    levels = level_laws(recorded, fits[1]) if recorded.visits else None
     tell("judging", 0.9)
     held_out = _held_out(search, fits, aside) if aside else None
     worse = held_out is not None and held_out.worse(matters)
@@ -171,6 +186,33 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
         aside,
         held_out,
     )
+
+
+def _explored(
+    recorded: Dataset, search: Search, simulation: Simulation, tell: Tell
+) -> tuple[Dataset, Search, Explored, Levels | None]:
+    """What explains the recordings, and what force levels tell of joints that are not linear.
+
+    Then the recordings are returned, and searched, as they are without that: a linear fit follows
+    what a law has on average, from pose to pose, by effects that are not there.
+    """
+
+    def explored() -> Explored:
+        steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
+        return Explorer(steps).explored()
+
+    found, levels, straight = explored(), None, recorded
+    for _ in range(ROUNDS if recorded.visits else 0):
+        tell("comparing hits of different force", 0.85)
+        told = level_laws(recorded, likeliest(found))
+        levels = told if levels is None or told.laws else levels
+        if not told.laws or recorded.most_heard is not recorded:
+            break
+        there = RobotPosterior.of(likeliest(found)).simulation
+        straight = straightened(recorded, with_laws(there, told.laws, recorded))
+        search = searching(straight.ended_frfs, straight.q, simulation, _order(straight))
+        found = explored()
+    return straight, search, found, levels
 
 
 def _words(law: LevelLaw) -> str:

@@ -12,14 +12,7 @@ import numpy as np
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.levels_hits import HitGroup, JointPort, hit_groups, own_ports
-from planner.diagnosis.levels_laws import (
-    SHAPES,
-    UNKNOWN,
-    JointMotions,
-    Step,
-    numbers_of,
-    stiffening,
-)
+from planner.diagnosis.levels_laws import JointMotions
 from planner.diagnosis.levels_weighing import (
     Differences,
     Values,
@@ -33,6 +26,7 @@ from planner.diagnosis.levels_weighing import (
 )
 from planner.fit.fitted import StructureFit
 from planner.inference.log_space import shares
+from planner.robot.joint_laws import SHAPES, UNKNOWN, LawTable, Step, numbers_of, stiffening
 
 SIZES = (0.0015, 0.004, 0.01, 0.03, 0.08, 0.2, 0.5)  # of the discrepancy, in shares of |H|
 LEAST = 20.0  # nats that a joint must gain: chance gave linear robots up to 14
@@ -57,7 +51,8 @@ MOST = 2  # joints
 class LevelLaw:
     """An effect at a joint: nats over a linear one, numbers with sds and units.
 
-    `share` of |H| is by how much hits of different force differ by it.
+    `share` of |H| is by how much hits of different force differ by it. `table` is its entry in
+    robot.toml, None for what none describes.
     """
 
     effect: str
@@ -65,6 +60,7 @@ class LevelLaw:
     nats: float
     parameters: dict[str, tuple[float, float, str]]
     share: float
+    table: LawTable | None = None
 
 
 @dataclass(frozen=True)
@@ -166,6 +162,17 @@ def _candidates(
     return tuple(sorted(((law.effect, at, p) for (law, at), p in each), key=lambda c: -c[2]))
 
 
+def _table(
+    port: JointPort, motions: JointMotions, shape: Step, sign: float, p: np.ndarray
+) -> LawTable:
+    """Of numbers p (4,) of a law in the joint's units."""
+    k, a = sign * motions.stiffness * np.exp(p[0]), motions.size * np.exp(p[1])
+    both = np.array([k]), np.array([a]), motions.stiffness * p[None, 2:]
+    spring, damper = motions.linear(shape, *both)[0] / k
+    linear = float(spring), float(damper * motions.groups[0].clock.instant_s)
+    return LawTable.of(port.joint, port.slides, shape, float(k), float(a), linear)
+
+
 @dataclass(frozen=True, eq=False)
 class _Point:
     """Numbers p (4,) of a law in the joint's units: value, changes, normal and way down."""
@@ -232,7 +239,8 @@ class _Search:
             numbers = best.p[:2] + np.log([motions.stiffness, motions.size])
             covariance = np.linalg.inv(best.normal)[:2, :2]
             told = numbers_of(effect, port.slides, sign, numbers, covariance)
-            law = LevelLaw(effect, port.at, nats, told, share_of(self.groups, best.changes))
+            table = None if effect == UNKNOWN else _table(port, motions, shape, sign, best.p)
+            law = LevelLaw(effect, port.at, nats, told, share_of(self.groups, best.changes), table)
             found.append(_Fit(law, best.changes, lower))
         return found
 

@@ -22,9 +22,13 @@ FADED = 0.1  # of the window's weight, below which nothing is told of a motion
 
 @dataclass(frozen=True)
 class JointPort:
-    """A joint's spring about (along) its own axis: "joint_2", its number among all, N·m/rad."""
+    """A joint's spring about (along) its own axis: "joint_2", its number among all, N·m/rad.
+
+    `joint` is its name in robot.toml.
+    """
 
     at: str
+    joint: str
     spring: int
     stiffness: float
     slides: bool
@@ -47,9 +51,14 @@ class Clock:
         return int(next_fast_len(3 * self.lines, real=True) or 0)
 
     @property
+    def instant_s(self) -> float:
+        """From one instant to the next."""
+        return self.samples * self.step_s / self._count
+
+    @property
     def window(self) -> np.ndarray:
         """(T,): what it makes of the instants."""
-        t = np.arange(self._count) * self.samples * self.step_s / self._count
+        t = np.arange(self._count) * self.instant_s
         window = np.exp(-self.rate_1_s * t)
         return window[window > FADED]
 
@@ -103,7 +112,9 @@ def own_ports(found: StructureFit) -> tuple[JointPort, ...]:
         block = robot.config.compliance[spring]
         if robot.is_own(block):
             at = f"joint_{robot.joint_names.index(block.joint) + 1}"
-            ports.setdefault(at, JointPort(at, own, float(stiffness[own]), block.slide))
+            ports.setdefault(
+                at, JointPort(at, block.joint, own, float(stiffness[own]), block.slide)
+            )
     return tuple(ports.values())
 
 

@@ -1,11 +1,10 @@
-"""Laws of joints that are not linear, and how they change what hits of a fitted robot answer.
+"""How laws of joints that are not linear change what hits of a fitted robot answer.
 
-A law's torque is k times a shape bent at the angle a, beside the linear spring's: rad (m),
-N·m/rad (N/m). What it has on average over all hits the linear fit has already, as a spring and a
-damper; only what goes beyond that changes FRFs.
+What a law has on average over all hits the linear fit has already, as a spring and a damper; only
+what goes beyond that changes FRFs.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,77 +12,9 @@ import numpy as np
 from scipy.signal import hilbert
 
 from planner.diagnosis.levels_hits import HitGroup
+from planner.robot.joint_laws import Step
 
-UNKNOWN = "unknown"
-NEARLY = 1 - 1e-12
 FARTHEST = 5.0  # of the linear swing: a joint that goes farther is no robot's
-Step = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-
-
-def stiffening(state: np.ndarray, before: np.ndarray, now: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """Secant stiffness 0 at small angles, 1 at large ones, half of it at a."""
-    return now**3 / (now**2 + a**2)
-
-
-def dead_zone(state: np.ndarray, before: np.ndarray, now: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """Within ± a the spring lacks 1."""
-    return -np.clip(now, -a, a)
-
-
-def dahl(state: np.ndarray, before: np.ndarray, now: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """Dahl 1968: dz/dθ = 1 − sgn(dθ) z / a, exact along a motion one way."""
-    way = now - before
-    end = np.sign(way) * a
-    return end + (state - end) * np.exp(-np.abs(way) / a)
-
-
-def bouc_wen(state: np.ndarray, before: np.ndarray, now: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """Bouc and Wen, dz/dθ = 1 − z²/a² while it loads, 1 while it unloads: exact one way."""
-    way = now - before
-    loaded = np.sign(way) * state
-    straight = np.minimum(np.abs(way), np.maximum(-loaded, 0.0))
-    begun = np.clip((loaded + straight) / a, -NEARLY, NEARLY)
-    return np.sign(way) * a * np.tanh(np.arctanh(begun) + (np.abs(way) - straight) / a)
-
-
-def fluid(state: np.ndarray, before: np.ndarray, now: np.ndarray, a: np.ndarray) -> np.ndarray:
-    """With the square of the speed, as oil has it: no effect that is named, but what else it is."""
-    return (now - before) * np.abs(now - before) / a
-
-
-# An effect's torque for k = 1 after a motion from one angle to another, and its two numbers: k, and
-# a or k a; named for joints that turn and that slide.
-SHAPES: tuple[tuple[str, Step], ...] = (
-    ("nonlinear_stiffness", stiffening),
-    ("friction", dahl),
-    ("friction", bouc_wen),
-    ("backlash", dead_zone),
-    (UNKNOWN, fluid),
-)
-NUMBERS = {
-    "nonlinear_stiffness": ("stiffness_change", ("angle", "shift"), False),
-    "friction": ("presliding_stiffness", ("coulomb_torque", "coulomb_force"), True),
-    "backlash": ("lost_stiffness", ("half_gap", "half_gap"), False),
-    UNKNOWN: ("damping", ("angle", "shift"), False),
-}
-UNITS = {False: ("N·m/rad", "rad", "N·m"), True: ("N/m", "m", "N")}
-# Relative sd of both: what a linear fit that a law has bent leaves wrong. Of 20 concealed joints.
-INEXACT = 0.05
-
-
-def numbers_of(
-    effect: str, slides: bool, sign: float, log_k_a: np.ndarray, covariance: np.ndarray
-) -> dict[str, tuple[float, float, str]]:
-    """A law's numbers by name: value, sd, unit; of logarithms of |k| and a (2,)."""
-    stiffness, ways, product = NUMBERS[effect]
-    both = np.array([[1.0, 0.0], [1.0 if product else 0.0, 1.0]])
-    values = np.exp(both @ log_k_a)
-    sds = values * np.hypot(np.sqrt(np.diag(both @ covariance @ both.T)), INEXACT)
-    first, way, force = UNITS[slides]
-    return {
-        stiffness: (float(sign * values[0]), float(sds[0]), first),
-        ways[slides]: (float(values[1]), float(sds[1]), force if product else way),
-    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +75,7 @@ class JointMotions:
         """
         window, end = self.window, self.swing.shape[1]
         linear, kernel = self.swing * window, self.kernel[:, ::-1].copy()
-        steps = float(np.linalg.norm(self.swing) / np.linalg.norm(np.diff(self.swing, axis=1)))
-        common = self._common(self._along(step, a) * k[:, None]).T + off * (1.0, steps)
+        common = self.linear(step, k, a, off)
         shown, swing = np.zeros((2, len(k), *self.swing.shape))
         state = before = np.zeros(swing.shape[:2])
         most = FARTHEST * np.max(np.abs(self.swing), axis=1)
@@ -156,9 +86,18 @@ class JointMotions:
             state = step(state, before, now, a)
             torque = k * state - spring * now - damper * (now - before)
             shown[..., i], swing[..., i], before = torque * window[i], now, now
-        both = np.stack([swing, steps * np.diff(swing, axis=-1, prepend=0.0)], axis=2)
+        both = np.stack([swing, self._steps * np.diff(swing, axis=-1, prepend=0.0)], axis=2)
         torques = np.concatenate([(shown / window)[:, :, None], -both], axis=2)
         return [self._answers(one) for one in torques]
+
+    def linear(self, step: Step, k: np.ndarray, a: np.ndarray, off: np.ndarray) -> np.ndarray:
+        """(V, 2): what the linear fit has of V laws, in N·m/rad, and the same per instant."""
+        return self._common(self._along(step, a) * k[:, None]).T + off * (1.0, self._steps)
+
+    @cached_property
+    def _steps(self) -> float:
+        """Swing over its change from one instant to the next."""
+        return float(np.linalg.norm(self.swing) / np.linalg.norm(np.diff(self.swing, axis=1)))
 
     def _answers(self, torques: np.ndarray) -> list[np.ndarray]:
         """Changes (C, n, 3, L) of FRFs of each group by torques (H, C, T) in N·m."""

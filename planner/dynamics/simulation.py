@@ -2,9 +2,10 @@
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
+import msgspec
 import numpy as np
 
 from planner.dynamics.mode_families import Families, rearranged, undamped_modes
@@ -16,7 +17,9 @@ from planner.dynamics.vibration import (
     receptance,
     solve_poles,
 )
+from planner.robot.config import HammerTable
 from planner.robot.elastic_model import ElasticModel, Matrices
+from planner.robot.joint_laws import LawTable
 from planner.robot.robot import Robot
 
 
@@ -57,6 +60,13 @@ class Simulation:
         if inertia_change is not None:
             elastic = ElasticModel(self.robot, inertia_change)
         other.elastic = elastic.carried_by(elasticity.stiffness)
+        return other
+
+    def with_laws(self, laws: Sequence[LawTable], hammer: HammerTable) -> "Simulation":
+        """The same with other laws of its joints, and another hammer."""
+        other, config = copy.copy(self), self.robot.config
+        config = msgspec.structs.replace(config, law=tuple(laws), hammer=hammer)
+        other.robot = replace(self.robot, config=config)
         return other
 
     @cached_property

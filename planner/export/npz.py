@@ -14,18 +14,21 @@ if TYPE_CHECKING:
 
 
 def save_frfs(
-    path: Path, frequency_hz: np.ndarray, mean: np.ndarray, sd: np.ndarray,
+    path: Path, frequency_hz: np.ndarray, mean: np.ndarray, sd: np.ndarray | None,
     poses: Sequence[str], joints: JointUnits, q: np.ndarray, outside: np.ndarray | None = None,
+    force_n: np.ndarray | None = None,
 ) -> None:  # fmt: skip
     """Write FRFs (n, 3, 3, F) in m/s²/N at lines (F,) and poses q (n, dof) to exactly this file.
 
-    With which of them lie `outside` (n,) the workspace, where there is one.
+    With which of them lie `outside` (n,) the workspace, and the peak force_n (n,) that was asked
+    for, NaN where none was. `sd` is None where nothing tells it.
 
     Raises InputError where that cannot be done.
     """
     more = {"joint_units": np.array(joints.units)} if any(joints.slides) else {}
-    more |= {} if outside is None else {"outside": outside}
-    _save(path, frequency_hz=frequency_hz, frf_mean=mean, frf_sd=sd, pose=np.array(poses),
+    told = {"frf_sd": sd, "outside": outside, "peak_force_n": force_n}
+    more |= {name: values for name, values in told.items() if values is not None}
+    _save(path, frequency_hz=frequency_hz, frf_mean=mean, pose=np.array(poses),
           joints_deg=joints.shown(q), **more)  # fmt: skip
 
 

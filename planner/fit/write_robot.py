@@ -12,6 +12,7 @@ from planner.errors import InputError
 from planner.fit.result import Identification
 from planner.robot.config import Compliance, entry_of
 from planner.robot.elastic_model import ElasticModel
+from planner.robot.joint_laws import LawTable
 from planner.robot.mesh_files import copy_meshes
 from planner.robot.robot import Robot
 from planner.robot.urdf_inertias import urdf_with_inertias
@@ -22,13 +23,18 @@ DIGITS = 6  # significant ones: more than any identification knows
 
 
 def updated_toml(
-    text: str, result: Identification, urdf: str | None = None, added: Sequence[Compliance] = ()
+    text: str,
+    result: Identification,
+    urdf: str | None = None,
+    added: Sequence[Compliance] = (),
+    laws: Sequence[LawTable] = (),
 ) -> str:
     """The robot.toml `text` with the [[compliance]] blocks' numbers (and its urdf) replaced.
 
     A new `urdf` is one of `urdf_with_inertias`, which has what [[link]] states in it.
     `added` blocks, which the identification counts last, follow those in the text, and so do
-    resonators and harmonics that it found.
+    resonators and harmonics that it found. `laws` take the place of those stated for their joints,
+    and bring the pulse of the hits that told them.
     """
     document = tomlkit.parse(text)
     listed = document["compliance"]
@@ -52,10 +58,25 @@ def updated_toml(
             table = tomlkit.table()
             table.update(msgspec.to_builtins(block))
             document.setdefault(kind, tomlkit.aot()).append(table)
+    if laws:
+        _state_laws(document, laws, result.simulation.robot.config.hammer.pulse_ms)
     if urdf is not None:
         document["urdf"] = urdf
         drop_stated_inertias(document)
     return tomlkit.dumps(document)
+
+
+def _state_laws(document: tomlkit.TOMLDocument, laws: Sequence[LawTable], pulse_ms: float) -> None:
+    joints = {law.joint for law in laws}
+    stated = [block for block in document.get("law", ()) if block["joint"] not in joints]
+    document.pop("law", None)
+    document["law"] = tomlkit.aot()
+    for block in (*stated, *map(msgspec.to_builtins, laws)):
+        table = tomlkit.table()
+        table.update(block)
+        table.add(tomlkit.nl())
+        document["law"].append(table)
+    document.setdefault("hammer", tomlkit.table())["pulse_ms"] = float(f"{pulse_ms:.3g}")
 
 
 def drop_stated_inertias(document: tomlkit.TOMLDocument) -> None:
@@ -85,8 +106,10 @@ def check_target(out: Path, robot: Robot) -> None:
         raise InputError(f"{folder} is no folder; {out} cannot be written there, name another.")
 
 
-def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
-    """Write robot.toml at `out`, and its URDF beside it where it is another.
+def write_robot(
+    out: Path, robot: Robot, result: Identification, laws: Sequence[LawTable] = ()
+) -> Written:
+    """Write robot.toml at `out`, with `laws` that were found, and its URDF where it is another.
 
     It is another where inertias were identified too (springs alone would fit worse than before),
     or where the folder is another. Nothing that exists is overwritten; InputError instead.
@@ -108,7 +131,7 @@ def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
         stated = robot.path.read_text(encoding="utf-8-sig")
         inside = sum(len(e.compliance) for e in robot.config.effects)
         added = robot.config.compliance[len(tomlkit.parse(stated)["compliance"]) + inside :]
-        _write_new(out, updated_toml(stated, result, name, added))
+        _write_new(out, updated_toml(stated, result, name, added, laws))
     except OSError as error:
         raise InputError(
             f"{out} cannot be written ({error.strerror}); name another file with --out."

@@ -8,6 +8,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from planner.errors import InputError
 from planner.recording.column_names import hit_direction
 from planner.recording.joints import AxisColumn, JointUnits
@@ -107,9 +109,19 @@ def read_poses(path: Path, joints: JointUnits | Sequence[str]) -> tuple[PoseRow,
         force = None
         if cells.get("peak_force_n", "").strip():
             force = _number(path, number, "peak_force_n", cells["peak_force_n"])
+            if not force > 0:
+                raise InputError(
+                    f"{path}, row {number}: peak_force_n is {force:g}; give a force above 0 N, or "
+                    f"leave the cell empty."
+                )
         angles = _angles(path, number, cells, columns)
         rows.append(PoseRow(pose, angles, number, peak_force_n=force))
     return tuple(rows)
+
+
+def peak_forces(rows: Sequence[PoseRow], others_n: float | None = None) -> np.ndarray:
+    """(n,) in N at which predictions are wanted; `others_n`, else NaN, where none is stated."""
+    return np.array([row.peak_force_n or others_n or np.nan for row in rows])
 
 
 def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:

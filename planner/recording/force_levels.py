@@ -16,6 +16,13 @@ def peak_n(hit: Hit) -> float:
     return hit.pulse.peak_n
 
 
+def pulse_s(hit: Hit) -> float:
+    """Impulse of a hit over its peak: about the width of its pulse at half its height."""
+    pulse = hit.pulse
+    force = hit.force_n[pulse.first : pulse.end] - pulse.offset_n
+    return abs(float(np.sum(force))) / (hit.sampling_rate_hz * pulse.peak_n)
+
+
 def far_below(hit: Hit, others: Sequence[Hit]) -> float | None:
     """The median peak (N) of other hits along its axis, where a hit is far below it; else None.
 

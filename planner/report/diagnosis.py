@@ -12,6 +12,7 @@ from rich.text import Text
 from planner.design.discrimination import LIKELY
 from planner.design.extra_sensor import ExtraSensor
 from planner.design.next_hit import NextHit
+from planner.dynamics.in_time import change_at_force
 from planner.effects.effect import Operator
 from planner.errors import InputError
 from planner.fit.posterior import RobotPosterior
@@ -113,20 +114,31 @@ class DiagnosisReport(Answer):
         assert self.diagnosis is not None
         return self.diagnosis
 
-    def predict(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def predict(
+        self, q: np.ndarray, frequency_hz: np.ndarray, peak_force_n: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """FRFs of the simulation with what was found, with their uncertainty.
 
         Args:
             q: Joint angles (n, dof) in rad.
             frequency_hz: Frequency lines (F,) in Hz.
+            peak_force_n: Of hits (n,) for which joints that are not linear are linearised; where it
+                is left out or NaN, as the recordings have them on average.
 
         Returns:
             Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N.
         """
-        return self.found.robot.predicted(q, frequency_hz)
+        mean, sd = self.found.robot.predicted(q, frequency_hz)
+        if peak_force_n is None:
+            return mean, sd
+        return mean + change_at_force(self.found.simulation, q, peak_force_n, frequency_hz), sd
 
-    def with_predictions(self, poses: Sequence[str], q: np.ndarray, npz: Path) -> "DiagnosisReport":
+    def with_predictions(
+        self, poses: Sequence[str], q: np.ndarray, npz: Path, peak_force_n: np.ndarray | None = None
+    ) -> "DiagnosisReport":
         """The same once FRFs at poses q (n, dof) in rad (m) are in the npz file.
+
+        Of hits of peak_force_n (n,), as of `predict`.
 
         Raises InputError where it cannot be written.
         """
@@ -135,7 +147,7 @@ class DiagnosisReport(Answer):
 
         search = self.found.search
         lines = frequency_lines(search.band_hz)
-        mean, sd = self.predict(q, lines)
+        mean, sd = self.predict(q, lines, peak_force_n)
         joints = search.prior.repertoire.stiff.robot.joints
         save_frfs(npz, lines, mean, sd, poses, joints, q)
         return replace(self, npz=str(npz))
@@ -154,7 +166,8 @@ class DiagnosisReport(Answer):
         robot = found.search.prior.repertoire.stiff.robot
         _make_room(folder, robot)
         model, result = as_identification(found.robot)
-        made = write_robot(folder / "robot.toml", model.simulation.robot, result)
+        result = replace(result, simulation=found.simulation)
+        made = write_robot(folder / "robot.toml", model.simulation.robot, result, found.laws)
         mark = SIMULATED_TITLE if self.simulated else ""
         figures = diagnosis_figures(found, mark)
         plots = Pictures(folder).write(figures, robot.name)["plots"]

@@ -6,14 +6,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec import UNSET
+from msgspec import UnsetType as Unset
 from rich.console import Group
 from rich.text import Text
 
+from planner.campaign.at_force import UNCHANGED
 from planner.campaign.campaign import Campaign
 from planner.campaign.planned import inside, outside_remark
+from planner.dynamics.at_force import modes_at_force
+from planner.dynamics.in_time import change_at_force
+from planner.dynamics.simulation import Simulation
 from planner.export.npz import save_frfs
+from planner.frf.synthesis import frequency_lines
 from planner.report.answer import Answer
-from planner.report.text import table, with_sd
+from planner.report.text import number, remarks, table, with_sd
+from planner.robot.robot import Robot
 from planner.words import counted
 
 if TYPE_CHECKING:
@@ -25,13 +33,13 @@ class ExpectedMode:
     """A mode as the model predicts it.
 
     `sd_hz` is what a new visit to the pose would show, the scatter from visit to visit included;
-    the modal analysis' own sd of that measurement is not.
+    the modal analysis' own sd of that measurement is not. None: nothing tells them.
     """
 
     frequency_hz: float
-    sd_hz: float
+    sd_hz: float | None
     damping_ratio: float
-    damping_sd: float
+    damping_sd: float | None
 
     @classmethod
     def all_of(cls, prediction: "ModalPrediction", i: int) -> "tuple[ExpectedMode, ...]":
@@ -43,6 +51,8 @@ class ExpectedMode:
     @property
     def cells(self) -> tuple[str, str]:
         """Frequency (Hz) and damping (%) as a table shows them; what is not known is no number."""
+        if self.sd_hz is None or self.damping_sd is None:
+            return number(self.frequency_hz, ".2f"), number(100 * self.damping_ratio, ".2f")
         damping = with_sd(100 * self.damping_ratio, 100 * self.damping_sd)
         if not self.damping_sd < self.damping_ratio:
             damping = "not known"
@@ -51,49 +61,125 @@ class ExpectedMode:
 
 @dataclass(frozen=True)
 class PosePrediction:
-    """The modes expected at a pose, from the lowest; whether it lies `outside` the workspace."""
+    """The modes expected at a pose, from the lowest; whether it lies `outside` the workspace.
+
+    `peak_force_n` is that of the hits that were asked for.
+    """
 
     pose: str
     modes: tuple[ExpectedMode, ...]
     outside: bool = False
+    peak_force_n: float | Unset = UNSET
+
+    @property
+    def title(self) -> str:
+        """Its name, and what is special."""
+        force = "" if self.peak_force_n is UNSET else f", {self.peak_force_n:g} N"
+        return f"{self.pose}{force} (outside)" if self.outside else f"{self.pose}{force}"
 
 
 @dataclass(frozen=True)
 class PredictionReport(Answer):
-    """Answer of `predict`; `npz` is the file with the FRFs, `measurements` how many poses count."""
+    """Answer of `predict`; `npz` is the file with the FRFs, `measurements` how many poses count.
+
+    `robot` is the robot.toml that was asked alone, without a campaign.
+    """
 
     poses: tuple[PosePrediction, ...]
     npz: str
     measurements: int
+    remarks: tuple[str, ...] = ()
+    robot: str | Unset = UNSET
 
     def text(self) -> Group:
         """A table of modes, and which poses lie where nobody asked the model to be good."""
-        made = table(
-            f"After {counted(self.measurements, 'measured pose')}",
-            *("pose", "mode", "frequency (Hz)", "damping (%)"),
-        )
+        title = f"After {counted(self.measurements, 'measured pose')}"
+        if self.robot is not UNSET:
+            title = f"As {self.robot} states the robot"
+        made = table(title, "pose", "mode", "frequency (Hz)", "damping (%)")
         for pose in self.poses:
             for k, mode in enumerate(pose.modes):
-                name = f"{pose.pose} (outside)" if pose.outside else pose.pose
-                made.add_row(name if k == 0 else "", str(k + 1), *mode.cells)
+                made.add_row(pose.title if k == 0 else "", str(k + 1), *mode.cells)
         said = outside_remark([pose.pose for pose in self.poses if pose.outside])
         told = [Text(said, style="yellow")] if said else []
-        return Group(made, *told, Text(f"FRFs (m/s²/N) with sd: {self.npz}"))
+        told += remarks(self.remarks)
+        sd = " with sd" if self.robot is UNSET else ""
+        return Group(made, *told, Text(f"FRFs (m/s²/N){sd}: {self.npz}"))
 
 
 def predictions(
-    campaign: Campaign, names: Sequence[str], q: Sequence[np.ndarray], npz: Path
+    campaign: Campaign,
+    names: Sequence[str],
+    q: Sequence[np.ndarray],
+    npz: Path,
+    force_n: np.ndarray | None = None,
 ) -> PredictionReport:
     """Predict at n poses q, (dof,) in rad each; FRFs go to the npz file.
+
+    Of hits of peak force_n (n,), where joints are not linear: FRFs as such hits measure them, modes
+    linearised. NaN, or None, is as those of the campaign.
 
     Raises InputError where that cannot be written.
     """
     angles, lines = np.array(q), campaign.frequency_lines
     prediction, (mean, sd) = campaign.model.predict(angles), campaign.frf_at(angles)
-    outside = ~inside(campaign.cell, angles)
-    save_frfs(npz, lines, mean, sd, names, campaign.cell.robot.joints, angles, outside)
+    said, asked = (), force_n is not None and bool(np.any(np.isfinite(force_n)))
+    if force_n is not None and asked:
+        there = campaign.at_force
+        prediction = there.modes(prediction, angles, force_n)
+        mean = mean + there.frf_change(angles, force_n, lines)
+        said = () if there.simulation else (UNCHANGED,)
+    outside, joints = ~inside(campaign.cell, angles), campaign.cell.robot.joints
+    save_frfs(npz, lines, mean, sd, names, joints, angles, outside, force_n if asked else None)
     poses = (
-        PosePrediction(name, ExpectedMode.all_of(prediction, i), bool(outside[i]))
+        PosePrediction(
+            name, ExpectedMode.all_of(prediction, i), bool(outside[i]), _stated(force_n, i)
+        )
         for i, name in enumerate(names)
     )
-    return PredictionReport(tuple(poses), str(npz.resolve()), len(campaign.state.used))
+    return PredictionReport(tuple(poses), str(npz.resolve()), len(campaign.state.used), said)
+
+
+def robot_predictions(
+    robot: Robot,
+    names: Sequence[str],
+    poses: Sequence[np.ndarray],
+    npz: Path,
+    force_n: np.ndarray,
+) -> PredictionReport:
+    """The same of a robot.toml alone: nothing tells how sure that is.
+
+    Raises InputError where its simulation is not possible there, or the file cannot be written.
+    """
+    simulation, band = Simulation(robot), robot.config.band_hz
+    q = np.reshape(poses, (len(names), len(robot.joint_names)))
+    lines, asked = frequency_lines(band), np.isfinite(force_n)
+    mean = simulation.accelerance(q, lines) + change_at_force(simulation, q, force_n, lines)
+    modes = simulation.frequencies(q, simulation.elastic.size)
+    f, ratio = modes.frequency_hz, modes.damping_ratio
+    if robot.config.law and asked.any():
+        there = modes_at_force(simulation, q[asked], force_n[asked], f.shape[1])
+        f[asked], ratio[asked] = there.frequency_hz, there.damping_ratio
+    save_frfs(
+        npz, lines, mean, None, names, robot.joints, q, None, force_n if asked.any() else None
+    )
+    expected = (
+        PosePrediction(
+            name,
+            tuple(
+                ExpectedMode(float(a), None, float(b), None)
+                for a, b in zip(f[i], ratio[i], strict=True)
+                if band[0] <= a <= band[1]
+            ),
+            peak_force_n=_stated(force_n, i),
+        )
+        for i, name in enumerate(names)
+    )
+    said = () if robot.config.law or not asked.any() else (UNCHANGED,)
+    return PredictionReport(
+        tuple(expected), str(npz.resolve()), 0, said, str(robot.path.absolute())
+    )
+
+
+def _stated(force_n: np.ndarray | None, i: int) -> float | Unset:
+    return UNSET if force_n is None or np.isnan(force_n[i]) else float(force_n[i])

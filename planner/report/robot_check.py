@@ -21,6 +21,7 @@ from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.plot_files import Pictures
 from planner.report.text import drawn, number, table
+from planner.robot.joint_laws import NUMBER_ENTRIES, LawTable
 from planner.words import counted
 
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
@@ -42,6 +43,7 @@ class RobotCheckReport(Answer):
     links: tuple[CheckedLink, ...]
     joints: tuple[CheckedJoint, ...]
     poses: tuple[CheckedPose, ...]
+    laws: tuple[LawTable, ...] = ()
     plots: tuple[str, ...] = ()
     rrd: str | None = None
     joint_units: Any = msgspec.UNSET
@@ -63,6 +65,7 @@ class RobotCheckReport(Answer):
             links=checked_links(found),
             joints=checked_joints(found),
             poses=checked_poses(found),
+            laws=robot.config.law,
             joint_units=robot.joints.declared,
             found=found,
         )
@@ -100,7 +103,8 @@ class RobotCheckReport(Answer):
             at = ", ".join(joints.text(i, v, 0) for i, v in enumerate(pose.joints_deg))
             modes.add_row(f"{pose.pose}: {at}", _cell(pose, most))
         low, high = self.band_hz
-        said = [Text(f"band_hz is {low:g} to {high:g} Hz."), *map(_line, self.findings)]
+        said = [Text(f"band_hz is {low:g} to {high:g} Hz."), *map(_law, self.laws)]
+        said += map(_line, self.findings)
         parts = [masses, *([modes] if self.poses else []), *said, _summary(self.findings)]
         return Group(*parts, *drawn(self.plots))
 
@@ -116,6 +120,12 @@ def _cell(pose: CheckedPose, most_hz: float) -> str:
     pairs = [pair for pair in both if pair[0] <= most_hz]
     # Frequency and damping of a mode stay on one line.
     return "   ".join(f"{number(f, '.1f')}\u00a0({number(100 * d, '.1f')})" for f, d in pairs)
+
+
+def _law(law: LawTable) -> Text:
+    named = ((name, getattr(law, name)) for name in NUMBER_ENTRIES)
+    numbers = ", ".join(f"{name} = {value:.4g}" for name, value in named if value is not None)
+    return Text(f"{law.joint} is not linear ({law.kind}: {numbers}); modes above are without that.")
 
 
 def _line(remark: CheckRemark) -> Text:

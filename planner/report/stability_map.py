@@ -90,7 +90,7 @@ def map_report(
         raise InputError(
             f'{asked.cut}: feed_in = "path" means nothing all over a workspace; state it in "base".'
         )
-    change, campaign = ToolChange.of(asked, cut), Campaign(asked.source)
+    change, campaign = ToolChange.of(asked, cut), asked.campaign
     candidates = campaign.cell.candidates
     count = min(count, campaign.cell.spread)
     asked_of = tuple(f"W{i + 1:03d}" for i in range(count))

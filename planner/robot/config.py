@@ -5,6 +5,8 @@ from typing import Any, Literal
 
 import msgspec
 
+from planner.robot.joint_laws import LawTable
+
 BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
 LOSS_FACTOR_BELOW = 2.0  # of a spring: more is a damper
 SLIDE_SD_MM = 0.5  # as far as 0.05° take a tool at half a metre
@@ -209,6 +211,15 @@ class ReadbackTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return 1e-3 * (SLIDE_SD_MM if isinstance(stated, msgspec.UnsetType) else stated)
 
 
+class HammerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The hammer whose peak forces are stated: how long its pulse lasts, impulse over peak.
+
+    That is about its width at half its height. Only [[law]] asks for it.
+    """
+
+    pulse_ms: float = 5.0
+
+
 class DiagnoseTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a diagnosis need not explain: a mismatch of so many percent of |H| does not matter."""
 
@@ -268,6 +279,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     compliance: tuple[Compliance, ...] = ()
     link: tuple[LinkTable, ...] = ()
     payload: tuple[Payload, ...] = ()
+    law: tuple[LawTable, ...] = ()
     obstacle: tuple[Obstacle, ...] = ()
     point: tuple[PointTable, ...] = ()
     collision: CollisionTable = CollisionTable()
@@ -275,6 +287,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     resonator: tuple[Resonator, ...] = ()
     harmonic: tuple[Harmonic, ...] = ()
     hits: HitsTable = HitsTable()
+    hammer: HammerTable = HammerTable()
     sensor: SensorTable = SensorTable()
     readback: ReadbackTable = ReadbackTable()
     diagnose: DiagnoseTable = DiagnoseTable()

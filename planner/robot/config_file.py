@@ -20,6 +20,7 @@ from planner.robot.config import (
     RobotConfig,
     SensorTable,
 )
+from planner.robot.joint_laws import NUMBER_ENTRIES, LawTable
 from planner.robot.moments import LINK, PAYLOAD, symmetric
 from planner.toml_file import load_toml
 from planner.words import command
@@ -91,6 +92,7 @@ def _check(config: RobotConfig, path: Path) -> None:
     for name in ("hits", "sensor", "readback", "diagnose"):
         check_sds(getattr(config, name), f"{path}: [{name}]")
     _within(f"{path}: [controller] speed_percent", config.controller.speed_percent, most=100)
+    _within(f"{path}: [hammer] pulse_ms", config.hammer.pulse_ms, " ms", most=100)
     margin = config.collision.margin_m
     _within(f"{path}: [collision] margin_m", margin, " m", zero=True, most=1)
     low, high = config.band_hz
@@ -140,6 +142,34 @@ def check_own_springs(
                 f"{path}: joint {name} slides, but its [[compliance]] turns about its axis, in "
                 f"N·m/rad; state its own spring along that axis with stiffness_n_m (N/m) and "
                 f"damping_n_s_m (N·s/m)."
+            )
+
+
+def check_laws(robot: "Robot") -> None:
+    """Raise InputError where a [[law]] is not that of a joint with a spring of its own."""
+    for number, law in enumerate(robot.config.law, 1):
+        entry = f"{robot.path}: [[law]] number {number} ({law.joint})"
+        if law.joint not in robot.joint_names:
+            names = ", ".join(robot.joint_names)
+            raise InputError(f"{entry} is of no actuated joint; name one of {names}.")
+        wanted = LawTable.entries(law.kind, robot.slides(law.joint))
+        stated = [name for name in NUMBER_ENTRIES if getattr(law, name) is not None]
+        if set(stated) != set(wanted):
+            said = ", ".join(stated) or "neither"
+            raise InputError(
+                f'{entry} states {said}; of kind "{law.kind}" give {" and ".join(wanted)}.'
+            )
+        for name in wanted:
+            _within(f"{entry}: {name}", getattr(law, name), most=LARGEST_STIFFNESS)
+        both = (law.in_spring, law.in_damper_s)
+        _finite(f"{entry}: in_spring, in_damper_s", both, 10, "a share and seconds, 0 if unknown")
+        own = [b for b in robot.config.compliance if b.joint == law.joint and robot.is_own(b)]
+        if not own:
+            raise InputError(f"{entry} has no [[compliance]] about the joint's own axis; add that.")
+        if not own[0].stiffness + law.weakest > 0:
+            raise InputError(
+                f"{entry} takes away more than the whole stiffness of its [[compliance]], "
+                f"{own[0].stiffness:.4g}; state less, or a stiffer spring."
             )
 
 

@@ -73,7 +73,7 @@ class ElasticModel:
         self._carrying = self.stiffness
         self.damping = np.array([c.damping for c in blocks] + dampers)
         self.loss_factor = np.array([c.loss_factor for c in blocks] + [0.0] * len(small))
-        self._waves = tuple((self._own(w.joint), w) for w in robot.config.harmonic)
+        self._waves = tuple((self.own_spring(w.joint), w) for w in robot.config.harmonic)
         self._virtual = virtual_model(robot, inertia_change)
         weighed = self._virtual if inertia_change is None else virtual_model(robot)
         self._model, self._weighed = self._virtual.model, weighed.model
@@ -100,7 +100,7 @@ class ElasticModel:
                 f"listed twice."
             )
 
-    def _own(self, joint: str) -> int:
+    def own_spring(self, joint: str) -> int:
         """Number of the block about a joint's own axis; InputError if there is none."""
         for number, block in enumerate(self.robot.config.compliance):
             if block.joint == joint and self.robot.is_own(block):

@@ -12,7 +12,7 @@ from planner.errors import InputError
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout, PointNames
 from planner.robot.config import Compliance, PointTable, RobotConfig
-from planner.robot.config_file import check_entries, check_own_springs, load_config
+from planner.robot.config_file import check_entries, check_laws, check_own_springs, load_config
 from planner.robot.controller_axes import with_axes
 from planner.robot.linkage import Linkage
 from planner.robot.points import PREFIX, check_points, names_of, with_points
@@ -81,6 +81,7 @@ class Robot:
         with_points(model, config.point, (robot._link_of_point(p) for p in config.point))
         check_entries(robot)
         check_own_springs(config, joints, robot.joint_axes, robot_toml)
+        check_laws(robot)
         _ = robot.points
         return robot
 

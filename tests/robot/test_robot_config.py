@@ -22,6 +22,12 @@ stiffness = {}
 damping = 1.0
 tie = "all"
 """
+LAW = """[[law]]
+joint = "{}"
+kind = "{}"
+{}
+[[obstacle]]"""
+BENT = "stiffness_n_m_rad = {}\nangle_rad = {}"
 INERTIA = "inertia = [0.01, 0.01, {}, 0, 0, 0]\n"
 
 # What is wrong: (old text, new text, words that the sentence has to hold).
@@ -79,6 +85,43 @@ WRONG_TOML = {
         PAYLOAD.format(2.0, 0.1).replace("tool", "hook") + "[[obstacle]]",
         ["[[payload]]", '"hook"'],
     ),
+    **{
+        f"a law, {name}": ("[[obstacle]]", LAW.format(joint, kind, numbers), ["[[law]]", *words])
+        for name, joint, kind, numbers, words in (
+            ("of no joint", "elbow", "hardening", BENT.format(1e4, 1e-3), ["elbow", "joint_a1"]),
+            (
+                "with the numbers of another",
+                "joint_a1",
+                "friction",
+                BENT.format(1e4, 1e-3),
+                ["friction", "angle_rad", "coulomb_torque_n_m"],
+            ),
+            (
+                "of a joint that slides",
+                "joint_a1",
+                "backlash",
+                "stiffness_n_m = 1.0\nshift_m = 1.0",
+                ["backlash", "shift_m", "give stiffness_n_m_rad and angle_rad"],
+            ),
+            ("without numbers", "joint_a1", "softening", "", ["neither"]),
+            ("below 0", "joint_a1", "hardening", BENT.format(-1e4, 1e-3), ["above 0"]),
+            ("no number", "joint_a1", "hardening", BENT.format(1e4, "nan"), ["angle_rad"]),
+            ("more than the spring", "joint_a1", "softening", BENT.format(7e4, 1e-3), ["6e+04"]),
+            (
+                "endless in the spring",
+                "joint_a1",
+                "hardening",
+                BENT.format(1e4, 1e-3) + "\nin_spring = inf",
+                ["in_spring"],
+            ),
+        )
+    },
+    "a law of no kind": (
+        "[[obstacle]]",
+        LAW.format("joint_a1", "rubber", ""),
+        ["rubber", "law"],
+    ),
+    "a pulse of none": ("[[obstacle]]", "[hammer]\npulse_ms = 0\n[[obstacle]]", ["pulse_ms"]),
     "a flat obstacle": (SIZES, "size_m = [4, 4, 0]", ["floor", "above 0 m"]),
     "a tool unknown": ('tcp_frame = "tool"', 'tcp_frame = "tol"', ["tcp_frame", '"tol"']),
     "a sensor unknown": ('"accelerometer"', '"adxl"', ["sensor_frame", '"adxl"']),
