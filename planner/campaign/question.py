@@ -29,9 +29,8 @@ from planner.recording.points import TOOL
 LOG_ODDS = np.log(1000.0)  # against a mistake, before anything is measured
 BETTER = 3.0  # times less is left by a mistake that explains them
 # Measured poses before which another structure may explain what nothing known fits: until then
-# the simulation alone tells of the chain, as before the first. One more before a joint is looked
-# for elsewhere: of 90 third poses with good hits 3 fitted another angle better, of 270 later 2.
-SURE, SETTLED = 2, 3
+# the simulation alone tells of the chain, as before the first; no joint is looked for elsewhere.
+SURE = 2
 # A joint is looked for elsewhere by 2^NEAREST to 2^(FARTHEST − 1) times as far as readbacks err.
 NEAREST, FARTHEST = 1, 7
 FOLLOWED = 3  # mistakes that are fitted, those that seem likeliest at once
@@ -74,7 +73,7 @@ def question(
     if not stated.doubted and not stated.instead(typed):
         return None
     mistakes = [*typed, *_poses(model, state, pose, joints_deg), *_chains(state, expected, q, frf)]
-    if learned.poses >= SETTLED:
+    if learned.poses >= SURE:
         mistakes += elsewhere(model.cell.robot.joints, expected, frf, joints_deg)
     fits = stated.instead(mistakes)
     if fits is None and not stated.impossible:

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from planner.campaign.chain_faults import AGAINST, TURNED, fitted
 from planner.campaign.chain_question import Draws
-from planner.campaign.question import SETTLED, SURE, Mistake, StatedHits, elsewhere
+from planner.campaign.question import SURE, Mistake, StatedHits, elsewhere
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
@@ -73,7 +73,7 @@ class Asker:
         if not stated.doubted:
             return ""
         mistakes = [Mistake(there, "", name) for name, there in others.items()]
-        if self.poses >= SETTLED:
+        if self.poses >= SURE:
             angles = tuple(self.joints.shown(q))
             mistakes += elsewhere(self.joints, self.expected, frf, angles)
         faults = (*TURNED, *AGAINST, *fitted(self.expected.shown(q, frf)))
