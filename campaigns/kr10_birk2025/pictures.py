@@ -10,7 +10,8 @@ from planner.studies import drawing
 from planner.studies.report import Table
 
 from .data import BAND_HZ, PATHS, PathHits
-from .fits import SEARCHED, Design, IdentifiedModel, percent
+from .fits import SEARCHED, IdentifiedModel, percent
+from .where import Design
 
 BOTH, MAIN = ("12P", "24P"), ("12P", "24P", "24P, ours")
 ORDER = (*MAIN, *SEARCHED)

@@ -12,7 +12,6 @@ from planner.dynamics.vibration import SimulatedModes
 from planner.effects.parameters import CAD_INERTIAS, Priors
 from planner.effects.table import Repertoire
 from planner.fit.fitted import FitRecord
-from planner.fit.frequency_uncertainty import frequency_sd
 from planner.fit.learned import Learned
 from planner.fit.result import Identification
 from planner.fit.search import Search
@@ -147,8 +146,7 @@ class LowFidelity:
         """
         if self.learned is None:
             return np.zeros((len(q), self.count))
-        nominal, identified = self.learned.structure.simulation, self.learned.identified
-        return frequency_sd(identified, nominal, self.learned.priors, q, simulated)
+        return self.learned.frequency_sd(q, simulated)
 
 
 def learn(
@@ -171,7 +169,8 @@ def learn(
     prior = RobotPrior(Repertoire.of(nominal, before.priors))
 
     def search(count: int) -> Search:
-        return Search(prior, tuple(frfs[:count]), q[:count], band_hz, before.tolerances)
+        first = tuple(frfs[:count])
+        return Search(prior, first, q[:count], band_hz, before.tolerances, widen=True)
 
     def found(count: int) -> FitRecord:
         def find() -> FitRecord:

@@ -10,7 +10,9 @@ from planner.studies import registry
 from planner.studies.claims import HOLDS, IN_KIND, NOT, UNTESTED, judge
 from tests.support.studied import part
 
-DATA, FITS, PICTURES = (part("birk2025", name) for name in ("data", "fits", "pictures"))
+DATA, FITS, PICTURES, WHERE = (
+    part("birk2025", name) for name in ("data", "fits", "pictures", "where")
+)
 RULES = [(name, rule) for name in registry.NAMES for rule in registry.load(name).RULES]
 
 
@@ -134,7 +136,8 @@ def made_up_birk(off):
         return FITS.IdentifiedModel(simulation, agreed, agreed, 1.0, values, bounds)
 
     hits = DATA.PathHits(SimpleNamespace(frfs=()), path)
-    designs = [FITS.Design("", np.arange(9), 16, 80.0), FITS.Design("", np.arange(9), 17, 82.0)]
+    told = (16, 80.0), (17, 82.0), (17, 79.0)
+    designs = [WHERE.Design("", np.arange(9), *one) for one in told]
     return PICTURES.Run(hits, {name: model(name) for name in off}, designs)
 
 
@@ -155,3 +158,4 @@ def test_figures_of_birk_say_which_model_is_better():
     assert found["least ratio of a joint"] == 4
     assert found["parameters determined beyond the paper's nine"] == 1
     assert found["FRAC elsewhere beyond the paper's nine, points"] == 2
+    assert found["FRAC elsewhere beyond D-optimal points, points"] == 3

@@ -15,7 +15,8 @@ from planner.truth.load import load_truth
 from tests.support.studied import part
 
 busch2022, busch2020, seyed, lei, birk = (part(name, "data") for name in registry.NAMES)
-FITS, SCORES = part("birk2025", "fits"), part("lei2023", "scores")
+FITS, WHERE = part("birk2025", "fits"), part("birk2025", "where")
+SCORES = part("lei2023", "scores")
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +142,7 @@ def test_the_most_informative_points_come_first():
     truth = birk.true_robot(11)
     q, path = birk.poses(truth, 6)
     assert list(path[:6]) == ["S1"] * 6
-    informative = FITS.Informative.of(simulation, Priors(), (), q, 1.0, (5.0, 200.0))
+    informative = WHERE.Informative.of(simulation, Priors(), (), q, 1.0, (5.0, 200.0))
     chosen = informative.best(4)
     assert len(set(chosen.tolist())) == 4
     assert informative.determined(chosen) >= informative.determined(np.arange(4))
@@ -239,8 +240,22 @@ def test_the_best_points_tell_most_and_one_direction_tells_less():
     """Two parameters, five points: each of two tells of one parameter, the others of nothing."""
     told = np.zeros((5, 3, 2, 2))
     told[1, 0, 0, 0], told[3, 1, 1, 1] = 100.0, 400.0
-    informative = FITS.Informative(np.eye(2), told)
+    informative = WHERE.Informative(np.eye(2), told)
     np.testing.assert_array_equal(informative.best(2), [3, 1])
     assert informative.determined(np.array([1, 3])) == 2
     assert informative.determined(np.array([1, 3]), [0]) == 1
     assert informative.determined(np.array([0, 2])) == 0
+
+
+def test_points_for_prediction_do_not_stand_together():
+    """Points 0 and 1 tell most, of one parameter, and are alike; point 2 tells of the other."""
+    by_parameter = np.array([[3.0, 0.0], [2.9, 0.0], [0.0, 1.0], [0.1, 0.1]])
+    products = np.einsum("np,mq->nmpq", by_parameter, by_parameter)
+    apart = np.eye(4)
+    near = apart.copy()
+    near[0, 1] = near[1, 0] = 0.99
+    alike = WHERE.Predictive(np.eye(2), (products,), (near,))
+    assert sorted(alike.best(2).tolist()) == [0, 2]
+    assert alike.left([0, 2]) < alike.left([0]) < alike.left([3])
+    other = WHERE.Predictive(np.eye(2), (products,), (apart,))
+    assert alike.left([0]) - alike.left([0, 1]) < other.left([0]) - other.left([0, 1])
