@@ -91,7 +91,11 @@ RULES = (
         "(outlook) Well chosen points determine the parameters better than ends and middles.",
         Bound("parameters determined beyond the paper's nine", above=0),
         Bound("FRAC elsewhere beyond the paper's nine, points", above=0, full=1),
-        Bound("FRAC elsewhere beyond D-optimal points, points", above=0, full=1),
+    ),
+    ClaimRule.of(
+        "Points chosen for the FRFs that they predict serve better than D-optimal ones.",
+        Bound("FRAC elsewhere beyond D-optimal points, points", above=0),
+        ours=True,
     ),
     ClaimRule.of(
         "24P with inertias free and hits' errors integrated out predicts better than 24P, at poses "
