@@ -26,7 +26,7 @@ def log_frequency_slope(
     damped ones, whatever the dampers. The sag under gravity is held where the springs carry the
     weight, as it is while they are identified.
     """
-    poles = Poles.of(simulation, q, modes)
+    poles = PoleMotion.of(simulation, q, modes)
     pole, x, scale = poles.pole, poles.shape, poles.scale
     springs, own = simulation.elasticity, len(parametrisation.parameters)
     by_kind = {
@@ -52,8 +52,8 @@ def log_frequency_slope(
 
 
 @dataclass(frozen=True, eq=False)
-class Poles:
-    """Poles λ (n, count) of modes, shapes (n, count, e), and `scale`: d ln λ is it times xᵀ dZ x.
+class PoleMotion:
+    """PoleMotion λ (n, count) of modes, shapes (n, count, e), and `scale`: d ln λ is it times xᵀ dZ x.
 
     Where there is no mode (not `known`) they mean nothing.
     """
@@ -64,7 +64,7 @@ class Poles:
     scale: np.ndarray
 
     @classmethod
-    def of(cls, simulation: Simulation, q: np.ndarray, modes: SimulatedModes) -> "Poles":
+    def of(cls, simulation: Simulation, q: np.ndarray, modes: SimulatedModes) -> "PoleMotion":
         """Of a simulation's `modes` at q (n, dof) in rad."""
         m, (hertz, ratio) = (
             simulation.elastic.matrices(q),
@@ -105,7 +105,7 @@ def frequency_sd(posterior: RobotPosterior, q: np.ndarray, modes: SimulatedModes
 
 def structure_slope(posterior: RobotPosterior, q: np.ndarray, modes: SimulatedModes) -> np.ndarray:
     """∂ ln f (n, count, D) of the same by the numbers of the structure, but for the chain's."""
-    poles, structure = Poles.of(posterior.simulation, q, modes), posterior.structure
+    poles, structure = PoleMotion.of(posterior.simulation, q, modes), posterior.structure
     data = posterior.at(q, np.abs(poles.pole) / (2 * np.pi))
     data = replace(data, measured=replace(data.measured, s=poles.pole))
     x = np.swapaxes(poles.shape[..., : len(structure.springs)], 1, 2)[:, :, None]

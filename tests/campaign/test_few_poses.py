@@ -6,7 +6,7 @@ FEW_SEED is the first seed, FEW how many robots (10).
 """
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,7 +61,7 @@ class Told:
     sd: np.ndarray
 
     @classmethod
-    def of(cls, model: Model, case: Case, q: np.ndarray, true: list) -> "Told":
+    def of(cls, model: Model, q: np.ndarray, true: list) -> "Told":
         """At q, where `true_modes` has found what is `true`."""
         f, sd = model.frequencies(q)
         hertz = np.array([counted(*one, row) for one, row in zip(true, f, strict=True)])
@@ -74,8 +74,13 @@ class Told:
 
     @property
     def percent(self) -> tuple[float, float]:
-        """Medians of error and sd in %."""
+        """Medians of error and of sd in %."""
         return 100 * float(np.median(np.abs(self.off))), 100 * float(np.median(self.sd))
+
+    @property
+    def words(self) -> str:
+        """Such as "0.92 (0.64, 1.19 %)"."""
+        return f"{self.held:.2f} ({self.percent[0]:.2f}, {self.percent[1]:.2f} %)"
 
 
 def told(case: Case, recall: Recall) -> list[Told]:
@@ -83,4 +88,20 @@ def told(case: Case, recall: Recall) -> list[Told]:
     rng = np.random.default_rng(1)
     q = rng.uniform(*case.box_rad, (UNSEEN, case.q.shape[1]))
     true = [true_modes(case.truth, one, COUNTED + NOT_COUNTED) for one in q]
-    return [Told.of(model, case, q, true) for model in models(case, recall)]
+    return [Told.of(model, q, true) for model in models(case, recall)]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(14400)
+def test_intervals_hold_from_the_first_pose_on(tmp_path):
+    print(f"\nshare held (median error, median sd) after {COUNTS} poses")
+    found = []
+    for number in range(ROBOTS):
+        arm, make = [*ARMS][number % len(ARMS)], (everyday, harder)[number // len(ARMS) % 2]
+        case = make(arm, FIRST + number, tmp_path / str(number))
+        with threadpool_limits(1):
+            found.append(told(case, in_memory()))
+        print(FIRST + number, arm, make.__name__, "; ".join(t.words for t in found[-1]), flush=True)
+    held = np.array([[t.held for t in one] for one in found])
+    print("all: " + "; ".join(f"{share:.3f}" for share in held.mean(axis=0)))
+    assert np.all(held.mean(axis=0) >= 0.9)
