@@ -25,6 +25,9 @@ BELIEVED = 0.99  # in a simulation that fits the recordings
 # Of ln f: what is left where the simulation explains the recordings, and where not, in shares of
 # what is not explained of |H|: resonances of a few per cent of damping shift by so much of it.
 RIGHT, DAMPING = 0.001, 0.05
+# Fewer poses tell neither the structure for sure, nor the scatter from visit to visit, nor, left out
+# one by one, how far a simulation is off that lacks physics.
+FEW_POSES = 5
 
 Used = tuple[Measurement, ...]
 # What was found of these measurements before, or is found now.
@@ -169,8 +172,8 @@ def learn(
     prior = RobotPrior(Repertoire.of(nominal, before.priors))
 
     def search(count: int) -> Search:
-        first = tuple(frfs[:count])
-        return Search(prior, first, q[:count], band_hz, before.tolerances, widen=True)
+        first, few = tuple(frfs[:count]), count < FEW_POSES
+        return Search(prior, first, q[:count], band_hz, before.tolerances, widen=few)
 
     def found(count: int) -> FitRecord:
         def find() -> FitRecord:

@@ -53,7 +53,7 @@ def log_frequency_slope(
 
 @dataclass(frozen=True, eq=False)
 class PoleMotion:
-    """PoleMotion λ (n, count) of modes, shapes (n, count, e), and `scale`: d ln λ is it times xᵀ dZ x.
+    """Poles λ (n, count) of modes, shapes (n, count, e), and `scale`: d ln λ is it times xᵀ dZ x.
 
     Where there is no mode (not `known`) they mean nothing.
     """

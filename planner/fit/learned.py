@@ -49,10 +49,10 @@ class Learned:
         count = modes.frequency_hz.shape[1]
         every = self.wider.identified.simulation.frequencies(q, count + ABOVE)
         same, away = _same(every.frequency_hz, modes.frequency_hz)
-        wider = SimulatedModes(
-            *(np.take_along_axis(v, same, 1) for v in (every.frequency_hz, every.damping_ratio)),
-            modes.residue,
+        hertz, ratio = (
+            np.take_along_axis(v, same, 1) for v in (every.frequency_hz, every.damping_ratio)
         )
+        wider = SimulatedModes(hertz, ratio, modes.residue)
         return np.hypot(self.wider.frequency_sd(q, wider), away)
 
     @property

@@ -8,7 +8,6 @@ FEW_SEED is the first seed, FEW how many robots (10).
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
