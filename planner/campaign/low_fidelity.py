@@ -25,8 +25,8 @@ BELIEVED = 0.99  # in a simulation that fits the recordings
 # Of ln f: what is left where the simulation explains the recordings, and where not, in shares of
 # what is not explained of |H|: resonances of a few per cent of damping shift by so much of it.
 RIGHT, DAMPING = 0.001, 0.05
-# Fewer poses tell neither the structure for sure, nor the scatter from visit to visit, nor, left out
-# one by one, how far a simulation is off that lacks physics.
+# Fewer poses tell neither the structure for sure, nor the scatter from visit to visit, nor, left
+# out one by one, how far a simulation is off that lacks physics.
 FEW_POSES = 5
 
 Used = tuple[Measurement, ...]
