@@ -12,7 +12,6 @@ from planner.dynamics.vibration import SimulatedModes
 from planner.effects.parameters import CAD_INERTIAS, Priors
 from planner.effects.table import Repertoire
 from planner.fit.fitted import FitRecord
-from planner.fit.frequency_uncertainty import frequency_sd
 from planner.fit.learned import Learned
 from planner.fit.result import Identification
 from planner.fit.search import Search
@@ -26,6 +25,9 @@ BELIEVED = 0.99  # in a simulation that fits the recordings
 # Of ln f: what is left where the simulation explains the recordings, and where not, in shares of
 # what is not explained of |H|: resonances of a few per cent of damping shift by so much of it.
 RIGHT, DAMPING = 0.001, 0.05
+# Fewer poses tell neither the structure for sure, nor the scatter from visit to visit, nor, left
+# out one by one, how far a simulation is off that lacks physics.
+FEW_POSES = 5
 
 Used = tuple[Measurement, ...]
 # What was found of these measurements before, or is found now.
@@ -147,8 +149,7 @@ class LowFidelity:
         """
         if self.learned is None:
             return np.zeros((len(q), self.count))
-        nominal, identified = self.learned.structure.simulation, self.learned.identified
-        return frequency_sd(identified, nominal, self.learned.priors, q, simulated)
+        return self.learned.frequency_sd(q, simulated)
 
 
 def learn(
@@ -171,7 +172,8 @@ def learn(
     prior = RobotPrior(Repertoire.of(nominal, before.priors))
 
     def search(count: int) -> Search:
-        return Search(prior, tuple(frfs[:count]), q[:count], band_hz, before.tolerances)
+        first, few = tuple(frfs[:count]), count < FEW_POSES
+        return Search(prior, first, q[:count], band_hz, before.tolerances, widen=few)
 
     def found(count: int) -> FitRecord:
         def find() -> FitRecord:

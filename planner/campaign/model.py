@@ -13,7 +13,7 @@ from planner.campaign.config import ModesTable
 from planner.campaign.hit_error_estimates import CampaignHitErrors
 from planner.campaign.hit_errors import PoseHitErrors
 from planner.campaign.labels import LabelledPose, observations
-from planner.campaign.low_fidelity import LowFidelity
+from planner.campaign.low_fidelity import FEW_POSES, LowFidelity
 from planner.campaign.state import Measurement
 from planner.design.acquisitions import mixed
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
@@ -39,9 +39,6 @@ FrfOf = Callable[[Measurement, ModesTable], Frf]
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
-# Fewer poses tell neither the scatter from visit to visit nor, left out one by one, how far a
-# simulation is off that lacks physics.
-FEW_POSES = 5
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,12 @@ MATTERS = 0.01  # share of |H| that an effect must change: nothing wrong changes
 
 @dataclass(frozen=True, eq=False)
 class StructureFit:
-    """A structure fitted to FRFs."""
+    """A structure fitted to FRFs; `wider` has beside it what they cannot exclude."""
 
     misfit: FrfMisfit
     at: At
     evidence: float
+    wider: "StructureFit | None" = None
 
     @cached_property
     def shares(self) -> tuple[float, ...]:
@@ -40,8 +41,12 @@ class StructureFit:
     @property
     def remembered(self) -> "FitRecord":
         """What is worth keeping of it."""
+        record = self._record(self.shares)
+        return replace(record, wider=self.wider and self.wider._record(()))
+
+    def _record(self, shares: tuple[float, ...]) -> "FitRecord":
         s = self.structure
-        return FitRecord(s.effects, s.names, self.at.x, self.at.own, size_of(self), self.shares)
+        return FitRecord(s.effects, s.names, self.at.x, self.at.own, size_of(self), shares)
 
     @property
     def settled(self) -> bool:
@@ -69,6 +74,7 @@ class FitRecord:
     own: np.ndarray
     size: float
     shares: tuple[float, ...]
+    wider: "FitRecord | None" = None
 
 
 def settled(misfit: FrfMisfit, at: At, rounds: int = 1, steps: int = SETTLED) -> StructureFit:

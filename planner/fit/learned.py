@@ -1,9 +1,14 @@
 """What recordings taught a simulation: a structure, and its parameters."""
 
 from dataclasses import dataclass
+from itertools import combinations
 
+import numpy as np
+
+from planner.dynamics.vibration import SimulatedModes
 from planner.effects.parameters import Priors
 from planner.fit.fitted import StructureFit
+from planner.fit.frequency_uncertainty import frequency_sd
 from planner.fit.identified import ExtendedModel, as_identification
 from planner.fit.posterior import RobotPosterior
 from planner.fit.result import Estimate, Identification
@@ -13,6 +18,7 @@ BEYOND = 2.0  # sds of the gains, from which their deviation is told
 KNOWN = 0.3  # sd of ln k to which a spring not stated is known when it is told of
 # PosedBodies from which a place is told as found: from one, neighbours imitate each other.
 PLACED = 3
+ABOVE, NOT_THERE = 2, 1.0  # modes that a wider structure may have beside; ln f of one that is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +30,30 @@ class Learned:
     structure: ExtendedModel
     identified: Identification
     poses: int = PLACED
+    wider: "Learned | None" = None
 
     @classmethod
     def of(cls, found: StructureFit) -> "Learned":
         """From the structure that was found."""
         posterior = RobotPosterior.of(found)
-        return cls(posterior, *as_identification(posterior), len(found.misfit.data.q))
+        wider = None if found.wider is None else cls.of(found.wider)
+        return cls(posterior, *as_identification(posterior), len(found.misfit.data.q), wider)
+
+    def frequency_sd(self, q: np.ndarray, modes: SimulatedModes) -> np.ndarray:
+        """Sd of ln f (n, count) of its `modes` at q (n, dof) in rad.
+
+        By the numbers of the wider structure, and by how far its modes are from these.
+        """
+        if self.wider is None:
+            return frequency_sd(self.posterior, q, modes)
+        count = modes.frequency_hz.shape[1]
+        every = self.wider.identified.simulation.frequencies(q, count + ABOVE)
+        same, away = _same(every.frequency_hz, modes.frequency_hz)
+        hertz, ratio = (
+            np.take_along_axis(v, same, 1) for v in (every.frequency_hz, every.damping_ratio)
+        )
+        wider = SimulatedModes(hertz, ratio, modes.residue)
+        return np.hypot(self.wider.frequency_sd(q, wider), away)
 
     @property
     def fits(self) -> bool:
@@ -78,3 +102,13 @@ class Learned:
             f"{counted(self.poses, 'pose')} it may as well be elsewhere: repair nothing yet, and "
             f"measure {counted(PLACED - self.poses, 'more pose')}."
         )
+
+
+def _same(every_hz: np.ndarray, hertz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which of all modes (n, more) those (n, k) are, in the same order, and how far off in ln f."""
+    k = hertz.shape[1]
+    choices = np.array(list(combinations(range(every_hz.shape[1]), k)))
+    away = np.abs(np.log(every_hz[:, choices] / hertz[:, None]))
+    away = np.where(np.isfinite(away), away, NOT_THERE)
+    best = np.argmin(np.sum(away**2, axis=-1), axis=1)
+    return choices[best], away[np.arange(len(best)), best]

@@ -40,6 +40,7 @@ SAME = 3.0  # nats that one less may cost
 COMPLETIONS = 2  # rounds
 MOST_OPERATORS = 3  # beside springs: more would imitate what the fit lacks
 IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which a few steps are not settled
+STIFF_AT_FIRST, WIDENING = 3.0, 10  # prior sds of springs that may be there; steps
 OPERATORS, FINALISTS, ENDS = 5, 4, 2  # how many are tried, followed, settled
 # Sizes: with all lines at first; up to which nothing need be missing; from which one begins afresh.
 CLOSE, EXPLAINED, UNEXPLAINED = 0.01, 0.008, 0.03
@@ -59,6 +60,7 @@ class Search:
     extend: bool = True  # where what is stated does not explain them
     order: np.ndarray | None = None  # as in `FrfData.of`
     floor: float = 0.0  # as in `FrfMisfit`
+    widen: bool = False  # whether `StructureFit.wider` is asked for
 
     def data(self, lines: int) -> FrfData:
         """On so many lines a pose."""
@@ -109,7 +111,8 @@ class Search:
             if fresh is None:
                 break
             best = self._evolved(converged(fresh), dense)
-        return self._last(that_matters(best))
+        found = self._last(that_matters(best))
+        return replace(found, wider=self._widened(found, best)) if self.widen else found
 
     def _again(self, known: FitRecord, data: FrfData, size: float) -> tuple[FrfMisfit, np.ndarray]:
         structure = RobotStructure(self.prior, known.effects, data.sensors)
@@ -122,7 +125,8 @@ class Search:
         """What was found of these FRFs before, as it was."""
         misfit, x = self._again(known, self._completed(known).data(LAST), known.size)
         at = misfit(x, known.own)
-        found = StructureFit(misfit, at, misfit.evidence(at))
+        wider = None if known.wider is None else self.recalled(known.wider)
+        found = StructureFit(misfit, at, misfit.evidence(at), wider)
         vars(found)["shares"] = known.shares
         return found
 
@@ -281,6 +285,28 @@ class Search:
         best = settled(misfit, at, rounds=2, steps=15)
         at = minimised(best.misfit, best.at.x, 25, 0.02, best.at.own, by_prior=True)
         return StructureFit(best.misfit, at, best.misfit.evidence(at))
+
+    def _widened(self, found: StructureFit, whole: StructureFit) -> StructureFit:
+        """With what was left out as it matters little, and every spring that there may be.
+
+        What poses not measured may show is open as it is here: few poses tell no structure.
+        """
+        misfit = replace(found.misfit, structure=whole.structure)
+        at = found.at
+        if whole.structure.effects != found.structure.effects:
+            at = minimised(misfit, whole.at.x, TRIED, 1.0, whole.at.own)
+        for effect in effects_free(whole.structure):
+            if not effect.springs:
+                continue
+            structure = misfit.structure.with_effect(effect)
+            x, names = structure.carried(misfit.structure, at.x), misfit.structure.names
+            new = [i for i in range(structure.stiffnesses) if structure.names[i] not in names]
+            x[new] += STIFF_AT_FIRST * structure.sd[new]
+            wider = replace(misfit, structure=structure)
+            if wider.possible(x):
+                misfit, at = wider, minimised(wider, x, FURTHER, 1.0, at.own)
+        at = minimised(misfit, at.x, WIDENING, 1.0, own=at.own)
+        return StructureFit(misfit, at, misfit.evidence(at))
 
 
 def placed(

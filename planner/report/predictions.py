@@ -11,20 +11,16 @@ from msgspec import UnsetType as Unset
 from rich.console import Group
 from rich.text import Text
 
-from planner.campaign.at_force import UNCHANGED
 from planner.campaign.campaign import Campaign
 from planner.campaign.planned import inside, outside_remark
-from planner.dynamics.at_force import modes_at_force
-from planner.dynamics.in_time import change_at_force
-from planner.dynamics.simulation import Simulation
 from planner.export.npz import save_frfs
 from planner.frf.synthesis import frequency_lines
 from planner.report.answer import Answer
 from planner.report.text import number, remarks, table, with_sd
-from planner.robot.robot import Robot
 from planner.words import counted
 
 if TYPE_CHECKING:
+    from planner.robot.robot import Robot
     from planner.surrogate.frf_bands import ModalPrediction
 
 
@@ -121,6 +117,8 @@ def predictions(
 
     Raises InputError where that cannot be written.
     """
+    from planner.campaign.at_force import UNCHANGED  # status needs none of what that imports
+
     angles, lines = np.array(q), campaign.frequency_lines
     prediction, (mean, sd) = campaign.model.predict(angles), campaign.frf_at(angles)
     said, asked = (), force_n is not None and bool(np.any(np.isfinite(force_n)))
@@ -141,7 +139,7 @@ def predictions(
 
 
 def robot_predictions(
-    robot: Robot,
+    robot: "Robot",
     names: Sequence[str],
     poses: Sequence[np.ndarray],
     npz: Path,
@@ -151,6 +149,11 @@ def robot_predictions(
 
     Raises InputError where its simulation is not possible there, or the file cannot be written.
     """
+    from planner.campaign.at_force import UNCHANGED
+    from planner.dynamics.at_force import modes_at_force
+    from planner.dynamics.in_time import change_at_force
+    from planner.dynamics.simulation import Simulation
+
     simulation, band = Simulation(robot), robot.config.band_hz
     q = np.reshape(poses, (len(names), len(robot.joint_names)))
     lines, asked = frequency_lines(band), np.isfinite(force_n)

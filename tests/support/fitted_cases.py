@@ -69,6 +69,9 @@ class Case:
     true_frf: np.ndarray
     true_hz: tuple[np.ndarray, ...]
     concealed: tuple[str, ...]
+    measured: tuple[MeasuredPose, ...]
+    truth: Truth
+    box_rad: np.ndarray  # (2, dof)
 
     def posterior(self) -> RobotPosterior:
         """What a fit makes of it."""
@@ -143,19 +146,23 @@ def _measured(
         aims = zip(axes, handling.aims(axes, rng), strict=True)
         aimed = [together(common[axis], aim) for axis, aim in aims]
         visits.append(HitVisit(there, shots, number / POSES, aims=aimed))
-    frfs = []
+    measured = []
     for recorded in hit_poses(truth, secret, visits, hammer, rng):
         hits = tuple(
             Hit(Path("hit"), h.axis, hammer.sampling_rate_hz, h.force_n, h.acceleration_m_s2,
                 simulated=True)
             for h in recorded
         )  # fmt: skip
-        frfs.append(MeasuredPose((), arm.band_hz, given=hits).one_hit_frf)
+        measured.append(MeasuredPose((), arm.band_hz, given=hits))
     lines = np.linspace(*arm.band_hz, LINES)
     true = np.array([truth.accelerance(one, lines) for one in unseen])
     modes = [true_modes(truth, one, 12, True) for one in unseen]
     seen = tuple(hz[np.asarray(shown)][:COUNTED] for hz, shown in modes)
-    return Case(arm.toml, arm.band_hz, q, tuple(frfs), unseen, lines, true, seen, concealed)
+    frfs = tuple(pose.one_hit_frf for pose in measured)
+    return Case(
+        arm.toml, arm.band_hz, q, frfs, unseen, lines, true, seen, concealed, tuple(measured),
+        truth, np.array([low, high]),
+    )  # fmt: skip
 
 
 def _box(arm: Arm, simulation: Simulation) -> tuple[np.ndarray, np.ndarray]:
