@@ -44,7 +44,10 @@ class Exported:
 
 
 def export(what: Exported, folder: Path) -> list[Path]:
-    """Write modes.uff (151, 164, 15, 2411, 82, 55), frfs.uff (58), modes.csv and shapes.csv."""
+    """Write modes.uff (151, 164, 15, 2411, 82, 55), frfs.uff (58), modes.csv and shapes.csv.
+
+    And vectors.uff (55) and vectors.csv: right and left vectors, where rows and columns are tied.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         files = [folder / name for name in ("modes.uff", "frfs.uff", "modes.csv", "shapes.csv")]
@@ -52,6 +55,10 @@ def export(what: Exported, folder: Path) -> list[Path]:
         _universal(files[1], [_header(what), *_frfs(what)])
         _modes_table(what.found, files[2])
         _shapes_table(what.found, files[3])
+        if apart := _vectors(what):
+            files += [folder / name for name in ("vectors.uff", "vectors.csv")]
+            _universal(files[4], [_header(what), *_geometry(what), *_vector_sets(what, apart)])
+            _vectors_table(apart, files[5])
     except OSError as error:
         raise InputError(
             f"Nothing can be written to {folder} ({error.strerror}); name another folder."
@@ -142,6 +149,51 @@ def _shapes(what: Exported) -> list[dict[str, Any]]:
                     "modal_b": -mode.pole * a}  # fmt: skip
         sets.append(common | more | dict(zip(("r1", "r2", "r3"), values, strict=True)))
     return sets
+
+
+Vectors = list[tuple[int, str, tuple[Dof, ...], np.ndarray, np.ndarray]]
+
+
+def _vectors(what: Exported) -> Vectors:
+    """Mode (from 1), side, its degrees of freedom, vector and sd: right before left."""
+    matrix = what.matrix
+    return [
+        (k, side, dofs, vector, sd)
+        for k, mode in enumerate(what.found.modes, 1)
+        if (v := mode.vectors) is not None
+        for side, dofs, vector, sd in (
+            ("right", matrix.responses, v.right, v.right_sd),
+            ("left", matrix.references, v.left, v.left_sd),
+        )
+    ]
+
+
+def _vector_sets(what: Exported, apart: Vectors) -> list[dict[str, Any]]:
+    """The format knows no left vectors: the second line of each set says which it is."""
+    sets, numbers = [], what.numbers
+    for k, side, dofs, vector, _ in apart:
+        mode, (nodes, motion) = what.found.modes[k - 1], _motion(dofs, vector, numbers)
+        a = 2j * mode.pole.imag
+        sets.append(
+            {
+                "type": 55, "id1": f"mode {k}: {mode.frequency_hz:.6g} Hz",
+                "id2": f"{side} vector: R = right left^T / (2 i w_d)", "model_type": 1,
+                "data_ch": 2, "spec_data_type": 8, "load_case": 0, "mode_n": k,
+                "node_nums": nodes, "n_data_per_node": 3, "analysis_type": 3, "data_type": 5,
+                "eig": mode.pole, "modal_a": a, "modal_b": -mode.pole * a,
+                **dict(zip(("r1", "r2", "r3"), map(np.ascontiguousarray, motion.T), strict=True)),
+            }
+        )  # fmt: skip
+    return sets
+
+
+def _vectors_table(apart: Vectors, path: Path) -> None:
+    rows = [
+        (k, side, dof.node, dof.direction, float(value.real), float(value.imag), float(error))
+        for k, side, dofs, vector, sd in apart
+        for dof, value, error in zip(dofs, vector, sd, strict=True)
+    ]
+    _table(path, ("mode", "side", "node", "direction", "re", "im", "sd"), rows)
 
 
 def _motion(

@@ -14,7 +14,7 @@ from planner.modal.mac import (
     real_normal_modes,
 )
 from planner.modal.matrix_poles import MatrixPoles, identify_matrix
-from planner.modal.modes import Mode
+from planner.modal.modes import Eigenvectors, Mode
 from planner.modal.motion_fields import expected
 from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, fit_shape, row_gain
 from planner.modal.residues import realign
@@ -63,8 +63,8 @@ def modes_of_matrix(
     shapes = _shapes(found, inside, entries)
     shapes = _informed(shapes, dofs, geometry)
     modes = tuple(
-        _mode(found, int(k), shape, entries, matrix.scaled)
-        for k, shape in zip(inside, shapes, strict=True)
+        replace(_mode(found, int(k), shape, entries, matrix.scaled), vectors=vectors)
+        for k, shape, vectors in zip(inside, shapes, _vectors(matrix, found, inside), strict=True)
     )
     remarks = (*matrix.remarks, *checks.faults, *checks.remarks)
     return MatrixModes(dofs, modes, band, remarks, found, checks)
@@ -127,6 +127,37 @@ def _shapes(found: MatrixPoles, modes: list[int], entries: Entries) -> list[Fitt
     free = [fitted(k, FREE_GAIN, None) for k in modes]
     gain = row_gain(free)
     return [fitted(k, gain, one.shape) for k, one in zip(modes, free, strict=True)]
+
+
+def _vectors(
+    matrix: FrfMatrix, found: MatrixPoles, modes: list[int]
+) -> list[Eigenvectors | None]:
+    """Right and left vectors of modes (indices), without reciprocity.
+
+    On the scale on which both are most alike at points that were felt and hit. None where rows and
+    columns fall apart into groups that share no entry: nothing ties their scales.
+    """
+    felt, hit = len(matrix.responses), len(matrix.references)
+    entries = Entries(found.rows, felt + found.columns, felt + hit)
+    group, _ = entries.groups
+    if len(np.unique(group[entries.rows])) > 1:
+        return [None] * len(modes)
+    there = [(matrix.index(d), i) for i, d in enumerate(matrix.references) if d in matrix.responses]
+    o, i = np.array(there, int).reshape(-1, 2).T
+
+    def apart(k: int) -> Eigenvectors:
+        variance = found.scale[k] * found.fit.residue_variance[:, k]
+        fitted = fit_shape(entries, found.fit.residue[:, k], variance, found.fit.poles[k].imag)
+        right, left = fitted.shape[:felt], fitted.shape[felt:]
+        alike = np.sum(left[i] * right[o].conj()) / max(np.sum(np.abs(right[o]) ** 2), 1e-300)
+        factor = np.sqrt(alike) if abs(alike) > 0 else realign(right)
+        factor *= np.sign((factor * right)[np.argmax(np.abs(right))].real) or 1.0
+        size = abs(factor)
+        return Eigenvectors(
+            factor * right, size * fitted.sd[:felt], left / factor, fitted.sd[felt:] / size
+        )
+
+    return [apart(k) for k in modes]
 
 
 def _mode(found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, scaled: bool) -> Mode:

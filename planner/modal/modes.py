@@ -13,6 +13,20 @@ LEAST_PROBABILITY = 0.2
 
 
 @dataclass(frozen=True, eq=False)
+class Eigenvectors:
+    """Of a mode without reciprocity: residues R = right · leftᵀ / (2iω_d) (Lei et al. 2023, eq. 15).
+
+    `right` (responses,) is how points move, `left` (references,) how hits there drive it, each with
+    the sd of real and imaginary part. Of reciprocal structures both are the mode's shape.
+    """
+
+    right: np.ndarray
+    right_sd: np.ndarray
+    left: np.ndarray
+    left_sd: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Mode:
     """One mode: pole, residues, shape, and their standard deviations.
 
@@ -23,8 +37,8 @@ class Mode:
     `shape_sd` (n,), like `residue_sd`, is of real and imaginary part each. `collinearity` is the
     MPC, `deviation_deg` the MPD. `misfit` is χ² per degree of freedom that one shape leaves in the
     residues, `scatter_hz` the sd of the frequency from set to set of roving points beyond their
-    noise, `support` the share of the higher model orders that have this pole. What an analysis does
-    not tell is NaN or None.
+    noise, `support` the share of the higher model orders that have this pole. `vectors` are of a
+    matrix of FRFs. What an analysis does not tell is NaN or None.
     """
 
     frequency_hz: float
@@ -42,6 +56,7 @@ class Mode:
     misfit: float = float("nan")
     scatter_hz: float = 0.0
     support: float = float("nan")
+    vectors: Eigenvectors | None = None
 
     @property
     def pole(self) -> complex:
@@ -53,6 +68,42 @@ class Mode:
     def modal_mass_kg(self) -> float:
         """Of the shape with largest component 1; NaN where it has no scale."""
         return 1 / float(np.max(np.abs(self.shape)) ** 2) if self.scaled else float("nan")
+
+    @property
+    def driven(self) -> tuple[np.ndarray, np.ndarray]:
+        """Left vector (references,) and its sd: what hits drive of a shape of unit length (1/kg).
+
+        R = shape · leftᵀ / (2iω_d), least squares; of a matrix of FRFs as in `vectors`. NaN where
+        nothing was hit.
+        """
+        if self.vectors is not None:
+            return self.vectors.left, self.vectors.left_sd
+        twice, size = 2 * self.pole.imag, float(np.linalg.norm(self.shape))
+        if len(self.residue) != len(self.shape):
+            return np.zeros(0, complex), np.zeros(0)
+        left = 1j * twice * (self.shape.conj() @ self.residue) / size**2
+        sd = twice * np.sqrt(np.abs(self.shape) ** 2 @ self.residue_sd**2) / size**2
+        return left, sd
+
+    @property
+    def modal_stiffness_n_m(self) -> tuple[np.ndarray, np.ndarray]:
+        """ω_n² m / φ² (n,) of each response that is hit where it is felt, and its sd.
+
+        NaN where it was not hit, or where nothing scales the shape.
+        """
+        n = len(self.shape)
+        if self.scaled:
+            sd = np.zeros(n) if self.shape_sd is None else self.shape_sd
+            size, sd = np.abs(self.shape) ** 2, 2 * np.abs(self.shape) * sd
+        elif self.residue.shape == (n, n):
+            own = np.diagonal(self.residue), np.diagonal(self.residue_sd)
+            size, sd = (2 * self.pole.imag * np.abs(part) for part in own)
+        else:
+            return np.full(n, np.nan), np.full(n, np.nan)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            stiffness = (2 * np.pi * self.frequency_hz) ** 2 / size
+            relative = np.hypot(2 * self.frequency_sd_hz / self.frequency_hz, sd / size)
+            return stiffness, stiffness * relative
 
     def unscaled(self) -> "Mode":
         """The same without residues, which nothing scales."""

@@ -256,6 +256,7 @@ def matrix_report(
     return ModesReport(
         modes=tuple(map(ModeAnswer.of, found.modes)),
         dofs=tuple(named(dof) for dof in found.dofs),
+        responses=tuple(named(dof) for dof in matrix.responses),
         references=tuple(named(dof) for dof in matrix.references),
         frfs=matrix.count,
         band_hz=found.band_hz,

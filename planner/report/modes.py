@@ -13,6 +13,7 @@ from rich.text import Text
 from planner.campaign.events import Amplitude
 from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.errors import RefusedFile
+from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.plot_files import Pictures
@@ -34,7 +35,11 @@ class ModeAnswer:
     `label` counts the modelled modes from 1, None: it is none of them. `shape` is [re, im] per
     response, in kg^-1/2 (unit modal mass) where `scaled`, else of unit length; `shape_sd` is of
     real and imaginary part each; `modal_mass_kg` belongs to the shape with largest component 1.
-    `residue` is [re, im, sd] in m/(N·s) of each response to each hit, row by row. `scatter_hz`: how
+    `residue` is [re, im, sd] in m/(N·s) of each response to each hit, row by row. Without
+    reciprocity it is right · leftᵀ / (2iω_d): `left` is [re, im] per hit axis or reference, `right`
+    per response (else the shape), both with sds; `participation_percent` is the size of each of
+    `left` over the largest. `modal_stiffness_n_m` is ω²m/φ² of each response hit where it is felt,
+    None where none was. `scatter_hz`: how
     the frequency differs from set to set (sd). `sensors_lowered_percent`: what the sensors' masses
     had lowered the frequency by, which is given without them; None where the simulation has no
     such mode. `expected`: what the model said before an import.
@@ -53,6 +58,13 @@ class ModeAnswer:
     mpc: float | Unset = UNSET
     mpd_deg: float | Unset = UNSET
     modal_mass_kg: float | Unset = UNSET
+    modal_stiffness_n_m: tuple[float, ...] | Unset = UNSET
+    modal_stiffness_sd_n_m: tuple[float, ...] | Unset = UNSET
+    right: tuple[tuple[float, float], ...] | Unset = UNSET
+    right_sd: tuple[float, ...] | Unset = UNSET
+    left: tuple[tuple[float, float], ...] | Unset = UNSET
+    left_sd: tuple[float, ...] | Unset = UNSET
+    participation_percent: tuple[float, ...] | Unset = UNSET
     scatter_hz: float | Unset = UNSET
     residue: tuple[tuple[float, float, float], ...] | Unset = UNSET
     sensors_lowered_percent: float | Unset | None = UNSET
@@ -65,6 +77,7 @@ class ModeAnswer:
         pairs = np.array(mode.shape)
         pairs = np.stack([pairs.real, pairs.imag], -1) if np.iscomplexobj(pairs) else pairs
         own["shape"] = tuple((float(re), float(im)) for re, im in pairs)
+        own |= _vectors(mode) if isinstance(mode, Mode) else {}
         over_points = getattr(mode, "shape_sd", None) is not None
         if hasattr(mode, "residue_sd") and not over_points:
             both = zip(np.ravel(mode.residue), np.ravel(mode.residue_sd), strict=True)
@@ -102,6 +115,27 @@ class ModeAnswer:
         return f"{self.frequency_hz:.2f}{' ?' if isinstance(sure, float) and sure < SURE else ''}"
 
 
+def _vectors(mode: Mode) -> dict[str, Any]:
+    """What hits drive, how points move, and how stiff a mode is there."""
+    told: dict[str, Any] = {}
+    stiffness = mode.modal_stiffness_n_m
+    if np.any(np.isfinite(stiffness)):
+        names = "modal_stiffness_n_m", "modal_stiffness_sd_n_m"
+        told |= {n: tuple(map(float, v)) for n, v in zip(names, stiffness, strict=True)}
+    if mode.vectors is not None:
+        told |= {"right": _pairs(mode.vectors.right), "right_sd": tuple(mode.vectors.right_sd)}
+    left, sd = mode.driven
+    size = np.abs(left)
+    if np.any(size > 0):
+        share = 100 * size / np.nanmax(size)
+        told |= {"left": _pairs(left), "left_sd": tuple(sd), "participation_percent": tuple(share)}
+    return told
+
+
+def _pairs(values: np.ndarray) -> tuple[tuple[float, float], ...]:
+    return tuple((float(v.real), float(v.imag)) for v in values)
+
+
 @dataclass(frozen=True)
 class SurveyedPose:
     """The modes of a pose, by label, and those without."""
@@ -116,7 +150,7 @@ class ModesReport(Answer):
     """Answer of `modes`; what an analysis does not have is UNSET.
 
     `poses` of a folder with several, `modes` are then those of the first. `dofs` are [node,
-    direction] of every entry of a shape, `frfs` how many FRFs there were, `hits` how many were
+    direction] of every entry of a shape, `responses` and `references` of right and left vectors, `frfs` how many FRFs there were, `hits` how many were
     averaged per axis. `fit_error` is ‖H − fit‖/‖H‖ in the band, None for unscaled FRFs; `tones_hz`
     are a machine's, not the structure's.
     """
@@ -124,6 +158,7 @@ class ModesReport(Answer):
     poses: tuple[SurveyedPose, ...] | Unset = UNSET
     modes: tuple[ModeAnswer, ...]
     dofs: tuple[tuple[int | str, str], ...] | Unset = UNSET
+    responses: tuple[tuple[int | str, str], ...] | Unset = UNSET
     references: tuple[tuple[int | str, str], ...] | Unset = UNSET
     frfs: int | Unset = UNSET
     scaled: bool | Unset = UNSET
