@@ -62,9 +62,14 @@ def modes_of_matrix(
     dofs, entries = _points(matrix, found, checks)
     shapes = _shapes(found, inside, entries)
     shapes = _informed(shapes, dofs, geometry)
+    modes = [
+        _mode(found, int(k), shape, entries, matrix.scaled)
+        for k, shape in zip(inside, shapes, strict=True)
+    ]
+    apart = _vectors(matrix, found, inside)
     modes = tuple(
-        replace(_mode(found, int(k), shape, entries, matrix.scaled), vectors=vectors)
-        for k, shape, vectors in zip(inside, shapes, _vectors(matrix, found, inside), strict=True)
+        replace(mode, vectors=vectors and _alike(vectors, mode, dofs, matrix.responses))
+        for mode, vectors in zip(modes, apart, strict=True)
     )
     remarks = (*matrix.remarks, *checks.faults, *checks.remarks)
     return MatrixModes(dofs, modes, band, remarks, found, checks)
@@ -129,9 +134,7 @@ def _shapes(found: MatrixPoles, modes: list[int], entries: Entries) -> list[Fitt
     return [fitted(k, gain, one.shape) for k, one in zip(modes, free, strict=True)]
 
 
-def _vectors(
-    matrix: FrfMatrix, found: MatrixPoles, modes: list[int]
-) -> list[Eigenvectors | None]:
+def _vectors(matrix: FrfMatrix, found: MatrixPoles, modes: list[int]) -> list[Eigenvectors | None]:
     """Right and left vectors of modes (indices), without reciprocity.
 
     On the scale on which both are most alike at points that were felt and hit. None where rows and
@@ -151,13 +154,24 @@ def _vectors(
         right, left = fitted.shape[:felt], fitted.shape[felt:]
         alike = np.sum(left[i] * right[o].conj()) / max(np.sum(np.abs(right[o]) ** 2), 1e-300)
         factor = np.sqrt(alike) if abs(alike) > 0 else realign(right)
-        factor *= np.sign((factor * right)[np.argmax(np.abs(right))].real) or 1.0
         size = abs(factor)
         return Eigenvectors(
             factor * right, size * fitted.sd[:felt], left / factor, fitted.sd[felt:] / size
         )
 
     return [apart(k) for k in modes]
+
+
+def _alike(
+    vectors: Eigenvectors, mode: Mode, dofs: tuple[Dof, ...], responses: tuple[Dof, ...]
+) -> Eigenvectors:
+    """With the sign of the mode's shape."""
+    shape = dict(zip(dofs, mode.shape, strict=True))
+    same = sum(
+        shape.get(d, 0.0).conjugate() * v for d, v in zip(responses, vectors.right, strict=True)
+    )
+    sign = np.sign(same.real) or 1.0
+    return replace(vectors, right=sign * vectors.right, left=sign * vectors.left)
 
 
 def _mode(found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, scaled: bool) -> Mode:

@@ -14,7 +14,7 @@ LEAST_PROBABILITY = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Eigenvectors:
-    """Of a mode without reciprocity: residues R = right · leftᵀ / (2iω_d) (Lei et al. 2023, eq. 15).
+    """Of a mode without reciprocity, R = right · leftᵀ / (2iω_d) (Lei et al. 2023, eq. 15).
 
     `right` (responses,) is how points move, `left` (references,) how hits there drive it, each with
     the sd of real and imaginary part. Of reciprocal structures both are the mode's shape.

@@ -150,9 +150,10 @@ class ModesReport(Answer):
     """Answer of `modes`; what an analysis does not have is UNSET.
 
     `poses` of a folder with several, `modes` are then those of the first. `dofs` are [node,
-    direction] of every entry of a shape, `responses` and `references` of right and left vectors, `frfs` how many FRFs there were, `hits` how many were
-    averaged per axis. `fit_error` is ‖H − fit‖/‖H‖ in the band, None for unscaled FRFs; `tones_hz`
-    are a machine's, not the structure's.
+    direction] of every entry of a shape, `responses` and `references` those of right and left
+    vectors, `frfs` how many FRFs there were, `hits` how many were averaged per axis. `fit_error` is
+    ‖H − fit‖/‖H‖ in the band, None for unscaled FRFs; `tones_hz` are a machine's, not the
+    structure's.
     """
 
     poses: tuple[SurveyedPose, ...] | Unset = UNSET

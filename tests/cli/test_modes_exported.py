@@ -106,8 +106,22 @@ def test_tables_hold_the_same_numbers(answered, answer):
         points = list(csv.DictReader(file))
     assert len(points) == len(hz) * len(answer["dofs"])
     assert answer["exports"] == [
-        str(folder / name) for name in ("modes.uff", "frfs.uff", "modes.csv", "shapes.csv")
-    ]
+        str(folder / name)
+        for name in ("modes.uff", "frfs.uff", "modes.csv", "shapes.csv", "vectors.uff",
+                     "vectors.csv")
+    ]  # fmt: skip
+
+
+def test_right_and_left_vectors_come_back(answered, answer):
+    vectors = [s for s in sets(answered[3] / "files" / "vectors.uff") if s["type"] == 55]
+    assert len(vectors) == 2 * len(answer["modes"])
+    for k, one in enumerate(vectors):
+        mode, side = answer["modes"][k // 2], ("right", "left")[k % 2]
+        assert one["id2"].startswith(f"{side} vector")
+        values = dict(zip(one["node_nums"].tolist(), one["r3"], strict=True))
+        dofs = answer["responses" if side == "right" else "references"]
+        for (node, _), value in zip(dofs, mode[side], strict=True):
+            assert values[node] == pytest.approx(complex(*value), rel=1e-4, abs=1e-5)
 
 
 def test_pictures_and_moving_shapes(answer):

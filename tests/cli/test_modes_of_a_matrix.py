@@ -1,13 +1,18 @@
 """`planner modes` of FRFs between any points: files of any kind, no robot."""
 
 import json
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from planner.cli.run import run
+from planner.frf.matrix import FrfMatrix
+from planner.frf.synthesis import pole
 from planner.modal.mac import mac
+from planner.recording.dof import Dof
 from tests.cli.test_modes_pictures import entities_of
 from tests.support.matrix_files import transposed, write_matrix
 from tests.support.struck_structures import struck, unit_mass_shapes
@@ -247,3 +252,55 @@ def test_the_recording_has_charts_shapes_and_mac_in_place_of_pictures(
     else:
         wanted |= {"/figures/shapes/frame"}
     assert wanted <= drawn
+
+
+def vectors_of(mode):
+    """Right and left vector, and 2iω_d."""
+    right, left = (np.array([complex(*v) for v in mode[side]]) for side in ("right", "left"))
+    damped = mode["frequency_hz"] * np.sqrt(1 - mode["damping_ratio"] ** 2)
+    return right, left, 4j * np.pi * damped
+
+
+def test_right_and_left_vectors_of_a_reciprocal_structure_are_its_shape(
+    structure, matrix, tmp_path, capsys
+):
+    path = write_matrix(tmp_path / "set.uff", matrix)
+    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    hit = [answer["dofs"].index(dof) for dof in answer["references"]]
+    for mode in answer["modes"]:
+        (right, left, _), shape = vectors_of(mode), np.array([complex(*v) for v in mode["shape"]])
+        assert mac(right, shape) > 0.995
+        assert max(mode["participation_percent"]) == 100
+        np.testing.assert_allclose(left, shape[hit], atol=0.05 * np.abs(shape).max())
+        stiffness = (2 * np.pi * mode["frequency_hz"]) ** 2 * mode["modal_mass_kg"]
+        assert min(mode["modal_stiffness_n_m"]) == pytest.approx(stiffness)
+
+
+@pytest.mark.parametrize("seed", [31, 32, 33])
+def test_right_and_left_vectors_of_a_robot_without_reciprocity(tmp_path, capsys, seed):
+    """Modes 1 to 5 of Lei et al. 2023, Table B1: both vectors come back, one shape would not do."""
+    campaigns = Path(__file__).parents[2] / "campaigns"
+    file = campaigns / "irb6660_lei2023" / "modes.toml"
+    table = [m for m in tomllib.loads(file.read_text())["mode"] if m["frequency_hz"] < 100]
+    hz, rng = np.arange(4.0, 40.0, 0.05), np.random.default_rng(seed)
+    s, h, residues = 2j * np.pi * hz, np.zeros((4, 4, 720), complex), []
+    for mode in table:
+        right, left = (np.array([complex(*v) for v in mode[side]]) for side in ("right", "left"))
+        p = pole(np.array(mode["frequency_hz"]), np.array(mode["damping_ratio"]))
+        r = np.outer(right, left)[..., None]
+        residues.append((mode["frequency_hz"], right, left, r[..., 0]))
+        h += s**2 * (r / (s - p) + r.conj() / (s - p.conj()))
+    h *= 1 + 0.02 * (rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape))
+    points = tuple(Dof.of_uff(node, direction) for node in "12" for direction in (1, 2))
+    matrix = FrfMatrix(hz, points, points, h, np.full(h.shape, np.nan), True)
+    path = write_matrix(tmp_path / "set.uff", matrix, "receptance")
+    code, answer, _ = modes(capsys, path, "--export", tmp_path / "files")
+    assert code == 0
+    assert "right and left vectors" in " ".join(answer["remarks"])
+    found = np.array([m["frequency_hz"] for m in answer["modes"]])
+    for f, right, left, residue in residues:
+        mode = answer["modes"][int(np.argmin(np.abs(found - f)))]
+        own_right, own_left, scale = vectors_of(mode)
+        assert min(mac(own_right, right), mac(own_left, left)) > 0.999
+        off = np.outer(own_right, own_left) / scale - residue
+        assert np.linalg.norm(off) < 0.05 * np.linalg.norm(residue)
