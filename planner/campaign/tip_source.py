@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.posture_tip import posture_tip
 from planner.campaign.store import is_campaign
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
@@ -15,6 +16,7 @@ from planner.milling.cutter_frf import CutterFrf, read_frf
 from planner.milling.rotations import completed
 from planner.milling.tip_files import MEASURE, read_tip
 from planner.milling.tool import Tool
+from planner.recording.folder import several_poses
 from planner.robot.robot import Robot
 
 LINES = 1e-6  # Hz by which lines of two files may differ
@@ -35,6 +37,8 @@ def tip_of(
     """
     if is_campaign(source):
         return _campaign(source, pose)
+    if several_poses([source]):
+        return posture_tip(source, tested, pose), str(pose)
     found = read_tip(source, tested, pose, noise, from_names)
     if isinstance(found, TipReceptance):
         return found, pose or source.stem

@@ -29,13 +29,15 @@ class TwoPoints:
     """Receptances (m/N) between all directions of two points, the tip's first.
 
     `directions` are those measured at each (numbers of x, y, z in the FRFs' axes, d of them);
-    `values` and `sd` (2d, 2d, F), response by hit, the tip's d directions first.
+    `values` and `sd` (2d, 2d, F), response by hit, the tip's d directions first. Where they err
+    together `errors` (D, 2d, 2d, F) says how, as in `TipReceptance`.
     """
 
     frequency_hz: np.ndarray
     directions: tuple[int, ...]
     values: np.ndarray
     sd: np.ndarray
+    errors: np.ndarray | None = None
 
 
 def two_point_receptance(seen: TwoPoints, tool: Tool, back: Point) -> TipReceptance:
@@ -57,6 +59,13 @@ def two_point_receptance(seen: TwoPoints, tool: Tool, back: Point) -> TipRecepta
     here = np.ix_(range(len(omega)), use, use)
     measured = (both.T @ values @ both)[here]
     sd = np.sqrt((both.T**2 @ variance @ both**2)[here])
+    together = None
+    if seen.errors is not None:
+        each = np.zeros((len(seen.errors), len(omega), 6, 6), complex)
+        each[np.ix_(range(len(each)), range(len(omega)), full, full)] = np.moveaxis(
+            seen.errors, -1, 1
+        )
+        together = (both.T @ each @ both)[(slice(None), *here)]
     v, w = _mapping(tool, back.from_tip, kept, omega)
     left = np.linalg.inv(v)
     right = np.swapaxes(left, 1, 2)
@@ -68,8 +77,9 @@ def two_point_receptance(seen: TwoPoints, tool: Tool, back: Point) -> TipRecepta
         spread = np.abs(other @ (measured - shift) @ np.swapaxes(other, 1, 2) - c)
     offset = -left @ w @ right
     return TipReceptance(
-        seen.frequency_hz, kept, measured, sd, left, right, offset, spread, tool.frame
-    )
+        seen.frequency_hz, kept, measured, sd, left, right, offset, spread, tool.frame,
+        errors=together,
+    )  # fmt: skip
 
 
 def _check(seen: TwoPoints, tool: Tool) -> None:

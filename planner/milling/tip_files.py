@@ -19,7 +19,7 @@ from planner.frf.synthesis import pole
 from planner.milling.coupling import TipReceptance
 from planner.milling.cutter_frf import CutterFrf, read_npz, row_of
 from planner.milling.rotations import TwoPoints, two_point_receptance
-from planner.milling.tool import Tool
+from planner.milling.tool import Point, Tool
 from planner.modal.estimate_modes import identify
 from planner.modal.fit_data import Data
 from planner.modal.rank_one_fit import Entries
@@ -86,9 +86,8 @@ def _joints(stored: dict[str, np.ndarray], row: int) -> np.ndarray | None:
     return JointUnits.declared_as([""] * len(stated), units).internal(stated)
 
 
-def _frfs(
-    path: Path, records: tuple[FrfRecord, ...], tool: Tool | None, noise: float
-) -> TipReceptance:
+def two_points_of(path: Path, tool: Tool | None) -> tuple[Point, Point]:
+    """The tip and the second point of the tested tool, of FRFs in `path`; InputError without."""
     if tool is None or len(tool.points) < 2:
         raise InputError(
             f"{path}: where its points are is not stated; give --reference with two [[point]] "
@@ -97,6 +96,14 @@ def _frfs(
     tip, back = sorted(tool.points, key=lambda p: p.from_tip)[:2]
     if tip.from_tip > 0:
         raise InputError(f"No [[point]] of {tool.name} is at its tip; give one from_tip_m = 0.")
+    return tip, back
+
+
+def _frfs(
+    path: Path, records: tuple[FrfRecord, ...], tool: Tool | None, noise: float
+) -> TipReceptance:
+    tip, back = two_points_of(path, tool)
+    assert tool is not None
     nodes = frozenset((tip.node, back.node))
     frequency, frfs = labelled_frfs(records, "receptance", InputError, nodes)
     found = {(*one.felt, *one.hit): one.values for one in frfs}

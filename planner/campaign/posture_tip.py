@@ -1,0 +1,176 @@
+"""Receptances between two points of the tested tool at a posture that was not hit.
+
+From FRFs of other postures, without any simulation (Lei et al. 2023): modes with right and left vectors, each
+followed over the postures, and a multi-task GP of each mode's parameters over the joints. Vectors
+are those of the tip's motion and of how far the second point departs from it: rotations are
+differences, and what both points have in common cancels in them.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.dataset.frf_set import frf_set
+from planner.dataset.screened_files import Source
+from planner.errors import InputError, PlannerError
+from planner.frf.matrix import FrfMatrix
+from planner.frf.synthesis import pole
+from planner.milling.coupling import TipReceptance
+from planner.milling.rotations import TwoPoints, two_point_receptance
+from planner.milling.tip_files import two_points_of
+from planner.milling.tool import Tool
+from planner.modal.matrix_modes import modes_of_matrix
+from planner.modal.modes import Mode
+from planner.modal.tracking import Guide, track
+from planner.recording.dof import Dof
+from planner.recording.folder import TABLE, joint_columns, read_poses, read_recordings
+from planner.recording.points import ANYWHERE
+from planner.recording.records import AXES
+from planner.surrogate.models.multitask import RANK, fit_multitask
+
+WANTED = "predict.csv"
+
+
+@dataclass(frozen=True, eq=False)
+class ModeOfTip:
+    """One mode at the postures x (n, d) that have it: parameters y (n, 2 + 4m) at m directions.
+
+    ln f, ln ζ, then right and left vector, real and imaginary part each; of the left vector entry
+    `reference` is 1.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    reference: int
+
+
+def posture_tip(folder: Path, tool: Tool | None, pose: str | None) -> TipReceptance:
+    """At the row `pose` of predict.csv, from all poses of recordings.csv.
+
+    Raises InputError in one sentence.
+    """
+    nodes = [point.node for point in two_points_of(folder, tool)]
+    assert tool is not None
+    joints = joint_columns(folder)
+    table = read_recordings(folder, joints, ANYWHERE)
+    wanted = {row.pose: row.joints_deg for row in read_poses(folder / WANTED, joints)}
+    if pose not in wanted:
+        raise InputError(f"Name a pose of {folder / WANTED}: --pose {next(iter(wanted))}.")
+    rows: dict[str, list[Source]] = {}
+    for row in table.rows:
+        assert row.file is not None
+        # Nodes and directions as the files have them: each holds hits along several.
+        rows.setdefault(row.pose, []).append(Source(row.file, str(row.file)))
+    matrices = [_matrix(name, tuple(sources)) for name, sources in rows.items()]
+    first = {row.pose: row.joints_deg for row in table.rows}
+    q = joints.internal([first[name] for name in rows])
+    there, span = joints.internal([wanted[pose]])[0], np.ptp(q, axis=0)
+    moves = span > 0
+    if np.any(there[~moves] != q[0, ~moves]):
+        raise InputError(f"{pose} turns a joint that no pose of {folder / TABLE} turns; hit some.")
+    x = (q[:, moves] - q[:, moves].min(axis=0)) / span[moves]
+    at = (there[moves] - q[:, moves].min(axis=0)) / span[moves]
+    directions = tuple(k for k in range(3) if Dof(nodes[0], AXES[k]) in matrices[0].references)
+    dofs = [Dof(node, AXES[k]) for node in nodes for k in directions]
+    hz = matrices[0].frequency_hz
+    values, errors = _predicted(_followed(matrices, dofs, x), at, hz)
+    sd = np.sqrt(np.sum(np.abs(errors) ** 2, axis=0))
+    found = two_point_receptance(
+        TwoPoints(hz, directions, values, sd, errors), tool, two_points_of(folder, tool)[1]
+    )
+    said = f"From FRFs of {len(x)} other postures, {values.shape[0] // 2} directions at two points."
+    simulated = any(matrix.simulated for matrix in matrices)
+    return replace(found, remarks=(*found.remarks, said), simulated=simulated)
+
+
+def _matrix(pose: str, sources: tuple[Source, ...]) -> FrfMatrix:
+    given = frf_set(sources, None)
+    if given is None:
+        raise InputError(f"Pose {pose} has FRFs of one point; export those between two points.")
+    return given.matrix(None)
+
+
+def _followed(matrices: list[FrfMatrix], dofs: list[Dof], x: np.ndarray) -> list[ModeOfTip]:
+    """Every mode that most postures have."""
+    found = [_modes(matrix, dofs) for matrix in matrices]
+    short = [[replace(m, shape=v[0][:3] / np.linalg.norm(v[0][:3])) for m, v in one]
+             for one in found]  # fmt: skip
+    tracks = track(short, Guide.by_example(short), x, ordered=True)
+    followed = []
+    for label in range(tracks.probability.shape[1]):
+        rows = [i for i, row in enumerate(tracks.modes) if row[label] is not None]
+        if 2 * len(rows) <= len(x):
+            continue
+        pairs = [
+            next(pair for pair, m in zip(found[i], short[i], strict=True)
+                 if m is tracks.modes[i][label])
+            for i in rows
+        ]  # fmt: skip
+        followed.append(_parameters(x[rows], pairs))
+    if not followed:
+        raise InputError("No mode is found in most postures; hit postures nearer to each other.")
+    return followed
+
+
+Found = tuple[Mode, tuple[np.ndarray, np.ndarray]]
+
+
+def _modes(matrix: FrfMatrix, dofs: list[Dof]) -> list[Found]:
+    """Modes with right and left vectors, (m,) each, of tip and departure; none where none is."""
+    try:
+        modes = modes_of_matrix(matrix).modes
+        felt = [matrix.responses.index(d) for d in dofs]
+        hit = [matrix.references.index(d) for d in dofs]
+    except (PlannerError, ValueError):
+        return []
+    apart = _departure(len(dofs))
+    return [
+        (m, (apart @ m.vectors.right[felt], apart @ m.vectors.left[hit]))
+        for m in modes
+        if m.vectors is not None
+    ]
+
+
+def _departure(count: int) -> np.ndarray:
+    """(m, m): of motions of tip and second point, those of the tip and their difference."""
+    return np.kron([[1.0, 0.0], [1.0, -1.0]], np.eye(count // 2))
+
+
+def _parameters(x: np.ndarray, pairs: list[Found]) -> ModeOfTip:
+    left = np.array([vectors[1] for _, vectors in pairs])
+    tip = left.shape[1] // 2
+    # The direction in which the mode never comes near to rest is 1.
+    share = np.abs(left[:, :tip]) / np.linalg.norm(left[:, :tip], axis=1, keepdims=True)
+    reference = int(np.argmax(share.min(axis=0)))
+    scale = left[:, reference, None]
+    right = np.array([v[0] / (2j * mode.pole.imag) for mode, v in pairs]) * scale
+    poles = np.array([[mode.frequency_hz, mode.damping_ratio] for mode, _ in pairs])
+    both = np.concatenate([right, left / scale], axis=1)
+    return ModeOfTip(x, np.concatenate([np.log(poles), both.real, both.imag], axis=1), reference)
+
+
+def _predicted(
+    modes: list[ModeOfTip], at: np.ndarray, hz: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Receptances (m, m, F) at one posture (d,), and by how much each parameter's sd moves them."""
+    values, errors = 0.0, []
+    for mode in modes:
+        mean, sd = (v[0] for v in fit_multitask(mode.x, mode.y, rank=RANK).predict(at[None]))
+        here = _receptance(mean, hz)
+        values = values + here
+        for k in np.flatnonzero(np.ptp(mode.y, axis=0) > 0):
+            errors.append(_receptance(mean + sd[k] * np.eye(len(mean))[k], hz) - here)
+    return np.asarray(values), np.array(errors)
+
+
+def _receptance(parameters: np.ndarray, hz: np.ndarray) -> np.ndarray:
+    """(m, m, F) of one mode between both points, tip first."""
+    parts = parameters[2:].reshape(2, 2, -1)
+    count = parts.shape[2]
+    back = np.linalg.inv(_departure(count))
+    right, left = (back @ (parts[0, k] + 1j * parts[1, k]) for k in (0, 1))
+    f, zeta = np.exp(parameters[:2])
+    p, s = pole(np.array(f), np.array(min(zeta, 0.95))), 2j * np.pi * hz
+    residue = np.outer(right, left)[..., None]
+    return residue / (s - p) + residue.conj() / (s - p.conj())
