@@ -1,9 +1,9 @@
 """Receptances between two points of the tested tool at a posture that was not hit.
 
-From FRFs of other postures, without any simulation (Lei et al. 2023): modes with right and left vectors, each
-followed over the postures, and a multi-task GP of each mode's parameters over the joints. Vectors
-are those of the tip's motion and of how far the second point departs from it: rotations are
-differences, and what both points have in common cancels in them.
+From FRFs of other postures, without any simulation (Lei et al. 2023): modes with right and left
+vectors, each followed over the postures, and a multi-task GP of each mode's parameters over the
+joints. Vectors are those of the tip's motion and of how far the second point departs from it:
+rotations are differences, and what both points have in common cancels in them.
 """
 
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ import numpy as np
 
 from planner.dataset.frf_set import frf_set
 from planner.dataset.screened_files import Source
-from planner.errors import InputError, PlannerError
+from planner.errors import InputError, RefusedError
 from planner.frf.matrix import FrfMatrix
 from planner.frf.synthesis import pole
 from planner.milling.coupling import TipReceptance
@@ -50,50 +50,61 @@ def posture_tip(folder: Path, tool: Tool | None, pose: str | None) -> TipRecepta
 
     Raises InputError in one sentence.
     """
-    nodes = [point.node for point in two_points_of(folder, tool)]
+    tip, back = two_points_of(folder, tool)
     assert tool is not None
+    x, at, matrices = _hit(folder, pose)
+    first = next(iter(matrices.values()))
+    directions = tuple(k for k in range(3) if Dof(tip.node, AXES[k]) in first.references)
+    dofs = [Dof(node, AXES[k]) for node in (tip.node, back.node) for k in directions]
+    for name, matrix in matrices.items():
+        lacks = [d for d in dofs if d not in matrix.responses or d not in matrix.references]
+        if lacks or not dofs:
+            what = lacks[0].at if lacks else f"at node {tip.node}"
+            raise InputError(f"Pose {name} lacks FRFs {what}; export those between both points.")
+    hz, every = first.frequency_hz, list(matrices.values())
+    values, errors = _predicted(_followed(every, dofs, x), at, hz)
+    sd = np.sqrt(np.sum(np.abs(errors) ** 2, axis=0))
+    seen = TwoPoints(hz, directions, values, sd, errors)
+    found = two_point_receptance(seen, tool, back)
+    said = f"From FRFs between two points at {len(x)} other postures; ± is that of their modes."
+    simulated = any(matrix.simulated for matrix in every)
+    return replace(found, remarks=(*found.remarks, said), simulated=simulated)
+
+
+def _hit(folder: Path, pose: str | None) -> tuple[np.ndarray, np.ndarray, dict[str, FrfMatrix]]:
+    """Postures x (n, d) that were hit, the wanted one (d,), both scaled, and FRFs by pose."""
     joints = joint_columns(folder)
     table = read_recordings(folder, joints, ANYWHERE)
     wanted = {row.pose: row.joints_deg for row in read_poses(folder / WANTED, joints)}
     if pose not in wanted:
         raise InputError(f"Name a pose of {folder / WANTED}: --pose {next(iter(wanted))}.")
-    rows: dict[str, list[Source]] = {}
+    sources: dict[str, list[Source]] = {}
     for row in table.rows:
         assert row.file is not None
         # Nodes and directions as the files have them: each holds hits along several.
-        rows.setdefault(row.pose, []).append(Source(row.file, str(row.file)))
-    matrices = [_matrix(name, tuple(sources)) for name, sources in rows.items()]
-    first = {row.pose: row.joints_deg for row in table.rows}
-    q = joints.internal([first[name] for name in rows])
-    there, span = joints.internal([wanted[pose]])[0], np.ptp(q, axis=0)
+        sources.setdefault(row.pose, []).append(Source(row.file, str(row.file)))
+    angles = {row.pose: row.joints_deg for row in table.rows}
+    q = joints.internal([angles[name] for name in sources])
+    there, low, span = joints.internal([wanted[pose]])[0], q.min(axis=0), np.ptp(q, axis=0)
     moves = span > 0
-    if np.any(there[~moves] != q[0, ~moves]):
+    if np.any(np.abs(there - low)[~moves] > 0):
         raise InputError(f"{pose} turns a joint that no pose of {folder / TABLE} turns; hit some.")
-    x = (q[:, moves] - q[:, moves].min(axis=0)) / span[moves]
-    at = (there[moves] - q[:, moves].min(axis=0)) / span[moves]
-    directions = tuple(k for k in range(3) if Dof(nodes[0], AXES[k]) in matrices[0].references)
-    dofs = [Dof(node, AXES[k]) for node in nodes for k in directions]
-    hz = matrices[0].frequency_hz
-    values, errors = _predicted(_followed(matrices, dofs, x), at, hz)
-    sd = np.sqrt(np.sum(np.abs(errors) ** 2, axis=0))
-    found = two_point_receptance(
-        TwoPoints(hz, directions, values, sd, errors), tool, two_points_of(folder, tool)[1]
-    )
-    said = f"From FRFs of {len(x)} other postures, {values.shape[0] // 2} directions at two points."
-    simulated = any(matrix.simulated for matrix in matrices)
-    return replace(found, remarks=(*found.remarks, said), simulated=simulated)
+    x, at = ((each - low)[..., moves] / span[moves] for each in (q, there))
+    return x, at, {name: _matrix(name, tuple(own)) for name, own in sources.items()}
 
 
 def _matrix(pose: str, sources: tuple[Source, ...]) -> FrfMatrix:
     given = frf_set(sources, None)
     if given is None:
-        raise InputError(f"Pose {pose} has FRFs of one point; export those between two points.")
+        raise InputError(f"Pose {pose} has no FRFs between points; export those between two.")
     return given.matrix(None)
 
 
 def _followed(matrices: list[FrfMatrix], dofs: list[Dof], x: np.ndarray) -> list[ModeOfTip]:
     """Every mode that most postures have."""
     found = [_modes(matrix, dofs) for matrix in matrices]
+    if not any(found):
+        raise InputError("No posture's FRFs show a mode; check that their band holds a resonance.")
     short = [[replace(m, shape=v[0][:3] / np.linalg.norm(v[0][:3])) for m, v in one]
              for one in found]  # fmt: skip
     tracks = track(short, Guide.by_example(short), x, ordered=True)
@@ -120,10 +131,10 @@ def _modes(matrix: FrfMatrix, dofs: list[Dof]) -> list[Found]:
     """Modes with right and left vectors, (m,) each, of tip and departure; none where none is."""
     try:
         modes = modes_of_matrix(matrix).modes
-        felt = [matrix.responses.index(d) for d in dofs]
-        hit = [matrix.references.index(d) for d in dofs]
-    except (PlannerError, ValueError):
+    except RefusedError:
         return []
+    felt = [matrix.responses.index(d) for d in dofs]
+    hit = [matrix.references.index(d) for d in dofs]
     apart = _departure(len(dofs))
     return [
         (m, (apart @ m.vectors.right[felt], apart @ m.vectors.left[hit]))

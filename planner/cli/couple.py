@@ -14,8 +14,8 @@ def couple(
         Path,
         typer.Argument(
             metavar="SOURCE",
-            help="FRFs at the tested tool's tip: npz, measured (a file or folder; one of many poses "
-            "predicts those of its predict.csv), or a campaign.",
+            help="FRFs at the tested tool's tip: npz, measured (a file or folder; from one with "
+            "recordings.csv those of predict.csv are predicted), or a campaign.",
         ),
     ],
     tool: Annotated[Path, typer.Option(metavar="TOOL_TOML", help="The tool that is put on.")],
