@@ -53,7 +53,7 @@ class Learned:
             np.take_along_axis(v, same, 1) for v in (every.frequency_hz, every.damping_ratio)
         )
         wider = SimulatedModes(hertz, ratio, modes.residue)
-        return np.hypot(self.wider.frequency_sd(q, wider), away)
+        return np.minimum(np.hypot(self.wider.frequency_sd(q, wider), away), NOT_THERE)
 
     @property
     def fits(self) -> bool:
