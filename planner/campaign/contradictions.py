@@ -48,7 +48,8 @@ def _told(hit: Hit, doubt: Doubt, names: tuple[str, ...], both_doubted: bool) ->
     said = f"(likeness {doubt.likeness:.2f})"
     if both_doubted:
         return (
-            f"{first} and {others} are both said to be along {hit.axis[-1]} but disagree {said}, "
+            f"{first} and {others} are {'both' if len(names) == 2 else 'all'} said to be along "
+            f"{hit.axis[-1]} but disagree {said}, "
             f"and nothing tells which is right"
         )
     return (

@@ -79,7 +79,7 @@ def _screen_alike(
 
 @dataclass(frozen=True)
 class Doubt:
-    """Why one of a few hits is wrong, and nothing tells which: a vote needs three along an axis.
+    """Why one of a few hits is wrong, and nothing tells which: no way has most of an axis' hits.
 
     `others` are the hits it contradicts, by their places among all; with `along` they are of
     that other axis and answer as it does, which hits of two axes do not. With a `size`, the ln of
@@ -93,7 +93,7 @@ class Doubt:
 
 
 def doubts(hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> tuple[Doubt | None, ...]:
-    """Per hit, whether it contradicts the only other of its axis, or repeats another axis'.
+    """Per hit, whether it contradicts half of those of its axis, or repeats another axis'.
 
     Of two hits that disagree the one that answers as another axis does is doubted alone. More may
     differ in size, and no majority tells which is right.
@@ -126,7 +126,13 @@ class _Few:
         if not same:
             return self._repeated(i)
         sized = self._sized(i, same)
-        return self._contradicted(i, same[0]) if len(same) == 1 and not sized else sized
+        if sized:
+            return sized
+        against = [doubt for j in same if (doubt := self._contradicted(i, j))]
+        if 2 * len(against) <= len(same):  # most answer as it does
+            return None
+        others = tuple(j for doubt in against for j in doubt.others)
+        return Doubt(others, max(doubt.likeness for doubt in against))
 
     def _sized(self, i: int, same: list[int]) -> Doubt | None:
         own = self.frfs[[i, *same]]

@@ -27,11 +27,14 @@ def made(tmp_path_factory):
     rng = np.random.default_rng(1)
     odd = simulate_hit(truth, q, "+y", HAMMER, rng)
     third = simulate_hit(truth, q, "+z", HAMMER, rng)
+    fourth = simulate_hit(truth, q, "+y", HAMMER, rng)
     hits = root / "hits"
     shutil.copytree(folder / "data", hits)
     wrong = next(hits.glob("*pz_2.uff"))
     write_uff(wrong, type(odd)("+z", odd.force_n, odd.acceleration_m_s2), HAMMER)
     write_uff(root / "third.uff", third, HAMMER)
+    as_z = type(odd)("+z", fourth.force_n, fourth.acceleration_m_s2)
+    write_uff(root / "fourth.uff", as_z, HAMMER)
     assert all(isinstance(r, TimeRecord) for r in read(wrong))
     return root / "cell", pose["pose"], hits, wrong, root / "third.uff"
 
@@ -64,6 +67,18 @@ def test_the_import_is_held_and_names_the_files(cell, made):
     assert "Joints as proposed: nothing was read back" in page  # files alone say no angles
     code, _, err = call("report", cell, "--out", cell / "none" / "x.html")
     assert (code, "make that folder" in err, (cell / "none").exists()) == (2, True, False)
+
+
+def test_two_and_two_are_held_too(cell, made):
+    _, pose, hits, wrong, third = made
+    fourth = third.with_name("fourth.uff")
+    code, _, err = call("import", cell, hits, third, fourth, "--pose", pose)
+    assert code == 3
+    assert all(name in " ".join(err.split()) for name in (wrong.name, fourth.name))
+    question = told("status", cell)["held"][0]["question"]
+    assert {Path(name).name for name in question["disagree"]} == {
+        wrong.name, wrong.name.replace("_2", "_1"), third.name, fourth.name,
+    }  # fmt: skip
 
 
 def test_a_third_hit_tells_which_was_right(cell, made):
