@@ -15,7 +15,6 @@ SIZES = (0.004, 0.008, 0.015, 0.03, 0.06, 0.12, 0.3)  # of the discrepancy: no r
 USUAL, SPREAD = 0.02, 1.5  # its prior: log-normal
 SETTLED = 8  # steps
 RESTED = 1.0  # nats that a step may still promise
-MATTERS = 0.01  # share of |H| that an effect must change: nothing wrong changes up to 0.7 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,14 +166,3 @@ def without(best: StructureFit, effects: Sequence[Operator], steps: int = 5) -> 
         return None
     at = minimised(misfit, x, steps, 1.0, best.at.own)
     return StructureFit(misfit, at, misfit.evidence(at) + _of_size(misfit))
-
-
-def that_matters(best: StructureFit) -> StructureFit:
-    """Without effects that change the FRFs by less than one would see."""
-    while True:
-        pairs = zip(best.structure.effects, best.shares, strict=True)
-        small = [effect for effect, share in pairs if share < MATTERS]
-        fewer = without(best, small) if small else None
-        if fewer is None:
-            return best
-        best = settled(fewer.misfit, fewer.at)

@@ -20,6 +20,7 @@ from planner.words import significant
 # that lacks nothing it is 0.001 to 0.015. Chosen.
 FOLLOWED = 0.06
 LOOKED_AT = 60  # lines of the band, where sds of FRFs are told
+MATTERS = 0.01  # share of |H| that a named effect changes: nothing wrong changes up to 0.7 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,10 +160,11 @@ class RobotPosterior:
 
     @cached_property
     def words(self) -> tuple[str, ...]:
-        """What the structure has beside what is stated, and by how much that changes FRFs."""
+        """What the structure has beside what is stated and that matters, and by how much."""
         pairs = zip(self.structure.effects, self.found.shares, strict=True)
         return tuple(
             f"{effect.words(self.values(effect)).replace(effect.at, effect.at.split('#')[0])} "
             f"Without that, simulated FRFs would be {significant(100 * min(share, 1.0))} % off."
             for effect, share in sorted(pairs, key=lambda pair: -pair[1])
+            if share >= MATTERS
         )

@@ -22,7 +22,6 @@ from planner.fit.fitted import (
     settled,
     size_of,
     stepped,
-    that_matters,
     without,
 )
 from planner.fit.gauss_newton import minimised
@@ -111,8 +110,8 @@ class Search:
             if fresh is None:
                 break
             best = self._evolved(converged(fresh), dense)
-        found = self._last(that_matters(best))
-        return replace(found, wider=self._widened(found, best)) if self.widen else found
+        found = self._last(best)
+        return replace(found, wider=self._widened(found)) if self.widen else found
 
     def _again(self, known: FitRecord, data: FrfData, size: float) -> tuple[FrfMisfit, np.ndarray]:
         structure = RobotStructure(self.prior, known.effects, data.sensors)
@@ -286,16 +285,13 @@ class Search:
         at = minimised(best.misfit, best.at.x, 25, 0.02, best.at.own, by_prior=True)
         return StructureFit(best.misfit, at, best.misfit.evidence(at))
 
-    def _widened(self, found: StructureFit, whole: StructureFit) -> StructureFit:
-        """With what was left out as it matters little, and every spring that there may be.
+    def _widened(self, found: StructureFit) -> StructureFit:
+        """With every spring that there may be.
 
         What poses not measured may show is open as it is here: few poses tell no structure.
         """
-        misfit = replace(found.misfit, structure=whole.structure)
-        at = found.at
-        if whole.structure.effects != found.structure.effects:
-            at = minimised(misfit, whole.at.x, TRIED, 1.0, whole.at.own)
-        for effect in effects_free(whole.structure):
+        misfit, at = found.misfit, found.at
+        for effect in effects_free(found.structure):
             if not effect.springs:
                 continue
             structure = misfit.structure.with_effect(effect)
