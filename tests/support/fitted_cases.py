@@ -83,7 +83,7 @@ class Case:
 
 def everyday(name: str, seed: int, folder: Path) -> Case:
     """A soft base, a link that bends and a hose at once, each of a size of its own."""
-    rng, arm = _arm(name, seed, folder)
+    rng, arm = drawn_arm(name, seed, folder)
     secret = Secret(REAL.scatter.of(int(rng.integers(2**31))))
     kinds = "soft base", "bending link", "hose"
     for kind in kinds:
@@ -94,7 +94,7 @@ def everyday(name: str, seed: int, folder: Path) -> Case:
 def harder(name: str, seed: int, folder: Path) -> Case:
     """A soft floor, two bearings and a hose, a spindle 3 % heavier, springs that scatter by 0.5 %
     from visit to visit, hits 3° and 5 mm off."""
-    rng, arm = _arm(name, seed, folder)
+    rng, arm = drawn_arm(name, seed, folder)
     secret = Secret(REAL.scatter.of(int(rng.integers(2**31))))
     for kind in ("soft base", "hose"):
         secret = added(secret, kind, log_uniform(rng, 0.5, 1.0), arm, rng)
@@ -121,7 +121,7 @@ def _bearings(truth: Truth) -> list[tuple[str, np.ndarray, float]]:
     return found
 
 
-def _arm(name: str, seed: int, folder: Path) -> tuple[np.random.Generator, Arm]:
+def drawn_arm(name: str, seed: int, folder: Path) -> tuple[np.random.Generator, Arm]:
     rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
     folder.mkdir(parents=True, exist_ok=True)
     return rng, ARMS[name](folder, rng)
@@ -133,7 +133,7 @@ def _measured(
 ) -> Case:  # fmt: skip
     truth = load_truth(arm.toml, secret.deviation)
     simulation = Simulation(Robot.load(arm.toml))
-    low, high = _box(arm, simulation)
+    low, high = limits(arm, simulation)
     q = rng.uniform(low, high, (POSES, len(low)))
     unseen = rng.uniform(low, high, (UNSEEN, len(low)))
     hammer = replace(arm.hammer, noise=float(rng.uniform(0.005, 0.03)))
@@ -165,7 +165,7 @@ def _measured(
     )  # fmt: skip
 
 
-def _box(arm: Arm, simulation: Simulation) -> tuple[np.ndarray, np.ndarray]:
+def limits(arm: Arm, simulation: Simulation) -> tuple[np.ndarray, np.ndarray]:
     import tomllib
 
     table = tomllib.loads(arm.workspace)
