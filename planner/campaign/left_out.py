@@ -54,12 +54,12 @@ def left_out(model: "Model") -> LeftOutValues:
 
     found, poses = found_without(model)
     modes = tuple(f"the frequency of mode {k + 1}" for k in range(model.surrogate.count))
-    values = int(np.isfinite(found.rank).sum()) if len(poses) > 1 else 0
+    values = int(np.isfinite(found.rank).sum()) if len(model.labelled) > 1 else 0
     said = tuple(report(found, poses, modes))
     if not values:
         return LeftOutValues(0, None, (), (), said)
     coverage = dict(zip(map(str, LEVELS), found.coverage().tolist(), strict=True))
-    worst = tuple(poses[i] for i in found.worst())
+    worst = tuple(poses[i] for i in found.worst().tolist())
     rows = _rows(found, poses, frequencies(model.labelled))
     return LeftOutValues(values, coverage, worst, rows, said)
 

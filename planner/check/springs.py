@@ -113,7 +113,7 @@ def _own_axes(simulation: Simulation) -> list[CheckRemark]:
     slides = all(robot.slides(name) for name in rigid)
     text = f"Rigid {'along' if slides else 'about'} its own axis: {', '.join(rigid)}."
     remedy = f'Add a [[compliance]] for each that gives; joint = "{BASE}" is for the floor.'
-    return [CheckRemark("warning", text, f"{robot.path.name}, [[compliance]]", remedy)]
+    return [CheckRemark("note", text, f"{robot.path.name}, [[compliance]]", remedy)]
 
 
 def check_band(

@@ -59,8 +59,9 @@ def springs_at_force(simulation: Simulation, m: Matrices, force_n: np.ndarray) -
     if len(force_n) > TOGETHER:
         parts = np.array_split(np.arange(len(force_n)), -(-len(force_n) // TOGETHER))
         each = [springs_at_force(simulation, m.at(part), force_n[part]) for part in parts]
-        both = (np.concatenate([getattr(one, v) for one in each]) for v in ("stiffness", "damping"))
-        return Elasticity(*both, simulation.elasticity.loss_factor)
+        stiffness = np.concatenate([one.stiffness for one in each])
+        damping = np.concatenate([one.damping for one in each])
+        return Elasticity(stiffness, damping, simulation.elasticity.loss_factor)
     laws = simulation.robot.config.law
     own = [simulation.elastic.own_spring(law.joint) for law in laws]
     springs = stated = _each(simulation.elasticity, len(force_n))
@@ -107,7 +108,7 @@ def averaged(
 
 def _products(law: LawTable, swing: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of swing and speed (n, h, T) with each other (n, 2, 2), and with a law's torque (n, 2)."""
-    torque, state, before = np.zeros_like(swing), *np.zeros((2, *swing.shape[:2]))
+    torque, state, before = np.zeros_like(swing), *map(np.zeros, 2 * (swing.shape[:2],))
     for i in range(swing.shape[2]):
         state = law.step(state, before, swing[..., i], np.array(law.a))
         torque[..., i], before = state, swing[..., i]

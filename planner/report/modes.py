@@ -77,7 +77,7 @@ class ModeAnswer:
         pairs = np.array(mode.shape)
         pairs = np.stack([pairs.real, pairs.imag], -1) if np.iscomplexobj(pairs) else pairs
         own["shape"] = tuple((float(re), float(im)) for re, im in pairs)
-        own |= _vectors(mode) if isinstance(mode, Mode) else {}
+        own |= _vectors(mode)
         over_points = getattr(mode, "shape_sd", None) is not None
         if hasattr(mode, "residue_sd") and not over_points:
             both = zip(np.ravel(mode.residue), np.ravel(mode.residue_sd), strict=True)
@@ -115,8 +115,10 @@ class ModeAnswer:
         return f"{self.frequency_hz:.2f}{' ?' if isinstance(sure, float) and sure < SURE else ''}"
 
 
-def _vectors(mode: Mode) -> dict[str, Any]:
+def _vectors(mode: Any) -> dict[str, Any]:
     """What hits drive, how points move, and how stiff a mode is there."""
+    if not isinstance(mode, Mode):
+        return {}
     told: dict[str, Any] = {}
     stiffness = mode.modal_stiffness_n_m
     if np.any(np.isfinite(stiffness)):
