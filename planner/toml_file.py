@@ -78,6 +78,9 @@ def wrong_entry(path: Path, name: str, text: str, kind: type, fault: str) -> str
     missing = re.search(r"missing required field `([^`]+)`", what)
     if missing:
         return f"{path}: {_entry([*steps, missing[1]])} is missing; add it."
+    if what.startswith("Invalid enum value") and (choices := _choices(kind, steps)):
+        said = f"{', '.join(choices[:-1])} or {choices[-1]}"
+        return f"{path}: {_entry(steps)} must be {said}, not {_given(text, steps)}."
     wanted = re.fullmatch(r"Expected `([^`]+)`, got `[^`]+`", what)
     if not wanted or not steps:
         where = f"{_entry(steps)}: " if steps else ""
@@ -106,12 +109,24 @@ def _is_place(step: str) -> bool:
 
 def _fields(kind: Any, steps: Sequence[str]) -> list[str]:
     """Names of the entries of a table, as far as they are known."""
+    return list(_hints(kind, steps))
+
+
+def _choices(kind: Any, steps: Sequence[str]) -> list[str]:
+    """What an entry may be, where that is one of few."""
+    *table, last = (step for step in steps if not _is_place(step))
+    choices = [p for p in _parts(_hints(kind, table).get(last)) if isinstance(p, str | int)]
+    return [f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in choices]
+
+
+def _hints(kind: Any, steps: Sequence[str]) -> dict[str, Any]:
+    """Types of the entries of a table by name, as far as they are known."""
     for step in (step for step in steps if not _is_place(step)):
         hints = typing.get_type_hints(kind) if msgspec.inspect.is_struct_type(kind) else {}
         kind = next(
             (part for part in _parts(hints.get(step)) if msgspec.inspect.is_struct_type(part)), None
         )
-    return list(typing.get_type_hints(kind)) if msgspec.inspect.is_struct_type(kind) else []
+    return typing.get_type_hints(kind) if msgspec.inspect.is_struct_type(kind) else {}
 
 
 def _parts(hint: Any) -> list[Any]:

@@ -119,7 +119,7 @@ WRONG_TOML = {
     "a law of no kind": (
         "[[obstacle]]",
         LAW.format("joint_a1", "rubber", ""),
-        ["rubber", "law"],
+        ["rubber", "law", "softening", "backlash"],
     ),
     "a pulse of none": ("[[obstacle]]", "[hammer]\npulse_ms = 0\n[[obstacle]]", ["pulse_ms"]),
     "a flat obstacle": (SIZES, "size_m = [4, 4, 0]", ["floor", "above 0 m"]),
