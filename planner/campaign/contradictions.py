@@ -1,5 +1,8 @@
 """Hits of a pose that contradict each other, where nothing tells which of them is right."""
 
+from collections.abc import Iterable
+from pathlib import Path
+
 from planner.campaign.events import Question
 from planner.dataset.measure import MeasuredPose
 from planner.recording.records import Hit
@@ -21,15 +24,24 @@ def contradiction(pose: str, measured: MeasuredPose, known: int) -> Question | N
     ]
     names, hits = [name for _, name, _ in named], tuple(hit for *_, hit in named)
     found = doubts(hits, measured.band_hz) if len(hits) > 1 else ()
-    told, disagree = [], dict[str, None]()
+    camps: dict[tuple[Doubt | None, tuple[int, ...]], list[int]] = {}
+    disagree: dict[str, None] = {}
     for i, doubt in enumerate(found):
         if doubt is None or max(named[j][0] for j in (i, *doubt.others)) < known:
             continue
-        both = (names[i], *(names[j] for j in doubt.others))
-        if set(both) <= disagree.keys():  # told from the other side
+        # Hits that disagree with the same ones are told together; those of other sizes are not.
+        key = (doubt if doubt.size or doubt.along else None), doubt.others
+        both = {names[i], *(names[j] for j in doubt.others)}
+        if key not in camps and both <= disagree.keys():  # told from the other side
             continue
-        disagree |= dict.fromkeys(both)
-        told.append(_told(hits[i], doubt, both, both_doubted=found[doubt.others[0]] is not None))
+        disagree |= dict.fromkeys((names[i], *(names[j] for j in doubt.others)))
+        camps.setdefault(key, []).append(i)
+    told = []
+    for (_, others), own in camps.items():
+        doubt = found[own[0]]
+        assert doubt is not None
+        first, rest = (_listed(names[j] for j in one) for one in (own, others))
+        told.append(_told(hits[own[0]], doubt, first, rest, found[others[0]] is not None))
     if not told:
         return None
     text = (
@@ -39,18 +51,21 @@ def contradiction(pose: str, measured: MeasuredPose, known: int) -> Question | N
     return Question(text, disagree=tuple(disagree))
 
 
-def _told(hit: Hit, doubt: Doubt, names: tuple[str, ...], both_doubted: bool) -> str:
-    first, others = names[0], " and ".join(names[1:])
+def _listed(names: Iterable[str]) -> str:
+    return " and ".join(Path(name).name for name in names)
+
+
+def _told(hit: Hit, doubt: Doubt, first: str, others: str, both_doubted: bool) -> str:
     if doubt.size:
         return f"{first}, along {hit.axis[-1]}, {other_size(doubt.size, others).rstrip('?')}"
     if doubt.along:
         return f"{first} is said to be {hit.axis}, but answers as {others} along {doubt.along} did"
     said = f"(likeness {doubt.likeness:.2f})"
     if both_doubted:
+        verb = "disagree" if " and " in first else "disagrees"
         return (
-            f"{first} and {others} are {'both' if len(names) == 2 else 'all'} said to be along "
-            f"{hit.axis[-1]} but disagree {said}, "
-            f"and nothing tells which is right"
+            f"along {hit.axis[-1]}, {first} {verb} with {others} {said}, and nothing tells which "
+            f"is right"
         )
     return (
         f"{first}, said to be {hit.axis}, disagrees with {others} {said} and answers as hits "

@@ -66,7 +66,10 @@ def posture_tip(folder: Path, tool: Tool | None, pose: str | None) -> TipRecepta
     sd = np.sqrt(np.sum(np.abs(errors) ** 2, axis=0))
     seen = TwoPoints(hz, directions, values, sd, errors)
     found = two_point_receptance(seen, tool, back)
-    said = f"From FRFs between two points at {len(x)} other postures; ± is that of their modes."
+    said = (
+        f"From FRFs between two points at {len(x)} other postures; ± is that of the modes that "
+        f"were followed, and too narrow: what other modes add is in neither value nor ±."
+    )
     simulated = any(matrix.simulated for matrix in every)
     return replace(found, remarks=(*found.remarks, said), simulated=simulated)
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.cuts import SLOT
 from tests.support.outside import call, make_cell, told
 from tests.support.robots import JOINTS_DEG
 
@@ -15,18 +16,7 @@ kind = "hardening"
 stiffness_n_m_rad = 4e4
 angle_rad = 2e-4
 """
-CUT = """teeth = 2
-diameter_m = 0.02
-milling = "slot"
-radial_immersion = 1.0
-kt_n_m2 = 6.0e8
-kr_n_m2 = 2.0e8
-feed = [1.0, 0.0, 0.0]
-axis = [0.0, 0.0, 1.0]
-spindle_rpm = [5000, 6000, 2]
-depth_m = [0.0, 0.05, 100]
-method = "zeroth_order"
-"""
+CUT = SLOT.format("5000, 6000, 2", "0.0, 0.05, 100", "zeroth_order")
 MIDDLE = ",".join(str(np.mean(pair)) for pair in JOINTS_DEG)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from planner.cli.run import run
+from tests.support.cuts import SLOT
 from tests.support.rerun_columns import lines_of
 
 MODES = """
@@ -16,19 +17,7 @@ damping_ratio = 0.011
 mass_kg = 0.03993
 direction = [1.0, 0.0, 0.0]
 """
-CUT = """
-teeth = 2
-diameter_m = 0.02
-milling = "slot"
-radial_immersion = 1.0
-kt_n_m2 = 6.0e8
-kr_n_m2 = 2.0e8
-feed = [1.0, 0.0, 0.0]
-axis = [0.0, 0.0, 1.0]
-spindle_rpm = [10000, 20000, 2]
-depth_m = [0.0, 0.01, 400]
-method = "full_discretisation"
-"""
+CUT = SLOT.format("10000, 20000, 2", "0.0, 0.01, 400", "full_discretisation")
 
 
 @pytest.fixture
