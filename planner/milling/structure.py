@@ -9,7 +9,7 @@ from scipy.stats import norm, qmc
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.cutter_fit import CutterFit, hidden_below
-from planner.milling.cutter_frf import EXACT, CutterFrf
+from planner.milling.cutter_frf import CutterFrf
 from planner.milling.cutter_modes import CutterModes, ModeFile
 from planner.milling.directional import Coefficients, mean_matrix
 from planner.milling.machine import LobeCurves, Machine, check_structure, curves
@@ -174,44 +174,29 @@ def of_modes(file: ModeFile, cut: Cut) -> Structure:
 
 def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
     """From FRFs, predicted with an sd or measured: modes are fitted, and how well is said."""
-    plane = frf.in_plane(cut)
-    fit = CutterFit.of(plane) if plane.sd is None else None
-    if fit is None or (fit.error > ROUNDING and plane.error(plane.fitted()) < EXACT):
-        return _computed(plane, cut)  # or without noise: what modes outside the lines add counts
-    return _measured(fit, plane, cut)
-
-
-def _measured(fit: CutterFit, plane: CutterFrf, cut: Cut) -> Structure:
-    mean = mean_matrix(cut, Coefficients.of(cut))
+    plane, mean = frf.in_plane(cut), mean_matrix(cut, Coefficients.of(cut))
+    if plane.sd is not None:
+        check_band(plane, curves(plane.frequency_hz, plane.receptance.transpose(2, 0, 1), mean))
+    fit = CutterFit.of(plane)
     check_structure(fit.modes)
-    floor = Machine(fit.modes, cut, Coefficients.of(cut)).floor().floor_m
-    # Lines in the noise tell nothing of modes below, whose flank may seem to matter there.
-    told = plane.frequency_hz > (hidden_below(fit, mean, floor) or 0.0)
-    check_band(plane, curves(plane.frequency_hz, fit.receptance(told), mean), told)
+    if plane.sd is None:
+        floor = Machine(fit.modes, cut, Coefficients.of(cut)).floor().floor_m
+        # Lines in the noise tell nothing of modes below, whose flank may seem to matter there.
+        told = plane.frequency_hz > (hidden_below(fit, mean, floor) or 0.0)
+        check_band(plane, curves(plane.frequency_hz, fit.receptance(told), mean), told)
+    spread, given = explaining(fit.modes, plane)
     count = len(np.unique(fit.modes.poles))
-    said = f"{count} modes fitted to {plane.name} leave {100 * fit.error:.2g} % of the accelerance."
-    noisy = fit if fit.error > ROUNDING else None
-    return Structure(fit.modes, ModeSpread.none(count), plane, (*plane.remarks, said), noisy)
-
-
-def _computed(plane: CutterFrf, cut: Cut) -> Structure:
-    mean = mean_matrix(cut, Coefficients.of(cut))
-    check_band(plane, curves(plane.frequency_hz, plane.receptance.transpose(2, 0, 1), mean))
-    modes = plane.fitted()
-    check_structure(modes)
-    error = plane.error(modes)
-    spread, given = explaining(modes, plane)
     remarks = [
         *plane.remarks,
-        f"{len(np.unique(modes.poles))} modes fitted to {plane.name} are off by {100 * error:.2g} "
-        f"% of the FRFs (root mean square over the lines).",
+        f"{count} modes fitted to {plane.name} leave {100 * fit.error:.2g} % of the accelerance.",
     ]
     if spread.any:
         remarks.append(
             f"Depths at 95 % draw each mode's frequency, damping and size within the FRFs' sd, of "
             f"which that gives {100 * given:.0f} % (of its square)."
         )
-    return Structure(modes, spread, plane, tuple(remarks))
+    noisy = fit if plane.sd is None and fit.error > ROUNDING else None
+    return Structure(fit.modes, spread, plane, tuple(remarks), noisy)
 
 
 def check_band(frf: CutterFrf, found: LobeCurves, told: np.ndarray | None = None) -> None:
