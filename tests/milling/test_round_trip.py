@@ -129,7 +129,8 @@ def test_a_second_point_two_millimetres_off():
     base, reference = machine(), tool(REFERENCE, RIGID_ENOUGH)
     seen = measured(frf(base, shifted, FREQUENCY, RIGID_ENOUGH, points=(-1, 12)), 0.01, 5)
     truth = ordered(frf(base, TARGET, FREQUENCY, LOOSER))
-    tip = smoothed(two_point_receptance(seen, reference, replace(BACK, place_sd=0.002)))
+    back = Point(BACK.node, BACK.from_tip_m, place_sd_m=0.002)
+    tip = smoothed(two_point_receptance(seen, reference, back))
     found = couple(tip, tool(TARGET, LOOSER), reference)
     off = np.abs(found.receptance[KEPT] - truth)
     assert at_peaks(found, truth)[:2, :2].max() < 0.05
