@@ -39,13 +39,6 @@ def match_gain(
     Frequencies `expected` (k,) and shapes (k, 3), complex, or None; sd (k,) of the logarithm of the
     frequency.
     """
-    spurious = np.array([unexpected_cost(mode) for mode in modes])
-    return MISSING_COST + spurious - _match_cost(modes, expected, shape, sd)
-
-
-def _match_cost(
-    modes: Sequence[Mode], expected: np.ndarray, shape: np.ndarray | None, sd: np.ndarray
-) -> np.ndarray:
     if not modes or not expected.size:
         return np.zeros((expected.size, len(modes)))
     frequency = np.array([mode.frequency_hz for mode in modes])
@@ -56,7 +49,7 @@ def _match_cost(
     if shape is not None:
         measured = np.array([mode.shape for mode in modes])
         cost += MAC_WEIGHT * (1 - mac_matrix(np.asarray(shape), measured))
-    return cost
+    return MISSING_COST + np.array([unexpected_cost(mode) for mode in modes]) - cost
 
 
 def unexpected_cost(mode: Mode) -> float:
