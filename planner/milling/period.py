@@ -6,7 +6,7 @@ at these points, and not between: a full discretisation (Ding et al., Int. J. Ma
 Manufacture 50, 2010) whose steps may be of any degree.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -235,10 +235,7 @@ def _uneven(
             for n, value in enumerate(values):
                 to = own[2 * n : 2 * n + 2]
                 target[p : p + 2, to] += turn * value * matrix
-    return Period(
-        built.duration_s, built.free, built.seen, built.reply, built.push, now, before,
-        built.time_s, built.weight_s, built.force,
-    )  # fmt: skip
+    return replace(built, now=now, before=before)
 
 
 def _element_at(found: Engagement, angle: float) -> int:

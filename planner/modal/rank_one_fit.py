@@ -38,27 +38,16 @@ class Entries:
         Groups share no entry. A group's scale is known where its entries cannot be parted into
         rows and columns that never meet: where the graph of its entries holds an odd ring.
         """
-        side = np.zeros(self.points, int)
-        group, odd = np.full(self.points, -1), []
-        neighbours: list[list[int]] = [[] for _ in range(self.points)]
-        for a, b in zip(self.rows, self.columns, strict=True):
-            neighbours[a].append(int(b))
-            neighbours[b].append(int(a))
-        for start in range(self.points):
-            if group[start] >= 0:
-                continue
-            number, stack = len(odd), [start]
-            group[start], side[start] = number, 1
-            odd.append(False)
-            while stack:
-                a = stack.pop()
-                for b in neighbours[a]:
-                    if group[b] < 0:
-                        group[b], side[b] = number, -side[a]
-                        stack.append(b)
-                    elif side[b] == side[a]:
-                        odd[number] = True
-        return group, np.array(odd)
+        from scipy.sparse.csgraph import connected_components  # 0.2 s
+
+        # Of two copies of each point, entries join one of a row with the other of a column: where
+        # an odd ring is, both copies are in one part.
+        n = self.points
+        joined = np.zeros((2 * n, 2 * n), bool)
+        joined[self.rows, n + self.columns] = joined[n + self.rows, self.columns] = True
+        part = connected_components(joined, directed=False)[1].reshape(2, n)
+        first, group = np.unique(np.min(part, axis=0), return_index=True, return_inverse=True)[1:]
+        return group, part[0, first] == part[1, first]
 
 
 @dataclass(frozen=True, eq=False)
