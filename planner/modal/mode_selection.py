@@ -75,10 +75,6 @@ class PoleFit:
     variance: np.ndarray
     excess: np.ndarray  # (F,) ≥ 1: χ² per degree of freedom (and of information) around a line
 
-    def scale_at(self, frequency_hz: float, lines_hz: np.ndarray) -> float:
-        """Factor by which the error around a frequency exceeds its stated variance."""
-        return float(np.interp(frequency_hz, lines_hz, self.excess))
-
 
 def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
     """Fit from starting poles (m,), leaving out and adding modes until neither helps.
@@ -261,7 +257,7 @@ def doubt(
 def scales(data: Data, current: PoleFit) -> np.ndarray:
     """(m,) factor on the covariance of each mode, from the error around it."""
     frequency = np.abs(current.refined.poles) / (2 * np.pi)
-    return np.array([current.scale_at(f, data.frequency_hz) for f in frequency])
+    return np.interp(frequency, data.frequency_hz, current.excess)
 
 
 def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:

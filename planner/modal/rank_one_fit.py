@@ -11,6 +11,8 @@ from itertools import combinations
 
 import numpy as np
 
+from planner.inference.student import wider
+
 ROUNDS = 60  # of alternating and of Gauss-Newton steps
 ROUGH, STILL = 1e-3, 1e-6  # a step below, relative to the shape, is the last: while weights change
 # Relative to all entries, an error that each is given at first: none rules alone.
@@ -259,9 +261,6 @@ def _ratio(top: np.ndarray, bottom: np.ndarray) -> np.ndarray:
 
 
 FREE_GAIN = 0.2  # sd that leaves a row's gain to what is measured
-# Student's t over the normal quantile, both at 97.5 %, by degrees of freedom. One degree would give
-# 6.5, which would call every shape unknown.
-STUDENT = (2.2, 2.2, 1.62, 1.42, 1.31)
 
 
 def row_gain(shapes: Sequence[FittedShape]) -> float:
@@ -274,8 +273,8 @@ def row_gain(shapes: Sequence[FittedShape]) -> float:
             common, own, count = common + found[0], own + found[1], count + 1
     if not count:
         return 0.0
-    student = STUDENT[min(tied - 2, len(STUDENT) - 1)]
-    return float(np.sqrt(student**2 * common / count + own / count))
+    # Of one degree of freedom Student's t would call every shape unknown: it counts as two.
+    return float(np.sqrt(wider(max(tied - 1, 2)) ** 2 * common / count + own / count))
 
 
 def _difference(shapes: Sequence[FittedShape], i: int, j: int) -> tuple[float, float] | None:
