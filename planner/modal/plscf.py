@@ -52,7 +52,10 @@ def plscf(
     and damping are returned.
     """
     omega = 2 * np.pi * np.asarray(frequency_hz)
-    circle = _circle(omega)
+    low, high = omega[[0, -1]]
+    # A band far above zero is moved down, or most of the circle would hold no data.
+    base = low if low > 0.5 * high else 0.0
+    circle = _Circle(base, np.pi / (high - base))
     scale = np.sqrt(np.mean(np.abs(frf) ** 2, axis=(0, 2)))
     scale = np.where(scale > 0, scale, 1.0)
     scaled = frf / scale[:, None]
@@ -60,13 +63,6 @@ def plscf(
         np.exp(1j * (omega - circle.base) * circle.step), scaled, weight, max(orders)
     )
     return tuple(_solve(order, normal, coupling, scale, circle) for order in orders)
-
-
-def _circle(omega: np.ndarray) -> _Circle:
-    low, high = omega[0], omega[-1]
-    # A band far above zero is moved down, or most of the circle would hold no data.
-    base = low if low > 0.5 * high else 0.0
-    return _Circle(base, np.pi / (high - base))
 
 
 def _normal(
