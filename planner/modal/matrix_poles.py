@@ -8,11 +8,14 @@ from planner.frf.matrix import FrfMatrix
 from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.matrix_selection import first_variance, judged, select_modes
-from planner.modal.plscf import PoleSet, plscf
+from planner.modal.plscf import PoleSet, plscf, row_errors
 from planner.modal.set_poles import SetPoles
 from planner.modal.stabilisation import Diagram, diagram, stable
 
 MARGIN = 0.05  # of the band, beyond its edges
+# Of rows that fit the denominator of all the worse than the median by more than this, the weight is
+# taken down, so many times over; fewer rows than these cannot tell.
+ODD, REWEIGHED, LEAST_ROWS = 3.0, 3, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +88,23 @@ def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Di
     # Max order.
     orders = ladder(max(2, min(36, block.shape[-1] // 3)))
     frequency = matrix.frequency_hz[chosen]
+    weight = _without_odd_rows(frequency, block, orders[-1], weight)
     sets: tuple[PoleSet, ...] = plscf(frequency, block, orders, weight)
     return orders, diagram(sets, (frequency[0] * 0.95, frequency[-1] * 1.05))
+
+
+def _without_odd_rows(
+    frequency: np.ndarray, block: np.ndarray, order: int, weight: np.ndarray
+) -> np.ndarray:
+    """Weights (o, F) with those rows taken down that do not go with the others."""
+    if block.shape[0] < LEAST_ROWS or block.shape[1] < 2:
+        return weight
+    changed = weight
+    for _ in range(REWEIGHED):
+        errors = row_errors(frequency, block, order, changed)
+        usual = max(float(np.median(errors)), 1e-300)
+        changed = weight * np.minimum(1.0, ODD * usual / np.maximum(errors, 1e-300))[:, None] ** 2
+    return changed
 
 
 def _references(measured: np.ndarray) -> np.ndarray:

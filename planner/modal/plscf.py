@@ -52,10 +52,7 @@ def plscf(
     and damping are returned.
     """
     omega = 2 * np.pi * np.asarray(frequency_hz)
-    low, high = omega[[0, -1]]
-    # A band far above zero is moved down, or most of the circle would hold no data.
-    base = low if low > 0.5 * high else 0.0
-    circle = _Circle(base, np.pi / (high - base))
+    circle = _circle(omega)
     scale = np.sqrt(np.mean(np.abs(frf) ** 2, axis=(0, 2)))
     scale = np.where(scale > 0, scale, 1.0)
     scaled = frf / scale[:, None]
@@ -63,6 +60,40 @@ def plscf(
         np.exp(1j * (omega - circle.base) * circle.step), scaled, weight, max(orders)
     )
     return tuple(_solve(order, normal, coupling, scale, circle) for order in orders)
+
+
+def row_errors(
+    frequency_hz: np.ndarray, frf: np.ndarray, order: int, weight: np.ndarray | None = None
+) -> np.ndarray:
+    """(outputs,) how badly each row fits the denominator of all, relative to the row: 0 is well.
+
+    One weight per row, the same for all lines. A row with a turned sign or with exchanged columns
+    has other poles than the rest and stands out.
+    """
+    omega = 2 * np.pi * np.asarray(frequency_hz)
+    circle = _circle(omega)
+    z = np.exp(1j * (omega - circle.base) * circle.step)
+    scale = np.sqrt(np.mean(np.abs(frf) ** 2, axis=(0, 2)))
+    scaled = frf / np.where(scale > 0, scale, 1.0)[:, None]
+    normal, coupling = _normal(z, scaled, weight, order)
+    inputs = frf.shape[1]
+    coefficients = _denominator(order, normal, coupling)
+    powers = z ** np.arange(order + 1)[:, None]
+    denominator = np.einsum("rij,rf->ijf", coefficients, powers)
+    seen = np.einsum("oif,ijf->ojf", scaled, denominator)
+    basis = np.concatenate([powers.real, powers.imag], axis=1)
+    values = np.concatenate([seen.real, seen.imag], axis=-1).reshape(-1, 2 * z.size)
+    orthonormal = np.linalg.qr(basis.T)[0]
+    left = np.sum(values**2, axis=1) - np.sum((values @ orthonormal) ** 2, axis=1)
+    power = np.sum(values**2, axis=1).reshape(-1, inputs).sum(axis=1)
+    return left.reshape(-1, inputs).sum(axis=1) / np.maximum(power, 1e-300)
+
+
+def _circle(omega: np.ndarray) -> _Circle:
+    low, high = omega[0], omega[-1]
+    # A band far above zero is moved down, or most of the circle would hold no data.
+    base = low if low > 0.5 * high else 0.0
+    return _Circle(base, np.pi / (high - base))
 
 
 def _normal(
