@@ -12,26 +12,27 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
+import msgspec
 import numpy as np
+import scipy.linalg
 
 SLICES = 24  # of a tapered segment: one that narrows to less than half is then exact to 1e-5
 TAYLOR = 14  # terms of the exponential: 1e-16 at the norm to which matrices are halved
 GAUSS = np.sqrt(3) / 6  # places of Gauss's two points on a slice, from its middle
 
 
-@dataclass(frozen=True)
-class ToolMaterial:
-    """Young's modulus in Pa, density in kg/m³, Poisson's ratio, structural loss factor."""
+class ToolMaterial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A material by a name of your choice; `loss_factor` is its structural damping."""
 
-    youngs_modulus: float
-    density: float
+    youngs_modulus_pa: float
+    density_kg_m3: float
     poisson_ratio: float
     loss_factor: float = 0.0
 
     @property
     def modulus(self) -> complex:
         """E (1 + iη)."""
-        return self.youngs_modulus * (1 + 1j * self.loss_factor)
+        return self.youngs_modulus_pa * (1 + 1j * self.loss_factor)
 
     @property
     def shear_modulus(self) -> complex:
@@ -64,7 +65,7 @@ class Segment:
         """Mass in kg, that at its end included."""
         d, e, b = self.diameter, self.end_diameter, self.bore
         volume = np.pi / 4 * self.length * ((d * d + d * e + e * e) / 3 - b * b)
-        return float(self.material.density * volume + self.mass)
+        return float(self.material.density_kg_m3 * volume + self.mass)
 
 
 @dataclass(frozen=True)
@@ -99,20 +100,20 @@ class Section:
         a[:, 0, 1] = 1
         a[:, 0, 2] = 1 / (self.shear_coefficient * m.shear_modulus * self.area)
         a[:, 1, 3] = 1 / (m.modulus * self.second_moment)
-        a[:, 2, 0] = -m.density * self.area * omega**2
-        a[:, 3, 1] = -m.density * self.second_moment * omega**2
+        a[:, 2, 0] = -m.density_kg_m3 * self.area * omega**2
+        a[:, 3, 1] = -m.density_kg_m3 * self.second_moment * omega**2
         a[:, 3, 2] = -1
         return a
 
     def stretching(self, omega: np.ndarray) -> np.ndarray:
         """(F, 2, 2) of (z, force z)."""
         m = self.material
-        return _rod(omega, m.modulus * self.area, m.density * self.area)
+        return _rod(omega, m.modulus * self.area, m.density_kg_m3 * self.area)
 
     def twisting(self, omega: np.ndarray) -> np.ndarray:
         """(F, 2, 2) of (θz, moment z)."""
         m, polar = self.material, 2 * self.second_moment
-        return _rod(omega, m.shear_modulus * polar, m.density * polar)
+        return _rod(omega, m.shear_modulus * polar, m.density_kg_m3 * polar)
 
 
 def _rod(omega: np.ndarray, stiffness: complex, inertia: float) -> np.ndarray:
@@ -188,7 +189,8 @@ def exponential(a: np.ndarray) -> np.ndarray:
     The entries' units differ (m, rad, N, N·m): they are balanced first.
     """
     size = a.shape[-1]
-    scale = _balance(np.abs(a).reshape(-1, size, size).max(axis=0))
+    largest = np.abs(a).reshape(-1, size, size).max(axis=0)
+    scale = scipy.linalg.matrix_balance(largest, permute=False, separate=True)[1][0]
     b = a / scale[:, None] * scale
     norm = np.abs(b).sum(axis=-1).max()
     # Halved to.
@@ -202,16 +204,3 @@ def exponential(a: np.ndarray) -> np.ndarray:
     for _ in range(halvings):
         less_one = 2 * less_one + less_one @ less_one
     return scale[:, None] * (eye + less_one) / scale
-
-
-def _balance(size: np.ndarray, sweeps: int = 8) -> np.ndarray:
-    """(n,) scales of the variables that make rows and columns of a matrix about equally large."""
-    off = size - np.diag(np.diag(size))
-    scale = np.ones(len(size))
-    for _ in range(sweeps):
-        for k in range(len(size)):
-            row, column = off[k] @ scale, np.sum(off[:, k] / scale)
-            if row > 0 and column > 0:
-                # b = off · scale_j / scale_k: its k-th row and column become equally large.
-                scale[k] = np.sqrt(row / column)
-    return scale

@@ -107,11 +107,7 @@ def _check(cut: Cut, path: Path) -> None:
         ("kt_sd_percent", cut.kt_sd_percent, 0.0, 100.0),
         ("kr_sd_percent", cut.kr_sd_percent, 0.0, 100.0),
     ]
-    for name, value, low, high in limits:
-        if not low <= value <= high:
-            raise InputError(
-                f"{path}: {name} is {value}; it must lie between {low:g} and {high:g}."
-            )
+    check_limits(str(path), limits)
     _check_range(cut.spindle_rpm, 1.0, 1e6, f"{path}: spindle_rpm")
     _check_range(cut.depth_m, 0.0, 1.0, f"{path}: depth_m")
     if cut.depth_m[1] <= 0:
@@ -132,6 +128,22 @@ def _check(cut: Cut, path: Path) -> None:
         )
 
 
+def check_limits(where: str, limits: Sequence[tuple[str, float, float, float]]) -> None:
+    """InputError for the first (name, value, least, most) that lies outside."""
+    for name, value, low, high in limits:
+        if not low <= value <= high:
+            raise InputError(
+                f"{where}: {name} is {value}; it must lie between {low:g} and {high:g}."
+            )
+
+
+def check_unit(where: str, **vectors: tuple[float, float, float]) -> None:
+    """InputError for the first that is no unit vector."""
+    for name, given in vectors.items():
+        if not abs(np.linalg.norm(given) - 1) < UNIT:
+            raise InputError(f"{where}: {name} is not of length 1; give a unit vector.")
+
+
 def _check_range(given: tuple[float, float, int], least: float, most: float, name: str) -> None:
     low, high, count = given
     if not least <= low <= high <= most:
@@ -145,9 +157,7 @@ def _check_range(given: tuple[float, float, int], least: float, most: float, nam
 
 
 def _check_directions(cut: Cut, path: Path) -> None:
-    for name, given in (("feed", cut.feed), ("axis", cut.axis)):
-        if not abs(np.linalg.norm(given) - 1) < UNIT:
-            raise InputError(f"{path}: {name} is not of length 1; give a unit vector.")
+    check_unit(str(path), feed=cut.feed, axis=cut.axis)
     if cut.feed_in == "frf" and abs(float(np.dot(cut.feed, cut.axis))) > UNIT:
         raise InputError(f"{path}: feed is not at right angles to the axis; correct one of them.")
 

@@ -1,4 +1,4 @@
-"""Modes at the cutter from measured FRFs, as `planner modes` finds them, and how sure they are.
+"""Modes at the cutter from its FRFs, as `planner modes` finds them, and how sure they are.
 
 They are fitted in accelerance, as sensors measure it: its noise is alike at all lines, and lines
 that hold nothing else count for nothing. Divided by ω² the lowest of them would govern the fit.
@@ -38,11 +38,14 @@ class CutterFit:
         """InputError where the FRFs hold no mode."""
         accelerance = frf.receptance * (2j * np.pi * frf.frequency_hz) ** 2
         there = np.any(accelerance != 0, axis=-1)
-        known = accelerance if np.all(there) else accelerance[there][:, None]
+        variance = frf.allowance
+        if not np.all(there):
+            accelerance = accelerance[there][:, None]
+            variance = None if variance is None else variance[there][:, None]
         # Of two poles where one mode drifted both may stay: it is their FRF that chatters.
-        data = Data(frf.frequency_hz, known, None, steady=True)
+        data = Data(frf.frequency_hz, accelerance, variance, steady=True)
         found = identify(data) if np.any(there) else None
-        if found is None:
+        if found is None or not (found.modes or frf.sd is not None):
             ends = frf.frequency_hz[[0, -1]]
             raise InputError(
                 f"{frf.name}: no mode shows between {ends[0]:g} and {ends[1]:g} Hz; measure over "
@@ -69,9 +72,13 @@ class CutterFit:
         return out
 
     def _as_modes(self, fitted: np.ndarray, residues: Residues) -> CutterModes:
-        """With two shapes and drives where a pole may stand for several modes."""
+        """With two shapes and drives where a pole may stand for several modes.
+
+        Predicted FRFs hold no noise: all their poles count, however damped.
+        """
         residue, upper = self._whole(residues.residue), self._whole(residues.rest)[..., -1]
-        kept = np.flatnonzero(weakness(self.found.data, self.found.fit) <= 1)
+        weak = weakness(self.found.data, self.found.fit)
+        kept = np.flatnonzero((weak <= 1) | (self.frf.sd is not None))
         which = np.repeat(kept, np.where(np.isin(kept, self.shaped.shaped), 1, 2))
         part = np.append(0, (np.diff(which) == 0).astype(int))
         left, sizes, right = np.linalg.svd(np.moveaxis(residue, -1, 0)[which])

@@ -1,4 +1,4 @@
-"""FRFs at the cutter: read from files, seen in the plane of a cut, and, if predicted, as modes."""
+"""FRFs at the cutter: read from files, seen in the plane of a cut."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,18 +9,11 @@ from planner.errors import InputError
 from planner.frf.labelled import labelled_frfs
 from planner.frf.quantities import convert
 from planner.milling.cut import Cut
-from planner.milling.cutter_modes import CutterModes
-from planner.milling.rational_fit import CLOSE, RationalFit, rational_fit
 from planner.recording.file_names import read_frfs
 from planner.recording.records import AXES, FrfRecord
 
 SEEN = 1e-9  # share of a direction in the plane of the cut that does not count
 LEAST_LINES = 16
-FAR = 3.0  # times the highest line
-# Relative error at which a fit to exact FRFs is close enough. What a loss factor or modes beyond
-# the lines add is no few modes': closer fits follow it with pairs of far poles that nearly cancel,
-# and chatter where nothing is known.
-EXACT = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +55,19 @@ class CutterFrf:
         return replace(self, receptance=h, sd=sd, remarks=remarks)
 
     @property
+    def allowance(self) -> np.ndarray | None:
+        """(d, d, F) in (m/s²/N)²: how far off a fit may be, squared; None where no sd is stated.
+
+        A tenth of the sd adds nothing to it; the mean of uncertain FRFs is that of no modes: more
+        poles would follow it and mean nothing. A share of the matrix keeps what has no sd from
+        being trusted without limit.
+        """
+        if self.sd is None:
+            return None
+        size = np.linalg.norm(self.receptance, axis=(0, 1))
+        return np.hypot(0.1 * self.sd, 1e-4 * size) ** 2 * (2 * np.pi * self.frequency_hz) ** 4
+
+    @property
     def _known(self) -> np.ndarray:
         """(3, 3) which entries are known."""
         return np.all(np.isfinite(self.receptance), axis=-1)
@@ -76,34 +82,6 @@ class CutterFrf:
             said.append(f"{self.name} lacks the FRF {AXES[i]}{AXES[j]}: it is taken {other}.")
         return h, tuple(said)
 
-    def fitted(self) -> CutterModes:
-        """Predicted FRFs in a plane, without noise, as modes; of measured ones see `cutter_fit`."""
-        fit = rational_fit(self.frequency_hz, self.receptance, close=self._close)
-        modes = as_modes(fit, self.frequency_hz)
-        # So many times a fit's error modes may be off by which leave far poles out; chosen
-        if self.error(modes) > max(2.0 * fit.error, CLOSE):
-            # Poles far above the lines are then no modes' compliance but a part of the curve.
-            modes = as_modes(fit, self.frequency_hz, far=np.inf)
-        return modes
-
-    @property
-    def _close(self) -> float:
-        """Relative error of a fit that is close enough, beside the sd that the FRFs have.
-
-        The mean of uncertain FRFs is that of no modes: more poles would follow that, and no more.
-        """
-        if self.sd is None:
-            return EXACT
-        size = np.linalg.norm(self.receptance, axis=(0, 1))
-        # A fit as close as this share of the FRFs' sd adds nothing to it; chosen
-        return max(EXACT, 0.1 * float(np.median(np.linalg.norm(self.sd, axis=(0, 1)) / size)))
-
-    def error(self, modes: CutterModes) -> float:
-        """Root mean square over lines of ‖H − modes‖/‖H‖."""
-        off = self.receptance - modes.receptance(self.frequency_hz).transpose(1, 2, 0)
-        share = np.linalg.norm(off, axis=(0, 1)) / np.linalg.norm(self.receptance, axis=(0, 1))
-        return float(np.sqrt(np.mean(share**2)))
-
 
 def _turned(values: np.ndarray, plane: np.ndarray) -> np.ndarray:
     """(2, 2, F) of (3, 3, F); entries that the plane does not see may be NaN."""
@@ -111,28 +89,6 @@ def _turned(values: np.ndarray, plane: np.ndarray) -> np.ndarray:
     share = np.einsum("ia,jb->ijab", weight, weight)
     parts = np.where(share[..., None] == 0, 0.0, share[..., None] * values)
     return parts.sum(axis=(2, 3))
-
-
-def as_modes(fit: RationalFit, frequency_hz: np.ndarray, far: float = FAR) -> CutterModes:
-    """Poles with a shape and a drive each; a residue of rank two takes its pole twice.
-
-    Poles beyond `far` times the highest of the lines (F,) are what is left of the modes there:
-    their compliance.
-    """
-    poles, shapes, drives = [], [], []
-    size = np.linalg.norm(fit.response(frequency_hz), axis=(0, 1))
-    s = 2j * np.pi * np.asarray(frequency_hz)
-    away = np.abs(fit.poles) > far * float(np.abs(s[-1]))
-    rest = fit.rest - 2 * np.real(fit.residues[away] / fit.poles[away, None, None]).sum(axis=0)
-    for pole, residue in zip(fit.poles[~away], fit.residues[~away], strict=True):
-        left, sizes, right = np.linalg.svd(residue)
-        second = np.max(sizes[1] * (1 / np.abs(s - pole) + 1 / np.abs(s - pole.conj())) / size)
-        # Share of the FRF, anywhere, below which a residue's second part does not count
-        for k in range(1 + int(second > 1e-3)):
-            poles.append(pole)
-            shapes.append(left[:, k] * sizes[k])
-            drives.append(right[k])
-    return CutterModes(np.array(poles), np.array(shapes), np.array(drives), rest)
 
 
 def read_frf(path: Path, pose: str | None, from_names: bool = False) -> CutterFrf:

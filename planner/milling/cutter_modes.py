@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from planner.errors import InputError
-from planner.milling.cut import UNIT
+from planner.milling.cut import check_limits, check_unit
 from planner.toml_file import load_toml
 
 
@@ -130,10 +130,5 @@ def _check(mode: StatedMode, where: str) -> None:
         ("damping_sd", mode.damping_sd, 0.0, 1.0),
         ("mass_sd_percent", mode.mass_sd_percent, 0.0, 100.0),
     ]
-    for name, value, low, high in limits:
-        if not low <= value <= high:
-            raise InputError(
-                f"{where}: {name} is {value}; it must lie between {low:g} and {high:g}."
-            )
-    if not abs(np.linalg.norm(mode.direction) - 1) < UNIT:
-        raise InputError(f"{where}: direction is not of length 1; give a unit vector.")
+    check_limits(where, limits)
+    check_unit(where, direction=mode.direction)

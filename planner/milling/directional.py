@@ -20,50 +20,37 @@ from planner.milling.cut import Cut
 IN_CUT = 1e-9  # rad: what an angle may miss the cut's ends by
 
 
-@dataclass(frozen=True)
-class Coefficients:
-    """Cutting coefficients in N/m²: tangential and radial."""
-
-    kt: float
-    kr: float
-
-    @classmethod
-    def of(cls, cut: Cut) -> "Coefficients":
-        """As the cut states them."""
-        return cls(cut.kt_n_m2, cut.kr_n_m2)
-
-
 def chip_direction(phi: np.ndarray) -> np.ndarray:
     """(..., 2): by how much the chip of a tooth at φ (...) grows per displacement (x, y)."""
     return np.stack([np.sin(phi), np.cos(phi)], axis=-1)
 
 
-def force_direction(phi: np.ndarray, k: Coefficients) -> np.ndarray:
+def force_direction(phi: np.ndarray, cut: Cut) -> np.ndarray:
     """(..., 2): force (x, y) on the cutter per area of the chip of a tooth at φ (...), N/m²."""
-    s, c = np.sin(phi), np.cos(phi)
-    return np.stack([-k.kt * c - k.kr * s, k.kt * s - k.kr * c], axis=-1)
+    s, c, kt, kr = np.sin(phi), np.cos(phi), cut.kt_n_m2, cut.kr_n_m2
+    return np.stack([-kt * c - kr * s, kt * s - kr * c], axis=-1)
 
 
-def mean_matrix(cut: Cut, k: Coefficients) -> np.ndarray:
+def mean_matrix(cut: Cut) -> np.ndarray:
     """(2, 2) in N/m²: force per displacement and depth, averaged over a turn of the spindle.
 
     Neither pitch nor helix changes it.
     """
     start, end = cut.immersion_rad
-    return cut.teeth / (2 * np.pi) * (_integral(end, k) - _integral(start, k))
+    return cut.teeth / (2 * np.pi) * (_integral(end, cut) - _integral(start, cut))
 
 
-def _integral(phi: np.ndarray | float, k: Coefficients) -> np.ndarray:
+def _integral(phi: np.ndarray | float, cut: Cut) -> np.ndarray:
     """(..., 2, 2): ∫ force_direction · chip_directionᵀ dφ from 0 to φ."""
-    phi = np.asarray(phi, dtype=float)
+    phi, kt, kr = np.asarray(phi, dtype=float), cut.kt_n_m2, cut.kr_n_m2
     cs, ss = (1 - np.cos(2 * phi)) / 4, phi / 2 - np.sin(2 * phi) / 4
     cc = phi / 2 + np.sin(2 * phi) / 4
-    top = np.stack([-k.kt * cs - k.kr * ss, -k.kt * cc - k.kr * cs], axis=-1)
-    low = np.stack([k.kt * ss - k.kr * cs, k.kt * cs - k.kr * cc], axis=-1)
+    top = np.stack([-kt * cs - kr * ss, -kt * cc - kr * cs], axis=-1)
+    low = np.stack([kt * ss - kr * cs, kt * cs - kr * cc], axis=-1)
     return np.stack([top, low], axis=-2)
 
 
-def tooth_matrix(cut: Cut, k: Coefficients, tip_rad: np.ndarray, depth_m: float) -> np.ndarray:
+def tooth_matrix(cut: Cut, tip_rad: np.ndarray, depth_m: float) -> np.ndarray:
     """(..., 2, 2) in N/m²: of one tooth whose tip is at the angles (...), per metre of depth.
 
     With a helix it is the mean over the depth: its parts lag behind the tip.
@@ -73,10 +60,10 @@ def tooth_matrix(cut: Cut, k: Coefficients, tip_rad: np.ndarray, depth_m: float)
     lag = cut.lag_rad_m * depth_m
     if lag < IN_CUT:
         inside = (tip >= start - IN_CUT) & (tip <= end + IN_CUT)
-        outer = force_direction(tip, k)[..., :, None] * chip_direction(tip)[..., None, :]
+        outer = force_direction(tip, cut)[..., :, None] * chip_direction(tip)[..., None, :]
         return np.where(inside[..., None, None], outer, 0.0)
     high, low = np.clip(tip, start, end), np.clip(tip - lag, start, end)
-    return (_integral(high, k) - _integral(low, k)) / lag
+    return (_integral(high, cut) - _integral(low, cut)) / lag
 
 
 APART = 1e-9  # rad: breakpoints closer than this are one
@@ -178,7 +165,7 @@ def _distinct(values: np.ndarray, period: float) -> np.ndarray:
 
 
 def directions(
-    cut: Cut, k: Coefficients, teeth: tuple[int, ...], angle: np.ndarray, depth_m: float
+    cut: Cut, teeth: tuple[int, ...], angle: np.ndarray, depth_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Chip rows (m, r, 2) and force columns (m, 2, r) at tip angles (m,) of the first tooth.
 
@@ -187,20 +174,18 @@ def directions(
     ahead = tooth_angles(cut)
     if len(teeth) == 1 and cut.lag_rad_m == 0:
         phi = angle + ahead[teeth[0]]
-        return chip_direction(phi)[:, None, :], force_direction(phi, k)[:, :, None]
-    matrix = sum(each_tooth(cut, k, j, angle, depth_m) for j in teeth)
+        return chip_direction(phi)[:, None, :], force_direction(phi, cut)[:, :, None]
+    matrix = sum(each_tooth(cut, j, angle, depth_m) for j in teeth)
     return np.broadcast_to(np.eye(2), (len(angle), 2, 2)), np.asarray(matrix)
 
 
-def each_tooth(
-    cut: Cut, k: Coefficients, tooth: int, angle: np.ndarray, depth_m: float
-) -> np.ndarray:
+def each_tooth(cut: Cut, tooth: int, angle: np.ndarray, depth_m: float) -> np.ndarray:
     """(m, 2, 2) of one tooth that is known to cut, at tip angles (m,) of the first tooth."""
     start, _ = cut.immersion_rad
     phi = np.mod(angle + tooth_angles(cut)[tooth] - start + APART, 2 * np.pi) + start - APART
     lag = cut.lag_rad_m * depth_m
     if lag == 0:
-        return force_direction(phi, k)[:, :, None] * chip_direction(phi)[:, None, :]
+        return force_direction(phi, cut)[:, :, None] * chip_direction(phi)[:, None, :]
     # The upper part of a long helix may still cut where the tip came round again.
     turns = 2 * np.pi * np.arange(1 + int(lag // (2 * np.pi) + 1))
-    return tooth_matrix(cut, k, phi[:, None] + turns, depth_m).sum(axis=1)
+    return tooth_matrix(cut, phi[:, None] + turns, depth_m).sum(axis=1)

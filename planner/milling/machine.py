@@ -8,7 +8,7 @@ import numpy as np
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
-from planner.milling.directional import Coefficients, mean_matrix
+from planner.milling.directional import mean_matrix
 from planner.milling.period import Discretisation, Period, period
 
 NOTHING = 1e-60  # 1/m: of an eigenvalue
@@ -106,11 +106,10 @@ MOST_POINTS = 400  # of a period: with more, each depth takes a second
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """Modes in the plane of the cut, the cut, and the coefficients that hold."""
+    """Modes in the plane of the cut, and the cut with the coefficients that hold."""
 
     modes: CutterModes
     cut: Cut
-    coefficients: Coefficients
 
     def grid(self, rpm: float, factor: float = 1.0) -> Discretisation:
         """As fine as the fastest mode asks for at this speed, times a factor."""
@@ -134,7 +133,7 @@ class Machine:
 
     def period(self, rpm: float, grid: Discretisation, depth_m: float) -> Period:
         """Matrices of a period; `depth_m` matters with a helix only."""
-        return period(self.modes, self.cut, self.coefficients, rpm, grid, depth_m)
+        return period(self.modes, self.cut, rpm, grid, depth_m)
 
     def monodromies(self, rpm: float, factor: float = 1.0) -> Monodromies:
         """By full discretisation, with so many times the usual points."""
@@ -148,7 +147,7 @@ class Machine:
 
     def floor(self) -> LobeCurves:
         """Zeroth-order curves over lines that resolve every mode."""
-        mean = mean_matrix(self.cut, self.coefficients)
+        mean = mean_matrix(self.cut)
         lines = resolving_lines(self.modes)
         return curves(lines, self.modes.receptance(lines), mean)
 

@@ -161,7 +161,7 @@ def decide(structure: Structure, cut: Cut, rpm: float, depth_m: float) -> PoseDe
     for i in range(len(poles)):
         by = np.zeros(3 * len(poles) + 1)
         by[i] = STEP
-        shifted = Machine(moved(machine.modes, by), cut, machine.coefficients)
+        shifted = Machine(moved(machine.modes, by), cut)
         slope[i] = (_margin(shifted, rpm, depth_m) - margin) / STEP
     # Least sd of log |µ|: where nothing is uncertain
     return PoseDecision(margin, max(sd, 1e-6), np.abs(poles) / (2 * np.pi), slope)

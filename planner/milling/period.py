@@ -6,14 +6,13 @@ at these points, and not between: a full discretisation (Ding et al., Int. J. Ma
 Manufacture 50, 2010) whose steps may be of any degree.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.directional import (
-    Coefficients,
     Engagement,
     contact,
     directions,
@@ -101,7 +100,6 @@ class _Points:
 def period(
     modes: CutterModes,
     cut: Cut,
-    k: Coefficients,
     rpm: float,
     grid: Discretisation,
     depth_m: float = 0.0,
@@ -110,9 +108,9 @@ def period(
     speed = rpm * 2 * np.pi / 60
     found = contact(cut, depth_m, grid.element_rad)
     even = cut.even
-    points = _points(found, cut, k, speed, grid.degree, depth_m, _seen(modes) if even else None)
+    points = _points(found, cut, speed, grid.degree, depth_m, _seen(modes) if even else None)
     built = _build(modes, found, points, speed, grid.degree)
-    return built if even else _uneven(built, found, points, cut, k, speed, grid.degree, depth_m)
+    return built if even else _uneven(built, found, points, cut, speed, grid.degree, depth_m)
 
 
 def _seen(modes: CutterModes) -> np.ndarray | None:
@@ -123,7 +121,7 @@ def _seen(modes: CutterModes) -> np.ndarray | None:
 
 
 def _points(
-    found: Engagement, cut: Cut, k: Coefficients, speed: float, degree: int, depth_m: float,
+    found: Engagement, cut: Cut, speed: float, degree: int, depth_m: float,
     seen: np.ndarray | None,
 ) -> _Points:  # fmt: skip
     nodes = lobatto(degree).nodes
@@ -131,7 +129,7 @@ def _points(
     number = -1
     for e, teeth in enumerate(found.teeth):
         angle = found.start[e] + nodes * (found.end[e] - found.start[e])
-        rows, columns = directions(cut, k, teeth, angle + found.offset, depth_m)
+        rows, columns = directions(cut, teeth, angle + found.offset, depth_m)
         if seen is not None and rows.shape[1] == 2:
             columns = np.einsum("mij,mjk,k->mi", columns, rows, seen)[:, :, None]
             rows = np.broadcast_to(seen, (len(nodes), 1, 2))
@@ -210,7 +208,7 @@ def _rotations(e: np.ndarray) -> np.ndarray:
 
 
 def _uneven(
-    built: Period, found: Engagement, points: _Points, cut: Cut, k: Coefficients, speed: float,
+    built: Period, found: Engagement, points: _Points, cut: Cut, speed: float,
     degree: int, depth_m: float,
 ) -> Period:  # fmt: skip
     """The same where teeth follow at different angles: each has a delay of its own.
@@ -225,7 +223,7 @@ def _uneven(
     nodes = lobatto(degree).nodes
     for p in range(0, len(first), 2):
         for tooth in found.teeth[element[p]]:
-            matrix = each_tooth(cut, k, tooth, angle[p : p + 1] + found.offset, depth_m)[0]
+            matrix = each_tooth(cut, tooth, angle[p : p + 1] + found.offset, depth_m)[0]
             now[p : p + 2, p : p + 2] += matrix
             at = angle[p] - delay[tooth]
             target, turn = (now, -1.0) if at >= -1e-9 else (before, 1.0)
@@ -237,10 +235,7 @@ def _uneven(
             for n, value in enumerate(values):
                 to = own[2 * n : 2 * n + 2]
                 target[p : p + 2, to] += turn * value * matrix
-    return Period(
-        built.duration_s, built.free, built.seen, built.reply, built.push, now, before,
-        built.time_s, built.weight_s, built.force,
-    )  # fmt: skip
+    return replace(built, now=now, before=before)
 
 
 def _element_at(found: Engagement, angle: float) -> int:

@@ -66,13 +66,13 @@ def two_point_receptance(seen: TwoPoints, tool: Tool, back: Point) -> TipRecepta
             seen.errors, -1, 1
         )
         together = (both.T @ each @ both)[(slice(None), *here)]
-    v, w = _mapping(tool, back.from_tip, kept, omega)
+    v, w = _mapping(tool, back.from_tip_m, kept, omega)
     left = np.linalg.inv(v)
     right = np.swapaxes(left, 1, 2)
     c = left @ (measured - w) @ right
     spread = np.zeros(c.shape)
-    if back.place_sd > 0:
-        moved, shift = _mapping(tool, back.from_tip + back.place_sd, kept, omega)
+    if back.place_sd_m > 0:
+        moved, shift = _mapping(tool, back.from_tip_m + back.place_sd_m, kept, omega)
         other = np.linalg.inv(moved)
         spread = np.abs(other @ (measured - shift) @ np.swapaxes(other, 1, 2) - c)
     offset = -left @ w @ right

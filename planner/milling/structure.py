@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 from scipy.optimize import nnls
 from scipy.stats import norm, qmc
@@ -9,9 +10,9 @@ from scipy.stats import norm, qmc
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.cutter_fit import CutterFit, hidden_below
-from planner.milling.cutter_frf import EXACT, CutterFrf
+from planner.milling.cutter_frf import CutterFrf
 from planner.milling.cutter_modes import CutterModes, ModeFile
-from planner.milling.directional import Coefficients, mean_matrix
+from planner.milling.directional import mean_matrix
 from planner.milling.machine import LobeCurves, Machine, check_structure, curves
 from planner.milling.uncertainty import OPEN, REPLICATES
 
@@ -19,41 +20,11 @@ STEP = 1e-4  # relative, of derivatives
 MOST_DAMPING = 0.95
 
 
-@dataclass(frozen=True, eq=False)
-class ModeSpread:
-    """Relative sds (m,) of m modes' frequencies, damping and sizes, and of all sizes together."""
-
-    frequency: np.ndarray
-    damping: np.ndarray
-    size: np.ndarray
-    common: float = 0.0
-
-    @property
-    def numbers(self) -> np.ndarray:
-        """(3m + 1,) all of them."""
-        return np.concatenate([self.frequency, self.damping, self.size, [self.common]])
-
-    @classmethod
-    def of(cls, numbers: np.ndarray) -> "ModeSpread":
-        """From all of them."""
-        frequency, damping, size = np.split(numbers[:-1], 3)
-        return cls(frequency, damping, size, float(numbers[-1]))
-
-    @classmethod
-    def none(cls, count: int) -> "ModeSpread":
-        """Of so many modes of which nothing is uncertain."""
-        return cls.of(np.zeros(3 * count + 1))
-
-    @property
-    def any(self) -> bool:
-        """Whether anything is uncertain."""
-        return bool(np.any(self.numbers > 0))
-
-
 def moved(modes: CutterModes, by: np.ndarray) -> CutterModes:
-    """Modes with relative changes (3m + 1,) of `ModeSpread.numbers`; m counts distinct poles.
+    """Modes with relative changes (3m + 1,), m the number of distinct poles.
 
-    A mode keeps its mass where its frequency changes; damping and sizes change by factors e^x.
+    Of every frequency, every damping, every size, and all sizes together. A mode keeps its mass
+    where its frequency changes; damping and sizes change by factors e^x.
     """
     _, group = np.unique(modes.poles, return_inverse=True)
     frequency, damping, size = (part[group] for part in np.split(by[:-1], 3))
@@ -71,11 +42,11 @@ def moved(modes: CutterModes, by: np.ndarray) -> CutterModes:
     )
 
 
-def explaining(modes: CutterModes, frf: CutterFrf) -> tuple[ModeSpread, float]:
-    """Sds that explain those of an FRF, and the share of its variance that they give."""
+def explaining(modes: CutterModes, frf: CutterFrf) -> tuple[np.ndarray, float]:
+    """Sds (3m + 1,) of such changes that explain an FRF's, and the share of its variance given."""
     count = len(np.unique(modes.poles))
     if frf.sd is None or not np.any(frf.sd > 0):
-        return ModeSpread.none(count), 1.0
+        return np.zeros(3 * count + 1), 1.0
     # Most lines of an FRF, that its sd is explained at
     every = max(1, len(frf.frequency_hz) // 300)
     hertz, sd = frf.frequency_hz[::every], frf.sd[..., ::every].transpose(2, 0, 1)
@@ -98,22 +69,23 @@ def explaining(modes: CutterModes, frf: CutterFrf) -> tuple[ModeSpread, float]:
     square = nnls(a / unit, wanted)[0] / unit
     given = float(np.sum(a @ square) / np.sum(wanted))
     # Most sd of ln frequency, damping or size: nothing is known of a mode that is less sure
-    return ModeSpread.of(np.minimum(np.sqrt(square), 0.5)), given
+    return np.minimum(np.sqrt(square), 0.5), given
 
 
 def sampled(
-    modes: CutterModes, spread: ModeSpread, k: Coefficients, sds: tuple[float, float],
-    count: int, seed: int,
-) -> list[tuple[CutterModes, Coefficients]]:  # fmt: skip
-    """So many samples of modes and coefficients (relative sds of K_t, K_r), a Latin hypercube."""
-    numbers = np.append(spread.numbers, sds)
+    machine: Machine, spread: np.ndarray, sds: tuple[float, float], count: int, seed: int
+) -> list[Machine]:
+    """So many samples, a Latin hypercube, by relative sds of modes (3m + 1,) and of K_t, K_r."""
+    numbers = np.append(spread, sds)
     points = qmc.LatinHypercube(len(numbers), rng=np.random.default_rng(seed)).random(count)
     normal = norm.ppf(points) * numbers
     found = []
     for row in normal:
         # Least coefficient of the stated one: a sample of K_t is not below
         kt, kr = 1 + np.maximum(row[-2:], 0.05 - 1)
-        found.append((moved(modes, row[:-2]), Coefficients(k.kt * kt, k.kr * kr)))
+        k = {"kt_n_m2": machine.cut.kt_n_m2 * kt, "kr_n_m2": machine.cut.kr_n_m2 * kr}
+        cut = msgspec.structs.replace(machine.cut, **k)
+        found.append(Machine(moved(machine.modes, row[:-2]), cut))
     return found
 
 
@@ -128,36 +100,36 @@ class OutOfBandError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Modes in the cut's plane, how uncertain they are, and the FRFs that they are from, if any.
+    """Modes in the cut's plane, and the FRFs that they are from, if any.
 
-    Modes from FRFs without a stated sd are as uncertain as their `fit` is by the FRFs' noise.
+    `spread` (3m + 1,) are relative sds of what `moved` changes. Modes from FRFs
+    without a stated sd are as uncertain as their `fit` is by the FRFs' noise.
     """
 
     modes: CutterModes
-    spread: ModeSpread
+    spread: np.ndarray
     frf: CutterFrf | None = None
     remarks: tuple[str, ...] = ()
     fit: CutterFit | None = None
 
     def machine(self, cut: Cut) -> Machine:
         """With a cut and its coefficients as stated."""
-        return Machine(self.modes, cut, Coefficients.of(cut))
+        return Machine(self.modes, cut)
 
     def samples(self, cut: Cut, count: int = SAMPLES, seed: int = SEED) -> list[Machine]:
         """So many machines that are as likely as each other; none where nothing is uncertain."""
         sds = cut.kt_sd_percent / 100, cut.kr_sd_percent / 100
-        if not self.spread.any and not any(sds) and self.fit is None:
+        if not np.any(self.spread > 0) and not any(sds) and self.fit is None:
             return []
-        k, each = Coefficients.of(cut), -(-count // REPLICATES)
+        machine, each = self.machine(cut), -(-count // REPLICATES)
         drawn = [
             sample for part in range(REPLICATES)
-            for sample in sampled(self.modes, self.spread, k, sds, each, seed + part)
+            for sample in sampled(machine, self.spread, sds, each, seed + part)
         ]  # fmt: skip
         if self.fit is not None:
             own = self.fit.drawn(len(drawn), seed)
-            drawn = [(modes, k) for modes, (_, k) in zip(own, drawn, strict=True)]
-        machine = self.machine(cut)
-        return [replace(machine, modes=modes, coefficients=k) for modes, k in drawn]
+            drawn = [replace(one, modes=modes) for one, modes in zip(drawn, own, strict=True)]
+        return drawn
 
 
 def of_modes(file: ModeFile, cut: Cut) -> Structure:
@@ -169,49 +141,34 @@ def of_modes(file: ModeFile, cut: Cut) -> Structure:
         complex(pole): row for pole, row in zip(file.modes.poles, file.relative_sds, strict=True)
     }
     sds = np.array([of_pole[complex(pole)] for pole in poles])
-    return Structure(modes, ModeSpread(*sds.T))
+    return Structure(modes, np.append(sds.T, 0.0))
 
 
 def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
     """From FRFs, predicted with an sd or measured: modes are fitted, and how well is said."""
-    plane = frf.in_plane(cut)
-    fit = CutterFit.of(plane) if plane.sd is None else None
-    if fit is None or (fit.error > ROUNDING and plane.error(plane.fitted()) < EXACT):
-        return _computed(plane, cut)  # or without noise: what modes outside the lines add counts
-    return _measured(fit, plane, cut)
-
-
-def _measured(fit: CutterFit, plane: CutterFrf, cut: Cut) -> Structure:
-    mean = mean_matrix(cut, Coefficients.of(cut))
+    plane, mean = frf.in_plane(cut), mean_matrix(cut)
+    if plane.sd is not None:
+        check_band(plane, curves(plane.frequency_hz, plane.receptance.transpose(2, 0, 1), mean))
+    fit = CutterFit.of(plane)
     check_structure(fit.modes)
-    floor = Machine(fit.modes, cut, Coefficients.of(cut)).floor().floor_m
-    # Lines in the noise tell nothing of modes below, whose flank may seem to matter there.
-    told = plane.frequency_hz > (hidden_below(fit, mean, floor) or 0.0)
-    check_band(plane, curves(plane.frequency_hz, fit.receptance(told), mean), told)
+    if plane.sd is None:
+        floor = Machine(fit.modes, cut).floor().floor_m
+        # Lines in the noise tell nothing of modes below, whose flank may seem to matter there.
+        told = plane.frequency_hz > (hidden_below(fit, mean, floor) or 0.0)
+        check_band(plane, curves(plane.frequency_hz, fit.receptance(told), mean), told)
+    spread, given = explaining(fit.modes, plane)
     count = len(np.unique(fit.modes.poles))
-    said = f"{count} modes fitted to {plane.name} leave {100 * fit.error:.2g} % of the accelerance."
-    noisy = fit if fit.error > ROUNDING else None
-    return Structure(fit.modes, ModeSpread.none(count), plane, (*plane.remarks, said), noisy)
-
-
-def _computed(plane: CutterFrf, cut: Cut) -> Structure:
-    mean = mean_matrix(cut, Coefficients.of(cut))
-    check_band(plane, curves(plane.frequency_hz, plane.receptance.transpose(2, 0, 1), mean))
-    modes = plane.fitted()
-    check_structure(modes)
-    error = plane.error(modes)
-    spread, given = explaining(modes, plane)
     remarks = [
         *plane.remarks,
-        f"{len(np.unique(modes.poles))} modes fitted to {plane.name} are off by {100 * error:.2g} "
-        f"% of the FRFs (root mean square over the lines).",
+        f"{count} modes fitted to {plane.name} leave {100 * fit.error:.2g} % of the accelerance.",
     ]
-    if spread.any:
+    if np.any(spread > 0):
         remarks.append(
             f"Depths at 95 % draw each mode's frequency, damping and size within the FRFs' sd, of "
             f"which that gives {100 * given:.0f} % (of its square)."
         )
-    return Structure(modes, spread, plane, tuple(remarks))
+    noisy = fit if plane.sd is None and fit.error > ROUNDING else None
+    return Structure(fit.modes, spread, plane, tuple(remarks), noisy)
 
 
 def check_band(frf: CutterFrf, found: LobeCurves, told: np.ndarray | None = None) -> None:
@@ -261,7 +218,7 @@ def doubts(structure: Structure, cut: Cut, depth_m: np.ndarray, known: np.ndarra
             f"finer lines or average more hits."
         )
     most = float(np.max(np.where(np.isfinite(depth_m), depth_m, cut.depth_m[1])))
-    hidden = hidden_below(fit, mean_matrix(cut, Coefficients.of(cut)), most)
+    hidden = hidden_below(fit, mean_matrix(cut), most)
     if hidden is not None:
         said.append(
             f"Below {hidden:.2g} Hz noise and lines of these FRFs would hide a mode that chatters "

@@ -93,8 +93,8 @@ def two_points_of(path: Path, tool: Tool | None) -> tuple[Point, Point]:
             f"{path}: where its points are is not stated; give --reference with two [[point]] "
             f"(node, from_tip_m)."
         )
-    tip, back = sorted(tool.points, key=lambda p: p.from_tip)[:2]
-    if tip.from_tip > 0:
+    tip, back = sorted(tool.points, key=lambda p: p.from_tip_m)[:2]
+    if tip.from_tip_m > 0:
         raise InputError(f"No [[point]] of {tool.name} is at its tip; give one from_tip_m = 0.")
     return tip, back
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 
 from planner.milling.beam import Segment, transfer
@@ -11,12 +12,10 @@ ACROSS, TURNING = (0, 1), (3, 4)
 NUMBERS = ("stiffness_n_m", "stiffness_nm_rad", "damping_ns_m", "damping_nms_rad")
 
 
-@dataclass(frozen=True)
-class ToolContact:
-    """Complex stiffness k + iωc across the axis and in bending; along and about it, it holds.
+class ToolContact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What holds a segment at its lower end; without it the segment is held rigidly.
 
-    Stiffness in N/m and N·m/rad, damping in N·s/m and N·m·s/rad; `sd_percent` says how well each
-    of the four numbers is known.
+    Stiffness and damping are across the axis and in bending; `sd_percent` says how well known.
     """
 
     stiffness_n_m: float
@@ -41,7 +40,7 @@ class ToolContact:
 
     def scaled(self, name: str, factor: float) -> "ToolContact":
         """The same with one of its four numbers multiplied."""
-        return replace(self, **{name: factor * getattr(self, name)})
+        return msgspec.structs.replace(self, **{name: factor * getattr(self, name)})
 
 
 SAME_PLACE = 1e-9  # m
@@ -55,14 +54,16 @@ class ToolPart:
     contact: ToolContact | None = None
 
 
-@dataclass(frozen=True)
-class Point:
-    """Where a tested tool was hit and measured; how far off that may be (sd); sensor's mass, kg."""
+class Point(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where a tested tool was hit and measured: the `node` of the FRFs' file, from its tip.
 
-    node: str
-    from_tip: float
-    place_sd: float = 0.0
-    sensor_mass: float = 0.0
+    `place_sd_m` says how well that is known, `sensor_mass_kg` what sat there.
+    """
+
+    node: int | str
+    from_tip_m: float
+    place_sd_m: float = 0.0
+    sensor_mass_kg: float = 0.0
 
 
 @dataclass(frozen=True)

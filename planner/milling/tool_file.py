@@ -41,34 +41,12 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.milling.beam import Segment, ToolMaterial
-from planner.milling.tool import NUMBERS, Point, Tool, ToolContact, ToolPart, loaded
+from planner.milling.tool import Point, Tool, ToolContact, ToolPart, loaded
 from planner.toml_file import load_toml
 
 # Of the cutting diameter, as which flutes bend (Kops and Vo, CIRP Annals 39, 1990).
 FLUTED = 0.8
 TO_TIP = (0.0, 0.0, 1.0)  # where a file says nothing: z of the tcp points out of the tool
-
-
-class ContactTable(msgspec.Struct, forbid_unknown_fields=True):
-    """What holds a segment at its lower end; without it the segment is held rigidly.
-
-    Stiffness and damping are across the axis and in bending; `sd_percent` says how well known.
-    """
-
-    stiffness_n_m: float
-    stiffness_nm_rad: float
-    damping_ns_m: float = 0.0
-    damping_nms_rad: float = 0.0
-    sd_percent: float = 0.0
-
-
-class MaterialTable(msgspec.Struct, forbid_unknown_fields=True):
-    """A material by a name of your choice; `loss_factor` is its structural damping."""
-
-    youngs_modulus_pa: float
-    density_kg_m3: float
-    poisson_ratio: float
-    loss_factor: float = 0.0
 
 
 class SegmentTable(msgspec.Struct, forbid_unknown_fields=True):
@@ -86,19 +64,7 @@ class SegmentTable(msgspec.Struct, forbid_unknown_fields=True):
     flutes: int = 0
     equivalent_diameter_m: float | None = None
     mass_kg: float = 0.0
-    contact: ContactTable | None = None
-
-
-class ToolPointTable(msgspec.Struct, forbid_unknown_fields=True):
-    """Where a tested tool was hit and measured: the `node` of the FRFs' file, from its tip.
-
-    `place_sd_m` says how well that is known, `sensor_mass_kg` what sat there.
-    """
-
-    node: int | str
-    from_tip_m: float
-    place_sd_m: float = 0.0
-    sensor_mass_kg: float = 0.0
+    contact: ToolContact | None = None
 
 
 class ToolTable(msgspec.Struct, forbid_unknown_fields=True):
@@ -109,11 +75,11 @@ class ToolTable(msgspec.Struct, forbid_unknown_fields=True):
     """
 
     segment: tuple[SegmentTable, ...]
-    material: dict[str, MaterialTable]
+    material: dict[str, ToolMaterial]
     name: str = ""
     to_spindle: tuple[float, float, float] | None = None
     axis: tuple[float, float, float] | None = None
-    point: tuple[ToolPointTable, ...] = ()
+    point: tuple[Point, ...] = ()
 
 
 def load_tool(path: Path) -> Tool:
@@ -123,25 +89,19 @@ def load_tool(path: Path) -> Tool:
     except InputError as error:
         raise InputError(_with_unit(path, str(error), str(error.__cause__))) from None
     _check(path, table)
-    materials = {
-        name: ToolMaterial(m.youngs_modulus_pa, m.density_kg_m3, m.poisson_ratio, m.loss_factor)
-        for name, m in table.material.items()
-    }
-    parts = tuple(_part(s, materials[s.material]) for s in table.segment)
-    points = tuple(
-        Point(str(p.node), p.from_tip_m, p.place_sd_m, p.sensor_mass_kg) for p in table.point
-    )
+    parts = tuple(_part(s, table.material[s.material]) for s in table.segment)
+    points = tuple(msgspec.structs.replace(p, node=str(p.node)) for p in table.point)
     tool = Tool(
         table.name or path.stem, _to_tip(table), parts, points, table.to_spindle is not None
     )
     for point in points:
-        if point.from_tip > tool.length:
+        if point.from_tip_m > tool.length:
             raise InputError(
-                f"{path}: node {point.node} is {point.from_tip} m from the tip of a tool that is "
+                f"{path}: node {point.node} is {point.from_tip_m} m from the tip of a tool that is "
                 f"{tool.length:g} m long; correct from_tip_m."
             )
-        if point.sensor_mass > 0:
-            parts = loaded(tool.parts, point.from_tip, point.sensor_mass)
+        if point.sensor_mass_kg > 0:
+            parts = loaded(tool.parts, point.from_tip_m, point.sensor_mass_kg)
             tool = replace(tool, parts=parts)
     return tool
 
@@ -162,12 +122,7 @@ def _part(s: SegmentTable, material: ToolMaterial) -> ToolPart:
         start, end = FLUTED * start, FLUTED * end
     if s.equivalent_diameter_m is not None:
         start = end = s.equivalent_diameter_m
-    contact = None
-    if s.contact is not None:
-        contact = ToolContact(
-            **{name: getattr(s.contact, name) for name in (*NUMBERS, "sd_percent")}
-        )
-    return ToolPart(Segment(s.length_m, start, end, material, s.bore_m, s.mass_kg), contact)
+    return ToolPart(Segment(s.length_m, start, end, material, s.bore_m, s.mass_kg), s.contact)
 
 
 UNITS = {
@@ -223,7 +178,7 @@ def _check(path: Path, table: ToolTable) -> None:
         raise InputError(f"{path} lists a [[point]] with the same node twice; correct node.")
 
 
-def _check_segment(where: str, s: SegmentTable, materials: dict[str, MaterialTable]) -> None:
+def _check_segment(where: str, s: SegmentTable, materials: dict[str, ToolMaterial]) -> None:
     if s.material not in materials:
         raise InputError(
             f"{where} is of {s.material!r}, which has no [material.{s.material}]; add that."

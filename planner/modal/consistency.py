@@ -76,7 +76,8 @@ def check(
     matrix: FrfMatrix, found: MatrixPoles, modes: np.ndarray, geometry: Geometry | None = None
 ) -> Consistency:
     """Check FRFs and residues of the modes (indices) that were established."""
-    sides, lines = Sides.of(matrix, found, modes), _lines(matrix, found)
+    sides, (low, high) = Sides.of(matrix, found, modes), found.data.frequency_hz[[0, -1]]
+    lines = (matrix.frequency_hz >= low) & (matrix.frequency_hz <= high)
     driving = tuple(_driving(matrix, sides, lines, *pair) for pair in sides.driving)
     reciprocity = tuple(_reciprocity(matrix, found, modes, *pair) for pair in _pairs(matrix))
     # Least modes that tell of signs and places
@@ -120,11 +121,6 @@ def _turned_row(dof: Dof, hit: bool) -> str:
         f" points around it. The sign of all FRFs {done} there was "
         "inverted before the analysis."
     )
-
-
-def _lines(matrix: FrfMatrix, found: MatrixPoles) -> np.ndarray:
-    low, high = found.data.frequency_hz[[0, -1]]
-    return (matrix.frequency_hz >= low) & (matrix.frequency_hz <= high)
 
 
 def _driving(

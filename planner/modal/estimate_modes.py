@@ -99,7 +99,7 @@ class PoleIdentification:
 
 
 def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | None:
-    """All modes that the lines of `data` carry, None where there is none."""
+    """All modes that the lines of `data` carry, None where there is no pole."""
     # At least as many lines as half the unknowns of one column need, and once that to spare.
     top = max(2, min(max_order, data.frequency_hz.size // 3))
     orders = ladder(top)
@@ -116,7 +116,7 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | Non
     modes = modes_of_fit(data, fitted, sets)
     error = np.linalg.norm(data.response - model(data, fitted.refined))
     relative = float(error / np.linalg.norm(data.response))
-    return PoleIdentification(modes, data, found, fitted, relative, top) if modes else None
+    return PoleIdentification(modes, data, found, fitted, relative, top)
 
 
 def ladder(top: int) -> tuple[int, ...]:

@@ -239,13 +239,10 @@ def exchanged_by_neighbours(sides: Sides, geometry: Geometry | None) -> tuple[Ex
     if sides.motions is None or geometry is None:
         return ()
     pair = exchanged_nodes(sides.rows, sides.motions[0].real, geometry)
-    return () if pair is None else (_named(sides, pair),)
-
-
-def _named(sides: Sides, pair: tuple[str, str]) -> Exchange:
-    """Two nodes of which only the neighbours tell, in all directions."""
+    if pair is None:
+        return ()
     first, second = (next(dof for dof in sides.rows if dof.node == node) for node in pair)
-    return Exchange(first, second, float("nan"), float("nan"))
+    return (Exchange(first, second, float("nan"), float("nan")),)
 
 
 def turning_helps(sides: Sides, turned: tuple[Dof, ...]) -> bool:

@@ -18,9 +18,8 @@ class Data:
     (the end of the record only scales the residues). `rate_1_s` is that of the exponential
     window which the records carry; poles are those of the structure, without it. `tail_s` is the
     time from the pulse to the end of the record (see `residues`). `force_share` and
-    `force_window_s` say how the noise of the force spoils whole columns (see `Frf`). `pooled`: an
-    unknown variance is taken as a level for each entry times one profile of lines. `near`: modes
-    may lie close below the band. `above`: a pole above the lines stands for all modes there.
+    `force_window_s` say how the noise of the force spoils whole columns (see `Frf`). `near`:
+    modes may lie close below the band. `above`: a pole above the lines stands for all modes there.
     `steady`: nothing changes between hits, so that poles close to each other are modes, however
     alike.
     """
@@ -33,7 +32,6 @@ class Data:
     tail_s: float = np.inf
     force_share: np.ndarray | None = None  # (inputs, F)
     force_window_s: float = 0.0
-    pooled: bool = False
     near: bool = False
     above: bool = False
     steady: bool = False

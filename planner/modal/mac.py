@@ -39,13 +39,6 @@ def match_gain(
     Frequencies `expected` (k,) and shapes (k, 3), complex, or None; sd (k,) of the logarithm of the
     frequency.
     """
-    spurious = np.array([unexpected_cost(mode) for mode in modes])
-    return MISSING_COST + spurious - _match_cost(modes, expected, shape, sd)
-
-
-def _match_cost(
-    modes: Sequence[Mode], expected: np.ndarray, shape: np.ndarray | None, sd: np.ndarray
-) -> np.ndarray:
     if not modes or not expected.size:
         return np.zeros((expected.size, len(modes)))
     frequency = np.array([mode.frequency_hz for mode in modes])
@@ -56,7 +49,7 @@ def _match_cost(
     if shape is not None:
         measured = np.array([mode.shape for mode in modes])
         cost += MAC_WEIGHT * (1 - mac_matrix(np.asarray(shape), measured))
-    return cost
+    return MISSING_COST + np.array([unexpected_cost(mode) for mode in modes]) - cost
 
 
 def unexpected_cost(mode: Mode) -> float:
@@ -91,8 +84,8 @@ def phase_deviation_deg(shape: np.ndarray) -> float:
     return float(np.rad2deg(size @ angle / np.sum(size)))
 
 
-def real_normal_modes(poles: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Undamped frequencies (Hz, m) and real shapes (n, m) of complex modes, in their order.
+def real_normal_modes(poles: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+    """Real shapes (n, m) of complex modes, in their order.
 
     poles (m,) in rad/s, shapes (n, m), n ≥ m. In the space of the m shapes, M⁻¹K and M⁻¹C are
     those real matrices that have these poles and shapes (Ibrahim, AIAA J. 21, 1983); the normal
@@ -103,7 +96,7 @@ def real_normal_modes(poles: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray
     turned = shapes * np.exp(-0.5j * np.angle(np.sum(shapes**2, axis=0)))
     points, count = shapes.shape
     if points < count:
-        return np.abs(poles) / (2 * np.pi), turned.real
+        return turned.real
     basis = np.linalg.svd(np.hstack([turned.real, turned.imag]), full_matrices=False)[0][:, :count]
     inside = basis.T @ turned
     both = np.hstack([inside, inside.conj()])
@@ -113,13 +106,12 @@ def real_normal_modes(poles: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray
     square, vectors = np.linalg.eig(system[:, :count].real)
     normal = (basis @ vectors).real
     likeness = np.abs(turned.conj().T @ (normal / np.linalg.norm(normal, axis=0)))
-    taken, hz, real = [], np.abs(poles) / (2 * np.pi), turned.real.copy()
+    taken, real = [], turned.real.copy()
     for k in np.argsort(-np.max(likeness, axis=1)):
         free = [j for j in range(count) if j not in taken]
         best = max(free, key=lambda j: likeness[k, j])
         taken.append(best)
         if square[best].real > 0 and np.linalg.norm(normal[:, best]) > 0:
-            hz[k] = np.sqrt(square[best].real) / (2 * np.pi)
             scale = normal[:, best] @ turned[:, k].real / (normal[:, best] @ normal[:, best])
             real[:, k] = scale * normal[:, best]
-    return hz, real
+    return real

@@ -50,7 +50,7 @@ def modes_of_matrix(
     found = identify_matrix(matrix, band)
     hz = np.abs(found.fit.poles) / (2 * np.pi) if found else np.zeros(0)
     inside = [
-        k for k in np.argsort(hz) if found and found.weak[k] <= 1 and _within(float(hz[k]), band)
+        k for k in np.argsort(hz) if found and found.weak[k] <= 1 and band[0] <= hz[k] <= band[1]
     ]
     if found is None or not inside:
         raise RefusedError(
@@ -88,10 +88,6 @@ def _put_right(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> Ma
     fit = found.fit
     residue, variance = fit.residue * sign, fit.residue_variance * doubt
     return replace(found, fit=replace(fit, residue=residue, residue_variance=variance))
-
-
-def _within(frequency_hz: float, band_hz: tuple[float, float]) -> bool:
-    return band_hz[0] <= frequency_hz <= band_hz[1]
 
 
 def _points(
@@ -224,7 +220,7 @@ def with_normal_modes(found: MatrixModes) -> MatrixModes:
     """With the real normal modes behind the complex shapes; frequencies and damping stay."""
     poles = np.array([mode.pole for mode in found.modes])
     shapes = np.stack([mode.shape for mode in found.modes], axis=1)
-    _, real = real_normal_modes(poles, shapes)
+    real = real_normal_modes(poles, shapes)
     modes = [
         replace(mode, shape=shape.astype(complex))
         for mode, shape in zip(found.modes, real.T, strict=True)

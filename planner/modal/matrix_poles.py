@@ -57,9 +57,7 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     rows, columns = np.nonzero(matrix.measured)
     response = matrix.accelerance[rows, columns][:, None, chosen]
     rate = matrix.exponential_rate_1_s
-    data = Data(
-        f[chosen], response, None, rate, tail_s=matrix.tail_s, pooled=True, near=True, above=True
-    )
+    data = Data(f[chosen], response, None, rate, tail_s=matrix.tail_s, near=True, above=True)
     # A record cut off while it rings leaves ripples, which polynomials take for poles.
     smooth = matrix.ended or matrix
     orders, found = _diagram(smooth, chosen)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.modal.fit_data import Data
-from planner.modal.mode_selection import MAX_DAMPING, excess, falls, presences, running_mean
+from planner.modal.mode_selection import doubt, excess, falls, presences, running_mean
 from planner.modal.refine import refine
 from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
 from planner.modal.set_search import Places, reestimated_sets
@@ -120,18 +120,12 @@ def judged(
     data: Data, fit: SetPoles, variance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(m,) noise beyond its variance, weakness (above 1: not established) and presence."""
-    poles, m = fit.poles, fit.poles.size
-    frequency = np.abs(poles) / (2 * np.pi)
+    frequency = np.abs(fit.poles) / (2 * np.pi)
     scale = np.interp(frequency, data.frequency_hz, _excess(data, fit, variance))
     # How the sets differ does not blur a mode: each has a pole of its own.
-    sd = np.sqrt(np.maximum(np.diag(fit.covariance) - fit.spread / len(fit.own), 0.0))
-    decay = np.maximum(-poles.real, 1e-12 * np.abs(poles))
-    weak = [
-        data.threshold * scale / np.maximum(fit.significance, 1e-300),
-        2 * np.sqrt(scale) * np.maximum(sd[:m], sd[m:]) / decay,
-        -poles.real / (MAX_DAMPING * np.abs(poles)),
-    ]
-    return scale, np.max(weak, axis=0), presences(data, poles, fit.residue)
+    alone = np.diag(fit.covariance) - fit.spread / len(fit.own)
+    weak = doubt(data, fit.poles, alone, fit.significance, scale)
+    return scale, weak, presences(data, fit.poles, fit.residue)
 
 
 def _excess(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:

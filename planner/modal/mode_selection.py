@@ -75,10 +75,6 @@ class PoleFit:
     variance: np.ndarray
     excess: np.ndarray  # (F,) ≥ 1: χ² per degree of freedom (and of information) around a line
 
-    def scale_at(self, frequency_hz: float, lines_hz: np.ndarray) -> float:
-        """Factor by which the error around a frequency exceeds its stated variance."""
-        return float(np.interp(frequency_hz, lines_hz, self.excess))
-
 
 def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
     """Fit from starting poles (m,), leaving out and adding modes until neither helps.
@@ -131,8 +127,6 @@ def _scatter(data: Data, refined: Refined, power: np.ndarray) -> np.ndarray:
     total = np.concatenate([np.zeros((*square.shape[:2], 1)), np.cumsum(square, axis=-1)], axis=-1)
     local = (total[..., high] - total[..., low]) / (high - low)
     flat = np.mean(square, axis=-1, keepdims=True)
-    if data.pooled:
-        local = flat * np.mean(local / flat, axis=(0, 1))
     # A little of the overall level keeps quiet stretches from being trusted without limit.
     # Least noise relative to the FRF: below it rounding rules.
     return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + 1e-10**2 * power
@@ -179,9 +173,9 @@ def excess(data: Data, error: np.ndarray, variance: np.ndarray, degrees: int) ->
     error = np.mean(np.abs(error) ** 2 / variance, axis=(0, 1))
     lines = error.size
     freedom = degrees / (2 * lines * data.entries)
-    low, high = _windows(lines, max(5, lines // 40))
-    total = np.concatenate([[0.0], np.cumsum(error)])
-    local = (total[high] - total[low]) / (high - low) / max(freedom, 0.1)
+    half = max(5, lines // 40)
+    low, high = _windows(lines, half)
+    local = running_mean(error, half) / max(freedom, 0.1)
     # A window of few lines scatters by itself; only what exceeds that is excess.
     noise = 1 + 2 / np.sqrt((high - low) * data.entries / data.correlated)
     local = np.maximum(local / noise, np.mean(error) / max(freedom, 0.1))
@@ -236,22 +230,34 @@ def _twins(data: Data, current: PoleFit) -> tuple[int, int] | None:
 
 
 def weakness(data: Data, current: PoleFit) -> np.ndarray:
-    """(m,) above 1 where a mode is not established: no fall of χ², blurred, or too damped."""
+    """(m,) above 1 where a mode is not established, 0 for the pole above the lines."""
     refined = current.refined
-    m = refined.poles.size
-    sd = np.sqrt(np.maximum(0.0, np.diag(refined.pole_covariance)))
-    scale = scales(data, current)
-    decay = np.maximum(data.rate_1_s - refined.poles.real, 1e-12 * np.abs(refined.poles))
-    found = data.threshold * scale / np.maximum(refined.significance, 1e-300)
+    weak = doubt(
+        data, refined.poles, np.diag(refined.pole_covariance), refined.significance,
+        scales(data, current),
+    )  # fmt: skip
+    return np.where(data.is_above(refined.poles), 0.0, weak)
+
+
+def doubt(
+    data: Data, poles: np.ndarray, variance: np.ndarray, significance: np.ndarray, scale: np.ndarray
+) -> np.ndarray:
+    """(m,) above 1 where a mode is not established: no fall of χ², blurred, or too damped.
+
+    Poles (m,) in rad/s with variance (2m,) of real, then imaginary parts; `scale` (m,) on that.
+    """
+    m, sd = poles.size, np.sqrt(np.maximum(variance, 0.0))
+    decay = np.maximum(data.rate_1_s - poles.real, 1e-12 * np.abs(poles))
+    found = data.threshold * scale / np.maximum(significance, 1e-300)
     blurred = 2 * np.sqrt(scale) * np.maximum(sd[:m], sd[m:]) / decay
-    damped = -refined.poles.real / (MAX_DAMPING * np.abs(refined.poles))
-    return np.where(data.is_above(refined.poles), 0.0, np.max([found, blurred, damped], axis=0))
+    damped = -poles.real / (MAX_DAMPING * np.abs(poles))
+    return np.max([found, blurred, damped], axis=0)
 
 
 def scales(data: Data, current: PoleFit) -> np.ndarray:
     """(m,) factor on the covariance of each mode, from the error around it."""
     frequency = np.abs(current.refined.poles) / (2 * np.pi)
-    return np.array([current.scale_at(f, data.frequency_hz) for f in frequency])
+    return np.interp(frequency, data.frequency_hz, current.excess)
 
 
 def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:

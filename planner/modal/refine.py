@@ -48,7 +48,6 @@ class Refined:
     pole_covariance: np.ndarray  # (2m, 2m) of real parts (all modes), then imaginary parts
     residue_variance: np.ndarray  # (outputs, inputs, 2, m) of real and imaginary parts
     significance: np.ndarray  # (m,) rise of χ² if the mode were left out, poles of others held
-    converged: bool
     point: ReducedFit
 
 
@@ -58,8 +57,6 @@ def refine(
     variance: np.ndarray,
     poles: np.ndarray,
     allowed: Callable[[np.ndarray], bool],
-    residual_terms: bool = True,
-    max_iterations: int = MAX_ITERATIONS,
 ) -> Refined:
     """Minimise the weighted error over poles and residues, starting from `poles`.
 
@@ -72,18 +69,18 @@ def refine(
     poles = np.asarray(poles, complex)
 
     def at(parts: np.ndarray) -> ReducedFit:
-        return evaluate(lines, data, weight, _complex(parts), residual_terms)
+        return evaluate(lines, data, weight, _complex(parts))
 
     def objective(parts: np.ndarray) -> ReducedFit | None:
         return at(parts) if allowed(_complex(parts)) else None
 
     start = np.concatenate([poles.real, poles.imag])
     found = minimise(
-        objective, start, 0.0, max_iterations,
+        objective, start, 0.0, MAX_ITERATIONS,
         longest=np.inf, at=at(start), rule=DAMPING, settled=_settled,
     )  # fmt: skip
     shape = outputs, inputs
-    return _finish(lines, _complex(found.x), found.at, shape, count, found.converged)
+    return _finish(lines, _complex(found.x), found.at, shape, count)
 
 
 def _settled(before: Iterate[ReducedFit], parts: np.ndarray, point: ReducedFit) -> bool:
@@ -133,15 +130,13 @@ def _complex(parts: np.ndarray) -> np.ndarray:
     return real + 1j * imag
 
 
-def evaluate(
-    lines: Lines, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool = True
-) -> ReducedFit:
+def evaluate(lines: Lines, data: np.ndarray, weight: np.ndarray, poles: np.ndarray) -> ReducedFit:
     """Residues at their best for poles (m,) of responses (entries, F), and how χ² goes on.
 
-    weight like data: 2/variance; `rest`: with out-of-band terms.
+    weight like data: 2/variance.
     """
     m = poles.size
-    linear, slope = basis(lines, poles, rest), basis_slope(lines, poles)
+    linear, slope = basis(lines, poles), basis_slope(lines, poles)
     p = linear.shape[0]
     columns = np.concatenate([linear, slope])
     norm = np.sqrt(np.mean(np.abs(columns) ** 2, axis=1))
@@ -199,14 +194,12 @@ def proportional(weight: np.ndarray) -> bool:
 
 
 def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:
-    """(entries, 2m, 2m): how the slope basis combines into ∂H/∂Re λ and ∂H/∂Im λ."""
-    real, imag = coefficients[:, :m], coefficients[:, m : 2 * m]
-    turn = np.zeros((coefficients.shape[0], 2 * m, 2 * m))
+    """(…, 2m, 2m) of (…, columns): how the slope basis combines into ∂H/∂Re λ and ∂H/∂Im λ."""
+    real, imag = coefficients[..., :m], coefficients[..., m : 2 * m]
+    turn = np.zeros((*real.shape[:-1], 2 * m, 2 * m))
     index = np.arange(m)
-    turn[:, index, index] = real
-    turn[:, m + index, index] = imag
-    turn[:, index, m + index] = -imag
-    turn[:, m + index, m + index] = real
+    turn[..., index, index] = turn[..., m + index, m + index] = real
+    turn[..., m + index, index], turn[..., index, m + index] = imag, -imag
     return turn
 
 
@@ -216,7 +209,6 @@ def _finish(
     point: ReducedFit,
     shape: tuple[int, int],
     count: int,
-    converged: bool,
 ) -> Refined:
     m = poles.size
     entries, p = point.coefficients.shape
@@ -233,7 +225,6 @@ def _finish(
         covariance,
         variance[:, : 2 * m].reshape(*shape, 2, m),
         significance(point, m),
-        converged,
         point,
     )
 

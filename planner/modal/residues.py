@@ -26,16 +26,6 @@ class Residues:
     residue: np.ndarray
     rest: np.ndarray  # coefficients of `Lines.rest`; none: last axis 0
 
-    @property
-    def lower(self) -> np.ndarray:
-        """(outputs, inputs) constant term of the accelerance: the modes below the band."""
-        return self.rest[..., 0]
-
-    @property
-    def upper(self) -> np.ndarray:
-        """(outputs, inputs) receptance (m/N) of the modes above the band."""
-        return self.rest[..., -1]
-
 
 @dataclass(frozen=True, eq=False)
 class Lines:

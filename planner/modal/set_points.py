@@ -105,33 +105,10 @@ def _block(data: SetData, poles: np.ndarray, which: slice) -> tuple[np.ndarray, 
 
 
 def _columns(data: SetData, poles: np.ndarray) -> tuple[np.ndarray, int]:
-    """(k, columns, 2F) `basis`, then `basis_slope`, weighted; how many of them are the first.
-
-    Real parts, then imaginary ones; written where they belong, since this is where the time goes.
-    """
-    (k, m), lines = poles.shape, data.lines.x.size
-    rest = data.lines.rest * data.root
-    linear = 2 * m + 2 * len(rest)
-    if np.isfinite(data.lines.tail_s):
-        parts = [basis(data.lines, poles), basis_slope(data.lines, poles)]
-        return stack(np.concatenate(parts, axis=-2) * data.root), linear
-    both = np.empty((k, linear + 2 * m, 2 * lines))
-    both[:, 2 * m : linear, :lines] = np.concatenate([rest.real, -rest.imag])
-    both[:, 2 * m : linear, lines:] = np.concatenate([rest.imag, rest.real])
-    up, down = 1 / (data.lines.x - poles[..., None]), 1 / (data.lines.x - poles.conj()[..., None])
-    first = second = data.lines.factor * data.root
-    for start in (0, linear):
-        first, second = first * up, second * down
-        one, other = slice(start, start + m), slice(start + m, start + 2 * m)
-        both[:, one, :lines], both[:, one, lines:] = (
-            first.real + second.real,
-            first.imag + second.imag,
-        )
-        both[:, other, :lines], both[:, other, lines:] = (
-            second.imag - first.imag,
-            first.real - second.real,
-        )
-    return both, linear
+    """(k, columns, 2F) `basis`, then `basis_slope`, weighted; how many of them are the first."""
+    linear = basis(data.lines, poles)
+    both = np.concatenate([linear, basis_slope(data.lines, poles)], axis=-2)
+    return stack(both * data.root), linear.shape[-2]
 
 
 def _normal(
@@ -151,16 +128,6 @@ def _normal(
     side = rr * ab - ri * aa + ir * bb - ii * ba
     low = ii * aa - ir * ab - ri * ba + rr * bb
     return np.block([[top, side], [side.transpose(0, 2, 1), low]])
-
-
-def turns(coefficients: np.ndarray, m: int) -> np.ndarray:
-    """(k, e, 2m, 2m): how the slope basis combines into the change by the poles."""
-    real, imag = coefficients[..., :m], coefficients[..., m : 2 * m]
-    turn = np.zeros((*real.shape[:2], 2 * m, 2 * m))
-    index = np.arange(m)
-    turn[..., index, index] = turn[..., m + index, m + index] = real
-    turn[..., m + index, index], turn[..., index, m + index] = imag, -imag
-    return turn
 
 
 def significances(point: SetPoints, weight: np.ndarray, m: int) -> np.ndarray:

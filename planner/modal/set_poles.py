@@ -13,6 +13,7 @@ import numpy as np
 
 from planner.inference.student import wider
 from planner.modal.fit_data import Data
+from planner.modal.refine import slope_turn
 from planner.modal.residues import Lines
 from planner.modal.set_points import (
     SetData,
@@ -20,7 +21,6 @@ from planner.modal.set_points import (
     fitted,
     set_points,
     significances,
-    turns,
 )
 
 ROUNDS = 4  # each a Gauss-Newton step of every set and of what is common
@@ -187,7 +187,7 @@ def _finish(
     # hardly depends on what is common.
     held = _held(point, spread)
     total = held * spread + held @ covariance @ held.transpose(0, 2, 1)
-    change = point.turned[:, None, : 2 * m] @ turns(point.coefficients, m)
+    change = point.turned[:, None, : 2 * m] @ slope_turn(point.coefficients, m)
     spent = np.sum((change @ total[:, None]) * change, axis=-1)
     alone = np.einsum("kcc->kc", point.inverse)[:, None, : 2 * m]
     parts = alone / np.maximum(data.weight, 1e-300)[..., None] + spent

@@ -11,7 +11,8 @@ import numpy as np
 from planner.errors import InputError, RefusedError
 from planner.frf.quantities import DERIVATIVE, convert
 from planner.modal.estimate_modes import ladder
-from planner.modal.fit_data import too_few_lines
+from planner.modal.fit_data import Data, too_few_lines
+from planner.modal.mode_selection import presences
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.plscf import plscf
 from planner.modal.residues import lsfd, rank_one
@@ -89,9 +90,10 @@ def _part(frequency: np.ndarray, response: np.ndarray, part: tuple[float, float]
         return []
     poles = np.array([line.pole for line in chosen])
     residues = lsfd(f, h, poles).residue
+    present = presences(Data(f, h, None), poles, residues)
     modes = []
     for k, line in enumerate(chosen):
-        presence = _presence(f, h, poles[k], residues[:, 0, k])
+        presence = float(present[k])
         inside = part[0] <= line.frequency_hz < part[1]
         still = line.share >= SHARE and line.scatter <= SCATTER
         if inside and still and line.damping_ratio <= DAMPING and presence >= PRESENCE:
@@ -102,14 +104,6 @@ def _part(frequency: np.ndarray, response: np.ndarray, part: tuple[float, float]
 
 def _reach(line: Line) -> int:
     return int(line.orders[-1] - line.orders[0])
-
-
-def _presence(f: np.ndarray, h: np.ndarray, pole: complex, residue: np.ndarray) -> float:
-    """‖response of the mode‖/‖response‖ at the line nearest its frequency."""
-    at = int(np.argmin(np.abs(f - abs(pole) / (2 * np.pi))))
-    s = 2j * np.pi * f[at]
-    one = np.linalg.norm(residue) * abs(s**2 / (s - pole))
-    return float(one / np.linalg.norm(h[..., at]))
 
 
 def _mode(line: Line, residue: np.ndarray, certain: float) -> Mode:

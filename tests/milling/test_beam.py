@@ -39,8 +39,9 @@ def test_simply_supported_rod_has_timoshenkos_frequencies(thick):
     s, m = Section(thick * length, 0.0, STEEL), STEEL
     k = np.pi * 2 / length
     r2 = s.second_moment / s.area
-    e, g = m.youngs_modulus, s.shear_coefficient * m.youngs_modulus / 2.6
-    a, b, c = m.density * r2 / g, -(1 + r2 * k**2 * (1 + e / g)), e * r2 * k**4 / m.density
+    e, g = m.youngs_modulus_pa, s.shear_coefficient * m.youngs_modulus_pa / 2.6
+    rho = m.density_kg_m3
+    a, b, c = rho * r2 / g, -(1 + r2 * k**2 * (1 + e / g)), e * r2 * k**4 / rho
     expected = np.sqrt((-b - np.sqrt(b * b - 4 * a * c)) / (2 * a))
     omega = expected * np.linspace(0.9951, 1.005, 41)  # no line on the root itself
     t = transfer([rod(length, thick * length)], omega)

@@ -102,7 +102,7 @@ def test_the_cut_turned_with_its_frame_stays_as_it_is():
     whole = CutterModes(modes.poles, flat[0] @ turn.T, flat[1] @ turn.T, np.zeros((3, 3)))
     given = {"milling": "down", "radial_immersion": 0.5, "spindle_rpm": (9000.0, 9000.0, 1)}
     turned = cut(**given, feed=tuple(turn[:, 0]), axis=tuple(turn[:, 2]))
-    found = Machine(whole.in_plane(turned.plane), turned, machine(modes, turned).coefficients)
+    found = Machine(whole.in_plane(turned.plane), turned)
     straight = losses(machine(modes, cut(**given)))[0]
     assert losses(found)[0].depth_m == pytest.approx(straight.depth_m, rel=1e-6)
 

@@ -30,18 +30,8 @@ def answered(*arguments):
 @pytest.fixture(scope="module")
 def coupled(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lei")
-    code, answer = answered(
-        LEI / "modes.toml",
-        *PAIR,
-        "--noise",
-        1,
-        "--out",
-        folder / "new.npz",
-        "--plot",
-        folder,
-        "--rrd",
-        folder / "new.rrd",
-    )
+    files = ["--out", folder / "new.npz", "--plot", folder, "--rrd", folder / "new.rrd"]
+    code, answer = answered(LEI / "modes.toml", *PAIR, "--noise", 1, *files)
     assert code == 0
     return answer
 

@@ -8,7 +8,7 @@ from planner.campaign.decision import Decision
 from planner.errors import InputError
 from planner.milling.lobes import losses
 from planner.milling.path import along, by_feed, decide
-from planner.milling.structure import ModeSpread, Structure
+from planner.milling.structure import Structure
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way
 
 RPM = 10000.0
@@ -16,7 +16,7 @@ RPM = 10000.0
 
 def uncertain(sd: float) -> Structure:
     """The mode of the literature, of which the size alone is uncertain."""
-    return Structure(one_mode(), ModeSpread.of(np.array([0.0, 0.0, sd, 0.0])))
+    return Structure(one_mode(), np.array([0.0, 0.0, sd, 0.0]))
 
 
 def limit() -> float:
@@ -38,7 +38,7 @@ def test_at_the_limit_it_is_even_and_surer_the_farther():
 def test_slope_names_the_mode_on_which_it_hangs():
     """At 12 krpm the modes near 1450 Hz decide: those near 500 Hz hardly matter."""
     given = cut(milling="down", radial_immersion=0.5, kt_n_m2=1319.4e6, kr_n_m2=788.8e6)
-    found = decide(Structure(two_each_way(), ModeSpread.of(np.zeros(13))), given, 12000.0, 9.1e-4)
+    found = decide(Structure(two_each_way(), np.zeros(13)), given, 12000.0, 9.1e-4)
     high = found.frequency_hz > 1000
     assert np.max(np.abs(found.slope[high])) > 5 * np.max(np.abs(found.slope[~high]))
 
@@ -55,8 +55,8 @@ def test_a_decision_is_as_sure_as_its_least_sure_pose():
 
 def test_path_takes_the_tightest_pose_and_the_speed_that_suits_all():
     given = cut(spindle_rpm=(10000.0, 16000.0, 3), depth_m=(0.0, 0.01, 10))
-    stiff = Structure(one_mode(), ModeSpread.of(np.zeros(4)))
-    soft = Structure(one_mode((0.6, 0.8)), ModeSpread.of(np.zeros(4)))
+    stiff = Structure(one_mode(), np.zeros(4))
+    soft = Structure(one_mode((0.6, 0.8)), np.zeros(4))
     both = along([("a", stiff), ("b", soft)], given, 20)
     alone = [
         [loss.depth_m for loss in losses(machine(structure.modes, given))]
@@ -70,7 +70,7 @@ def test_path_takes_the_tightest_pose_and_the_speed_that_suits_all():
 def test_feed_turned_into_a_mode_is_the_cut_turned():
     """A mode along x under a feed turned by 90° is one along −y under a feed along x."""
     given = cut(milling="down", radial_immersion=0.3, depth_m=(0.0, 0.02, 10))
-    structure = Structure(one_mode(), ModeSpread.of(np.zeros(4)))
+    structure = Structure(one_mode(), np.zeros(4))
     turned = by_feed([("a", structure)], given, RPM)
     across = cut(
         milling="down", radial_immersion=0.3, depth_m=(0.0, 0.02, 10), spindle_rpm=(RPM, RPM, 1)

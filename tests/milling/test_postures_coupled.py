@@ -50,7 +50,7 @@ def recorded(folder, seed, wanted=("H1,0.31,5",)):
 def test_a_posture_between_others(tmp_path, seed):
     tool = load_tool(recorded(tmp_path, seed))
     tip = posture_tip(tmp_path, tool, "H1")
-    back = next(p for p in tool.points if p.from_tip > 0).from_tip
+    back = next(p for p in tool.points if p.from_tip_m > 0).from_tip_m
     assert back == pytest.approx(0.02)
     truth = np.moveaxis(receptance(0.31), -1, 0)
     off = np.linalg.norm(tip.measured - truth) / np.linalg.norm(truth)

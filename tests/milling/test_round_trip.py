@@ -68,11 +68,13 @@ def test_all_sixteen_within_five_percent():
 
 
 @pytest.mark.slow
-def test_all_sixteen_of_twenty_noises():
-    """How often, and how sure: printed for the record."""
+@pytest.mark.parametrize(("distance", "place", "least"), [(0.02, 12, 16), (0.03, 8, 19)])
+def test_all_sixteen_of_twenty_noises(distance, place, least):
+    """Other machines, other noises; 30 mm behind the tip as the program advises, and 20."""
     worst, sure = [], []
     for seed in range(100, 120):
-        found, truth = changed(machine(seed=seed), seed=seed)
+        back = Point("1a", distance)
+        found, truth = changed(machine(seed=seed), seed=seed, back=back, place=place)
         worst.append(at_peaks(found, truth))
         sure.append(scatter(found, truth))
     motions, whole = (np.max(np.array(worst)[:, :n, :n], axis=(1, 2)) for n in (2, 4))
@@ -81,19 +83,8 @@ def test_all_sixteen_of_twenty_noises():
     )
     print(f"errors in sds {np.sort(sure).round(2)}")
     assert np.max(motions) < 0.05
-    assert np.count_nonzero(whole < 0.05) >= 16
+    assert np.count_nonzero(whole < 0.05) >= least
     assert 0.6 < np.median(sure) < 1.4
-
-
-@pytest.mark.slow
-def test_all_sixteen_where_the_second_point_is_farther_off():
-    """30 mm behind the tip, as the program advises, and not 20: other machines, other noises."""
-    worst = []
-    for seed in range(140, 160):
-        found, truth = changed(machine(seed=seed), seed=seed, back=Point("1a", 0.03), place=8)
-        worst.append(at_peaks(found, truth).max())
-    print(f"worst of all, 30 mm: {np.sort(100 * np.array(worst)).round(1)} %")
-    assert np.count_nonzero(np.array(worst) < 0.05) >= 19
 
 
 @pytest.mark.slow
@@ -129,7 +120,8 @@ def test_a_second_point_two_millimetres_off():
     base, reference = machine(), tool(REFERENCE, RIGID_ENOUGH)
     seen = measured(frf(base, shifted, FREQUENCY, RIGID_ENOUGH, points=(-1, 12)), 0.01, 5)
     truth = ordered(frf(base, TARGET, FREQUENCY, LOOSER))
-    tip = smoothed(two_point_receptance(seen, reference, replace(BACK, place_sd=0.002)))
+    back = Point(BACK.node, BACK.from_tip_m, place_sd_m=0.002)
+    tip = smoothed(two_point_receptance(seen, reference, back))
     found = couple(tip, tool(TARGET, LOOSER), reference)
     off = np.abs(found.receptance[KEPT] - truth)
     assert at_peaks(found, truth)[:2, :2].max() < 0.05

@@ -8,12 +8,11 @@ import pytest
 
 from planner.errors import InputError
 from planner.frf.quantities import convert
+from planner.milling.cutter_fit import CutterFit
 from planner.milling.cutter_frf import CutterFrf, of_accelerance
 from planner.milling.cutter_modes import CutterModes, real_modes
 from planner.milling.lobes import losses
-from planner.milling.rational_fit import rational_fit
 from planner.milling.structure import (
-    ModeSpread,
     Structure,
     doubts,
     explaining,
@@ -180,18 +179,17 @@ def test_what_lines_and_noise_leave_open_is_said():
 
 def test_spread_of_modes_explains_the_sd_that_it_makes():
     modes = two_each_way()
-    spread = ModeSpread(*(np.array(sds) for sds in (
-        [0.002, 0.004, 0.001, 0.003], [0.05, 0.02, 0.04, 0.03], [0.03, 0.02, 0.01, 0.05],
-    )))  # fmt: skip
-    k = machine(modes, cut()).coefficients
-    samples = sampled(modes, spread, k, (0.0, 0.0), 400, seed=1)
-    h = np.array([m.receptance(LINES) for m, _ in samples]).transpose(0, 2, 3, 1)
+    spread = np.concatenate([
+        [0.002, 0.004, 0.001, 0.003], [0.05, 0.02, 0.04, 0.03], [0.03, 0.02, 0.01, 0.05], [0.0],
+    ])  # fmt: skip
+    samples = sampled(machine(modes, cut()), spread, (0.0, 0.0), 400, seed=1)
+    h = np.array([m.modes.receptance(LINES) for m in samples]).transpose(0, 2, 3, 1)
     off = np.sqrt(np.mean(np.abs(h - h.mean(axis=0)) ** 2, axis=0))
     plane = tip(modes).in_plane(cut())
     frf = type(plane)(plane.name, LINES, plane.receptance, off)
     found, given = explaining(modes, frf)
     # Of a mode with 11 % damping 0.2 % hardly show: lines count alike, whatever their sd.
-    np.testing.assert_allclose(found.frequency, spread.frequency, atol=7e-4)
+    np.testing.assert_allclose(found[:4], spread[:4], atol=7e-4)
     assert 0.9 < given < 1.1
 
 
@@ -207,19 +205,19 @@ def test_a_pole_that_hardly_swings_hides_no_uncertainty():
     frf = type(plane)(plane.name, LINES, plane.receptance, 0.05 * np.abs(plane.receptance))
     found, given = explaining(modes, frf)
     assert 0.7 < given < 1.3
-    assert found.common > 0.02
+    assert found[-1] > 0.02
 
 
 def test_what_is_known_exactly_has_one_limit():
     given = cut()
-    structure = Structure(one_mode(), ModeSpread.of(np.zeros(4)))
+    structure = Structure(one_mode(), np.zeros(4))
     assert structure.samples(given) == []
 
 
 def test_robust_depth_is_that_of_the_coefficients_alone():
     """Limits go with 1/K where both coefficients err together: the quantile is known."""
     given = cut(spindle_rpm=(9000.0, 12000.0, 3), kt_sd_percent=10.0)
-    structure = Structure(one_mode(), ModeSpread.of(np.array([0.0, 0.0, 0.0, 0.1])))
+    structure = Structure(one_mode(), np.array([0.0, 0.0, 0.0, 0.1]))
     exact = cut(spindle_rpm=(9000.0, 12000.0, 3))
     found = losses(structure.machine(exact))
     drawn = sampled_limits(structure.samples(exact, 60), found)
@@ -244,6 +242,7 @@ def test_mean_of_uncertain_frfs_is_fitted_by_modes_as_close_as_its_sd_asks():
     ]
     mean, sd = np.mean(drawn, axis=0), np.std(drawn, axis=0)
     frf = CutterFrf("uncertain", lines, mean.transpose(1, 2, 0), sd.transpose(1, 2, 0))
-    fit = rational_fit(lines, frf.receptance)
-    assert np.all(fit.poles.imag > 0)
-    assert frf.error(frf.fitted()) < 0.03
+    modes = CutterFit.of(frf).modes
+    off = np.linalg.norm(modes.receptance(lines) - mean, axis=(1, 2))
+    assert np.sqrt(np.mean((off / np.linalg.norm(mean, axis=(1, 2))) ** 2)) < 0.03
+    assert len(modes.poles) < 20

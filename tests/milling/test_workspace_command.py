@@ -68,19 +68,8 @@ def asked(cell, capsys, *more, code=0):
 
 
 def test_map_of_the_workspace(cell, tmp_path, capsys):
-    said = asked(
-        cell,
-        capsys,
-        "--map",
-        "--poses",
-        4,
-        "--point",
-        "6000,0.0002",
-        "--plot",
-        tmp_path,
-        "--rrd",
-        tmp_path / "map.rrd",
-    )
+    files = ("--plot", tmp_path, "--rrd", tmp_path / "map.rrd")
+    said = asked(cell, capsys, "--map", "--poses", 4, "--point", "6000,0.0002", *files)
     assert said["spindle_rpm"] == 6000
     found, robust = (np.array(said[n], float) for n in ("depth_limit_m", "depth_limit_m_at_95"))
     assert found.shape == (4,)

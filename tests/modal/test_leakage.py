@@ -63,11 +63,3 @@ def test_damping_of_a_third_of_a_percent_from_two_seconds(case):
         f"worst error {np.abs(off).max():.1f} %"
     )
     assert np.max(np.abs(off)) < 10
-
-
-def test_without_being_told_of_the_window_damping_is_far_off():
-    """The reason why it has to be told: the window alone looks like damping."""
-    recorded = tuple(windowed(hit) for hit in struck(0))
-    modes = estimate_modes(estimate(recorded, BAND), BAND).modes
-    lowest = min(modes, key=lambda mode: abs(mode.frequency_hz - FREQUENCY_HZ[0]))
-    assert lowest.damping_ratio > 3 * DAMPING

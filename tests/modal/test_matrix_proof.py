@@ -3,18 +3,14 @@
 SEED=5000 pytest -m slow -s tests/modal/test_matrix_proof.py
 """
 
-import contextlib
-import io
 import os
 import re
-import warnings
 from collections import Counter
 
 import numpy as np
 import pytest
 
 from planner.modal.consistency import check
-from planner.modal.mac import mac
 from planner.modal.matrix_modes import modes_of_matrix
 from tests.support.rough_hammer_sets import geometry_of, rough_set, spoiled, tellable, told
 
@@ -145,35 +141,3 @@ def test_a_fifth_is_missing():
     assert min(right, sure[1]) > 0.9
     assert min(sized, sure[2]) > 0.9
     assert all(0.9 < c < 0.985 for c in (cover, bare))
-
-
-def test_beside_a_peer_that_is_told_the_frequencies():
-    """sdypy-EMA fits one column at a time; it gets the best one, and the true frequencies."""
-    from sdypy import EMA
-
-    ours, theirs, total = 0, 0, 0
-    for seed in PEER:
-        case = rough_set(seed, gain=0.0, drift=0.0)
-        hz = np.abs(case.poles) / (2 * np.pi)
-        found = modes_of_matrix(case.matrix, case.band_hz)
-        ours += sum(t is not None and t.mac >= 0.995 for t in told(case, found.modes, found.dofs))
-        total += int(np.count_nonzero(case.seen))
-        good = np.zeros(hz.size, bool)
-        for column in range(3):  # the user looks at all three, and takes each mode's best
-            with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
-                warnings.simplefilter("ignore")
-                model = EMA.Model(
-                    case.matrix.accelerance[:, column], case.matrix.frequency_hz,
-                    lower=case.band_hz[0], upper=case.band_hz[1], pol_order_high=60,
-                    frf_form="accelerance",
-                )  # fmt: skip
-                model.get_poles(show_progress=False)
-                model.select_closest_poles(list(hz), f_window=2)
-                _, shapes = model.get_constants()
-            for k, at in enumerate(np.asarray(model.nat_freq)):
-                near = int(np.argmin(np.abs(hz - at)))
-                good[near] |= mac(shapes[:, k], case.shapes[:, near]) >= 0.995
-        theirs += int(np.count_nonzero(good & case.seen))
-    print(f"\nshapes with MAC >= 0.995: ours {ours}, sdypy-EMA {theirs}, of {total}")
-    assert ours >= theirs
-    assert ours > 0.97 * total

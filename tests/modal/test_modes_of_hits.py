@@ -44,38 +44,28 @@ def covered(values: np.ndarray) -> float:
     return float(np.mean(np.abs(values) < 1.96))
 
 
+HUNDRED = [
+    {"record_s": record_s, "force_noise": force_noise, "noise": noise}
+    for record_s in (3.0, 10.0) for force_noise in (0.0, 1e-3) for noise in (0.003, 0.02)
+]  # fmt: skip
+
+
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize(
-    "settings",
+    ("seeds", "settings"),
     [
-        {"force_noise": 0.0, "record_s": 3.0},  # the end of the record
-        {"force_noise": 3e-3, "record_s": 6.0},  # the noise of the force
-        {"repeats": 1, "record_s": 3.0},
+        (range(300, 335), {"force_noise": 0.0, "record_s": 3.0}),  # the end of the record
+        (range(300, 335), {"force_noise": 3e-3, "record_s": 6.0}),  # the noise of the force
+        (range(300, 335), {"repeats": 1, "record_s": 3.0}),
+        *(pytest.param(range(40000, 40100), s, marks=pytest.mark.slow) for s in HUNDRED),
     ],
 )
-def test_intervals_from_hits_cover_the_truth(settings):
-    of_poles, of_residues, lost = scores(range(300, 335), **settings)
-    assert lost <= 1
+def test_intervals_from_hits_cover_the_truth(seeds, settings):
+    of_poles, of_residues, lost = scores(seeds, **settings)
+    print(f"{settings}: cover {covered(of_poles)} of poles, {covered(of_residues)} of residues")
+    assert lost <= len(seeds) / 35
     assert 0.90 < covered(of_poles) < 0.985
-    assert 0.91 < covered(of_residues) < 0.98
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(900)
-@pytest.mark.parametrize("record_s", [3.0, 10.0])
-@pytest.mark.parametrize("force_noise", [0.0, 1e-3])
-@pytest.mark.parametrize("noise", [0.003, 0.02])
-def test_intervals_of_a_hundred_systems(record_s, force_noise, noise):
-    of_poles, of_residues, lost = scores(
-        range(40000, 40100), record_s=record_s, force_noise=force_noise, noise=noise
-    )
-    print(
-        f"{record_s:g} s, noise {noise:g}, of the force {force_noise:g}: 95 % intervals cover"
-        f" {100 * covered(of_poles):.1f} % of poles, {100 * covered(of_residues):.1f} % of"
-        f" residues, {lost} lost"
-    )
-    assert lost <= 2
-    assert 0.90 < covered(of_poles) < 0.98
-    assert 0.90 < covered(of_residues) < 0.98
+    assert (0.91 if len(seeds) < 100 else 0.90) < covered(of_residues) < 0.98
 
 
 def test_a_soft_mode_that_still_rings_keeps_its_size():

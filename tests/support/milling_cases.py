@@ -6,7 +6,6 @@ import numpy as np
 
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes, real_modes
-from planner.milling.directional import Coefficients
 from planner.milling.machine import Machine
 
 # Insperger and Stépán's mode, as Ding et al. (2010) use it.
@@ -55,4 +54,4 @@ def two_each_way() -> CutterModes:
 
 def machine(modes: CutterModes, given: Cut) -> Machine:
     """A structure and a cut."""
-    return Machine(modes, given, Coefficients.of(given))
+    return Machine(modes, given)

@@ -60,5 +60,5 @@ def _step_matrices(machine: Machine, count: int, depth: float) -> np.ndarray:
     for tooth in range(cut.teeth):
         for turn in range(2):
             tips = edges + 2 * np.pi * (tooth / cut.teeth + turn)
-            total = total + tooth_matrix(cut, machine.coefficients, tips, depth)
+            total = total + tooth_matrix(cut, tips, depth)
     return np.mean(np.reshape(total, (count, AVERAGED, 2, 2)), axis=1)
