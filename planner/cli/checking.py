@@ -25,7 +25,7 @@ def check(
     Example: planner check robot/robot.toml --plot pictures
     """
     from planner.campaign.cell import examine_robot
-    from planner.report.plot_files import Pictures
+    from planner.report.pictures import Pictures
     from planner.report.robot_check import RobotCheckReport
 
     pictures = Pictures(plot, format_)

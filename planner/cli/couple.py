@@ -57,7 +57,7 @@ def couple(
     from planner.milling.coupling import couple as coupling
     from planner.milling.tool_file import load_tool
     from planner.report.coupling import coupling_report
-    from planner.report.plot_files import Pictures
+    from planner.report.pictures import Pictures
 
     pictures = Pictures(plot, format_, rrd)
     target = load_tool(tool)

@@ -2,14 +2,19 @@
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 
 from planner.errors import RefusedFile
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.console import RenderableType
+
+    from planner.report.pictures import Pictures
+    from planner.report.rerun.figures import More
 
 __all__ = ["NOT_IN_JSON", "Answer", "RefusedFile", "encoded", "plain"]
 
@@ -32,6 +37,32 @@ class Answer:
     def text(self) -> "RenderableType | None":
         """For the engineer, units in every column; None where there is nothing to say."""
         return None
+
+    @property
+    def end(self) -> "list[RenderableType]":
+        """The last lines of a text: where pictures are, and whether recordings are simulated."""
+        from planner.report.text import SIMULATED, drawn
+
+        made = drawn(getattr(self, "plots", ()), getattr(self, "rrd", None))
+        return [*made, SIMULATED] if getattr(self, "simulated", False) else made
+
+    def with_figures(
+        self,
+        pictures: "Pictures",
+        draw: "Callable[[], dict[str, Figure]]",
+        name: str,
+        note: str = "",
+        more: "More | None" = None,
+    ) -> Self:
+        """The same once what `draw` gives is where pictures are wanted, if they are.
+
+        `name`, `note` and `more` as `Pictures.write` has them.
+        """
+        if not pictures.wanted:
+            return self
+        simulated = getattr(self, "simulated", False)
+        written = pictures.write(draw(), name, note, more, simulated)
+        return dataclasses.replace(self, **written)  # pyright: ignore[reportArgumentType]
 
     def _repr_html_(self) -> str:
         """What notebooks show."""

@@ -1,8 +1,8 @@
 """Answer of `couple`: the FRFs of another tool, how sure they are, and the hit that would tell."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
@@ -21,9 +21,11 @@ from planner.milling.coupling import (
 )
 from planner.milling.tool import NUMBERS
 from planner.report.answer import NOT_IN_JSON, Answer
-from planner.report.coupling_plots import coupling_figures
-from planner.report.plot_files import Pictures
-from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
+from planner.report.pictures import Pictures
+from planner.report.text import remarks, table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -103,20 +105,21 @@ class CouplingReport(Answer):
         ]
         if isinstance(self.contact, dict):
             lines.append(Text(_contact_sentence(self.contact)))
-        if self.simulated:
-            lines.append(SIMULATED)
-        return Group(made, *lines, *remarks(self.remarks), *drawn(self.plots, self.rrd))
+        return Group(made, *lines, *remarks(self.remarks), *self.end)
 
     def with_pictures(self, pictures: Pictures) -> "CouplingReport":
         """The same, its pictures drawn."""
-        if not pictures.wanted or self.coupled is None:
+        coupled, title = self.coupled, f"{self.tool} at {self.pose}"
+        if coupled is None:
             return self
-        mark = SIMULATED_TITLE if self.simulated else ""
-        title = f"{mark}{self.tool} at {self.pose}"
         before = "as measured" if self.reference is None else f"measured: {self.reference}"
-        figures = coupling_figures(self.before, self.coupled, title, before)
-        written = pictures.write(figures, self.tool, title)
-        return replace(self, plots=tuple(written["plots"]), rrd=written["rrd"])
+
+        def figures() -> "dict[str, Figure]":
+            from planner.report.coupling_plots import coupling_figure
+
+            return {"coupling": coupling_figure(self.before, coupled, title, before)}
+
+        return self.with_figures(pictures, figures, self.tool, title)
 
 
 def _contact_sentence(contact: dict[str, Any]) -> str:

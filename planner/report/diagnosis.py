@@ -20,14 +20,7 @@ from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
 from planner.report.established_effects import EstablishedEffect, established_effects
 from planner.report.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
-from planner.report.text import (
-    SIMULATED,
-    SIMULATED_TITLE,
-    command_line,
-    drawn,
-    remarks,
-    table,
-)
+from planner.report.text import command_line, remarks, table
 from planner.robot.place_names import place_names, with_names
 from planner.words import probable
 
@@ -101,6 +94,7 @@ class DiagnosisReport(Answer):
     urdf: Path | None = field(default=None, metadata=NOT_IN_JSON)
     campaign_robot: Path | None = field(default=None, metadata=NOT_IN_JSON)
     plots: tuple[str, ...] = ()
+    rrd: str | None = field(default=None, metadata=NOT_IN_JSON)
     closest: tuple[EffectAtPlace, ...] = field(default=(), metadata=NOT_IN_JSON)
     next: NextHit | None = None
     next_sensor: ExtraSensor | None = None
@@ -160,7 +154,7 @@ class DiagnosisReport(Answer):
         from planner.fit.identified import as_identification
         from planner.fit.write_robot import write_robot
         from planner.report.diagnosis_plots import diagnosis_figures
-        from planner.report.plot_files import Pictures
+        from planner.report.pictures import Pictures
 
         found = self.found
         robot = found.search.prior.repertoire.stiff.robot
@@ -168,13 +162,9 @@ class DiagnosisReport(Answer):
         model, result = as_identification(found.robot)
         result = replace(result, simulation=found.simulation)
         made = write_robot(folder / "robot.toml", model.simulation.robot, result, found.laws)
-        mark = SIMULATED_TITLE if self.simulated else ""
-        figures = diagnosis_figures(found, mark)
-        plots = Pictures(folder).write(figures, robot.name)["plots"]
+        drawn = self.with_figures(Pictures(folder), lambda: diagnosis_figures(found), robot.name)
         said = *self.remarks, *made.remarks, *_unwritten(found)
-        written = replace(
-            self, robot=str(made.robot_toml), urdf=made.urdf, plots=plots, remarks=said
-        )
+        written = replace(drawn, robot=str(made.robot_toml), urdf=made.urdf, remarks=said)
         (folder / "diagnosis.json").write_bytes(encoded(written))  # for planner report
         return written
 
@@ -195,8 +185,7 @@ class DiagnosisReport(Answer):
         parts += remarks(self.remarks)
         parts += [Text(f"Predictions: {self.npz}")] if self.npz else []
         parts += self._robot_text()
-        parts += drawn(self.plots)
-        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+        return Group(*parts, *self.end)
 
     def to_json(self) -> dict[str, Any]:
         """With the verdict, and what is said of a pose, in words."""

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
-from planner.report.plot_text import plain_text
+from planner.report.plot_marks import plain_text
 
 FAINTEST_DB = 50.0  # below the strongest resonance; what is fainter is drawn alike
 MOST_NAMES = 40  # of poses that fit beside each other at an axis

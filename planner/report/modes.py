@@ -1,6 +1,6 @@
 """Answer of `modes`: modes of one pose, of any points, of responses alone, of many poses."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,12 +16,14 @@ from planner.errors import RefusedFile
 from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.report.answer import NOT_IN_JSON, Answer
-from planner.report.plot_files import Pictures
+from planner.report.pictures import Pictures
 from planner.report.predictions import ExpectedMode
-from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
+from planner.report.text import remarks, table, with_sd
 from planner.words import counted
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from planner.campaign.survey import Survey
 
 SURE = 0.9  # probability of a label below which the text marks it as doubtful
@@ -185,22 +187,10 @@ class ModesReport(Answer):
 
     def with_pictures(self, pictures: Pictures, name: str) -> "ModesReport":
         """The same once frequencies are drawn pose by pose, where that is wanted."""
-        if not pictures.wanted or self.survey is None:
+        survey = self.survey
+        if survey is None:
             return self
-        from planner.report.modal_plots import frequency_figure
-
-        tracks, expected = self.survey.tracks, self.survey.simulated_hz
-        rows = [[m.frequency_sd_hz if m else np.nan for m in row] for row in tracks.modes]
-        sd = np.array(rows, dtype=float).reshape(tracks.probability.shape)
-        seen = np.any(np.isfinite(tracks.frequency_hz), axis=0)
-        figure = frequency_figure(
-            self.survey.poses,
-            tracks.frequency_hz[:, seen],
-            sd[:, seen],
-            None if expected is None else expected[:, seen],
-            title=f"{SIMULATED_TITLE if self.simulated else ''}Campbell diagram · {name}",
-        )
-        return replace(self, **pictures.write({"campbell": figure}, name))
+        return self.with_figures(pictures, lambda: _campbell(survey, name), name)
 
     def text(self) -> Group:
         """The modes as a table."""
@@ -208,10 +198,10 @@ class ModesReport(Answer):
         if isinstance(self.habits, tuple):
             parts.append(Text("  ?: the label is less than 90 % sure."))
             parts += [Text(f"  {habit}") for habit in self.habits]
-        parts += [*remarks(self.remarks), *drawn(self.plots, self.rrd)]
+        parts += remarks(self.remarks)
         if isinstance(self.exports, tuple) and self.exports:
             parts.append(Text("\n  ".join(["Files:", *self.exports])))
-        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+        return Group(*parts, *self.end)
 
     def _table(self) -> Table:
         what = "Modes" if isinstance(self.tones_hz, Unset) else "Operating modes"
@@ -242,6 +232,21 @@ class ModesReport(Answer):
             others = "  ".join(mode.short for mode in pose.unlabelled)
             made.add_row(pose.pose, *(by_label.get(label, "–") for label in labels), others)
         return made
+
+
+def _campbell(survey: "Survey", name: str) -> "dict[str, Figure]":
+    from planner.report.modal_plots import frequency_figure
+
+    tracks, expected = survey.tracks, survey.simulated_hz
+    rows = [[m.frequency_sd_hz if m else np.nan for m in row] for row in tracks.modes]
+    sd = np.array(rows, dtype=float).reshape(tracks.probability.shape)
+    seen = np.any(np.isfinite(tracks.frequency_hz), axis=0)
+    simulated = None if expected is None else expected[:, seen]
+    figure = frequency_figure(
+        survey.poses, tracks.frequency_hz[:, seen], sd[:, seen], simulated,
+        f"Campbell diagram · {name}",
+    )  # fmt: skip
+    return {"campbell": figure}
 
 
 def named(dof: Dof) -> tuple[int | str, str]:

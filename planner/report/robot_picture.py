@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from planner.report.plot_text import plain_text
+from planner.report.plot_marks import plain_text
 from planner.robot.link_bodies import LinkBody
 from planner.robot.robot import Robot
 from planner.robot.skeleton import RobotLines, robot_lines

@@ -19,7 +19,7 @@ from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain
 from planner.report.imports import AskedOfPose
 from planner.report.kept_diagnosis import diagnosis_of, read_diagnosis, two_answers
-from planner.report.plot_files import Pictures
+from planner.report.pictures import Pictures
 from planner.report.proposals import forecast_json, target_sentence
 from planner.report.refitted_springs import (
     NOT_KNOWN,
@@ -27,10 +27,12 @@ from planner.report.refitted_springs import (
     refitted_springs,
     springs_table,
 )
-from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, table
+from planner.report.text import table
 from planner.words import by_reason, counted, local_time, significant
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from planner.campaign.model import Model
     from planner.campaign.model_comparison import LeftOutModel
     from planner.campaign.state import CampaignState
@@ -190,14 +192,17 @@ class StatusReport(Answer):
 
     def with_pictures(self, pictures: Pictures, name: str) -> "StatusReport":
         """The same once each pose is drawn as predicted without it, where that is wanted."""
-        if not pictures.wanted or not self.leave_one_out.values or self.model is None:
+        model = self.model
+        if not self.leave_one_out.values or model is None:
             return self
-        from planner.report.campaign_plots import left_out_figure
 
-        mark = SIMULATED_TITLE if self.simulated else ""
-        title = f"{mark}Each measured pose, predicted without it"
-        figure = left_out_figure(*found_without(self.model()), title)
-        return replace(self, **pictures.write({"leave_one_out": figure}, name))
+        def figures() -> "dict[str, Figure]":
+            from planner.report.campaign_plots import left_out_figure
+
+            title = "Each measured pose, predicted without it"
+            return {"leave_one_out": left_out_figure(*found_without(model()), title)}
+
+        return self.with_figures(pictures, figures, name)
 
     def with_models(self, progress: "Tell") -> "StatusReport":
         """The same once every model of `[surrogate]` has predicted poses left out."""
@@ -216,8 +221,7 @@ class StatusReport(Answer):
             measured.add_row(*pose.cells)
         springs = [springs_table(self.springs), Text(f"  {NOT_KNOWN}")] if self.springs else []
         springs += [] if self.models is msgspec.UNSET else models_text(self.models)
-        parts = [measured, *springs, Text("\n".join(self._lines())), *drawn(self.plots)]
-        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+        return Group(measured, *springs, Text("\n".join(self._lines())), *self.end)
 
     def _counts(self) -> str:
         """How many poses the model uses, as report and predict count them, and others."""

@@ -11,10 +11,11 @@ from rich.console import Console
 from planner.diagnosis.odd_pose import OddPose
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.diagnosis import DiagnosisReport, EffectAtPlace, RankedExplanation
-from planner.report.diagnosis_plots import _overlay, _residuals
+from planner.report.diagnosis_plots import STYLES, _residuals
+from planner.report.frf_plots import ComparedFrfs, Side
 from planner.report.kept_diagnosis import two_answers
 from planner.report.mismatch import MismatchShares, Residuals
-from planner.report.plot_text import ink
+from planner.report.plot_marks import ink
 from planner.report.refitted_springs import RefittedSpring
 from planner.robot.place_names import place_names, with_names
 from planner.robot.robot import Robot
@@ -126,7 +127,7 @@ def test_residuals_by_direction_share_a_scale_that_is_shown():
         Residuals(np.linspace(4, 60, 9), *(s * rng.uniform(1, 30, n) for n in (8, 3, (3, 3))))
         for s in (1.0, 0.05)
     ]
-    figure = _residuals(*places, ["A$1$", "B", "C"], "")
+    figure = _residuals(*places, ["A$1$", "B", "C"])
     figure.canvas.draw()  # pose names are no formulas
     images = [image for axes in figure.axes for image in axes.images]
     assert images[0].norm is images[1].norm
@@ -145,10 +146,14 @@ def test_curves_that_agree_are_all_seen(picture):
     lines, curve = np.linspace(4.0, 60.0, 100), 10 ** np.linspace(-3.0, 1.0, 100)
     place = Residuals(np.linspace(4, 60, 9), np.full(8, 3.0), np.full(3, 2.0), np.ones((3, 3)))
     if picture == "residuals":
-        figure, colours = _residuals(place, place, ["A", "B", "C"], ""), ("tab:orange", "tab:red")
+        figure, colours = _residuals(place, place, ["A", "B", "C"]), ("tab:orange", "tab:red")
     else:
         same = np.broadcast_to(curve, (3, 3, 100))
-        figure = _overlay(lines, same, [0.3 * same, same, same], "")
+        sides = (
+            Side(n, n, STYLES[n], h[None])
+            for n, h in zip(STYLES, (0.3 * same, same, same), strict=True)
+        )
+        figure = ComparedFrfs(("A",), lines[None], same[None], tuple(sides)).overlay(0)
         colours = "0.25", "tab:blue", "tab:orange", "tab:red"
     for legend in (*figure.legends, *(panel.get_legend() for panel in figure.axes)):
         if legend is not None:

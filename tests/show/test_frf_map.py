@@ -5,7 +5,7 @@ import pytest
 from matplotlib.collections import QuadMesh
 
 from planner.report.frf_map import frf_map
-from planner.report.frf_plots import png
+from planner.report.pictures import png
 
 FREQUENCY = np.arange(0.0, 30.0)
 

@@ -14,9 +14,10 @@ from matplotlib.text import Text
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes, identification
 from planner.modal.mac import mac
-from planner.report.frf_plots import save
-from planner.report.modal_plots import frequency_figure, mac_figure, modal_figures
-from planner.report.plot_marks import mark_band, spread, with_sd
+from planner.report.modal_plots import auto_mac_figure, frequency_figure, modal_figures
+from planner.report.pictures import Pictures, save
+from planner.report.plot_marks import mark_band, spread
+from planner.report.text import with_sd
 from tests.support.modal_systems import exact_frf, noisy, random_system
 
 BAND = (4.0, 60.0)
@@ -37,7 +38,7 @@ def analysed(modes=5, hits=(4, 0, 3), pair=0.01, spacing=0.1, seed=5, known=True
     frf = Frf(lines, h, variance, coherence, hits, USABLE)
     found, modal = identification(frf, BAND), estimate_modes(frf, BAND)
     assert found is not None
-    return system, frf, found, modal, modal_figures(frf, found, modal, "P001", simulated=True)
+    return system, frf, found, modal, modal_figures(frf, found, modal, "P001")
 
 
 @pytest.fixture(scope="module")
@@ -71,15 +72,16 @@ def assert_apart(figure, texts):
     assert all(b.x0 >= 0 and b.y0 >= 0 and b.x1 <= width and b.y1 <= height for b in boxes)
 
 
-def test_every_picture_says_what_it_shows_and_that_it_is_simulated(five):
-    _, frf, found, modal, figures = five
+@pytest.mark.parametrize("simulated", [True, False])
+def test_every_picture_says_what_it_shows_and_what_is_simulated(five, simulated, tmp_path):
+    _, frf, found, modal, _ = five
+    figures = modal_figures(frf, found, modal, "P001")
     assert list(figures) == ["stabilisation", "frf", "coherence", "mac"]
+    Pictures(tmp_path).write(figures, "P001", simulated=simulated)
     for figure in figures.values():
-        assert "SIMULATED" in figure.get_suptitle()
+        assert ("SIMULATED" in figure.get_suptitle()) == simulated
         assert "P001" in figure.get_suptitle()
-    for figure in modal_figures(frf, found, modal, "P001", simulated=False).values():
-        assert "SIMULATED" not in figure.get_suptitle()
-    assert list(modal_figures(None, found, modal, "P001", False)) == ["stabilisation", "mac"]
+    assert list(modal_figures(None, found, modal, "P001")) == ["stabilisation", "mac"]
 
 
 def test_cmif_is_the_spectrum_of_singular_values(five):
@@ -110,7 +112,7 @@ def test_stabilisation_diagram_holds_every_pole_and_marks_the_modes(five):
     assert verticals(left) == pytest.approx([mode.frequency_hz for mode in modal.modes])
     for mode, text in zip(modal.modes, left.texts, strict=True):
         for words in (
-            with_sd(mode.frequency_hz, mode.frequency_sd_hz) + " Hz",
+            with_sd(mode.frequency_hz, mode.frequency_sd_hz, ".3f") + " Hz",
             with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd) + " %",
             f"physical {100 * mode.probability:.0f} %",
         ):
@@ -209,21 +211,18 @@ def test_mac_matrix_and_the_values_in_its_cells(five):
 
 
 def test_campbell_diagram_has_gaps_error_bars_and_dashes():
-    y = np.array([0.5, -0.5, 0.0])
     frequency = np.array([[10.0, 20.0], [11.0, np.nan], [12.0, 21.0]])
     sd = np.array([[0.1, 0.2], [0.1, np.nan], [0.3, np.nan]])
-    figure = frequency_figure(y, frequency, sd, frequency * 1.1, axis="tool y (m)")
+    figure = frequency_figure(["A", "B", "C"], frequency, sd, frequency * 1.1)
     axes = figure.axes[0]
     one, two = (c.lines[0] for c in axes.containers)
-    assert one.get_xdata().tolist() == [-0.5, 0.0, 0.5]  # along the coordinate
-    assert one.get_ydata().tolist() == [11.0, 12.0, 10.0]
-    assert np.isnan(two.get_ydata()[0])
+    assert one.get_ydata().tolist() == [10.0, 11.0, 12.0]
+    assert np.isnan(two.get_ydata()[1])
     bars = axes.containers[0].lines[2][0].get_segments()
-    assert [np.ptp(bar[:, 1]) for bar in bars] == pytest.approx([0.4, 1.2, 0.4])
+    assert [np.ptp(bar[:, 1]) for bar in bars] == pytest.approx([0.4, 0.4, 1.2])
     dashed = [line for line in axes.get_lines() if line.get_linestyle() == "--"]
-    assert dashed[0].get_ydata() == pytest.approx([12.1, 13.2, 11.0])
+    assert dashed[0].get_ydata() == pytest.approx([11.0, 12.1, 13.2])
     assert [text.get_text() for text in axes.texts] == ["mode 1", "mode 2"]
-    assert axes.get_xlabel() == "tool y (m)"
 
 
 def test_campbell_diagram_over_named_poses_labels_close_modes_apart():
@@ -255,17 +254,10 @@ def test_spread_moves_as_little_as_possible():
     assert spread(np.array([1.0, 1.0, 5.0]), 1.0, 0.0, 10.0).tolist() == [0.5, 1.5, 5.0]
 
 
-def test_figures_say_the_digits_that_the_standard_deviation_leaves():
-    assert with_sd(11.26342, 0.0012) == "11.263 ± 0.001"
-    assert with_sd(53.2, 0.18) == "53.2 ± 0.2"
-    assert with_sd(2.16, 3e-6) == "2.1600 ± 3e-06"
-    assert with_sd(2.16, float("nan")) == "2.16"
-
-
 @pytest.mark.parametrize("form", ["png", "svg"])
 def test_the_same_modes_give_the_same_file(five, tmp_path, form):
     for name in ("first", "second"):
-        save(mac_figure(five[3]), tmp_path / f"{name}.{form}")
+        save(auto_mac_figure(five[3], "MAC"), tmp_path / f"{name}.{form}")
     assert (tmp_path / f"first.{form}").read_bytes() == (tmp_path / f"second.{form}").read_bytes()
 
 

@@ -18,7 +18,7 @@ from planner.campaign.events import Proposal
 from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
-from planner.report.frf_plots import AXES
+from planner.report.plot_marks import AXES
 from planner.report.rerun.figures import draw, figure_view
 from planner.report.rerun.modes import GROUND, VIBRATION, ModeDrawing, mode_views
 from planner.report.rerun.progress import (

@@ -8,7 +8,6 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from planner.campaign.labels import LabelledPose
@@ -26,7 +25,7 @@ from planner.modal.matrix_modes import MatrixModes
 from planner.modal.modes import motions, moved
 from planner.recording.geometry import Geometry
 from planner.recording.points import Layout
-from planner.report.plot_text import plain_text, write_values
+from planner.report.modal_plots import mac_figure
 from planner.report.rerun.figures import More, draw, figure_view
 from planner.robot.skeleton import Skeleton, skeleton
 
@@ -123,25 +122,16 @@ class ModeDrawing:
 
 
 def _mac_figure(pose: LabelledPose, mac: np.ndarray, points: int) -> Figure:
-    """MAC (k, l) of measured and simulated shapes; white where nothing is known."""
-    figure = Figure(figsize=(6.0, 5.4), layout="constrained")
-    FigureCanvasAgg(figure)
-    panel = figure.add_subplot()
-    image = panel.imshow(mac, vmin=0.0, vmax=1.0, cmap="Blues")
-    write_values(panel, image, ".2f", fontsize=8)
+    """MAC (k, l) of measured (rows) and simulated shapes."""
     rows = [
         f"{k + 1}: {mode.frequency_hz:.1f} Hz" if mode else f"{k + 1}: none"
         for k, mode in enumerate(pose.modes)
     ]
     columns = [f"{j + 1}: {hz:.1f}" for j, hz in enumerate(pose.simulated_hz)]
-    panel.set_yticks(range(len(rows)), rows)
-    panel.set_xticks(range(len(columns)), columns)
     few = ";\ndifferent modes can look alike in so few" if points == 1 else ""
-    panel.set(
-        xlabel="simulated (Hz)", ylabel="measured",
-        title=f"{plain_text(pose.pose)}: MAC of shapes at {3 * points} coordinates{few}",
-    )  # fmt: skip
-    panel.title.set_fontsize(9)
+    title = f"{pose.pose}: MAC of shapes at {3 * points} coordinates{few}"
+    figure = mac_figure(mac, rows, columns, title)
+    figure.axes[0].set(xlabel="simulated (Hz)", ylabel="measured")
     return figure
 
 
