@@ -26,13 +26,13 @@ def confirm(
     Example: planner confirm cell7 P014 --at P009
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import ConfirmedPose
+    from planner.report.campaign_acts import confirmed
     from planner.report.imports import ImportedPoses
 
     campaign = Campaign(directory)
     if at is None:
         campaign.confirm(pose)
-        return respond(ConfirmedPose(pose, campaign.model.frequency_sd_percent), as_json)
+        return respond(confirmed(pose, campaign.model.frequency_sd_percent), as_json)
     answer = ImportedPoses.of((campaign.move(pose, at),))
     return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
 
@@ -43,9 +43,9 @@ def undo(directory: Directory, as_json: AsJson = False) -> int:
     Example: planner undo cell7
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import UndoneAct
+    from planner.report.campaign_acts import undone
 
-    return respond(UndoneAct.of(Campaign(directory).undo()), as_json)
+    return respond(undone(Campaign(directory).undo()), as_json)
 
 
 def redo(directory: Directory, as_json: AsJson = False) -> int:
@@ -54,9 +54,9 @@ def redo(directory: Directory, as_json: AsJson = False) -> int:
     Example: planner redo cell7
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import RedoneAct
+    from planner.report.campaign_acts import redone
 
-    return respond(RedoneAct.of(Campaign(directory).redo()), as_json)
+    return respond(redone(Campaign(directory).redo()), as_json)
 
 
 def withdraw(
@@ -70,10 +70,10 @@ def withdraw(
     Example: planner withdraw cell7 P003 --reason "loose sensor"
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import WithdrawnPose
+    from planner.report.campaign_acts import withdrawn
 
     Campaign(directory).withdraw(pose, reason)
-    return respond(WithdrawnPose(pose, reason), as_json)
+    return respond(withdrawn(pose, reason), as_json)
 
 
 def skip(
@@ -90,7 +90,10 @@ def skip(
     Example: planner skip cell7 P007 --reason "hose in the way"
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import SkippedPose
+    from planner.report.answer import Done
 
     Campaign(directory).skip(pose, reason, neighbours=bool(reason))
-    return respond(SkippedPose(pose, reason), as_json)
+    return respond(
+        Done({"skipped": pose, "reason": reason}, f"Pose {pose} will not be offered again."),
+        as_json,
+    )

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from planner.report.pictures import Pictures
     from planner.report.rerun.figures import More
 
-__all__ = ["NOT_IN_JSON", "Answer", "RefusedFile", "encoded", "plain"]
+__all__ = ["NOT_IN_JSON", "Answer", "Done", "RefusedFile", "encoded", "plain"]
 
 # Metadata of a field for what an answer was made of; None where it came from another process.
 NOT_IN_JSON = {"json": False}
@@ -73,6 +73,22 @@ class Answer:
         console = Console(file=io.StringIO(), record=True, width=100)
         console.print(self.text() or "")
         return console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Done(Answer):
+    """Answer of an act that needs one sentence; `keys` are those of its JSON."""
+
+    keys: Mapping[str, Any]
+    sentence: str
+
+    def to_json(self) -> dict[str, Any]:
+        """The keys alone."""
+        return plain(self.keys)
+
+    def text(self) -> str:
+        """The sentence."""
+        return self.sentence
 
 
 def plain(value: Any) -> Any:

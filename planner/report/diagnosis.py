@@ -16,7 +16,7 @@ from planner.dynamics.in_time import change_at_force
 from planner.effects.effect import Operator
 from planner.errors import InputError
 from planner.fit.posterior import RobotPosterior
-from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
+from planner.report.agreement import ThreeSimilarities
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
 from planner.report.established_effects import EstablishedEffect, established_effects
 from planner.report.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
@@ -82,7 +82,7 @@ class DiagnosisReport(Answer):
     sets: tuple[tuple[EffectAtPlace, ...], ...]
     where: MismatchPlaces
     fit: ThreeSimilarities
-    held_out: HeldOutSimilarities
+    held_out: ThreeSimilarities
     misfit: TwoMisfits
     shares: MismatchShares
     refused: tuple[RefusedFile, ...]
@@ -230,8 +230,8 @@ class DiagnosisReport(Answer):
             *("poses", "as given", "refitted", "explained"),
         )
         aside = self.held_out
-        rows: list[tuple[str, ThreeSimilarities | HeldOutSimilarities]] = [("used", self.fit)]
-        if aside.poses:
+        rows = [("used", self.fit)]
+        if isinstance(aside.poses, tuple) and aside.poses:
             rows.append((f"held out: {', '.join(aside.poses)}", aside))
         for name, of in rows:
             sides = (of.nominal, of.refitted, of.explained)
@@ -284,7 +284,7 @@ def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> Diagno
         sets=tuple(tuple(EffectAtPlace(*one) for one in members) for members in verdict.sets),
         where=MismatchPlaces.of(place, recorded.poses),
         fit=ThreeSimilarities.of(found.fitted),
-        held_out=HeldOutSimilarities.at(aside, found.held_out),
+        held_out=ThreeSimilarities.of(found.held_out, aside),
         misfit=TwoMisfits(*sides),
         shares=MismatchShares.of(found),
         refused=tuple(RefusedFile(*entry) for entry in recorded.refused),

@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planner.report.agreement import FrfSimilarity, HeldOutChange, SimilarityChange
+from planner.report.agreement import FrfSimilarity, SimilarityChange
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
 from planner.report.pictures import Pictures
 from planner.report.text import remarks, table, with_sd
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from planner.dynamics.simulation import Simulation
     from planner.fit.held_out import JudgedIdentification
     from planner.fit.result import Identification
+    from planner.measurement.agreement import Similarity
     from planner.report.frf_plots import ComparedFrfs
     from planner.robot.robot import Robot
 
@@ -122,7 +123,7 @@ class IdentificationReport(Answer):
 
     parameters: tuple[IdentifiedSpring, ...]
     fit: SimilarityChange
-    held_out: HeldOutChange
+    held_out: SimilarityChange
     undetermined: tuple[str, ...]
     misfit: float
     misfit_by_pose: Mapping[str, float]
@@ -212,8 +213,8 @@ class IdentificationReport(Answer):
             f"noise; {self.seconds:.1f} s)",
             *("poses", "FRAC before", "FRAC after", "Frobenius before", "Frobenius after"),
         )
-        rows: list[tuple[str, SimilarityChange]] = [("all", self.fit)]
-        if aside.poses:
+        rows = [("all", self.fit)]
+        if isinstance(aside.poses, tuple) and aside.poses:
             rows.append((f"held out: {', '.join(aside.poses)}", aside))
         for name, of in rows:
             values = (of.before.frac, of.frac, of.before.frobenius, of.frobenius)
@@ -227,17 +228,11 @@ def identification_report(
     """Of an identification that was judged at poses held out."""
     dataset, judged = basis.dataset, basis.judged
     final, names = judged.final.identified, dataset.poses
-    after, aside = FrfSimilarity.of(judged.after), FrfSimilarity.of(judged.held_out_after)
-    held_out = HeldOutChange(
-        aside.frac,
-        aside.frobenius,
-        FrfSimilarity.of(judged.held_out_before),
-        tuple(names[i] for i in judged.held_out),
-    )
+    aside = tuple(names[i] for i in judged.held_out)
     return IdentificationReport(
         parameters=identified_springs(basis.fitted, final),
-        fit=SimilarityChange(after.frac, after.frobenius, FrfSimilarity.of(judged.before)),
-        held_out=held_out,
+        fit=_change(judged.after, judged.before),
+        held_out=_change(judged.held_out_after, judged.held_out_before, aside),
         undetermined=tuple(direction.text for direction in final.undetermined),
         misfit=final.misfit,
         misfit_by_pose=dict(zip(names, final.misfit_by_pose, strict=True)),
@@ -249,6 +244,17 @@ def identification_report(
         inertias=inertias,
         added=judged.final.structure.added,
         basis=basis,
+    )
+
+
+def _change(
+    after: "Similarity | None",
+    before: "Similarity | None",
+    poses: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET,
+) -> SimilarityChange:
+    found = FrfSimilarity.of(after)
+    return SimilarityChange(
+        found.frac, found.frobenius, before=FrfSimilarity.of(before), poses=poses
     )
 
 

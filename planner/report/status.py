@@ -107,7 +107,7 @@ class RefusedHit:
     reason: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ModelStatus:
     """What `status` says of the model; sds (count,) in % are over the workspace, mode by mode."""
 
@@ -119,11 +119,11 @@ class ModelStatus:
     forecast: Forecast
     remarks: tuple[str, ...]
     leave_one_out: LeftOutValues
-    decision: DecisionStatus | None = None
+    decision: DecisionStatus | None = None  # where the campaign is for a cut
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
-    springs: tuple[RefittedSpring, ...] = ()
-    waits_for: str = ""
-    frf_sd_percent: tuple[float, ...] = ()
+    springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
+    waits_for: str = ""  # what lacks until the target is reached
+    frf_sd_percent: tuple[float, ...] = ()  # of predicted FRFs, and of their common scale
 
     @classmethod
     def of(cls, model: "Model") -> "ModelStatus":
@@ -154,41 +154,29 @@ class LogStatus:
     torn_bytes: int
 
 
-@dataclass(frozen=True, eq=False)
-class StatusReport(Answer):
-    """Answer of `status`; sds (count,) in % are over the workspace, mode by mode."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StatusReport(ModelStatus, Answer):
+    """Answer of `status`; `used` of the measured poses are those that the model rests on."""
 
     campaign: str
-    robot: str
     simulated: bool
     measurements: tuple[MeasuredPoseStatus, ...]
     open: tuple[Proposal, ...]
     skipped: tuple[SkippedProposal, ...]
     refused: tuple[RefusedHit, ...]
-    frequency_sd_percent: np.ndarray
-    target_frequency_sd_percent: float
-    done: bool
-    forecast: Forecast
-    remarks: tuple[str, ...]
     log: LogStatus
-    joint_names: tuple[str, ...]
     stored_but_not_imported: tuple[str, ...]
-    leave_one_out: LeftOutValues
+    held: tuple[HeldPose, ...]
+    used: int
     plots: tuple[str, ...] = ()
     rrd: str | None = None
-    held: tuple["HeldPose", ...] = ()
-    decision: Any = msgspec.UNSET
-    joint_units: Any = msgspec.UNSET
-    used: int = 0  # of the measured poses, those that the model rests on
-    springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
-    waits_for: str = ""  # what lacks until the target is reached
-    frf_sd_percent: tuple[float, ...] = ()  # of predicted FRFs, and of their common scale
     models: tuple["LeftOutModel", ...] | msgspec.UnsetType = msgspec.UNSET  # where asked for
     model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
-        """With the forecast's sentence."""
-        return super().to_json() | {"forecast": forecast_json(self.forecast)}
+        """With the forecast's sentence; "decision" where there is one."""
+        said = super().to_json() | {"forecast": forecast_json(self.forecast)}
+        return said if self.decision else {k: v for k, v in said.items() if k != "decision"}
 
     def with_pictures(self, pictures: Pictures, name: str) -> "StatusReport":
         """The same once each pose is drawn as predicted without it, where that is wanted."""
@@ -261,8 +249,7 @@ class StatusReport(Answer):
             f"Held, not used: {h.question.text} Answer with planner confirm, or withdraw."
             for h in self.held
         ]
-        if self.decision is not msgspec.UNSET:
-            lines.append(self.decision.text)
+        lines += [self.decision.text] if self.decision else []
         lines += [*self.remarks, *self.leave_one_out.text]
         told = by_reason((r.file, r.reason) for r in self.refused)
         return lines + [f"refused {one}" for one in told]
@@ -284,32 +271,21 @@ def status(campaign: Campaign) -> StatusReport:
     """Of a campaign as it is now."""
     state = campaign.state
     believed = campaign.of_model("status", ModelStatus, ModelStatus.of)
-    measured = state.measured
-    refused = _still_refused(state)
+    remarks = (*believed.remarks, *_beside_diagnosis(campaign, believed.springs))
     return StatusReport(
+        **(vars(believed) | {"remarks": remarks}),
         campaign=str(campaign.directory),
-        robot=believed.robot,
         simulated=state.simulated,
-        measurements=tuple(MeasuredPoseStatus.of(m, m.pose in state.starred) for m in measured),
+        measurements=tuple(
+            MeasuredPoseStatus.of(m, m.pose in state.starred) for m in state.measured
+        ),
         open=tuple(state.proposals[pose] for pose in state.open),
         skipped=tuple(SkippedProposal(p, r) for p, r in state.skipped.items()),
-        refused=refused,
-        frequency_sd_percent=believed.frequency_sd_percent,
-        target_frequency_sd_percent=believed.target_frequency_sd_percent,
-        done=believed.done,
-        forecast=believed.forecast,
-        remarks=(*believed.remarks, *_beside_diagnosis(campaign, believed.springs)),
+        refused=_still_refused(state),
         log=LogStatus(state.events, campaign.torn_bytes),
-        joint_names=believed.joint_names,
         stored_but_not_imported=tuple(campaign.orphans()),
-        leave_one_out=believed.leave_one_out,
         held=tuple(HeldPose.of(m, m.pose in state.starred) for m in state.held.values()),
-        decision=msgspec.UNSET if believed.decision is None else believed.decision,
-        joint_units=believed.joint_units,
         used=len(state.used),
-        springs=believed.springs,
-        waits_for=believed.waits_for,
-        frf_sd_percent=believed.frf_sd_percent,
         model=lambda: campaign.model,
     )
 
