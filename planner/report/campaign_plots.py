@@ -7,7 +7,7 @@ from matplotlib.tri import Triangulation
 from scipy.stats import binom
 
 from planner.frf.frf import Frf
-from planner.report.plot_marks import AXES, MEASURED, MODEL, empty, magnitude, plain_text
+from planner.report.plot_marks import AXES, MEASURED, MODEL, empty, magnitude, phase, plain_text
 from planner.surrogate.leave_one_out import LeaveOneOut
 
 SHARES = np.linspace(0.02, 0.98, 49)
@@ -149,7 +149,8 @@ def frf_sheet(
         floor = FAINTEST * float(np.abs(h).max())
         magnitude(panels[0, i], lines, one, color=MEASURED, lw=1.0, label="measured")
         magnitude(panels[0, i], frequency_hz, h, sd[i, i], floor, color=MODEL, lw=1, label="model")
-        _phase(panels[1, i], frequency_hz, h, sd[i, i], lines, one)
+        phase(panels[1, i], lines, one, color=MEASURED, lw=1.0)
+        phase(panels[1, i], frequency_hz, h, sd[i, i], color=MODEL, lw=1.0)
         if coherent:
             panels[2, i].plot(lines, measured.coherence[i, i, inside], color="tab:blue", lw=0.8)
             panels[2, i].set(ylim=(0, 1.05))
@@ -170,17 +171,3 @@ def frf_sheet(
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", ncols=4, fontsize=8)
     return figure
-
-
-def _phase(panel, lines, mean, sd, measured_hz, measured) -> None:
-    """Phase in °; its band is the widest angle under which a circle of 2 sd is seen."""
-    angle = np.rad2deg(np.angle(mean))
-    half = np.rad2deg(np.arcsin(np.minimum(2 * sd / np.maximum(np.abs(mean), 1e-300), 1.0)))
-    # Drawn on the turn of the circle where the model is, so that ±180° do not jump back and forth.
-    seen = np.rad2deg(np.angle(measured))
-    near = np.interp(measured_hz, lines, np.rad2deg(np.unwrap(np.angle(mean))))
-    seen = seen + 360 * np.round((near - seen) / 360)
-    smooth = np.rad2deg(np.unwrap(np.deg2rad(angle)))
-    panel.fill_between(lines, smooth - half, smooth + half, color=MODEL, alpha=0.25, lw=0)
-    panel.plot(measured_hz, seen, color=MEASURED, lw=1.0)
-    panel.plot(lines, smooth, color=MODEL, lw=1.0)

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from planner.report.frf_map import frf_map
-from planner.report.plot_marks import AXES, empty, magnitude
+from planner.report.plot_marks import AXES, empty, magnitude, panels, plain_text
 
 # Dashes over wide lines: where two agree, both are seen.
 SEEN = {"label": "measured", "color": "0.25", "lw": 4.5}
@@ -18,6 +17,9 @@ REFITTED = {"color": "tab:orange", "ls": "-", "lw": 2.6}
 EXPLAINED = {"color": "tab:red", "ls": "--", "lw": 1.0}
 IDENTIFIED = {"color": "tab:red", "ls": "-", "lw": 1.2}
 MOST = 6  # poses whose FRFs are shown
+FAINTEST_DB = 50.0  # below the strongest resonance; what is fainter is drawn alike
+MOST_NAMES = 40  # of poses that fit beside each other at an axis
+DIFFERENCE_DB = 20.0  # a factor of ten saturates the colours of the difference
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,17 +71,72 @@ class ComparedFrfs:
         """Direct FRFs xx, yy, zz of the k-th pose."""
         role = f" ({self.roles[k]})" if self.roles else ""
         figure = empty((7.5, 7.0), f"{self.place}Pose {self.names[k]}{role}")
-        panels, hz = figure.subplots(3, 1, sharex=True), self.frequency_hz[k]
-        for i, panel in enumerate(panels):
+        below, hz = figure.subplots(3, 1, sharex=True), self.frequency_hz[k]
+        for i, panel in enumerate(below):
             magnitude(panel, hz, self.measured[k, i, i], **SEEN)
             for side in self.sides:
                 magnitude(panel, hz, side.h[k, i, i], label=side.label, **side.style)
             panel.set_ylabel(f"|H {AXES[i]}{AXES[i]}| (m/s²/N)", fontsize=8)
             panel.grid(True, which="both", alpha=0.25)
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
-        panels[-1].set_xlabel("frequency (Hz)")
+        figure.legend(*below[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        below[-1].set_xlabel("frequency (Hz)")
         return figure
 
     def overlays(self) -> Iterator[Figure]:
         """Of all poses, one after the other."""
         return map(self.overlay, range(len(self.names)))
+
+
+def frf_map(
+    place: np.ndarray,
+    measured: np.ndarray | None,
+    simulated: np.ndarray,
+    frequency_hz: np.ndarray,
+    pose_label: str = "pose",
+    title: str = "",
+    names: Sequence[str] = (),
+) -> Figure:
+    """One FRF along a path (Birk et al. 2025, section 2.5): measured, simulated, the difference.
+
+    place (n,) is where on the path a pose is (number, angle, length; increasing); measured, if
+    there is any, and simulated (n, F), complex or magnitudes, in m/s²/N, on frequency_hz (F,) are
+    drawn in dB. NaN stays blank. `names` (n,) of the poses stand at the axis instead of numbers.
+    """
+    both = ("measured", measured), ("simulated", simulated)
+    levels = {name: _decibel(frf) for name, frf in both if frf is not None}
+    top = max((np.nanmax(v) for v in levels.values() if not np.isnan(v).all()), default=0.0)
+    shown = [(name, level, (top - FAINTEST_DB, top), "viridis") for name, level in levels.items()]
+    if measured is not None:
+        difference = levels["simulated"] - levels["measured"]
+        limits = -DIFFERENCE_DB, DIFFERENCE_DB
+        shown.append(("simulated − measured", difference, limits, "RdBu_r"))
+    figure, grid = panels((3.6 * len(shown) + 1.2, 4.2), title, 1, len(shown), sharey=True)
+    cells, images = (_edges(np.asarray(place, float)), _edges(frequency_hz)), []
+    for panel, (name, level, (low, high), colours) in zip(grid[0], shown, strict=True):
+        panel.set_title(name, fontsize=9)
+        panel.set_xlabel(pose_label)
+        values = np.ma.masked_invalid(level.T)
+        style = {"vmin": low, "vmax": high, "cmap": colours, "rasterized": True}
+        images.append(panel.pcolormesh(*cells, values, **style))
+        if len(names):
+            every = -(-len(names) // MOST_NAMES)
+            ticks = [plain_text(name) for name in names][::every]
+            panel.set_xticks(np.asarray(place)[::every], ticks, rotation=90, fontsize=7)
+    grid[0, 0].set_ylabel("frequency (Hz)")
+    same = list(grid[0, : len(levels)])
+    figure.colorbar(images[0], ax=same, label="dB re 1 m/s²/N", pad=0.01)
+    if measured is not None:
+        figure.colorbar(images[2], ax=grid[0, 2], label="dB", pad=0.01)
+    return figure
+
+
+def _decibel(frf: np.ndarray) -> np.ndarray:
+    return 20 * np.log10(np.maximum(np.abs(frf), np.finfo(float).tiny))
+
+
+def _edges(centres: np.ndarray) -> np.ndarray:
+    """Cell borders (n + 1,) halfway between increasing centres (n,)."""
+    if len(centres) == 1:
+        return centres[0] + np.array([-0.5, 0.5])
+    inner = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate([[2 * centres[0] - inner[0]], inner, [2 * centres[-1] - inner[-1]]])

@@ -27,9 +27,11 @@ from planner.report.plot_marks import (
     USABLE,
     label_ends,
     label_modes,
+    magnitude,
     mark_band,
     number_modes,
     panels,
+    phase,
     plain_text,
     write_values,
 )
@@ -37,7 +39,6 @@ from planner.report.plot_marks import (
 SINGULAR = ("black", "0.4", "0.65")
 STABLE = {"marker": "o", "color": "tab:green", "ms": 3.5, "ls": ""}
 UNSTABLE = {"marker": "x", "color": "tab:orange", "ms": 3.5, "mew": 0.7, "ls": ""}
-SPREAD = {"color": "0.6", "alpha": 0.6, "lw": 0}
 POINTS = {"color": MEASURED, "lw": 0.6, "marker": ".", "ms": 2.5}
 TONE = "tab:purple"
 FITTED = {"color": MODEL, "lw": 1.2}
@@ -140,22 +141,22 @@ def matrix_figure(
     figure, grid = panels((13.0, 10.0), title, 6, len(columns), gridspec_kw=layout)
     fitted = model(found.data, found.fit.refined)
     for i, k in np.ndindex(3, len(columns)):
-        size, phase = grid[2 * i, k], grid[2 * i + 1, k]
+        size, turn = grid[2 * i, k], grid[2 * i + 1, k]
         h, sd = frf.accelerance[i, columns[k]], np.sqrt(frf.variance[i, columns[k]] / 2)
-        for panel in (size, phase):
+        for panel in (size, turn):
             mark_band(panel, frf, i, columns[k])
         _magnitude(size, frf, h, sd)
-        _phase(phase, frf.frequency_hz, h, sd)
+        phase(turn, frf.frequency_hz, h, sd, **POINTS)
         size.plot(found.data.frequency_hz, np.abs(fitted[i, k]), **FITTED)
-        _wrapped(phase, found.data.frequency_hz, fitted[i, k], **FITTED)
+        phase(turn, found.data.frequency_hz, fitted[i, k], **FITTED)
         size.set_title(_entry(i, columns[k]), fontsize=9, pad=3, loc="left")
         number_modes(size, modal)
         if k == 0:
             size.set_ylabel("|H| (m/s²/N)", fontsize=8)
-            phase.set_ylabel("phase (°)", fontsize=8)
+            turn.set_ylabel("phase (°)", fontsize=8)
     handles: list = [Line2D([], [], **POINTS, label="measured")]
     if np.any(np.isfinite(frf.variance)):
-        handles.append(Patch(**SPREAD, label="± 2 sd"))
+        handles.append(Patch(color=MEASURED, alpha=0.25, label="± 2 sd"))
     _legend(figure, grid, [*handles, Line2D([], [], **FITTED, label="fit")])
     return figure
 
@@ -173,26 +174,8 @@ def _magnitude(panel: Axes, frf: Frf, h: np.ndarray, sd: np.ndarray) -> None:
         panel.text(0.5, 0.5, "not measured", transform=panel.transAxes, ha="center")
         return
     floor = 0.5 * seen.min()
-    below = np.maximum(size - 2 * sd, 0.1 * floor)
-    panel.fill_between(frf.frequency_hz, below, size + 2 * sd, **SPREAD)
-    panel.semilogy(frf.frequency_hz, size, **POINTS)
+    magnitude(panel, frf.frequency_hz, h, sd, 0.1 * floor, **POINTS)
     panel.set_ylim(floor, 6 * seen.max())  # room for the modes' numbers
-
-
-def _phase(panel: Axes, frequency_hz: np.ndarray, h: np.ndarray, sd: np.ndarray) -> None:
-    angle = np.angle(h, deg=True)
-    error = np.rad2deg(np.minimum(2 * sd / np.maximum(np.abs(h), 1e-300), np.pi))
-    panel.fill_between(frequency_hz, angle - error, angle + error, **SPREAD)
-    _wrapped(panel, frequency_hz, h, **POINTS)
-    panel.set_ylim(-200, 200)
-    panel.set_yticks([-180, 0, 180])
-
-
-def _wrapped(panel: Axes, frequency_hz: np.ndarray, h: np.ndarray, **style: Any) -> None:
-    """Phase without strokes from −180° to 180°."""
-    angle = np.angle(h, deg=True)
-    jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180) + 1
-    panel.plot(np.insert(frequency_hz, jumps, np.nan), np.insert(angle, jumps, np.nan), **style)
 
 
 def _legend(figure: Figure, grid: Any, handles: list) -> None:

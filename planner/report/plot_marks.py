@@ -79,6 +79,20 @@ def magnitude(
     panel.semilogy(frequency_hz, size, **style)
 
 
+def phase(
+    panel: Axes, frequency_hz: np.ndarray, h: np.ndarray, sd: np.ndarray | None = None, **style: Any
+) -> None:
+    """Phase in ° without strokes from −180° to 180°; its band is the angle of 2 sd."""
+    angle = np.angle(h, deg=True)
+    if sd is not None:
+        half = np.rad2deg(np.arcsin(np.minimum(2 * sd / np.maximum(np.abs(h), 1e-300), 1.0)))
+        band = {"color": style.get("color"), "alpha": 0.25, "lw": 0}
+        panel.fill_between(frequency_hz, angle - half, angle + half, **band)
+    jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180) + 1
+    panel.plot(np.insert(frequency_hz, jumps, np.nan), np.insert(angle, jumps, np.nan), **style)
+    panel.set(ylim=(-200, 200), yticks=(-180, 0, 180))
+
+
 def spread(x: np.ndarray, gap: float, low: float, high: float) -> np.ndarray:
     """Increasing positions (k,) moved as little as it takes to lie `gap` apart in [low, high].
 
