@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import msgspec
-import numpy as np
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
@@ -17,7 +16,6 @@ from planner.campaign.taking_back import act
 from planner.check.remark import CheckRemark
 from planner.report.answer import Answer, Done
 from planner.report.text import command_line, table
-from planner.words import significant
 
 
 @dataclass(frozen=True)
@@ -133,13 +131,4 @@ def withdrawn(pose: str, reason: str) -> Done:
     return Done(
         {"withdrawn": pose, "reason": reason},
         f"Pose {pose} is set aside; its recordings are kept: planner confirm uses them again.",
-    )
-
-
-def confirmed(pose: str, frequency_sd_percent: np.ndarray) -> Done:
-    """Answer of `confirm`: the held hits of a pose are used; sds (count,) in % thereafter."""
-    sd = ", ".join(f"{significant(v)} %" for v in frequency_sd_percent)
-    return Done(
-        {"confirmed": pose, "frequency_sd_percent": frequency_sd_percent},
-        f"The hits of pose {pose} are used; sd of frequencies: {sd}.",
     )
