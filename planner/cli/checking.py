@@ -29,7 +29,8 @@ def check(
     from planner.report.robot_check import RobotCheckReport
 
     pictures = Pictures(plot, format_)
-    answer = RobotCheckReport.of(examine_robot(robot, campaign)).with_pictures(pictures)
+    answer = RobotCheckReport.of(examine_robot(robot, campaign))
+    answer = answer.with_pictures(pictures, answer.robot)
     if as_json:  # the text says them itself
         for finding in answer.findings:
             if finding.severity == "error":

@@ -73,4 +73,4 @@ def couple(
     answer = coupling_report(before, coupled, target.name, tested_name, name, out)
     if contact is not None:
         answer = replace(answer, contact=contact.to_json())
-    return respond(answer.with_pictures(pictures), as_json)
+    return respond(answer.with_pictures(pictures, f"{answer.tool} at {answer.pose}"), as_json)

@@ -64,6 +64,14 @@ class Answer:
         written = pictures.write(draw(), name, note, more, simulated)
         return dataclasses.replace(self, **written)  # pyright: ignore[reportArgumentType]
 
+    def figures(self) -> "dict[str, Figure]":
+        """Its pictures by name."""
+        return {}
+
+    def with_pictures(self, pictures: "Pictures", name: str, note: str = "") -> Self:
+        """The same once its figures are drawn, where that is wanted."""
+        return self.with_figures(pictures, self.figures, name, note)
+
     def _repr_html_(self) -> str:
         """What notebooks show."""
         import io

@@ -83,10 +83,7 @@ class ComparisonReport(Answer):
         curves = self.curves
         if curves is None:
             return self
-        title = (
-            f"{self.robot}: pool of {self.pool} poses, {self.repeats} repeats, "
-            f"simulation {self.simulation}"
-        )
+        title = f"Pool of {self.pool} poses, {self.repeats} repeats, simulation {self.simulation}"
 
         def figures() -> "dict[str, Figure]":
             from planner.report.learning_curves import learning_figure

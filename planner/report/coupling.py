@@ -21,7 +21,6 @@ from planner.milling.coupling import (
 )
 from planner.milling.tool import NUMBERS
 from planner.report.answer import NOT_IN_JSON, Answer
-from planner.report.pictures import Pictures
 from planner.report.text import remarks, table
 
 if TYPE_CHECKING:
@@ -107,19 +106,15 @@ class CouplingReport(Answer):
             lines.append(Text(_contact_sentence(self.contact)))
         return Group(made, *lines, *remarks(self.remarks), *self.end)
 
-    def with_pictures(self, pictures: Pictures) -> "CouplingReport":
-        """The same, its pictures drawn."""
-        coupled, title = self.coupled, f"{self.tool} at {self.pose}"
-        if coupled is None:
-            return self
+    def figures(self) -> "dict[str, Figure]":
+        """Receptances before and after, and how errors grow."""
+        if self.coupled is None:
+            return {}
+        from planner.report.coupling_plots import coupling_figure
+
+        title = "Receptances of the tip, before and after"
         before = "as measured" if self.reference is None else f"measured: {self.reference}"
-
-        def figures() -> "dict[str, Figure]":
-            from planner.report.coupling_plots import coupling_figure
-
-            return {"coupling": coupling_figure(self.before, coupled, title, before)}
-
-        return self.with_figures(pictures, figures, self.tool, title)
+        return {"coupling": coupling_figure(self.before, self.coupled, title, before)}
 
 
 def _contact_sentence(contact: dict[str, Any]) -> str:

@@ -11,15 +11,14 @@ from rich.text import Text
 
 from planner.design.discrimination import LIKELY
 from planner.design.extra_sensor import ExtraSensor
-from planner.design.next_hit import NextHit
+from planner.design.next_hit import NextHit, in_words
+from planner.diagnosis.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
 from planner.dynamics.in_time import change_at_force
 from planner.effects.effect import Operator
 from planner.errors import InputError
 from planner.fit.posterior import RobotPosterior
 from planner.report.agreement import ThreeSimilarities
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
-from planner.report.established_effects import EstablishedEffect, established_effects
-from planner.report.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
 from planner.report.text import command_line, remarks, table
 from planner.robot.place_names import place_names, with_names
 from planner.words import probable
@@ -27,6 +26,7 @@ from planner.words import probable
 if TYPE_CHECKING:
     from planner.diagnosis.diagnose import Diagnosis
     from planner.diagnosis.odd_pose import OddPose
+    from planner.diagnosis.verdict import Candidate
     from planner.robot.robot import Robot
 
 SHOWN = 6  # candidates in the table
@@ -36,6 +36,48 @@ VERDICTS = {
     "unexplained": "Something makes the robot differ from the simulation, and none of the effects "
     "that planner knows describes it.",
 }
+
+
+@dataclass(frozen=True)
+class ParameterValue:
+    """A parameter of an effect with its standard deviation and unit."""
+
+    value: float
+    sd: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class EstablishedEffect:
+    """An effect at its place, the probability that it is there, and its parameters by name.
+
+    `change_percent` is by how much of |H| FRFs change when it is left out and the rest refitted;
+    None of what signals alone tell.
+    """
+
+    effect: str
+    at: str | None
+    probability: float
+    change_percent: float | None
+    parameters: Mapping[str, ParameterValue]
+    text: str
+
+
+def established_effects(
+    found: "Diagnosis", undecided: "Sequence[Candidate]", names: Mapping[str, str]
+) -> tuple[EstablishedEffect, ...]:
+    """Those of signals and of fits; `names` are the robot's own of places, see `place_names`."""
+    others = "; ".join(in_words(c.places, c.probability) for c in undecided[1:])
+    rest = f" These recordings cannot tell it from: {others}." if others else ""
+    return tuple(
+        EstablishedEffect(
+            e.effect, e.at, e.probability, None if e.change is None else 100 * e.change,
+            {name: ParameterValue(*value) for name, value in e.parameters.items()},
+            with_names(f"{e.text} ({probable(e.probability)}){'' if e.change is None else rest}",
+                       names),
+        )
+        for e in found.findings
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from planner.diagnosis.diagnose import Diagnosis
+from planner.diagnosis.mismatch import Residuals, simulated
 from planner.recording.points import TOOL
 from planner.report.frf_plots import EXPLAINED, GIVEN, REFITTED, ComparedFrfs, Side
-from planner.report.mismatch import Residuals, simulated
 from planner.report.plot_marks import AXES, empty, plain_text, write_values
 
 LINES = 256  # a pose

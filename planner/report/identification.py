@@ -13,7 +13,7 @@ from rich.text import Text
 
 from planner.report.agreement import FrfSimilarity, SimilarityChange
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
-from planner.report.pictures import Pictures
+from planner.report.pictures import Pictures, entitle
 from planner.report.text import remarks, table, with_sd
 
 if TYPE_CHECKING:
@@ -153,15 +153,16 @@ class IdentificationReport(Answer):
         if not pictures.wanted or self.basis is None:
             return self
         compared, more = self.basis.compared(self.band_hz), None
+        name = self.basis.nominal.robot.name
         if compared is None:
-            return self.with_figures(pictures, dict, self.basis.nominal.robot.name)
+            return self.with_figures(pictures, dict, name)
         if pictures.rrd is not None:
             from planner.report.rerun.figures import one_by_one
 
-            more = one_by_one("pose", "FRFs, pose by pose", compared.overlays())
+            each = (entitle(f, name, self.simulated) for f in compared.overlays())
+            more = one_by_one("pose", "FRFs, pose by pose", each)
         first = sorted(range(len(compared.roles)), key=lambda k: compared.roles[k] == "used")
         note = "Those held out are shown with what was identified without them."
-        name = self.basis.nominal.robot.name
         return self.with_figures(pictures, lambda: compared.figures(first), name, note, more)
 
     def write(self, robot_toml: Path) -> "IdentificationReport":

@@ -29,26 +29,26 @@ AHEAD, BESIDE = "tab:red", "tab:blue"
 
 
 def matrix_figures(
-    matrix: FrfMatrix, found: MatrixModes, geometry: Geometry | None, name: str
+    matrix: FrfMatrix, found: MatrixModes, geometry: Geometry | None
 ) -> dict[str, Figure]:
     """Every picture by its name."""
     poles = poles_by_stability(found.found.diagram, found.found.data.rate_1_s)
     figures = {
         "stabilisation": stabilisation_figure(
             found.found.data.frequency_hz, _singular(matrix, found), found,
-            f"Stabilisation diagram of {matrix.count} FRFs · {name}",
+            f"Stabilisation diagram of {matrix.count} FRFs",
             f"singular values of {FRFS if matrix.scaled else SPECTRA}", poles,
         ),
-        "mac": auto_mac_figure(found, f"AutoMAC\n{name}"),
-        "complexity": complexity_figure(found, f"Mode shapes in the complex plane · {name}"),
+        "mac": auto_mac_figure(found),
+        "complexity": complexity_figure(found, "Mode shapes in the complex plane"),
     }  # fmt: skip
     if matrix.driving:
-        figures["driving_points"] = driving_figure(matrix, found, f"Driving points · {name}")
+        figures["driving_points"] = driving_figure(matrix, found, "Driving points")
     if geometry is not None:
-        figures["geometry"] = geometry_figure(matrix, geometry, f"Points · {name}")
-        figures["shapes"] = shapes_figure(found, geometry, f"Mode shapes · {name}")
+        figures["geometry"] = geometry_figure(matrix, geometry, "Points")
+        figures["shapes"] = shapes_figure(found, geometry, "Mode shapes")
     else:
-        figures["shapes"] = bars_figure(found, f"Mode shapes · {name}")
+        figures["shapes"] = bars_figure(found, "Mode shapes")
     return figures
 
 

@@ -149,8 +149,9 @@ def _drawn(
         return answer
     from planner.report.modal_plots import modal_figures
 
-    name = _titled(answer.accepted)
-    return answer.with_figures(pictures, lambda: modal_figures(frf, found, modal, name), name)
+    return answer.with_figures(
+        pictures, lambda: modal_figures(frf, found, modal), _titled(answer.accepted)
+    )
 
 
 def _by_channel(
@@ -193,8 +194,8 @@ def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -
         size = np.linalg.norm(record.values[:, lines], axis=0)[None]
         what = "singular value of the FRFs (as in the file)"
         return {
-            "cmif": stabilisation_figure(hz[lines], size, modal, f"CMIF · {name}", what),
-            "mac": auto_mac_figure(modal, f"AutoMAC\n{name}"),
+            "cmif": stabilisation_figure(hz[lines], size, modal, "CMIF", what),
+            "mac": auto_mac_figure(modal),
         }
 
     return _of_model(
@@ -250,7 +251,7 @@ def matrix_report(
     def figures() -> "dict[str, Figure]":
         from planner.report.matrix_plots import matrix_figures
 
-        return matrix_figures(matrix, found, geometry, name)
+        return matrix_figures(matrix, found, geometry)
 
     answer = answer.with_figures(pictures, figures, name, note, more)
     if geometry is not None and pictures.folder is not None:
@@ -294,14 +295,14 @@ def operating_report(
         hz, (low, high) = found.spectrum_hz, found.band_hz
         inside = (hz >= low) & (hz <= high)
         power = singular_values(found.spectrum[..., inside])[:MOST_SINGULAR]
-        said = f"Stabilisation diagram, responses alone (unscaled) · {name}"
+        said = "Stabilisation diagram, responses alone (unscaled)"
         what = "cross power of the responses (each of unit variance)"
         poles = poles_by_stability(found.diagram)
         return {
             "stabilisation": stabilisation_figure(
                 hz[inside], power, found, said, what, poles, "singular value"
             ),
-            "mac": auto_mac_figure(found, f"AutoMAC, unscaled\n{name}"),
+            "mac": auto_mac_figure(found, "AutoMAC, unscaled"),
         }
 
     note = "Responses alone give no scale: neither FRFs nor modal masses follow."

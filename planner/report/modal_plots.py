@@ -47,18 +47,18 @@ FRFS, SPECTRA = "the FRF matrix (m/s²/N)", "the decays' spectra (equal rms)"
 
 
 def modal_figures(
-    frf: Frf | None, found: PoleIdentification, modal: ModalModel, name: str
+    frf: Frf | None, found: PoleIdentification, modal: ModalModel
 ) -> dict[str, Figure]:
     """Every picture of one pose by its name; without an FRF only those that need none."""
     singular = singular_values(found.data.response)
     what = f"singular values of {FRFS if frf is not None else SPECTRA}"
-    title = f"Stabilisation diagram · {name}"
+    title = "Stabilisation diagram"
     hz, poles = found.data.frequency_hz, poles_by_stability(found.diagram, found.data.rate_1_s)
     figures = {"stabilisation": stabilisation_figure(hz, singular, modal, title, what, poles)}
     if frf is not None:
-        figures["frf"] = matrix_figure(frf, found, modal, f"FRFs and their fit · {name}")
-        figures["coherence"] = coherence_figure(frf, modal, f"Coherence · {name}")
-    figures["mac"] = auto_mac_figure(modal, f"AutoMAC\n{name}")
+        figures["frf"] = matrix_figure(frf, found, modal, "FRFs and their fit")
+        figures["coherence"] = coherence_figure(frf, modal, "Coherence")
+    figures["mac"] = auto_mac_figure(modal)
     return figures
 
 
@@ -212,7 +212,9 @@ def coherence_figure(frf: Frf, modal: ModalModel, title: str = "") -> Figure:
     return figure
 
 
-def auto_mac_figure(modal: ModalModel | MatrixModes | OperatingModes, title: str) -> Figure:
+def auto_mac_figure(
+    modal: ModalModel | MatrixModes | OperatingModes, title: str = "AutoMAC"
+) -> Figure:
     """AutoMAC of the shapes."""
     shapes = np.array([mode.shape for mode in modal.modes])
     names = [f"{k + 1}: {mode.frequency_hz:.2f} Hz" for k, mode in enumerate(modal.modes)]

@@ -16,7 +16,6 @@ from planner.errors import RefusedFile
 from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.report.answer import NOT_IN_JSON, Answer
-from planner.report.pictures import Pictures
 from planner.report.predictions import ExpectedMode
 from planner.report.text import remarks, table, with_sd
 from planner.words import counted
@@ -185,12 +184,19 @@ class ModesReport(Answer):
     habits: tuple[str, ...] | Unset = UNSET
     survey: "Survey | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
-    def with_pictures(self, pictures: Pictures, name: str) -> "ModesReport":
-        """The same once frequencies are drawn pose by pose, where that is wanted."""
-        survey = self.survey
-        if survey is None:
-            return self
-        return self.with_figures(pictures, lambda: _campbell(survey, name), name)
+    def figures(self) -> "dict[str, Figure]":
+        """Frequencies pose by pose."""
+        if self.survey is None:
+            return {}
+        from planner.report.modal_plots import frequency_figure
+
+        survey, tracks, expected = self.survey, self.survey.tracks, self.survey.simulated_hz
+        rows = [[m.frequency_sd_hz if m else np.nan for m in row] for row in tracks.modes]
+        sd = np.array(rows, dtype=float).reshape(tracks.probability.shape)
+        seen = np.any(np.isfinite(tracks.frequency_hz), axis=0)
+        simulated = None if expected is None else expected[:, seen]
+        hz, title = tracks.frequency_hz[:, seen], "Campbell diagram"
+        return {"campbell": frequency_figure(survey.poses, hz, sd[:, seen], simulated, title)}
 
     def text(self) -> Group:
         """The modes as a table."""
@@ -232,21 +238,6 @@ class ModesReport(Answer):
             others = "  ".join(mode.short for mode in pose.unlabelled)
             made.add_row(pose.pose, *(by_label.get(label, "–") for label in labels), others)
         return made
-
-
-def _campbell(survey: "Survey", name: str) -> "dict[str, Figure]":
-    from planner.report.modal_plots import frequency_figure
-
-    tracks, expected = survey.tracks, survey.simulated_hz
-    rows = [[m.frequency_sd_hz if m else np.nan for m in row] for row in tracks.modes]
-    sd = np.array(rows, dtype=float).reshape(tracks.probability.shape)
-    seen = np.any(np.isfinite(tracks.frequency_hz), axis=0)
-    simulated = None if expected is None else expected[:, seen]
-    figure = frequency_figure(
-        survey.poses, tracks.frequency_hz[:, seen], sd[:, seen], simulated,
-        f"Campbell diagram · {name}",
-    )  # fmt: skip
-    return {"campbell": figure}
 
 
 def named(dof: Dof) -> tuple[int | str, str]:

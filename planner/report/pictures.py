@@ -47,13 +47,13 @@ class Pictures:
     ) -> dict[str, Any]:
         """Write every figure; answers where they are. Raises InputError if that is impossible.
 
-        In the Rerun file a `note` says what is what, and `more` draws what is no figure. Of
-        `simulated` recordings titles and note say so.
+        `name` says of what they are. In the Rerun file a `note` says what is what, and `more` draws
+        what is no figure. Of `simulated` recordings titles and note say so.
         """
         if simulated:
             note = f"{SIMULATED_TITLE} · {note}" if note else SIMULATED_TITLE
-            for figure in figures.values():
-                figure.suptitle(f"{SIMULATED_TITLE} · {figure.get_suptitle()}", fontsize=10)
+        for figure in figures.values():
+            entitle(figure, name, simulated)
         files = [] if self.folder is None else _files(figures, self.folder, self.format)
         if self.rrd is not None:
             from planner.report.rerun.figures import record_figures
@@ -63,6 +63,15 @@ class Pictures:
             "plots": tuple(str(file) for file in files),
             "rrd": None if self.rrd is None else str(self.rrd.absolute()),
         }
+
+
+def entitle(figure: "Figure", name: str, simulated: bool) -> "Figure":
+    """The figure; its title says what is simulated, and of what it is."""
+    from planner.report.plot_marks import plain_text
+
+    mark = f"{SIMULATED_TITLE} · " if simulated else ""
+    figure.suptitle(f"{mark}{figure.get_suptitle()}\n{plain_text(name)}", fontsize=10)
+    return figure
 
 
 def _files(figures: dict[str, "Figure"], folder: Path, form: str) -> list[Path]:

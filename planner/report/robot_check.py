@@ -19,7 +19,6 @@ from planner.check.examine import (
 from planner.check.remark import SEVERITIES, CheckRemark
 from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer
-from planner.report.pictures import Pictures
 from planner.report.text import number, table
 from planner.robot.joint_laws import NUMBER_ENTRIES, LawTable
 from planner.words import counted
@@ -73,18 +72,13 @@ class RobotCheckReport(Answer):
             found=found,
         )
 
-    def with_pictures(self, pictures: Pictures) -> "RobotCheckReport":
-        """The same once the robot is drawn at home, where that is wanted."""
-        found = self.found
-        if found is None:
-            return self
+    def figures(self) -> "dict[str, Figure]":
+        """The robot at home."""
+        if self.found is None:
+            return {}
+        from planner.report.robot_picture import robot_figure
 
-        def figures() -> "dict[str, Figure]":
-            from planner.report.robot_picture import robot_figure
-
-            return {"robot": robot_figure(found.robot, found.q[0], found.links)}
-
-        return self.with_figures(pictures, figures, self.robot)
+        return {"robot": robot_figure(self.found.robot, self.found.q[0], self.found.links)}
 
     def text(self) -> Group:
         """Masses, modes, then what was found, worst first."""

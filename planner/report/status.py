@@ -12,14 +12,13 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.decision_status import DecisionStatus
-from planner.campaign.events import Proposal
+from planner.campaign.events import Proposal, Question
 from planner.campaign.left_out import LeftOutValues, found_without, left_out
 from planner.campaign.state import Measurement
 from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain
-from planner.report.imports import AskedOfPose
+from planner.report.imports import asked_of
 from planner.report.kept_diagnosis import diagnosis_of, read_diagnosis, two_answers
-from planner.report.pictures import Pictures
 from planner.report.proposals import forecast_json, target_sentence
 from planner.report.refitted_springs import (
     NOT_KNOWN,
@@ -77,17 +76,12 @@ class HeldPose(Answer):
     """A pose whose hits are not used until a question is answered."""
 
     measured: MeasuredPoseStatus
-    question: AskedOfPose
-
-    @classmethod
-    def of(cls, m: Measurement, starred: bool) -> "HeldPose":
-        """Of a held measurement."""
-        assert m.question is not None
-        return cls(MeasuredPoseStatus.of(m, starred), AskedOfPose(m.pose, m.question))
+    question: Question
 
     def to_json(self) -> dict[str, Any]:
         """The keys of a measured pose, and "question"."""
-        return {**plain(self.measured), "question": plain(self.question)}
+        asked = asked_of(self.measured.pose, self.question)
+        return {**plain(self.measured), "question": asked}
 
 
 @dataclass(frozen=True)
@@ -178,19 +172,14 @@ class StatusReport(ModelStatus, Answer):
         said = super().to_json() | {"forecast": forecast_json(self.forecast)}
         return said if self.decision else {k: v for k, v in said.items() if k != "decision"}
 
-    def with_pictures(self, pictures: Pictures, name: str) -> "StatusReport":
-        """The same once each pose is drawn as predicted without it, where that is wanted."""
-        model = self.model
-        if not self.leave_one_out.values or model is None:
-            return self
+    def figures(self) -> "dict[str, Figure]":
+        """Each pose as predicted without it."""
+        if not self.leave_one_out.values or self.model is None:
+            return {}
+        from planner.report.campaign_plots import left_out_figure
 
-        def figures() -> "dict[str, Figure]":
-            from planner.report.campaign_plots import left_out_figure
-
-            title = "Each measured pose, predicted without it"
-            return {"leave_one_out": left_out_figure(*found_without(model()), title)}
-
-        return self.with_figures(pictures, figures, name)
+        title = "Each measured pose, predicted without it"
+        return {"leave_one_out": left_out_figure(*found_without(self.model()), title)}
 
     def with_models(self, progress: "Tell") -> "StatusReport":
         """The same once every model of `[surrogate]` has predicted poses left out."""
@@ -284,7 +273,11 @@ def status(campaign: Campaign) -> StatusReport:
         refused=_still_refused(state),
         log=LogStatus(state.events, campaign.torn_bytes),
         stored_but_not_imported=tuple(campaign.orphans()),
-        held=tuple(HeldPose.of(m, m.pose in state.starred) for m in state.held.values()),
+        held=tuple(
+            HeldPose(MeasuredPoseStatus.of(m, m.pose in state.starred), m.question)
+            for m in state.held.values()
+            if m.question
+        ),
         used=len(state.used),
         model=lambda: campaign.model,
     )

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 
+from planner.diagnosis.mismatch import Residuals
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes, identification
 from planner.modal.mac import mac
@@ -23,7 +24,6 @@ from planner.report.campaign_plots import frf_sheet, left_out_figure
 from planner.report.diagnosis_plots import STYLES, _residuals
 from planner.report.frf_plots import ComparedFrfs, Side, frf_map
 from planner.report.matrix_plots import geometry_figure, shapes_figure
-from planner.report.mismatch import Residuals
 from planner.report.modal_plots import auto_mac_figure, frequency_figure, modal_figures
 from planner.report.pictures import Pictures, png, save
 from planner.report.plot_marks import ink, mark_band, spread
@@ -51,7 +51,7 @@ def analysed(modes=5, hits=(4, 0, 3), pair=0.01, spacing=0.1, seed=5, known=True
     frf = Frf(lines, h, variance, coherence, hits, USABLE)
     found, modal = identification(frf, BAND), estimate_modes(frf, BAND)
     assert found is not None
-    return system, frf, found, modal, modal_figures(frf, found, modal, "P001")
+    return system, frf, found, modal, modal_figures(frf, found, modal)
 
 
 @pytest.fixture(scope="module")
@@ -88,19 +88,19 @@ def assert_apart(figure, texts):
 @pytest.mark.parametrize("simulated", [True, False])
 def test_every_picture_says_what_it_shows_and_what_is_simulated(five, simulated, tmp_path):
     _, frf, found, modal, _ = five
-    figures = modal_figures(frf, found, modal, "P001")
+    figures = modal_figures(frf, found, modal)
     assert list(figures) == ["stabilisation", "frf", "coherence", "mac"]
     Pictures(tmp_path).write(figures, "P001", simulated=simulated)
     for figure in figures.values():
         assert ("SIMULATED" in figure.get_suptitle()) == simulated
         assert "P001" in figure.get_suptitle()
-    assert list(modal_figures(None, found, modal, "P001")) == ["stabilisation", "mac"]
+    assert list(modal_figures(None, found, modal)) == ["stabilisation", "mac"]
 
 
 @pytest.mark.parametrize("form", ["png", "svg"])
 def test_the_same_modes_give_the_same_file(five, tmp_path, form):
     for name in ("first", "second"):
-        save(auto_mac_figure(five[3], "MAC"), tmp_path / f"{name}.{form}")
+        save(auto_mac_figure(five[3]), tmp_path / f"{name}.{form}")
     assert (tmp_path / f"first.{form}").read_bytes() == (tmp_path / f"second.{form}").read_bytes()
 
 

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from planner.cli.answer import respond
 from planner.design.stopping import percent
+from planner.diagnosis.mismatch import MismatchShares
 from planner.diagnosis.odd_pose import OddPose
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.answer import Answer, RefusedFile
@@ -19,7 +20,6 @@ from planner.report.console import STAND_IN, UnbrokenConsole
 from planner.report.diagnosis import DiagnosisReport, EffectAtPlace, RankedExplanation
 from planner.report.imports import PoseImport
 from planner.report.kept_diagnosis import two_answers
-from planner.report.mismatch import MismatchShares
 from planner.report.predictions import ExpectedMode
 from planner.report.refitted_springs import RefittedSpring
 from planner.report.text import table, with_sd
