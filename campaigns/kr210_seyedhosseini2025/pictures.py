@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from planner.report.plot_text import write_values
+from planner.report.plot_marks import write_values
 from planner.studies import drawing
 from planner.studies.report import Table, r_squared
 

@@ -40,9 +40,9 @@ def undo(directory: Directory, as_json: AsJson = False) -> int:
     Example: planner undo cell7
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import UndoneAct
+    from planner.report.campaign_acts import undone
 
-    return respond(UndoneAct.of(Campaign(directory).undo()), as_json)
+    return respond(undone(Campaign(directory).undo()), as_json)
 
 
 def redo(directory: Directory, as_json: AsJson = False) -> int:
@@ -51,9 +51,9 @@ def redo(directory: Directory, as_json: AsJson = False) -> int:
     Example: planner redo cell7
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import RedoneAct
+    from planner.report.campaign_acts import redone
 
-    return respond(RedoneAct.of(Campaign(directory).redo()), as_json)
+    return respond(redone(Campaign(directory).redo()), as_json)
 
 
 def withdraw(
@@ -67,10 +67,10 @@ def withdraw(
     Example: planner withdraw cell7 P003 --reason "loose sensor"
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import WithdrawnPose
+    from planner.report.campaign_acts import withdrawn
 
     Campaign(directory).withdraw(pose, reason)
-    return respond(WithdrawnPose(pose, reason), as_json)
+    return respond(withdrawn(pose, reason), as_json)
 
 
 def skip(
@@ -87,7 +87,10 @@ def skip(
     Example: planner skip cell7 P007 --reason "hose in the way"
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import SkippedPose
+    from planner.report.answer import Done
 
     Campaign(directory).skip(pose, reason, neighbours=bool(reason))
-    return respond(SkippedPose(pose, reason), as_json)
+    return respond(
+        Done({"skipped": pose, "reason": reason}, f"Pose {pose} will not be offered again."),
+        as_json,
+    )

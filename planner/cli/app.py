@@ -108,7 +108,7 @@ def status_(
     """
     from planner.campaign.campaign import Campaign
     from planner.cli.progress import telling
-    from planner.report.plot_files import Pictures
+    from planner.report.pictures import Pictures
     from planner.report.status import status
 
     campaign, pictures = Campaign(directory), Pictures(plot, format_)

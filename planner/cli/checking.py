@@ -25,11 +25,12 @@ def check(
     Example: planner check robot/robot.toml --plot pictures
     """
     from planner.campaign.cell import examine_robot
-    from planner.report.plot_files import Pictures
+    from planner.report.pictures import Pictures
     from planner.report.robot_check import RobotCheckReport
 
     pictures = Pictures(plot, format_)
-    answer = RobotCheckReport.of(examine_robot(robot, campaign)).with_pictures(pictures)
+    answer = RobotCheckReport.of(examine_robot(robot, campaign))
+    answer = answer.with_pictures(pictures, answer.robot)
     if as_json:  # the text says them itself
         for finding in answer.findings:
             if finding.severity == "error":

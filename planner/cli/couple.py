@@ -57,7 +57,7 @@ def couple(
     from planner.milling.coupling import couple as coupling
     from planner.milling.tool_file import load_tool
     from planner.report.coupling import coupling_report
-    from planner.report.plot_files import Pictures
+    from planner.report.pictures import Pictures
 
     pictures = Pictures(plot, format_, rrd)
     target = load_tool(tool)
@@ -73,4 +73,4 @@ def couple(
     answer = coupling_report(before, coupled, target.name, tested_name, name, out)
     if contact is not None:
         answer = replace(answer, contact=contact.to_json())
-    return respond(answer.with_pictures(pictures), as_json)
+    return respond(answer.with_pictures(pictures, f"{answer.tool} at {answer.pose}"), as_json)

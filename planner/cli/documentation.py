@@ -1,24 +1,12 @@
 """What explains the rest (`planner schema`, `planner manual`)."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from planner.cli.answer import AsJson, respond
-from planner.report.answer import Answer
-
-
-@dataclass(frozen=True)
-class WrittenManual(Answer):
-    """Answer of `manual`: the file."""
-
-    manual: str
-
-    def text(self) -> str:
-        """One sentence."""
-        return f"The manual: {self.manual}"
+from planner.report.answer import Done
 
 
 def schema(
@@ -54,4 +42,5 @@ def manual(
     assert context.parent is not None
     commands = getattr(context.parent.command, "commands", {})
     told = [(name, command.help or "") for name, command in commands.items()]
-    return respond(WrittenManual(str(write_manual(out, told))), as_json)
+    file = write_manual(out, told)
+    return respond(Done({"manual": str(file)}, f"The manual: {file}"), as_json)

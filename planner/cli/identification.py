@@ -50,7 +50,7 @@ def identify(
     from planner.cli.progress import telling
     from planner.fit.write_robot import check_target
     from planner.report.modal_analysis import check_options
-    from planner.report.plot_files import Pictures
+    from planner.report.pictures import Pictures
 
     started = time.perf_counter()
     check_options(band_hz, window_rate_1_s=window_rate_1_s)

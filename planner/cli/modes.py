@@ -67,7 +67,7 @@ def modes(
         sources_of,
         unlabelled_report,
     )
-    from planner.report.plot_files import Pictures
+    from planner.report.pictures import Pictures
 
     check_options(band_hz, estimator, quantity, window_rate_1_s)
     pictures = Pictures(plot, format_, rrd)

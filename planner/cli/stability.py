@@ -78,7 +78,7 @@ def stability(
     from planner.campaign.cut_source import Asked
     from planner.cli.progress import telling
     from planner.milling.cut import load_cut
-    from planner.report.plot_files import Pictures
+    from planner.report.pictures import Pictures
 
     asked = Asked(
         source,
@@ -102,11 +102,11 @@ def stability(
             return respond(map_report(asked, poses or 40, load_cut(cut), pictures, tell), as_json)
         if path is not None or pose == "all":
             from planner.campaign.toolpath_poses import Way
-            from planner.report.stability_path import path_report
+            from planner.report.stability import path_report
 
             way = Way(path, origin, poses or 12, turns)
             return respond(path_report(asked, way, load_cut(cut), pictures, tell), as_json)
-        from planner.report.stability_lobes import stability_of
+        from planner.report.stability import stability_of
 
         return respond(stability_of(asked, pictures, tell), as_json)
 

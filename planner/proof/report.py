@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from planner.proof.score import Place, Scored, Share, by_probability, figures
 from planner.report.answer import Answer, plain
-from planner.report.frf_plots import png
-from planner.report.plot_text import ink
+from planner.report.pictures import png
+from planner.report.plot_marks import ink
 
 
 @dataclass(frozen=True)

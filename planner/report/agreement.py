@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from msgspec import UNSET
+from msgspec import UnsetType as Unset
+
 if TYPE_CHECKING:
     from planner.diagnosis.diagnose import ThreefoldSimilarity
     from planner.measurement.agreement import Similarity
@@ -15,60 +18,41 @@ class FrfSimilarity:
     None where there is no pose to compare at.
     """
 
-    frac: float | None
-    frobenius: float | None
+    frac: float | None = None
+    frobenius: float | None = None
 
     @classmethod
     def of(cls, found: "Similarity | None") -> "FrfSimilarity":
         """Of what identification and diagnosis find."""
-        return cls(None, None) if found is None else cls(found.frac, found.frobenius)
+        return cls() if found is None else cls(found.frac, found.frobenius)
 
 
-@dataclass(frozen=True)
-class SimilarityChange:
-    """After an identification, and before it."""
+@dataclass(frozen=True, kw_only=True)
+class SimilarityChange(FrfSimilarity):
+    """After an identification, and before it; at `poses` that the fit did not see, or at all."""
 
-    frac: float | None
-    frobenius: float | None
     before: FrfSimilarity
-
-
-@dataclass(frozen=True)
-class HeldOutChange(SimilarityChange):
-    """The same at poses that the fit did not see."""
-
-    poses: tuple[str, ...]
+    poses: tuple[str, ...] | Unset = UNSET
 
 
 @dataclass(frozen=True)
 class ThreeSimilarities:
-    """The simulation as given, with its own parameters refitted, and with what explains it."""
+    """The simulation as given, with its own parameters refitted, and with what explains it.
+
+    At `poses` that no fit had seen, or at all.
+    """
 
     nominal: FrfSimilarity
     refitted: FrfSimilarity
     explained: FrfSimilarity
+    poses: tuple[str, ...] | Unset = UNSET
 
     @classmethod
-    def of(cls, found: "ThreefoldSimilarity | None") -> "ThreeSimilarities":
+    def of(
+        cls, found: "ThreefoldSimilarity | None", poses: tuple[str, ...] | Unset = UNSET
+    ) -> "ThreeSimilarities":
         """None where there is no pose to compare at."""
         if found is None:
-            return cls(*(FrfSimilarity(None, None),) * 3)
+            return cls(*(FrfSimilarity(),) * 3, poses)
         sides = found.nominal, found.refitted, found.explained
-        return cls(*map(FrfSimilarity.of, sides))
-
-
-@dataclass(frozen=True)
-class HeldOutSimilarities:
-    """The same at `poses`, which no fit had seen."""
-
-    poses: tuple[str, ...]
-    nominal: FrfSimilarity
-    refitted: FrfSimilarity
-    explained: FrfSimilarity
-
-    @classmethod
-    def at(
-        cls, poses: tuple[str, ...], found: "ThreefoldSimilarity | None"
-    ) -> "HeldOutSimilarities":
-        """Of what was judged there."""
-        return cls(poses, **vars(ThreeSimilarities.of(found)))
+        return cls(*map(FrfSimilarity.of, sides), poses)

@@ -2,16 +2,21 @@
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 
 from planner.errors import RefusedFile
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.console import RenderableType
 
-__all__ = ["NOT_IN_JSON", "Answer", "RefusedFile", "encoded", "plain"]
+    from planner.report.pictures import Pictures
+    from planner.report.rerun.figures import More
+
+__all__ = ["NOT_IN_JSON", "Answer", "Done", "RefusedFile", "encoded", "plain"]
 
 # Metadata of a field for what an answer was made of; None where it came from another process.
 NOT_IN_JSON = {"json": False}
@@ -33,6 +38,40 @@ class Answer:
         """For the engineer, units in every column; None where there is nothing to say."""
         return None
 
+    @property
+    def end(self) -> "list[RenderableType]":
+        """The last lines of a text: where pictures are, and whether recordings are simulated."""
+        from planner.report.text import SIMULATED, drawn
+
+        made = drawn(getattr(self, "plots", ()), getattr(self, "rrd", None))
+        return [*made, SIMULATED] if getattr(self, "simulated", False) else made
+
+    def with_figures(
+        self,
+        pictures: "Pictures",
+        draw: "Callable[[], dict[str, Figure]]",
+        name: str,
+        note: str = "",
+        more: "More | None" = None,
+    ) -> Self:
+        """The same once what `draw` gives is where pictures are wanted, if they are.
+
+        `name`, `note` and `more` as `Pictures.write` has them.
+        """
+        if not pictures.wanted:
+            return self
+        simulated = getattr(self, "simulated", False)
+        written = pictures.write(draw(), name, note, more, simulated)
+        return dataclasses.replace(self, **written)  # pyright: ignore[reportArgumentType]
+
+    def figures(self) -> "dict[str, Figure]":
+        """Its pictures by name."""
+        return {}
+
+    def with_pictures(self, pictures: "Pictures", name: str, note: str = "") -> Self:
+        """The same once its figures are drawn, where that is wanted."""
+        return self.with_figures(pictures, self.figures, name, note)
+
     def _repr_html_(self) -> str:
         """What notebooks show."""
         import io
@@ -42,6 +81,22 @@ class Answer:
         console = Console(file=io.StringIO(), record=True, width=100)
         console.print(self.text() or "")
         return console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Done(Answer):
+    """Answer of an act that needs one sentence; `keys` are those of its JSON."""
+
+    keys: Mapping[str, Any]
+    sentence: str
+
+    def to_json(self) -> dict[str, Any]:
+        """The keys alone."""
+        return plain(self.keys)
+
+    def text(self) -> str:
+        """The sentence."""
+        return self.sentence
 
 
 def plain(value: Any) -> Any:

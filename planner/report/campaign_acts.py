@@ -14,7 +14,7 @@ from planner.campaign.events import Entry
 from planner.campaign.from_urdf import Guess, Guessed
 from planner.campaign.taking_back import act
 from planner.check.remark import CheckRemark
-from planner.report.answer import Answer
+from planner.report.answer import Answer, Done
 from planner.report.text import command_line, table
 
 
@@ -105,74 +105,30 @@ class ExampleFolder(Answer):
         return Group(Text(said), *(command_line("  ", *words) for words in commands))
 
 
-@dataclass(frozen=True)
-class UndoneAct(Answer):
-    """Answer of `undo`: number and kind of the log's entry that was taken back, and its words.
-
-    `with_it` are the words of the proposals that followed it.
-    """
-
-    undone: int
-    event: str
-    what: str
-    with_it: tuple[str, ...] = ()
-
-    @classmethod
-    def of(cls, entries: Sequence[Entry]) -> "UndoneAct":
-        """Of the entry that was taken back and those that went with it."""
-        entry, *others = entries
-        kind = msgspec.to_builtins(entry.event)["kind"]
-        return cls(entry.seq, kind, act(entry), tuple(act(other) for other in others))
-
-    def text(self) -> str:
-        """One sentence."""
-        follow = f"; with it: {', '.join(self.with_it)}" if self.with_it else ""
-        return f"Took back entry {self.undone} of the log ({self.what}{follow})."
+def undone(entries: Sequence[Entry]) -> Done:
+    """Answer of `undo`: the log's entry that was taken back, and those that went with it."""
+    keys, words = _told(entries, "undone")
+    return Done(keys, f"Took back entry {keys['undone']} of the log ({words}).")
 
 
-@dataclass(frozen=True)
-class RedoneAct(Answer):
-    """Answer of `redo`: number and kind of the log's entry that holds again, and its words."""
-
-    redone: int
-    event: str
-    what: str
-    with_it: tuple[str, ...] = ()
-
-    @classmethod
-    def of(cls, entries: Sequence[Entry]) -> "RedoneAct":
-        """Of the entry that holds again and those that came with it."""
-        told = UndoneAct.of(entries)
-        return cls(told.undone, told.event, told.what, told.with_it)
-
-    def text(self) -> str:
-        """One sentence."""
-        follow = f"; with it: {', '.join(self.with_it)}" if self.with_it else ""
-        return f"Entry {self.redone} of the log holds again ({self.what}{follow})."
+def redone(entries: Sequence[Entry]) -> Done:
+    """Answer of `redo`: the log's entry that holds again, and those that came with it."""
+    keys, words = _told(entries, "redone")
+    return Done(keys, f"Entry {keys['redone']} of the log holds again ({words}).")
 
 
-@dataclass(frozen=True)
-class WithdrawnPose(Answer):
+def _told(entries: Sequence[Entry], what: str) -> tuple[dict[str, Any], str]:
+    """Number, kind and words of the first entry, the others' words; and all words in one."""
+    entry, *others = entries
+    kind, said = msgspec.to_builtins(entry.event)["kind"], [act(other) for other in others]
+    follow = f"; with it: {', '.join(said)}" if said else ""
+    keys = {what: entry.seq, "event": kind, "what": act(entry), "with_it": said}
+    return keys, f"{act(entry)}{follow}"
+
+
+def withdrawn(pose: str, reason: str) -> Done:
     """Answer of `withdraw`."""
-
-    withdrawn: str
-    reason: str
-
-    def text(self) -> str:
-        """One sentence."""
-        return (
-            f"Pose {self.withdrawn} is set aside; its recordings are kept: planner confirm uses "
-            f"them again."
-        )
-
-
-@dataclass(frozen=True)
-class SkippedPose(Answer):
-    """Answer of `skip`."""
-
-    skipped: str
-    reason: str
-
-    def text(self) -> str:
-        """One sentence."""
-        return f"Pose {self.skipped} will not be offered again."
+    return Done(
+        {"withdrawn": pose, "reason": reason},
+        f"Pose {pose} is set aside; its recordings are kept: planner confirm uses them again.",
+    )

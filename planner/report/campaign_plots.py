@@ -7,8 +7,7 @@ from matplotlib.tri import Triangulation
 from scipy.stats import binom
 
 from planner.frf.frf import Frf
-from planner.report.frf_plots import AXES, MEASURED, MODEL
-from planner.report.plot_text import plain_text
+from planner.report.plot_marks import AXES, MEASURED, MODEL, empty, magnitude, phase, plain_text
 from planner.surrogate.leave_one_out import LeaveOneOut
 
 SHARES = np.linspace(0.02, 0.98, 49)
@@ -18,8 +17,7 @@ NAMED = 3  # poses that are named
 
 def left_out_figure(found: LeaveOneOut, poses: tuple[str, ...], title: str = "") -> Figure:
     """Coverage against nominal level (left), errors by pose in what was expected (right)."""
-    figure = Figure(figsize=(11.0, 4.8), layout="constrained")
-    figure.suptitle(plain_text(title), fontsize=11)
+    figure = empty((11.0, 4.8), title)
     left, right = figure.subplots(1, 2, width_ratios=(1, 1.8))
     _coverage(left, found)
     _errors(right, found, poses)
@@ -148,8 +146,11 @@ def frf_sheet(
     lines = measured.frequency_hz[inside]
     for i, axis in enumerate(AXES):
         one, h = measured.accelerance[i, i, inside], mean[i, i]
-        _magnitude(panels[0, i], frequency_hz, h, sd[i, i], lines, one)
-        _phase(panels[1, i], frequency_hz, h, sd[i, i], lines, one)
+        floor = FAINTEST * float(np.abs(h).max())
+        magnitude(panels[0, i], lines, one, color=MEASURED, lw=1.0, label="measured")
+        magnitude(panels[0, i], frequency_hz, h, sd[i, i], floor, color=MODEL, lw=1, label="model")
+        phase(panels[1, i], lines, one, color=MEASURED, lw=1.0)
+        phase(panels[1, i], frequency_hz, h, sd[i, i], color=MODEL, lw=1.0)
         if coherent:
             panels[2, i].plot(lines, measured.coherence[i, i, inside], color="tab:blue", lw=0.8)
             panels[2, i].set(ylim=(0, 1.05))
@@ -170,26 +171,3 @@ def frf_sheet(
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", ncols=4, fontsize=8)
     return figure
-
-
-def _magnitude(panel, lines, mean, sd, measured_hz, measured) -> None:
-    size = np.abs(mean)
-    least = FAINTEST * float(size.max())
-    band = np.maximum(size - 2 * sd, least), size + 2 * sd
-    panel.fill_between(lines, *band, color=MODEL, alpha=0.25, lw=0, label="± 2 sd")
-    panel.semilogy(measured_hz, np.abs(measured), color=MEASURED, lw=1.0, label="measured")
-    panel.semilogy(lines, size, color=MODEL, lw=1.0, label="model")
-
-
-def _phase(panel, lines, mean, sd, measured_hz, measured) -> None:
-    """Phase in °; its band is the widest angle under which a circle of 2 sd is seen."""
-    angle = np.rad2deg(np.angle(mean))
-    half = np.rad2deg(np.arcsin(np.minimum(2 * sd / np.maximum(np.abs(mean), 1e-300), 1.0)))
-    # Drawn on the turn of the circle where the model is, so that ±180° do not jump back and forth.
-    seen = np.rad2deg(np.angle(measured))
-    near = np.interp(measured_hz, lines, np.rad2deg(np.unwrap(np.angle(mean))))
-    seen = seen + 360 * np.round((near - seen) / 360)
-    smooth = np.rad2deg(np.unwrap(np.deg2rad(angle)))
-    panel.fill_between(lines, smooth - half, smooth + half, color=MODEL, alpha=0.25, lw=0)
-    panel.plot(measured_hz, seen, color=MEASURED, lw=1.0)
-    panel.plot(lines, smooth, color=MODEL, lw=1.0)

@@ -1,33 +1,15 @@
 """Answer of `report`: where the file is."""
 
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError
-from planner.report.answer import Answer
+from planner.report.answer import Done
 from planner.words import counted
 
 
-@dataclass(frozen=True)
-class WrittenReport(Answer):
-    """Answer of `report`: the file, its size, and what it is about."""
-
-    report: str
-    bytes: int
-    measurements: int
-    simulated: bool
-    diagnosis: str | None
-    seconds: float
-
-    def text(self) -> str:
-        """One sentence."""
-        size = self.bytes / 1e6
-        return f"Report of {counted(self.measurements, 'pose')} ({size:.1f} MB): {self.report}"
-
-
-def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -> WrittenReport:
+def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -> Done:
     """Write the report of a campaign, by default report.html in its folder.
 
     `diagnosis` names what `planner diagnose --out` has written. Raises InputError where the file
@@ -48,12 +30,9 @@ def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -
         file.write_bytes(data)
     except OSError as error:
         raise InputError(f"{file} cannot be written ({error.strerror}); name another.") from None
-    state = campaign.state
-    return WrittenReport(
-        report=str(file),
-        bytes=len(data),
-        measurements=len(state.used),
-        simulated=state.simulated,
-        diagnosis=str(kept) if kept else None,
-        seconds=time.perf_counter() - started,
-    )
+    used, simulated = len(campaign.state.used), campaign.state.simulated
+    keys = {
+        "report": str(file), "bytes": len(data), "measurements": used, "simulated": simulated,
+        "diagnosis": str(kept) if kept else None, "seconds": time.perf_counter() - started,
+    }  # fmt: skip
+    return Done(keys, f"Report of {counted(used, 'pose')} ({len(data) / 1e6:.1f} MB): {file}")

@@ -22,12 +22,13 @@ from planner.compare.processes import Failure
 from planner.compare.tasks import Run, Study, Task
 from planner.errors import InputError
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded
-from planner.report.text import SIMULATED, SIMULATED_TITLE, table
+from planner.report.pictures import Pictures
+from planner.report.text import table
 
 if TYPE_CHECKING:
-    from planner.report.learning_curves import Learning
+    from matplotlib.figure import Figure
 
-PICTURE, TABLE = "learning_curves.png", "comparison.json"
+PICTURE, TABLE = "learning_curves", "comparison.json"
 SHOWN = 8  # columns of measurements that fit
 
 
@@ -79,28 +80,19 @@ class ComparisonReport(Answer):
 
         `key` is the pool's content hash.
         """
-        if self.curves is None or (out is None and rrd is None):
+        curves = self.curves
+        if curves is None:
             return self
-        from planner.report.learning_curves import learning_figure
+        title = f"Pool of {self.pool} poses, {self.repeats} repeats, simulation {self.simulation}"
 
-        learned = {name: _learning(curve) for name, curve in self.curves.items()}
-        title = (
-            f"{SIMULATED_TITLE if self.simulated else ''}{self.robot}: pool of {self.pool} poses, "
-            f"{self.repeats} repeats, simulation {self.simulation}"
-        )
-        figure, shown = learning_figure(learned, title), self
-        if out is not None:
-            from planner.report.frf_plots import save
+        def figures() -> "dict[str, Figure]":
+            from planner.report.learning_curves import learning_figure
 
-            plots = (str(out.absolute() / PICTURE),)
-            shown = replace(shown, out=str(out.absolute()), plots=plots)
-            save(figure, out / PICTURE)
-        if rrd is not None:
-            from planner.report.rerun.figures import record_figures
+            return {PICTURE: learning_figure(curves, title)}
 
-            shown = replace(shown, rrd=str(rrd.absolute()))
-            record_figures({"curves": figure}, self.robot, f"{title}\n\nPool {key}.", rrd)
-        return shown
+        note = f"{title}\n\nPool {key}."
+        shown = self.with_figures(Pictures(out, rrd=rrd), figures, self.robot, note)
+        return shown if out is None else replace(shown, out=str(out.absolute()))
 
     def write(self, folder: Path) -> None:
         """The JSON answer as a file of the folder."""
@@ -111,23 +103,20 @@ class ComparisonReport(Answer):
     def text(self) -> Group:
         """Curves as tables, then what each strategy needs to reach 1 %."""
         columns = _spread(len(next(iter(self.strategies.values())).n))
-        parts: list[RenderableType] = [SIMULATED] if self.simulated else []
-        parts.append(
-            Text(
-                f"{self.robot}: pool of {self.pool} poses, {self.repeats} repeats from "
-                f"{self.initial} to {self.budget} measurements, simulation "
-                f"{self.simulation}; medians, on poses not used."
-            )
+        head = Text(
+            f"{self.robot}: pool of {self.pool} poses, {self.repeats} repeats from {self.initial} "
+            f"to {self.budget} measurements, simulation {self.simulation}; medians, on poses not "
+            f"used."
         )
-        parts += [
+        return Group(
+            head,
             self._curves("frequency_rmse_percent", "Frequency RMSE (%)", ".2f", columns),
             self._curves("r2", "R²", ".3f", columns),
             self._curves("coverage95", "Share in 95 % interval", ".2f", columns),
             self._goals(),
             *map(Text, self.remarks),
-        ]
-        written = (*self.plots[:1], *((self.rrd,) if self.rrd else ()))
-        return Group(*parts, *(Text(f"Written: {path}") for path in written))
+            *self.end,
+        )
 
     def _curves(self, name: str, title: str, form: str, columns: list[int]) -> RenderableType:
         n = next(iter(self.strategies.values())).n
@@ -211,13 +200,6 @@ def _by_name(
             raise InputError(f"Every run of {name} failed: {failed[0].reason}")
         curves[name] = Curves.of(runs)
     return curves
-
-
-def _learning(curve: Curves) -> "Learning":
-    from planner.report.learning_curves import Band, Learning
-
-    parts = (curve.frequency_rmse_percent, curve.r2, curve.coverage95)
-    return Learning(curve.n, *(Band.of(part) for part in parts))
 
 
 def _interval(value: float, interval: np.ndarray, form: str) -> str:

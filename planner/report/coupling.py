@@ -1,8 +1,8 @@
 """Answer of `couple`: the FRFs of another tool, how sure they are, and the hit that would tell."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
@@ -21,9 +21,10 @@ from planner.milling.coupling import (
 )
 from planner.milling.tool import NUMBERS
 from planner.report.answer import NOT_IN_JSON, Answer
-from planner.report.coupling_plots import coupling_figures
-from planner.report.plot_files import Pictures
-from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
+from planner.report.text import remarks, table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -103,20 +104,17 @@ class CouplingReport(Answer):
         ]
         if isinstance(self.contact, dict):
             lines.append(Text(_contact_sentence(self.contact)))
-        if self.simulated:
-            lines.append(SIMULATED)
-        return Group(made, *lines, *remarks(self.remarks), *drawn(self.plots, self.rrd))
+        return Group(made, *lines, *remarks(self.remarks), *self.end)
 
-    def with_pictures(self, pictures: Pictures) -> "CouplingReport":
-        """The same, its pictures drawn."""
-        if not pictures.wanted or self.coupled is None:
-            return self
-        mark = SIMULATED_TITLE if self.simulated else ""
-        title = f"{mark}{self.tool} at {self.pose}"
+    def figures(self) -> "dict[str, Figure]":
+        """Receptances before and after, and how errors grow."""
+        if self.coupled is None:
+            return {}
+        from planner.report.coupling_plots import coupling_figure
+
+        title = "Receptances of the tip, before and after"
         before = "as measured" if self.reference is None else f"measured: {self.reference}"
-        figures = coupling_figures(self.before, self.coupled, title, before)
-        written = pictures.write(figures, self.tool, title)
-        return replace(self, plots=tuple(written["plots"]), rrd=written["rrd"])
+        return {"coupling": coupling_figure(self.before, self.coupled, title, before)}
 
 
 def _contact_sentence(contact: dict[str, Any]) -> str:

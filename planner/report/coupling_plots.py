@@ -4,18 +4,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from planner.milling.coupling import AMPLIFICATION_LIMIT, CoupledFrf
-from planner.report.frf_plots import AXES, MEASURED, MODEL
-from planner.report.plot_marks import panels
+from planner.report.plot_marks import AXES, MEASURED, MODEL, magnitude, panels
 
 FLOOR = 0.3  # of the least value: bands that reach below are cut off there
 MANY_DECADES = 20.0  # ratio of the band's ends from which the frequency axis is logarithmic
-
-
-def coupling_figures(
-    before: CoupledFrf | None, coupled: CoupledFrf, title: str, reference: str
-) -> dict[str, Figure]:
-    """Every picture by its name."""
-    return {"coupling": coupling_figure(before, coupled, title, reference)}
 
 
 def coupling_figure(
@@ -33,15 +25,13 @@ def coupling_figure(
     for row, i in enumerate(moved):
         for column, j in enumerate(moved):
             panel = grid[row, column]
-            mean, sd = np.abs(coupled.receptance[i, j]), coupled.sd[i, j]
-            low = np.maximum(mean - 2 * sd, 1e-3 * mean)
-            panel.fill_between(f, 1e6 * low, 1e6 * (mean + 2 * sd), color=MODEL, alpha=0.25, lw=0)
-            panel.plot(f, 1e6 * mean, color=MODEL, lw=1.3, label="this tool, ± 2 sd")
+            mean, sd = 1e6 * coupled.receptance[i, j], 1e6 * coupled.sd[i, j]
+            floor = FLOOR * np.abs(mean).min()
+            magnitude(panel, f, mean, sd, floor, color=MODEL, lw=1.3, label="this tool")
             if before is not None:
-                size = 1e6 * np.abs(before.receptance[i, j])
-                panel.plot(f, size, color=MEASURED, lw=0.9, label=reference)
-            panel.set_yscale("log")
-            panel.set_ylim(bottom=1e6 * FLOOR * mean.min())
+                size = 1e6 * before.receptance[i, j]
+                magnitude(panel, f, size, color=MEASURED, lw=0.9, label=reference)
+            panel.set_ylim(bottom=floor)
             panel.set_title(f"response {AXES[i]}, hit {AXES[j]}", fontsize=9, loc="left", pad=3)
             panel.grid(True, which="both", alpha=0.2)
             if column == 0:
@@ -61,5 +51,5 @@ def coupling_figure(
         grown.set_xscale("log")
     grown.set_xlim(f[0], f[-1])
     handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=9)
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
     return figure

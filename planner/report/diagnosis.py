@@ -11,29 +11,22 @@ from rich.text import Text
 
 from planner.design.discrimination import LIKELY
 from planner.design.extra_sensor import ExtraSensor
-from planner.design.next_hit import NextHit
+from planner.design.next_hit import NextHit, in_words
+from planner.diagnosis.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
 from planner.dynamics.in_time import change_at_force
 from planner.effects.effect import Operator
 from planner.errors import InputError
 from planner.fit.posterior import RobotPosterior
-from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
+from planner.report.agreement import ThreeSimilarities
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
-from planner.report.established_effects import EstablishedEffect, established_effects
-from planner.report.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
-from planner.report.text import (
-    SIMULATED,
-    SIMULATED_TITLE,
-    command_line,
-    drawn,
-    remarks,
-    table,
-)
+from planner.report.text import command_line, remarks, table
 from planner.robot.place_names import place_names, with_names
 from planner.words import probable
 
 if TYPE_CHECKING:
     from planner.diagnosis.diagnose import Diagnosis
     from planner.diagnosis.odd_pose import OddPose
+    from planner.diagnosis.verdict import Candidate
     from planner.robot.robot import Robot
 
 SHOWN = 6  # candidates in the table
@@ -43,6 +36,48 @@ VERDICTS = {
     "unexplained": "Something makes the robot differ from the simulation, and none of the effects "
     "that planner knows describes it.",
 }
+
+
+@dataclass(frozen=True)
+class ParameterValue:
+    """A parameter of an effect with its standard deviation and unit."""
+
+    value: float
+    sd: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class EstablishedEffect:
+    """An effect at its place, the probability that it is there, and its parameters by name.
+
+    `change_percent` is by how much of |H| FRFs change when it is left out and the rest refitted;
+    None of what signals alone tell.
+    """
+
+    effect: str
+    at: str | None
+    probability: float
+    change_percent: float | None
+    parameters: Mapping[str, ParameterValue]
+    text: str
+
+
+def established_effects(
+    found: "Diagnosis", undecided: "Sequence[Candidate]", names: Mapping[str, str]
+) -> tuple[EstablishedEffect, ...]:
+    """Those of signals and of fits; `names` are the robot's own of places, see `place_names`."""
+    others = "; ".join(in_words(c.places, c.probability) for c in undecided[1:])
+    rest = f" These recordings cannot tell it from: {others}." if others else ""
+    return tuple(
+        EstablishedEffect(
+            e.effect, e.at, e.probability, None if e.change is None else 100 * e.change,
+            {name: ParameterValue(*value) for name, value in e.parameters.items()},
+            with_names(f"{e.text} ({probable(e.probability)}){'' if e.change is None else rest}",
+                       names),
+        )
+        for e in found.findings
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -89,7 +124,7 @@ class DiagnosisReport(Answer):
     sets: tuple[tuple[EffectAtPlace, ...], ...]
     where: MismatchPlaces
     fit: ThreeSimilarities
-    held_out: HeldOutSimilarities
+    held_out: ThreeSimilarities
     misfit: TwoMisfits
     shares: MismatchShares
     refused: tuple[RefusedFile, ...]
@@ -101,6 +136,7 @@ class DiagnosisReport(Answer):
     urdf: Path | None = field(default=None, metadata=NOT_IN_JSON)
     campaign_robot: Path | None = field(default=None, metadata=NOT_IN_JSON)
     plots: tuple[str, ...] = ()
+    rrd: str | None = field(default=None, metadata=NOT_IN_JSON)
     closest: tuple[EffectAtPlace, ...] = field(default=(), metadata=NOT_IN_JSON)
     next: NextHit | None = None
     next_sensor: ExtraSensor | None = None
@@ -160,7 +196,7 @@ class DiagnosisReport(Answer):
         from planner.fit.identified import as_identification
         from planner.fit.write_robot import write_robot
         from planner.report.diagnosis_plots import diagnosis_figures
-        from planner.report.plot_files import Pictures
+        from planner.report.pictures import Pictures
 
         found = self.found
         robot = found.search.prior.repertoire.stiff.robot
@@ -168,13 +204,9 @@ class DiagnosisReport(Answer):
         model, result = as_identification(found.robot)
         result = replace(result, simulation=found.simulation)
         made = write_robot(folder / "robot.toml", model.simulation.robot, result, found.laws)
-        mark = SIMULATED_TITLE if self.simulated else ""
-        figures = diagnosis_figures(found, mark)
-        plots = Pictures(folder).write(figures, robot.name)["plots"]
+        drawn = self.with_figures(Pictures(folder), lambda: diagnosis_figures(found), robot.name)
         said = *self.remarks, *made.remarks, *_unwritten(found)
-        written = replace(
-            self, robot=str(made.robot_toml), urdf=made.urdf, plots=plots, remarks=said
-        )
+        written = replace(drawn, robot=str(made.robot_toml), urdf=made.urdf, remarks=said)
         (folder / "diagnosis.json").write_bytes(encoded(written))  # for planner report
         return written
 
@@ -195,8 +227,7 @@ class DiagnosisReport(Answer):
         parts += remarks(self.remarks)
         parts += [Text(f"Predictions: {self.npz}")] if self.npz else []
         parts += self._robot_text()
-        parts += drawn(self.plots)
-        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+        return Group(*parts, *self.end)
 
     def to_json(self) -> dict[str, Any]:
         """With the verdict, and what is said of a pose, in words."""
@@ -241,8 +272,8 @@ class DiagnosisReport(Answer):
             *("poses", "as given", "refitted", "explained"),
         )
         aside = self.held_out
-        rows: list[tuple[str, ThreeSimilarities | HeldOutSimilarities]] = [("used", self.fit)]
-        if aside.poses:
+        rows = [("used", self.fit)]
+        if isinstance(aside.poses, tuple) and aside.poses:
             rows.append((f"held out: {', '.join(aside.poses)}", aside))
         for name, of in rows:
             sides = (of.nominal, of.refitted, of.explained)
@@ -295,7 +326,7 @@ def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> Diagno
         sets=tuple(tuple(EffectAtPlace(*one) for one in members) for members in verdict.sets),
         where=MismatchPlaces.of(place, recorded.poses),
         fit=ThreeSimilarities.of(found.fitted),
-        held_out=HeldOutSimilarities.at(aside, found.held_out),
+        held_out=ThreeSimilarities.of(found.held_out, aside),
         misfit=TwoMisfits(*sides),
         shares=MismatchShares.of(found),
         refused=tuple(RefusedFile(*entry) for entry in recorded.refused),

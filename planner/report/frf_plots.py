@@ -1,24 +1,142 @@
-"""What all pictures share: names of axes, colours, and how figures become files."""
+"""Pictures of FRFs: measured and simulated ones over each other, and maps of them along poses."""
 
-from pathlib import Path
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
-from matplotlib import rc_context
+import numpy as np
 from matplotlib.figure import Figure
 
-from planner.report.picture_files import rendered
+from planner.report.plot_marks import AXES, empty, magnitude, panels, plain_text
 
-AXES = ("x", "y", "z")
-MEASURED, MODEL = "black", "tab:red"
+# Dashes over wide lines: where two agree, both are seen.
+SEEN = {"label": "measured", "color": "0.25", "lw": 4.5}
+GIVEN = {"color": "tab:blue", "ls": ":", "lw": 1.1, "zorder": 3.0}
+REFITTED = {"color": "tab:orange", "ls": "-", "lw": 2.6}
+EXPLAINED = {"color": "tab:red", "ls": "--", "lw": 1.0}
+IDENTIFIED = {"color": "tab:red", "ls": "-", "lw": 1.2}
+MOST = 6  # poses whose FRFs are shown
+FAINTEST_DB = 50.0  # below the strongest resonance; what is fainter is drawn alike
+MOST_NAMES = 40  # of poses that fit beside each other at an axis
+DIFFERENCE_DB = 20.0  # a factor of ten saturates the colours of the difference
 
 
-def png(figure: Figure, dpi: int = 80) -> bytes:
-    """The figure as PNG bytes, the same for the same figure."""
-    return rendered(figure, format="png", dpi=dpi, metadata={"Software": None})
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One simulation's FRFs (n, 3, 3, F) in m/s²/N; its `key` in files' names, how it is drawn."""
+
+    key: str
+    label: str
+    style: Mapping[str, Any]
+    h: np.ndarray
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG or SVG, by the file's name; the same file for the same figure."""
-    # Without a salt the SVG's ids are random, without this entry it holds the time.
-    stamp = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-    with rc_context({"svg.hashsalt": "planner"}):
-        path.write_bytes(rendered(figure, format=path.suffix[1:], dpi=150, metadata=stamp))
+@dataclass(frozen=True, eq=False)
+class ComparedFrfs:
+    """FRFs of n named poses on lines (n, F): measured (n, 3, 3, F) in m/s²/N, and as simulated.
+
+    NaN where nothing was measured.
+    """
+
+    names: tuple[str, ...]
+    frequency_hz: np.ndarray
+    measured: np.ndarray
+    sides: tuple[Side, ...]
+    roles: tuple[str, ...] = ()  # of the poses
+    place: str = ""  # before titles, where it is not the tool
+
+    def figures(self, first: Sequence[int]) -> dict[str, Figure]:
+        """Maps of every direct FRF, then the direct FRFs of so many of the `first` poses."""
+        number, figures = np.arange(1.0, len(self.names) + 1), {}
+        for i, axis in enumerate(AXES):
+            measured = self._aligned(self.measured[:, i, i])
+            for side in self.sides:
+                figures[f"map_{axis}{axis}_{side.key}"] = frf_map(
+                    number, measured, self._aligned(side.h[:, i, i]), self.frequency_hz[0],
+                    "pose, in recorded order",
+                    f"{self.place}Map of H {axis}{axis}, simulation {side.label}", names=self.names,
+                )  # fmt: skip
+        for k in first[:MOST]:
+            name = re.sub(r"[^\w.-]", "_", str(self.names[k]))
+            figures[f"frf_{name}"] = self.overlay(k)
+        return figures
+
+    def _aligned(self, h: np.ndarray) -> np.ndarray:
+        """|H| (n, F) on the lines of the first pose."""
+        first, rows = self.frequency_hz[0], zip(self.frequency_hz, np.abs(h), strict=True)
+        return np.array([np.interp(first, hz, row, np.nan, np.nan) for hz, row in rows])
+
+    def overlay(self, k: int) -> Figure:
+        """Direct FRFs xx, yy, zz of the k-th pose."""
+        role = f" ({self.roles[k]})" if self.roles else ""
+        figure = empty((7.5, 7.0), f"{self.place}Pose {self.names[k]}{role}")
+        below, hz = figure.subplots(3, 1, sharex=True), self.frequency_hz[k]
+        for i, panel in enumerate(below):
+            magnitude(panel, hz, self.measured[k, i, i], **SEEN)
+            for side in self.sides:
+                magnitude(panel, hz, side.h[k, i, i], label=side.label, **side.style)
+            panel.set_ylabel(f"|H {AXES[i]}{AXES[i]}| (m/s²/N)", fontsize=8)
+            panel.grid(True, which="both", alpha=0.25)
+        figure.legend(*below[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        below[-1].set_xlabel("frequency (Hz)")
+        return figure
+
+    def overlays(self) -> Iterator[Figure]:
+        """Of all poses, one after the other."""
+        return map(self.overlay, range(len(self.names)))
+
+
+def frf_map(
+    place: np.ndarray,
+    measured: np.ndarray | None,
+    simulated: np.ndarray,
+    frequency_hz: np.ndarray,
+    pose_label: str = "pose",
+    title: str = "",
+    names: Sequence[str] = (),
+) -> Figure:
+    """One FRF along a path (Birk et al. 2025, section 2.5): measured, simulated, the difference.
+
+    place (n,) is where on the path a pose is (number, angle, length; increasing); measured, if
+    there is any, and simulated (n, F), complex or magnitudes, in m/s²/N, on frequency_hz (F,) are
+    drawn in dB. NaN stays blank. `names` (n,) of the poses stand at the axis instead of numbers.
+    """
+    both = ("measured", measured), ("simulated", simulated)
+    levels = {name: _decibel(frf) for name, frf in both if frf is not None}
+    top = max((np.nanmax(v) for v in levels.values() if not np.isnan(v).all()), default=0.0)
+    shown = [(name, level, (top - FAINTEST_DB, top), "viridis") for name, level in levels.items()]
+    if measured is not None:
+        difference = levels["simulated"] - levels["measured"]
+        limits = -DIFFERENCE_DB, DIFFERENCE_DB
+        shown.append(("simulated − measured", difference, limits, "RdBu_r"))
+    figure, grid = panels((3.6 * len(shown) + 1.2, 4.2), title, 1, len(shown), sharey=True)
+    cells, images = (_edges(np.asarray(place, float)), _edges(frequency_hz)), []
+    for panel, (name, level, (low, high), colours) in zip(grid[0], shown, strict=True):
+        panel.set_title(name, fontsize=9)
+        panel.set_xlabel(pose_label)
+        values = np.ma.masked_invalid(level.T)
+        style = {"vmin": low, "vmax": high, "cmap": colours, "rasterized": True}
+        images.append(panel.pcolormesh(*cells, values, **style))
+        if len(names):
+            every = -(-len(names) // MOST_NAMES)
+            ticks = [plain_text(name) for name in names][::every]
+            panel.set_xticks(np.asarray(place)[::every], ticks, rotation=90, fontsize=7)
+    grid[0, 0].set_ylabel("frequency (Hz)")
+    same = list(grid[0, : len(levels)])
+    figure.colorbar(images[0], ax=same, label="dB re 1 m/s²/N", pad=0.01)
+    if measured is not None:
+        figure.colorbar(images[2], ax=grid[0, 2], label="dB", pad=0.01)
+    return figure
+
+
+def _decibel(frf: np.ndarray) -> np.ndarray:
+    return 20 * np.log10(np.maximum(np.abs(frf), np.finfo(float).tiny))
+
+
+def _edges(centres: np.ndarray) -> np.ndarray:
+    """Cell borders (n + 1,) halfway between increasing centres (n,)."""
+    if len(centres) == 1:
+        return centres[0] + np.array([-0.5, 0.5])
+    inner = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate([[2 * centres[0] - inner[0]], inner, [2 * centres[-1] - inner[-1]]])

@@ -7,19 +7,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planner.report.agreement import FrfSimilarity, HeldOutChange, SimilarityChange
+from planner.report.agreement import FrfSimilarity, SimilarityChange
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
-from planner.report.plot_files import Pictures
-from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
+from planner.report.pictures import Pictures, entitle
+from planner.report.text import remarks, table, with_sd
 
 if TYPE_CHECKING:
     from planner.dataset.dataset import Dataset
     from planner.dynamics.simulation import Simulation
     from planner.fit.held_out import JudgedIdentification
     from planner.fit.result import Identification
+    from planner.measurement.agreement import Similarity
+    from planner.report.frf_plots import ComparedFrfs
     from planner.robot.robot import Robot
 
 
@@ -80,6 +83,36 @@ class IdentificationBasis:
         """The robot with everything that was fitted, as stated."""
         return self.judged.final.structure.simulation.robot
 
+    def compared(self, band_hz: tuple[float, float]) -> "ComparedFrfs | None":
+        """FRFs before and after it, pose by pose; None where the tool was not measured."""
+        from planner.measurement.agreement import MODEL_ERROR, MOST_LINES
+        from planner.measurement.measured_frfs import stack
+        from planner.report.frf_plots import GIVEN, IDENTIFIED, ComparedFrfs, Side
+
+        judged, (aside, trial) = self.judged, (self.judged.held_out, self.judged.trial)
+        tools = ((i, frf.of_tool) for i, frf in enumerate(self.dataset.frfs))
+        frfs = {i: frf for i, frf in tools if frf is not None}
+        if not frfs:
+            return None
+        seen = stack(list(frfs.values()), band_hz, MOST_LINES, MODEL_ERROR)
+        fits = [trial if i in aside and trial else judged.final for i in frfs]
+        before, after = (
+            np.array([s.accelerance(self.dataset.q[i], hz)[0]
+                      for s, i, hz in zip(of_pose, frfs, seen.frequency_hz, strict=True)])
+            for of_pose in ([self.nominal for _ in frfs], [f.identified.simulation for f in fits])
+        )  # fmt: skip
+        sides = (
+            Side("before", "as stated", GIVEN, before),
+            Side("after", "identified", IDENTIFIED, after),
+        )
+        return ComparedFrfs(
+            tuple(self.dataset.poses[i] for i in frfs),
+            seen.frequency_hz,
+            np.where(seen.used, seen.accelerance, np.nan),
+            sides,
+            tuple("held out: identified without it" if i in aside else "used" for i in frfs),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class IdentificationReport(Answer):
@@ -90,7 +123,7 @@ class IdentificationReport(Answer):
 
     parameters: tuple[IdentifiedSpring, ...]
     fit: SimilarityChange
-    held_out: HeldOutChange
+    held_out: SimilarityChange
     undetermined: tuple[str, ...]
     misfit: float
     misfit_by_pose: Mapping[str, float]
@@ -119,32 +152,18 @@ class IdentificationReport(Answer):
         """The same once FRFs before and after are drawn, where that is wanted."""
         if not pictures.wanted or self.basis is None:
             return self
-        from planner.report.identification_plots import (
-            ShownPose,
-            direct_figure,
-            identification_figures,
-        )
-
-        dataset, judged = self.basis.dataset, self.basis.judged
-        poses = []
-        for i, name in enumerate(dataset.poses):
-            aside = i in judged.held_out
-            shown = judged.trial if aside and judged.trial else judged.final
-            frf = dataset.frfs[i].of_tool
-            if frf is not None:  # pictures show the tool's FRFs
-                poses.append(ShownPose(name, dataset.q[i], frf, shown.identified.simulation, aside))
-        mark = SIMULATED_TITLE if self.simulated else ""
-        nominal = self.basis.nominal
-        figures = identification_figures(poses, nominal, self.band_hz, mark)
-        name = nominal.robot.name
-        note = f"{mark}Those held out are shown with what was identified without them."
-        more = None
-        if poses and pictures.rrd is not None:
+        compared, more = self.basis.compared(self.band_hz), None
+        name = self.basis.nominal.robot.name
+        if compared is None:
+            return self.with_figures(pictures, dict, name)
+        if pictures.rrd is not None:
             from planner.report.rerun.figures import one_by_one
 
-            each = (direct_figure(pose, nominal, self.band_hz, mark) for pose in poses)
+            each = (entitle(f, name, self.simulated) for f in compared.overlays())
             more = one_by_one("pose", "FRFs, pose by pose", each)
-        return replace(self, **pictures.write(figures, name, note, more))
+        first = sorted(range(len(compared.roles)), key=lambda k: compared.roles[k] == "used")
+        note = "Those held out are shown with what was identified without them."
+        return self.with_figures(pictures, lambda: compared.figures(first), name, note, more)
 
     def write(self, robot_toml: Path) -> "IdentificationReport":
         """Write the identified robot, read it again, and say how well that one agrees.
@@ -182,11 +201,11 @@ class IdentificationReport(Answer):
         if self.undetermined:
             parts.append(Text("Not determined by these recordings:"))
             parts += [Text(f"  {text}") for text in self.undetermined]
-        parts += [self._agreement(), *remarks(self.remarks), *drawn(self.plots, self.rrd)]
+        parts += [self._agreement(), *remarks(self.remarks)]
         if self.out and isinstance(self.written, FrfSimilarity):
             frac = 100 * (self.written.frac or math.nan)
             parts.append(Text(f"Written: {self.out} (FRAC {frac:.2f} %), {self.urdf}"))
-        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+        return Group(*parts, *self.end)
 
     def _agreement(self) -> RenderableType:
         aside = self.held_out
@@ -195,8 +214,8 @@ class IdentificationReport(Answer):
             f"noise; {self.seconds:.1f} s)",
             *("poses", "FRAC before", "FRAC after", "Frobenius before", "Frobenius after"),
         )
-        rows: list[tuple[str, SimilarityChange]] = [("all", self.fit)]
-        if aside.poses:
+        rows = [("all", self.fit)]
+        if isinstance(aside.poses, tuple) and aside.poses:
             rows.append((f"held out: {', '.join(aside.poses)}", aside))
         for name, of in rows:
             values = (of.before.frac, of.frac, of.before.frobenius, of.frobenius)
@@ -210,17 +229,11 @@ def identification_report(
     """Of an identification that was judged at poses held out."""
     dataset, judged = basis.dataset, basis.judged
     final, names = judged.final.identified, dataset.poses
-    after, aside = FrfSimilarity.of(judged.after), FrfSimilarity.of(judged.held_out_after)
-    held_out = HeldOutChange(
-        aside.frac,
-        aside.frobenius,
-        FrfSimilarity.of(judged.held_out_before),
-        tuple(names[i] for i in judged.held_out),
-    )
+    aside = tuple(names[i] for i in judged.held_out)
     return IdentificationReport(
         parameters=identified_springs(basis.fitted, final),
-        fit=SimilarityChange(after.frac, after.frobenius, FrfSimilarity.of(judged.before)),
-        held_out=held_out,
+        fit=_change(judged.after, judged.before),
+        held_out=_change(judged.held_out_after, judged.held_out_before, aside),
         undetermined=tuple(direction.text for direction in final.undetermined),
         misfit=final.misfit,
         misfit_by_pose=dict(zip(names, final.misfit_by_pose, strict=True)),
@@ -232,6 +245,17 @@ def identification_report(
         inertias=inertias,
         added=judged.final.structure.added,
         basis=basis,
+    )
+
+
+def _change(
+    after: "Similarity | None",
+    before: "Similarity | None",
+    poses: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET,
+) -> SimilarityChange:
+    found = FrfSimilarity.of(after)
+    return SimilarityChange(
+        found.frac, found.frobenius, before=FrfSimilarity.of(before), poses=poses
     )
 
 

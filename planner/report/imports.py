@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planner.campaign.events import Amplitude, MeasuredMode, Question
+from planner.campaign.events import Amplitude, Question
 from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.modes import ModeAnswer
@@ -38,26 +38,9 @@ def _cells(mode: ModeAnswer, other: str) -> tuple[str, ...]:
     )
 
 
-@dataclass(frozen=True)
-class AskedOfPose(Answer):
-    """A question of hits that are held at `pose`, as the log keeps it."""
-
-    pose: str
-    question: Question
-
-    @classmethod
-    def of(cls, question: Question | None, pose: str) -> "AskedOfPose | None":
-        """None where nothing is asked."""
-        return None if question is None else cls(pose, question)
-
-    def to_json(self) -> dict[str, Any]:
-        """The pose, then the question's own keys."""
-        return {"pose": self.pose, **plain(self.question)}
-
-    @property
-    def text(self) -> str:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """The sentence."""
-        return self.question.text
+def asked_of(pose: str, question: Question | None) -> dict[str, Any] | None:
+    """In JSON: the pose whose hits are held, then the question's own keys."""
+    return None if question is None else {"pose": pose, **plain(question)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +59,7 @@ class PoseImport(Answer):
     amplitude: Amplitude | None
     simulated: bool
     hit_errors: tuple[HitErrorEstimate, ...] = ()
-    question: "AskedOfPose | None" = None
+    question: Question | None = None
     expected: tuple[ExpectedMode, ...] = ()  # of held hits at the pose that is stated
 
     @classmethod
@@ -98,9 +81,13 @@ class PoseImport(Answer):
             amplitude=measurement.amplitude if measurement else None,
             simulated=bool(measurement and measurement.simulated),
             hit_errors=report.hit_errors(model),
-            question=AskedOfPose.of(report.question, report.pose),
+            question=report.question,
             expected=_expected(report) if report.question else (),
         )
+
+    def to_json(self) -> dict[str, Any]:
+        """With the pose of the question."""
+        return super().to_json() | {"question": asked_of(self.pose, self.question)}
 
     def parts(self) -> list[RenderableType]:
         """Modes beside what was expected, remarks, and the change of the model, if there is any."""
@@ -196,8 +183,8 @@ class ImportedPoses(Answer):
 
     def to_be_answered(self, directory: Path) -> list[str]:
         """What is asked of held hits, with the commands that answer it, a line each."""
-        asked = [pose.question for pose in self.poses if pose.question is not None]
-        return [how_to_answer(directory, one.pose, one.question) for one in asked]
+        held = ((pose.pose, pose.question) for pose in self.poses)
+        return [how_to_answer(directory, pose, asked) for pose, asked in held if asked]
 
     def text(self) -> Group:
         """Pose by pose."""
@@ -224,12 +211,6 @@ def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
     )
 
 
-def _answer(
-    mode: MeasuredMode, label: int | None, sure: float | None, expected: ExpectedMode | None
-) -> ModeAnswer:
-    return ModeAnswer.of(mode, label=label, label_probability=sure, expected=expected)
-
-
 def _expected(report: "ImportReport") -> tuple[ExpectedMode, ...]:
     """What the model before expected of the modes at the pose, in their order."""
     if report.measurement is None:
@@ -250,8 +231,8 @@ def _labelled_modes(report: "ImportReport") -> tuple[ModeAnswer, ...]:
     found = []
     for mode in report.measurement.modes:
         k = labels.get(mode.frequency_hz)
-        if k is not None:
-            found.append(_answer(mode, k + 1, float(sure[k]), expected[k]))
-        elif mode.likely:
-            found.append(_answer(mode, None, None, None))
+        known = (None, None, None) if k is None else (k + 1, float(sure[k]), expected[k])
+        if k is not None or mode.likely:
+            said = dict(zip(("label", "label_probability", "expected"), known, strict=True))
+            found.append(ModeAnswer.of(mode, **said))
     return tuple(found)

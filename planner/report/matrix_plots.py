@@ -9,9 +9,15 @@ from matplotlib.lines import Line2D
 from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_modes import MatrixModes
 from planner.recording.geometry import Geometry
-from planner.report.frf_plots import MEASURED, MODEL
-from planner.report.modal_plots import mac_figure, stabilisation_figure
-from planner.report.plot_marks import number_modes, panels
+from planner.report.modal_plots import (
+    FRFS,
+    SPECTRA,
+    auto_mac_figure,
+    poles_by_stability,
+    singular_values,
+    stabilisation_figure,
+)
+from planner.report.plot_marks import MEASURED, MODEL, empty, magnitude, number_modes, panels
 from planner.report.shape_motion import motions, moved
 
 MOST_SINGULAR = 4  # curves of the mode indicator
@@ -23,26 +29,26 @@ AHEAD, BESIDE = "tab:red", "tab:blue"
 
 
 def matrix_figures(
-    matrix: FrfMatrix, found: MatrixModes, geometry: Geometry | None, name: str
+    matrix: FrfMatrix, found: MatrixModes, geometry: Geometry | None
 ) -> dict[str, Figure]:
     """Every picture by its name."""
-    mark = "SIMULATED recordings · " if matrix.simulated else ""
-    end = f" · {name}"
+    poles = poles_by_stability(found.found.diagram, found.found.data.rate_1_s)
     figures = {
         "stabilisation": stabilisation_figure(
-            found.found, found, f"{mark}Stabilisation diagram of {matrix.count} FRFs{end}",
-            scaled=matrix.scaled, singular=_singular(matrix, found),
+            found.found.data.frequency_hz, _singular(matrix, found), found,
+            f"Stabilisation diagram of {matrix.count} FRFs",
+            f"singular values of {FRFS if matrix.scaled else SPECTRA}", poles,
         ),
-        "mac": mac_figure(found, f"{mark}AutoMAC{end}"),
-        "complexity": complexity_figure(found, f"{mark}Mode shapes in the complex plane{end}"),
+        "mac": auto_mac_figure(found),
+        "complexity": complexity_figure(found, "Mode shapes in the complex plane"),
     }  # fmt: skip
     if matrix.driving:
-        figures["driving_points"] = driving_figure(matrix, found, f"{mark}Driving points{end}")
+        figures["driving_points"] = driving_figure(matrix, found, "Driving points")
     if geometry is not None:
-        figures["geometry"] = geometry_figure(matrix, geometry, f"{mark}Points{end}")
-        figures["shapes"] = shapes_figure(found, geometry, f"{mark}Mode shapes{end}")
+        figures["geometry"] = geometry_figure(matrix, geometry, "Points")
+        figures["shapes"] = shapes_figure(found, geometry, "Mode shapes")
     else:
-        figures["shapes"] = bars_figure(found, f"{mark}Mode shapes{end}")
+        figures["shapes"] = bars_figure(found, "Mode shapes")
     return figures
 
 
@@ -50,20 +56,14 @@ def _singular(matrix: FrfMatrix, found: MatrixModes) -> np.ndarray:
     """(k, F) singular values of the complete rows, the few largest."""
     lines = np.isin(matrix.frequency_hz, found.found.data.frequency_hz)
     table = matrix.accelerance[..., lines]
-    table = np.where(np.isfinite(table), table, 0.0)
-    values = np.linalg.svd(np.moveaxis(table, -1, 0), compute_uv=False).T
-    return values[:MOST_SINGULAR]
+    return singular_values(np.where(np.isfinite(table), table, 0.0))[:MOST_SINGULAR]
 
 
 def _grid(count: int, title: str, size: float, **options: Any) -> tuple[Figure, list[Any]]:
     """A figure of so many equal panels, side by side."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
     columns = min(count, int(np.ceil(np.sqrt(1.6 * count))))
     rows = -(-count // columns)
-    figure = Figure(figsize=(size * columns + 0.6, size * rows + 0.9), layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=11)
+    figure = empty((size * columns + 0.6, size * rows + 0.9), title, 11)
     return figure, [figure.add_subplot(rows, columns, k + 1, **options) for k in range(count)]
 
 
@@ -101,10 +101,9 @@ def driving_figure(matrix: FrfMatrix, found: MatrixModes, title: str = "") -> Fi
         for e, (o, i) in enumerate(zip(found.found.rows, found.found.columns, strict=True))
     }
     for panel, (o, i) in zip(grid[:, 0], pairs, strict=True):
-        size = np.abs(matrix.accelerance[o, i])
-        panel.semilogy(matrix.frequency_hz, size, color=MEASURED, lw=1.0, label="measured")
-        fitted = np.abs(found.found.fit.fitted[places[o, i]])
-        panel.semilogy(data.frequency_hz, fitted, color=MODEL, lw=1.0, label="fit")
+        measured, fitted = matrix.accelerance[o, i], found.found.fit.fitted[places[o, i]]
+        magnitude(panel, matrix.frequency_hz, measured, color=MEASURED, lw=1.0, label="measured")
+        magnitude(panel, data.frequency_hz, fitted, color=MODEL, lw=1.0, label="fit")
         panel.set_xlim(data.frequency_hz[0], data.frequency_hz[-1])
         panel.grid(True, alpha=0.25)
         panel.set_ylabel("|H| (m/s²/N)" if matrix.scaled else "|H|", fontsize=8)

@@ -1,6 +1,6 @@
 """From recordings to the answer of `modes`: one pose, any points, unlabelled FRFs, responses."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,17 +30,15 @@ from planner.recording.points import ANYWHERE, PointNames
 from planner.recording.read import READERS, read
 from planner.recording.records import Channel, TimeRecord
 from planner.report.modes import ModeAnswer, ModesReport, named
-from planner.report.plot_files import Pictures
-from planner.report.text import SIMULATED_TITLE
+from planner.report.pictures import Pictures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from planner.report.rerun.figures import More
-
 ESTIMATORS = ("h1", "h2", "hv")
 LONGEST_NAME = 40  # characters of a file's name in a title
 NO_PICTURES = Pictures()
+MOST_SINGULAR = 3  # curves of singular values of responses
 RESPONSES = ("acceleration", "velocity", "displacement", "voltage", "unknown")
 UNSCALED = (
     "UNSCALED: modes are from responses alone; their shapes have no scale and give no FRFs or "
@@ -89,19 +87,10 @@ def _of_no_robot(source: Source) -> Source:
     return replace(source, stated=replace(source.stated, names=PointNames()))
 
 
-def _draw(
-    pictures: Pictures,
-    files: Sequence[str],
-    figures: Callable[[str], "dict[str, Figure]"],
-    note: str = "",
-    more: "More | None" = None,
-) -> dict[str, Any]:
-    """Draw what is wanted under the files' name; `note` and `more` as `Pictures.write` has them."""
-    if not pictures.wanted:
-        return {}
+def _titled(files: Sequence[str]) -> str:
+    """The files' name in titles."""
     others = f" and {len(files) - 1} more" if len(files) > 1 else ""
-    name = f"{Path(files[0]).name[-LONGEST_NAME:]}{others}"
-    return pictures.write(figures(name), name, note, more)
+    return f"{Path(files[0]).name[-LONGEST_NAME:]}{others}"
 
 
 def _of_model(modal: ModalModel, **others: Any) -> ModesReport:
@@ -139,8 +128,7 @@ def modal_report(
     simulated = any(v.simulated for v in measured.verdicts)
     accepted = tuple(v.source.name for v in measured.verdicts if v.accepted)
     found = identification(measured.frf, band) if pictures.wanted else None
-    drawn = _draw_pose(pictures, measured.frf, found, measured.modal, accepted, simulated)
-    return _of_model(
+    answer = _of_model(
         measured.modal,
         refused=tuple(refused),
         accepted=accepted,
@@ -149,23 +137,21 @@ def modal_report(
         remarks=(*told_of_files(measured.verdicts), *measured.remarks),
         amplitude=from_homogeneity(measured.homogeneity),
         simulated=simulated,
-        **drawn,
     )
+    return _drawn(answer, pictures, measured.frf, found, measured.modal)
 
 
-def _draw_pose(
-    pictures: Pictures, frf: Frf | None, found: PoleIdentification | None, modal: ModalModel,
-    accepted: Sequence[str], simulated: bool,
-) -> dict[str, Any]:  # fmt: skip
-    if found is None:
-        return {}
+def _drawn(
+    answer: ModesReport, pictures: Pictures, frf: Frf | None, found: PoleIdentification | None,
+    modal: ModalModel,
+) -> ModesReport:  # fmt: skip
+    if found is None or not isinstance(answer.accepted, tuple):
+        return answer
+    from planner.report.modal_plots import modal_figures
 
-    def figures(name: str) -> "dict[str, Figure]":
-        from planner.report.modal_plots import modal_figures
-
-        return modal_figures(frf, found, modal, name, simulated)
-
-    return _draw(pictures, accepted, figures, SIMULATED_TITLE if simulated else "")
+    return answer.with_figures(
+        pictures, lambda: modal_figures(frf, found, modal), _titled(answer.accepted)
+    )
 
 
 def _by_channel(
@@ -183,9 +169,8 @@ def _by_channel(
     if not records:
         raise InputError(f"{sources[0].name} holds no time histories; leave out --force.")
     modal, found = analyse_record(records[0], force_channel=force, band_hz=band_hz)
-    accepted, simulated = (sources[0].name,), records[0].simulated
-    drawn = _draw_pose(pictures, None, found, modal, accepted, simulated)
-    return _of_model(modal, accepted=accepted, simulated=simulated, **drawn)
+    answer = _of_model(modal, accepted=(sources[0].name,), simulated=records[0].simulated)
+    return _drawn(answer, pictures, None, found, modal)
 
 
 def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -> ModesReport:
@@ -198,20 +183,25 @@ def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -
     record = joined(given.records)
     modal = modes_from_transfer_functions(record, quantity, given.band_hz)
 
-    def figures(name: str) -> "dict[str, Figure]":
-        from planner.report.modal_plots import cmif_figure, mac_figure
+    name = _titled((record.source.name, *given.accepted[1:]))
 
-        mark = SIMULATED_TITLE if record.simulated else ""
+    def figures() -> "dict[str, Figure]":
+        from planner.report.modal_plots import auto_mac_figure, stabilisation_figure
+
+        low, high = modal.band_hz
+        hz = record.frequency_hz
+        lines = (hz >= low) & (hz <= high)
+        size = np.linalg.norm(record.values[:, lines], axis=0)[None]
+        what = "singular value of the FRFs (as in the file)"
         return {
-            "cmif": cmif_figure(record.frequency_hz, record.values, modal, f"{mark}CMIF · {name}"),
-            "mac": mac_figure(modal, f"{mark}AutoMAC · {name}"),
+            "cmif": stabilisation_figure(hz[lines], size, modal, "CMIF", what),
+            "mac": auto_mac_figure(modal),
         }
 
-    files = (record.source.name, *given.accepted[1:])
     return _of_model(
         modal, fit_error=None, accepted=given.accepted, refused=given.refused,
-        simulated=record.simulated, **_draw(pictures, files, figures),
-    )  # fmt: skip
+        simulated=record.simulated,
+    ).with_figures(pictures, figures, name)  # fmt: skip
 
 
 def matrix_report(
@@ -236,24 +226,7 @@ def matrix_report(
         paths = export(Exported(matrix, found, geometry, real), files_to.absolute())
         exports = tuple(map(str, paths))
 
-    def figures(name: str) -> "dict[str, Figure]":
-        from planner.report.matrix_plots import matrix_figures
-
-        return matrix_figures(matrix, found, geometry, name)
-
-    mark, more = SIMULATED_TITLE if matrix.simulated else "", None
-    if geometry is not None and pictures.rrd is not None:
-        from planner.report.rerun.modes import moving_shapes
-
-        more = moving_shapes(found, geometry)
-    note = f"{mark}On the timeline shapes move, exaggerated; grey: at rest." if more else mark
-    drawn = _draw(pictures, [file.name for file in given.files], figures, note, more)
-    if geometry is not None and pictures.folder is not None:
-        from planner.report.shape_motion import animate
-
-        moving = animate(found, geometry, pictures.folder.absolute(), mark)
-        drawn["plots"] = [*drawn["plots"], *map(str, moving)]
-    return ModesReport(
+    answer = ModesReport(
         modes=tuple(map(ModeAnswer.of, found.modes)),
         dofs=tuple(named(dof) for dof in found.dofs),
         responses=tuple(named(dof) for dof in matrix.responses),
@@ -267,8 +240,26 @@ def matrix_report(
         remarks=(*given.remarks, *found.remarks),
         simulated=matrix.simulated,
         exports=exports,
-        **drawn,
     )
+    name, note, more = _titled([file.name for file in given.files]), "", None
+    if geometry is not None and pictures.rrd is not None:
+        from planner.report.rerun.modes import moving_shapes
+
+        more = moving_shapes(found, geometry)
+        note = "On the timeline shapes move, exaggerated; grey: at rest."
+
+    def figures() -> "dict[str, Figure]":
+        from planner.report.matrix_plots import matrix_figures
+
+        return matrix_figures(matrix, found, geometry)
+
+    answer = answer.with_figures(pictures, figures, name, note, more)
+    if geometry is not None and pictures.folder is not None:
+        from planner.report.shape_motion import animate
+
+        moving = animate(found, geometry, pictures.folder.absolute(), matrix.simulated)
+        answer = replace(answer, plots=(*answer.plots, *map(str, moving)))
+    return answer
 
 
 def operating_report(
@@ -291,16 +282,30 @@ def operating_report(
     if found.tones_hz:
         tones = ", ".join(f"{hz:.4g}" for hz in found.tones_hz)
         told.append(f"Tones, not modes, at {tones} Hz: what turns or hums there was left out.")
-    mark = SIMULATED_TITLE if record.simulated else ""
+    name = _titled([sources[0].path.name])
 
-    def figures(name: str) -> "dict[str, Figure]":
-        from planner.report.modal_plots import mac_figure, operating_figure
+    def figures() -> "dict[str, Figure]":
+        from planner.report.modal_plots import (
+            auto_mac_figure,
+            poles_by_stability,
+            singular_values,
+            stabilisation_figure,
+        )
 
-        said = f"{mark}Stabilisation diagram, responses alone (unscaled) · {name}"
-        mac = mac_figure(found, f"{mark}AutoMAC, unscaled · {name}")
-        return {"stabilisation": operating_figure(found, said), "mac": mac}
+        hz, (low, high) = found.spectrum_hz, found.band_hz
+        inside = (hz >= low) & (hz <= high)
+        power = singular_values(found.spectrum[..., inside])[:MOST_SINGULAR]
+        said = "Stabilisation diagram, responses alone (unscaled)"
+        what = "cross power of the responses (each of unit variance)"
+        poles = poles_by_stability(found.diagram)
+        return {
+            "stabilisation": stabilisation_figure(
+                hz[inside], power, found, said, what, poles, "singular value"
+            ),
+            "mac": auto_mac_figure(found, "AutoMAC, unscaled"),
+        }
 
-    note = f"{mark}Responses alone give no scale: neither FRFs nor modal masses follow."
+    note = "Responses alone give no scale: neither FRFs nor modal masses follow."
     return ModesReport(
         modes=tuple(ModeAnswer.of(m, modal_mass_kg=UNSET, scatter_hz=UNSET) for m in found.modes),
         dofs=tuple(named(dof.positive) for dof in dofs),
@@ -310,8 +315,7 @@ def operating_report(
         accepted=(sources[0].name,),
         remarks=tuple(told),
         simulated=record.simulated,
-        **_draw(pictures, [sources[0].path.name], figures, note),
-    )
+    ).with_figures(pictures, figures, name, note)
 
 
 def _responses(path: Path) -> tuple[TimeRecord, list[Channel]]:

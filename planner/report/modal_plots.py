@@ -1,5 +1,6 @@
 """Pictures of a modal analysis: stabilisation diagram, FRFs and their fit, coherence, AutoMAC."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,156 +14,115 @@ from planner.frf.frf import Frf
 from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.mac import mac_matrix
 from planner.modal.matrix_modes import MatrixModes
-from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel
 from planner.modal.operating import OperatingModes
-from planner.modal.stabilisation import stable
-from planner.report.frf_plots import AXES, MEASURED, MODEL
+from planner.modal.stabilisation import Diagram, stable
 from planner.report.plot_marks import (
+    AXES,
     COLUMNS,
+    MEASURED,
     MODE,
+    MODEL,
     USABLE,
     label_ends,
     label_modes,
+    magnitude,
     mark_band,
     number_modes,
     panels,
+    phase,
+    plain_text,
+    write_values,
 )
-from planner.report.plot_text import plain_text, write_values
 
 SINGULAR = ("black", "0.4", "0.65")
 STABLE = {"marker": "o", "color": "tab:green", "ms": 3.5, "ls": ""}
 UNSTABLE = {"marker": "x", "color": "tab:orange", "ms": 3.5, "mew": 0.7, "ls": ""}
-SPREAD = {"color": "0.6", "alpha": 0.6, "lw": 0}
 POINTS = {"color": MEASURED, "lw": 0.6, "marker": ".", "ms": 2.5}
 TONE = "tab:purple"
 FITTED = {"color": MODEL, "lw": 1.2}
+# What singular values are of: decays' spectra have a size that means nothing.
+FRFS, SPECTRA = "the FRF matrix (m/s²/N)", "the decays' spectra (equal rms)"
 
 
 def modal_figures(
-    frf: Frf | None, found: PoleIdentification, modal: ModalModel, name: str, simulated: bool
+    frf: Frf | None, found: PoleIdentification, modal: ModalModel
 ) -> dict[str, Figure]:
     """Every picture of one pose by its name; without an FRF only those that need none."""
-    mark = "SIMULATED recordings · " if simulated else ""
-    end = f" · {name}"
-    figures = {
-        "stabilisation": stabilisation_figure(
-            found, modal, f"{mark}Stabilisation diagram{end}", scaled=frf is not None
-        )
-    }
+    singular = singular_values(found.data.response)
+    what = f"singular values of {FRFS if frf is not None else SPECTRA}"
+    title = "Stabilisation diagram"
+    hz, poles = found.data.frequency_hz, poles_by_stability(found.diagram, found.data.rate_1_s)
+    figures = {"stabilisation": stabilisation_figure(hz, singular, modal, title, what, poles)}
     if frf is not None:
-        figures["frf"] = matrix_figure(frf, found, modal, f"{mark}FRFs and their fit{end}")
-        figures["coherence"] = coherence_figure(frf, modal, f"{mark}Coherence{end}")
-    figures["mac"] = mac_figure(modal, f"{mark}AutoMAC{end}")
+        figures["frf"] = matrix_figure(frf, found, modal, "FRFs and their fit")
+        figures["coherence"] = coherence_figure(frf, modal, "Coherence")
+    figures["mac"] = auto_mac_figure(modal)
     return figures
 
 
+def singular_values(response: np.ndarray) -> np.ndarray:
+    """(k, F), decreasing, of a matrix (r, c, F)."""
+    return np.linalg.svd(np.moveaxis(response, -1, 0), compute_uv=False).T
+
+
 def stabilisation_figure(
-    found: PoleIdentification | MatrixPoles,
-    modal: ModalModel | MatrixModes,
-    title: str = "",
-    scaled: bool = True,
-    singular: np.ndarray | None = None,
+    frequency_hz: np.ndarray,
+    singular: np.ndarray,
+    modal: ModalModel | MatrixModes | OperatingModes,
+    title: str,
+    what: str,
+    poles: tuple[np.ndarray, np.ndarray] | None = None,
+    curve: str = "CMIF",
 ) -> Figure:
-    """Poles of all model orders (right axis) over the singular values of the responses (left).
+    """Poles of all model orders (right axis) over singular values (k, F) of responses (left).
 
     The singular values of the FRF matrix over frequency are the complex mode indicator function
-    (CMIF; Shih et al., Mech. Syst. Signal Process. 2, 1988). `scaled` is False where the
-    responses are spectra of free decays, whose size means nothing, or not in SI units. `singular`
-    (k, F), decreasing, where it is known already.
+    (CMIF; Shih et al., Mech. Syst. Signal Process. 2, 1988). `what` is their axis' label, `poles`
+    are as of `poles_by_stability`. Tones among operating modes are marked.
     """
     figure, grid = panels((12.0, 7.0 if len(modal.modes) <= COLUMNS else 10.0), title)
-    panel, data = grid[0, 0], found.data
-    if singular is None:
-        singular = np.linalg.svd(np.moveaxis(data.response, -1, 0), compute_uv=False).T
+    panel = grid[0, 0]
     for k, values in enumerate(singular):
         colour = SINGULAR[min(k, len(SINGULAR) - 1)]
-        panel.semilogy(data.frequency_hz, values, color=colour, lw=1.1, label=f"CMIF {k + 1}")
-    panel.set_xlim(data.frequency_hz[0], data.frequency_hz[-1])
+        panel.semilogy(frequency_hz, values, color=colour, lw=1.1, label=f"{curve} {k + 1}")
+    panel.set_xlim(frequency_hz[0], frequency_hz[-1])
     panel.set_xlabel("frequency (Hz)")
-    kind = "the FRF matrix (m/s²/N)" if scaled else "the decays' spectra (equal rms)"
-    panel.set_ylabel(f"singular values of {kind}")
+    panel.set_ylabel(what)
     panel.grid(True, alpha=0.25)
-    orders = panel.twinx()
-    stays, moves = poles_by_stability(found)
-    orders.plot(*moves, **UNSTABLE, label="unstable pole")
-    orders.plot(*stays, **STABLE, label="stable pole")
-    orders.set_ylim(0, found.order + 1)
-    orders.set_ylabel("model order")
-    orders.yaxis.set_major_locator(MaxNLocator(integer=True))
+    for k, tone in enumerate(getattr(modal, "tones_hz", ())):
+        panel.axvline(tone, color=TONE, ls="--", lw=1.0, label=None if k else "tone, no mode")
+    handles: list[Any] = panel.get_legend_handles_labels()[0]
+    if poles is not None:
+        orders = panel.twinx()
+        handles += orders.plot(*poles[0], **STABLE, label="stable pole")
+        handles += orders.plot(*poles[1], **UNSTABLE, label="unstable pole")
+        orders.set_ylim(0, max((p[1].max() for p in poles if p.size), default=0) + 1)
+        orders.set_ylabel("model order")
+        orders.yaxis.set_major_locator(MaxNLocator(integer=True))
     label_modes(panel, modal)
-    handles: list[Any] = [*panel.get_lines()[: len(singular)], *orders.get_lines()]
-    handles.append(Line2D([], [], color=MODE, label="mode"))
-    for beyond in (
-        (panel.get_xlim()[0], modal.band_hz[0]),
-        (modal.band_hz[1], panel.get_xlim()[1]),
-    ):
-        if beyond[0] < beyond[1]:
-            panel.axvspan(*beyond, color="0.92", lw=0, zorder=0)
-    handles.append(Patch(color="0.92", label="outside the band"))
+    handles += [Line2D([], [], color=MODE, label="mode")]
+    low, high = panel.get_xlim()
+    beyond = [(a, b) for a, b in ((low, modal.band_hz[0]), (modal.band_hz[1], high)) if a < b]
+    for ends in beyond:
+        panel.axvspan(*ends, color="0.92", lw=0, zorder=0)
+    handles += [Patch(color="0.92", label="outside the band")] if beyond else []
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9)
     return figure
 
 
-def operating_figure(found: OperatingModes, title: str = "") -> Figure:
-    """Poles of all orders over the singular values of the responses' cross spectra."""
-    figure, grid = panels((12.0, 7.0 if len(found.modes) <= COLUMNS else 10.0), title)
-    panel = grid[0, 0]
-    values = np.linalg.svd(np.moveaxis(found.spectrum, -1, 0), compute_uv=False).T
-    inside = (found.spectrum_hz >= found.band_hz[0]) & (found.spectrum_hz <= found.band_hz[1])
-    for k, one in enumerate(values[: len(SINGULAR)]):
-        label = f"singular value {k + 1}"
-        panel.semilogy(found.spectrum_hz[inside], one[inside], color=SINGULAR[k], label=label)
-    panel.set_xlim(*found.band_hz)
-    panel.set_xlabel("frequency (Hz)")
-    panel.set_ylabel("cross power of the responses (each of unit variance)")
-    orders = panel.twinx()
-    kept = {complex(p) for line in stable(found.diagram) for p in line.poles}
-    for is_stable, style, label in ((False, UNSTABLE, "unstable"), (True, STABLE, "stable")):
-        points = [
-            (abs(pole) / (2 * np.pi), entry.order)
-            for entry in found.diagram.sets
-            for pole in entry.poles
-            if (complex(pole) in kept) == is_stable
-        ]
-        x, y = np.array(points, float).reshape(-1, 2).T
-        orders.plot(x, y, **style, label=f"{label} pole")
-    orders.set_ylabel("model order")
-    for k, tone in enumerate(found.tones_hz):
-        panel.axvline(tone, color=TONE, ls="--", lw=1.0, label=None if k else "tone, no mode")
-    label_modes(panel, found)
-    handles = [*panel.get_legend_handles_labels()[0], *orders.get_legend_handles_labels()[0]]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=8)
-    return figure
+def poles_by_stability(diagram: Diagram, rate_1_s: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Frequency (Hz) and order, (2, k), of the poles on stable lines, and of all others.
 
-
-def cmif_figure(
-    frequency_hz: np.ndarray, values: np.ndarray, modal: ModalModel, title: str = ""
-) -> Figure:
-    """CMIF of FRFs (k, F) of one hit point, of unknown scale, with the modes found."""
-    figure, grid = panels((14.0, 7.0 if len(modal.modes) <= COLUMNS else 10.0), title)
-    panel = grid[0, 0]
-    low, high = modal.band_hz
-    lines = (frequency_hz >= low) & (frequency_hz <= high)
-    panel.semilogy(frequency_hz[lines], np.linalg.norm(values[:, lines], axis=0), color="black")
-    panel.set_xlim(low, high)
-    panel.set_xlabel("frequency (Hz)")
-    panel.set_ylabel("singular value of the FRFs (as in the file)")
-    panel.grid(True, alpha=0.25)
-    label_modes(panel, modal)
-    return figure
-
-
-def poles_by_stability(found: PoleIdentification | MatrixPoles) -> tuple[np.ndarray, np.ndarray]:
-    """Frequency (Hz) and order, (2, k), of the poles on stable lines, and of all others."""
-    lines = stable(found.diagram)
+    A pole is drawn where it would lie without the records' exponential window of that rate.
+    """
+    lines = stable(diagram)
     kept = {(int(o), complex(p)) for x in lines for o, p in zip(x.orders, x.poles, strict=True)}
     points: tuple[list, list] = ([], [])
-    for entry in found.diagram.sets:
+    for entry in diagram.sets:
         for pole in entry.poles:
-            # The line of a pole is where it would lie without the records' exponential window.
-            frequency = abs(pole + found.data.rate_1_s) / (2 * np.pi)
+            frequency = abs(pole + rate_1_s) / (2 * np.pi)
             points[(entry.order, complex(pole)) not in kept].append((frequency, entry.order))
     stays, moves = (np.array(p, float).reshape(-1, 2).T for p in points)
     return stays, moves
@@ -181,22 +141,22 @@ def matrix_figure(
     figure, grid = panels((13.0, 10.0), title, 6, len(columns), gridspec_kw=layout)
     fitted = model(found.data, found.fit.refined)
     for i, k in np.ndindex(3, len(columns)):
-        size, phase = grid[2 * i, k], grid[2 * i + 1, k]
+        size, turn = grid[2 * i, k], grid[2 * i + 1, k]
         h, sd = frf.accelerance[i, columns[k]], np.sqrt(frf.variance[i, columns[k]] / 2)
-        for panel in (size, phase):
+        for panel in (size, turn):
             mark_band(panel, frf, i, columns[k])
         _magnitude(size, frf, h, sd)
-        _phase(phase, frf.frequency_hz, h, sd)
+        phase(turn, frf.frequency_hz, h, sd, **POINTS)
         size.plot(found.data.frequency_hz, np.abs(fitted[i, k]), **FITTED)
-        _wrapped(phase, found.data.frequency_hz, fitted[i, k], **FITTED)
+        phase(turn, found.data.frequency_hz, fitted[i, k], **FITTED)
         size.set_title(_entry(i, columns[k]), fontsize=9, pad=3, loc="left")
         number_modes(size, modal)
         if k == 0:
             size.set_ylabel("|H| (m/s²/N)", fontsize=8)
-            phase.set_ylabel("phase (°)", fontsize=8)
+            turn.set_ylabel("phase (°)", fontsize=8)
     handles: list = [Line2D([], [], **POINTS, label="measured")]
     if np.any(np.isfinite(frf.variance)):
-        handles.append(Patch(**SPREAD, label="± 2 sd"))
+        handles.append(Patch(color=MEASURED, alpha=0.25, label="± 2 sd"))
     _legend(figure, grid, [*handles, Line2D([], [], **FITTED, label="fit")])
     return figure
 
@@ -214,26 +174,8 @@ def _magnitude(panel: Axes, frf: Frf, h: np.ndarray, sd: np.ndarray) -> None:
         panel.text(0.5, 0.5, "not measured", transform=panel.transAxes, ha="center")
         return
     floor = 0.5 * seen.min()
-    below = np.maximum(size - 2 * sd, 0.1 * floor)
-    panel.fill_between(frf.frequency_hz, below, size + 2 * sd, **SPREAD)
-    panel.semilogy(frf.frequency_hz, size, **POINTS)
+    magnitude(panel, frf.frequency_hz, h, sd, 0.1 * floor, **POINTS)
     panel.set_ylim(floor, 6 * seen.max())  # room for the modes' numbers
-
-
-def _phase(panel: Axes, frequency_hz: np.ndarray, h: np.ndarray, sd: np.ndarray) -> None:
-    angle = np.angle(h, deg=True)
-    error = np.rad2deg(np.minimum(2 * sd / np.maximum(np.abs(h), 1e-300), np.pi))
-    panel.fill_between(frequency_hz, angle - error, angle + error, **SPREAD)
-    _wrapped(panel, frequency_hz, h, **POINTS)
-    panel.set_ylim(-200, 200)
-    panel.set_yticks([-180, 0, 180])
-
-
-def _wrapped(panel: Axes, frequency_hz: np.ndarray, h: np.ndarray, **style: Any) -> None:
-    """Phase without strokes from −180° to 180°."""
-    angle = np.angle(h, deg=True)
-    jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180) + 1
-    panel.plot(np.insert(frequency_hz, jumps, np.nan), np.insert(angle, jumps, np.nan), **style)
 
 
 def _legend(figure: Figure, grid: Any, handles: list) -> None:
@@ -270,62 +212,61 @@ def coherence_figure(frf: Frf, modal: ModalModel, title: str = "") -> Figure:
     return figure
 
 
-def mac_figure(modal: ModalModel | MatrixModes | OperatingModes, title: str = "") -> Figure:
-    """AutoMAC of the shapes, with its values in the cells."""
-    count = len(modal.modes)
-    side = float(np.clip(0.6 * count, 4.0, 14.0))
-    figure, grid = panels((side + 2.0, side + 1.2), title.replace(" · ", "\n"))
+def auto_mac_figure(
+    modal: ModalModel | MatrixModes | OperatingModes, title: str = "AutoMAC"
+) -> Figure:
+    """AutoMAC of the shapes."""
     shapes = np.array([mode.shape for mode in modal.modes])
-    values, panel = mac_matrix(shapes, shapes), grid[0, 0]
-    image = panel.imshow(values, vmin=0, vmax=1, cmap="Blues")
-    write_values(panel, image, ".2f", fontsize=8)
     names = [f"{k + 1}: {mode.frequency_hz:.2f} Hz" for k, mode in enumerate(modal.modes)]
-    panel.set_xticks(range(count), names, rotation=45, ha="right", rotation_mode="anchor")
-    panel.set_yticks(range(count), names)
-    panel.tick_params(labelsize=8)
-    figure.colorbar(image, ax=panel, label="MAC (1: same shape, 0: orthogonal)")
+    figure = mac_figure(mac_matrix(shapes, shapes), names, names, title)
     note = f"Shapes of {shapes.shape[1]} coordinates: different modes can look alike in so few."
     figure.supxlabel(note, fontsize=7.5, color="0.35")
     return figure
 
 
+def mac_figure(mac: np.ndarray, rows: Sequence[str], columns: Sequence[str], title: str) -> Figure:
+    """MAC (k, l) of shapes with its values in the cells; white where nothing is known."""
+    side = float(np.clip(0.6 * len(columns), 4.0, 14.0))
+    figure, grid = panels((side + 2.0, side + 1.2), title)
+    panel = grid[0, 0]
+    image = panel.imshow(mac, vmin=0, vmax=1, cmap="Blues")
+    write_values(panel, image, ".2f", fontsize=8)
+    panel.set_xticks(range(len(columns)), columns, rotation=45, ha="right", rotation_mode="anchor")
+    panel.set_yticks(range(len(rows)), rows)
+    panel.tick_params(labelsize=8)
+    figure.colorbar(image, ax=panel, label="MAC (1: same shape, 0: orthogonal)")
+    return figure
+
+
 def frequency_figure(
-    place: tuple[str, ...] | np.ndarray,
+    poses: Sequence[str],
     frequency_hz: np.ndarray,
     sd_hz: np.ndarray,
     simulated_hz: np.ndarray | None = None,
-    axis: str = "pose",
     title: str = "",
 ) -> Figure:
     """Natural frequencies of labelled modes over the poses, ± 2 sd, the simulated ones dashed.
 
-    place: names of the poses in their order, or a coordinate (n,) of theirs that `axis` names
-    with its unit; frequency_hz, sd_hz and simulated_hz (n, k), NaN where there is none (a gap).
+    frequency_hz, sd_hz and simulated_hz (n, k), NaN where there is none (a gap).
     """
-    named = len(place) > 0 and isinstance(place[0], str)
-    x = np.arange(len(place), dtype=float) if named else np.asarray(place, float)
-    order = np.argsort(x, kind="stable")
     figure, grid = panels((11.0, 6.5), title)
-    panel = grid[0, 0]
+    panel, x = grid[0, 0], np.arange(len(poses))
     for k in range(frequency_hz.shape[1]):
         colour = f"C{k % 10}"
         if simulated_hz is not None:
             style = {"color": colour, "lw": 1.0, "marker": "D", "ms": 3.5, "mfc": "none"}
-            panel.plot(x[order], simulated_hz[order, k], "--", **style)
-        error = np.where(np.isfinite(sd_hz[order, k]), 2 * sd_hz[order, k], 0.0)
+            panel.plot(x, simulated_hz[:, k], "--", **style)
+        error = np.where(np.isfinite(sd_hz[:, k]), 2 * sd_hz[:, k], 0.0)
         style = {"color": colour, "lw": 1.4, "marker": "o", "ms": 4, "capsize": 3}
-        panel.errorbar(x[order], frequency_hz[order, k], error, **style)
-    if named:
-        panel.set_xticks(x, [plain_text(p) for p in place], rotation=90 if len(place) > 12 else 0)
-    panel.set_xlabel(axis)
+        panel.errorbar(x, frequency_hz[:, k], error, **style)
+    panel.set_xticks(x, map(plain_text, poses), rotation=90 if len(poses) > 12 else 0)
+    panel.set_xlabel("pose")
     panel.set_ylabel("natural frequency (Hz)")
     panel.grid(True, alpha=0.25)
-    names = [f"mode {k + 1}" for k in range(frequency_hz.shape[1])]
-    label_ends(panel, frequency_hz[order], names)
+    label_ends(panel, frequency_hz, [f"mode {k + 1}" for k in range(frequency_hz.shape[1])])
     handles = [Line2D([], [], color="0.3", marker="o", label="measured, ± 2 sd")]
     if simulated_hz is not None:
-        handles.append(
-            Line2D([], [], color="0.3", ls="--", marker="D", mfc="none", label="simulation")
-        )
+        style = {"color": "0.3", "ls": "--", "marker": "D", "mfc": "none"}
+        handles.append(Line2D([], [], **style, label="simulation"))
     figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9)
     return figure

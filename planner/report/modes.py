@@ -1,6 +1,6 @@
 """Answer of `modes`: modes of one pose, of any points, of responses alone, of many poses."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,12 +16,13 @@ from planner.errors import RefusedFile
 from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.report.answer import NOT_IN_JSON, Answer
-from planner.report.plot_files import Pictures
 from planner.report.predictions import ExpectedMode
-from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
+from planner.report.text import remarks, table, with_sd
 from planner.words import counted
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from planner.campaign.survey import Survey
 
 SURE = 0.9  # probability of a label below which the text marks it as doubtful
@@ -183,24 +184,19 @@ class ModesReport(Answer):
     habits: tuple[str, ...] | Unset = UNSET
     survey: "Survey | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
-    def with_pictures(self, pictures: Pictures, name: str) -> "ModesReport":
-        """The same once frequencies are drawn pose by pose, where that is wanted."""
-        if not pictures.wanted or self.survey is None:
-            return self
+    def figures(self) -> "dict[str, Figure]":
+        """Frequencies pose by pose."""
+        if self.survey is None:
+            return {}
         from planner.report.modal_plots import frequency_figure
 
-        tracks, expected = self.survey.tracks, self.survey.simulated_hz
+        survey, tracks, expected = self.survey, self.survey.tracks, self.survey.simulated_hz
         rows = [[m.frequency_sd_hz if m else np.nan for m in row] for row in tracks.modes]
         sd = np.array(rows, dtype=float).reshape(tracks.probability.shape)
         seen = np.any(np.isfinite(tracks.frequency_hz), axis=0)
-        figure = frequency_figure(
-            self.survey.poses,
-            tracks.frequency_hz[:, seen],
-            sd[:, seen],
-            None if expected is None else expected[:, seen],
-            title=f"{SIMULATED_TITLE if self.simulated else ''}Campbell diagram · {name}",
-        )
-        return replace(self, **pictures.write({"campbell": figure}, name))
+        simulated = None if expected is None else expected[:, seen]
+        hz, title = tracks.frequency_hz[:, seen], "Campbell diagram"
+        return {"campbell": frequency_figure(survey.poses, hz, sd[:, seen], simulated, title)}
 
     def text(self) -> Group:
         """The modes as a table."""
@@ -208,10 +204,10 @@ class ModesReport(Answer):
         if isinstance(self.habits, tuple):
             parts.append(Text("  ?: the label is less than 90 % sure."))
             parts += [Text(f"  {habit}") for habit in self.habits]
-        parts += [*remarks(self.remarks), *drawn(self.plots, self.rrd)]
+        parts += remarks(self.remarks)
         if isinstance(self.exports, tuple) and self.exports:
             parts.append(Text("\n  ".join(["Files:", *self.exports])))
-        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+        return Group(*parts, *self.end)
 
     def _table(self) -> Table:
         what = "Modes" if isinstance(self.tones_hz, Unset) else "Operating modes"

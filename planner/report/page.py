@@ -175,7 +175,7 @@ def _measured(campaign: Campaign, state: CampaignState, now: StatusReport) -> di
         "stood": stood,
         "stood_says": said,
         "refused": [(r.pose, r.file, r.reason) for r in now.refused],
-        "held": [(h.measured.pose, h.question.question.text) for h in now.held],
+        "held": [(h.measured.pose, h.question.text) for h in now.held],
         "skipped": [(s.pose, s.reason or "–") for s in now.skipped],
         "remarks": [(m.pose, text) for m in state.recorded for text in m.remarks],
     }

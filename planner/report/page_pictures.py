@@ -11,7 +11,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.left_out import found_without
 from planner.recording.joints import SCALES
 from planner.report.campaign_plots import frf_sheet, left_out_figure, workspace_map
-from planner.report.frf_plots import png
+from planner.report.pictures import png
 
 SHOWN_FRFS = 6  # poses whose FRFs are drawn: the ones furthest off, then the first
 SHOWN_MAPS = 8  # modes whose maps are drawn

@@ -1,32 +1,96 @@
-"""What the pictures of a modal analysis share: panels, marked modes, labels that keep apart."""
+"""What pictures share: panels, curves with bands, marked modes, text that can be read."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 from scipy.optimize import isotonic_regression
 
-from planner.frf.frf import Frf
-from planner.modal.matrix_modes import MatrixModes
-from planner.modal.modes import ModalModel
-from planner.modal.operating import OperatingModes
-from planner.report.plot_text import plain_text
+from planner.report.text import with_sd
 
+if TYPE_CHECKING:
+    from matplotlib.image import AxesImage
+
+    from planner.frf.frf import Frf
+    from planner.modal.matrix_modes import MatrixModes
+    from planner.modal.modes import ModalModel
+    from planner.modal.operating import OperatingModes
+
+AXES = ("x", "y", "z")
+MEASURED, MODEL = "black", "tab:red"
+# Relative luminance of sRGB (ITU-R BT.709), and the one at which black and white contrast alike
+# with a colour (WCAG 2: (L + 0.05)² = 0.05 · 1.05).
+WEIGHTS, ALIKE = (0.2126, 0.7152, 0.0722), 0.179
 MODE, USABLE = "tab:blue", "tab:green"
 COHERENT, WINDOW = 0.8, 7  # from this coherence (median of so many lines around) an FRF is shaded
 COLUMNS = 9  # labels of several lines that fit side by side; more are turned upright
 
 
+def plain_text(text: str) -> str:
+    """A name as it stands: Matplotlib would read what lies between two dollars as a formula."""
+    return text.replace("$", r"\$")
+
+
+def ink(colour: ArrayLike) -> str:
+    """ "black" or "white", whichever is read better on a colour (3 or 4 numbers, 0 to 1)."""
+    part = np.asarray(colour, dtype=float)[:3]
+    linear = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+    return "black" if linear @ WEIGHTS > ALIKE else "white"
+
+
+def write_values(panel: Axes, image: "AxesImage", form: str, **style: Any) -> None:
+    """Values of an image (`form` as of `format`) in its cells, in readable ink."""
+    values = np.asarray(image.get_array(), dtype=float)
+    for (i, j), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            colour = ink(image.to_rgba(value))
+            panel.text(j, i, format(value, form), ha="center", va="center", color=colour, **style)
+
+
+def empty(size: tuple[float, float], title: str = "", fontsize: float = 10) -> Figure:
+    """A figure (size in inches) with a title."""
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(plain_text(title), fontsize=fontsize)
+    return figure
+
+
 def panels(
     size: tuple[float, float], title: str, rows: int = 1, columns: int = 1, **layout: Any
 ) -> tuple[Figure, Any]:
-    """A figure (size in inches) with panels (rows, columns) that share the frequency axis."""
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(plain_text(title), fontsize=11)
+    """A figure (size in inches) with panels (rows, columns) that share the horizontal axis."""
+    figure = empty(size, title, 11)
     return figure, figure.subplots(rows, columns, sharex=True, squeeze=False, **layout)
+
+
+def magnitude(
+    panel: Axes, frequency_hz: np.ndarray, h: np.ndarray, sd: np.ndarray | None = None,
+    floor: float = 0.0, **style: Any,
+) -> None:  # fmt: skip
+    """|H| on a logarithmic axis, with a band of ± 2 sd cut off at the `floor`."""
+    size = np.abs(h)
+    if sd is not None:
+        band = np.maximum(size - 2 * sd, floor), size + 2 * sd
+        colour = style.get("color")
+        panel.fill_between(frequency_hz, *band, color=colour, alpha=0.25, lw=0, label="± 2 sd")
+    panel.semilogy(frequency_hz, size, **style)
+
+
+def phase(
+    panel: Axes, frequency_hz: np.ndarray, h: np.ndarray, sd: np.ndarray | None = None, **style: Any
+) -> None:
+    """Phase in ° without strokes from −180° to 180°; its band is the angle of 2 sd."""
+    angle = np.angle(h, deg=True)
+    if sd is not None:
+        half = np.rad2deg(np.arcsin(np.minimum(2 * sd / np.maximum(np.abs(h), 1e-300), 1.0)))
+        band = {"color": style.get("color"), "alpha": 0.25, "lw": 0}
+        panel.fill_between(frequency_hz, angle - half, angle + half, **band)
+    jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180) + 1
+    panel.plot(np.insert(frequency_hz, jumps, np.nan), np.insert(angle, jumps, np.nan), **style)
+    panel.set(ylim=(-200, 200), yticks=(-180, 0, 180))
 
 
 def spread(x: np.ndarray, gap: float, low: float, high: float) -> np.ndarray:
@@ -41,16 +105,7 @@ def spread(x: np.ndarray, gap: float, low: float, high: float) -> np.ndarray:
     return np.clip(level, low, max(low, high - steps[-1])) + steps
 
 
-def with_sd(value: float, sd: float) -> str:
-    """A value and its standard deviation, both to the digit where the latter begins (1 to 4)."""
-    if not np.isfinite(sd):
-        return f"{value:.2f}"
-    decimals = int(np.clip(np.ceil(-np.log10(max(sd, 1e-300))), 1, 4))
-    small = f"{sd:.0e}" if sd < 0.5e-4 else f"{sd:.{decimals}f}"
-    return f"{value:.{decimals}f} ± {small}"
-
-
-def label_modes(panel: Axes, modal: ModalModel | MatrixModes | OperatingModes) -> None:
+def label_modes(panel: Axes, modal: "ModalModel | MatrixModes | OperatingModes") -> None:
     """Modes as vertical lines, with frequency, damping and probability above the panel."""
     upright = len(modal.modes) > COLUMNS
     low, high = panel.get_xlim()
@@ -60,7 +115,7 @@ def label_modes(panel: Axes, modal: ModalModel | MatrixModes | OperatingModes) -
         panel.axvline(mode.frequency_hz, color=MODE, lw=1.2, alpha=0.8)
         rows = (
             f"mode {k + 1}",
-            f"{with_sd(mode.frequency_hz, mode.frequency_sd_hz)} Hz",
+            f"{with_sd(mode.frequency_hz, mode.frequency_sd_hz, '.3f')} Hz",
             f"ζ {with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd)} %",
             f"physical {100 * mode.probability:.0f} %",
         )
@@ -79,7 +134,7 @@ def label_modes(panel: Axes, modal: ModalModel | MatrixModes | OperatingModes) -
         )
 
 
-def number_modes(panel: Axes, modal: ModalModel | MatrixModes | OperatingModes) -> None:
+def number_modes(panel: Axes, modal: "ModalModel | MatrixModes | OperatingModes") -> None:
     """Modes as thin vertical lines, with their numbers inside at the top."""
     low, high = panel.get_xlim()
     frequency = np.array([mode.frequency_hz for mode in modal.modes])
@@ -93,7 +148,7 @@ def number_modes(panel: Axes, modal: ModalModel | MatrixModes | OperatingModes) 
         )  # fmt: skip
 
 
-def mark_band(panel: Axes, frf: Frf, response: int, hit: int) -> None:
+def mark_band(panel: Axes, frf: "Frf", response: int, hit: int) -> None:
     """The whole frequency axis of an FRF; shaded where it is coherent in the usable band."""
     panel.set_xlim(0, frf.frequency_hz[-1])
     for begins, ends in _trusted(frf, response, hit):
@@ -102,7 +157,7 @@ def mark_band(panel: Axes, frf: Frf, response: int, hit: int) -> None:
     panel.tick_params(labelsize=8)
 
 
-def _trusted(frf: Frf, response: int, hit: int) -> list[tuple[float, float]]:
+def _trusted(frf: "Frf", response: int, hit: int) -> list[tuple[float, float]]:
     """Where (Hz, from and to) an FRF is coherent within the matrix' usable band.
 
     Where a single hit tells no coherence, the share of the signal in |H|² stands for it.

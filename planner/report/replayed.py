@@ -10,21 +10,13 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.events import Proposal
 from planner.compare.counterfactual import OtherAcquisition
 from planner.progress import Tell
 from planner.recording.joints import JointUnits
 from planner.replay import Step, replay
 from planner.report.answer import Answer
 from planner.report.text import table
-
-
-@dataclass(frozen=True)
-class OtherPose:
-    """A pose that another acquisition would have proposed."""
-
-    joints_deg: tuple[float, ...]
-    position_m: tuple[float, float, float]
-    hits: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +30,7 @@ class ReplayedStep:
     detail: str
     measurements: int
     frequency_sd_percent: np.ndarray
-    instead: tuple[OtherPose, ...]
+    instead: tuple[Proposal, ...]  # of another acquisition
 
     @classmethod
     def of(cls, step: Step) -> "ReplayedStep":
@@ -46,8 +38,7 @@ class ReplayedStep:
         entry = step.entry
         return cls(
             entry.seq, entry.time, msgspec.to_builtins(entry.event)["kind"], step.check,
-            step.detail, len(step.model.labelled), step.model.frequency_sd_percent,
-            tuple(OtherPose(p.joints_deg, p.position_m, p.hits) for p in step.instead),
+            step.detail, len(step.model.labelled), step.model.frequency_sd_percent, step.instead,
         )  # fmt: skip
 
 
@@ -63,7 +54,7 @@ class ReplayReport(Answer):
     otherwise: OtherAcquisition | None
     joint_units: Any = msgspec.UNSET
 
-    def _stands(self, pose: OtherPose) -> str:
+    def _stands(self, pose: Proposal) -> str:
         names = [""] * len(pose.joints_deg)
         return JointUnits.declared_as(names, self.joint_units).listed(pose.joints_deg, 0)
 

@@ -1,7 +1,7 @@
 """Answer of `check`: what a robot's description says, and what looks wrong in it."""
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 from rich.console import Group
@@ -19,10 +19,12 @@ from planner.check.examine import (
 from planner.check.remark import SEVERITIES, CheckRemark
 from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer
-from planner.report.plot_files import Pictures
-from planner.report.text import drawn, number, table
+from planner.report.text import number, table
 from planner.robot.joint_laws import NUMBER_ENTRIES, LawTable
 from planner.words import counted
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
 SHOWN_TO = 2.0  # times the end of the band; the others stand in the JSON
@@ -70,14 +72,13 @@ class RobotCheckReport(Answer):
             found=found,
         )
 
-    def with_pictures(self, pictures: Pictures) -> "RobotCheckReport":
-        """The same once the robot is drawn at home, where that is wanted."""
-        if not pictures.wanted or self.found is None:
-            return self
+    def figures(self) -> "dict[str, Figure]":
+        """The robot at home."""
+        if self.found is None:
+            return {}
         from planner.report.robot_picture import robot_figure
 
-        figure = robot_figure(self.found.robot, self.found.q[0], self.found.links)
-        return replace(self, **pictures.write({"robot": figure}, self.robot))
+        return {"robot": robot_figure(self.found.robot, self.found.q[0], self.found.links)}
 
     def text(self) -> Group:
         """Masses, modes, then what was found, worst first."""
@@ -106,7 +107,7 @@ class RobotCheckReport(Answer):
         said = [Text(f"band_hz is {low:g} to {high:g} Hz."), *map(_law, self.laws)]
         said += map(_line, self.findings)
         parts = [masses, *([modes] if self.poses else []), *said, _summary(self.findings)]
-        return Group(*parts, *drawn(self.plots))
+        return Group(*parts, *self.end)
 
     def _carried(self) -> str:
         """What [[payload]] of robot.toml adds to the links that move, in words."""

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from scipy.spatial import ConvexHull
 
-from planner.report.plot_text import plain_text
+from planner.report.plot_marks import empty, plain_text
 from planner.robot.link_bodies import LinkBody
 from planner.robot.robot import Robot
 from planner.robot.skeleton import RobotLines, robot_lines
@@ -22,10 +23,8 @@ AREA_PER_SHARE = 1200.0  # of a mass's dot in points², times its share of the w
 def robot_figure(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Figure:
     """The robot at q (dof,) in rad: from the side, from above, and in space."""
     lines = _close(robot_lines(robot, q, links), robot.shoulder_m, robot.reach_m)
-    figure = Figure(figsize=(15.0, 6.0), layout="constrained")
     stands = robot.joints.listed(robot.joints.shown(q), 0)
-    title = f"{plain_text(robot.name)} at joint angles ({stands})"
-    figure.suptitle(title, fontsize=12)
+    figure = empty((15.0, 6.0), f"At joint angles ({stands})", 12)
     grid = figure.add_gridspec(1, 3)
     for column, (name, pair) in enumerate(VIEWS):
         panel = figure.add_subplot(grid[0, column])
@@ -130,20 +129,5 @@ def _edges(corners: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _outline(points: np.ndarray) -> np.ndarray:
-    """Convex hull of points (n, 2), in order (Andrew's monotone chain)."""
-
-    def half(ordered: list[np.ndarray]) -> list[np.ndarray]:
-        found: list[np.ndarray] = []
-        for point in ordered:
-            while len(found) > 1 and _turn(found[-2], found[-1], point) <= 1e-12:
-                found.pop()
-            found.append(point)
-        return found[:-1]
-
-    ordered = [points[i] for i in np.lexsort((points[:, 1], points[:, 0]))]
-    hull = half(ordered) + half(ordered[::-1])
-    return np.array(hull) if len(hull) > 2 else points
-
-
-def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    """Convex hull of points (n, 2), in order; those of a box seen edge on may be on a line."""
+    return points[ConvexHull(points, qhull_options="QJ").vertices]

@@ -7,15 +7,18 @@ import numpy as np
 from planner.modal.matrix_modes import MatrixModes
 from planner.modal.modes import motions, moved
 from planner.recording.geometry import Geometry
+from planner.report.pictures import SIMULATED_TITLE
 
 FRAMES, FRAME_MS = 24, 50
 SIZE = (560, 420)
 TURN_DEG, RISE_DEG = -60.0, 28.0  # from where the structure is seen
 
 
-def animate(found: MatrixModes, geometry: Geometry, folder: Path, mark: str = "") -> list[Path]:
-    """One GIF for every mode, whose title begins with `mark`; their paths."""
-    files = []
+def animate(
+    found: MatrixModes, geometry: Geometry, folder: Path, simulated: bool = False
+) -> list[Path]:
+    """One GIF for every mode, whose title says what is simulated; their paths."""
+    files, mark = [], f"{SIMULATED_TITLE} · " if simulated else ""
     for k, mode in enumerate(found.modes):
         file = folder / f"mode_{k + 1:02d}.gif"
         title = (

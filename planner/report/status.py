@@ -12,14 +12,13 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.decision_status import DecisionStatus
-from planner.campaign.events import Proposal
+from planner.campaign.events import Proposal, Question
 from planner.campaign.left_out import LeftOutValues, found_without, left_out
 from planner.campaign.state import Measurement
 from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain
-from planner.report.imports import AskedOfPose
+from planner.report.imports import asked_of
 from planner.report.kept_diagnosis import diagnosis_of, read_diagnosis, two_answers
-from planner.report.plot_files import Pictures
 from planner.report.proposals import forecast_json, target_sentence
 from planner.report.refitted_springs import (
     NOT_KNOWN,
@@ -27,10 +26,12 @@ from planner.report.refitted_springs import (
     refitted_springs,
     springs_table,
 )
-from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, table
+from planner.report.text import table
 from planner.words import by_reason, counted, local_time, significant
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from planner.campaign.model import Model
     from planner.campaign.model_comparison import LeftOutModel
     from planner.campaign.state import CampaignState
@@ -75,17 +76,12 @@ class HeldPose(Answer):
     """A pose whose hits are not used until a question is answered."""
 
     measured: MeasuredPoseStatus
-    question: AskedOfPose
-
-    @classmethod
-    def of(cls, m: Measurement, starred: bool) -> "HeldPose":
-        """Of a held measurement."""
-        assert m.question is not None
-        return cls(MeasuredPoseStatus.of(m, starred), AskedOfPose(m.pose, m.question))
+    question: Question
 
     def to_json(self) -> dict[str, Any]:
         """The keys of a measured pose, and "question"."""
-        return {**plain(self.measured), "question": plain(self.question)}
+        asked = asked_of(self.measured.pose, self.question)
+        return {**plain(self.measured), "question": asked}
 
 
 @dataclass(frozen=True)
@@ -105,7 +101,7 @@ class RefusedHit:
     reason: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ModelStatus:
     """What `status` says of the model; sds (count,) in % are over the workspace, mode by mode."""
 
@@ -117,11 +113,11 @@ class ModelStatus:
     forecast: Forecast
     remarks: tuple[str, ...]
     leave_one_out: LeftOutValues
-    decision: DecisionStatus | None = None
+    decision: DecisionStatus | None = None  # where the campaign is for a cut
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
-    springs: tuple[RefittedSpring, ...] = ()
-    waits_for: str = ""
-    frf_sd_percent: tuple[float, ...] = ()
+    springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
+    waits_for: str = ""  # what lacks until the target is reached
+    frf_sd_percent: tuple[float, ...] = ()  # of predicted FRFs, and of their common scale
 
     @classmethod
     def of(cls, model: "Model") -> "ModelStatus":
@@ -152,52 +148,38 @@ class LogStatus:
     torn_bytes: int
 
 
-@dataclass(frozen=True, eq=False)
-class StatusReport(Answer):
-    """Answer of `status`; sds (count,) in % are over the workspace, mode by mode."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StatusReport(ModelStatus, Answer):
+    """Answer of `status`; `used` of the measured poses are those that the model rests on."""
 
     campaign: str
-    robot: str
     simulated: bool
     measurements: tuple[MeasuredPoseStatus, ...]
     open: tuple[Proposal, ...]
     skipped: tuple[SkippedProposal, ...]
     refused: tuple[RefusedHit, ...]
-    frequency_sd_percent: np.ndarray
-    target_frequency_sd_percent: float
-    done: bool
-    forecast: Forecast
-    remarks: tuple[str, ...]
     log: LogStatus
-    joint_names: tuple[str, ...]
     stored_but_not_imported: tuple[str, ...]
-    leave_one_out: LeftOutValues
+    held: tuple[HeldPose, ...]
+    used: int
     plots: tuple[str, ...] = ()
     rrd: str | None = None
-    held: tuple["HeldPose", ...] = ()
-    decision: Any = msgspec.UNSET
-    joint_units: Any = msgspec.UNSET
-    used: int = 0  # of the measured poses, those that the model rests on
-    springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
-    waits_for: str = ""  # what lacks until the target is reached
-    frf_sd_percent: tuple[float, ...] = ()  # of predicted FRFs, and of their common scale
     models: tuple["LeftOutModel", ...] | msgspec.UnsetType = msgspec.UNSET  # where asked for
     model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
-        """With the forecast's sentence."""
-        return super().to_json() | {"forecast": forecast_json(self.forecast)}
+        """With the forecast's sentence; "decision" where there is one."""
+        said = super().to_json() | {"forecast": forecast_json(self.forecast)}
+        return said if self.decision else {k: v for k, v in said.items() if k != "decision"}
 
-    def with_pictures(self, pictures: Pictures, name: str) -> "StatusReport":
-        """The same once each pose is drawn as predicted without it, where that is wanted."""
-        if not pictures.wanted or not self.leave_one_out.values or self.model is None:
-            return self
+    def figures(self) -> "dict[str, Figure]":
+        """Each pose as predicted without it."""
+        if not self.leave_one_out.values or self.model is None:
+            return {}
         from planner.report.campaign_plots import left_out_figure
 
-        mark = SIMULATED_TITLE if self.simulated else ""
-        title = f"{mark}Each measured pose, predicted without it"
-        figure = left_out_figure(*found_without(self.model()), title)
-        return replace(self, **pictures.write({"leave_one_out": figure}, name))
+        title = "Each measured pose, predicted without it"
+        return {"leave_one_out": left_out_figure(*found_without(self.model()), title)}
 
     def with_models(self, progress: "Tell") -> "StatusReport":
         """The same once every model of `[surrogate]` has predicted poses left out."""
@@ -216,8 +198,7 @@ class StatusReport(Answer):
             measured.add_row(*pose.cells)
         springs = [springs_table(self.springs), Text(f"  {NOT_KNOWN}")] if self.springs else []
         springs += [] if self.models is msgspec.UNSET else models_text(self.models)
-        parts = [measured, *springs, Text("\n".join(self._lines())), *drawn(self.plots)]
-        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+        return Group(measured, *springs, Text("\n".join(self._lines())), *self.end)
 
     def _counts(self) -> str:
         """How many poses the model uses, as report and predict count them, and others."""
@@ -257,8 +238,7 @@ class StatusReport(Answer):
             f"Held, not used: {h.question.text} Answer with planner confirm, or withdraw."
             for h in self.held
         ]
-        if self.decision is not msgspec.UNSET:
-            lines.append(self.decision.text)
+        lines += [self.decision.text] if self.decision else []
         lines += [*self.remarks, *self.leave_one_out.text]
         told = by_reason((r.file, r.reason) for r in self.refused)
         return lines + [f"refused {one}" for one in told]
@@ -280,32 +260,25 @@ def status(campaign: Campaign) -> StatusReport:
     """Of a campaign as it is now."""
     state = campaign.state
     believed = campaign.of_model("status", ModelStatus, ModelStatus.of)
-    measured = state.measured
-    refused = _still_refused(state)
+    remarks = (*believed.remarks, *_beside_diagnosis(campaign, believed.springs))
     return StatusReport(
+        **(vars(believed) | {"remarks": remarks}),
         campaign=str(campaign.directory),
-        robot=believed.robot,
         simulated=state.simulated,
-        measurements=tuple(MeasuredPoseStatus.of(m, m.pose in state.starred) for m in measured),
+        measurements=tuple(
+            MeasuredPoseStatus.of(m, m.pose in state.starred) for m in state.measured
+        ),
         open=tuple(state.proposals[pose] for pose in state.open),
         skipped=tuple(SkippedProposal(p, r) for p, r in state.skipped.items()),
-        refused=refused,
-        frequency_sd_percent=believed.frequency_sd_percent,
-        target_frequency_sd_percent=believed.target_frequency_sd_percent,
-        done=believed.done,
-        forecast=believed.forecast,
-        remarks=(*believed.remarks, *_beside_diagnosis(campaign, believed.springs)),
+        refused=_still_refused(state),
         log=LogStatus(state.events, campaign.torn_bytes),
-        joint_names=believed.joint_names,
         stored_but_not_imported=tuple(campaign.orphans()),
-        leave_one_out=believed.leave_one_out,
-        held=tuple(HeldPose.of(m, m.pose in state.starred) for m in state.held.values()),
-        decision=msgspec.UNSET if believed.decision is None else believed.decision,
-        joint_units=believed.joint_units,
+        held=tuple(
+            HeldPose(MeasuredPoseStatus.of(m, m.pose in state.starred), m.question)
+            for m in state.held.values()
+            if m.question
+        ),
         used=len(state.used),
-        springs=believed.springs,
-        waits_for=believed.waits_for,
-        frf_sd_percent=believed.frf_sd_percent,
         model=lambda: campaign.model,
     )
 

@@ -1,5 +1,6 @@
 """Parts of answers as text."""
 
+import math
 from collections.abc import Sequence
 
 from rich.table import Table
@@ -10,7 +11,6 @@ from planner.words import command, small
 SIMULATED = Text(
     "SIMULATED RECORDINGS: nothing here was measured on a real robot", style="bold magenta"
 )
-SIMULATED_TITLE = "SIMULATED recordings · "  # before the title of a picture
 
 
 def table(title: str, *columns: str) -> Table:
@@ -23,7 +23,7 @@ def table(title: str, *columns: str) -> Table:
 
 def number(value: float | None, form: str = ".2f") -> str:
     """A number, or a dash where there is none."""
-    return "–" if value is None or value != value else format(value, form)
+    return format(value, form) if value is not None and math.isfinite(value) else "–"
 
 
 def with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:
@@ -33,7 +33,8 @@ def with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:
     """
     if number(value, form) == "–":
         return "–"
-    return f"{number(value, form)} ± {number(sd, form) if not sd or sd != sd else small(sd, form)}"
+    known = sd is not None and math.isfinite(sd)
+    return f"{number(value, form)} ± {small(sd, form) if known else '–'}"
 
 
 def remarks(lines: Sequence[str]) -> list[Text]:

@@ -23,7 +23,7 @@ from planner.campaign.state import fold
 from planner.campaign.taking_back import last_acts
 from planner.dataset.screened_files import Source
 from planner.errors import NoPoseLeftError, PlannerError
-from planner.report.campaign_acts import RedoneAct, UndoneAct
+from planner.report.campaign_acts import redone, undone
 from planner.session import session_text
 from planner.session.course import BAD, Course, PoseInProgress
 from planner.session.page import TakingBack, page_with_hits, page_without_hits
@@ -213,7 +213,7 @@ def undo(station: Station, course: Course) -> Course:
     taken = station.campaign.undo(decisions_only=True)
     station.rerun_queue.note()
     station.screen.forget()
-    station.say(UndoneAct.of(taken).text())
+    station.say(undone(taken).text())
     return course.undone(station.campaign.state)
 
 
@@ -222,7 +222,7 @@ def _redo(station: Station, course: Course) -> Course:
     again = station.campaign.redo()
     station.rerun_queue.note()
     station.screen.forget()
-    station.say(RedoneAct.of(again).text())
+    station.say(redone(again).text())
     event = again[0].event
     if isinstance(event, Imported | Confirmed):
         return measured(station, course, event.pose)

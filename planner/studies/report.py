@@ -13,7 +13,7 @@ from rich.text import Text
 
 from planner.errors import InputError
 from planner.report.answer import Answer
-from planner.report.plot_files import Pictures
+from planner.report.pictures import Pictures
 from planner.report.text import table
 from planner.studies.claims import COLUMNS, HOLDS, IN_KIND, NOT, UNTESTED, PaperClaim
 

@@ -11,7 +11,7 @@ from planner.errors import InputError, RefusedError
 from planner.modal.modes import ModalModel
 from planner.recording.hits import hits_from
 from planner.recording.read import read
-from planner.report.plot_files import Pictures
+from planner.report.pictures import Pictures
 from planner.truth.hits import record_poses
 from tests.support.outside import HAMMER, make_cell
 

@@ -10,7 +10,7 @@ from matplotlib.font_manager import findfont, get_font
 from rerun.chunk import RrdReader
 
 from planner.cli.run import run
-from planner.report.picture_files import rendered
+from planner.report.pictures import rendered
 from tests.support.outside import make_cell, record
 
 NAMES = ["stabilisation", "frf", "coherence", "mac"]

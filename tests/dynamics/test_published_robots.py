@@ -12,8 +12,8 @@ from planner.campaign.config import load_campaign_config
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
 from planner.frf.metrics import agreement
-from planner.report.frf_map import frf_map
-from planner.report.frf_plots import save
+from planner.report.frf_plots import frf_map
+from planner.report.pictures import save
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
 from planner.truth.load import load_truth

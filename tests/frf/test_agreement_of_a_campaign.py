@@ -13,8 +13,8 @@ from planner.demo import Pool, shipped
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.frf.metrics import Agreement, agreement, direct_mean, mean_known, stack
-from planner.report.frf_map import frf_map
-from planner.report.frf_plots import save
+from planner.report.frf_plots import frf_map
+from planner.report.pictures import save
 from planner.robot.robot import Robot
 
 BAND_HZ = (4.0, 60.0)

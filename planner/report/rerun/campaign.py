@@ -18,9 +18,9 @@ from planner.campaign.events import Proposal
 from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
-from planner.report.frf_plots import AXES
+from planner.report.plot_marks import AXES
 from planner.report.rerun.figures import draw, figure_view
-from planner.report.rerun.modes import GROUND, VIBRATION, ModeDrawing, mode_views
+from planner.report.rerun.modes import BEFORE_US, GROUND, VIBRATION, ModeDrawing, mode_views
 from planner.report.rerun.progress import (
     MeasuredSeries,
     force_figure,
@@ -41,7 +41,6 @@ COLOURS = {
     "obstacle": (140, 150, 155),
 }
 SCALE = "0.1 % dark to 10 % yellow"
-BEFORE_US = -1000  # measurements lie so long before the vibration, 1 µs apart
 NEAR = 0.75  # modes are seen from nearer than the cell
 ARROW = 0.18  # length of a hit's arrow, in units of the arm's length
 NOTE = """\
@@ -112,6 +111,7 @@ class RerunView:
 
     def _at(self, number: int) -> None:
         self._stream.set_time(TIMELINE, sequence=number)
+        # Measurements are 1 µs apart.
         self._stream.set_time(VIBRATION, duration=np.timedelta64(BEFORE_US + number, "us"))
 
     def _move(self, q: np.ndarray) -> None:

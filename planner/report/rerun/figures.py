@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.path import Path as Path2D
 
-from planner.report.frf_plots import png
+from planner.report.pictures import png
 from planner.report.rerun.stream import open_stream
 
 DPI = 160

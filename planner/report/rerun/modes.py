@@ -8,7 +8,6 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from planner.campaign.labels import LabelledPose
@@ -23,10 +22,11 @@ from planner.campaign.mode_motion import (
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
 from planner.modal.matrix_modes import MatrixModes
-from planner.modal.modes import motions, moved
+from planner.modal.modes import LARGEST as FARTHEST
+from planner.modal.modes import motions
 from planner.recording.geometry import Geometry
 from planner.recording.points import Layout
-from planner.report.plot_text import plain_text, write_values
+from planner.report.modal_plots import mac_figure
 from planner.report.rerun.figures import More, draw, figure_view
 from planner.robot.skeleton import Skeleton, skeleton
 
@@ -34,6 +34,8 @@ VIBRATION = "vibration"
 FRAMES, FRAME_MS = 24, 100  # of one period on the screen
 LARGEST = 0.12  # of the arm's length: how far the point moves that moves most
 MOST_SHOWN = 12  # modes of measured points with a view of their own
+TURNS = np.exp(2j * np.pi * np.arange(FRAMES) / FRAMES)
+BEFORE_US = -1000  # what stands still lies so long before the vibration
 PIECES = 6  # a line is drawn in, each in the colour of its motion
 THICK, THIN, BALL = 0.02, 0.004, 0.03  # radii in units of the same
 MEASURED, REST, BRIGHT = (255, 255, 255), (85, 88, 92), (235, 235, 235)
@@ -80,7 +82,8 @@ class ModeDrawing:
             self._still(path, drawn, _title(pose, k), robot.arm_m)
             size = LARGEST * robot.arm_m
             if whole is not None and np.all(np.isfinite(whole.motion[k])):
-                self._moving(f"{path}/simulated", drawn, size * whole.motion[k], robot.arm_m)
+                rest, way = (_pieces(drawn, v) for v in (drawn.place_m, size * whole.motion[k]))
+                move_lines(self._stream, f"{path}/simulated", rest, way, THICK * robot.arm_m)
             self._points(f"{path}/measured", seen, k, size, robot.arm_m)
 
     def _still(self, path: str, drawn: Skeleton, title: str, reach_m: float) -> None:
@@ -92,20 +95,6 @@ class ModeDrawing:
             rr.Points3D([below], radii=0.0001, labels=[title], colors=BRIGHT, show_labels=True),
         )
 
-    def _moving(self, path: str, drawn: Skeleton, motion: np.ndarray, reach_m: float) -> None:
-        """The robot in pieces (p, 2, 3) that are coloured by how far they move."""
-        rest, way = _pieces(drawn, drawn.place_m), _pieces(drawn, motion)
-        largest = np.max(np.linalg.norm(np.abs(motion), axis=1)) or 1.0
-        share = np.linalg.norm(np.abs(way.mean(axis=1)), axis=1) / largest
-        colours = (255 * colormaps["plasma"](0.1 + 0.85 * share)).astype(np.uint8)
-        self._stream.log(
-            path,
-            rr.LineStrips3D(rest + way.real, radii=THICK * reach_m, colors=colours),
-        )
-        places = [rest + np.real(way * turn) for turn in _turns()]
-        strips = rr.LineStrips3D.columns(strips=[s for place in places for s in place])
-        self._stream.send_columns(path, [_times()], strips.partition([len(rest)] * FRAMES))
-
     def _points(self, path: str, seen: PointShapes, k: int, size: float, reach_m: float) -> None:
         """Sensors where they move to by the measured shape."""
         known = np.all(np.isfinite(seen.motion[k]), axis=1)
@@ -116,32 +105,45 @@ class ModeDrawing:
             show_labels=len(names) > 1,
         )  # fmt: skip
         self._stream.log(path, balls)
-        if len(places):
-            every = np.concatenate([places + np.real(motion * turn) for turn in _turns()])
-            columns = rr.Points3D.columns(positions=every).partition([len(places)] * FRAMES)
-            self._stream.send_columns(path, [_times()], columns)
+        move_points(self._stream, path, places, motion)
+
+
+def move_lines(
+    stream: rr.RecordingStream, path: str, rest: np.ndarray, way: np.ndarray, radius: float
+) -> None:
+    """Lines (n, 2, 3) that move by `way` (n, 2, 3), complex, coloured by how far they move."""
+    far = np.linalg.norm(np.abs(way.mean(axis=1)), axis=1)
+    lines = rr.LineStrips3D(rest + way.real, radii=radius, colors=_colours(far))
+    stream.log(path, lines)
+    strips = [strip for turn in TURNS for strip in rest + np.real(way * turn)]
+    columns = rr.LineStrips3D.columns(strips=strips).partition([len(rest)] * FRAMES)
+    stream.send_columns(path, [_times()], columns)
+
+
+def move_points(stream: rr.RecordingStream, path: str, rest: np.ndarray, way: np.ndarray) -> None:
+    """Points (n, 3), drawn at the path already, that move by `way` (n, 3), complex."""
+    if len(rest):
+        places = np.concatenate([rest + np.real(way * turn) for turn in TURNS])
+        columns = rr.Points3D.columns(positions=places).partition([len(rest)] * FRAMES)
+        stream.send_columns(path, [_times()], columns)
+
+
+def _colours(far: np.ndarray) -> np.ndarray:
+    share = far / (np.max(far, initial=0.0) or 1.0)
+    return (255 * colormaps["plasma"](0.1 + 0.85 * share)).astype(np.uint8)
 
 
 def _mac_figure(pose: LabelledPose, mac: np.ndarray, points: int) -> Figure:
-    """MAC (k, l) of measured and simulated shapes; white where nothing is known."""
-    figure = Figure(figsize=(6.0, 5.4), layout="constrained")
-    FigureCanvasAgg(figure)
-    panel = figure.add_subplot()
-    image = panel.imshow(mac, vmin=0.0, vmax=1.0, cmap="Blues")
-    write_values(panel, image, ".2f", fontsize=8)
+    """MAC (k, l) of measured (rows) and simulated shapes."""
     rows = [
         f"{k + 1}: {mode.frequency_hz:.1f} Hz" if mode else f"{k + 1}: none"
         for k, mode in enumerate(pose.modes)
     ]
     columns = [f"{j + 1}: {hz:.1f}" for j, hz in enumerate(pose.simulated_hz)]
-    panel.set_yticks(range(len(rows)), rows)
-    panel.set_xticks(range(len(columns)), columns)
     few = ";\ndifferent modes can look alike in so few" if points == 1 else ""
-    panel.set(
-        xlabel="simulated (Hz)", ylabel="measured",
-        title=f"{plain_text(pose.pose)}: MAC of shapes at {3 * points} coordinates{few}",
-    )  # fmt: skip
-    panel.title.set_fontsize(9)
+    title = f"{pose.pose}: MAC of shapes at {3 * points} coordinates{few}"
+    figure = mac_figure(mac, rows, columns, title)
+    figure.axes[0].set(xlabel="simulated (Hz)", ylabel="measured")
     return figure
 
 
@@ -167,10 +169,6 @@ def _pieces(drawn: Skeleton, values: np.ndarray) -> np.ndarray:
     return np.concatenate(pieces)
 
 
-def _turns() -> np.ndarray:
-    return np.exp(2j * np.pi * np.arange(FRAMES) / FRAMES)
-
-
 def _times() -> rr.TimeColumn:
     return rr.TimeColumn(VIBRATION, duration=FRAME_MS * np.arange(FRAMES).astype("timedelta64[ms]"))
 
@@ -179,40 +177,27 @@ def moving_shapes(found: MatrixModes, geometry: Geometry) -> More:
     """Draws the first modes of measured points in motion, coloured by how far each point moves."""
 
     def drawn(stream: rr.RecordingStream) -> tuple[rrb.Container, rrb.TimePanel]:
-        shown = list(enumerate(found.modes[:MOST_SHOWN], 1))
-        for k, mode in shown:
-            motion = motions(found.dofs, mode.shape, geometry)
-            _points_and_lines(stream, f"modes/shape/{k}", geometry, motion)
-        views = [
-            rrb.Spatial3DView(
-                origin=f"/modes/shape/{k}", name=f"{k}: {mode.frequency_hz:.4g} Hz",
-                background=GROUND,
-            )
-            for k, mode in shown
-        ]  # fmt: skip
+        index = {node: k for k, node in enumerate(geometry.nodes)}
+        ends = np.array([(index[a], index[b]) for a, b in geometry.lines], int).reshape(-1, 2)
+        rest, views = geometry.position_m, []
+        extent = float(np.linalg.norm(np.ptp(rest, axis=0))) or 1.0
+        radius = 0.004 * extent
+        stream.set_time(VIBRATION, duration=np.timedelta64(BEFORE_US, "us"))
+        for k, mode in enumerate(found.modes[:MOST_SHOWN], 1):
+            path, motion = f"modes/shape/{k}", motions(found.dofs, mode.shape, geometry)
+            way = FARTHEST * extent * motion
+            still = rr.LineStrips3D(rest[ends], colors=REST, radii=radius / 4)
+            stream.log(f"{path}/rest", still, static=True)
+            colours = _colours(np.linalg.norm(np.abs(way), axis=1))
+            stream.log(f"{path}/points", rr.Points3D(rest, colors=colours, radii=radius))
+            move_points(stream, f"{path}/points", rest, way)
+            move_lines(stream, f"{path}/lines", rest[ends], way[ends], radius / 2)
+            name = f"{k}: {mode.frequency_hz:.4g} Hz"
+            views.append(rrb.Spatial3DView(origin=f"/{path}", name=name, background=GROUND))
+        stream.reset_time()
         moves = rrb.TimePanel(
-            state="collapsed", timeline=VIBRATION, play_state="playing", loop_mode="all", fps=FRAMES
+            state="collapsed", timeline=VIBRATION, play_state="playing", loop_mode="all"
         )
         return rrb.Grid(*views, name="Mode shapes"), moves
 
     return drawn
-
-
-def _points_and_lines(
-    stream: rr.RecordingStream, path: str, geometry: Geometry, motion: np.ndarray
-) -> None:
-    index = {node: k for k, node in enumerate(geometry.nodes)}
-    ends = np.array([(index[a], index[b]) for a, b in geometry.lines], int).reshape(-1, 2)
-    rest = geometry.position_m
-    radius = 0.004 * (float(np.linalg.norm(np.ptp(rest, axis=0))) or 1.0)
-    still = rr.LineStrips3D(rest[ends], colors=REST, radii=radius / 4)
-    stream.log(f"{path}/rest", still, static=True)
-    for frame, turn in enumerate(_turns()):
-        stream.set_time(VIBRATION, sequence=frame)
-        place = moved(geometry, motion, float(np.angle(turn)))
-        size = np.linalg.norm(np.real(motion * turn), axis=1)
-        colours = (255 * colormaps["plasma"](size)[:, :3]).astype(np.uint8)
-        stream.log(f"{path}/points", rr.Points3D(place, colors=colours, radii=radius))
-        between = (255 * colormaps["plasma"](size[ends].mean(axis=1))[:, :3]).astype(np.uint8)
-        stream.log(f"{path}/lines", rr.LineStrips3D(place[ends], colors=between, radii=radius / 2))
-    stream.reset_time()

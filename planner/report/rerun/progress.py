@@ -6,18 +6,17 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
-from planner.report.frf_plots import AXES
-from planner.report.plot_text import plain_text
+from planner.report.plot_marks import AXES, magnitude, panels
 
 LINES = 300  # frequency lines of a plot: as many as its width shows
-DECADES = 4.0  # of an FRF shown below its largest value
-PULSE_MS = (5.0, 35.0)  # of a hit shown before and after its peak
+FAINTEST = 1e-4  # of an FRF's largest magnitude: what is smaller is not shown
+PULSE_MS = (-5.0, 35.0)  # of a hit, shown from its peak
 SIZE = (7.0, 3.6)  # inches
 EXPECTED, SPREAD, TARGET = (255, 150, 40), (150, 95, 40), (120, 200, 120)
 MEASURED, ALL = (235, 235, 235), (150, 154, 158)
@@ -29,28 +28,24 @@ def frf_figures(
     """Direct FRFs xx, yy, zz of the tool: measured, predicted before that, and believed now."""
     low, high = model.cell.config.modes.band_hz
     lines = np.linspace(low, high, LINES)
-    now = np.abs(model.frf(pose.q[None], lines)[0][0])
+    now = model.frf(pose.q[None], lines)[0][0]
     then = None if before is None or not before.labelled else before.frf(pose.q[None], lines)
-    frf = None if measured is None else measured.frf
-    figures = []
+    frf, figures = None if measured is None else measured.frf, []
     for i, axis in enumerate(AXES):
-        title = f"{plain_text(pose.pose)}: response along {axis} to hits along {axis}"
-        figure, panel = _figure(title, "frequency (Hz)", "|H| (m/s²/N)")
-        top = float(np.nanmax(now[i, i]))
+        figure, panel = _figure(
+            f"{pose.pose}: response along {axis} to hits along {axis}", "|H| (m/s²/N)"
+        )
+        floor = FAINTEST * float(np.abs(now[i, i]).max())
         if then is not None:
-            size, sd = np.abs(then[0][0, i, i]), then[1][0, i, i]
-            panel.fill_between(
-                lines, np.maximum(size - 2 * sd, 0.0), size + 2 * sd, color="tab:orange",
-                alpha=0.25, lw=0, label="± 2 sd",
-            )  # fmt: skip
-            panel.plot(lines, size, color="tab:orange", label="predicted before")
-            top = max(top, float(np.nanmax(size)))
-        panel.plot(lines, now[i, i], color="tab:blue", lw=1.8, label="believed now")
+            mean, sd = then[0][0, i, i], then[1][0, i, i]
+            style = {"color": "tab:orange", "label": "predicted before"}
+            magnitude(panel, lines, mean, sd, floor, **style)
+        magnitude(panel, lines, now[i, i], color="tab:blue", lw=1.8, label="believed now")
         if frf is not None:
-            seen = np.interp(lines, frf.frequency_hz, np.abs(frf.accelerance[i, i]))
-            panel.plot(lines, seen, color="black", lw=1.0, label="measured")
-            top = max(top, float(np.nanmax(seen, initial=0.0)))
-        panel.set(yscale="log", xlim=(low, high), ylim=(2 * top * 10**-DECADES, 2 * top))
+            style = {"color": "black", "lw": 1.0, "label": "measured"}
+            magnitude(panel, frf.frequency_hz, frf.accelerance[i, i], **style)
+        panel.set(xlabel="frequency (Hz)", xlim=(low, high))
+        panel.set_ylim(bottom=floor)
         panel.legend(fontsize=7, loc="upper right", ncols=4)
         figures.append(figure)
     return figures
@@ -59,25 +54,23 @@ def frf_figures(
 def force_figure(measured: MeasuredPose) -> Figure:
     """The force of one hit along each axis around its peak."""
     title = "Force, one hit an axis" if measured.hits else "FRFs were imported: no hits to show"
-    figure, panel = _figure(title, "time after the peak (ms)", "force (N)")
+    figure, panel = _figure(title, "force (N)")
     shown = {hit.axis[-1]: hit for hit in reversed(measured.hits)}
     for axis, hit in sorted(shown.items()):
         ms = 1000 * np.arange(hit.force_n.size) / hit.sampling_rate_hz
         ms = ms - ms[int(np.argmax(np.abs(hit.force_n)))]
         panel.plot(ms, np.abs(hit.force_n), label=f"along {axis}")
-    panel.set(xlim=(-PULSE_MS[0], PULSE_MS[1]))
+    panel.set(xlabel="time after the peak (ms)", xlim=PULSE_MS)
     if shown:
         panel.legend(fontsize=7)
     return figure
 
 
-def _figure(title: str, x: str, y: str):
-    figure = Figure(figsize=SIZE, layout="constrained")
-    FigureCanvasAgg(figure)
-    panel = figure.add_subplot()
-    panel.set(title=title, xlabel=x, ylabel=y)
-    panel.grid(True, which="both", alpha=0.25)
-    return figure, panel
+def _figure(title: str, y: str) -> tuple[Figure, Axes]:
+    figure, grid = panels(SIZE, title)
+    grid[0, 0].set_ylabel(y)
+    grid[0, 0].grid(True, which="both", alpha=0.25)
+    return figure, grid[0, 0]
 
 
 def measured_modes(pose: LabelledPose, before: Model | None) -> dict[str, float]:
