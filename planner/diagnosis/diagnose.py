@@ -11,7 +11,7 @@ from planner.diagnosis.exponential_window import screen_window
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.found_laws import straightened, with_laws
 from planner.diagnosis.levels import LevelLaw, Levels, level_laws
-from planner.diagnosis.search import FITTED, LEAST, Explored, Explorer
+from planner.diagnosis.search import LEAST, Explored, explored
 from planner.diagnosis.tone import screen_tone
 from planner.diagnosis.verdict import NamedEffect, Verdict, judged, likeliest
 from planner.dynamics.simulation import Simulation
@@ -23,7 +23,7 @@ from planner.fit.held_out import set_aside
 from planner.fit.identify import TOO_SOFT
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
-from planner.fit.search import Search
+from planner.fit.search import SEARCHED, Search
 from planner.fit.structure import RobotPrior, RobotStructure
 from planner.frf.frf import Frf
 from planner.measurement.agreement import Similarity, similarity_of
@@ -197,11 +197,10 @@ def _explored(
     what a law has on average, from pose to pose, by effects that are not there.
     """
 
-    def explored() -> Explored:
-        steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
-        return Explorer(steps).explored()
+    def find() -> Explored:
+        return explored(replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5)))
 
-    found, levels, straight = explored(), None, recorded
+    found, levels, straight = find(), None, recorded
     for _ in range(ROUNDS if recorded.visits else 0):
         tell("comparing hits of different force", 0.85)
         told = level_laws(recorded, likeliest(found))
@@ -211,7 +210,7 @@ def _explored(
         there = RobotPosterior.of(likeliest(found)).simulation
         straight = straightened(recorded, with_laws(there, told.laws, recorded))
         search = searching(straight.ended_frfs, straight.q, simulation, _order(straight))
-        found = explored()
+        found = find()
     return straight, search, found, levels
 
 
@@ -285,7 +284,7 @@ def _held_out(
     search: Search, fits: tuple[StructureFit, StructureFit], aside: tuple[int, ...]
 ) -> ThreefoldSimilarity:
     """Of fits that never saw the poses set aside; the structure was chosen with all."""
-    data = search.data(FITTED)
+    data = search.data(SEARCHED)
     kept = np.array([i for i in range(len(data.q)) if i not in aside])
     again = []
     for fit in fits:
