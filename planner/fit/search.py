@@ -112,10 +112,12 @@ class Search:
             return plain, plain
         if size_of(plain) <= max(EXPLAINED, self.floor):  # nothing need be missing
             best = plain
+        elif warm is None and self.built:  # its bearings give already
+            best = plain
         elif warm is None:
             springs = tuple(e for e in self.prior.repertoire.effects if e.springs)
-            freed = replace(stated, effects=(*self.built, *springs))
-            best = self._removed(self._noted(converged(self._begun(data, freed))))
+            freed = replace(stated, effects=springs)
+            best = self._noted(converged(self._begun(data, freed)))
         else:
             misfit, x = self._again(warm, data, max(warm.size, UNEXPLAINED))
             best = self._noted(converged(settled(misfit, minimised(misfit, x, 4, 1.0))))
@@ -320,11 +322,13 @@ def placed(base: StructureFit, start: Start) -> list[np.ndarray]:
     x = structure.carried(base.structure, base.at.x)
     effect = structure.effects[-1]
     if not effect.springs:
-        if start.moved is not None:
-            x = structure.carried(base.structure, base.at.x + start.moved)
-            x = np.clip(x, structure.least, structure.mean + REACH * structure.sd)
+        begun = [(x, start.psi), *((x, psi) for psi in effect.beside(start.psi))]
+        if start.moved is not None:  # all else with it, as the first order has it
+            y = structure.carried(base.structure, base.at.x + start.moved)
+            most = structure.mean + REACH * structure.sd
+            begun.append((np.clip(y, structure.least, most), start.psi))
         out = []
-        for psi in (start.psi, *effect.beside(start.psi)):
+        for x, psi in begun:
             z = x.copy()
             z[structure.own[-1]] = psi
             out.append(z)
