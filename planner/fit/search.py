@@ -110,9 +110,8 @@ class Search:
         plain = self._noted(converged(self._begun(data, stated)))
         if not self.extend:
             return plain, plain
-        if size_of(plain) <= max(EXPLAINED, self.floor):  # nothing need be missing
-            best = plain
-        elif warm is None and self.built:  # its bearings give already
+        explained = size_of(plain) <= max(EXPLAINED, self.floor)  # nothing need be missing
+        if explained or (warm is None and self.built):  # what is built in gives at all bearings
             best = plain
         elif warm is None:
             springs = tuple(e for e in self.prior.repertoire.effects if e.springs)
