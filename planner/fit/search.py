@@ -27,7 +27,8 @@ from planner.fit.fitted import (
 )
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
-from planner.fit.structure import REACH, RobotPrior, RobotStructure, effects_free, exported
+from planner.fit.starts import from_stated, leaders, placed, pulled
+from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.measurement.truncated_decay import completed
@@ -43,8 +44,7 @@ COMPLETIONS = 2  # rounds
 MOST_OPERATORS = 3  # beside springs: more would imitate what the fit lacks
 IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which nothing is followed
 STIFF_AT_FIRST, WIDENING = 3.0, 10  # prior sds of springs that may be there; steps
-KEPT, FOLLOWED, SETTLED, FARTHEST = 6, 6, 3, 5  # by first order, followed, settled, from afar
-PULLED = 1.5  # prior sds, from which another prior may pay
+FOLLOWED, SETTLED, FARTHEST = 6, 3, 5  # how many are followed, settled, come from afar
 # Sizes: with all lines at first; up to which nothing need be missing; from which many begin afar.
 CLOSE, EXPLAINED, UNEXPLAINED = 0.01, 0.008, 0.03
 
@@ -197,8 +197,8 @@ class Search:
         free, every = effects_free(base.structure), self.prior.repertoire.effects
         again = (e for e in every if e.several and e not in free)  # more may hang on a link
         far = size_of(base) >= UNEXPLAINED
-        tried = (e for e in (*free, *again) if far or _pulled(base, e))
-        return _leaders([s for e in tried for s in e.starts(motions, gain)])
+        tried = (e for e in (*free, *again) if far or pulled(base, e))
+        return leaders([s for e in tried for s in e.starts(motions, gain)])
 
     def _compete(self, base: StructureFit, starts: Sequence[Start]) -> list[StructureFit]:
         """Starts beside a structure: a few steps each, the best farther, the very best settled."""
@@ -238,7 +238,7 @@ class Search:
         for start in starts:
             structure = base.structure.with_effect(start.effect)
             misfit = FrfMisfit(structure, rough, self.tolerances, None, self.floor)
-            for x in _afar(structure, start):
+            for x in from_stated(structure, start):
                 if misfit.possible(x):
                     at = minimised(misfit, x, NEARER)
                     found.append((at.value, structure, at.x))
@@ -315,83 +315,10 @@ class Search:
         return StructureFit(misfit, at, misfit.evidence(at))
 
 
-def placed(base: StructureFit, start: Start) -> list[np.ndarray]:
-    """Where fits with one more effect begin."""
-    structure = base.structure.with_effect(start.effect)
-    x = structure.carried(base.structure, base.at.x)
-    effect = structure.effects[-1]
-    if not effect.springs:
-        begun = [(x, start.psi), *((x, psi) for psi in effect.beside(start.psi))]
-        if start.moved is not None:  # all else with it, as the first order has it
-            y = structure.carried(base.structure, base.at.x + start.moved)
-            most = structure.mean + REACH * structure.sd
-            begun.append((np.clip(y, structure.least, most), start.psi))
-        out = []
-        for x, psi in begun:
-            z = x.copy()
-            z[structure.own[-1]] = psi
-            out.append(z)
-        return out
-    new = [i for i, p in enumerate(structure.parameters) if set(p.blocks) & set(effect.springs)]
-    stiff = [i for i in new if i < structure.stiffnesses]
-    x[stiff] = structure.mean[stiff] + structure.sd[stiff]
-    starts = [x]
-    # Stated springs that strayed far softer may stand in for the new ones: back to what is stated,
-    # the new ones as soft as they were.
-    away = (x - structure.mean) / structure.sd
-    stated = [i for i in range(structure.stiffnesses) if structure.parameters[i].stated]
-    far = [i for i in stated if away[i] < -1.5]
-    if far:
-        z = x.copy()
-        softest = x[far].min()
-        z[far] = structure.mean[far]
-        low, high = structure.mean[stiff] - 3 * structure.sd[stiff], structure.mean[stiff]
-        z[stiff] = np.clip(softest, low, high)
-        starts.append(z)
-    return starts
-
-
-def _afar(structure: RobotStructure, start: Start) -> Iterable[np.ndarray]:
-    """Where a fit from afar begins: as stated, new springs as expected and softer."""
-    effect, x = structure.effects[-1], structure.mean.copy()
-    if not effect.springs:
-        x[structure.own[-1]] = start.psi
-        return (x,)
-    new = [i for i in range(structure.stiffnesses) if not structure.parameters[i].stated]
-    mine = [i for i in new if set(structure.parameters[i].blocks) & set(effect.springs)]
-    softer = x.copy()
-    softer[mine] -= 1.2 * structure.sd[mine]
-    return x, softer
-
-
-def _pulled(base: StructureFit, effect: Operator) -> bool:
-    """Whether anything is gained where springs that are there need not be as they are expected."""
-    s, known = base.structure, effect.spring_priors
-    there = [i for i in range(s.stiffnesses) if known.keys() & set(s.parameters[i].blocks)]
-    away = np.abs((base.at.x - s.mean) / s.sd)[there]
-    return not there or bool(np.any(away > PULLED))
-
-
 def _change(before: StructureFit, after: StructureFit) -> float:
     """By how much of |H| at the measured poses both differ."""
     one, other = (np.abs(f.at.motion.accelerance) for f in (before, after))
     return float(np.linalg.norm(other - one) / np.linalg.norm(other))
-
-
-def _leaders(starts: Sequence[Start]) -> list[Start]:
-    """Springs, which the first order says little of, the first operators, the best of each kind."""
-    kept: list[Start] = []
-    kinds: set[str] = set()
-    operators = 0
-    for start in sorted(starts, key=lambda s: -s.nats):
-        effect: Operator = start.effect
-        new = effect.kind not in kinds
-        told = np.isinf(start.nats) or effect.artefact
-        if told or (start.nats > 0 and (operators < KEPT or new)):
-            kept.append(start)
-            kinds.add(effect.kind)
-            operators += not np.isinf(start.nats)
-    return kept
 
 
 def _best_of_each(pool: Iterable[StructureFit]) -> list[StructureFit]:
