@@ -11,7 +11,7 @@ from planner.diagnosis.exponential_window import screen_window
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.found_laws import straightened, with_laws
 from planner.diagnosis.levels import LevelLaw, Levels, level_laws
-from planner.diagnosis.search import LEAST, Explored, explored
+from planner.diagnosis.search import FITTED, LEAST, Explored, Explorer
 from planner.diagnosis.tone import screen_tone
 from planner.diagnosis.verdict import NamedEffect, Verdict, judged, likeliest
 from planner.dynamics.simulation import Simulation
@@ -23,7 +23,7 @@ from planner.fit.held_out import set_aside
 from planner.fit.identify import TOO_SOFT
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
-from planner.fit.search import SEARCHED, Search
+from planner.fit.search import Search
 from planner.fit.structure import RobotPrior, RobotStructure
 from planner.frf.frf import Frf
 from planner.measurement.agreement import Similarity, similarity_of
@@ -202,10 +202,11 @@ def _explored(
     what a law has on average, from pose to pose, by effects that are not there.
     """
 
-    def find() -> Explored:
-        return explored(replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5)))
+    def explored() -> Explored:
+        steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
+        return Explorer(steps).explored()
 
-    found, levels, straight = find(), None, recorded
+    found, levels, straight = explored(), None, recorded
     for _ in range(ROUNDS if recorded.visits else 0):
         tell("comparing hits of different force", 0.85)
         told = level_laws(recorded, likeliest(found))
@@ -215,7 +216,7 @@ def _explored(
         there = RobotPosterior.of(likeliest(found)).simulation
         straight = straightened(recorded, with_laws(there, told.laws, recorded))
         search = searching(straight.ended_frfs, straight.q, simulation, _order(straight))
-        found = find()
+        found = explored()
     return straight, search, found, levels
 
 
@@ -289,7 +290,7 @@ def _held_out(
     search: Search, fits: tuple[StructureFit, StructureFit], aside: tuple[int, ...]
 ) -> ThreefoldSimilarity:
     """Of fits that never saw the poses set aside; the structure was chosen with all."""
-    data = search.data(SEARCHED)
+    data = search.data(FITTED)
     kept = np.array([i for i in range(len(data.q)) if i not in aside])
     again = []
     for fit in fits:

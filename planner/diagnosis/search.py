@@ -1,15 +1,30 @@
-"""Which effects explain the recordings: what a search settled, by sets of effects."""
+"""Which effects explain the recordings: all compete at all places, one more at a time.
 
-from dataclasses import dataclass, replace
+Where little is left, few steps from the fit so far tell them apart; where much is, each is fitted
+from afar by logarithms first. What is settled is kept: the posterior is over all of it.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
 from planner.effects.effect import Operator
-from planner.fit.fitted import StructureFit
+from planner.fit.fitted import (
+    StructureFit,
+    converged,
+    removal_costs,
+    settled,
+    without,
+)
 from planner.fit.search import Search
+from planner.fit.structure import RobotStructure
 
+FITTED, SCREENED = 24, 48  # lines a pose
 RARE = 5.0  # nats: one effect at one place, of some 70, is so much rarer than none
 LEAST = RARE + float(np.log(9.0))  # nats that one more effect must gain: it is 9 times as likely
+SETTLED = 4  # of those that compete
+ROUNDS, FROM_AFAR = 4, 2
 
 Key = frozenset[tuple[str, str]]
 
@@ -40,16 +55,79 @@ class Explored:
     settled: tuple[StructureFit, ...]
 
 
-def explored(search: Search) -> Explored:
-    """Everything that a search settles, the likeliest of each set of effects."""
-    pool: dict[Key, StructureFit] = {}
+@dataclass(frozen=True, eq=False)
+class Explorer:
+    """Explains FRFs by the effects of a search's repertoire."""
 
-    def keep(one: StructureFit) -> None:
+    search: Search
+
+    def explored(self) -> Explored:
+        """From the robot as stated on."""
+        search = self.search
+        data = search.data(FITTED)
+        built = search.prior.repertoire.as_built()
+        stated = RobotStructure(search.prior, built, data.sensors)
+        plain = best = converged(search.begun(data, stated))
+        pool: dict[Key, StructureFit] = {key_of(plain): plain}
+        for number in range(ROUNDS):
+            ends = self._further(best, afar=number < FROM_AFAR)
+            _keep(pool, ends)
+            if not ends or ends[0].evidence < best.evidence + LEAST:
+                break
+            search.tell(f"+ {ends[0].structure.effects[-1].label}")
+            before, best = best, self._pruned(converged(ends[0]))
+            _keep(pool, [best])
+            if _change(before, best) < search.floor:
+                break  # what is smaller yet does not matter
+        best = self._exchanged(best, pool)
+        return Explored(plain, best, tuple(pool.values()))
+
+    def _exchanged(self, best: StructureFit, pool: dict[Key, StructureFit]) -> StructureFit:
+        """Each of several effects against all others in its place."""
+        for effect in added(best) if len(added(best)) > 1 else ():
+            if effect not in best.structure.effects:
+                continue
+            fewer = without(best, [effect])
+            if fewer is None:
+                continue
+            fewer = settled(fewer.misfit, fewer.at)
+            ends = self._further(fewer)
+            _keep(pool, [fewer, *ends])
+            if ends and ends[0].evidence > best.evidence + LEAST / 4:
+                self.search.tell(f"{effect.label} → {ends[0].structure.effects[-1].label}")
+                best = self._pruned(converged(ends[0]))
+                _keep(pool, [best])
+        return best
+
+    def _pruned(self, best: StructureFit) -> StructureFit:
+        """Without what the others make superfluous."""
+        costs = removal_costs(best)
+        for effect in sorted(added(best), key=lambda e: costs[e]):
+            if costs[effect] > 100 or len(added(best)) < 2:
+                break
+            fewer = without(best, [effect])
+            if fewer is None:
+                continue
+            fewer = settled(fewer.misfit, fewer.at)
+            if fewer.evidence > best.evidence - LEAST / 2:
+                self.search.tell(f"− {effect.label}")
+                best = fewer
+        return best
+
+    def _further(self, base: StructureFit, afar: bool = False) -> list[StructureFit]:
+        """With one effect more, settled, likeliest first."""
+        starts = self.search.starts(base, SCREENED)
+        return self.search.compete(base, starts, count=SETTLED, unmoved=False, afar=afar)
+
+
+def _change(before: StructureFit, after: StructureFit) -> float:
+    """By how much of |H| at the measured poses both differ."""
+    one, other = (np.abs(f.at.motion.accelerance) for f in (before, after))
+    return float(np.linalg.norm(other - one) / np.linalg.norm(other))
+
+
+def _keep(pool: dict[Key, StructureFit], more: Iterable[StructureFit]) -> None:
+    for one in more:
         known = pool.get(key_of(one))
         if known is None or one.evidence > known.evidence:
             pool[key_of(one)] = one
-
-    built = search.prior.repertoire.as_built()
-    plain, best = replace(search, built=built, note=keep).explored()
-    keep(best)
-    return Explored(plain, best, tuple(pool.values()))

@@ -61,10 +61,8 @@ class Search:
     tell: Callable[[str], None] = lambda _: None
     extend: bool = True  # where what is stated does not explain them
     order: np.ndarray | None = None  # as in `FrfData.of`
-    floor: float = 0.0  # as in `FrfMisfit`; effects that change less are not looked for
+    floor: float = 0.0  # as in `FrfMisfit`
     widen: bool = False  # whether `StructureFit.wider` is asked for
-    built: tuple[Operator, ...] = ()  # effects that every robot has
-    note: Callable[[StructureFit], None] = lambda _: None  # of all that is settled
 
     @cached_property
     def _data(self) -> dict[int, FrfData]:
@@ -99,35 +97,26 @@ class Search:
         return replace(self, frfs=tuple(out))
 
     def _found(self, warm: FitRecord | None) -> StructureFit:
-        found = self._last(self.explored(warm)[1])
-        return replace(found, wider=self._widened(found)) if self.widen and self.extend else found
-
-    def explored(self, warm: FitRecord | None = None) -> tuple[StructureFit, StructureFit]:
-        """As stated, and with what explains them best, on the lines on which it is searched."""
         data = self.data(SEARCHED)
-        stated = RobotStructure(self.prior, self.built, data.sensors)
+        stated = RobotStructure(self.prior, (), data.sensors)
         self.tell("as stated")
-        plain = self._noted(converged(self._begun(data, stated)))
+        plain = converged(self.begun(data, stated))
         if not self.extend:
-            return plain, plain
-        explained = size_of(plain) <= max(EXPLAINED, self.floor)  # nothing need be missing
-        if explained or (warm is None and self.built):  # what is built in gives at all bearings
+            return self._last(plain)
+        if size_of(plain) <= EXPLAINED:  # nothing need be missing
             best = plain
         elif warm is None:
             springs = tuple(e for e in self.prior.repertoire.effects if e.springs)
             freed = replace(stated, effects=springs)
-            best = self._noted(converged(self._begun(data, freed)))
+            best = converged(self.begun(data, freed))
         else:
             misfit, x = self._again(warm, data, max(warm.size, UNEXPLAINED))
-            best = self._noted(converged(settled(misfit, minimised(misfit, x, 4, 1.0))))
+            best = converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
         best = self._evolved(best)
         if plain.evidence > best.evidence and plain.structure.effects != best.structure.effects:
             best = self._evolved(plain)
-        return plain, best
-
-    def _noted(self, found: StructureFit) -> StructureFit:
-        self.note(found)
-        return found
+        found = self._last(best)
+        return replace(found, wider=self._widened(found)) if self.widen else found
 
     def _again(self, known: FitRecord, data: FrfData, size: float) -> tuple[FrfMisfit, np.ndarray]:
         structure = RobotStructure(self.prior, known.effects, data.sensors)
@@ -145,7 +134,7 @@ class Search:
         vars(found)["shares"] = known.shares
         return found
 
-    def _begun(
+    def begun(
         self, data: FrfData, structure: RobotStructure, x: np.ndarray | None = None
     ) -> StructureFit:
         """From x (the prior's mean): logarithms first, then FRFs that count more and more."""
@@ -165,34 +154,29 @@ class Search:
             newest = added.structure.effects[-1] if added is not best else None
             fewer = self._removed(added, newest)
             changed = fewer is not best
-            small = added is not best and _change(best, added) < self.floor
-            best = self._noted(converged(fewer)) if changed else best
-            swapped = best if small else self._exchanged(best)
-            if swapped is best and (small or not changed):
+            best = converged(fewer) if changed else best
+            swapped = self._exchanged(best)
+            if swapped is best and not changed:
                 break
             best = swapped
         return best
-
-    def _more(self, found: StructureFit) -> list[Operator]:
-        """Effects beside those that every robot has."""
-        return [e for e in found.structure.effects if e not in self.built]
 
     def _added(self, best: StructureFit) -> StructureFit:
         """With the one effect that gains most, if that is enough.
 
         Where so many operators do not explain the FRFs, more would only imitate what does.
         """
-        if sum(not e.springs for e in self._more(best)) >= MOST_OPERATORS:
+        if sum(not e.springs for e in best.structure.effects) >= MOST_OPERATORS:
             return best
-        ends = self._compete(best, self._starts(best))
+        ends = self.compete(best, self.starts(best, SCREENED))
         if not ends or ends[0].evidence < best.evidence + LEAST:
             return best
         self.tell(f"+ {ends[0].structure.effects[-1].label}")
         return converged(ends[0])
 
-    def _starts(self, base: StructureFit) -> list[Start]:
+    def starts(self, base: StructureFit, lines: int) -> list[Start]:
         """All effects that it has not; of operators those that the first order ranks first."""
-        misfit = replace(base.misfit, data=self.data(SCREENED))
+        misfit = replace(base.misfit, data=self.data(lines))
         motions, gain = misfit.first_order(base.at.x, base.at.own)
         free, every = effects_free(base.structure), self.prior.repertoire.effects
         again = (e for e in every if e.several and e not in free)  # more may hang on a link
@@ -200,16 +184,27 @@ class Search:
         tried = (e for e in (*free, *again) if far or pulled(base, e))
         return leaders([s for e in tried for s in e.starts(motions, gain)])
 
-    def _compete(self, base: StructureFit, starts: Sequence[Start]) -> list[StructureFit]:
-        """Starts beside a structure: a few steps each, the best farther, the very best settled."""
+    def compete(
+        self,
+        base: StructureFit,
+        starts: Sequence[Start],
+        *,
+        count: int = SETTLED,
+        unmoved: bool = True,
+        afar: bool = True,
+    ) -> list[StructureFit]:
+        """Starts beside a structure: a few steps each, the best farther, `count` settled.
+
+        `unmoved` as in `placed`; where much is left, and `afar`, from what is stated too.
+        """
         rough = self._on(base, self.data(ROUGH))
-        pool = [f for s in starts if (f := self._few(rough, s)) is not None]
-        if size_of(base) >= UNEXPLAINED:
+        pool = [f for s in starts if (f := self._few(rough, s, unmoved)) is not None]
+        if afar and size_of(base) >= UNEXPLAINED:
             pool += self._from_afar(rough, starts)
         near = _best_of_each(p for p in pool if p.evidence > rough.evidence - FAR)
         followed = [self._on(p, base.misfit.data) for p in near[:FOLLOWED]]
         followed = _best_of_each(stepped(p, FURTHER) for p in followed)
-        ends = [self._noted(settled(p.misfit, p.at)) for p in followed[:SETTLED]]
+        ends = [settled(p.misfit, p.at) for p in followed[:count]]
         return sorted(ends, key=evidence_of, reverse=True)
 
     def _on(self, found: StructureFit, data: FrfData) -> StructureFit:
@@ -220,12 +215,12 @@ class Search:
         at = misfit(found.at.x, found.at.own)
         return StructureFit(misfit, at, misfit.evidence(at))
 
-    def _few(self, base: StructureFit, start: Start) -> StructureFit | None:
+    def _few(self, base: StructureFit, start: Start, unmoved: bool) -> StructureFit | None:
         structure = base.structure.with_effect(start.effect)
         misfit = replace(base.misfit, structure=structure)
         # Where the first order leads to no robot that can be, it begins without the effect.
         none = structure.carried(base.structure, base.at.x)
-        begun = [x for x in placed(base, start) if misfit.possible(x)]
+        begun = [x for x in placed(base, start, unmoved) if misfit.possible(x)]
         ends = []
         for x in begun or [x for x in (none,) if misfit.possible(x)]:
             at = minimised(misfit, x, FEW, HOPELESS, base.at.own)
@@ -243,14 +238,13 @@ class Search:
                     at = minimised(misfit, x, NEARER)
                     found.append((at.value, structure, at.x))
         found.sort(key=lambda one: one[0])
-        return [self._begun(base.misfit.data, s, x) for _, s, x in found[:FARTHEST]]
+        return [self.begun(base.misfit.data, s, x) for _, s, x in found[:FARTHEST]]
 
-    def _removed(self, best: StructureFit, newest: Operator | None = None) -> StructureFit:
+    def _removed(self, best: StructureFit, newest: Operator | None) -> StructureFit:
         """Without what the others make superfluous, what seems to matter least first."""
         while True:
             costs = removal_costs(best)
-            tried = [e for e in self._more(best) if e is not newest]
-            least = sorted(tried, key=lambda e: costs[e])
+            least = sorted((e for e in costs if e is not newest), key=lambda e: costs[e])
             idle = [e for e in least if costs[e] < IDLE]
             groups = ([idle] if len(idle) > 1 else []) + [[e] for e in least if costs[e] < FAR]
             for group in groups:
@@ -258,7 +252,7 @@ class Search:
                 if fewer is None or fewer.evidence < best.evidence - FAR:
                     continue
                 if fewer.evidence < best.evidence:
-                    fewer = self._noted(settled(fewer.misfit, fewer.at))
+                    fewer = settled(fewer.misfit, fewer.at)
                 if fewer.evidence > best.evidence - SAME:
                     self.tell("− " + ", ".join(e.label for e in group))
                     best = fewer
@@ -268,7 +262,7 @@ class Search:
 
     def _exchanged(self, best: StructureFit) -> StructureFit:
         """An operator at another place, where that is likelier."""
-        for effect in self._more(best):
+        for effect in best.structure.effects:
             base = without(best, [effect])
             if base is None or effect.springs:
                 continue
@@ -279,7 +273,7 @@ class Search:
                 if type(e) is type(effect) and e.at != effect.at.split("#")[0]
             ]  # fmt: skip
             starts = [e.elsewhere(psi, motions, gain) for e in others]
-            ends = self._compete(base, starts)
+            ends = self.compete(base, starts)
             if ends and ends[0].evidence > best.evidence + SAME:
                 self.tell(f"{effect.label} → {ends[0].structure.effects[-1].label}")
                 return converged(ends[0])
@@ -313,12 +307,6 @@ class Search:
                 misfit, at = wider, minimised(wider, x, FURTHER, 1.0, at.own)
         at = minimised(misfit, at.x, WIDENING, 1.0, own=at.own)
         return StructureFit(misfit, at, misfit.evidence(at))
-
-
-def _change(before: StructureFit, after: StructureFit) -> float:
-    """By how much of |H| at the measured poses both differ."""
-    one, other = (np.abs(f.at.motion.accelerance) for f in (before, after))
-    return float(np.linalg.norm(other - one) / np.linalg.norm(other))
 
 
 def _best_of_each(pool: Iterable[StructureFit]) -> list[StructureFit]:

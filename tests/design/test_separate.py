@@ -11,10 +11,11 @@ from planner.design.discrimination import Tied, separation
 from planner.design.extra_sensor import WORTH, extra_sensor
 from planner.design.next_hit import next_hit
 from planner.diagnosis.diagnose import searching
+from planner.diagnosis.search import FITTED
 from planner.dynamics.simulation import Simulation
 from planner.fit.fitted import converged, settled
 from planner.fit.misfit import FrfMisfit
-from planner.fit.search import SEARCHED, Search
+from planner.fit.search import Search
 from planner.fit.structure import RobotStructure
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot
@@ -45,7 +46,7 @@ class Cell:
 
     def candidates(self) -> tuple[Tied, ...]:
         """Both explanations, settled."""
-        data, prior = self.search.data(SEARCHED), self.search.prior
+        data, prior = self.search.data(FITTED), self.search.prior
         found, built = [], prior.repertoire.as_built()
         every = {effect.label: effect for effect in prior.repertoire.effects}
         for label, place in PLACES.items():
