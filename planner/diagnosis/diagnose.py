@@ -129,6 +129,11 @@ class Diagnosis:
         told = [law.table for law in self._laws]
         return tuple(law for law in self.simulation.robot.config.law if law in told)
 
+    @property
+    def unwritten(self) -> tuple[tuple[str, str], ...]:
+        """Laws, and where, that would take away more than the spring of their joint has."""
+        return tuple((law.effect, law.at) for law in self._laws if law.table not in self.laws)
+
     def _share(self, law: LevelLaw) -> float:
         place = law.effect, law.at
         return sum(c.probability for c in self.verdict.candidates if place in c.places)

@@ -2,16 +2,17 @@
 
 Two starts, as stated and with base and all bearings, lest what is missing be hidden by what it
 bent. Then all effects at all places compete: operators are ranked by their first-order columns,
-springs are always tried nonlinearly, a few steps each, the best are settled.
+springs are always tried nonlinearly, a few steps each, where much is left from afar too, by
+logarithms; the best are settled.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from planner.effects.effect import Operator, Start
-from planner.effects.springs import BendingLink
 from planner.fit.data import FrfData
 from planner.fit.fitted import (
     FitRecord,
@@ -26,24 +27,26 @@ from planner.fit.fitted import (
 )
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
-from planner.fit.structure import REACH, RobotPrior, RobotStructure, effects_free, exported
+from planner.fit.starts import from_stated, leaders, placed, pulled
+from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.measurement.truncated_decay import completed
 
 SEARCHED, SCREENED, LAST = 28, 64, 44  # lines a pose: while searching, for operators, at the end
+ROUGH, AFAR = 14, 12  # where many are tried a few steps each, and by logarithms from what is stated
 ANNEALED = ((0.5, 6), (0.2, 8), (0.07, 8))  # sizes by which a start comes near, and steps at each
-LOG_STEPS, TRIED, FURTHER = 15, 6, 3  # steps
+LOG_STEPS, NEARER, FEW, FURTHER = 60, 6, 6, 4  # steps: until near, of many from afar, of each tried
+HOPELESS = 4.0  # nats, below which a further step is not worth it while many are tried
 LEAST = 12.0  # nats that one more effect must gain
 SAME = 3.0  # nats that one less may cost
 COMPLETIONS = 2  # rounds
 MOST_OPERATORS = 3  # beside springs: more would imitate what the fit lacks
-IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which a few steps are not settled
+IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which nothing is followed
 STIFF_AT_FIRST, WIDENING = 3.0, 10  # prior sds of springs that may be there; steps
-OPERATORS, FINALISTS, ENDS = 5, 4, 2  # how many are tried, followed, settled
-# Sizes: with all lines at first; up to which nothing need be missing; from which one begins afresh.
+FOLLOWED, SETTLED, FARTHEST = 6, 3, 5  # how many are followed, settled, come from afar
+# Sizes: with all lines at first; up to which nothing need be missing; from which many begin afar.
 CLOSE, EXPLAINED, UNEXPLAINED = 0.01, 0.008, 0.03
-FRESH = 10.0  # nats that this must gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +64,17 @@ class Search:
     floor: float = 0.0  # as in `FrfMisfit`
     widen: bool = False  # whether `StructureFit.wider` is asked for
 
+    @cached_property
+    def _data(self) -> dict[int, FrfData]:
+        return {}
+
     def data(self, lines: int) -> FrfData:
         """On so many lines a pose."""
-        return FrfData.of(self.prior, self.frfs, self.q, self.band_hz, lines, self.order)
+        if lines not in self._data:
+            self._data[lines] = FrfData.of(
+                self.prior, self.frfs, self.q, self.band_hz, lines, self.order
+            )
+        return self._data[lines]
 
     def found(self, warm: FitRecord | None = None) -> StructureFit:
         """The structure that explains them best; from what was found before, if that is given.
@@ -86,30 +97,24 @@ class Search:
         return replace(self, frfs=tuple(out))
 
     def _found(self, warm: FitRecord | None) -> StructureFit:
-        data, dense = self.data(SEARCHED), self.data(SCREENED)
+        data = self.data(SEARCHED)
         stated = RobotStructure(self.prior, (), data.sensors)
         self.tell("as stated")
-        plain = converged(self._begun(data, stated))
+        plain = converged(self.begun(data, stated))
         if not self.extend:
             return self._last(plain)
         if size_of(plain) <= EXPLAINED:  # nothing need be missing
             best = plain
         elif warm is None:
             springs = tuple(e for e in self.prior.repertoire.effects if e.springs)
-            best = converged(self._begun(data, replace(stated, effects=springs)))
+            freed = replace(stated, effects=springs)
+            best = converged(self.begun(data, freed))
         else:
             misfit, x = self._again(warm, data, max(warm.size, UNEXPLAINED))
             best = converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
-        best = self._evolved(best, dense)
-        if plain.evidence > best.evidence:
-            best = self._evolved(plain, dense)
-        for _ in range(3 if warm is None else 1):
-            if size_of(best) < UNEXPLAINED:
-                break
-            fresh = self._afresh(best)
-            if fresh is None:
-                break
-            best = self._evolved(converged(fresh), dense)
+        best = self._evolved(best)
+        if plain.evidence > best.evidence and plain.structure.effects != best.structure.effects:
+            best = self._evolved(plain)
         found = self._last(best)
         return replace(found, wider=self._widened(found)) if self.widen else found
 
@@ -129,7 +134,7 @@ class Search:
         vars(found)["shares"] = known.shares
         return found
 
-    def _begun(
+    def begun(
         self, data: FrfData, structure: RobotStructure, x: np.ndarray | None = None
     ) -> StructureFit:
         """From x (the prior's mean): logarithms first, then FRFs that count more and more."""
@@ -142,10 +147,10 @@ class Search:
             own = at.own if size < 0.1 else None
         return settled(misfit, at)
 
-    def _evolved(self, best: StructureFit, dense: FrfData) -> StructureFit:
+    def _evolved(self, best: StructureFit) -> StructureFit:
         """Effects added, removed and exchanged until nothing gains."""
         for _ in range(12):
-            added = self._added(best, dense)
+            added = self._added(best)
             newest = added.structure.effects[-1] if added is not best else None
             fewer = self._removed(added, newest)
             changed = fewer is not best
@@ -156,62 +161,84 @@ class Search:
             best = swapped
         return best
 
-    def _added(self, best: StructureFit, dense: FrfData) -> StructureFit:
+    def _added(self, best: StructureFit) -> StructureFit:
         """With the one effect that gains most, if that is enough.
 
         Where so many operators do not explain the FRFs, more would only imitate what does.
         """
         if sum(not e.springs for e in best.structure.effects) >= MOST_OPERATORS:
             return best
-        ends = self._compete(best, self._starts(best, dense), best.evidence)
+        ends = self.compete(best, self.starts(best, SCREENED))
         if not ends or ends[0].evidence < best.evidence + LEAST:
             return best
         self.tell(f"+ {ends[0].structure.effects[-1].label}")
         return converged(ends[0])
 
-    def _starts(self, best: StructureFit, dense: FrfData) -> list[Start]:
+    def starts(self, base: StructureFit, lines: int) -> list[Start]:
         """All effects that it has not; of operators those that the first order ranks first."""
-        misfit = replace(best.misfit, data=dense)
-        motions, gain = misfit.first_order(best.at.x, best.at.own)
-        free = effects_free(best.structure)
-        again = [  # something else may hang on the same link
-            e for e in self.prior.repertoire.effects
-            if e.several and e not in free
-        ]  # fmt: skip
-        starts = [s for e in (*free, *again) for s in e.starts(motions, gain)]
-        starts.sort(key=lambda s: -s.nats)
-        kept, kinds, operators = [], set(), 0
-        for start in starts:
-            spring, kind = bool(start.effect.springs), start.effect.kind
-            if start.nats > 0 and (spring or operators < OPERATORS or kind not in kinds):
-                kept.append(start)
-                kinds.add(kind)
-                operators += not spring
-        return kept
+        misfit = replace(base.misfit, data=self.data(lines))
+        motions, gain = misfit.first_order(base.at.x, base.at.own)
+        free, every = effects_free(base.structure), self.prior.repertoire.effects
+        again = (e for e in every if e.several and e not in free)  # more may hang on a link
+        far = size_of(base) >= UNEXPLAINED
+        tried = (e for e in (*free, *again) if far or pulled(base, e))
+        return leaders([s for e in tried for s in e.starts(motions, gain)])
 
-    def _compete(
-        self, base: StructureFit, starts: Iterable[Start], known: float
+    def compete(
+        self,
+        base: StructureFit,
+        starts: Sequence[Start],
+        *,
+        count: int = SETTLED,
+        unmoved: bool = True,
+        afar: bool = True,
     ) -> list[StructureFit]:
-        """Starts beside a structure: a few steps each, the best farther, the very best settled."""
-        pool = []
-        for start in starts:
-            tried = [self._few(base, start, x, steps) for x, steps in placed(base, start)]
-            pool += sorted((t for t in tried if t is not None), key=evidence_of)[-1:]
-        pool.sort(key=evidence_of, reverse=True)
-        pool = [stepped(p, FURTHER) for p in pool[:FINALISTS] if p.evidence > known - FAR]
-        pool.sort(key=evidence_of, reverse=True)
-        ends = [settled(one.misfit, one.at) for one in pool[:ENDS]]
+        """Starts beside a structure: a few steps each, the best farther, `count` settled.
+
+        `unmoved` as in `placed`; where much is left, and `afar`, from what is stated too.
+        """
+        rough = self._on(base, self.data(ROUGH))
+        pool = [f for s in starts if (f := self._few(rough, s, unmoved)) is not None]
+        if afar and size_of(base) >= UNEXPLAINED:
+            pool += self._from_afar(rough, starts)
+        near = _best_of_each(p for p in pool if p.evidence > rough.evidence - FAR)
+        followed = [self._on(p, base.misfit.data) for p in near[:FOLLOWED]]
+        followed = _best_of_each(stepped(p, FURTHER) for p in followed)
+        ends = [settled(p.misfit, p.at) for p in followed[:count]]
         return sorted(ends, key=evidence_of, reverse=True)
 
-    def _few(
-        self, base: StructureFit, start: Start, x: np.ndarray, steps: int
-    ) -> StructureFit | None:
+    def _on(self, found: StructureFit, data: FrfData) -> StructureFit:
+        """The same on other lines."""
+        misfit = FrfMisfit(
+            found.structure, data, self.tolerances, found.misfit.rho, self.floor
+        )  # fmt: skip
+        at = misfit(found.at.x, found.at.own)
+        return StructureFit(misfit, at, misfit.evidence(at))
+
+    def _few(self, base: StructureFit, start: Start, unmoved: bool) -> StructureFit | None:
         structure = base.structure.with_effect(start.effect)
         misfit = replace(base.misfit, structure=structure)
-        if not misfit.possible(x):
-            return None
-        at = minimised(misfit, x, steps, 1.0, base.at.own)
-        return StructureFit(misfit, at, misfit.evidence(at))
+        # Where the first order leads to no robot that can be, it begins without the effect.
+        none = structure.carried(base.structure, base.at.x)
+        begun = [x for x in placed(base, start, unmoved) if misfit.possible(x)]
+        ends = []
+        for x in begun or [x for x in (none,) if misfit.possible(x)]:
+            at = minimised(misfit, x, FEW, HOPELESS, base.at.own)
+            ends.append(StructureFit(misfit, at, misfit.evidence(at)))
+        return max(ends, key=evidence_of, default=None)
+
+    def _from_afar(self, base: StructureFit, starts: Sequence[Start]) -> list[StructureFit]:
+        """Each effect from what is stated, by logarithms on few lines; the best go on."""
+        rough, found = self.data(AFAR), []
+        for start in starts:
+            structure = base.structure.with_effect(start.effect)
+            misfit = FrfMisfit(structure, rough, self.tolerances, None, self.floor)
+            for x in from_stated(structure, start):
+                if misfit.possible(x):
+                    at = minimised(misfit, x, NEARER)
+                    found.append((at.value, structure, at.x))
+        found.sort(key=lambda one: one[0])
+        return [self.begun(base.misfit.data, s, x) for _, s, x in found[:FARTHEST]]
 
     def _removed(self, best: StructureFit, newest: Operator | None) -> StructureFit:
         """Without what the others make superfluous, what seems to matter least first."""
@@ -234,12 +261,10 @@ class Search:
                 return best
 
     def _exchanged(self, best: StructureFit) -> StructureFit:
-        """An operator at another link, where that is likelier."""
+        """An operator at another place, where that is likelier."""
         for effect in best.structure.effects:
-            if effect.springs:
-                continue
-            base = without(best, [effect], 4)
-            if base is None:
+            base = without(best, [effect])
+            if base is None or effect.springs:
                 continue
             motions, gain = base.misfit.first_order(base.at.x, base.at.own)
             psi = best.at.x[best.structure.own[best.structure.effects.index(effect)]]
@@ -248,32 +273,11 @@ class Search:
                 if type(e) is type(effect) and e.at != effect.at.split("#")[0]
             ]  # fmt: skip
             starts = [e.elsewhere(psi, motions, gain) for e in others]
-            ends = self._compete(base, starts, best.evidence)
+            ends = self.compete(base, starts)
             if ends and ends[0].evidence > best.evidence + SAME:
                 self.tell(f"{effect.label} → {ends[0].structure.effects[-1].label}")
                 return converged(ends[0])
         return best
-
-    def _afresh(self, best: StructureFit) -> StructureFit | None:
-        """What was found, and that with a link that bends, from what is stated again."""
-        structure, data = best.structure, best.misfit.data
-        bends = [e for e in effects_free(structure) if isinstance(e, BendingLink)]
-        tried = []
-        for one in (structure, *(structure.with_effect(e) for e in bends)):
-            for softer in (0.0, 1.2):
-                x = one.mean.copy()
-                for effect, own in zip(one.effects, one.own, strict=True):
-                    if effect in structure.effects:
-                        x[own] = best.at.x[structure.own[structure.effects.index(effect)]]
-                new = [i for i in range(one.stiffnesses) if not one.parameters[i].stated]
-                x[new] -= softer * one.sd[new]
-                if FrfMisfit(one, data, self.tolerances).possible(x):
-                    tried.append(self._begun(data, one, x))
-        fresh = max(tried, key=evidence_of, default=None)
-        if fresh is None or fresh.evidence < best.evidence + FRESH:
-            return None
-        self.tell("afresh")
-        return fresh
 
     def _last(self, best: StructureFit) -> StructureFit:
         """On all lines, and at last along what the data leave open."""
@@ -305,38 +309,8 @@ class Search:
         return StructureFit(misfit, at, misfit.evidence(at))
 
 
-def placed(
-    base: StructureFit, start: Start, all_move: bool = False
-) -> list[tuple[np.ndarray, int]]:
-    """Where fits with one more effect begin, and their steps; `all_move`: of all numbers."""
-    structure = base.structure.with_effect(start.effect)
-    x = structure.carried(base.structure, base.at.x)
-    effect = structure.effects[-1]
-    if not effect.springs:
-        if all_move and start.moved is not None:
-            x = structure.carried(base.structure, base.at.x + start.moved)
-            x = np.clip(x, structure.least, structure.mean + REACH * structure.sd)
-        x[structure.own[-1]] = start.psi
-        others = []
-        for psi in effect.beside(start.psi):
-            z = x.copy()
-            z[structure.own[-1]] = psi
-            others.append((z, TRIED))
-        return [(x, TRIED if others else 4), *others]
-    new = [i for i, p in enumerate(structure.parameters) if set(p.blocks) & set(effect.springs)]
-    stiff = [i for i in new if i < structure.stiffnesses]
-    x[stiff] = structure.mean[stiff] + structure.sd[stiff]
-    starts = [x]
-    # Stated springs that strayed far softer may stand in for the new ones: back to what is stated,
-    # the new ones as soft as they were.
-    away = (x - structure.mean) / structure.sd
-    stated = [i for i in range(structure.stiffnesses) if structure.parameters[i].stated]
-    far = [i for i in stated if away[i] < -1.5]
-    if far:
-        z = x.copy()
-        softest = x[far].min()
-        z[far] = structure.mean[far]
-        low, high = structure.mean[stiff] - 3 * structure.sd[stiff], structure.mean[stiff]
-        z[stiff] = np.clip(softest, low, high)
-        starts.append(z)
-    return [(one, TRIED) for one in starts]
+def _best_of_each(pool: Iterable[StructureFit]) -> list[StructureFit]:
+    best: dict[frozenset[str], StructureFit] = {}
+    for one in sorted(pool, key=evidence_of):
+        best[frozenset(e.label for e in one.structure.effects)] = one
+    return sorted(best.values(), key=evidence_of, reverse=True)

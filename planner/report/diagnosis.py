@@ -301,10 +301,11 @@ def _unwritten(found: "Diagnosis") -> tuple[str, ...]:
         psi, values = found.best.at.x[own], found.robot.values(effect)
         written = effect.inertia(psi), effect.losses(psi), effect.tables(values), effect.springs
         if type(effect).impedance is not Operator.impedance and not any(written):
-            gone.append(" at ".join(effect.name).replace("_", " "))
+            gone.append(effect.name)
+    names = (" at ".join(name).replace("_", " ") for name in (*gone, *found.unwritten))
     return tuple(
         f"robot.toml has no entry for {name}: the robot that was written does without it."
-        for name in gone
+        for name in names
     )
 
 

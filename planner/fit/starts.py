@@ -1,0 +1,87 @@
+"""Where fits with one more effect begin, and which of many effects are tried."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from planner.effects.effect import Operator, Start
+from planner.fit.fitted import StructureFit
+from planner.fit.structure import REACH, RobotStructure
+
+KEPT = 6  # operators by first order beside the best of each kind
+PULLED = 1.5  # prior sds, from which another prior may pay
+
+
+def placed(base: StructureFit, start: Start, unmoved: bool = True) -> list[np.ndarray]:
+    """Where fits with one more effect begin: all else as it is, if `unmoved`, and moved with it."""
+    structure = base.structure.with_effect(start.effect)
+    x = structure.carried(base.structure, base.at.x)
+    effect = structure.effects[-1]
+    if not effect.springs:
+        moved = x
+        if start.moved is not None:  # as the first order has it
+            moved = structure.carried(base.structure, base.at.x + start.moved)
+            moved = np.clip(moved, structure.least, structure.mean + REACH * structure.sd)
+        begun = [(x if unmoved else moved, p) for p in (start.psi, *effect.beside(start.psi))]
+        if unmoved and moved is not x:
+            begun.append((moved, start.psi))
+        out = []
+        for x, psi in begun:
+            z = x.copy()
+            z[structure.own[-1]] = psi
+            out.append(z)
+        return out
+    new = [i for i, p in enumerate(structure.parameters) if set(p.blocks) & set(effect.springs)]
+    stiff = [i for i in new if i < structure.stiffnesses]
+    x[stiff] = structure.mean[stiff] + structure.sd[stiff]
+    starts = [x]
+    # Stated springs that strayed far softer may stand in for the new ones: back to what is stated,
+    # the new ones as soft as they were.
+    away = (x - structure.mean) / structure.sd
+    stated = [i for i in range(structure.stiffnesses) if structure.parameters[i].stated]
+    far = [i for i in stated if away[i] < -1.5]
+    if far:
+        z = x.copy()
+        softest = x[far].min()
+        z[far] = structure.mean[far]
+        low, high = structure.mean[stiff] - 3 * structure.sd[stiff], structure.mean[stiff]
+        z[stiff] = np.clip(softest, low, high)
+        starts.append(z)
+    return starts
+
+
+def from_stated(structure: RobotStructure, start: Start) -> Iterable[np.ndarray]:
+    """Where a fit from afar begins: as stated, new springs as expected and softer."""
+    effect, x = structure.effects[-1], structure.mean.copy()
+    if not effect.springs:
+        x[structure.own[-1]] = start.psi
+        return (x,)
+    new = [i for i in range(structure.stiffnesses) if not structure.parameters[i].stated]
+    mine = [i for i in new if set(structure.parameters[i].blocks) & set(effect.springs)]
+    softer = x.copy()
+    softer[mine] -= 1.2 * structure.sd[mine]
+    return x, softer
+
+
+def pulled(base: StructureFit, effect: Operator) -> bool:
+    """Whether anything is gained where springs that are there need not be as they are expected."""
+    s, known = base.structure, effect.spring_priors
+    there = [i for i in range(s.stiffnesses) if known.keys() & set(s.parameters[i].blocks)]
+    away = np.abs((base.at.x - s.mean) / s.sd)[there]
+    return not there or bool(np.any(away > PULLED))
+
+
+def leaders(starts: Sequence[Start]) -> list[Start]:
+    """Springs, which the first order says little of, the first operators, the best of each kind."""
+    kept: list[Start] = []
+    kinds: set[str] = set()
+    operators = 0
+    for start in sorted(starts, key=lambda s: -s.nats):
+        effect: Operator = start.effect
+        new = effect.kind not in kinds
+        told = np.isinf(start.nats) or effect.artefact
+        if told or (start.nats > 0 and (operators < KEPT or new)):
+            kept.append(start)
+            kinds.add(effect.kind)
+            operators += not np.isinf(start.nats)
+    return kept
