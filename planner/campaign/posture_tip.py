@@ -53,9 +53,9 @@ def posture_tip(folder: Path, tool: Tool | None, pose: str | None) -> TipRecepta
     tip, back = two_points_of(folder, tool)
     assert tool is not None
     x, at, matrices = _hit(folder, pose)
-    first = next(iter(matrices.values()))
-    directions = tuple(k for k in range(3) if Dof(tip.node, AXES[k]) in first.references)
-    dofs = [Dof(node, AXES[k]) for node in (tip.node, back.node) for k in directions]
+    first, ends = next(iter(matrices.values())), (str(tip.node), str(back.node))
+    directions = tuple(k for k in range(3) if Dof(ends[0], AXES[k]) in first.references)
+    dofs = [Dof(node, AXES[k]) for node in ends for k in directions]
     for name, matrix in matrices.items():
         lacks = [d for d in dofs if d not in matrix.responses or d not in matrix.references]
         if lacks or not dofs:

@@ -104,11 +104,11 @@ def _frfs(
 ) -> TipReceptance:
     tip, back = two_points_of(path, tool)
     assert tool is not None
-    nodes = frozenset((tip.node, back.node))
-    frequency, frfs = labelled_frfs(records, "receptance", InputError, nodes)
+    ends = str(tip.node), str(back.node)
+    frequency, frfs = labelled_frfs(records, "receptance", InputError, frozenset(ends))
     found = {(*one.felt, *one.hit): one.values for one in frfs}
     directions = tuple(k for k in range(3) if any(key[1] == k for key in found))
-    wanted = [(node, k) for node in (tip.node, back.node) for k in directions]
+    wanted = [(node, k) for node in ends for k in directions]
     lacking = [(a, b) for a in wanted for b in wanted if (*a, *b) not in found]
     if lacking or len(directions) < 2:
         raise InputError(f"{path}: {_lacks(lacking)}; {MEASURE}.")

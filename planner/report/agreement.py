@@ -53,6 +53,7 @@ class ThreeSimilarities:
     ) -> "ThreeSimilarities":
         """None where there is no pose to compare at."""
         if found is None:
-            return cls(*(FrfSimilarity(),) * 3, poses)
-        sides = found.nominal, found.refitted, found.explained
-        return cls(*map(FrfSimilarity.of, sides), poses)
+            nothing = FrfSimilarity()
+            return cls(nothing, nothing, nothing, poses)
+        of = FrfSimilarity.of
+        return cls(of(found.nominal), of(found.refitted), of(found.explained), poses)

@@ -43,7 +43,9 @@ class Answer:
         """The last lines of a text: where pictures are, and whether recordings are simulated."""
         from planner.report.text import SIMULATED, drawn
 
-        made = drawn(getattr(self, "plots", ()), getattr(self, "rrd", None))
+        made: list[RenderableType] = [
+            *drawn(getattr(self, "plots", ()), getattr(self, "rrd", None))
+        ]
         return [*made, SIMULATED] if getattr(self, "simulated", False) else made
 
     def with_figures(
@@ -64,13 +66,13 @@ class Answer:
         written = pictures.write(draw(), name, note, more, simulated)
         return dataclasses.replace(self, **written)  # pyright: ignore[reportArgumentType]
 
-    def figures(self) -> "dict[str, Figure]":
+    def drawings(self) -> "dict[str, Figure]":
         """Its pictures by name."""
         return {}
 
     def with_pictures(self, pictures: "Pictures", name: str, note: str = "") -> Self:
         """The same once its figures are drawn, where that is wanted."""
-        return self.with_figures(pictures, self.figures, name, note)
+        return self.with_figures(pictures, self.drawings, name, note)
 
     def _repr_html_(self) -> str:
         """What notebooks show."""

@@ -106,7 +106,7 @@ class CouplingReport(Answer):
             lines.append(Text(_contact_sentence(self.contact)))
         return Group(made, *lines, *remarks(self.remarks), *self.end)
 
-    def figures(self) -> "dict[str, Figure]":
+    def drawings(self) -> "dict[str, Figure]":
         """Receptances before and after, and how errors grow."""
         if self.coupled is None:
             return {}

@@ -1,6 +1,7 @@
 """Learning curves of sampling strategies: RMSE, R² and coverage by number of measurements."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,7 +20,11 @@ def learning_figure(strategies: Mapping[str, Curves], title: str = "") -> Figure
     figure = empty((11.0, 4.6), title)
     panels = figure.subplot_mosaic([["rmse", "r2"], ["rmse", "coverage"]], width_ratios=(1.5, 1))
     for i, (name, curve) in enumerate(strategies.items()):
-        style = {"color": f"C{i % 10}", "marker": MARKS[i % len(MARKS)], "label": name}
+        style: dict[str, Any] = {
+            "color": f"C{i % 10}",
+            "marker": MARKS[i % len(MARKS)],
+            "label": name,
+        }
         low, median, high = np.percentile(curve.frequency_rmse_percent, QUARTILES, axis=0)
         panels["rmse"].fill_between(curve.n, low, high, color=style["color"], alpha=0.15, lw=0)
         medians = {"rmse": median, "r2": np.median(curve.r2, axis=0)}

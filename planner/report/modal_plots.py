@@ -266,7 +266,7 @@ def frequency_figure(
     label_ends(panel, frequency_hz, [f"mode {k + 1}" for k in range(frequency_hz.shape[1])])
     handles = [Line2D([], [], color="0.3", marker="o", label="measured, ± 2 sd")]
     if simulated_hz is not None:
-        style = {"color": "0.3", "ls": "--", "marker": "D", "mfc": "none"}
+        style: dict[str, Any] = {"color": "0.3", "ls": "--", "marker": "D", "mfc": "none"}
         handles.append(Line2D([], [], **style, label="simulation"))
     figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9)
     return figure

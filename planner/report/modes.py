@@ -184,7 +184,7 @@ class ModesReport(Answer):
     habits: tuple[str, ...] | Unset = UNSET
     survey: "Survey | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
-    def figures(self) -> "dict[str, Figure]":
+    def drawings(self) -> "dict[str, Figure]":
         """Frequencies pose by pose."""
         if self.survey is None:
             return {}

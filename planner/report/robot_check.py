@@ -72,7 +72,7 @@ class RobotCheckReport(Answer):
             found=found,
         )
 
-    def figures(self) -> "dict[str, Figure]":
+    def drawings(self) -> "dict[str, Figure]":
         """The robot at home."""
         if self.found is None:
             return {}

@@ -60,8 +60,8 @@ class MapReport(Answer):
         for i in order[:MOST_ROWS]:
             place = ", ".join(f"{v:.3f}" for v in self.position_m[i])
             shown = 1e3 * self.depth_limit_m[i], 1e3 * self.depth_limit_m_at_95[i]
-            made.add_row(self.poses[i], place, *(number(v, ".4f") for v in shown))
-        low, high = (1e3 * self.depth_limit_m_at_95[order[k]] for k in (0, -1))
+            made.add_row(self.poses[i], place, *(number(float(v), ".4f") for v in shown))
+        low, high = (float(1e3 * self.depth_limit_m_at_95[order[k]]) for k in (0, -1))
         said = (
             f"With 95 % probability the workspace allows {number(low, '.3f')} mm at "
             f"{self.tightest_pose} and {number(high, '.3f')} mm at {self.poses[order[-1]]}."

@@ -172,7 +172,7 @@ class StatusReport(ModelStatus, Answer):
         said = super().to_json() | {"forecast": forecast_json(self.forecast)}
         return said if self.decision else {k: v for k, v in said.items() if k != "decision"}
 
-    def figures(self) -> "dict[str, Figure]":
+    def drawings(self) -> "dict[str, Figure]":
         """Each pose as predicted without it."""
         if not self.leave_one_out.values or self.model is None:
             return {}
@@ -262,7 +262,7 @@ def status(campaign: Campaign) -> StatusReport:
     believed = campaign.of_model("status", ModelStatus, ModelStatus.of)
     remarks = (*believed.remarks, *_beside_diagnosis(campaign, believed.springs))
     return StatusReport(
-        **(vars(believed) | {"remarks": remarks}),
+        **(vars(believed) | {"remarks": remarks}),  # pyright: ignore[reportArgumentType]
         campaign=str(campaign.directory),
         simulated=state.simulated,
         measurements=tuple(

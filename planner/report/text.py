@@ -33,8 +33,8 @@ def with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:
     """
     if number(value, form) == "–":
         return "–"
-    known = sd is not None and math.isfinite(sd)
-    return f"{number(value, form)} ± {small(sd, form) if known else '–'}"
+    known = small(sd, form) if sd is not None and math.isfinite(sd) else "–"
+    return f"{number(value, form)} ± {known}"
 
 
 def remarks(lines: Sequence[str]) -> list[Text]:
