@@ -1,267 +1,164 @@
-"""Does choosing where to measure pay? Strategies × a simulation that learns, or stays, or both.
+"""Does choosing where to measure pay? The default beside a frozen simulation on a Latin hypercube.
 
-`pytest -m slow tests/studies/test_acquisitions.py -s` prints the tables. STUDY_CELLS (all five,
-names separated by ";"), STUDY_SEEDS (2), STUDY_FIRST (101), STUDY_ONLY (some strategies, by ";")
-make it larger or smaller; STUDY_KEPT names a folder that keeps finished runs, so that it can be
-stopped, and several processes can share it. Truths are MuJoCo models with ± 15 % springs, 4 %
-inertias and noise of EMA's size; errors are those at 60 poses never measured, FRFs' at ten of them.
-Seeds 1-20 were used in development.
+`pytest -m slow tests/studies/test_acquisitions.py -s` prints both; STUDY_SEEDS (2) and STUDY_FIRST
+(101) make it larger. Truths are MuJoCo models with ± 15 % springs, 4 % inertias and noise of EMA's
+size; errors are those at 60 poses never measured. Seeds 1-20 were used in development. Other
+strategies over a pool of recordings are what `planner compare` compares.
 """
 
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from planner.campaign.config import CostTable
+from planner.campaign.acquisition_inputs import cost_of
+from planner.campaign.build import build
+from planner.campaign.cell import Cell
+from planner.campaign.config import config_from_builtins
+from planner.campaign.log_conversion import from_mode
+from planner.campaign.proposals import propose
+from planner.campaign.state import CampaignState, Measurement
 from planner.design.space_filling import NESTED
-from tests.support.acquisition_cases import CELLS, campaign, make
+from planner.frf.frf import Frf
+from planner.modal.modes import Mode
+from planner.truth.arms import ARMS
+from planner.truth.deviation import Deviation, Spring
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
-NAMES = os.environ.get("STUDY_CELLS", ";".join(CELLS)).split(";")
 SEEDS = int(os.environ.get("STUDY_SEEDS", "2"))
 FIRST = int(os.environ.get("STUDY_FIRST", "101"))
-BASELINE, DEFAULT = "maximin_lhs", "integrated_variance"
-STRATEGIES = {
-    "updated": (
-        BASELINE, "integrated_variance", "parameter_information", "mixed",
-        "parameter_information best", "mixed best", "random", "sobol", "variance", "d_information",
-        "mutual_information",
-    ),
-    "frozen": (
-        BASELINE, "integrated_variance", "integrated_variance best", "variance", "random", "sobol",
-        "mutual_information",
-    ),
-}  # "best": along the axes that tell most per minute, not along all  # fmt: skip
-ONLY = os.environ.get("STUDY_ONLY", "")
-AXES = ("all", "best")
-ABOUT = 1.02  # minutes that are as good as equal: travel differs by seconds
-BUDGET = {
-    "updated": int(os.environ.get("STUDY_BUDGET", "5")),
-    "frozen": int(os.environ.get("STUDY_FROZEN", "12")),
-}
-INITIAL = {"updated": 0, "frozen": 2}  # poses of the baseline's design with which all begin
-GOALS: dict[str, Callable[["Curve"], tuple[float, float]]] = {
-    "RMSE 1 %": lambda c: c.until(1.0),
-    "RMSE 0.5 %": lambda c: c.until(0.5),
-    "FRAC 95 %": lambda c: c.alike(0.95),
-}
+# Robot, and whether its simulation lacks transverse tilts of the joints beside the floor's.
+CELLS = [("kr10", 2), ("irb6640", 2), ("kr210", 2), ("kr10", 1), ("kr210", 1)]
+MODES, CANDIDATES, UNUSED, LINES = 4, 200, 60, 160
+FREQUENCY_SD, DAMPING_SD, FRF_SD = 1e-3, 0.05, 0.02  # relative, the last one to the FRF's rms
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One true robot, what the planner knows of it, and unused poses with true frequencies."""
+
+    truth: Truth
+    cell: Cell
+    seed: int
+    unused: np.ndarray
+    true_hz: np.ndarray
+
+    @classmethod
+    def make(cls, robot: str, per_joint: int, seed: int, simulation: str, folder: Path) -> "Case":
+        """The truth has two springs a joint and a soft floor."""
+        arm = ARMS[robot]
+        full = arm.write(folder / "full", 2)
+        toml = full if per_joint == 2 else arm.write(folder / "robot", per_joint)
+        soft = 25 * max(arm.torsion)
+        floor = tuple(Spring("base", axis, soft, 3e-4 * soft) for axis in ((1.0, 0, 0), (0, 1, 0)))
+        truth = load_truth(full, Deviation(seed, 0.15, 0.15, 0.04, 0.005, extra=floor))
+        table = {
+            "robot": str(toml),
+            "workspace": {"joints_deg": [list(r) for r in arm.joints_deg]},
+            "modes": {"count": MODES, "band_hz": [arm.band_hz[0], 0.4 * arm.band_hz[1]]},
+            "fidelity": {"simulation": simulation},
+            "acquisition": {"candidates": CANDIDATES},
+        }
+        low, high = np.deg2rad(np.array(arm.joints_deg)).T
+        unused = np.random.default_rng(10_000 + seed).uniform(low, high, (UNUSED, 6))
+        true_hz = np.array([truth.modes(q, MODES)[0] for q in unused])
+        return cls(truth, Cell.load(toml, config_from_builtins(table)), seed, unused, true_hz)
+
+    def measure(self, q: np.ndarray, number: int) -> tuple[Measurement, Frf]:
+        """Modes and FRF at q (6,), with noise of its own for every pose."""
+        rng, modes = np.random.default_rng([self.seed, number]), []
+        for f, z, r in zip(*self.truth.modes(q, MODES), strict=True):
+            sd = 0.03 * np.abs(r).max()
+            noisy = r + sd * (rng.standard_normal((3, 3)) + 1j * rng.standard_normal((3, 3)))
+            shape = np.linalg.svd(noisy)[0][:, 0]
+            hertz = f * np.exp(FREQUENCY_SD * rng.standard_normal())
+            zeta = z * np.exp(DAMPING_SD * rng.standard_normal())
+            own = hertz, f * FREQUENCY_SD, zeta, z * DAMPING_SD, noisy, np.full((3, 3), sd)
+            modes.append(from_mode(Mode(*own, shape, 1.0)))
+        band = self.cell.config.modes.band_hz
+        lines = np.linspace(*band, LINES)
+        h = self.truth.accelerance(q, lines)
+        sd = FRF_SD * np.sqrt(np.mean(np.abs(h) ** 2, axis=(0, 2), keepdims=True))
+        noise = rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape)
+        variance, nan = np.broadcast_to(sd**2, h.shape), np.full(h.shape, np.nan)
+        frf = Frf(lines, h + sd / np.sqrt(2) * noise, variance, nan, (4, 4, 4), band)
+        return Measurement(f"P{number}", tuple(np.rad2deg(q)), (), tuple(modes)), frf
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One campaign: errors, minutes, and what the model foretold after each measurement."""
+    """A campaign measurement by measurement: RMSE in %, minutes, and what the model foretold."""
 
     rmse: np.ndarray
-    worst: np.ndarray
     minutes: np.ndarray
     reached: np.ndarray  # foretold probability that the RMSE is below 1 %
-    bound: np.ndarray  # foretold 95 % bound of the RMSE
-    frac: np.ndarray  # Global FRAC of FRFs
+
+    @classmethod
+    def of(cls, case: Case, strategy: str, budget: int) -> "Curve":
+        """By an acquisition, or on a space-filling design."""
+        cost, candidates = cost_of(case.cell), case.cell.candidates
+        design = NESTED.get(strategy)
+        planned = design(candidates.features, budget, case.seed) if design else ()
+        measured, frfs, minutes, at, rows = {}, {}, 0.0, None, []
+        frf_of: Callable = lambda m, _: frfs[m.pose]  # noqa: E731
+        model = build(case.cell, CampaignState(), frf_of)
+        for n in range(1, budget + 1):
+            if design:
+                q = candidates.q[planned[n - 1]]
+            else:
+                state = CampaignState(measurements=measured, events=n)
+                q = np.deg2rad(propose(model, state, 1, strategy)[0].joints_deg)
+            minutes += float(cost.minutes(q[None], at, (0, 1, 2))[0])
+            at, (measurement, frfs[f"P{n}"]) = q, case.measure(q, n)
+            measured = {**measured, measurement.pose: measurement}
+            model = build(case.cell, CampaignState(measurements=measured, events=n), frf_of)
+            found = np.sort(model.predict(case.unused).frequency_hz, axis=1)
+            rmse = 100 * float(np.sqrt(np.mean(np.log(found / case.true_hz) ** 2)))
+            told = model.forecast if n >= 3 else None  # the rule does not speak before
+            rows.append((rmse, minutes, told.reached if told else 0.0))
+        return cls(*np.array(rows).T)
 
     def until(self, percent: float) -> tuple[float, float]:
         """Measurements and minutes from which on the RMSE stays below; ∞ beyond the budget."""
-        return self._stays(self.rmse <= percent)
-
-    def alike(self, frac: float) -> tuple[float, float]:
-        """Measurements and minutes from which on the FRAC stays above; ∞ beyond the budget."""
-        return self._stays(self.frac >= frac)
-
-    def worst_within(self, minutes: float) -> float:
-        """Worst error in % of the last measurement that ends within the minutes; ∞ if none does."""
-        count = int(np.sum(self.minutes <= minutes))
-        return float(self.worst[count - 1]) if count else np.inf
-
-    def worst_after(self, hits: int) -> float:
-        """Worst error in % of the last measurement that ends within so many hits, an axis each."""
-        cost = CostTable()
-        axes = (np.diff(self.minutes, prepend=0.0) - cost.minutes_per_pose) / (
-            cost.minutes_per_hit * cost.hits_per_axis
-        )  # travel takes seconds
-        count = int(np.sum(np.cumsum(np.round(axes)) <= hits))
-        return float(self.worst[count - 1]) if count else np.inf
-
-    def _stays(self, good: np.ndarray) -> tuple[float, float]:
-        bad = np.flatnonzero(~good)
+        bad = np.flatnonzero(self.rmse > percent)
         n = int(bad[-1]) + 1 if len(bad) else 0
-        if n == len(good):
-            return np.inf, np.inf
-        return n + 1, float(self.minutes[n])
+        return (n + 1, float(self.minutes[n])) if n < len(self.rmse) else (np.inf, np.inf)
 
 
-def curve(case, strategy: str, budget: int, initial: int) -> Curve:
-    x = case.cell.candidates.features
-    first = NESTED[BASELINE](x, budget, case.seed).tolist()[:initial]
-    plan = strategy
-    if strategy in NESTED:
-        plan = NESTED[strategy](x, budget, case.seed).tolist()
-    rows = []
-    for step in campaign(case, first, plan, budget):
-        # The rule does not speak before three measurements.
-        told = step.model.forecast if step.n >= 3 else None
-        reached, bound = (told.reached, told.bound_percent) if told else (0.0, np.inf)
-        rows.append(
-            (step.rmse_percent, step.worst_percent, step.minutes, reached, bound, step.frac)
-        )
-    return Curve(*np.array(rows).T)
-
-
-def kept(name: str, make_it: Callable[[], Curve]) -> Curve:
-    """A run from the folder STUDY_KEPT, or made and kept there."""
-    folder = os.environ.get("STUDY_KEPT")
-    if not folder:
-        return make_it()
-    path = Path(folder) / f"{name}.npy"
-    if not path.exists():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        np.save(path, np.array(list(vars(make_it()).values())))
-    return Curve(*np.load(path))
-
-
-def played(
-    simulation: str, folder: Path, strategies: tuple[str, ...] = ()
-) -> dict[str, list[Curve]]:
-    """Curves by strategy, cell by cell and seed by seed."""
-    if not strategies:
-        strategies = tuple(s for s in STRATEGIES[simulation] if not ONLY or s in ONLY.split(";"))
-    found: dict[str, list[Curve]] = {s: [] for s in strategies}
-    budget, initial = BUDGET[simulation], INITIAL[simulation]
-    for name, seed in ((n, s) for s in range(FIRST, FIRST + SEEDS) for n in NAMES):
-        robot, lacking = CELLS[name]
-        case = lru_cache(partial(_case, robot, seed, simulation, folder, lacking))
-        for strategy, curves in found.items():
-            plain, _, axes = strategy.partition(" ")
-            run = f"{simulation} {lacking} {robot} {seed} {strategy} {budget} {initial}"
-            made = partial(_curve_of, case, axes or "all", plain, budget, initial)
-            curves.append(kept(run.replace(" ", "_"), made))
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory) -> dict[str, list[Curve]]:
+    """What `planner next` does unless told otherwise, and AR1 on maximin LHS."""
+    found: dict[str, list[Curve]] = {"default": [], "AR1 + maximin LHS": []}
+    ways = [("updated", "integrated_variance", 5), ("frozen", "maximin_lhs", 12)]
+    for number, cell in enumerate(CELLS * SEEDS):
+        for curves, (simulation, strategy, budget) in zip(found.values(), ways, strict=True):
+            folder = tmp_path_factory.mktemp("case")
+            case = Case.make(*cell, FIRST + number // len(CELLS), simulation, folder)
+            curves.append(Curve.of(case, strategy, budget))
+    for name, curves in found.items():
+        print(f"\n{name:18}" + " ".join(f"{v:5.2f}" for v in median([c.rmse for c in curves])))
     return found
 
 
-def _case(robot: str, seed: int, simulation: str, folder: Path, lacking: str, axes: str):
-    return make(robot, seed, simulation, folder / f"{robot}{seed}{lacking}{axes}", lacking, axes)
+def median(rows: list) -> np.ndarray:
+    return np.median(rows, axis=0)
 
 
-def _curve_of(case: Callable, axes: str, strategy: str, budget: int, initial: int) -> Curve:
-    return curve(case(axes), strategy, budget, initial)
-
-
-@pytest.fixture(scope="module", params=["updated", "frozen"])
-def runs(request, tmp_path_factory) -> tuple[str, dict[str, list[Curve]]]:
-    return request.param, played(request.param, tmp_path_factory.mktemp("cases"))
-
-
-def saving(ours: np.ndarray, theirs: np.ndarray) -> str:
-    """One less the ratio of medians in %, with a 95 % bootstrap interval over paired runs.
-
-    What was not reached counts as if reached just beyond the budget.
-    """
-    rng = np.random.default_rng(0)
-    picks = rng.integers(0, len(ours), (2000, len(ours)))
-    beyond = 1.05 * np.max(np.concatenate([ours, theirs]), where=np.isfinite(
-        np.concatenate([ours, theirs])), initial=0.0)  # fmt: skip
-    ours, theirs = (np.where(np.isfinite(v), v, beyond) for v in (ours, theirs))
-    if not beyond:
-        return "not to be said"
-    ratios = np.median(ours[picks], axis=1) / np.median(theirs[picks], axis=1)
-    low, middle, high = np.quantile(100 * (1 - ratios), [0.025, 0.5, 0.975])
-    return f"{middle:+.0f} % [{low:+.0f}, {high:+.0f}]"
-
-
-def reached(curves: list[Curve], goal: str) -> np.ndarray:
-    """(runs, 2) measurements and minutes to a goal of GOALS."""
-    return np.array([GOALS[goal](c) for c in curves])
-
-
-def test_measurements_to_the_target(runs):
-    simulation, found = runs
-    base, count = found[BASELINE], len(found[BASELINE])
-    print(f"\n{simulation} simulation, {count} runs a strategy in {len(NAMES)} cells, RMSE in %")
-    for strategy, curves in found.items():
-        middle = np.median([c.rmse for c in curves], axis=0)
-        alike = np.median([c.frac for c in curves], axis=0)
-        print(
-            f"  {strategy:26s}" + " ".join(f"{v:5.2f}" for v in middle)
-            + "   FRAC " + " ".join(f"{v:.3f}" for v in alike)
-        )  # fmt: skip
-    for goal in GOALS:
-        print(f"  to {goal}: median measurements, minutes; reached; saving against {BASELINE}")
-        at = reached(base, goal)
-        for strategy, curves in found.items():
-            own = reached(curves, goal)
-            n, minutes = np.median(own, axis=0)
-            each = [np.median(own[i :: len(NAMES), 0]) for i in range(len(NAMES))]
-            print(
-                f"    {strategy:26s}{n:5.1f} {minutes:6.1f}  {np.isfinite(own[:, 0]).sum()}/{count}"
-                f"  measurements {saving(own[:, 0], at[:, 0])}, minutes "
-                f"{saving(own[:, 1], at[:, 1])}; by cell " + " ".join(f"{v:g}" for v in each)
-            )
-    print("  worst error in % after 4: median of the runs, 9 of 10, all; saving in the median")
-    at = np.array([c.worst[3] for c in base])
-    for strategy, curves in found.items():
-        own = np.array([c.worst[3] for c in curves])
-        of = " ".join(f"{v:6.2f}" for v in np.quantile(own, [0.5, 0.9, 1.0]))
-        print(f"    {strategy:26s}{of}  {saving(own, at)}")
-    for hits in (4, 6):
-        print(f"  the same after {hits} hits, a hit being one axis of one pose")
-        at = np.array([c.worst_after(hits) for c in base])
-        for strategy, curves in found.items():
-            own = np.array([c.worst_after(hits) for c in curves])
-            print(f"    {strategy:26s}{np.median(own):6.2f}  {saving(own, at)}")
-    print("  the same within the minutes of the other's 3")
-    at = np.array([c.worst[2] for c in base])
-    for strategy, curves in found.items():
-        pairs = zip(curves, base, strict=True)
-        own = np.array([c.worst_within(ABOUT * b.minutes[2]) for c, b in pairs])
-        print(f"    {strategy:26s}{np.median(own):6.2f}  {saving(own, at)}")
-    for curves in found.values():
-        assert all(np.isfinite(c.rmse).all() for c in curves)
-
-
-def test_the_default_beside_a_frozen_simulation_on_a_latin_hypercube(tmp_path):
-    """What `planner next` does unless told otherwise, and AR1 on maximin LHS."""
-    ours = played("updated", tmp_path, (DEFAULT,))[DEFAULT]
-    theirs = played("frozen", tmp_path, (BASELINE,))[BASELINE]
-    for goal in GOALS:
-        own, other = reached(ours, goal), reached(theirs, goal)
-        n, minutes = np.median(own, axis=0)
-        n_other, minutes_other = np.median(other, axis=0)
-        worse = np.sum(own[:, 0] > other[:, 0])
-        print(
-            f"\nto {goal}: default {n:g} measurements, {minutes:.1f} min; AR1 + maximin LHS "
-            f"{n_other:g}, {minutes_other:.1f} min; saving {saving(own[:, 0], other[:, 0])} of the "
-            f"measurements, {saving(own[:, 1], other[:, 1])} of the minutes; more in {worse} of "
-            f"{len(own)} runs"
-        )
-    own, other = reached(ours, "RMSE 1 %"), reached(theirs, "RMSE 1 %")
-    assert np.median(own[:, 0]) <= 0.5 * np.median(other[:, 0])
-    assert np.median(own[:, 1]) <= 0.5 * np.median(other[:, 1])
+def test_the_default_beside_a_frozen_simulation_on_a_latin_hypercube(runs):
+    own, other = (np.array([c.until(1.0) for c in curves]) for curves in runs.values())
+    print(f"to RMSE 1 %: measurements and minutes {median(own)}, AR1 {median(other)}")
+    assert np.all(median(own) <= 0.5 * median(other))
 
 
 def test_when_it_says_done_it_is(runs):
     """The rule fires (probability ≥ 0.95 that RMSE ≤ 1 %): was it so, at that moment?"""
-    simulation, found = runs
-    fired, right, early = 0, 0, []
-    inside, steps = 0, 0
-    for curves in found.values():
-        for c in curves:
-            inside += int(np.sum(c.rmse[2:] <= c.bound[2:]))
-            steps += len(c.rmse) - 2
-            done = np.flatnonzero(c.reached[2:] >= 0.95)  # not before three measurements
-            if len(done):
-                fired += 1
-                right += int(c.rmse[done[0] + 2] <= 1.0)
-                n, _ = c.until(1.0)
-                early.append(done[0] + 3 - n)
-    late = float(np.median(early)) if early else float("nan")
-    total = sum(len(c) for c in found.values())
-    print(
-        f"\n{simulation}: 'done at 1 %' said in {fired} of {total} runs, true in {right}; "
-        f"{late:.0f} measurements after it became true (median); "
-        f"RMSE within its 95 % bound in {100 * inside / max(steps, 1):.0f} % of {steps} forecasts"
-    )
-    assert fired > 0
-    assert right >= 0.95 * fired
+    fired = [(c, c.reached >= 0.95) for curves in runs.values() for c in curves]
+    right = [c.rmse[np.argmax(done)] <= 1.0 for c, done in fired if done.any()]
+    print(f"'done at 1 %' said in {len(right)} of {len(fired)} runs, true in {sum(right)}")
+    assert right
+    assert sum(right) >= 0.95 * len(right)
