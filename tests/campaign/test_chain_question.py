@@ -13,7 +13,7 @@ from planner.demo import NAME, Pool, shipped
 from planner.recording.folder import TABLE
 from planner.replay import replay
 from tests.support.chain_cases import FAULTS, SLIGHTEST, cases, fault, judged, shown_by
-from tests.support.outside import planner
+from tests.support.outside import call
 
 POSES = 1
 
@@ -110,13 +110,13 @@ def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
     lines = (shipped(NAME) / "recordings" / TABLE).read_text().splitlines()
     own = [line for line in lines[1:] if any(line.endswith(name) for name in names)]
     (tmp_path / TABLE).write_text("\n".join([lines[0], *own]).replace("data/", "") + "\n")
-    done = planner("import", campaign.directory, tmp_path / TABLE, "--json", check=False)
-    assert done.returncode == 3
-    answer = json.loads(done.stdout)
+    code, out, err = call("import", campaign.directory, tmp_path / TABLE, "--json")
+    assert code == 3
+    answer = json.loads(out)
     assert answer["question"]["about"] == "chain"
-    assert "1000 times too large: units or sensitivity" in done.stderr
-    assert f"planner undo {campaign.directory}" in done.stderr
-    assert f"planner confirm {campaign.directory} A11" in done.stderr
+    assert "1000 times too large: units or sensitivity" in err
+    assert f"planner undo {campaign.directory}" in err
+    assert f"planner confirm {campaign.directory} A11" in err
     held = Campaign(campaign.directory)
     assert len(held.state.held["A11"].hits) == len(paths)
     held.confirm("A11")

@@ -7,12 +7,12 @@ import numpy as np
 from rerun.chunk import RrdReader
 
 from planner.demo import shipped
-from tests.support.outside import answer
+from tests.support.outside import told
 from tests.support.rerun_frames import WORLD, Frames
 
 
 def test_demo_reaches_two_percent_and_writes_a_recording(tmp_path):
-    summary = answer("demo", "--dir", tmp_path / "demo")
+    summary = told("demo", "--dir", tmp_path / "demo")
     print({k: summary[k] for k in summary if "rmse" in k or "coverage" in k})
     assert summary["simulated"] is True
     assert summary["measurements"] <= 10
@@ -23,8 +23,8 @@ def test_demo_reaches_two_percent_and_writes_a_recording(tmp_path):
     said = " ".join(summary["remarks"])
     base = re.search(r"The base gives way \((.*?)\)", said)
     assert base is not None, said
-    told = re.findall(r"about ([xy]) (\S+) ± (\S+) N", base[1])
-    stiffness = {axis: (float(value), float(sd)) for axis, value, sd in told}
+    stated = re.findall(r"about ([xy]) (\S+) ± (\S+) N", base[1])
+    stiffness = {axis: (float(value), float(sd)) for axis, value, sd in stated}
     for axis, true in (("x", 2.2e7), ("y", 1.9e7)):
         value, sd = stiffness[axis]
         assert abs(value - true) < 2 * sd < 0.1 * true
@@ -73,7 +73,7 @@ def recording_contents(path):
 def check_replay(tmp_path, summary):
     """Replay reproduces every step, and writes the same recording."""
     rrd = tmp_path / "again.rrd"
-    replayed = answer("replay", summary["campaign"], "--rrd", rrd, "--acquisition", "variance")
+    replayed = told("replay", summary["campaign"], "--rrd", rrd, "--acquisition", "variance")
     assert replayed["reproduced"]
     check_otherwise(replayed, summary)
     assert {step["check"] for step in replayed["steps"]} <= {"identical", "kept"}
