@@ -132,13 +132,21 @@ class Campaign(CampaignReads):
                 hits = refusals(self.directory, paths, reasons or {}, stated or {})
                 self._append(Refused(pose, hits))
 
-    def confirm(self, pose: str) -> None:
+    def confirm(self, pose: str) -> "ImportReport":
         """Held hits are from their pose indeed, or those of a withdrawn one good: they are used."""
+        from planner.campaign.importing import ImportReport
+
+        started = time.perf_counter()
         with self._acting():
-            known = self.state.measurements.get(pose)
+            known, before = self.state.measurements.get(pose), self.model
             if known is None or not known.withdrawn:
                 self._held(pose)
             self._append(Confirmed(pose))
+            found = self.state.measurements[pose]
+            return ImportReport(
+                pose, found.accepted, (), (), found, None, before, self.model,
+                time.perf_counter() - started, self.model.remarks,
+            )  # fmt: skip
 
     def move(self, pose: str, other: str) -> "ImportReport":
         """The held hits of a pose are from another one: import them there."""

@@ -124,7 +124,7 @@ def _tool(tcp: str, mass: float, robot: Robot) -> Payload:
     place = _off_the_arm(robot) * side / 2
     moment = round(mass * side**2 / 6, 5)
     x, y, z = (round(float(v), 4) + 0.0 for v in place)
-    return Payload(tcp, mass, (x, y, z), (moment, moment, moment, 0.0, 0.0, 0.0))
+    return Payload(tcp, mass, (x, y, z), (moment, 0.0, 0.0, moment, 0.0, moment))
 
 
 def _off_the_arm(robot: Robot) -> np.ndarray:

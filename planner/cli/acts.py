@@ -26,14 +26,11 @@ def confirm(
     Example: planner confirm cell7 P014 --at P009
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import ConfirmedPose
     from planner.report.imports import ImportedPoses
 
     campaign = Campaign(directory)
-    if at is None:
-        campaign.confirm(pose)
-        return respond(ConfirmedPose(pose, campaign.model.frequency_sd_percent), as_json)
-    answer = ImportedPoses.of((campaign.move(pose, at),))
+    report = campaign.confirm(pose) if at is None else campaign.move(pose, at)
+    answer = ImportedPoses.of((report,), campaign.state.simulated)
     return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
 
 

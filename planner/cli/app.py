@@ -190,6 +190,9 @@ def predict(
 ) -> int:  # fmt: skip
     """Modes and FRFs, with uncertainty, at given poses.
 
+    The npz holds for n poses: frf_mean and frf_sd (n, 3, 3, F) in m/s²/N (response, force; x, y, z
+    of the tcp frame), frequency_hz (F,), pose (n,), joints_deg (n, joints).
+
     Example: planner predict cell7 poses.csv --out frfs.npz
     """
     from planner.campaign.campaign import Campaign

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import msgspec
-import numpy as np
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
@@ -17,7 +16,6 @@ from planner.campaign.taking_back import act
 from planner.check.remark import CheckRemark
 from planner.report.answer import Answer
 from planner.report.text import command_line, table
-from planner.words import significant
 
 
 @dataclass(frozen=True)
@@ -178,16 +176,3 @@ class SkippedPose(Answer):
     def text(self) -> str:
         """One sentence."""
         return f"Pose {self.skipped} will not be offered again."
-
-
-@dataclass(frozen=True, eq=False)
-class ConfirmedPose(Answer):
-    """Answer of `confirm`: the held hits of a pose are used; sds (count,) in % thereafter."""
-
-    confirmed: str
-    frequency_sd_percent: np.ndarray
-
-    def text(self) -> str:
-        """One sentence."""
-        sd = ", ".join(f"{significant(v)} %" for v in self.frequency_sd_percent)
-        return f"The hits of pose {self.confirmed} are used; sd of frequencies: {sd}."

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 COLUMNS = "joint and axis", "stated", "refitted ± sd", "unit", "known"
 NOT_KNOWN = (
     "Known, yes: the recordings tell this stiffness; its sd is half of what was assumed before, or "
-    "less. No: they tell little of it, and the value is mostly what was assumed."
+    "less. No: they tell less, and the value leans on what was assumed."
 )
 
 

@@ -69,14 +69,14 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A body carried by a link of the URDF that does not list it.
 
-    Mass in kg, centre of mass in the link's frame, moments (xx, yy, zz, xy, xz, yz) in kg·m² about
+    Mass in kg, centre of mass in the link's frame, moments (xx, xy, xz, yy, yz, zz) in kg·m² about
     that centre along the link's axes; without moments it is a point.
     """
 
     link: str
     mass: float
     com_m: tuple[float, float, float]
-    inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    inertia_kg_m2: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class LinkTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -21,7 +21,7 @@ from planner.robot.config import (
     SensorTable,
 )
 from planner.robot.joint_laws import NUMBER_ENTRIES, LawTable
-from planner.robot.moments import LINK, PAYLOAD, symmetric
+from planner.robot.moments import STATED, symmetric
 from planner.toml_file import load_toml
 from planner.words import command
 
@@ -178,12 +178,12 @@ def _check_payloads(config: RobotConfig, path: Path) -> None:
         entry = f"{path}: [[payload]] number {number} ({block.link})"
         _within(f"{entry}: mass", block.mass, " kg")
         _finite(f"{entry}: com_m", block.com_m, 1e2, "3 lengths in m")
-        moments = symmetric(block.inertia, PAYLOAD)
+        moments = symmetric(block.inertia_kg_m2, STATED)
         finite = bool(np.all(np.isfinite(moments)))
         if not finite or np.linalg.eigvalsh(moments)[0] < -1e-9 * np.abs(moments).max():
             raise InputError(
-                f"{entry} has inertia {list(block.inertia)}, which no body can have; give "
-                f"xx, yy, zz, xy, xz, yz in kg·m² about its centre of mass."
+                f"{entry} has inertia_kg_m2 {list(block.inertia_kg_m2)}, which no body can have; "
+                f"give xx, xy, xz, yy, yz, zz in kg·m² about its centre of mass."
             )
 
 
@@ -203,7 +203,7 @@ def _check_links(config: RobotConfig, path: Path) -> None:
             raise InputError(f"{entry} needs mass_kg, centre_m and inertia_kg_m2; give all three.")
         _within(f"{entry}: mass_kg", table.mass_kg, " kg")
         _finite(f"{entry}: centre_m", table.centre_m, 1e2, "3 lengths in m")
-        moments = np.linalg.eigvalsh(symmetric(table.inertia_kg_m2, LINK))
+        moments = np.linalg.eigvalsh(symmetric(table.inertia_kg_m2, STATED))
         if moments[0] < 0 or moments[0] + moments[1] < moments[2] * (1 - 1e-6):
             raise InputError(
                 f"{entry} has inertia_kg_m2 {list(table.inertia_kg_m2)}, which no body can have; "

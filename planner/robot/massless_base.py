@@ -22,6 +22,6 @@ def massless_base(robot: Robot) -> tuple[Payload, ...]:
     reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
     moment = mass * reach**2
     fixed = [f.name for f in model.frames if f.type == pin.FrameType.BODY and f.parentJoint == 0]
-    own = Payload(fixed[0], mass, (0.0, 0.0, 0.0), (moment, moment, moment, 0.0, 0.0, 0.0))
+    own = Payload(fixed[0], mass, (0.0, 0.0, 0.0), (moment, 0.0, 0.0, moment, 0.0, moment))
     others = any(block.link in fixed and block != own for block in robot.config.payload)
     return () if others else (own,)

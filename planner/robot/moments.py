@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 Order = Sequence[tuple[int, int]]
-LINK: Order = (0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)  # a [[link]], and the URDF
+STATED: Order = (0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)  # robot.toml, as in a URDF
 PINOCCHIO: Order = (0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)
-PAYLOAD: Order = (0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)  # a [[payload]]
 
 
 def symmetric(values: Sequence[float] | np.ndarray, order: Order) -> np.ndarray:

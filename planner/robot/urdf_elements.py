@@ -7,10 +7,10 @@ import numpy as np
 import pinocchio as pin
 
 from planner.robot.config import LinkTable
-from planner.robot.moments import LINK, symmetric
+from planner.robot.moments import STATED, symmetric
 
 TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
-ENTRIES = dict(zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), LINK, strict=True))
+ENTRIES = dict(zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), STATED, strict=True))
 
 Joints = Mapping[str, ElementTree.Element]  # by name
 
@@ -67,7 +67,7 @@ def link_inertia(link: ElementTree.Element) -> pin.Inertia:
         return pin.Inertia.Zero()
     mass, entries = inertial.find("mass"), inertial.find("inertia")
     stated = {} if entries is None else entries.attrib
-    moments = symmetric([float(stated.get(k, "0")) for k in ENTRIES], LINK)
+    moments = symmetric([float(stated.get(k, "0")) for k in ENTRIES], STATED)
     place = place_of(inertial)
     turned = place.rotation @ moments @ place.rotation.T
     value = 0.0 if mass is None else float(mass.get("value", "0"))
@@ -96,6 +96,6 @@ def state_inertias(root: ElementTree.Element, tables: Sequence[LinkTable]) -> No
     links = {link.get("name"): link for link in root.findall("link")}
     for table in tables:
         if table.mass_kg is not None and table.link in links:
-            moments = symmetric(table.inertia_kg_m2 or (0.0,) * 6, LINK)
+            moments = symmetric(table.inertia_kg_m2 or (0.0,) * 6, STATED)
             centre = np.array(table.centre_m or (0.0,) * 3)
             write_inertia(links[table.link], pin.Inertia(table.mass_kg, centre, moments))

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from planner.errors import InputError
 from planner.robot.config import BASE
-from planner.robot.moments import PAYLOAD, PINOCCHIO, symmetric
+from planner.robot.moments import PINOCCHIO, STATED, symmetric
 from planner.robot.points import PREFIX
 from planner.robot.robot import Robot
 
@@ -236,7 +236,7 @@ def body_inertia(robot: Robot, joint: int) -> np.ndarray:
     for block in robot.config.payload:
         frame = robot.model.frames[robot.frame_id("[[payload]] link", block.link)]
         if frame.parentJoint == joint:
-            moments = symmetric(block.inertia, PAYLOAD)
+            moments = symmetric(block.inertia_kg_m2, STATED)
             body = pin.Inertia(block.mass, np.array(block.com_m, dtype=float), moments)
             total = total + frame.placement.act(body)
     return np.array(total.toDynamicParameters())

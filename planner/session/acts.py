@@ -124,13 +124,6 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
             return undo(station, over)
         case "U":
             return _redo(station, over)
-        case "n":
-            if not again:
-                station.say(f"Press n again, and {pose} is never offered again.", "yellow")
-                return asked
-            campaign.skip(pose, "another was asked for")
-            station.say(session_text.never_again(pose))
-            return over
         case "q":
             return replace(course, stop="quit")
         case "?":

@@ -96,15 +96,16 @@ def _keys(page: PosePage, late: set[str], can: TakingBack) -> str:
         ("R", "refuse all", bool(page.hits)),
         ("b", f"late ones to {' and '.join(sorted(late))}", "late" in kinds),
         ("h", _right_here(kinds), bool(kinds & {"late", "unsure"})),
-        ("s", "mark ★", True), ("k", "skip (asks why)", True), ("n", "never again", True),
+        ("s", "mark for a second look", True), ("k", "skip this pose", True),
         ("u", "undo", can.undo), ("U", "redo", can.redo), ("q", "quit", True), ("?", "help", True),
     ])  # fmt: skip
 
 
 def _right_here(kinds: set[str]) -> str:
     if "late" not in kinds:
-        return "unsure ones are right"
-    return "late and unsure ones are right" if "unsure" in kinds else "late ones are from here"
+        return "those asked about are right"
+    asked = ", those asked about right" if "unsure" in kinds else ""
+    return f"late ones are from here{asked}"
 
 
 def _named(path: Path, why: str) -> str:

@@ -20,9 +20,10 @@ from planner.words import counted, short_name, significant
 
 HELP = """\
 a, Enter  import the hits that wait      r, R  set bad hits, or all, aside
-k         skip this pose; asks why       n     never offer this pose again
-b, h      late hits: b, they are of the pose named; h, of this one (unsure ones too)
-s         mark this pose with a star (★) u, U  take back the last act; redo it
+k         skip this pose; asks whether something stands in the way of those near it too
+b, h      late hits: b, they are of the pose named; h, of this one (those asked about are right)
+s         mark this pose for a second look (★ in status and report)
+u, U      take back the last act; redo it
 q         quit; everything is on disk, and planner watch goes on from here"""
 NONE_BAD = "No hit is to be repeated: press r again, or R, to set all that wait aside."
 NOTHING_NEW = "Nothing to import yet: no new recording is whole and usable."

@@ -258,5 +258,7 @@ def test_the_commands_say_it_and_answer_it(campaign, pool, tmp_path):
     assert f"planner confirm {campaign.directory} X1" in err
     assert len(err.splitlines()) == 1
     assert call("confirm", campaign.directory, "A11")[0] == 2
-    assert "are used" in call("confirm", campaign.directory, "X1")[1]
+    said = call("confirm", campaign.directory, "X1")[1]
+    assert "frequency (Hz)" in said
+    assert "hits accepted" in said
     assert "X1" in [m.pose for m in Campaign(campaign.directory).state.used]

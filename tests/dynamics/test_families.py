@@ -57,7 +57,7 @@ def test_a_payload_is_the_mass_that_the_other_engine_adds(tmp_path):
     # The other engine's lump has a gyration radius of 1 cm.
     more = (
         f'[[payload]]\nlink = "spindle"\nmass = 2.5\ncom_m = {list(place)}\n'
-        f"inertia = [2.5e-4, 2.5e-4, 2.5e-4, 0, 0, 0]\n"
+        f"inertia_kg_m2 = [2.5e-4, 0, 0, 2.5e-4, 0, 2.5e-4]\n"
     )
     loaded = edited(KR10.write(tmp_path / "loaded", 2), more=more)
     assert_same_frfs(loaded, plain, Deviation(added=(AttachedMass("spindle", place, 2.5),)))

@@ -34,7 +34,7 @@ def carrying(simulation):
     """The same robot with the rod as a payload of its tcp."""
     length, m, radius = ROD.length, ROD.weight, ROD.diameter / 2
     across, along = m * (3 * radius**2 + length**2) / 12, m * radius**2 / 2
-    body = Payload("tcp", m, (0.0, 0.0, length / 2), (across, across, along, 0.0, 0.0, 0.0))
+    body = Payload("tcp", m, (0.0, 0.0, length / 2), (across, 0.0, 0.0, across, 0.0, along))
     config = simulation.robot.config
     config = msgspec.structs.replace(config, payload=(*config.payload, body))
     return Simulation(replace(simulation.robot, config=config))

@@ -28,7 +28,7 @@ kind = "{}"
 {}
 [[obstacle]]"""
 BENT = "stiffness_n_m_rad = {}\nangle_rad = {}"
-INERTIA = "inertia = [0.01, 0.01, {}, 0, 0, 0]\n"
+INERTIA = "inertia_kg_m2 = [0.01, 0, 0, 0.01, 0, {}]\n"
 
 # What is wrong: (old text, new text, words that the sentence has to hold).
 WRONG_TOML = {

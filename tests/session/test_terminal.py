@@ -39,8 +39,6 @@ def test_keys_and_screen_of_a_terminal(tmp_path):
         read_until(ours, "Nothing to import yet")
         os.write(ours, b"b")
         read_until(ours, "b is not possible now")
-        os.write(ours, b"n")
-        read_until(ours, "Press n again")
         os.write(ours, b"k")
         read_until(ours, "stands in the way?")
         os.write(ours, b"\n")

@@ -159,7 +159,7 @@ class Engineer:
         if late and rng.random() < 0.4:
             self.done["answered"] += 1
             return late
-        keys = ["a", "a", "u", "U", "k", "n", "r", "s", "R", "q", "\n"]
+        keys = ["a", "a", "u", "U", "k", "r", "s", "R", "q", "\n"]
         chances = [0.6, 0.1, 0.08, 0.06, 0.02, 0.02, 0.04, 0.02, 0.01, 0.03, 0.02]
         key = str(rng.choice(keys, p=chances))
         self.done[key] += 1
