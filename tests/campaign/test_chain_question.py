@@ -17,26 +17,10 @@ from planner.recording.folder import TABLE
 from tests.support.chain_cases import FAULTS, SLIGHTEST, cases, fault, judged, shown_by
 from tests.support.outside import call
 
-POSES = 1
-
-
-def counted(folder, seeds: range, rough: bool) -> tuple[dict[str, np.ndarray], int, int]:
-    """By fault, how often each pose was asked about; of good imports: how many, and asked."""
-    asked = {name: np.zeros(POSES, dtype=int) for name in FAULTS}
-    good = false = 0
-    for seed, case in zip(seeds, cases(folder, seeds, POSES, rough), strict=True):
-        rng = np.random.default_rng(seed)
-        for number, sums in enumerate(case.sums):
-            good, false = good + 1, false + (judged(sums) is not None)
-            for name in FAULTS:
-                found = judged(shown_by(sums, fault(name, rng)))
-                asked[name][number] += found is not None
-    return asked, good, false
-
 
 def test_faults_of_a_chain_are_asked_about_and_named(tmp_path):
     seeds = range(700, 705)
-    for seed, case in zip(seeds, cases(tmp_path, seeds, 2, rough=False), strict=True):
+    for seed, case in zip(seeds, cases(tmp_path, seeds, 2), strict=True):
         rng = np.random.default_rng(seed)
         for sums in case.sums:
             assert judged(sums) is None
@@ -47,21 +31,6 @@ def test_faults_of_a_chain_are_asked_about_and_named(tmp_path):
                 found = judged(shown_by(sums, true))
                 assert found is not None, (case.robot, name)
                 np.testing.assert_allclose(found.matrix, true, rtol=0.6)
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(3600)
-@pytest.mark.parametrize(("rough", "first"), [(False, 800), (True, 1800)])
-def test_how_often_chains_are_asked_about(tmp_path, rough, first):
-    count = 50
-    asked, good, false = counted(tmp_path, range(first, first + count), rough)
-    print(f"\n{'rough' if rough else 'everyday'}: {count} robots, asked of {false} of {good} good")
-    for name, each in asked.items():
-        print(f"{name:>14} {' '.join(f'{100 * n / count:4.0f} %' for n in each)}")
-    assert false <= 0.01 * good
-    if not rough:
-        assert min(asked[name].sum() for name in SLIGHTEST) >= 0.75 * good
-        assert min(asked[name].sum() for name in {*FAULTS} - {*SLIGHTEST}) >= 0.95 * good
 
 
 @pytest.mark.parametrize(
