@@ -92,7 +92,6 @@ def test_hits_of_another_pose_are_held_until_confirmed(campaign, pool, tmp_path)
     again.confirm("X1")
     assert "X1" in [m.pose for m in again.state.used]
     assert not again.state.held
-    assert all(step.check in ("identical", "kept") for step in replay(again))
     again.undo()
     assert again.state.held["X1"].question == asked
     again.undo()
