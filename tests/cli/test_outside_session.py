@@ -9,7 +9,7 @@ from planner.truth.load import load_truth
 from tests.support.outside import call, make_cell, record, told
 from tests.support.robots import JOINTS_DEG
 
-MEASUREMENTS = 8
+MEASUREMENTS = 5
 
 
 def likeness(a, b) -> float:
@@ -17,7 +17,7 @@ def likeness(a, b) -> float:
     return float(np.abs(np.vdot(a, b)) / (np.linalg.norm(a) * np.linalg.norm(b)))
 
 
-def test_eight_measurements_and_a_prediction(tmp_path):
+def test_five_measurements_and_a_prediction(tmp_path):
     robot, campaign_toml, truth = make_cell(tmp_path)
     cell = tmp_path / "cell"
     made = told("new", cell, "--robot", robot, "--campaign", campaign_toml)
@@ -73,6 +73,23 @@ def test_eight_measurements_and_a_prediction(tmp_path):
         )
         assert likeness(npz["frf_mean"], h) > likeness(simulated, h)
 
-    replayed = told("replay", cell)
+    replayed = told("replay", cell, "--acquisition", "variance")
     assert replayed["reproduced"]
     assert {s["check"] for s in replayed["steps"]} <= {"identical", "kept"}
+    check_otherwise(replayed, [m["pose"] for m in status["measurements"]])
+
+
+def check_otherwise(replayed, measured):
+    """What another acquisition would have proposed at each step, and saved."""
+    proposed = [step for step in replayed["steps"] if step["event"] == "proposed"]
+    assert proposed
+    assert all(len(step["instead"]) == 1 for step in proposed)
+    assert all(not step["instead"] for step in replayed["steps"] if step["event"] == "imported")
+    runs = replayed["otherwise"]["runs"]
+    was, other = runs["campaign"], runs["variance"]
+    assert was["poses"] == measured[: len(was["poses"])]
+    assert other["poses"][0] == was["poses"][0]
+    assert len(set(other["poses"])) == len(was["poses"]) == len(measured) - 2
+    assert was["n"] == other["n"]
+    assert np.all(np.diff(other["minutes"]) > 0)
+    assert "variance would have needed" in replayed["otherwise"]["text"]
