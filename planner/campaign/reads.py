@@ -131,15 +131,16 @@ class CampaignReads:
 
         return self._kept.get(key, Model)
 
-    def _key(self, what: str, used: tuple[Measurement, ...]) -> str:
+    def _key(self, what: str, used: tuple[Measurement, ...], where: str | None = None) -> str:
         """Name in the store of what is a function of configuration and measurements in use.
 
         The robot of a model knows its files by their paths, so the folder is part of it.
         """
+        where = str(self.directory) if where is None else where
         measured = tuple(replace(m, time="") for m in used)
         told = content_hash.of(self._configured()), content_hash.of(measured)
         computes = content_hash.program(), content_hash.libraries(*LIBRARIES)
-        return content_hash.digest(what, *computes, str(self.directory), *told)
+        return content_hash.digest(what, *computes, where, *told)
 
     def of_model(self, what: str, kind: type[T], make: Callable[["Model"], T]) -> T:
         """What follows from the model, kept on disk: where it is, the model is not loaded.
@@ -161,7 +162,12 @@ class CampaignReads:
         kept.look_through(state.used, self._kept)  # a damaged one is told now
 
         def recall(used: tuple[Measurement, ...], find: Callable[[], FitRecord]) -> FitRecord:
-            return self._kept.result(self._key("fit", used), FitRecord, find)
+            # What was fitted does not know where files are: a copy of the campaign finds it.
+            bare = tuple(replace(m, hits=tuple(unplaced(h) for h in m.hits)) for m in used)
+            return self._kept.result(self._key("fit", bare, ""), FitRecord, find)
+
+        def unplaced(hit: HitRecord) -> HitRecord:
+            return msgspec.structs.replace(hit, file="")
 
         with threadpool_limits(1):
             model = build(self.cell, state, kept.frf, kept.hits, recall)

@@ -1,5 +1,8 @@
 """How long a person waits, with a peer in the same run: pytest -m slow tests/benchmarks -s"""
 
+import statistics
+import time
+
 import numpy as np
 import pytest
 
@@ -9,17 +12,32 @@ from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
 from planner.demo import Pool, shipped
+from planner.dynamics.gradient import Inertias, laplace, response, response_gradient
+from planner.dynamics.simulation import Elasticity, Simulation
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
+from planner.robot.robot import Robot
+from planner.robot.virtual_joints import inertia_basis
 from planner.surrogate.modal_surrogate import fit_surrogate
+from planner.truth.arms import KR10
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
 from planner.truth.load import load_truth
 from tests.support.direct_solution import direct_accelerance
 from tests.support.surrogates import observed, simulated
-from tests.support.timing import seconds
 
 pytestmark = pytest.mark.slow
+
+
+def seconds(action, repeats=7):
+    """Median after one warm-up."""
+    action()
+    taken = []
+    for _ in range(repeats):
+        started = time.perf_counter()
+        action()
+        taken.append(time.perf_counter() - started)
+    return statistics.median(taken)
 
 
 @pytest.fixture(scope="module")
@@ -101,3 +119,30 @@ def test_refit_against_scikit_learn():
         f"restarts {theirs:.2f} s for 4, ratio per output {theirs / 4 / (ours / 80):.0f}"
     )
     assert ours / 80 < theirs / 4
+
+
+def test_gradient_against_differences(tmp_path):
+    """9 poses, 127 lines, 36 parameters."""
+    simulation = Simulation(Robot.load(KR10.write(tmp_path, 3)))
+    q, s = KR10.poses(9), laplace(np.tile(np.linspace(5, 200, 127), (9, 1)))
+    m, springs = simulation.elastic.matrices(q), simulation.elasticity
+    basis = np.tile(inertia_basis(), (6, 1, 1, 1))
+    inertias = Inertias(simulation.elastic.body_jacobians(q), basis)
+
+    def differences():
+        before = response(m, springs, s)
+        for kind in range(2):
+            for j in range(18):
+                values = [springs.stiffness.copy(), springs.damping.copy()]
+                values[kind][j] *= 1 + 1e-6
+                _ = response(m, Elasticity(*values, springs.loss_factor), s) - before
+
+    ours = seconds(lambda: response_gradient(m, springs, s), 15)
+    whole = seconds(lambda: response_gradient(m, springs, s, inertias=inertias), 15)
+    peer = seconds(differences, 3)
+    assert response_gradient(m, springs, s)[1].shape == (9, 36, 3, 3, 127)
+    print(
+        f"\nFRFs and 36 derivatives, 9 poses × 127 lines: {1e3 * ours:.1f} ms (with 60 of inertias "
+        f"{1e3 * whole:.1f} ms), forward differences {1e3 * peer:.0f} ms, ratio {peer / ours:.0f}"
+    )
+    assert ours < peer / 5

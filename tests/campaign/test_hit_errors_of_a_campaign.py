@@ -9,7 +9,6 @@ from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.dataset.store import Store
 from planner.replay import replay
 from planner.report.imports import ImportedPoses
-from planner.truth.handling import LABORATORY
 from tests.support.missed_hits import MissedCell, missed_cell
 
 NORMAL95 = 1.959964
@@ -81,52 +80,3 @@ def test_what_hits_have_in_common_is_said():
         "Your −x hits tilt by 2.0 ± 0.2° towards −z.",
     )
     assert systematic_errors([hit("+y", (0.3, 0.3), (1.0, 1.0))] * 3) == ()
-
-
-CELLS = (("kr10", 1, 51), ("irb6640", 1, 52), ("kr210", 3, 53))
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(3600)
-def test_216_hits_of_three_robots(tmp_path, capsys):
-    """Correlation of at least 0.9, coverage of 90 to 98 %, residues at least twice as good."""
-    every, errors = [], []
-    lines = ["robot, tilt: corr, cover, offset: corr, cover, residues: raw, corrected, exact hits"]
-    for robot, per_joint, seed in CELLS:
-        made = missed_cell(tmp_path / robot, robot, per_joint, seed=seed)
-        campaign, _ = imported(made, tmp_path / robot / "campaign")
-        raw = build(campaign.cell, campaign.state, campaign.frf_of)
-        folder = tmp_path / f"{robot}_exact"
-        exact = missed_cell(folder, robot, per_joint, seed=seed, handling=LABORATORY)
-        calm, _ = imported(exact, folder / "campaign")
-        every.append(told_of(made, campaign.model))
-        three = (made, raw), (made, campaign.model), (exact, calm.model)
-        errors.append([one.residue_errors(model) for one, model in three])
-        lines.append(row(robot, every[-1], errors[-1]))
-    whole = tuple(np.concatenate(part) for part in zip(*every, strict=True))
-    pooled = [np.concatenate(kind) for kind in zip(*errors, strict=True)]
-    lines.append(row("all", whole, pooled))
-    with capsys.disabled():
-        print("\n" + "\n".join(lines))
-    assert len(whole[0]) >= 200
-    for part in (slice(0, 2), slice(2, 4)):
-        correlation, covered = agreement(*(one[:, part] for one in whole))
-        assert correlation >= 0.9
-        assert 0.90 <= covered <= 0.98
-    assert rms(pooled[1]) <= 0.5 * rms(pooled[0])
-
-
-def rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def agreement(told: np.ndarray, sd: np.ndarray, true: np.ndarray) -> tuple[float, float]:
-    correlation = np.corrcoef(told.ravel(), true.ravel())[0, 1]
-    return float(correlation), float(np.mean(np.abs(told - true) < NORMAL95 * sd))
-
-
-def row(name: str, parts: tuple, errors: list) -> str:
-    tilt = agreement(*(one[:, :2] for one in parts))
-    offset = agreement(*(one[:, 2:] for one in parts))
-    numbers = [f"{v:.3f}" for v in (*tilt, *offset)] + [f"{100 * rms(e):.2f} %" for e in errors]
-    return ", ".join([name, *numbers])

@@ -1,6 +1,5 @@
 """`planner modes` of FRFs between any points: files of any kind, no robot."""
 
-import json
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -8,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.cli.run import run
 from planner.frf.matrix import FrfMatrix
 from planner.frf.synthesis import pole
 from planner.modal.mac import mac
 from planner.recording.dof import Dof
 from tests.cli.test_modes_pictures import entities_of
 from tests.support.matrix_files import transposed, write_matrix
+from tests.support.outside import modes
 from tests.support.struck_structures import struck, unit_mass_shapes
 from tests.support.structures import plate
 
@@ -31,12 +30,6 @@ def structure():
 @pytest.fixture(scope="module")
 def matrix(structure):
     return struck(structure, REFERENCES, LINES, np.random.default_rng(3))
-
-
-def modes(capsys, *arguments):
-    code = run(["modes", *(str(a) for a in arguments), "--json"])
-    captured = capsys.readouterr()
-    return code, json.loads(captured.out) if captured.out else None, captured.err
 
 
 def true_modes(structure):
@@ -62,9 +55,9 @@ def agree(answer, structure, least=0.995, scale=0.03):
 
 
 @pytest.mark.parametrize("kind", ["accelerance", "mobility", "receptance"])
-def test_a_roving_hammer_set(structure, matrix, tmp_path, capsys, kind):
+def test_a_roving_hammer_set(structure, matrix, tmp_path, kind):
     path = write_matrix(tmp_path / "set.uff", matrix, kind, turned=[4, 9])
-    code, answer, err = modes(capsys, path, "--band-hz", *BAND)
+    code, answer, err = modes(path, "--band-hz", *BAND)
     assert (code, err) == (0, "")
     assert answer["dofs"] == [[node, "z"] for node in structure.nodes]
     assert answer["frfs"] == 150
@@ -79,15 +72,15 @@ def keep(matrix, rng, share):
     return [pair for pair in pairs if pair in matrix.driving or rng.random() > share]
 
 
-def test_a_fifth_of_the_matrix_is_missing(structure, matrix, tmp_path, capsys):
+def test_a_fifth_of_the_matrix_is_missing(structure, matrix, tmp_path):
     entries = keep(matrix, np.random.default_rng(5), 0.2)
     path = write_matrix(tmp_path / "set.uff", matrix, entries=entries)
-    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    code, answer, _ = modes(path, "--band-hz", *BAND)
     assert (code, answer["frfs"]) == (0, len(entries))
     agree(answer, structure)
 
 
-def test_several_files_one_per_reference_and_geometry_beside(structure, matrix, tmp_path, capsys):
+def test_several_files_one_per_reference_and_geometry_beside(structure, matrix, tmp_path):
     nodes = np.array(structure.nodes)
     place = np.array([structure.position_m[n] for n in structure.nodes])
     sets = [{"type": 15, "node_nums": nodes, "x": place[:, 0], "y": place[:, 1], "z": place[:, 2]}]
@@ -96,26 +89,26 @@ def test_several_files_one_per_reference_and_geometry_beside(structure, matrix, 
         write_matrix(tmp_path / f"{i}.uff", matrix, entries=[(o, i) for o in range(50)])
         for i in range(3)
     ]
-    code, answer, err = modes(capsys, *paths, geometry, "--band-hz", *BAND)
+    code, answer, err = modes(*paths, geometry, "--band-hz", *BAND)
     assert (code, err) == (0, "")
     assert answer["refused"] == []
     agree(answer, structure)
 
 
 @pytest.mark.parametrize("column", [True, False])
-def test_one_column_or_one_row(structure, matrix, tmp_path, capsys, column):
+def test_one_column_or_one_row(structure, matrix, tmp_path, column):
     matrix = matrix if column else transposed(matrix)
     entries = [(o, 1) if column else (1, o) for o in range(50)]
     path = write_matrix(tmp_path / "set.uff", matrix, entries=entries)
-    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    code, answer, _ = modes(path, "--band-hz", *BAND)
     assert code == 0
     agree(answer, structure)
 
 
-def test_without_a_driving_point_shapes_are_not_scaled(structure, matrix, tmp_path, capsys):
+def test_without_a_driving_point_shapes_are_not_scaled(structure, matrix, tmp_path):
     entries = [(o, 0) for o in range(1, 50)]
     path = write_matrix(tmp_path / "set.uff", matrix, entries=entries)
-    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    code, answer, _ = modes(path, "--band-hz", *BAND)
     assert code == 0
     assert not any(mode["scaled"] for mode in answer["modes"])
     assert len(answer["dofs"]) == 49
@@ -125,11 +118,11 @@ def test_without_a_driving_point_shapes_are_not_scaled(structure, matrix, tmp_pa
         assert np.linalg.norm(mode["shape"]) == pytest.approx(1.0)
 
 
-def test_unstated_quantity_and_scalar_directions(structure, matrix, tmp_path, capsys):
+def test_unstated_quantity_and_scalar_directions(structure, matrix, tmp_path):
     unknown = {"ordinate_spec_data_type": 0, "ordinate_axis_units_lab": "NONE", "rsp_dir": 0,
                "ref_dir": 0}  # fmt: skip
     path = write_matrix(tmp_path / "set.uff", matrix, **unknown)
-    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    code, answer, _ = modes(path, "--band-hz", *BAND)
     assert (code, answer["dofs"][0]) == (0, [1, "scalar"])
     assert "--quantity" in " ".join(answer["remarks"])
     agree(answer, structure, scale=None)
@@ -142,15 +135,15 @@ def exchange(matrix, a, b):
     return replace(matrix, accelerance=matrix.accelerance[order])
 
 
-def test_a_turned_sign_and_exchanged_nodes_are_named(structure, matrix, tmp_path, capsys):
+def test_a_turned_sign_and_exchanged_nodes_are_named(structure, matrix, tmp_path):
     turned = matrix.accelerance.copy()
     turned[:, 1] *= -1
     path = write_matrix(tmp_path / "turned.uff", replace(matrix, accelerance=turned))
-    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    _, answer, _ = modes(path, "--band-hz", *BAND)
     assert "sign of the channel at node 14, z is turned" in " ".join(answer["remarks"])
     agree(answer, structure)
     path = write_matrix(tmp_path / "exchanged.uff", exchange(matrix, 13, 25))
-    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    _, answer, _ = modes(path, "--band-hz", *BAND)
     told = " ".join(answer["remarks"])
     assert "Nodes 14 and 26 (z) are probably swapped" in told
 
@@ -169,14 +162,14 @@ def places(structure):
 
 @pytest.mark.parametrize("hammer", [True, False])
 def test_points_without_a_reference_are_told_by_their_neighbours(
-    structure, matrix, tmp_path, capsys, hammer
+    structure, matrix, tmp_path, hammer
 ):
     turned = matrix.accelerance.copy()
     turned[24] *= -1
     one = replace(matrix, accelerance=turned)
     one = transposed(one) if hammer else one
     path = write_matrix(tmp_path / "turned.uff", one, before=places(structure))
-    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    _, answer, _ = modes(path, "--band-hz", *BAND)
     done = "hit" if hammer else "felt"
     (remark,) = answer["remarks"]
     assert f"The sign at node 25, z is turned where it was {done}" in remark
@@ -184,17 +177,17 @@ def test_points_without_a_reference_are_told_by_their_neighbours(
     other = exchange(matrix, 8, 30)
     other = transposed(other) if hammer else other
     path = write_matrix(tmp_path / "exchanged.uff", other, before=places(structure))
-    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    _, answer, _ = modes(path, "--band-hz", *BAND)
     (remark,) = answer["remarks"]
     assert "Nodes 9 and 31 are probably swapped" in remark
 
 
-def test_single_frfs_are_named(structure, matrix, tmp_path, capsys):
+def test_single_frfs_are_named(structure, matrix, tmp_path):
     values = matrix.accelerance.copy()
     values[20, 0] *= -1
     values[[5, 33], 2] = values[[33, 5], 2]
     path = write_matrix(tmp_path / "odd.uff", replace(matrix, accelerance=values))
-    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    _, answer, _ = modes(path, "--band-hz", *BAND)
     told = " ".join(answer["remarks"])
     assert "The FRF felt at node 21, z and hit at node 1, z has a turned sign" in told
     assert "felt at node 6, z and hit at node 38, z and felt at node 34, z and hit at" in told
@@ -202,27 +195,27 @@ def test_single_frfs_are_named(structure, matrix, tmp_path, capsys):
     agree(answer, structure)
 
 
-def test_nothing_is_named_where_nothing_is_wrong(structure, matrix, tmp_path, capsys):
+def test_nothing_is_named_where_nothing_is_wrong(structure, matrix, tmp_path):
     path = write_matrix(tmp_path / "set.uff", matrix, before=places(structure))
-    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    _, answer, _ = modes(path, "--band-hz", *BAND)
     assert answer["remarks"] == []
 
 
-def test_lines_that_differ_are_refused(matrix, tmp_path, capsys):
+def test_lines_that_differ_are_refused(matrix, tmp_path):
     first = write_matrix(tmp_path / "a.uff", matrix, entries=[(0, 0)])
     other = replace(matrix, frequency_hz=matrix.frequency_hz * 1.1)
     second = write_matrix(tmp_path / "b.uff", other, entries=[(1, 0)])
-    code, _, err = modes(capsys, first, second)
+    code, _, err = modes(first, second)
     assert code in (2, 3)
     assert "b.uff has other frequency lines" in err
     assert len(err.strip().splitlines()) == 1
 
 
-def test_dead_channels_are_left_out_and_named(structure, matrix, tmp_path, capsys):
+def test_dead_channels_are_left_out_and_named(structure, matrix, tmp_path):
     values = matrix.accelerance.copy()
     values[10], values[20, 1] = 0.0, 0.0
     path = write_matrix(tmp_path / "set.uff", replace(matrix, accelerance=values))
-    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    code, answer, _ = modes(path, "--band-hz", *BAND)
     assert (code, answer["frfs"]) == (0, 146)
     assert "4 FRFs are zero throughout" in " ".join(answer["remarks"])
     assert [11, "z"] not in answer["dofs"]
@@ -231,7 +224,7 @@ def test_dead_channels_are_left_out_and_named(structure, matrix, tmp_path, capsy
 
 @pytest.mark.parametrize("placed", [True, False])
 def test_the_recording_has_charts_shapes_and_mac_in_place_of_pictures(
-    structure, matrix, tmp_path, capsys, placed
+    structure, matrix, tmp_path, placed
 ):
     place = np.array([structure.position_m[n] for n in structure.nodes])
     ends = [number for pair in structure.lines for number in (*pair, 0)]
@@ -242,7 +235,7 @@ def test_the_recording_has_charts_shapes_and_mac_in_place_of_pictures(
          "nodes": np.array(ends)},
     ]  # fmt: skip
     path = write_matrix(tmp_path / "set.uff", matrix, before=sets if placed else ())
-    code, answer, err = modes(capsys, path, "--band-hz", *BAND, "--rrd", tmp_path / "modes.rrd")
+    code, answer, err = modes(path, "--band-hz", *BAND, "--rrd", tmp_path / "modes.rrd")
     assert (code, err) == (0, "")
     drawn = entities_of(answer["rrd"])
     count = len(answer["modes"])
@@ -262,10 +255,10 @@ def vectors_of(mode):
 
 
 def test_right_and_left_vectors_of_a_reciprocal_structure_are_its_shape(
-    structure, matrix, tmp_path, capsys
+    structure, matrix, tmp_path
 ):
     path = write_matrix(tmp_path / "set.uff", matrix)
-    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    _, answer, _ = modes(path, "--band-hz", *BAND)
     hit = [answer["dofs"].index(dof) for dof in answer["references"]]
     for mode in answer["modes"]:
         (right, left, _), shape = vectors_of(mode), np.array([complex(*v) for v in mode["shape"]])
@@ -277,7 +270,7 @@ def test_right_and_left_vectors_of_a_reciprocal_structure_are_its_shape(
 
 
 @pytest.mark.parametrize("seed", [31, 32, 33])
-def test_right_and_left_vectors_of_a_robot_without_reciprocity(tmp_path, capsys, seed):
+def test_right_and_left_vectors_of_a_robot_without_reciprocity(tmp_path, seed):
     """Modes 1 to 5 of Lei et al. 2023, Table B1: both vectors come back, one shape would not do."""
     campaigns = Path(__file__).parents[2] / "campaigns"
     file = campaigns / "irb6660_lei2023" / "modes.toml"
@@ -294,7 +287,7 @@ def test_right_and_left_vectors_of_a_robot_without_reciprocity(tmp_path, capsys,
     points = tuple(Dof.of_uff(node, direction) for node in "12" for direction in (1, 2))
     matrix = FrfMatrix(hz, points, points, h, np.full(h.shape, np.nan), True)
     path = write_matrix(tmp_path / "set.uff", matrix, "receptance")
-    code, answer, _ = modes(capsys, path, "--export", tmp_path / "files")
+    code, answer, _ = modes(path, "--export", tmp_path / "files")
     assert code == 0
     assert "right and left vectors" in " ".join(answer["remarks"])
     found = np.array([m["frequency_hz"] for m in answer["modes"]])

@@ -1,23 +1,15 @@
 """`planner modes` of FRFs that state little, and of bands in which they have no lines."""
 
-import json
-
 import numpy as np
 import pytest
 from scipy.io import savemat
 
-from planner.cli.run import run
+from tests.support.outside import modes
 from tests.support.structures import plate
 
 BAND = (25.0, 120.0)
 PLATE = plate(3, 3)
 NODES = range(len(PLATE.nodes))
-
-
-def modes(capsys, *arguments):
-    code = run(["modes", *(str(a) for a in arguments), "--json"])
-    captured = capsys.readouterr()
-    return code, json.loads(captured.out) if captured.out else None, captured.err
 
 
 def exact_frfs(folder, names, axis=0, turned=False):
@@ -32,9 +24,9 @@ def exact_frfs(folder, names, axis=0, turned=False):
     return files
 
 
-def test_a_turned_channel_of_a_nameless_point(tmp_path, capsys):
+def test_a_turned_channel_of_a_nameless_point(tmp_path):
     (path,) = exact_frfs(tmp_path, ["accelerance_xx"], turned=True)
-    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    code, answer, _ = modes(path, "--band-hz", *BAND)
     assert (code, answer["dofs"], len(answer["modes"])) == (0, [["", "x"]], 3)
     assert "The sign of the channel along x is turned" in " ".join(answer["remarks"])
     assert "node" not in " ".join(answer["remarks"])
@@ -49,18 +41,18 @@ def logged(path, rows, hz):
     return path
 
 
-def test_unlabelled_frfs_of_several_files_are_rows_of_one_analysis(tmp_path, capsys):
+def test_unlabelled_frfs_of_several_files_are_rows_of_one_analysis(tmp_path):
     hz = np.arange(513) * 0.25
     whole = logged(tmp_path / "whole.mat", list(NODES), hz)
     parts = [logged(tmp_path / f"{k}.mat", [2 * k, 2 * k + 1], hz) for k in range(4)]
     options = "--quantity", "accelerance", "--band-hz", *BAND
-    code, answer, err = modes(capsys, *parts, logged(tmp_path / "last.mat", [8], hz), *options)
+    code, answer, err = modes(*parts, logged(tmp_path / "last.mat", [8], hz), *options)
     assert (code, err) == (0, "")
     assert len(answer["accepted"]) == 5
     assert [len(mode["shape"]) for mode in answer["modes"]] == 3 * [len(NODES)]
-    assert answer["modes"] == modes(capsys, whole, *options)[1]["modes"]
+    assert answer["modes"] == modes(whole, *options)[1]["modes"]
     other = logged(tmp_path / "other.mat", [0], hz * 1.5)
-    code, _, err = modes(capsys, *parts, other, *options)
+    code, _, err = modes(*parts, other, *options)
     assert code in (2, 3)
     assert "other.mat has other frequency lines" in err
 
@@ -71,7 +63,7 @@ def test_unlabelled_frfs_of_several_files_are_rows_of_one_analysis(tmp_path, cap
      ((0.01, 0.2), "The FRFs begin at 0.25 Hz, above the band of 0.01 to 0.2 Hz")],
 )  # fmt: skip
 @pytest.mark.parametrize("kind", ["matrix", "pose", "folder", "unlabelled"])
-def test_bands_that_frfs_do_not_hold_are_named(kind, band, told, tmp_path, capsys):
+def test_bands_that_frfs_do_not_hold_are_named(kind, band, told, tmp_path):
     if kind == "unlabelled":
         paths = [logged(tmp_path / "a.mat", [0, 1], np.arange(601) * 0.25)]
     else:
@@ -87,14 +79,14 @@ def test_bands_that_frfs_do_not_hold_are_named(kind, band, told, tmp_path, capsy
         rows = "pose,hit,repeat,file\nP1,+x,1,P1.csv\nP2,+x,1,P2.csv\n"
         (tmp_path / "recordings.csv").write_text(rows)
         paths = [tmp_path]
-    code, _, err = modes(capsys, *paths, "--quantity", "accelerance", "--band-hz", *band)
+    code, _, err = modes(*paths, "--quantity", "accelerance", "--band-hz", *band)
     assert code == 3
     assert told in err
     assert "--band-hz" in err
     assert len(err.strip().splitlines()) == 1
 
 
-def test_file_names_say_where_frfs_are_where_asked(tmp_path, capsys):
+def test_file_names_say_where_frfs_are_where_asked(tmp_path):
     hz = np.arange(1, 601) * 0.25
     paths = []
     for k in range(3):
@@ -104,9 +96,9 @@ def test_file_names_say_where_frfs_are_where_asked(tmp_path, capsys):
         head = "Frequency (Hz),Real ((m/s^2)/N),Imaginary ((m/s^2)/N)"
         np.savetxt(paths[-1], table, delimiter=",", header=head, comments="", fmt="%.9g")
     options = "--band-hz", *BAND
-    code, answer, err = modes(capsys, *paths, "--from-names", *options)
+    code, answer, err = modes(*paths, "--from-names", *options)
     assert (code, err) == (0, "")
     assert answer["dofs"] == [[1, "scalar"], [2, "scalar"], [3, "scalar"]]
     assert all(mode["scaled"] for mode in answer["modes"])
-    code, answer, err = modes(capsys, *paths, *options)
+    code, answer, err = modes(*paths, *options)
     assert (code, err, "dofs" in answer) == (0, "", False)

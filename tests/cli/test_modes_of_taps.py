@@ -1,14 +1,13 @@
 """`planner modes` of time histories of any points: one sensor, a roving hammer, a roving sensor."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from planner.cli.run import run
 from planner.modal.mac import mac
+from tests.support.outside import modes
 from tests.support.struck_structures import unit_mass_shapes
 from tests.support.structures import plate
 from tests.support.taps import tap, write_csv, write_uff
@@ -16,12 +15,6 @@ from tests.support.taps import tap, write_csv, write_uff
 BAND = (25.0, 120.0)
 PLATE = plate(3, 3)
 NODES = range(len(PLATE.nodes))
-
-
-def modes(capsys, *arguments):
-    code = run(["modes", *(str(a) for a in arguments), "--json"])
-    captured = capsys.readouterr()
-    return code, json.loads(captured.out) if captured.out else None, captured.err
 
 
 def agree(answer, scale=0.03, shapes=True):
@@ -82,9 +75,9 @@ def table(folder, rng):
 @pytest.mark.parametrize(
     "write", [roving_hammer, roving_sensor, one_file, repeats, named_columns, table]
 )
-def test_hits_of_any_points(write, tmp_path, capsys):
+def test_hits_of_any_points(write, tmp_path):
     paths = write(tmp_path, np.random.default_rng(4))
-    code, answer, err = modes(capsys, *paths, "--band-hz", *BAND)
+    code, answer, err = modes(*paths, "--band-hz", *BAND)
     assert (code, err) == (0, "")
     assert len(answer["dofs"]) == len(NODES)
     assert answer["simulated"] == (write not in (named_columns, table))
@@ -102,11 +95,11 @@ def test_hits_of_any_points(write, tmp_path, capsys):
         ("acceleration_m_s2", (), ["acceleration_m_s2", "scalar"], False),
     ],
 )
-def test_a_hammer_and_one_sensor(column, attributes, dof, scaled, tmp_path, capsys):
+def test_a_hammer_and_one_sensor(column, attributes, dof, scaled, tmp_path):
     """Without a band: where the hit excites; what is not stated is not made up."""
     path = write_csv(tmp_path / "tap.csv", tap(PLATE, 0, (0,), np.random.default_rng(2)), column,
                      *attributes)  # fmt: skip
-    code, answer, err = modes(capsys, path)
+    code, answer, err = modes(path)
     assert (code, err) == (0, "")
     assert answer["dofs"] == [dof]
     assert BAND[1] < answer["band_hz"][1] < 512
@@ -114,56 +107,56 @@ def test_a_hammer_and_one_sensor(column, attributes, dof, scaled, tmp_path, caps
     agree(answer, shapes=False)
 
 
-def test_an_analysers_window_is_taken_out_of_the_damping(tmp_path, capsys):
+def test_an_analysers_window_is_taken_out_of_the_damping(tmp_path):
     rng, rate = np.random.default_rng(3), 3.0
     one = tap(PLATE, 0, (0,), rng)
     window = np.exp(-rate * np.maximum(0, np.arange(one.force_n.size) / 1024.0 - 0.102))
     one.acceleration_m_s2[:] *= window
     one.force_n[:] *= window
     path = write_csv(tmp_path / "tap.csv", one, "acceleration_z_m_s2", "hit: +z")
-    code, answer, _ = modes(capsys, path, "--window-rate", rate)
+    code, answer, _ = modes(path, "--window-rate", rate)
     assert code == 0
     agree(answer, shapes=False)
 
 
-def test_faulty_hits_are_refused_and_the_others_used(tmp_path, capsys):
+def test_faulty_hits_are_refused_and_the_others_used(tmp_path):
     rng = np.random.default_rng(6)
     paths = roving_hammer(tmp_path, rng)
     double = write_uff(tmp_path / "double.uff", [tap(PLATE, 3, (0,), rng, second=0.6)])
     run_of = [tap(PLATE, 5, (0,), rng, second=share) for share in (0.0, 0.5)]
     run_of = write_uff(tmp_path / "run.uff", run_of)
-    code, answer, err = modes(capsys, *paths, double, run_of, "--band-hz", *BAND)
+    code, answer, err = modes(*paths, double, run_of, "--band-hz", *BAND)
     assert code == 3
     assert [one["file"] for one in answer["refused"]] == [str(double), f"{run_of} (hit 2)"]
     assert all("second pulse" in one["reason"] for one in answer["refused"])
     agree(answer)
-    code, answer, err = modes(capsys, double)
+    code, answer, err = modes(double)
     assert (code, answer) == (3, None)
     assert "second pulse" in err
     assert len(err.strip().splitlines()) == 1
 
 
-def test_pictures_and_files_of_taps(tmp_path, capsys):
+def test_pictures_and_files_of_taps(tmp_path):
     paths = roving_hammer(tmp_path, np.random.default_rng(7))
     options = "--plot", tmp_path / "plots", "--export", tmp_path / "out", "--band-hz", *BAND
-    code, answer, err = modes(capsys, *paths, *options)
+    code, answer, err = modes(*paths, *options)
     assert (code, err) == (0, "")
     assert all(Path(path).read_bytes().startswith(b"\x89PNG") for path in answer["plots"])
-    code, again, _ = modes(capsys, tmp_path / "out" / "frfs.uff", "--band-hz", *BAND)
+    code, again, _ = modes(tmp_path / "out" / "frfs.uff", "--band-hz", *BAND)
     assert code == 0
     assert again["dofs"] == answer["dofs"]
 
 
-def test_a_record_sampled_too_slowly_for_the_band_names_both(tmp_path, capsys):
+def test_a_record_sampled_too_slowly_for_the_band_names_both(tmp_path):
     one = tap(PLATE, 0, (0,), np.random.default_rng(2))
     path = write_csv(tmp_path / "tap.csv", one, "acceleration_z_m_s2", "hit: +z")
-    code, _, err = modes(capsys, path, "--band-hz", 600, 900)
+    code, _, err = modes(path, "--band-hz", 600, 900)
     assert code == 3
     assert "its FRFs end at 460.8 Hz, before the end of the band of 600 to 900 Hz" in err
     assert "--band-hz" in err
 
 
-def test_what_readers_notice_of_hits_is_told(tmp_path, capsys):
+def test_what_readers_notice_of_hits_is_told(tmp_path):
     """Channels that begin apart, of no known unit; a pulse that not all channels have."""
     one = tap(PLATE, 0, (0,), np.random.default_rng(6))
     write_csv(tmp_path / "tap.csv", one, "acceleration_z_m_s2", "hit: +z")
@@ -176,23 +169,23 @@ def test_what_readers_notice_of_hits_is_told(tmp_path, capsys):
         return tmp_path / "late.csv"
 
     late = round(0.01 / (rows[1, 0] - rows[0, 0]))
-    code, answer, err = modes(capsys, written(late))
+    code, answer, err = modes(written(late))
     assert (code, err) == (0, "")
     assert any("acceleration_z_m_s2 begin" in text for text in answer["remarks"])
     assert any("unit is not known: other." in text for text in answer["remarks"])
-    code, _, err = modes(capsys, written(len(rows) // 2))
+    code, _, err = modes(written(len(rows) // 2))
     assert code == 3
     assert "s apart" in err
 
 
-def test_short_records_of_one_sensor_give_modes_or_a_sentence(tmp_path, capsys):
+def test_short_records_of_one_sensor_give_modes_or_a_sentence(tmp_path):
     one = tap(PLATE, 0, (0,), np.random.default_rng(2))
     for kept in (120, 160, 180, 200, 220, 260, 300, 340, 380, 420):
         cut = replace(
             one, force_n=one.force_n[:kept], acceleration_m_s2=one.acceleration_m_s2[:, :kept]
         )
         path = write_csv(tmp_path / f"{kept}.csv", cut, "acceleration_z_m_s2", "hit: +z")
-        code, _, err = modes(capsys, path)
+        code, _, err = modes(path)
         assert code in (0, 3), (kept, err)
         assert code == 0 or err.startswith(
             ("No mode could be found", "No modes could be identified")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import pyuff
 
-from planner.cli.run import run
 from planner.modal.mac import mac
+from tests.support.outside import call
 from tests.support.rerun_columns import lines_of
 from tests.support.running import response
 from tests.support.structures import plate
@@ -45,13 +45,7 @@ def record(structure, tmp_path_factory):
     return path
 
 
-def answered(capsys, *arguments):
-    code = run(["modes", *(str(a) for a in arguments)])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
-
-
-def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path, capsys):
+def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path):
     options = (
         "--operating",
         "--band-hz",
@@ -62,7 +56,7 @@ def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path, c
         "--rrd",
         tmp_path / "modes.rrd",
     )
-    code, out, err = answered(capsys, record, *options)
+    code, out, err = call("modes", record, *options)
     assert (code, err) == (0, "")
     answer = json.loads(out)
     poles, shapes = structure.poles()
@@ -85,13 +79,7 @@ def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path, c
     assert {f"/figures/stabilisation/0/singular_value_{k}" for k in (1, 2, 3)} <= set(drawn)
 
 
-def test_the_text_says_that_nothing_is_scaled(record, capsys):
-    code, out, _ = answered(capsys, record, "--operating", "--band-hz", *BAND)
-    assert code == 0
-    assert "UNSCALED" in out
-
-
-def test_two_files_are_refused(record, capsys):
-    code, out, err = answered(capsys, record, record, "--operating")
+def test_two_files_are_refused(record):
+    code, out, err = call("modes", record, record, "--operating")
     assert (code, out) == (2, "")
     assert "one record at a time" in err

@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 from rerun.chunk import RrdReader
 
-from planner.cli.run import run
 from planner.report.pictures import rendered
-from tests.support.outside import make_cell, record
+from tests.support.outside import call, make_cell, record
 
 NAMES = ["stabilisation", "frf", "coherence", "mac"]
 
@@ -25,14 +24,8 @@ def hits(tmp_path_factory):
     return sorted((folder / "data").iterdir())
 
 
-def modes(capsys, *arguments):
-    code = run(["modes", *(str(a) for a in arguments)])
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
-
-
-def test_pictures_are_written_and_named_on_screen(hits, tmp_path, capsys):
-    code, out, err = modes(capsys, *hits, "--plot", tmp_path / "new" / "folder")
+def test_pictures_are_written_and_named_on_screen(hits, tmp_path):
+    code, out, err = call("modes", *hits, "--plot", tmp_path / "new" / "folder")
     assert code == 0, err
     flat = "".join(out.split())
     for name in NAMES:
@@ -41,10 +34,10 @@ def test_pictures_are_written_and_named_on_screen(hits, tmp_path, capsys):
         assert str(path) in flat
 
 
-def test_pictures_are_listed_and_told_to_rerun(hits, tmp_path, monkeypatch, capsys):
+def test_pictures_are_listed_and_told_to_rerun(hits, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     options = ("--plot", "here", "--format", "svg", "--rrd", "sub/modes.rrd", "--json")
-    code, out, err = modes(capsys, *hits, *options)
+    code, out, err = call("modes", *hits, *options)
     assert code == 0, err
     answer, expected = json.loads(out), [tmp_path / "here" / f"{name}.svg" for name in NAMES]
     assert answer["plots"] == [str(path) for path in expected]
@@ -63,8 +56,8 @@ def entities_of(rrd):
     return {str(chunk.entity_path) for chunk in reader.stream(store=reader.recordings()[0])}
 
 
-def test_without_a_wish_nothing_is_drawn(hits, capsys):
-    code, out, _ = modes(capsys, *hits, "--json")
+def test_without_a_wish_nothing_is_drawn(hits):
+    code, out, _ = call("modes", *hits, "--json")
     answer = json.loads(out)
     assert (code, answer["plots"], answer["rrd"]) == (0, [], None)
 
@@ -79,23 +72,21 @@ def test_without_a_wish_nothing_is_drawn(hits, capsys):
         (("--rrd", "taken/below.rrd"), "taken/below.rrd"),
     ],
 )
-def test_a_place_that_cannot_be_written_is_said(
-    hits, tmp_path, monkeypatch, capsys, options, words
-):
+def test_a_place_that_cannot_be_written_is_said(hits, tmp_path, monkeypatch, options, words):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").write_text("a file")
     (tmp_path / "blocked" / "stabilisation.png").mkdir(parents=True)
-    code, out, err = modes(capsys, *hits, "--json", *options)
+    code, out, err = call("modes", *hits, "--json", *options)
     assert (code, out) == (2, "")
     assert words in err
     assert len(err.strip().splitlines()) == 1
     assert "failed inside" not in err
 
 
-def test_free_decays_are_drawn_without_frfs(shared_data, tmp_path, capsys):
+def test_free_decays_are_drawn_without_frfs(shared_data, tmp_path):
     path = shared_data / "imphammer_mit" / "imp_ham_set1_nomass.CSV"
     options = ("--force", "CH8", "--json", "--plot", tmp_path, "--format", "svg")
-    code, out, _ = modes(capsys, path, *options)
+    code, out, _ = call("modes", path, *options)
     assert code == 0
     names = [tmp_path / f"{name}.svg" for name in ("stabilisation", "mac")]
     assert json.loads(out)["plots"] == [str(name) for name in names]

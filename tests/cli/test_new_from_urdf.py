@@ -1,6 +1,5 @@
 """`planner new --urdf`: from a maker's description to the first pose, whatever it lacks."""
 
-import json
 import re
 import shutil
 from pathlib import Path
@@ -9,18 +8,11 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.cli.run import run
 from planner.robot.robot import Robot
+from tests.support.outside import call, said, told
 from tests.support.published import HAND, LIMITS, PACKAGE, RAIL, published, robot_toml
 
 GIVEN = "--mass-kg", "420", "--payload-kg", "20"
-
-
-def ask(capsys, *arguments: object) -> dict:
-    code = run([*map(str, arguments), "--json"])
-    said = capsys.readouterr()
-    assert code == 0, said.err
-    return json.loads(said.out)
 
 
 def whole(folder: Path) -> Path:
@@ -65,9 +57,9 @@ def odd_limits(folder: Path) -> Path:
     return urdf
 
 
-def test_its_robot_toml_says_how_to_move_the_tcp(tmp_path, capsys):
+def test_its_robot_toml_says_how_to_move_the_tcp(tmp_path):
     cell = tmp_path / "cell"
-    ask(capsys, "new", cell, "--urdf", whole(tmp_path / "src"))
+    told("new", cell, "--urdf", whole(tmp_path / "src"))
     toml = cell / "robot" / "robot.toml"
     flange, text = Robot.load(toml), toml.read_text()
     said = [line[2:] for line in text.splitlines() if line.startswith("# ")]
@@ -78,7 +70,7 @@ def test_its_robot_toml_says_how_to_move_the_tcp(tmp_path, capsys):
     q = np.full(len(flange.joint_names), 0.2)
     moved = Robot.load(toml).forward(q)[1] - flange.forward(q)[1]
     assert np.linalg.norm(moved) == pytest.approx(0.25, abs=1e-3)
-    assert ask(capsys, "next", cell)["proposals"]
+    assert told("next", cell)["proposals"]
 
 
 KINDS = {
@@ -88,10 +80,10 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
-def test_it_goes_from_a_description_to_a_first_pose(kind, tmp_path, capsys):
+def test_it_goes_from_a_description_to_a_first_pose(kind, tmp_path):
     urdf, cell = kind(tmp_path / "src"), tmp_path / "cell"
     given = () if kind is whole else GIVEN
-    new = ask(capsys, "new", cell, "--urdf", urdf, *given, "--tool-mass-kg", 8)
+    new = told("new", cell, "--urdf", urdf, *given, "--tool-mass-kg", 8)
     named = {guess["what"] for guess in new["guessed"]}
     assert {"stiffness of joint_1 about its axis", "workspace joints_deg"} <= named
     assert ("mass of link_2" in named) == (kind is not whole)
@@ -99,51 +91,49 @@ def test_it_goes_from_a_description_to_a_first_pose(kind, tmp_path, capsys):
     masses = [g["value"] for g in new["guessed"] if g["what"].startswith("mass of")]
     assert kind is whole or sum(masses) == pytest.approx(420, rel=1e-3)
     shutil.rmtree(tmp_path / "src")  # the campaign holds all it needs
-    checked = ask(capsys, "check", cell / "robot" / "robot.toml", "--campaign",
+    checked = told("check", cell / "robot" / "robot.toml", "--campaign",
                   cell / "campaign.toml")  # fmt: skip
     warned = [f["what"] for f in checked["findings"] if f["severity"] != "note"]
     assert len(warned) == (kind in (no_meshes, zero_sizes)), warned
     assert all("left out" in what for what in warned)
     assert {link["guessed"] for link in checked["links"] if link["mass_kg"]} == {kind is not whole}
-    (proposal,) = ask(capsys, "next", cell)["proposals"]
+    (proposal,) = told("next", cell)["proposals"]
     robot = Robot.load(cell / "robot" / "robot.toml")
     q = robot.joints.internal(proposal["joints_deg"])
     assert np.all((robot.lower_rad <= q) & (q <= robot.upper_rad))
     x, _, z = proposal["position_m"]
     assert x > 0.3  # in front
     assert z > 0.0
-    assert ask(capsys, "replay", cell)["reproduced"]
+    assert told("replay", cell)["reproduced"]
 
 
-def test_it_copies_what_it_needs_and_nothing_else(tmp_path, capsys):
+def test_it_copies_what_it_needs_and_nothing_else(tmp_path):
     urdf = published(tmp_path)
     (urdf.parent / "notes.pdf").write_text("x")
-    ask(capsys, "new", tmp_path / "cell", "--urdf", urdf, *GIVEN)
+    told("new", tmp_path / "cell", "--urdf", urdf, *GIVEN)
     files = {p.name for p in (tmp_path / "cell" / "robot").rglob("*") if p.is_file()}
     meshes = {f"link_{i}.stl" for i in range(1, 7)}
     assert files == {"robot.toml", "arm.urdf", "base_link.stl", *meshes}
 
 
-def test_joints_beside_the_arm_are_held_and_named(tmp_path, capsys):
-    new = ask(capsys, "new", tmp_path / "cell", "--urdf", hand(tmp_path / "src"), *GIVEN)
+def test_joints_beside_the_arm_are_held_and_named(tmp_path):
+    new = told("new", tmp_path / "cell", "--urdf", hand(tmp_path / "src"), *GIVEN)
     assert len(new["joints"]) == 6
-    (told,) = [text for text in new["told"] if "longest chain" in text]
-    assert "finger_joint_left" in told
-    with_rail = ask(capsys, "new", tmp_path / "two", "--urdf", rail(tmp_path / "rail"), *GIVEN)
+    (text,) = [text for text in new["told"] if "longest chain" in text]
+    assert "finger_joint_left" in text
+    with_rail = told("new", tmp_path / "two", "--urdf", rail(tmp_path / "rail"), *GIVEN)
     assert with_rail["joint_units"] == ["mm", *["deg"] * 6]
 
 
-def test_the_screen_says_what_to_put_right_first(tmp_path, capsys):
+def test_the_screen_says_what_to_put_right_first(tmp_path):
     cell = tmp_path / "cell"
-    assert run(["new", str(cell), "--urdf", str(published(tmp_path)), *GIVEN]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert 'Put right first: tcp_frame = "tool0", where the hammer hits' in said
-    assert "and the tool's mass" in said
-    assert "a factor of 3" in said
-    assert "Masses are guessed" in said
-    assert run(["check", str(cell / "robot" / "robot.toml")]) == 0
-    assert "Masses are guessed" in capsys.readouterr().out
-    assert run(["report", str(cell)]) == 0
+    screen = " ".join(said("new", cell, "--urdf", published(tmp_path), *GIVEN).split())
+    assert 'Put right first: tcp_frame = "tool0", where the hammer hits' in screen
+    assert "and the tool's mass" in screen
+    assert "a factor of 3" in screen
+    assert "Masses are guessed" in screen
+    assert "Masses are guessed" in said("check", cell / "robot" / "robot.toml")
+    said("report", cell)
     assert "Masses are guessed" in next(cell.glob("*.html")).read_text()
 
 
@@ -157,29 +147,27 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("arguments", "words"), REFUSED.values(), ids=REFUSED)
-def test_what_is_missing_is_asked_for(arguments, words, tmp_path, capsys):
-    assert run(["new", str(tmp_path / "cell"), *arguments(tmp_path)]) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert len(said.strip().splitlines()) == 1
+def test_what_is_missing_is_asked_for(arguments, words, tmp_path):
+    code, _, err = call("new", tmp_path / "cell", *arguments(tmp_path))
+    assert (code, words in err, len(err.strip().splitlines())) == (2, True, 1), err
     assert not (tmp_path / "cell").exists()
 
 
-def test_a_robot_toml_may_name_a_urdf_elsewhere(tmp_path, capsys):
+def test_a_robot_toml_may_name_a_urdf_elsewhere(tmp_path):
     (tmp_path / "own").mkdir()
     toml = robot_toml(tmp_path / "own" / "robot.toml", whole(tmp_path / "src"))
-    ask(capsys, "new", tmp_path / "cell", "--robot", toml)
+    told("new", tmp_path / "cell", "--robot", toml)
     shutil.rmtree(tmp_path / "src")
-    assert len(ask(capsys, "next", tmp_path / "cell")["proposals"]) == 1
+    assert len(told("next", tmp_path / "cell")["proposals"]) == 1
 
 
 @pytest.mark.parametrize("high", [1.4, 2.61799387799149, 0.123456789])
-def test_the_default_workspace_lies_within_the_limits(high, tmp_path, capsys):
+def test_the_default_workspace_lies_within_the_limits(high, tmp_path):
     urdf = whole(tmp_path / "src")
     urdf.write_text(urdf.read_text().replace('upper="1.4"', f'upper="{high}"'))
     (tmp_path / "own").mkdir()
     toml = robot_toml(tmp_path / "own" / "robot.toml", urdf)
-    ask(capsys, "new", tmp_path / "cell", "--robot", toml)
+    told("new", tmp_path / "cell", "--robot", toml)
     ranges = Campaign(str(tmp_path / "cell")).cell.config.workspace.joints_deg
     assert ranges is not None
     assert np.rad2deg(high) - 1e-3 <= ranges[2][1] <= np.rad2deg(high) + 1e-9

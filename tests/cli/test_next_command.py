@@ -1,8 +1,6 @@
 """`next` with every acquisition, and on a robot that cannot be checked for collision."""
 
-import contextlib
 import io
-import json
 import re
 from pathlib import Path
 
@@ -12,26 +10,13 @@ from rich.console import Console
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposed
-from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESIGNS
 from planner.session.keys import NoKeys
 from planner.session.watch import watch
+from tests.support.outside import said, told
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 UNCHECKED = "Nothing is checked for collision, because plain.urdf has no collision geometry"
-
-
-def call(*arguments: object) -> str:
-    """What a command that must succeed prints."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = run([str(a) for a in arguments])
-    assert code == 0, (arguments, err.getvalue())
-    return out.getvalue()
-
-
-def ask(*arguments: object) -> dict:
-    return json.loads(call(*arguments, "--json"))
 
 
 @pytest.fixture
@@ -57,18 +42,18 @@ def begun(
 ) -> Path:
     toml = plain_campaign(folder / "plan" / "campaign.toml", acquisition)
     toml.write_text(toml.read_text() + more)
-    call("new", folder / "cell", "--robot", robot, "--campaign", toml)
+    said("new", folder / "cell", "--robot", robot, "--campaign", toml)
     return folder / "cell"
 
 
 def proposed_again(cell: Path, *options: object) -> list[dict]:
     """Proposals that the next command reads from the log as the first one answered them."""
-    first = ask("next", cell, "--count", 2, *options)["proposals"]
-    assert ask("next", cell, "--count", 2, *options)["proposals"] == first
-    status = ask("status", cell)
+    first = told("next", cell, "--count", 2, *options)["proposals"]
+    assert told("next", cell, "--count", 2, *options)["proposals"] == first
+    status = told("status", cell)
     assert [p["pose"] for p in status["open"]] == [p["pose"] for p in first]
     assert status["log"]["torn_bytes"] == 0
-    assert [s["check"] for s in ask("replay", cell)["steps"]] == ["kept", "identical"]
+    assert [s["check"] for s in told("replay", cell)["steps"]] == ["kept", "identical"]
     return first
 
 
@@ -88,10 +73,10 @@ def test_every_acquisition_is_logged_so_that_it_reads_back(name, robot, tmp_path
 def test_a_log_in_which_a_score_became_null_opens(robot, tmp_path):
     """Not a number is null in JSON: earlier versions wrote that and could not read it."""
     cell = begun(tmp_path, robot)
-    proposals = ask("next", cell, "--acquisition", "sobol")["proposals"]
+    proposals = told("next", cell, "--acquisition", "sobol")["proposals"]
     log = (cell / "log.jsonl").read_text()
     assert '"score":null' in log
-    call("skip", cell, proposals[0]["pose"])
+    said("skip", cell, proposals[0]["pose"])
     event = Campaign(cell).entries[1].event
     assert isinstance(event, Proposed)
     assert event.proposals[0].score is None
@@ -99,11 +84,11 @@ def test_a_log_in_which_a_score_became_null_opens(robot, tmp_path):
 
 def test_a_robot_without_collision_geometry_is_told_of_once(robot, tmp_path):
     toml = plain_campaign(tmp_path / "plan" / "campaign.toml")
-    text = call("new", tmp_path / "cell", "--robot", robot, "--campaign", toml)
+    text = said("new", tmp_path / "cell", "--robot", robot, "--campaign", toml)
     assert UNCHECKED in " ".join(text.split())
-    text = call("next", tmp_path / "cell", "--count", 3)
+    text = said("next", tmp_path / "cell", "--count", 3)
     assert " ".join(text.split()).count(UNCHECKED) == 1
-    (remark,) = ask("next", tmp_path / "cell", "--count", 3)["remarks"]
+    (remark,) = told("next", tmp_path / "cell", "--count", 3)["remarks"]
     assert remark.startswith(UNCHECKED)
 
 
@@ -121,7 +106,7 @@ def test_a_robot_with_collision_geometry_is_not_told_of(robot, tmp_path):
     urdf = robot.parent / "plain.urdf"
     shape = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>'
     urdf.write_text(urdf.read_text().replace("</inertial></link>", f"</inertial>{shape}", 1))
-    assert ask("next", begun(tmp_path, robot))["remarks"] == []
+    assert told("next", begun(tmp_path, robot))["remarks"] == []
 
 
 def without_damping(robot: Path) -> None:
@@ -137,6 +122,6 @@ def sensor_elsewhere(robot: Path) -> None:
 def test_a_pose_is_proposed_for_odd_robots_too(change, robot, tmp_path):
     change(robot)
     plan = plain_campaign(tmp_path / "campaign.toml")
-    call("new", tmp_path / "cell", "--robot", robot, "--campaign", plan)
-    proposal, *_ = ask("next", tmp_path / "cell", "--count", 2)["proposals"]
+    said("new", tmp_path / "cell", "--robot", robot, "--campaign", plan)
+    proposal, *_ = told("next", tmp_path / "cell", "--count", 2)["proposals"]
     assert np.isfinite(proposal["score"])

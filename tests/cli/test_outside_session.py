@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from planner.truth.load import load_truth
-from tests.support.outside import answer, make_cell, planner, record
+from tests.support.outside import call, make_cell, record, told
 from tests.support.robots import JOINTS_DEG
 
-MEASUREMENTS = 8
+MEASUREMENTS = 5
 
 
 def likeness(a, b) -> float:
@@ -17,23 +17,22 @@ def likeness(a, b) -> float:
     return float(np.abs(np.vdot(a, b)) / (np.linalg.norm(a) * np.linalg.norm(b)))
 
 
-def test_eight_measurements_and_a_prediction(tmp_path):
+def test_five_measurements_and_a_prediction(tmp_path):
     robot, campaign_toml, truth = make_cell(tmp_path)
     cell = tmp_path / "cell"
-    made = answer("new", cell, "--robot", robot, "--campaign", campaign_toml)
+    made = told("new", cell, "--robot", robot, "--campaign", campaign_toml)
     assert made["modes"] == 4
     for number in range(MEASUREMENTS):
-        (proposal,) = answer("next", cell)["proposals"]
+        (proposal,) = told("next", cell)["proposals"]
         assert set(proposal) >= {"pose", "joints_deg", "position_m", "score", "reason"}
         folder = record(truth, tmp_path / f"export{number}", proposal["pose"],
                         proposal["joints_deg"], seed=number)  # fmt: skip
-        report = answer("import", cell, folder)
+        report = told("import", cell, folder)
         assert report["pose"] == proposal["pose"]
         assert len(report["accepted"]) == 9
         assert report["refused"] == []
-    again = planner("import", cell, folder, "--json")
-    assert again.returncode == 0
-    status = answer("status", cell, "--plot", tmp_path / "pictures")
+    assert call("import", cell, folder, "--json")[0] == 0
+    status = told("status", cell, "--plot", tmp_path / "pictures")
     assert len(status["measurements"]) == MEASUREMENTS
     assert status["simulated"] is True
     left_out = status["leave_one_out"]
@@ -50,7 +49,7 @@ def test_eight_measurements_and_a_prediction(tmp_path):
         writer = csv.writer(file)
         writer.writerow(["pose", *(f"joint_a{i}_deg" for i in range(1, 7))])
         writer.writerows([[f"H{i:02d}", *row] for i, row in enumerate(poses)])
-    predicted = answer("predict", cell, table, "--out", tmp_path / "out.npz")
+    predicted = told("predict", cell, table, "--out", tmp_path / "out.npz")
     true = np.array([truth.modes(np.deg2rad(q), 4)[0] for q in poses])
     ours = np.array([[m["frequency_hz"] for m in p["modes"]] for p in predicted["poses"]])
     sd = np.array([[m["sd_hz"] for m in p["modes"]] for p in predicted["poses"]])
@@ -74,6 +73,23 @@ def test_eight_measurements_and_a_prediction(tmp_path):
         )
         assert likeness(npz["frf_mean"], h) > likeness(simulated, h)
 
-    replayed = answer("replay", cell)
+    replayed = told("replay", cell, "--acquisition", "variance")
     assert replayed["reproduced"]
     assert {s["check"] for s in replayed["steps"]} <= {"identical", "kept"}
+    check_otherwise(replayed, [m["pose"] for m in status["measurements"]])
+
+
+def check_otherwise(replayed, measured):
+    """What another acquisition would have proposed at each step, and saved."""
+    proposed = [step for step in replayed["steps"] if step["event"] == "proposed"]
+    assert proposed
+    assert all(len(step["instead"]) == 1 for step in proposed)
+    assert all(not step["instead"] for step in replayed["steps"] if step["event"] == "imported")
+    runs = replayed["otherwise"]["runs"]
+    was, other = runs["campaign"], runs["variance"]
+    assert was["poses"] == measured[: len(was["poses"])]
+    assert other["poses"][0] == was["poses"][0]
+    assert len(set(other["poses"])) == len(was["poses"]) == len(measured) - 2
+    assert was["n"] == other["n"]
+    assert np.all(np.diff(other["minutes"]) > 0)
+    assert "variance would have needed" in replayed["otherwise"]["text"]

@@ -1,17 +1,15 @@
 """Where FRFs as text were felt and hit: from recordings.csv, or, where asked, from file names."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from planner.cli.run import run
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.recording.file_names import place_in_name
 from planner.robot.robot import Robot
-from tests.support.outside import make_cell
+from tests.support.outside import call, make_cell, told
 
 MODES = {"xx": (22.0, 0.03, 200.0), "yy": (27.0, 0.025, 250.0)}
 CUT = """teeth = 2
@@ -30,11 +28,6 @@ def write_frf(path: Path, hertz: np.ndarray, values: np.ndarray, unit: str) -> N
     path.write_text(f"Freq [Hz]\tReal [{unit}]\tImag [{unit}]\n" + "\n".join(rows) + "\n")
 
 
-def answer(capsys, *command) -> dict:
-    assert run([str(part) for part in command] + ["--json"]) == 0, capsys.readouterr().err
-    return json.loads(capsys.readouterr().out)
-
-
 @pytest.mark.parametrize(
     ("name", "place"),
     [("tap_yx.txt", ("", "y", "", "x")), ("P1 +y-x.csv", ("", "+y", "", "-x")),
@@ -51,7 +44,7 @@ def test_names_that_say_nothing(name):
         place_in_name(Path(name))
 
 
-def test_a_tap_test_in_files_of_one_frf_each(tmp_path, capsys):
+def test_a_tap_test_in_files_of_one_frf_each(tmp_path):
     taps, cut = tmp_path / "taps", tmp_path / "cut.toml"
     taps.mkdir()
     cut.write_text(CUT)
@@ -65,20 +58,20 @@ def test_a_tap_test_in_files_of_one_frf_each(tmp_path, capsys):
         modes += f"[[mode]]\nfrequency_hz = {f}\ndamping_ratio = {z}\nmass_kg = {m}\n"
         modes += f"direction = {axis}\n"
     (tmp_path / "modes.toml").write_text(modes)
-    assert run(["stability", str(taps), "--cut", str(cut)]) == 2
-    assert "does not state its directions" in capsys.readouterr().err
-    found = answer(capsys, "stability", taps, "--cut", cut, "--from-names")
-    right = answer(capsys, "stability", tmp_path / "modes.toml", "--cut", cut)
+    code, _, err = call("stability", taps, "--cut", cut)
+    assert (code, "does not state its directions" in err) == (2, True)
+    found = told("stability", taps, "--cut", cut, "--from-names")
+    right = told("stability", tmp_path / "modes.toml", "--cut", cut)
     np.testing.assert_allclose(found["depth_limit_m"], right["depth_limit_m"], rtol=1e-3)
 
 
 @pytest.mark.parametrize("how", ["table", "names"])
-def test_frfs_as_text_into_a_campaign(tmp_path, capsys, how):
+def test_frfs_as_text_into_a_campaign(tmp_path, how):
     robot, plan, _ = make_cell(tmp_path)
     cell, taps = tmp_path / "cell", tmp_path / "taps"
     taps.mkdir()
-    answer(capsys, "new", cell, "--robot", robot, "--campaign", plan)
-    (proposal,) = answer(capsys, "next", cell)["proposals"]
+    told("new", cell, "--robot", robot, "--campaign", plan)
+    (proposal,) = told("next", cell)["proposals"]
     loaded = Robot.load(robot)
     hertz, q = np.arange(4.0, 60.0, 0.1), loaded.joints.internal(proposal["joints_deg"])
     simulation = Simulation(loaded)
@@ -92,10 +85,10 @@ def test_frfs_as_text_into_a_campaign(tmp_path, capsys, how):
             rows.append(f"{proposal['pose']},{angles},+{hit},+{felt},tap_{felt}{hit}.txt")
     if how == "table":
         (taps / "recordings.csv").write_text("\n".join(rows) + "\n")
-        imported = answer(capsys, "import", cell, taps)
+        imported = told("import", cell, taps)
     else:
-        imported = answer(capsys, "import", cell, taps, "--from-names")
+        imported = told("import", cell, taps, "--from-names")
     assert len(imported["accepted"]) == 9
     (expected,) = simulation.modes(q, 1).frequency_hz
     assert imported["modes"][0]["frequency_hz"] == pytest.approx(expected[0], rel=1e-3)
-    assert run(["replay", str(cell)]) == 0
+    assert told("replay", cell)["reproduced"]

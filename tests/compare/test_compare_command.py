@@ -13,18 +13,18 @@ import pytest
 from planner.campaign.build import build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
-from planner.cli.run import run as call
 from planner.compare.bench import assemble, cell_of, decide
 from planner.compare.resume import recorded
 from planner.compare.run import run
 from planner.compare.tasks import Task
 from planner.dataset.visits import recordings_in
 from planner.robot.robot import Robot
-from tests.support.outside import PLANNER, planner
+from tests.support.outside import PLANNER, call, said, told
 from tests.support.pools import make_pool
 
 POSES, STRATEGIES = 12, "maximin_lhs,random,default"
-SMALL = ("--repeats", "2", "--initial", "2", "--budget", "4", "--simulation", "frozen")
+SMALL = ("--repeats", "2", "--initial", "2", "--budget", "4", "--simulation", "frozen",
+         "--workers", "1")  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -55,8 +55,7 @@ def command(pool, out: Path, *more: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def first(pool, out):
-    rrd = out / "curves.rrd"
-    return json.loads(planner(*command(pool, out, "--rrd", str(rrd), "--json")).stdout)
+    return told(*command(pool, out, "--rrd", str(out / "curves.rrd"), "--workers", "2"))
 
 
 def test_the_answer_has_every_documented_key(first):
@@ -98,26 +97,26 @@ def test_what_is_done_is_not_done_again(pool, out, first):
     runs[0].unlink()
     flipped = runs[1].read_bytes().replace(b"0.", b"1.", 1)
     runs[1].write_bytes(flipped)  # a figure that reads as well as the one before
-    again = json.loads(planner(*command(pool, out, "--json")).stdout)
+    again = told(*command(pool, out))
     for name, curve in first["strategies"].items():
         for key in ("n", "frequency_rmse_percent", "r2", "coverage95"):
             assert again["strategies"][name][key] == curve[key]
     after = {path: path.stat().st_mtime_ns for path in kept}
     assert sorted(path for path in kept if after[path] != kept[path]) == runs[:2]
-    assert [said for said in again["remarks"] if runs[1].name in said and "damaged" in said]
+    assert [r for r in again["remarks"] if runs[1].name in r and "damaged" in r]
     assert runs[1].read_bytes() != flipped
 
 
 def test_more_repeats_take_up_those_that_are_there(pool, out, first):
-    text = planner(*command(pool, out, "--repeats", "3")).stdout
+    text = said(*command(pool, out, "--repeats", "3"))
     assert "SIMULATED" in text
     assert "to 1 %" in text
     assert len(list((out / "runs").iterdir())) == 9
 
 
 def test_models_are_compared_as_strategies_are(pool, tmp_path):
-    asked = command(pool, tmp_path, "--strategies", "random", "--models", "gp,ar1,none", "--json")
-    found = json.loads(planner(*asked).stdout)
+    asked = command(pool, tmp_path, "--strategies", "random", "--models", "gp,ar1,none")
+    found = told(*asked)
     assert found["models"] == {"gp": "gp", "ar1": "ar1", "none": "none"}
     assert set(found["acquisitions"].values()) == {"random"}
     last = {n: c["frequency_rmse_percent"][-1] for n, c in found["strategies"].items()}
@@ -139,10 +138,10 @@ def test_ctrl_c_keeps_what_is_finished(pool, tmp_path):
     while len(list((tmp_path / "runs").glob("*.json"))) < 2 and time.monotonic() < until:
         time.sleep(0.1)
     os.kill(process.pid, signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    _, last = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert said.splitlines()[-1].startswith("Stopped")  # after progress, on a slow machine
-    assert "kept" in said
+    assert last.splitlines()[-1].startswith("Stopped")  # after progress, on a slow machine
+    assert "kept" in last
     done = list((tmp_path / "runs").glob("*.json"))
     assert 2 <= len(done) < 500
     assert all(json.loads(path.read_bytes())["kept"]["n"] == [2, 3, 4] for path in done)
@@ -188,7 +187,7 @@ def test_other_versions_of_the_program_are_refused(bench):
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("more", "words"),
     [
         (("--strategies", "astrology"), "astrology"),
         (("--strategies", ","), "--strategies names none"),
@@ -203,9 +202,6 @@ def test_other_versions_of_the_program_are_refused(bench):
         (("--repeats", "0"), "repeats"),
     ],
 )
-def test_bad_input_is_one_sentence(pool, out, first, more, said, capsys):
-    assert call([*command(pool, out), *more, "--json"]) == 2
-    shown = capsys.readouterr()
-    assert shown.out == ""
-    assert shown.err.count("\n") == 1
-    assert said in shown.err
+def test_bad_input_is_one_sentence(pool, out, first, more, words):
+    code, shown, err = call(*command(pool, out), *more, "--json")
+    assert (code, shown, err.count("\n"), words in err) == (2, "", 1, True), err

@@ -10,9 +10,9 @@ from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import solve
+from planner.truth.arms import IRB6640, KR10, KR210
 from planner.truth.inverse import joint_angles, tool_rotation
 from planner.truth.load import load_truth
-from tests.support.known_robots import IRB6640, KR10, KR210
 from tests.support.robots import JOINTS_DEG, make_arm
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1500)]

@@ -12,10 +12,10 @@ from planner.dynamics import vibration
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.robot import Robot
+from planner.truth.arms import KR10
 from planner.truth.deviation import AttachedMass, Deviation, Spring
 from planner.truth.load import load_truth
 from tests.support.direct_solution import direct_accelerance
-from tests.support.known_robots import KR10
 from tests.support.pendulums import pendulum_urdf
 
 LINES = np.linspace(5, 150, 50)

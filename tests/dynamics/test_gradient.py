@@ -15,7 +15,7 @@ from planner.dynamics.gradient import (
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import inertia_basis
-from tests.support.known_robots import KR10
+from planner.truth.arms import KR10
 
 LINES = np.linspace(6, 180, 25)
 STEP = 1e-5

@@ -9,12 +9,12 @@ from planner.effects.table import Repertoire
 from planner.fit.inertias import BodyNumbers, pseudo_inertia
 from planner.fit.structure import RobotPrior, RobotStructure
 from planner.robot.robot import Robot
-from tests.support.known_robots import kr10_folder
+from planner.truth.arms import KR10
 
 
 @pytest.fixture(scope="module")
 def bodies(tmp_path_factory) -> BodyNumbers:
-    simulation = Simulation(Robot.load(kr10_folder(tmp_path_factory.mktemp("robot"))))
+    simulation = Simulation(Robot.load(KR10.write(tmp_path_factory.mktemp("robot"))))
     repertoire = Repertoire.of(simulation, Priors(mass=0.05, inertia=0.05, com_m=0.01))
     return RobotStructure(RobotPrior(repertoire)).bodies
 

@@ -14,9 +14,9 @@ from planner.errors import InputError
 from planner.fit.held_out import identify_judged, set_aside
 from planner.measurement.agreement import fit_similarity
 from planner.robot.robot import Robot
+from planner.truth.arms import KR10
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
-from tests.support.known_robots import KR10
 from tests.support.measured_frfs import measured_frfs
 
 

@@ -12,10 +12,10 @@ from planner.fit.identify import identify
 from planner.measurement.missed_ports import actual_ports
 from planner.measurement.nuisances import EXACT_HITS, OpenNumbers, Tolerances
 from planner.robot.robot import Robot
+from planner.truth.arms import KR10
 from planner.truth.deviation import Deviation
 from planner.truth.handling import Aim, Handling
 from planner.truth.load import load_truth
-from tests.support.known_robots import KR10
 from tests.support.measured_frfs import measured_frfs
 
 LINES = np.linspace(6.0, 60.0, 48)

@@ -19,12 +19,12 @@ from planner.dynamics.simulation import Simulation
 from planner.fit.identify import identify
 from planner.fit.result import Identification
 from planner.robot.robot import Robot
+from planner.truth.arms import KR10
 from planner.truth.deviation import Deviation
 from planner.truth.handling import EVERYDAY
 from planner.truth.hits import write_recordings
 from planner.truth.load import load_truth
 from planner.truth.secret import HitVisit, Secret, hit_poses
-from tests.support.known_robots import KR10
 from tests.support.studied import part
 
 HAMMER = part("birk2025", "data").HAMMER

@@ -1,14 +1,11 @@
 """Modes as they are without the sensors' masses, beside a truth of another engine."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from planner.cli.run import run
 from planner.dynamics.simulation import Simulation
 from planner.measurement.sensor_loading import unloaded
 from planner.modal.modes import Mode
@@ -17,6 +14,7 @@ from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
 from planner.truth.secret import Secret
 from tests.support.arm_with_points import poses, record, write_arm
+from tests.support.outside import told
 
 # Two heavy clusters of sensors; the tool's own weighs nothing.
 KG = {"shoulder": 3.0, "elbow": 1.5}
@@ -52,16 +50,11 @@ def bare(toml: Path, q: np.ndarray, sensors: tuple[str, ...] = ("sensor",)) -> n
     return replace(load_truth(toml), sensors=sensors).modes(q, 4)[0]
 
 
-def answer(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
-    assert run(["modes", *map(str, arguments), "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 def test_frequencies_are_given_without_the_sensors(
-    surveyed: tuple[Path, Path, np.ndarray], capsys: pytest.CaptureFixture[str]
+    surveyed: tuple[Path, Path, np.ndarray],
 ) -> None:
     folder, toml, q = surveyed
-    found = answer(capsys, folder, "--robot", toml)
+    found = told("modes", folder, "--robot", toml)
     for pose, row in zip(found["poses"], q, strict=True):
         true = bare(toml, row)
         for mode in (*pose["modes"], *pose["unlabelled"]):
@@ -75,8 +68,8 @@ def test_frequencies_are_given_without_the_sensors(
     assert max(lowered) == pytest.approx(np.max(expected[: len(lowered)]), rel=0.1)
     assert max(lowered) > 1.0
     assert "elbow (1.5 kg)" in found["remarks"][0]
-    assert any(told.startswith("P002: sensors were moved") for told in found["remarks"])
-    assert not any(told.startswith("P001: sensors were moved") for told in found["remarks"])
+    assert any(text.startswith("P002: sensors were moved") for text in found["remarks"])
+    assert not any(text.startswith("P001: sensors were moved") for text in found["remarks"])
 
 
 def test_without_masses_nothing_is_corrected(tmp_path: Path) -> None:

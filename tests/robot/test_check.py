@@ -9,8 +9,8 @@ import pytest
 
 from planner.campaign.store import EXAMPLE
 from planner.check.remark import CheckRemark
-from planner.cli.run import run
 from planner.report.robot_check import _summary
+from tests.support.outside import call, said
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 ROBOT, URDF, PLAN = "robot/robot.toml", "robot/robot.urdf", "campaign.toml"
@@ -93,15 +93,14 @@ def changed(folder: Path, file: str, pattern: str, text: str) -> Path:
     return folder / ROBOT
 
 
-def checked(robot: Path, capsys, *options: object) -> tuple[int, dict, str]:
+def checked(robot: Path, *options: object) -> tuple[int, dict, str]:
     """Exit code, answer, and what stands on stderr."""
-    code = run(["check", str(robot), *map(str, options), "--json"])
-    said = capsys.readouterr()
-    return code, json.loads(said.out), said.err
+    code, out, err = call("check", robot, *options, "--json")
+    return code, json.loads(out), err
 
 
-def test_nothing_is_wrong_with_the_example(capsys):
-    code, answer, err = checked(EXAMPLE / ROBOT, capsys, "--campaign", EXAMPLE / PLAN)
+def test_nothing_is_wrong_with_the_example():
+    code, answer, err = checked(EXAMPLE / ROBOT, "--campaign", EXAMPLE / PLAN)
     assert (code, err, answer["ok"]) == (0, "", True)
     assert {f["severity"] for f in answer["findings"]} <= {"note"}
     assert answer["moving_mass_kg"] == pytest.approx(255)
@@ -117,18 +116,18 @@ def test_nothing_is_wrong_with_the_example(capsys):
 
 
 @pytest.mark.parametrize("robot", sorted(Path("campaigns").glob("*/robot/robot*.toml")), ids=str)
-def test_published_robots_are_not_suspected(robot, capsys):
-    code, answer, _ = checked(robot, capsys)
+def test_published_robots_are_not_suspected(robot):
+    code, answer, _ = checked(robot)
     assert code == 0
     assert [f for f in answer["findings"] if f["severity"] != "note"] == []
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_wrong_is_found(name, tmp_path, capsys):
+def test_what_is_wrong_is_found(name, tmp_path):
     file, pattern, text, severity, words = WRONG[name]
     robot = changed(tmp_path / "own", file, pattern, text)
     options = ("--campaign", tmp_path / "own" / PLAN) if file == PLAN else ()
-    code, answer, err = checked(robot, capsys, *options)
+    code, answer, err = checked(robot, *options)
     found = [f for f in answer["findings"] if f["severity"] == severity]
     assert any(re.search(words, f["what"]) for f in found), answer["findings"]
     assert all(f["where"] and f["what"].endswith((".", ":")) for f in found)
@@ -137,70 +136,63 @@ def test_what_is_wrong_is_found(name, tmp_path, capsys):
     assert bool(err) == refused
 
 
-def test_the_cause_is_told_first_and_each_error_once(tmp_path, capsys):
+def test_the_cause_is_told_first_and_each_error_once(tmp_path):
     """Lengths in mm let springs look soft too; limits in degrees are none with a workspace."""
     file, pattern, text, *_ = WRONG["lengths in mm"]
     robot = changed(tmp_path / "long", file, pattern, text)
-    assert run(["check", str(robot)]) == 2
-    said = capsys.readouterr()
-    both = " ".join((said.out + said.err).split())
+    code, out, err = call("check", robot)
+    both = " ".join((out + err).split())
+    assert code == 2
     assert both.count("as if lengths were in millimetres") == 1
     assert both.index("error:") < both.index("warning:")
     file, pattern, text, *_ = WRONG["limits in degrees"]
     robot = changed(tmp_path / "wide", file, pattern, text)
-    assert run(["check", str(robot)]) == 0
-    capsys.readouterr()
-    assert run(["check", str(robot), "--campaign", str(tmp_path / "wide" / PLAN)]) == 2
-    assert "error: robot.urdf, joint" in capsys.readouterr().out
+    said("check", robot)
+    code, out, _ = call("check", robot, "--campaign", tmp_path / "wide" / PLAN)
+    assert (code, "error: robot.urdf, joint" in out) == (2, True)
 
 
-def test_modes_are_told_with_where_the_robot_stands(capsys):
-    assert run(["check", str(EXAMPLE / ROBOT)]) == 0
-    said = " ".join(re.sub("[│┃]", " ", capsys.readouterr().out).split())
-    assert "home: 0°, 0°" in said
-    assert "…" not in said
+def test_modes_are_told_with_where_the_robot_stands():
+    screen = " ".join(re.sub("[│┃]", " ", said("check", EXAMPLE / ROBOT)).split())
+    assert "home: 0°, 0°" in screen
+    assert "…" not in screen
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_would_crash_later_is_refused_and_leaves_nothing(name, tmp_path, capsys):
+def test_what_would_crash_later_is_refused_and_leaves_nothing(name, tmp_path):
     file, pattern, text, words = REFUSED[name]
     robot = changed(tmp_path / "own", file, pattern, text)
-    cell = tmp_path / "cell"
-    code = run(
-        ["new", str(cell), "--robot", str(robot), "--campaign", str(robot.parents[1] / PLAN)]
-    )
-    said = capsys.readouterr().err
+    cell, plan = tmp_path / "cell", robot.parents[1] / PLAN
+    code, _, err = call("new", cell, "--robot", robot, "--campaign", plan)
     assert code == 2
-    assert re.search(words, said)
-    assert said.count("\n") == 1
-    assert ".part" not in said  # names the user's file, not a copy that is gone
+    assert re.search(words, err)
+    assert err.count("\n") == 1
+    assert ".part" not in err  # names the user's file, not a copy that is gone
     assert [p.name for p in tmp_path.iterdir()] == ["own"]
 
 
-def test_new_warns_and_begins_all_the_same(tmp_path, capsys):
+def test_new_warns_and_begins_all_the_same(tmp_path):
     robot = make_plain_arm(tmp_path / "robot")
     plan = plain_campaign(tmp_path / PLAN)
-    assert run(["new", str(tmp_path / "cell"), "--robot", str(robot), "--campaign", str(plan)]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert said.count("Nothing is checked for collision") == 1
+    screen = " ".join(said("new", tmp_path / "cell", "--robot", robot, "--campaign", plan).split())
+    assert screen.count("Nothing is checked for collision") == 1
 
 
-def test_a_change_by_hand_that_cannot_be_is_refused_and_not_believed(tmp_path, capsys):
+def test_a_change_by_hand_that_cannot_be_is_refused_and_not_believed(tmp_path):
     shutil.copytree(EXAMPLE, tmp_path / "own")
     cell = tmp_path / "cell"
-    new = ["new", str(cell), "--robot", str(tmp_path / "own" / ROBOT), "--campaign",
-           str(tmp_path / "own" / PLAN)]  # fmt: skip
-    assert run(new) == 0
+    own = tmp_path / "own"
+    said("new", cell, "--robot", own / ROBOT, "--campaign", own / PLAN)
     log = (cell / "log.jsonl").read_bytes()
     toml = cell / ROBOT
     toml.write_text(toml.read_text().replace("1.2e6", "500.0"))
-    assert run(["next", str(cell)]) == 2
-    assert "falls over" in capsys.readouterr().err
+    code, _, err = call("next", cell)
+    assert (code, "falls over" in err) == (2, True)
     assert (cell / "log.jsonl").read_bytes() == log
 
 
-def test_the_robot_is_drawn(tmp_path, capsys):
-    code, answer, _ = checked(EXAMPLE / ROBOT, capsys, "--plot", tmp_path / "pictures")
+def test_the_robot_is_drawn(tmp_path):
+    code, answer, _ = checked(EXAMPLE / ROBOT, "--plot", tmp_path / "pictures")
     (picture,) = answer["plots"]
     assert code == 0
     assert Path(picture).stat().st_size > 20_000

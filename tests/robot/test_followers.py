@@ -4,7 +4,6 @@ Laws are checked over drawn trees of joints against differences of places, and a
 tree whose followers are joints like all others.
 """
 
-import json
 import re
 
 import numpy as np
@@ -14,13 +13,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from planner.check.joints import check_joints
-from planner.cli.run import run
 from planner.errors import InputError
 from planner.robot.collision import Collisions
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.inverse_kinematics import solve
 from planner.robot.robot import Robot
 from planner.robot.skeleton import placements
+from tests.support.outside import said, told
 from tests.support.robots import campaign_text, make_arm
 
 LEADS, FOLLOWERS = 3, 4
@@ -292,14 +291,12 @@ def test_a_follower_in_the_wrist_is_solved_for(factor, tmp_path):
 
 
 @pytest.mark.parametrize("begun_by", ["--robot", "--urdf"])
-def test_followers_are_no_columns_from_check_to_a_proposal(begun_by, tmp_path, capsys):
+def test_followers_are_no_columns_from_check_to_a_proposal(begun_by, tmp_path):
     robot = balanced(tmp_path / "robot")
     plan = tmp_path / "campaign.toml"
     plan.write_text(campaign_text(3).replace("candidates = 200", "candidates = 40"))
-    assert run(["check", str(robot), "--campaign", str(plan)]) == 0
-    cell, urdf = str(tmp_path / "cell"), str(robot.with_name("arm.urdf"))
-    own = ["--robot", str(robot)] if begun_by == "--robot" else ["--urdf", urdf, "--mass-kg", "55"]
-    assert run(["new", cell, *own, "--campaign", str(plan)]) == 0
-    capsys.readouterr()
-    assert run(["next", cell, "--json"]) == 0
-    assert len(json.loads(capsys.readouterr().out)["proposals"][0]["joints_deg"]) == 6
+    said("check", robot, "--campaign", plan)
+    urdf = robot.with_name("arm.urdf")
+    own = ["--robot", robot] if begun_by == "--robot" else ["--urdf", urdf, "--mass-kg", 55]
+    said("new", tmp_path / "cell", *own, "--campaign", plan)
+    assert len(told("next", tmp_path / "cell")["proposals"][0]["joints_deg"]) == 6

@@ -9,14 +9,14 @@ from planner.errors import InputError
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
 from planner.robot.urdf_inertias import urdf_with_inertias
-from tests.support.known_robots import KNOWN_ROBOTS
+from planner.truth.arms import ARMS
 from tests.support.plain_arm import make_plain_arm
 
 
-@pytest.mark.parametrize("name", list(KNOWN_ROBOTS))
+@pytest.mark.parametrize("name", list(ARMS))
 @pytest.mark.parametrize("base", [False, True])
 def test_a_small_change_is_taken_whole(tmp_path: Path, name, base):
-    path = KNOWN_ROBOTS[name].write(tmp_path)
+    path = ARMS[name].write(tmp_path)
     if base:
         text = path.read_text()
         block = '[[compliance]]\njoint = "base"\naxis = [1, 0, 0]\nstiffness = 1e7\ndamping = 1e4\n'
@@ -36,7 +36,7 @@ def test_a_small_change_is_taken_whole(tmp_path: Path, name, base):
 
 
 def test_what_matter_cannot_form_is_taken_in_part(tmp_path: Path):
-    robot = Robot.load(KNOWN_ROBOTS["kr210"].write(tmp_path))
+    robot = Robot.load(ARMS["kr210"].write(tmp_path))
     elastic = ElasticModel(robot)
     change = np.zeros_like(elastic.inertia)
     change[1, 0] = -2 * elastic.inertia[1, 0]
@@ -50,7 +50,7 @@ def test_what_matter_cannot_form_is_taken_in_part(tmp_path: Path):
 
 
 def test_comments_of_the_urdf_stay(tmp_path: Path):
-    path = KNOWN_ROBOTS["kr10"].write(tmp_path)
+    path = ARMS["kr10"].write(tmp_path)
     urdf = path.with_name("robot.urdf")
     head = '<?xml version="1.0"?>\n<!-- measured in spring -->\n'
     urdf.write_text(head + urdf.read_text().replace("<joint", "<!-- a joint --><joint", 1))

@@ -6,7 +6,7 @@ import pytest
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import solve
 from planner.robot.robot import Robot
-from tests.support.known_robots import KNOWN_ROBOTS
+from planner.truth.arms import ARMS
 from tests.support.robots import make_arm
 
 TARGETS = 60
@@ -17,9 +17,9 @@ def arm(tmp_path_factory) -> Robot:
     return Robot.load(make_arm(tmp_path_factory.mktemp("arm")))
 
 
-@pytest.fixture(scope="module", params=sorted(KNOWN_ROBOTS))
+@pytest.fixture(scope="module", params=sorted(ARMS))
 def known(request, tmp_path_factory) -> Robot:
-    return Robot.load(KNOWN_ROBOTS[request.param].write(tmp_path_factory.mktemp(request.param)))
+    return Robot.load(ARMS[request.param].write(tmp_path_factory.mktemp(request.param)))
 
 
 def reaches(robot, q, rotation, position) -> bool:
@@ -45,8 +45,8 @@ def test_what_a_robot_can_reach_is_found(known):
 
 def test_near_a_good_start_the_solution_stays_on_its_branch(known):
     rng = np.random.default_rng(3)
-    name = next(k for k, v in KNOWN_ROBOTS.items() if v.name == known.name)
-    for q in KNOWN_ROBOTS[name].poses(20, seed=5):
+    name = next(k for k, v in ARMS.items() if v.name == known.name)
+    for q in ARMS[name].poses(20, seed=5):
         rotation, position = known.forward(q)
         start = q + rng.uniform(-0.1, 0.1, 6)
         result = solve(known, rotation, position, start, restarts=0)

@@ -8,7 +8,7 @@ import pytest
 
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
-from tests.support.known_robots import KR10
+from planner.truth.arms import KR10
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from planner.errors import InputError, NoPoseLeftError
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
-from tests.support.known_robots import KR10, KR210
+from planner.truth.arms import KR10, KR210
 from tests.support.robots import JOINTS_DEG, make_arm
 
 DOWN = (0.0, 0.0, -1.0)

@@ -1,6 +1,7 @@
 """A session with a fake analyser that writes slowly and a scripted engineer."""
 
 import io
+import shutil
 import time
 from dataclasses import dataclass
 
@@ -41,15 +42,15 @@ class Session:
 
 @pytest.fixture
 def session():
-    """Plays a session with keys (moment, key); without any nobody is at the keyboard."""
+    """Plays a session with keys (moment, key); without any nobody answers, `until` it is over."""
 
-    def played(campaign, inbox, *keys, hits=9, limit_s=30, quiet_s=0.05, **more):
+    def played(campaign, inbox, *keys, hits=9, limit_s=30, quiet_s=0.05, until=(), **more):
         played.console = console = Console(
             width=100, record=True, file=io.StringIO(), force_terminal=False
         )
         summary = watch(
-            campaign, inbox, console=console, keys=Script(console, keys), auto=not keys,
-            hits_per_pose=hits, quiet_s=quiet_s, limit_s=limit_s, **more,
+            campaign, inbox, console=console, auto=not keys, hits_per_pose=hits, quiet_s=quiet_s,
+            keys=Script(console, keys or (until and [(until, "q")])), limit_s=limit_s, **more,
         )  # fmt: skip
         return Session(summary, console.export_text(clear=False))
 
@@ -63,6 +64,28 @@ def cell(tmp_path):
     campaign = Campaign.new(tmp_path / "cell", robot, campaign_toml)
     (tmp_path / "inbox").mkdir()
     return campaign, truth, tmp_path / "inbox"
+
+
+@pytest.fixture(scope="session")
+def measured_once(tmp_path_factory):
+    """A campaign of four poses, and the robot's truth: to be copied."""
+    root = tmp_path_factory.mktemp("measured")
+    robot, campaign_toml, truth = make_cell(root)
+    campaign = Campaign.new(root / "cell", robot, campaign_toml)
+    for number in range(4):
+        pose = campaign.next()[0]
+        folder = record(truth, root / f"made{number}", pose.pose, pose.joints_deg, number)
+        (report,) = campaign.import_paths((folder,))
+        assert report.question is None
+    return campaign.directory, truth
+
+
+@pytest.fixture
+def measured(measured_once, tmp_path):
+    """A campaign of four poses, the robot's truth, and a folder to watch."""
+    folder, truth = measured_once
+    (tmp_path / "inbox").mkdir()
+    return Campaign(shutil.copytree(folder, tmp_path / "cell")), truth, tmp_path / "inbox"
 
 
 @pytest.fixture

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 from rerun.chunk import RrdReader
 
 from planner.campaign.campaign import Campaign
@@ -52,10 +51,10 @@ def test_a_session_shows_imports_and_goes_on(cell, deliver, session):
 def test_resume_ignores_what_was_imported_and_waits_for_torn_files(cell, deliver, session):
     campaign, _, inbox = cell
     deliver(campaign.next()[0])
-    assert session(campaign, inbox, limit_s=4).summary.measured == ("P001",)
+    assert session(campaign, inbox, until="go to pose P002").summary.measured == ("P001",)
     again = Campaign(campaign.directory)
     deliver(again.next()[0], 1, torn=True)
-    second = session(again, inbox, limit_s=3)
+    second = session(again, inbox, limit_s=2)
     assert (second.summary.measured, second.summary.stopped) == ((), "time limit")
     assert "not whole yet" in second.text
     assert list(again.state.measurements) == ["P001"]
@@ -70,7 +69,7 @@ def test_refused_hits_are_not_offered_again_even_by_the_next_session(cell, deliv
     assert campaign.state.measurements == {}
     again = Campaign(campaign.directory)
     assert len(again.state.refused) == 9
-    assert session(again, inbox, limit_s=2).summary.measured == ()
+    assert session(again, inbox, limit_s=1).summary.measured == ()
     assert again.state.measurements == {}
     # Taken back, they wait again, at the same pose.
     session(again, inbox, ("[u] undo", "u"), ("all hits are in", "a"), ("P001: 9 hits in", "q"))
@@ -101,22 +100,18 @@ def test_a_hit_along_another_axis_than_said_is_asked_about(cell, session, key, s
 
 
 @pytest.fixture
-def four(cell, deliver, tmp_path):
-    """The cell after four poses, and a proposal at which the hits of another pose arrive."""
-    campaign, truth, inbox = cell
-    for number in range(4):
-        pose = campaign.next()[0]
-        folder = record(truth, tmp_path / f"made{number}", pose.pose, pose.joints_deg, number)
-        (report,) = campaign.import_paths((folder,))
-        assert report.question is None
+def four(measured, tmp_path):
+    """A campaign of four poses, and a proposal at which the hits of another pose arrive."""
+    campaign, truth, inbox = measured
     stated, true = campaign.next(2)
-    deliver(replace(true, pose=stated.pose), 9)
+    made = record(truth, tmp_path / "made", stated.pose, true.joints_deg, 9)
+    shutil.copytree(made / "data", inbox, dirs_exist_ok=True)
     return campaign, inbox, stated.pose, true.pose
 
 
 def test_without_anybody_to_ask_hits_of_another_pose_are_held(four, session):
     campaign, inbox, stated, true = four
-    played = session(campaign, inbox, limit_s=4)
+    played = session(campaign, inbox, until=f"go to pose {true}")
     asked = campaign.state.held[stated].question
     assert asked is not None
     assert asked.fits == true
@@ -152,8 +147,8 @@ def test_a_table_of_recordings_in_the_folder_gives_the_readback(cell, session, t
     folder = record(truth, tmp_path / "made", proposal.pose, proposal.joints_deg)
     shutil.copytree(folder, inbox, dirs_exist_ok=True)
     rrd = tmp_path / "session.rrd"
-    for limit_s in (4, 1):  # the second session resumes, and its recording tells it all
-        session(campaign, inbox, limit_s=limit_s, rrd=rrd)
+    for _ in range(2):  # the second session resumes, and its recording tells it all
+        session(campaign, inbox, until="go to pose P002", rrd=rrd)
     reader = RrdReader(rrd)
     seen = {str(chunk.entity_path) for chunk in reader.stream(store=reader.recordings()[0])}
     assert {"/note", "/frf/xx/0/measured", "/cell/measured", "/cell/proposed"} <= seen
@@ -242,8 +237,7 @@ def test_pictures_wait_for_the_next_page_and_are_made_at_the_end_where_interrupt
             raise KeyboardInterrupt
 
     monkeypatch.setattr(Story, "tell", tell)
-    played = session(campaign, inbox, limit_s=4 if not interrupted else 20)
-    assert played.summary.stopped == ("quit" if interrupted else "time limit")
+    session(campaign, inbox, until=lambda text: len(told) == 2)
     assert told[interrupted:] == [("Imported", 1, True, True), ("Proposed", 1, True, False)]
 
 
@@ -268,7 +262,7 @@ def test_the_diagnosis_runs_beside_the_session_and_is_said_when_it_is_through(
     said = ""
     for number in range(2):
         deliver(campaign.next()[0], number)
-        said += session(campaign, inbox, limit_s=4, explain=True).flat
+        said += session(campaign, inbox, until="Diagnosis: ", explain=True).flat
     assert "Diagnosis: The simulation, once refitted, explains the recordings" in said
     assert "Diagnosis: The floor gives way." in said
 

@@ -42,7 +42,7 @@ def without(folder, unwanted):
 def test_a_table_in_a_subfolder_gives_the_readback(posed, session):
     campaign, pose, made, inbox = posed
     shutil.copytree(made, inbox / "left_station" / pose.pose)
-    session(campaign, inbox, limit_s=5)
+    session(campaign, inbox, until="go to pose P002")
     stood = campaign.state.measurements[pose.pose].joints_deg
     assert 0 < np.max(np.abs(np.subtract(stood, pose.joints_deg))) <= 0.011
     assert {h.repeat for h in campaign.state.used[0].accepted} == {1, 2, 3}
@@ -55,7 +55,8 @@ def test_a_table_without_joints_is_of_proposed_poses(posed, session, by):
     without(made, lambda name: name.endswith("_deg"))
     shutil.copytree(made, inbox / "export")
     if by == "session":
-        assert "along which axis" not in session(campaign, inbox, limit_s=5).flat
+        said = session(campaign, inbox, until="go to pose P002").flat
+        assert "along which axis" not in said
     else:
         assert call("import", campaign.directory, inbox)[0] == 0
     (measured,) = Campaign(campaign.directory).state.used
@@ -78,7 +79,7 @@ def test_hits_of_another_pose_by_their_table_are_not_counted_here(posed, session
     table = made / TABLE
     table.write_text(table.read_text().replace(f"{pose.pose},", "X1,"))
     shutil.copytree(made, inbox / "export")
-    said = session(campaign, inbox, limit_s=5).flat
+    said = session(campaign, inbox, until="X1: 9 hits in").flat
     assert "not from here: of X1 by recordings.csv" in said
     assert "all hits are in" not in said
     assert [m.pose for m in campaign.state.used] == ["X1"]
@@ -92,7 +93,7 @@ def test_a_left_over_file_of_the_pose_before_is_left_out_alone(posed, session, t
     there = record(truth, inbox / "there", second.pose, second.joints_deg)
     (left,) = (there / "data").glob("*z_3.uff")
     shutil.copy(next((made / "data").glob("*z_1.uff")), left)
-    said = session(campaign, inbox, limit_s=6).flat
+    said = session(campaign, inbox, until="8 hits in").flat
     assert f"it was imported before as a recording of pose {pose.pose} and cannot" in said
     assert [len(m.accepted) for m in campaign.state.used] == [9, 8]
 
@@ -103,14 +104,15 @@ def test_an_angle_that_no_joint_reaches_is_said_at_once_and_read_again(posed, se
     stated = right.splitlines()[1].split(",")[1]
     (made / TABLE).write_text(right.replace(f",{stated},", ",624.87,"))
     shutil.copytree(made, inbox / "export")
-    assert "at 624.87° is outside its limits" in session(campaign, inbox, limit_s=2).flat
+    said = "at 624.87° is outside its limits"
+    assert said in session(campaign, inbox, until=said).flat
     robot = campaign.cell.robot
     table = FolderTable(inbox, robot.joints, robot.points, campaign.cell.check_pose)
     path = inbox / "export" / TABLE
     assert (table.follow(), [where for where, _ in table.waiting]) == (set(), [path])
     path.write_text(right)
     assert (table.follow(), table.waiting, table.follow()) == ({path}, [], set())
-    session(campaign, inbox, limit_s=5)
+    session(campaign, inbox, until="go to pose P002")
     assert [m.pose for m in campaign.state.used] == [pose.pose]
 
 
@@ -118,7 +120,7 @@ def test_a_table_without_one_of_the_joints_is_not_followed_and_says_why(posed, s
     campaign, _, made, inbox = posed
     without(made, lambda name: name == "joint_a2_deg")
     shutil.copytree(made, inbox / "export")
-    said = session(campaign, inbox, limit_s=2).flat
+    said = session(campaign, inbox, until="has no column").flat
     assert "cannot be used: recordings.csv" in said
     assert "has no column joint_a2_deg" in said
     assert not campaign.state.used

@@ -7,7 +7,7 @@ import subprocess
 import termios
 import time
 
-from tests.support.outside import PLANNER, answer, make_cell
+from tests.support.outside import PLANNER, make_cell, told
 
 
 def read_until(handle: int, text: str, seconds: float = 60.0) -> str:
@@ -22,7 +22,7 @@ def read_until(handle: int, text: str, seconds: float = 60.0) -> str:
 def test_keys_and_screen_of_a_terminal(tmp_path):
     robot, campaign_toml, _ = make_cell(tmp_path)
     cell, inbox = tmp_path / "cell", tmp_path / "inbox"
-    answer("new", cell, "--robot", robot, "--campaign", campaign_toml)
+    told("new", cell, "--robot", robot, "--campaign", campaign_toml)
     inbox.mkdir()
     ours, theirs = pty.openpty()
     before = termios.tcgetattr(theirs)
@@ -53,5 +53,5 @@ def test_keys_and_screen_of_a_terminal(tmp_path):
         process.wait()
         os.close(ours)
         os.close(theirs)
-    status = answer("status", cell)
+    status = told("status", cell)
     assert [s["pose"] for s in status["skipped"]] == ["P001"]

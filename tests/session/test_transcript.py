@@ -13,12 +13,11 @@ import time
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.truth.hits import AXES, SimulatedHit, noisy, pulse, sampled, simulate_hit, write_uff
 from planner.truth.model import Truth
-from tests.support.outside import HAMMER, PLANNER, make_cell, record
+from tests.support.outside import HAMMER, PLANNER
 
 ROWS, COLUMNS = 24, 80
 
@@ -97,27 +96,15 @@ class Analyser:
         return SimulatedHit(axis, np.minimum(good.force_n, top), good.acceleration_m_s2)
 
 
-@pytest.fixture
-def cell(tmp_path):
-    robot, campaign_toml, truth = make_cell(tmp_path)
-    campaign = Campaign.new(tmp_path / "cell", robot, campaign_toml)
-    for number in range(3):
-        pose = campaign.next()[0]
-        folder = record(truth, tmp_path / f"made{number}", pose.pose, pose.joints_deg, number)
-        campaign.import_paths((folder,))
-    stated, other = campaign.next(2)
-    (tmp_path / "inbox").mkdir()
-    return campaign, truth, tmp_path / "inbox", stated, other
-
-
 def used_files(directory: Path) -> set[str]:
     """Names of the hits in use, without folders."""
     state = Campaign(directory).state
     return {Path(h.file).name for m in state.used for h in m.accepted}
 
 
-def test_a_session_in_which_all_goes_wrong(cell):
-    campaign, truth, inbox, first, second = cell
+def test_a_session_in_which_all_goes_wrong(measured):
+    campaign, truth, inbox = measured
+    first, second = campaign.next(2)
     terminal = Terminal(campaign.directory, inbox, "--hits-per-pose", 6)
     try:
         page = terminal.until(f"go to pose {first.pose}", "axes of tool", "x 0/2", "/inbox")

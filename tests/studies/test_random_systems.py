@@ -12,7 +12,6 @@ from scipy.optimize import linear_sum_assignment
 from planner.errors import RefusedError
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import Mode
-from tests.support.ema_peer import peer_poles
 from tests.support.modal_systems import System, as_frf, exact_frf, noisy, random_system
 
 pytestmark = pytest.mark.slow
@@ -82,38 +81,3 @@ def test_two_hundred_random_systems():
     assert good >= 0.97 * total
     assert spurious <= 0.02 * reported
     assert np.all((cover >= 90) & (cover <= 98))
-
-
-def test_beside_the_peer_on_long_records():
-    """3 × 3 × 1,600 lines, orders to 60; the peer's user knows the true frequencies."""
-    lines = np.arange(1, 1601) * 0.05
-    rng = np.random.default_rng(SEED + 1)
-    ours = theirs = total = spurious = 0
-    times = np.zeros((10, 2))
-    for k in range(10):
-        system, noise = draw(rng)
-        h, variance = noisy(exact_frf(system, lines), noise, rng)
-        start = time.perf_counter()
-        model = estimate_modes(as_frf(lines, h, variance), BAND, max_order=60)
-        times[k, 0] = time.perf_counter() - start
-        frequency, zeta, times[k, 1] = peer_poles(h, system.frequency_hz, lines, 60)
-        total += system.frequency_hz.size
-        ours += close(
-            system, *np.transpose([(m.frequency_hz, m.damping_ratio) for m in model.modes])
-        )
-        theirs += close(system, frequency, zeta)
-        spurious += len(model.modes) - len(pairs(system, model.modes))
-    ratio = np.median(times[:, 1] / times[:, 0])
-    print(
-        f"\n{total} true poles: ours {ours} right ({spurious} spurious), peer {theirs}; "
-        f"ours {np.median(times[:, 0]):.2f} s, peer {np.median(times[:, 1]):.2f} s: "
-        f"{ratio:.1f} times as fast"
-    )
-    assert ours >= theirs
-
-
-def close(system: System, frequency: np.ndarray, zeta: np.ndarray) -> int:
-    """True modes with one of the given within 0.3 % in frequency and 10 % in damping."""
-    near = np.abs(frequency[None] / system.frequency_hz[:, None] - 1) < 0.003
-    near &= np.abs(zeta[None] / system.damping_ratio[:, None] - 1) < 0.1
-    return int(np.sum(np.any(near, axis=1)))

@@ -3,22 +3,15 @@
 `pytest -m slow tests/studies/test_tracking.py -s` prints the share of right labels.
 """
 
-import json
 from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
-from planner.campaign.cell import Cell
-from planner.campaign.config import load_campaign_config
 from planner.dynamics.simulation import Simulation
 from planner.modal.tracking import Guide, Tracks, track
 from planner.robot.robot import Robot
-from planner.truth.deviation import Deviation
-from planner.truth.load import load_truth
 from tests.support.random_ways import (
-    CAMPAIGN,
-    SOFT_FLOOR,
     Way,
     exchanges,
     hidden_modes,
@@ -34,44 +27,12 @@ from tests.support.true_modes import Measured, measure_all
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
 COUNT, ABOVE, POSES = 4, 2, 60
-CROSSING = 118, 122, 129  # the first seeds from 100 on for which true modes cross twice or more
-SURE = 0.95
-
-
-def kr240() -> tuple[Measured, Simulation, np.ndarray, np.ndarray]:
-    """60 poses of the shipped workspace; the true robot is that of the shipped recordings."""
-    toml = CAMPAIGN / "robot" / "robot.toml"
-    seed = int(json.loads((CAMPAIGN / "truth.json").read_text())["engine"].split()[-1])
-    off = Deviation(seed, stiffness=0.12, damping=0.15, inertia=0.04, com_m=0.005, extra=SOFT_FLOOR)
-    cell = Cell.load(toml, load_campaign_config(CAMPAIGN / "campaign.toml"))
-    candidates = cell.candidates
-    chosen = np.random.default_rng(5).choice(len(candidates.q), POSES, replace=False)
-    q = candidates.q[chosen]
-    measured = measure_all(load_truth(toml, off), q, cell.config.modes.band_hz, COUNT, q[0])
-    return measured, Simulation(Robot.load(toml)), q, candidates.features[chosen]
 
 
 def followed(simulation: Simulation, q: np.ndarray) -> Guide:
     """The simulation's families from the first pose on."""
     modes = simulation.followed(q, COUNT + ABOVE, simulation.families(q[0], q))
     return Guide(modes.frequency_hz, modes.shape)
-
-
-def wrong(measured: Measured, tracks: Tracks) -> list[str]:
-    """What is not labelled as it truly is."""
-    out = []
-    for i, k in np.ndindex(*measured.partner.shape):
-        j = measured.partner[i, k]
-        true = measured.modes[i][j] if j >= 0 else None
-        given = tracks.modes[i][k]
-        if given is not true:
-            said = "missing" if given is None else f"{given.frequency_hz:.2f} Hz"
-            sure = 100 * tracks.probability[i, k]
-            out.append(
-                f"pose {i}: mode {k + 1} is at {measured.true_hz[i, k]:.2f} Hz, said: {said} "
-                f"({sure:.0f} % sure)"
-            )
-    return out
 
 
 def hide(measured: Measured, rng: np.random.Generator) -> Measured:
@@ -84,47 +45,6 @@ def hide(measured: Measured, rng: np.random.Generator) -> Measured:
         partner[i] = np.where(partner[i] > j, partner[i] - 1, partner[i])
         partner[i, k] = -1
     return Measured(tuple(modes), measured.place, measured.true_hz, partner)
-
-
-def test_share_of_right_labels():
-    measured, simulation, q, x = kr240()
-    crossed = exchanges(measured.place)
-    guide = followed(simulation, q)
-    total = POSES * COUNT
-    for name, case in (
-        ("as measured", measured),
-        ("every third pose with a hidden mode", hide(measured, np.random.default_rng(0))),
-    ):
-        bad = wrong(case, track(case.modes, guide, x))
-        share = 100 * (1 - len(bad) / total)
-        found = int(np.sum(case.partner >= 0))
-        print(
-            f"KR240, {POSES} poses, {name}: {share:.1f} % of {total} labels right "
-            f"({found} modes found, {crossed} exchanges of order between poses)"
-        )
-        print("\n".join(f"  {line}" for line in bad))
-        assert share >= 98.0
-
-
-@pytest.mark.parametrize("seed", CROSSING)
-def test_what_is_sure_where_modes_cross_is_right(seed, tmp_path):
-    """On a way of a nearly symmetric KR10; which of two alike modes is which need not be known."""
-    way = nearly_symmetric_kr10(seed, tmp_path, POSES)
-    measured = measure_all(way.truth, way.q, way.band_hz, COUNT, way.q[0])
-    for name, case in (
-        ("as measured", measured),
-        ("every third pose with a hidden mode", hide(measured, np.random.default_rng(0))),
-    ):
-        tracks = tracked(way, case)
-        labels, stated = right(case, tracks), tracks.probability[:, :COUNT]
-        sure = stated >= SURE
-        print(
-            f"KR10 {seed}, {name}: {100 * labels.mean():.1f} % of {labels.size} labels right, "
-            f"{100 * labels[sure].mean():.1f} % of {sure.sum()} that are {SURE:.0%} sure"
-        )
-        assert labels[sure].mean() >= 0.98
-        assert sure.sum() >= POSES  # something is sure
-    assert exchanges(measured.place) >= 2
 
 
 def show(name: str, cases: Sequence[Measured], tracks: Sequence[Tracks]) -> tuple[float, float]:

@@ -14,13 +14,9 @@ from planner.campaign.chain_question import LOG_ODDS, Draws, Sums, likeliest
 from planner.campaign.config import load_campaign_config
 from planner.campaign.deliveries import sort_paths
 from planner.dataset.measure import MeasuredPose
-from planner.truth.handling import EVERYDAY, Handling
-from planner.truth.secret import Secret
 from tests.support.everyday_campaigns import Cell
 from tests.support.lacking_robots import KINDS, ROBOTS, lacking
 
-# As much as is still a good import: hits 3° beside, gains 3 % off, springs 40 % and all alike too.
-ROUGH = replace(EVERYDAY, angle_deg=3.0, gain=0.03, force_gain=0.03)
 FACTORS = {
     "× 1000": 1e3,
     "÷ 1000": 1e-3,
@@ -42,17 +38,13 @@ class Struck:
     sums: tuple[Sums, ...]
 
 
-def struck(folder: Path, seed: int, poses: int, rough: bool) -> Struck:
+def struck(folder: Path, seed: int, poses: int) -> Struck:
     """A robot of those for everyday campaigns in turn, hit at poses of its workspace."""
     name, kind = [*ROBOTS][seed % len(ROBOTS)], KINDS[(seed + seed // len(ROBOTS)) % len(KINDS)]
     rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
     robot = ROBOTS[name](folder, rng)
     secret, _ = lacking(kind, robot, rng)
-    handling: Handling = ROUGH if rough else EVERYDAY
-    if rough:
-        common, off = float(np.exp(rng.uniform(-0.3, 0.3))), secret.deviation
-        secret = Secret(replace(off, stiffness=0.3, common=common, damping=0.4))
-    true = Cell.of(robot, secret, rng, handling)
+    true = Cell.of(robot, secret, rng)
     config = folder / "campaign.toml"
     config.write_text(
         f"[workspace]\n{robot.workspace}\n[modes]\ncount = 3\nband_hz = {list(robot.band_hz)}\n"
@@ -101,8 +93,8 @@ def judged(sums: Sums) -> ChainFault | None:
     return found if gain >= LOG_ODDS else None
 
 
-def cases(folder: Path, seeds: range, poses: int, rough: bool) -> Iterator[Struck]:
+def cases(folder: Path, seeds: range, poses: int) -> Iterator[Struck]:
     """Of all seeds."""
     for seed in seeds:
         (folder / str(seed)).mkdir(parents=True)
-        yield struck(folder / str(seed), seed, poses, rough)
+        yield struck(folder / str(seed), seed, poses)

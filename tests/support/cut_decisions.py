@@ -25,13 +25,14 @@ from planner.milling.lobes import losses
 from planner.milling.structure import of_frf
 from planner.modal.estimate_modes import estimate_modes
 from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, Spring
+from planner.truth.hits import Hammer
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
-from tests.support.fidelity_cells import HAMMER
 from tests.support.plain_arm import JOINTS_DEG, STIFFNESS, make_plain_arm
 from tests.support.true_modes import hits_at
 
 BAND_HZ = (3.0, 60.0)
+HAMMER = Hammer(peak_n=300, duration_s=0.004, sampling_rate_hz=640, record_s=2.4)
 LINES = np.arange(2.0, 60.01, 0.25)
 PATH, CANDIDATES, INITIAL = 12, 100, 2
 SPEEDS = np.linspace(500.0, 2500.0, 9)  # rpm that a case chooses from

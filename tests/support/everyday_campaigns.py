@@ -18,7 +18,7 @@ import numpy as np
 from planner.campaign.campaign import Campaign
 from planner.campaign.model import Model
 from planner.dataset.store import Store
-from planner.truth.handling import EVERYDAY, Aim, Handling, together
+from planner.truth.handling import EVERYDAY, Aim, together
 from planner.truth.hits import AXES, Hammer, noisy, write_recordings
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
@@ -39,7 +39,6 @@ class Cell:
     secret: Secret
     hammer: Hammer
     habits: list[Aim]
-    handling: Handling
     rng: np.random.Generator
 
     @classmethod
@@ -48,17 +47,16 @@ class Cell:
         robot: Robot,
         secret: Secret,
         rng: np.random.Generator,
-        handling: Handling = EVERYDAY,
     ) -> "Cell":
         truth = load_truth(robot.toml, secret.deviation)
         hammer = replace(robot.hammer, noise=float(rng.uniform(0.005, 0.03)), oversampling=8)
-        secret = replace(secret, chain=handling.chain(rng))
+        secret = replace(secret, chain=EVERYDAY.chain(rng))
         middle = np.mean([truth.lower_rad, truth.upper_rad], axis=0)
         [quiet] = quiet_hits(
             truth, secret, [HitVisit(middle, [("+x", hammer.peak_n)])], hammer, rng
         )
-        hammer = handling.floor(hammer, quiet, rng)
-        return cls(robot, truth, secret, hammer, handling.common(rng), handling, rng)
+        hammer = EVERYDAY.floor(hammer, quiet, rng)
+        return cls(robot, truth, secret, hammer, EVERYDAY.common(rng), rng)
 
     def record(self, folder: Path, pose: str, joints_deg: tuple[float, ...]) -> Path:
         """Hits at a pose where the robot was sent; the robot stands a little beside."""
@@ -66,9 +64,9 @@ class Cell:
         axes = [axis for axis in range(3) for _ in range(REPEATS)]
         aims = [
             together(self.habits[axis], aim)
-            for axis, aim in zip(axes, self.handling.aims(axes, rng), strict=True)
+            for axis, aim in zip(axes, EVERYDAY.aims(axes, rng), strict=True)
         ]
-        off = np.deg2rad(self.handling.readback_deg) * rng.standard_normal(len(joints_deg))
+        off = np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(len(joints_deg))
         there = np.deg2rad(joints_deg) + off
         shots = [(f"+{AXES[axis]}", self.hammer.peak_n) for axis in axes]
         [quiet] = quiet_hits(
@@ -93,8 +91,6 @@ class Score:
     rmse: float
     covered: float
     visit: float
-    by_mode: tuple[float, ...]
-    trust: tuple[float, ...]
     misfit: float | None
 
     @classmethod
@@ -116,8 +112,6 @@ class Score:
             100 * float(np.sqrt(np.mean(off**2))),
             inside,
             visit,
-            tuple((100 * np.sqrt(np.mean(off**2, axis=0))).tolist()),
-            tuple(model.surrogate.frequency_trust.tolist()),
             learned.identified.misfit if learned else None,
         )
 

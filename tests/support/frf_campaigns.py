@@ -1,7 +1,7 @@
 """Campaigns on true robots (MuJoCo) hit as people hit: FRFs predicted at poses never measured."""
 
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from planner.truth.arms import ARMS
 from planner.truth.cases import DAMPING_S, PEAK_N
 from planner.truth.conceal import EFFECTS
 from planner.truth.deviation import Deviation
-from planner.truth.handling import EVERYDAY, Handling, together
+from planner.truth.handling import EVERYDAY, together
 from planner.truth.hits import AXES, Hammer
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
@@ -76,7 +76,7 @@ class FrfCase:
 
 def make(
     robot: str, lacking: str, seed: int, folder: Path, poses: int = 6, unseen: int = 8,
-    simulation: str = "updated", handling: Handling = EVERYDAY,
+    simulation: str = "updated",
 ) -> FrfCase:  # fmt: skip
     """A robot of ARMS whose simulation lacks one of LACKING, hit at `poses` random poses."""
     rng = np.random.default_rng([seed, zlib.crc32(f"{robot} {lacking}".encode())])
@@ -92,7 +92,7 @@ def make(
         secret = EFFECTS[LACKING[lacking]](scene, secret, rng).secret
     truth = load_truth(toml, secret.deviation)
     hammer = Hammer(PEAK_N[robot], PULSE_S, noise=float(rng.uniform(0.005, 0.03)))
-    measurements, frfs, one_hit = _measured(truth, secret, q, hammer, arm.band_hz, handling, rng)
+    measurements, frfs, one_hit = _measured(truth, secret, q, hammer, arm.band_hz, rng)
     table = {
         "robot": str(toml),
         "workspace": {"joints_deg": [list(r) for r in arm.joints_deg]},
@@ -108,16 +108,16 @@ def make(
 
 def _measured(
     truth: Truth, secret: Secret, q: np.ndarray, hammer: Hammer, band_hz: tuple[float, float],
-    handling: Handling, rng: np.random.Generator,
+    rng: np.random.Generator,
 ) -> tuple[tuple[Measurement, ...], dict[str, Frf], dict[str, Frf]]:  # fmt: skip
     """REPEATS hits an axis at each pose (n, 6), with errors of hand and chain."""
-    secret, common = replace(secret, chain=handling.chain(rng)), handling.common(rng)
+    secret, common = replace(secret, chain=EVERYDAY.chain(rng)), EVERYDAY.common(rng)
     axes = [axis for axis in range(3) for _ in range(REPEATS)]
     shots = [(f"+{AXES[axis]}", hammer.peak_n) for axis in axes]
     visits = []
     for one in q:
-        there = one + np.deg2rad(handling.readback_deg) * rng.standard_normal(6)
-        own = zip(axes, handling.aims(axes, rng), strict=True)
+        there = one + np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(6)
+        own = zip(axes, EVERYDAY.aims(axes, rng), strict=True)
         aims = [together(common[axis], aim) for axis, aim in own]
         visits.append(HitVisit(there, shots, aims=aims))
     measurements, frfs, one_hit = [], {}, {}
@@ -155,15 +155,9 @@ class FrfScore:
     alone: float
 
     @classmethod
-    def of(
-        cls, case: FrfCase, model: Model,
-        predict: Callable[[Model], tuple[np.ndarray, np.ndarray]] | None = None,
-    ) -> "FrfScore":  # fmt: skip
+    def of(cls, case: FrfCase, model: Model) -> "FrfScore":
         """Of a model at the unseen poses."""
-        if predict is None:
-            mean, sd = model.frf(case.unseen, case.lines_hz)
-        else:
-            mean, sd = predict(model)
+        mean, sd = model.frf(case.unseen, case.lines_hz)
         inside = np.abs(mean - case.true_frf) <= 2 * sd
         half = LINES // 2
         learned, alone = model.low.learned or model.low.suspect, np.nan

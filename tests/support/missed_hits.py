@@ -10,7 +10,7 @@ from planner.campaign.model import Model
 from planner.truth.arms import ARMS
 from planner.truth.cases import PEAK_N
 from planner.truth.deviation import Deviation
-from planner.truth.handling import EVERYDAY, Aim, Handling, MeasuringChain, together
+from planner.truth.handling import EVERYDAY, Aim, MeasuringChain, together
 from planner.truth.hits import AXES, Hammer, write_recordings
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
@@ -67,31 +67,23 @@ class MissedCell:
         return np.array(out)
 
 
-def missed_cell(
-    folder: Path,
-    robot: str,
-    per_joint: int = 1,
-    poses: int = 6,
-    repeats: int = 4,
-    seed: int = 0,
-    handling: Handling = HAND,
-) -> MissedCell:
+def missed_cell(folder: Path, robot: str, poses: int, repeats: int, seed: int) -> MissedCell:
     """Hits along each axis, in both senses, at `poses` poses; `repeats` a pose and axis."""
     rng, noise = np.random.default_rng([seed, 24]), np.random.default_rng([seed, 25])
     arm = ARMS[robot]
-    robot_toml = arm.write(folder / "robot", per_joint)
+    robot_toml = arm.write(folder / "robot", 1)
     deviation = replace(SCATTER, seed=seed)
     truth, hammer = load_truth(robot_toml, deviation), Hammer(PEAK_N[robot], PULSE_S, noise=NOISE)
-    chain, common = handling.chain(rng), handling.common(rng)
+    chain, common = HAND.chain(rng), HAND.common(rng)
     shots = [(f"{'+-'[k % 2]}{a}", hammer.peak_n) for a in AXES for k in range(repeats)]
     axes = [AXES.index(hit[1]) for hit, _ in shots]
     visits, stood, aimed, readback = [], {}, {}, {}
     for i, q in enumerate(arm.poses(poses, seed)):
         name = f"P{i + 1:02d}"
         readback[name] = np.round(np.rad2deg(q), 4)
-        off = np.deg2rad(handling.readback_deg) * rng.standard_normal(len(q))
+        off = np.deg2rad(HAND.readback_deg) * rng.standard_normal(len(q))
         stood[name] = np.deg2rad(readback[name]) + off
-        own = handling.aims(axes, rng)
+        own = HAND.aims(axes, rng)
         aimed[name] = [together(common[a], aim) for a, aim in zip(axes, own, strict=True)]
         visits.append(HitVisit(stood[name], shots, i / poses, aimed[name]))
     found = hit_poses(truth, Secret(deviation, chain=chain), visits, hammer, noise)

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,21 +27,11 @@ def with_tests() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
 
 
-def planner(
-    *arguments: object, check: bool = True, limit_s: float = 240
-) -> subprocess.CompletedProcess[str]:
+def planner(*arguments: object, limit_s: float = 240) -> subprocess.CompletedProcess[str]:
     """Run `planner …` in a process of its own."""
     command = [*PLANNER, *(str(a) for a in arguments)]
     env = {**os.environ, "PLANNER_DEBUG": "1"}
-    done = subprocess.run(command, capture_output=True, text=True, env=env, timeout=limit_s)
-    if check:
-        assert done.returncode == 0, f"{arguments}: {done.returncode}\n{done.stderr}"
-    return done
-
-
-def answer(*arguments: object) -> dict:
-    """The JSON answer of a command that must succeed."""
-    return json.loads(planner(*arguments, "--json").stdout)
+    return subprocess.run(command, capture_output=True, text=True, env=env, timeout=limit_s)
 
 
 def call(*arguments: object) -> tuple[int, str, str]:
@@ -51,11 +42,22 @@ def call(*arguments: object) -> tuple[int, str, str]:
     return code, out.getvalue(), err.getvalue()
 
 
+def said(*arguments: object) -> str:
+    """What a command that must succeed prints, in this process."""
+    code, out, err = call(*arguments)
+    assert code == 0, f"{arguments}: {code}\n{err}"
+    return out
+
+
 def told(*arguments: object) -> dict:
     """The JSON answer of a command that must succeed, in this process."""
-    code, out, err = call(*arguments, "--json")
-    assert code == 0, f"{arguments}: {code}\n{err}"
-    return json.loads(out)
+    return json.loads(said(*arguments, "--json"))
+
+
+def modes(*arguments: object) -> tuple[int, Any, str]:
+    """Exit code, JSON answer (None where there is none) and stderr of `planner modes`."""
+    code, out, err = call("modes", *arguments, "--json")
+    return code, json.loads(out) if out else None, err
 
 
 def make_cell(root: Path) -> tuple[Path, Path, Truth]:

@@ -90,12 +90,10 @@ def _bending_element(dx: float, dy: float, rigidity: float, poisson: float) -> n
 def plate(
     columns: int = 10, rows: int = 5, size_m: tuple[float, float] = (0.6, 0.28),
     thickness_m: float = 0.004, ratio: tuple[float, float] = (0.004, 0.004),
-    dashpot: float = 0.0,
 ) -> Structure:  # fmt: skip
     """A free plate of aluminium on soft springs: columns × rows transverse degrees of freedom.
 
-    Rotations are condensed (they have no mass), so that the reduced structure is exact. `dashpot`
-    (N·s/m) at the last corner makes damping not proportional and shapes complex.
+    Rotations are condensed (they have no mass), so that the reduced structure is exact.
     """
     modulus, poisson, density = 70e9, 0.33, 2700.0
     dx, dy = size_m[0] / (columns - 1), size_m[1] / (rows - 1)
@@ -120,7 +118,6 @@ def plate(
     mass = np.diag(m)
     stiffness += (2 * np.pi * 2.0) ** 2 * mass  # hung at 2 Hz
     damping = damped(mass, stiffness, ratio, (100.0, 800.0))
-    damping[-1, -1] += dashpot
     position = {i + 1: (dx * (i % columns), dy * (i // columns), 0.0) for i in range(n)}
     lines = [(i + 1, i + 2) for i in range(n) if (i + 1) % columns]
     lines += [(i + 1, i + 1 + columns) for i in range(n - columns)]

@@ -1,11 +1,10 @@
-"""Frequencies of five true robots (MuJoCo) that scatter from visit to visit, and two peers.
+"""Frequencies of five true robots (MuJoCo) that scatter from visit to visit.
 
 A visit's ln f is the pose's plus scatter, half of its variance common to all modes, half each
 mode's own; EMA adds a noise whose sd it states. What is scored are new visits at other poses.
 """
 
 import tempfile
-import warnings
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -16,9 +15,9 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import ModalObservations
+from planner.truth.arms import ARMS
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.load import load_truth
-from tests.support.known_robots import KNOWN_ROBOTS
 from tests.support.plain_arm import JOINTS_DEG, make_plain_arm
 
 KR240 = Path(__file__).parents[2] / "campaigns" / "kr240_plane" / "robot" / "robot.toml"
@@ -42,7 +41,7 @@ class TrueRobot:
     simulated: dict[str, np.ndarray]
 
 
-ROBOTS = (*KNOWN_ROBOTS, "plain", "kr240")
+ROBOTS = (*ARMS, "plain", "kr240")
 
 
 @cache
@@ -50,8 +49,8 @@ def true_robot(name: str) -> TrueRobot:
     """One of ROBOTS; a second of MuJoCo the first time."""
     seed = ROBOTS.index(name)
     folder = Path(tempfile.mkdtemp())
-    if name in KNOWN_ROBOTS:
-        toml, box = KNOWN_ROBOTS[name].write(folder, 2), KNOWN_ROBOTS[name].joints_deg
+    if name in ARMS:
+        toml, box = ARMS[name].write(folder, 2), ARMS[name].joints_deg
     elif name == "plain":
         toml, box = make_plain_arm(folder), JOINTS_DEG
     else:
@@ -131,28 +130,3 @@ def modes_of(low: np.ndarray) -> SimulatedModes:
     return SimulatedModes(
         np.exp(low), np.full(low.shape, np.nan), np.full((*low.shape, 3, 3), np.nan + 0j)
     )
-
-
-def peer(case: Visited, with_simulation: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and sd (u, k) of new visits by scikit-learn's GP (maximum likelihood, noise included).
-
-    Of ln f itself, or of the logarithm of its ratio to the simulation's.
-    """
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
-
-    y = np.log(case.seen.frequency_hz)
-    base, new = (np.log(case.seen.simulated.frequency_hz), case.simulated)
-    if not with_simulation:
-        base, new = np.zeros_like(base), np.zeros_like(new)
-    mean, sd = np.empty(new.shape), np.empty(new.shape)
-    for k in range(y.shape[1]):
-        kernel = ConstantKernel(0.5) * Matern(1.0, (0.1, 30.0), nu=2.5) + WhiteKernel(0.3)
-        gp = GaussianProcessRegressor(kernel, normalize_y=True, n_restarts_optimizer=1,
-                                      random_state=0)  # fmt: skip
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)
-            gp.fit(case.seen.x, y[:, k] - base[:, k])
-            mean[:, k], sd[:, k] = gp.predict(case.x, return_std=True)
-    return mean + new, sd

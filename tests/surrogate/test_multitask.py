@@ -1,7 +1,5 @@
 """Multi-task GP, B free or of low rank: Kronecker equals dense, slopes, limits, bad input."""
 
-import time
-
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
@@ -117,22 +115,3 @@ def test_degenerate_data_work_and_missing_values_are_no_input(rank):
         assert np.isfinite(mean_and_sd).all()
     with pytest.raises(InputError, match="Output 3"):
         fit_multitask(x, np.where(np.arange(5) == 2, np.nan, y), rank=rank)
-
-
-@pytest.mark.slow
-def test_144_outputs_train_in_less_than_the_paper_takes_for_three():
-    """Lei et al. 2023 take 3.36 s for one group of three outputs; here nine groups of sixteen."""
-    rng = np.random.default_rng(0)
-    x = rng.random((90, 6))
-    source = np.column_stack([np.sin(3 * x[:, i] + i) for i in range(6)])
-    groups = [
-        source @ rng.standard_normal((6, 16)) + 0.1 * rng.standard_normal((90, 16))
-        for _ in range(9)
-    ]
-    fit_multitask(x, groups[0], iterations=2)  # compiles
-    start, own = time.perf_counter(), time.process_time()
-    for y in groups:
-        fit_multitask(x, y)
-    spent, own = time.perf_counter() - start, time.process_time() - own
-    print(f"\n144 outputs of 90 postures: {spent:.2f} s, {own:.2f} s of processor (paper: 3.36 s)")
-    assert own < 3.36

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from planner.errors import InputError
+from planner.truth.arms import KR10
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer
 from planner.truth.laws import Backlash, Contact, Friction, Hardening, JointLaw
@@ -16,7 +17,6 @@ from planner.truth.load import load_truth
 from planner.truth.model import Truth
 from planner.truth.nonlinear import Port, StruckPose, respond
 from planner.truth.secret import Secret, frfs, once
-from tests.support.known_robots import KR10
 from tests.support.wrenches import along
 
 STEP, N = 1 / 6400, 3200

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planner.truth.arms import KR10, KR210
 from planner.truth.deviation import (
     BentLink,
     Bridge,
@@ -16,7 +17,6 @@ from planner.truth.deviation import (
 from planner.truth.load import load_truth
 from planner.truth.loss_factors import LOSS_BAND_HZ, branches
 from planner.truth.springs import compensation
-from tests.support.known_robots import KR10, KR210
 
 Q = KR210.poses(1)[0]
 

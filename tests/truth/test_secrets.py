@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planner.truth.arms import KR10, KR210
 from planner.truth.deviation import (
     AttachedResonator,
     Deviation,
@@ -28,7 +29,6 @@ from planner.truth.secret import (
     hit_poses,
     once,
 )
-from tests.support.known_robots import KR10, KR210
 
 Q = KR210.poses(1)[0]
 QUIET = Hammer(noise=0.0, force_noise=0.0, record_s=2.56)

@@ -12,9 +12,9 @@ from planner.errors import InputError
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
 from planner.truth import inverse
+from planner.truth.arms import ARMS, KR10
 from planner.truth.deviation import AttachedMass, Deviation, Spring
 from planner.truth.load import load_truth
-from tests.support.known_robots import KNOWN_ROBOTS, KR10
 from tests.support.pendulums import pendulum_urdf
 
 MASS, RADIUS, MOMENT, STIFFNESS, DAMPING = 3.0, 0.4, 0.05, 2.0e4, 12.0
@@ -43,7 +43,7 @@ def pendulum(tmp_path) -> Path:
 
 
 def folder(tmp_path: Path, name: str, per_joint: int) -> Path:
-    return KNOWN_ROBOTS[name].write(tmp_path / name, per_joint)
+    return ARMS[name].write(tmp_path / name, per_joint)
 
 
 def test_one_degree_of_freedom_is_the_textbook_oscillator(pendulum):
@@ -88,20 +88,20 @@ def test_response_is_that_of_an_ode_solver(tmp_path):
 
 
 @pytest.mark.parametrize("per_joint", [1, 2, 3])
-@pytest.mark.parametrize("name", sorted(KNOWN_ROBOTS))
+@pytest.mark.parametrize("name", sorted(ARMS))
 def test_agrees_with_the_planners_own_simulation(tmp_path, name, per_joint):
     """MuJoCo and Pinocchio, two URDF readers, two eigenproblems: one robot."""
     path = folder(tmp_path, name, per_joint)
     truth, simulation = load_truth(path), Simulation(Robot.load(path))
     f = np.linspace(4, 120, 60)
-    for q in KNOWN_ROBOTS[name].poses(3, seed=per_joint):
+    for q in ARMS[name].poses(3, seed=per_joint):
         ours, theirs = truth.accelerance(q, f), simulation.accelerance(q, f)[0]
         assert np.max(np.abs(ours - theirs)) < 1e-7 * np.max(np.abs(ours))
 
 
 @pytest.mark.parametrize("tilt", [(0.0, 0.0, -9.81), (3.0, -2.0, -9.0)])
 def test_gravity_is_left_out_of_both_engines_where_robot_toml_says_so(tmp_path, tilt):
-    arm, f = KNOWN_ROBOTS["kr10"], np.linspace(4, 120, 60)
+    arm, f = ARMS["kr10"], np.linspace(4, 120, 60)
     path, q = folder(tmp_path, "kr10", 2), arm.poses(1)[0]
     text = path.read_text().replace("[0.0, 0.0, -9.81]", str(list(tilt)))
     found = []
@@ -120,15 +120,15 @@ def test_reciprocity_where_hammer_and_sensor_meet(tmp_path):
     path = folder(tmp_path, "kr210", 3)
     path.write_text(path.read_text().replace('sensor_frame = "sensor"', 'sensor_frame = "tcp"'))
     truth = load_truth(path, Deviation(5, 0.2, 0.2, 0.05, 0.01))
-    for q in KNOWN_ROBOTS["kr210"].poses(3):
+    for q in ARMS["kr210"].poses(3):
         H = truth.accelerance(q, np.linspace(5, 80, 20))
         assert np.max(np.abs(H - H.transpose(1, 0, 2))) < 1e-7 * np.max(np.abs(H))
 
 
 def test_an_added_mass_enters_the_mass_matrix_where_it_sits(tmp_path):
-    path, place = folder(tmp_path, "kr210", 2), KNOWN_ROBOTS["kr210"].tcp
+    path, place = folder(tmp_path, "kr210", 2), ARMS["kr210"].tcp
     path.write_text("geometric_stiffness = false\n" + path.read_text())  # the same posture
-    q = KNOWN_ROBOTS["kr210"].poses(1)[0]
+    q = ARMS["kr210"].poses(1)[0]
     plain = load_truth(path)
     loaded = load_truth(path, Deviation(added=(AttachedMass("link_6", tuple(place), 12.0),)))
     hit = plain.matrices(q)[3]
@@ -139,7 +139,7 @@ def test_an_added_mass_enters_the_mass_matrix_where_it_sits(tmp_path):
 
 
 def test_a_base_that_gives_way_lowers_frequencies_and_a_rigid_one_does_not(tmp_path):
-    path, q = folder(tmp_path, "kr210", 2), KNOWN_ROBOTS["kr210"].poses(1)[0]
+    path, q = folder(tmp_path, "kr210", 2), ARMS["kr210"].poses(1)[0]
     plain = load_truth(path).modes(q, 4)[0]
 
     def tilting(stiffness: float) -> np.ndarray:
@@ -166,9 +166,9 @@ def test_deviations_follow_the_seed(tmp_path):
     assert not np.allclose(modes(0, inertia=0.04), modes(0), rtol=1e-4)
 
 
-@pytest.mark.parametrize("name", sorted(KNOWN_ROBOTS))
+@pytest.mark.parametrize("name", sorted(ARMS))
 def test_inverse_kinematics_reaches_the_placement(tmp_path, name):
-    truth, known = load_truth(folder(tmp_path, name, 1)), KNOWN_ROBOTS[name]
+    truth, known = load_truth(folder(tmp_path, name, 1)), ARMS[name]
     rng = np.random.default_rng(1)
     for q in known.poses(5):
         rotation, position, _ = truth.tcp(q)

@@ -7,10 +7,10 @@ import pytest
 import pyuff
 
 from planner.recording.folder import read_recordings
+from planner.truth.arms import KR10, KR210
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses, simulate_hit, write_predict
 from planner.truth.load import load_truth
-from tests.support.known_robots import KR10, KR210, kr10_folder, kr210_folder
 
 QUIET = Hammer(noise=0.0, force_noise=0.0, record_s=10.0, readback_deg=0.0)
 SMALL = Hammer(peak_n=80.0, duration_s=0.004, sampling_rate_hz=640.0, record_s=1.6)
@@ -18,13 +18,13 @@ SMALL = Hammer(peak_n=80.0, duration_s=0.004, sampling_rate_hz=640.0, record_s=1
 
 @pytest.fixture(scope="module")
 def kr210(tmp_path_factory):
-    path = kr210_folder(tmp_path_factory.mktemp("kr210"), 2)
+    path = KR210.write(tmp_path_factory.mktemp("kr210"), 2)
     return load_truth(path, Deviation(4, 0.1, 0.1, 0.04, 0.004))
 
 
 @pytest.fixture(scope="module")
 def kr10(tmp_path_factory):
-    return load_truth(kr10_folder(tmp_path_factory.mktemp("kr10")), Deviation(9, 0.1))
+    return load_truth(KR10.write(tmp_path_factory.mktemp("kr10")), Deviation(9, 0.1))
 
 
 def spectra(hit, rate_hz):
