@@ -159,7 +159,7 @@ def write(answer: StudyAnswer, figures: "dict[str, Figure]", folder: Path | None
     if folder is None:
         return []
     files = [write_table(each, folder) for each in (*answer.tables, answer.claims)]
-    return files + Pictures(folder).write(figures, answer.study)["plots"]
+    return [*files, *Pictures(folder).write(figures, answer.study)["plots"]]
 
 
 def write_table(made: Table, folder: Path) -> str:

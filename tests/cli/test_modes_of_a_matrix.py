@@ -263,7 +263,7 @@ def test_right_and_left_vectors_of_a_reciprocal_structure_are_its_shape(
     for mode in answer["modes"]:
         (right, left, _), shape = vectors_of(mode), np.array([complex(*v) for v in mode["shape"]])
         assert mac(right, shape) > 0.995
-        assert max(mode["participation_percent"]) == 100
+        assert max(mode["participation_percent"]) == pytest.approx(100)
         np.testing.assert_allclose(left, shape[hit], atol=0.05 * np.abs(shape).max())
         stiffness = (2 * np.pi * mode["frequency_hz"]) ** 2 * mode["modal_mass_kg"]
         assert min(mode["modal_stiffness_n_m"]) == pytest.approx(stiffness)
