@@ -21,6 +21,7 @@ WINDOW_LEAST_1_S = 0.05  # slower ones change no damping that matters
 # Of accelerations: samples before the pulse and hits at least, and the end of the record, by when
 # what is fast has rung down; relative sd of the rate, as analysers begin their windows differently.
 BEFORE, LEAST_HITS, END, UNSURE = 24, 4, 0.8, 0.03
+LARGEST = 500.0  # exponent that a float holds
 NOISY = -0.3  # correlation of neighbours, above which it is no noise
 MOST = 0.9  # share of hits whose noise fades by half the rate or more
 
@@ -86,7 +87,8 @@ def _fading(hit: Hit) -> tuple[float, float] | None:
     ) / hit.sampling_rate_hz
 
     def left(rate: float) -> float:
-        return float(np.mean(np.exp(-2 * rate * t)) - share.max())
+        # Records of many seconds would overflow: what is beyond is as large as can be.
+        return float(np.mean(np.exp(np.minimum(-2 * rate * t, LARGEST))) - share.max())
 
     if left(-WINDOW_FASTEST_1_S) < 0 or left(WINDOW_FASTEST_1_S) > 0:
         return None
