@@ -12,9 +12,9 @@ import pytest
 from planner.surrogate.models.averaged import fit_gp
 from planner.surrogate.models.fidelity_levels import Samples
 from planner.surrogate.models.multitask import fit_multitask
+from planner.truth.arms import ARMS
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
-from tests.support.known_robots import KNOWN_ROBOTS
 
 MODES, TASKS, POSTURES, FOLDS = 9, 11, 112, 5
 PART = 0.4  # of every joint's range: postures that one would mill in
@@ -24,14 +24,14 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(1500)]
 
 
 def truth_of(folder):
-    return load_truth(KNOWN_ROBOTS["kr210"].write(folder, 3), Deviation(5, 0.15, 0.1, 0.05))
+    return load_truth(ARMS["kr210"].write(folder, 3), Deviation(5, 0.15, 0.1, 0.05))
 
 
 def postures(count, seed=0):
     """Joint angles (n, 6) in rad of a Latin hypercube over the workspace, and scaled to [0, 1]."""
     from scipy.stats import qmc
 
-    box = np.deg2rad(KNOWN_ROBOTS["kr210"].joints_deg)
+    box = np.deg2rad(ARMS["kr210"].joints_deg)
     x = qmc.LatinHypercube(6, rng=np.random.default_rng(seed)).random(count)
     return box.mean(axis=1) + PART * (x - 0.5) * np.ptp(box, axis=1), x
 
@@ -96,7 +96,7 @@ def test_seyedhosseini2025_last_fifteen_of_254_postures(tmp_path):
     t = np.linspace(0, 1, 254)
     turns = np.array([1.0, 1.7, 2.3, 0.7, 1.3, 2.9])
     x = 0.5 + 0.45 * np.sin(2 * np.pi * (t[:, None] * turns + np.arange(6) / 6))
-    box = np.deg2rad(KNOWN_ROBOTS["kr210"].joints_deg)
+    box = np.deg2rad(ARMS["kr210"].joints_deg)
     q = box[:, 0] + x * np.ptp(box, axis=1)
     y = parameters(truth_of(tmp_path), q)
     start = time.perf_counter()

@@ -4,21 +4,18 @@ NARGP beside emukit's: same kernels, noise and data. At emukit's hyperparameters
 same. Each finds hyperparameters by its own climb: ours must never end lower, and where both end on
 the same peak, predict the same; where ours ends higher, emukit's is not the greatest likelihood.
 `pytest -m slow -s tests/benchmarks/test_published_peers.py`
-prints the tables; the peers run in the interpreter that PEERS_PYTHON names. PEERS_SEEDS (10) says
-how many designs per problem.
+prints the tables; the peers run in the interpreter that PEERS_PYTHON names (see
+`test_fusion_peers`). PEERS_SEEDS (10) says how many designs per problem.
 """
 
 import importlib.util
 import os
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import qmc
 
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
@@ -29,6 +26,7 @@ from planner.surrogate.models.nargp import NARGP, fit_nargp, perdikaris
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
 from tests.support import published_peers
+from tests.support.fusion_problems import PROBLEMS, Design, Problem, design
 from tests.support.nargp_levels import fit_low
 
 SEEDS = int(os.environ.get("PEERS_SEEDS", "10"))
@@ -39,8 +37,6 @@ SAME_PEAK = 0.15  # difference of log-likelihoods of two climbs that say the sam
 # Of some hundred: 25 points on a line with next to no noise leave a nearly singular matrix.
 LIKELIHOODS = 0.03
 DRAWN = 0.02  # what emukit's 2,000 draws of the cheap level leave of an RMSE of 0.3 %
-LOW_POINTS = {1: 25, 2: 50}
-TEST_POINTS = 400
 PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)
 
 pytestmark = [
@@ -51,84 +47,6 @@ pytestmark = [
         reason="the peers are not installed: pip install 'planner[peers]', or set PEERS_PYTHON",
     ),
 ]
-
-
-@dataclass(frozen=True)
-class Problem:
-    """`high` and `low` take x (n, d) in [0, 1] and return (n,)."""
-
-    d: int
-    high: Callable[[np.ndarray], np.ndarray]
-    low: Callable[[np.ndarray], np.ndarray]
-
-
-@dataclass(frozen=True, eq=False)
-class Design:
-    """Nested design: x_high is the head of x_low."""
-
-    x_low: np.ndarray
-    y_low: np.ndarray
-    x_high: np.ndarray
-    y_high: np.ndarray
-    x_test: np.ndarray
-    y_test: np.ndarray
-
-
-def design(problem: Problem, n: int, seed: int) -> Design:
-    """n expensive points of a Latin hypercube; the cheap ones add a scrambled Sobol set."""
-    rng = np.random.default_rng(1000 * seed + n)
-    x_high = qmc.LatinHypercube(problem.d, rng=rng).random(n)
-    more = LOW_POINTS[problem.d] - n
-    sobol = qmc.Sobol(problem.d, scramble=True, rng=rng)
-    x_low = np.vstack([x_high, sobol.random_base2(7)[:more]])
-    test = qmc.Sobol(problem.d, scramble=True, rng=np.random.default_rng(77))
-    x_test = test.random_base2(9)[:TEST_POINTS]
-    return Design(
-        x_low, problem.low(x_low), x_high, problem.high(x_high), x_test, problem.high(x_test)
-    )
-
-
-def _forrester(x: np.ndarray) -> np.ndarray:
-    return (6 * x[:, 0] - 2) ** 2 * np.sin(12 * x[:, 0] - 4)
-
-
-def _forrester_low(x: np.ndarray) -> np.ndarray:
-    return 0.5 * _forrester(x) + 10 * (x[:, 0] - 0.5) - 5
-
-
-def _branin_raw(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    bowl = b - 5.1 / (4 * np.pi**2) * a**2 + 5 / np.pi * a - 6
-    return bowl**2 + 10 * (1 - 1 / (8 * np.pi)) * np.cos(a) + 10
-
-
-def _branin(x: np.ndarray) -> np.ndarray:
-    return _branin_raw(15 * x[:, 0] - 5, 15 * x[:, 1])
-
-
-def _branin_low(x: np.ndarray) -> np.ndarray:
-    a, b = 15 * x[:, 0] - 5, 15 * x[:, 1]
-    return 10 * np.sqrt(_branin_raw(a - 2, b - 2)) + 2 * (a - 0.5) - 3 * (3 * b - 1) - 1
-
-
-def _currin(x: np.ndarray) -> np.ndarray:
-    a, b = x[:, 0], np.maximum(x[:, 1], 1e-8)
-    top = 2300 * a**3 + 1900 * a**2 + 2092 * a + 60
-    bottom = 100 * a**3 + 500 * a**2 + 4 * a + 20
-    return (1 - np.exp(-0.5 / b)) * top / bottom
-
-
-def _currin_low(x: np.ndarray) -> np.ndarray:
-    shifts = [(0.05, 0.05), (0.05, -0.05), (-0.05, 0.05), (-0.05, -0.05)]
-    moved = [np.column_stack([x[:, 0] + a, np.maximum(x[:, 1] + b, 0)]) for a, b in shifts]
-    return np.mean([_currin(m) for m in moved], axis=0)
-
-
-# Forrester et al. 2007; Perdikaris et al. 2017 (Branin); Xiong, Qian & Wu 2013 (Currin).
-PROBLEMS = {
-    "forrester": Problem(1, _forrester, _forrester_low),
-    "branin": Problem(2, _branin, _branin_low),
-    "currin": Problem(2, _currin, _currin_low),
-}
 
 
 def kr240(mode: int) -> Problem:
@@ -192,7 +110,8 @@ def rmse(mean: np.ndarray, d: Design) -> float:
 
 
 def test_nargp_is_as_good_as_emukits(tmp_path):
-    problems = PROBLEMS | {f"KR240 mode {k + 1}": kr240(k) for k in range(2)}
+    problems = {name: PROBLEMS[name] for name in ("forrester", "branin", "currin")}
+    problems |= {f"KR240 mode {k + 1}": kr240(k) for k in range(2)}
     folder = Path(os.environ.get("FUSION_ANSWERS") or tmp_path)
     rows: dict[str, list] = {}
     for seed in range(SEEDS):

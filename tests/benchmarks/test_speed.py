@@ -1,8 +1,5 @@
 """How long a person waits, with a peer in the same run: pytest -m slow tests/benchmarks -s"""
 
-import statistics
-import time
-
 import numpy as np
 import pytest
 
@@ -25,19 +22,9 @@ from planner.truth.hits import Hammer, record_poses
 from planner.truth.load import load_truth
 from tests.support.direct_solution import direct_accelerance
 from tests.support.surrogates import observed, simulated
+from tests.support.timing import seconds
 
 pytestmark = pytest.mark.slow
-
-
-def seconds(action, repeats=7):
-    """Median after one warm-up."""
-    action()
-    taken = []
-    for _ in range(repeats):
-        started = time.perf_counter()
-        action()
-        taken.append(time.perf_counter() - started)
-    return statistics.median(taken)
 
 
 @pytest.fixture(scope="module")

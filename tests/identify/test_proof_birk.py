@@ -14,9 +14,9 @@ from planner.fit.identify import identify
 from planner.measurement.agreement import fit_similarity
 from planner.measurement.nuisances import EXACT_HITS
 from planner.robot.robot import Robot
+from planner.truth.arms import KR10
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
-from tests.support.known_robots import KR10
 from tests.support.measured_frfs import birk_bounds, birk_folder, measured_frfs
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]

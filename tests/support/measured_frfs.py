@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from planner.frf.frf import Frf
+from planner.truth.arms import KR10
 from planner.truth.model import Truth
-from tests.support.known_robots import KR10
 from tests.support.studied import part
 
 FITS = part("birk2025", "fits")

@@ -7,30 +7,10 @@ from planner.surrogate.ar1 import fit_ar1
 from planner.surrogate.average import fit_hedged
 from planner.surrogate.modal_surrogate import FREQUENCY_PRIOR, FREQUENCY_PRIOR_ALONE
 from planner.surrogate.training_data import TrainingData
+from tests.support.fusion_problems import arm_hz
 
 GRID = np.random.default_rng(5).random((200, 3))
 COUNTS, SEEDS = (3, 5, 8, 15), range(8)
-
-
-def arm_hz(x: np.ndarray, stiffness: tuple[float, float], base: float | None) -> np.ndarray:
-    """Natural frequencies (n, 2) in Hz of two links of 1.2 and 1.0 m at joint angles (q2, q3)."""
-    q2, q3 = 0.3 + 1.2 * x[:, 0], -2.2 + 1.6 * x[:, 1]
-    l1, l2, m1, m2 = 1.2, 1.0, 160.0, 90.0
-    c = m2 * l1 * l2 / 2 * np.cos(q3)
-    inner = 18.0 + m2 * (l2 / 2) ** 2
-    m = np.empty((len(x), 3, 3))
-    m[:, 0, 0] = 25 + m1 * (l1 / 2) ** 2 + m2 * l1**2 + inner + 2 * c
-    m[:, 0, 1] = m[:, 1, 0] = inner + c
-    m[:, 1, 1] = inner
-    # The base moves sideways: the links' masses times how high they stand.
-    lever1, lever2 = (m1 / 2 + m2) * l1 * np.sin(q2), m2 / 2 * l2 * np.sin(q2 + q3)
-    m[:, 2, 2] = 600.0
-    m[:, 0, 2] = m[:, 2, 0] = -(lever1 + lever2)
-    m[:, 1, 2] = m[:, 2, 1] = -lever2
-    k = np.diag([*stiffness, base or 0.0])
-    size = 2 if base is None else 3
-    values = np.linalg.eigvals(np.linalg.solve(m[:, :size, :size], k[None, :size, :size]))
-    return np.sqrt(np.sort(values.real, axis=1)[:, :2]) / (2 * np.pi)
 
 
 def arm(x, stiffness, base):
