@@ -1,6 +1,5 @@
 """Robots of another engine that lack several things at once, hit as people hit; FRFs and truth."""
 
-import tomllib
 import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,7 +26,6 @@ from planner.truth.scene import deviate, log_uniform, triple
 from planner.truth.secret import HitVisit, Secret, hit_poses
 from planner.truth.world import REAL
 from tests.support.counted_modes import true_modes
-from tests.support.frf_campaigns import frac_of
 from tests.support.lacking_robots import ROBOTS, added, known
 from tests.support.lacking_robots import Robot as Arm
 
@@ -71,6 +69,9 @@ class Case:
     true_frf: np.ndarray
     true_hz: tuple[np.ndarray, ...]
     concealed: tuple[str, ...]
+    measured: tuple[MeasuredPose, ...]
+    truth: Truth
+    box_rad: np.ndarray  # (2, dof)
 
     def posterior(self) -> RobotPosterior:
         """What a fit makes of it."""
@@ -145,22 +146,28 @@ def _measured(
         aims = zip(axes, handling.aims(axes, rng), strict=True)
         aimed = [together(common[axis], aim) for axis, aim in aims]
         visits.append(HitVisit(there, shots, number / POSES, aims=aimed))
-    frfs = []
+    measured = []
     for recorded in hit_poses(truth, secret, visits, hammer, rng):
         hits = tuple(
             Hit(Path("hit"), h.axis, hammer.sampling_rate_hz, h.force_n, h.acceleration_m_s2,
                 simulated=True)
             for h in recorded
         )  # fmt: skip
-        frfs.append(MeasuredPose((), arm.band_hz, given=hits).one_hit_frf)
+        measured.append(MeasuredPose((), arm.band_hz, given=hits))
     lines = np.linspace(*arm.band_hz, LINES)
     true = np.array([truth.accelerance(one, lines) for one in unseen])
     modes = [true_modes(truth, one, 12, True) for one in unseen]
     seen = tuple(hz[np.asarray(shown)][:COUNTED] for hz, shown in modes)
-    return Case(arm.toml, arm.band_hz, q, tuple(frfs), unseen, lines, true, seen, concealed)
+    frfs = tuple(pose.one_hit_frf for pose in measured)
+    return Case(
+        arm.toml, arm.band_hz, q, frfs, unseen, lines, true, seen, concealed, tuple(measured),
+        truth, np.array([low, high]),
+    )  # fmt: skip
 
 
 def limits(arm: Arm, simulation: Simulation) -> tuple[np.ndarray, np.ndarray]:
+    import tomllib
+
     table = tomllib.loads(arm.workspace)
     limits = table.get("joints_deg")
     if limits is None:
@@ -182,10 +189,13 @@ class Judged:
     inside: float
     named: tuple[str, ...]
     shares: tuple[float, ...]
+    size: float
 
     @classmethod
     def of(cls, case: Case, found: RobotPosterior) -> "Judged":
         """Scale is the least squares factor from the truth, the mean over poses."""
+        from tests.support.frf_campaigns import frac_of
+
         mean, sd = found.predicted(case.unseen, case.lines_hz)
         true = case.true_frf
         pairs = list(zip(true, mean, strict=True))
@@ -199,5 +209,5 @@ class Judged:
         return cls(
             100 * float(np.sqrt(np.mean(np.square(off)))), frac_of(true, mean), scale,
             found.scale_sd, error, float(np.mean(np.abs(mean - true) <= 2 * sd)),
-            tuple(e.label for e in found.structure.effects), found.found.shares,
+            tuple(e.label for e in found.structure.effects), found.found.shares, found.size,
         )  # fmt: skip
