@@ -60,6 +60,10 @@ class PointMass(Operator):
         place = place + np.clip(psi[1:] / mass, -1, 1)
         return Start(self, np.array([mass, *place]), nats, moved)
 
+    def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
+        """See `Operator.beside`: far off, the first order may have even the sign wrong."""
+        return (np.array([LEAST, 0.0, 0.0, 0.0]),)
+
     def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray]:
         """See `Operator.inertia`."""
         x, y, z = np.array(self.centre_m) + self.size_m * psi[1:]

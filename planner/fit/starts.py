@@ -10,6 +10,7 @@ from planner.fit.structure import REACH, RobotStructure
 
 KEPT = 6  # operators by first order beside the best of each kind
 PULLED = 1.5  # prior sds, from which another prior may pay
+STRAYED = 4.0  # prior sds, from which springs and masses are not what robot.toml states
 
 
 def placed(base: StructureFit, start: Start, unmoved: bool = True) -> list[np.ndarray]:
@@ -54,8 +55,11 @@ def from_stated(structure: RobotStructure, start: Start) -> Iterable[np.ndarray]
     """Where a fit from afar begins: as stated, new springs as expected and softer."""
     effect, x = structure.effects[-1], structure.mean.copy()
     if not effect.springs:
-        x[structure.own[-1]] = start.psi
-        return (x,)
+        begun = []
+        for psi in (start.psi, *effect.beside(start.psi)):
+            begun.append(x.copy())
+            begun[-1][structure.own[-1]] = psi
+        return begun
     new = [i for i in range(structure.stiffnesses) if not structure.parameters[i].stated]
     mine = [i for i in new if set(structure.parameters[i].blocks) & set(effect.springs)]
     softer = x.copy()
@@ -85,3 +89,10 @@ def leaders(starts: Sequence[Start]) -> list[Start]:
             kinds.add(effect.kind)
             operators += not np.isinf(start.nats)
     return kept
+
+
+def strayed(found: StructureFit) -> bool:
+    """Whether a spring or a body is far from what is stated: something else may have moved it."""
+    s = found.structure
+    stated = slice(0, s.inertial.stop)
+    return bool(np.any(np.abs((found.at.x - s.mean) / s.sd)[stated] > STRAYED))
