@@ -12,6 +12,7 @@ from planner.fit.frequency_uncertainty import frequency_sd
 from planner.fit.identified import ExtendedModel, as_identification
 from planner.fit.posterior import RobotPosterior
 from planner.fit.result import Estimate, Identification
+from planner.fit.strays import strays_told
 from planner.words import counted, significant
 
 BEYOND = 2.0  # sds of the gains, from which their deviation is told
@@ -90,6 +91,11 @@ class Learned:
             f"though gains of sensor and hammer are stated to {significant(100 * allowed)} %: "
             f"check their sensitivities, and the masses in the URDF."
         )
+
+    @property
+    def strays(self) -> str:
+        """What robot.toml may state wrongly; empty where the fit is near it."""
+        return strays_told(self.posterior.structure, self.posterior.x)
 
     @property
     def words(self) -> str:

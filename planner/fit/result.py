@@ -18,7 +18,7 @@ class Estimate:
     """One parameter: value, the sd of its logarithm, and what was known before.
 
     `blocks` are the [[compliance]] blocks that share it, from 0. `identifiable`: the data at
-    least halved the sd of its logarithm, and what was fitted is `explained` by the simulation.
+    least halved the sd of its logarithm, and it is near what is stated (`explained`).
     """
 
     name: str

@@ -27,7 +27,8 @@ from planner.fit.fitted import (
 )
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
-from planner.fit.starts import from_stated, leaders, placed, pulled, strayed
+from planner.fit.starts import from_stated, leaders, placed, pulled
+from planner.fit.strays import strayed
 from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
@@ -327,12 +328,12 @@ class Search:
 
 def explained(found: StructureFit) -> bool:
     """Whether nothing need be missing."""
-    return size_of(found) <= EXPLAINED and not strayed(found)
+    return size_of(found) <= EXPLAINED and not strayed(found.structure, found.at.x)
 
 
 def in_doubt(found: StructureFit) -> bool:
     """Whether much is left, or what was stated is far from what was found."""
-    return size_of(found) >= UNEXPLAINED or strayed(found)
+    return size_of(found) >= UNEXPLAINED or bool(strayed(found.structure, found.at.x))
 
 
 def crowded(found: StructureFit) -> bool:

@@ -10,7 +10,6 @@ from planner.fit.structure import REACH, RobotStructure
 
 KEPT = 6  # operators by first order beside the best of each kind
 PULLED = 1.5  # prior sds, from which another prior may pay
-STRAYED = 4.0  # prior sds, from which springs and masses are not what robot.toml states
 
 
 def placed(base: StructureFit, start: Start, unmoved: bool = True) -> list[np.ndarray]:
@@ -89,10 +88,3 @@ def leaders(starts: Sequence[Start]) -> list[Start]:
             kinds.add(effect.kind)
             operators += not np.isinf(start.nats)
     return kept
-
-
-def strayed(found: StructureFit) -> bool:
-    """Whether a spring or a body is far from what is stated: something else may have moved it."""
-    s = found.structure
-    stated = slice(0, s.inertial.stop)
-    return bool(np.any(np.abs((found.at.x - s.mean) / s.sd)[stated] > STRAYED))
