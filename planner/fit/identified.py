@@ -6,9 +6,9 @@ import numpy as np
 
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import Parametrisation, Priors, parametrise
+from planner.fit.departures import departed
 from planner.fit.posterior import RobotPosterior
 from planner.fit.result import Identification, estimates, undetermined
-from planner.fit.strays import strayed
 from planner.measurement.agreement import MODEL_ERROR
 
 
@@ -47,7 +47,7 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
     misfit, by_pose = posterior.misfits(MODEL_ERROR)
     used = 2 * int(np.count_nonzero(posterior.found.misfit.data.measured.used))
     before = np.sqrt(np.diagonal(turned @ np.linalg.inv(structure.precision) @ turned.T))
-    far = strayed(structure, posterior.x) if posterior.explains else range(structure.size)
+    far = departed(structure, posterior.x) if posterior.explains else range(structure.size)
     doubted = {structure.names[i] for i in far}
     told = estimates(p, mean[: len(p.parameters)], covariance)
     result = Identification(

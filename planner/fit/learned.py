@@ -7,12 +7,12 @@ import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
 from planner.effects.parameters import Priors
+from planner.fit.departures import departures_text
 from planner.fit.fitted import StructureFit
 from planner.fit.frequency_uncertainty import frequency_sd
 from planner.fit.identified import ExtendedModel, as_identification
 from planner.fit.posterior import RobotPosterior
 from planner.fit.result import Estimate, Identification
-from planner.fit.strays import strays_told
 from planner.words import counted, significant
 
 BEYOND = 2.0  # sds of the gains, from which their deviation is told
@@ -93,9 +93,9 @@ class Learned:
         )
 
     @property
-    def strays(self) -> str:
+    def departures(self) -> str:
         """What robot.toml may state wrongly; empty where the fit is near it."""
-        return strays_told(self.posterior.structure, self.posterior.x)
+        return departures_text(self.posterior.structure, self.posterior.x)
 
     @property
     def words(self) -> str:

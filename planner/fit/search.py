@@ -1,6 +1,6 @@
 """Which effects a robot has: by evidence, added, removed and exchanged until nothing gains.
 
-Starts: as stated, with base and all bearings, and, where much is left or numbers strayed far, with
+Starts: as stated, with base and all bearings, and, where much is left or numbers departed far, with
 each effect from what is stated, lest what is missing be hidden by what it bent. From each all
 effects at all places compete: operators are ranked by their first-order columns, springs are always
 tried nonlinearly, a few steps each; the best are settled.
@@ -14,6 +14,7 @@ import numpy as np
 
 from planner.effects.effect import Operator, Start
 from planner.fit.data import FrfData
+from planner.fit.departures import departed
 from planner.fit.fitted import (
     FitRecord,
     StructureFit,
@@ -28,7 +29,6 @@ from planner.fit.fitted import (
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
 from planner.fit.starts import from_stated, leaders, placed, pulled
-from planner.fit.strays import strayed
 from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
@@ -328,12 +328,12 @@ class Search:
 
 def explained(found: StructureFit) -> bool:
     """Whether nothing need be missing."""
-    return size_of(found) <= EXPLAINED and not strayed(found.structure, found.at.x)
+    return size_of(found) <= EXPLAINED and not departed(found.structure, found.at.x)
 
 
 def in_doubt(found: StructureFit) -> bool:
     """Whether much is left, or what was stated is far from what was found."""
-    return size_of(found) >= UNEXPLAINED or bool(strayed(found.structure, found.at.x))
+    return size_of(found) >= UNEXPLAINED or bool(departed(found.structure, found.at.x))
 
 
 def crowded(found: StructureFit) -> bool:

@@ -11,7 +11,7 @@ from planner.fit.structure import RobotStructure
 from planner.robot.virtual_joints import OUTER
 from planner.words import significant
 
-STRAYED = 4.0  # prior sds
+DEPARTED = 4.0  # prior sds
 TOLD = 3  # at most
 
 
@@ -23,14 +23,14 @@ def away(structure: RobotStructure, x: np.ndarray) -> np.ndarray:
     return out
 
 
-def strayed(structure: RobotStructure, x: np.ndarray) -> tuple[int, ...]:
+def departed(structure: RobotStructure, x: np.ndarray) -> tuple[int, ...]:
     """Numbers of x that are far from what is stated."""
-    return tuple(map(int, np.flatnonzero(np.abs(away(structure, x)) > STRAYED)))
+    return tuple(map(int, np.flatnonzero(np.abs(away(structure, x)) > DEPARTED)))
 
 
-def strays_told(structure: RobotStructure, x: np.ndarray) -> str:
+def departures_text(structure: RobotStructure, x: np.ndarray) -> str:
     """What robot.toml may state wrongly; empty where all is near it."""
-    far = strayed(structure, x)
+    far = departed(structure, x)
     told = [*_bodies(structure, x, far), *_springs(structure, x, far)]
     if not told:
         return ""
