@@ -38,7 +38,10 @@ DAMPING_S = 1e-4, 3e-3
 ALONG = 0.5  # cosine above which a stated axis already covers this one
 SHORT, BEND = 0.1, 0.3  # of the longest link: does not bend; of the joint's stiffness: a link's
 ADDED_MASS, ADDED_PLACE = 0.22, 0.35  # sds: of the links' mean mass, of the longest link
-RADIUS, RADIUS_SD = 0.25, 0.7  # of gyration, of an added mass: of its place's sd; its logarithm's sd
+RADIUS, RADIUS_SD = (
+    0.25,
+    0.7,
+)  # of gyration, of an added mass: of its place's sd; its logarithm's sd
 RESONATOR_MASS, RESONATOR_DAMPING = 0.05, 0.03  # medians: of the links' mean mass; ratio
 LOSS_FACTOR = 0.02  # median, with a factor of e as its sd
 ANGLE_SHARE = 0.3  # sd of a joint's stiffness that goes with its angle
