@@ -45,7 +45,6 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
     covariance = turned @ posterior.covariance @ turned.T
     covariance += np.diag(np.full(len(covariance), 1e-9))  # of bodies that nothing moves
     misfit, by_pose = posterior.misfits(MODEL_ERROR)
-    used = 2 * int(np.count_nonzero(posterior.found.misfit.data.measured.used))
     before = np.sqrt(np.diagonal(turned @ np.linalg.inv(structure.precision) @ turned.T))
     far = departed(structure, posterior.x) if posterior.explains else range(structure.size)
     doubted = {structure.names[i] for i in far}
@@ -60,12 +59,9 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
         mean,
         covariance,
         misfit,
-        used,
         by_pose,
         undetermined(p, covariance),
-        (),
         posterior.found.settled,
-        0.0,
     )
     return model, result
 
