@@ -205,10 +205,7 @@ class Search:
         count: int = SETTLED,
         unmoved: bool = True,
     ) -> list[StructureFit]:
-        """Starts beside a structure: a few steps each, the best farther, `count` settled.
-
-        `unmoved` as in `placed`.
-        """
+        """Starts (`placed`) beside it: a few steps each, the best farther, `count` settled."""
         rough = self._on(base, self.data(ROUGH))
         pool = [f for s in starts if (f := self._few(rough, s, unmoved)) is not None]
         near = _best_of_each(p for p in pool if p.evidence > rough.evidence - FAR)
