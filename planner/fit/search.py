@@ -16,6 +16,7 @@ from planner.effects.effect import Operator, Start
 from planner.fit.data import FrfData
 from planner.fit.departures import departed
 from planner.fit.fitted import (
+    SIZES,
     FitRecord,
     StructureFit,
     converged,
@@ -47,8 +48,7 @@ MOST_OPERATORS = 3  # beside springs: more would imitate what the fit lacks
 IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which nothing is followed
 STIFF_AT_FIRST, WIDENING = 3.0, 10  # prior sds of springs that may be there; steps
 FOLLOWED, SETTLED, FARTHEST = 6, 3, 3  # how many are followed, settled, come from afar
-# Sizes: with all lines at first; up to which nothing need be missing; from which many begin afar.
-CLOSE, EXPLAINED, UNEXPLAINED = 0.01, 0.008, 0.03
+AGAIN = 0.03  # least size with which what was found before goes on
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +124,9 @@ class Search:
         data = self.data(SEARCHED)
         known = plain
         if warm is not None:
-            misfit, x = self._again(warm, data, max(warm.size, UNEXPLAINED))
+            misfit, x = self._again(warm, data, max(warm.size, AGAIN))
             known = converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
-        afar = self.from_afar(plain) if in_doubt(known) else []
+        afar = [] if explained(known) else self.from_afar(plain)
         likeliest = max(plain, known, *afar, key=evidence_of)
         if warm is not None or explained(likeliest):
             return [likeliest]
@@ -193,7 +193,7 @@ class Search:
         motions, gain = misfit.first_order(base.at.x, base.at.own)
         free, every = effects_free(base.structure), self.prior.repertoire.effects
         again = (e for e in every if e.several and e not in free)  # more may hang on a link
-        far = in_doubt(base)
+        far = not explained(base)
         tried = (e for e in (*free, *again) if far or pulled(base, e))
         return leaders([s for e in tried for s in e.starts(motions, gain)])
 
@@ -235,11 +235,11 @@ class Search:
         return max(ends, key=evidence_of, default=None)
 
     def from_afar(self, base: StructureFit) -> list[StructureFit]:
-        """Each effect beside others from what is stated, where `base` is in doubt; likeliest first.
+        """Each effect beside others from what is stated, where `base` leaves some; likeliest first.
 
         By logarithms on few lines; the best go on.
         """
-        if not in_doubt(base) or crowded(base):
+        if explained(base) or crowded(base):
             return []
         rough, found = self.data(AFAR), []
         for start in self.starts(base, SCREENED):
@@ -324,13 +324,9 @@ class Search:
 
 
 def explained(found: StructureFit) -> bool:
-    """Whether nothing need be missing."""
-    return size_of(found) <= EXPLAINED and not departed(found.structure, found.at.x)
-
-
-def in_doubt(found: StructureFit) -> bool:
-    """Whether much is left, or what was stated is far from what was found."""
-    return size_of(found) >= UNEXPLAINED or bool(departed(found.structure, found.at.x))
+    """Whether nothing need be missing: as little is left as may be, near what is stated."""
+    least = max(SIZES[0], found.misfit.floor)
+    return size_of(found) <= least and not departed(found.structure, found.at.x)
 
 
 def crowded(found: StructureFit) -> bool:
