@@ -11,7 +11,8 @@ from planner.recording import stated
 from planner.recording.column_names import time_unit, unit_text
 from planner.recording.entries import EntryTree, text_of
 from planner.recording.frf_columns import holds_frfs
-from planner.recording.named_columns import Named, check_finite
+from planner.recording.named_columns import Named
+from planner.recording.plausible import check_numbers
 from planner.recording.sampling import UNEVEN, sampling_rate
 from planner.recording.units import Unit, lookup
 
@@ -131,7 +132,7 @@ def _with_own_times(file: Path, tree: EntryTree) -> EntryTree:
     at = arrays[name][0] * unit.factor
     if len({array.shape for array, _ in arrays.values()}) > 1 or not np.isrealobj(at):
         return tree
-    check_finite(file, name, at)
+    check_numbers(file, name, at)
     axis = {"dt": 1 / sampling_rate(file, at), "t0": float(at[0]), "x_unit": unit.si}
     rest = {n: p for n, p in tree.parts.items() if n != name}
     return EntryTree({**tree.attributes, **axis}, rest, tree.unread)

@@ -32,17 +32,10 @@ def read_hdf5(path: Path) -> tuple[Record, ...]:
     """
     import h5py
 
-    try:
-        _check_texts(path)
-        with h5py.File(path, "r") as file:
-            _check(path, file)
-            root = _Reader(path).group(file)
-    except InputError:
-        raise
-    except Exception as error:  # the library raises whatever the junk makes it raise
-        raise InputError(
-            f"{path} is not a readable HDF5 file ({type(error).__name__}); export it again."
-        ) from None
+    _check_texts(path)
+    with h5py.File(path, "r") as file:
+        _check(path, file)
+        root = _Reader(path).group(file)
     return records_of(path, root)
 
 

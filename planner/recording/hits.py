@@ -1,5 +1,6 @@
 """Records to hits: force in N, accelerations in m/s², one stated axis; nothing guessed."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -269,9 +270,8 @@ def without_unit(record: TimeRecord) -> str:
 
 def describe(record: TimeRecord) -> str:
     """What a record holds, in words: "2 accelerations (m/s^2), 1 pressure (Pa)"."""
-    counts: dict[str, int] = {}
-    for channel in record.channels:
-        known = channel.quantity != "unknown"
-        text = f"{channel.quantity} ({channel.unit})" if known else "unlabelled record"
-        counts[text] = counts.get(text, 0) + 1
+    counts = Counter(
+        f"{c.quantity} ({c.unit})" if c.quantity != "unknown" else "unlabelled record"
+        for c in record.channels
+    )
     return ", ".join(f"{n} × {text}" for text, n in counts.items())

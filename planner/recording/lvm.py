@@ -15,7 +15,7 @@ import numpy as np
 from planner.errors import InputError
 from planner.recording.entries import MOST_ENTRIES, EntryTree, tree_of
 from planner.recording.entry_records import records_of
-from planner.recording.named_columns import check_finite
+from planner.recording.plausible import check_numbers
 from planner.recording.records import Record
 from planner.recording.sampling import UNEVEN, sampling_rate
 from planner.recording.text_tables import MAX_BYTES, decoded, read_text
@@ -158,7 +158,7 @@ def _channel(
         )
     start, step = (_number(path, tag, stated(tag)) for tag in ("X0", "Delta_X"))
     if x.size:  # times have more digits than steps
-        check_finite(path, ABSCISSA, x)
+        check_numbers(path, ABSCISSA, x)
         start += float(x[0]) - _number(path, "X0", stated("X0", owner))
         step = 1 / sampling_rate(path, x - x[0])
     of_spectrum = stated("X_Dimension") == "Frequency" or stated("X_Unit_Label") in ("Hz", "hertz")

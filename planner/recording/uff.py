@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.errors import ForeignFileError, InputError
+from planner.recording.plausible import check_numbers
 from planner.recording.records import Channel, FrfRecord, Record, TimeRecord
 from planner.recording.sampling import aligned, sampling_rate
 from planner.recording.units import MOTIONS, Unit, lookup, lookup_ratio
@@ -75,22 +76,13 @@ def _sets(path: Path) -> list[dict[str, Any]]:
         end = file.read().rstrip()
     if not end.endswith(b"-1"):  # the parser would leave out the dataset that is cut off
         raise InputError(f"{path} does not end with a whole dataset; export it again.")
-    try:
-        with opened(path) as (file, kinds):
-            if not kinds:
-                raise ForeignFileError(
-                    f"{path} is no universal file (no dataset in it); export again."
-                )
-            if 0 in kinds:  # bytes between two datasets are damaged
-                raise InputError(f"{path} holds a dataset without a number; export it again.")
-            sets: list[Any] = [file.read_sets(i) for i in range(len(kinds))]
-            blocks = file._block_ind  # where datasets begin and end, which nothing public says
-    except InputError:
-        raise
-    except Exception as error:  # the parser raises whatever the junk makes it raise
-        raise InputError(
-            f"{path} cannot be read as a universal file ({type(error).__name__}); export it again."
-        ) from None
+    with opened(path) as (file, kinds):
+        if not kinds:
+            raise ForeignFileError(f"{path} is no universal file (no dataset in it); export again.")
+        if 0 in kinds:  # bytes between two datasets are damaged
+            raise InputError(f"{path} holds a dataset without a number; export it again.")
+        sets: list[Any] = [file.read_sets(i) for i in range(len(kinds))]
+        blocks = file._block_ind  # where datasets begin and end, which nothing public says
     system = None
     for kind, one, (first, end) in zip(kinds, sets, blocks, strict=True):
         if kind == 164:
@@ -147,12 +139,7 @@ def _check_numbers(path: Path, sets: list[dict[str, Any]]) -> None:
                 f"{path}: dataset {number} states {s['num_pts']} points and holds {len(data)}; "
                 f"the file is cut off, export it again."
             )
-        bad = np.flatnonzero(~np.isfinite(data))
-        if bad.size:
-            raise InputError(
-                f"{path}: dataset {number}, sample {bad[0] + 1} is not a finite number; "
-                f"export it again."
-            )
+        check_numbers(path, f"dataset {number}", data)
 
 
 def _simulated(sets: list[dict[str, Any]]) -> bool:
