@@ -11,8 +11,10 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.campaign.events import Proposal
+from planner.dataset.screened_files import when
 from planner.recording.joints import JointUnits
 from planner.report.text import with_sd
+from planner.session.hit_verdicts import HitVerdict
 from planner.session.screen import Said, fitted
 from planner.words import command
 
@@ -22,43 +24,20 @@ COLOURS = {"good": "bold green", "repeat": "bold red", "late": "bold yellow",
            "elsewhere": "yellow", "unsure": "bold yellow", "unstated": "bold yellow"}  # fmt: skip
 
 
-@dataclass(frozen=True)
-class JudgedHit:
-    """A hit that waits: its number at this pose, axis, kind as of its verdict, why.
-
-    `when`: " at 14.00 s" in a record of several hits.
-    """
-
-    number: int
-    axis: str
-    kind: str
-    text: str
-    when: str = ""
-
-    @property
-    def said(self) -> Text:
-        """In full, what to do before why, in colour."""
-        do, why = remedy_first(self.text)
-        return self._headed(" ".join([do, why]).strip())
-
-    @property
-    def shortly(self) -> Text:
-        """What to do alone."""
-        return self._headed(remedy_first(self.text)[0])
-
-    def _headed(self, text: str) -> Text:
-        axis = (self.axis or "axis not stated") + self.when
-        if self.kind == "good":
-            but = f"hit {self.number} ({axis}): good, but: {text}"
-            plain = Text(f"hit {self.number} ({axis}): good", style=COLOURS["good"])
-            return Text(but, style=COLOURS["late"]) if text else plain
-        named = f"{self.number} ({axis})"
-        said = {
-            "repeat": f"REPEAT HIT {named}:", "late": f"hit {named}, late?",
-            "unsure": f"hit {named}, right?", "elsewhere": f"hit {named}, not from here:",
-            "unstated": f"hit {self.number}{self.when}, along which axis?",
-        }  # fmt: skip
-        return Text(f"{said[self.kind]} {text}", style=COLOURS[self.kind])
+def verdict_in_words(hit: HitVerdict, whole: bool = True) -> Text:
+    """What is to be done about a hit, in colour; after it why, where the `whole` is said."""
+    do, why = remedy_first(hit.text)
+    text = f"{do} {why}".strip() if whole else do
+    named = f"{hit.number} ({(hit.axis or 'axis not stated') + when(hit.at_s)})"
+    if hit.kind == "good":
+        but = Text(f"hit {named}: good, but: {text}", style=COLOURS["late"])
+        return but if text else Text(f"hit {named}: good", style=COLOURS["good"])
+    said = {
+        "repeat": f"REPEAT HIT {named}:", "late": f"hit {named}, late?",
+        "unsure": f"hit {named}, right?", "elsewhere": f"hit {named}, not from here:",
+        "unstated": f"hit {hit.number}{when(hit.at_s)}, along which axis?",
+    }  # fmt: skip
+    return Text(f"{said[hit.kind]} {text}", style=COLOURS[hit.kind])
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +49,7 @@ class PosePage:
     joints: JointUnits
     frame: str  # whose axes the hits are along
     per_axis: int
-    hits: tuple[JudgedHit, ...]
+    hits: tuple[HitVerdict, ...]
     expected_hz: tuple[float, ...]
     expected_sd_hz: tuple[float, ...]
     folder: Path
@@ -125,10 +104,10 @@ class PosePage:
         """The last hits; the very last one in any case."""
         *before, last = self.hits[-LAST:] or (None,)
         parts = [
-            Said([None, hit.shortly, hit.said], len(before) - i)
+            Said([None, *_forms(hit)], len(before) - i)
             for i, hit in enumerate(before) if hit
         ]  # fmt: skip
-        return [*parts, Said([last.shortly, last.said])] if last else parts
+        return [*parts, Said(_forms(last))] if last else parts
 
     def _angles(self) -> Table:
         angles = Table(box=None, header_style="bold", pad_edge=False)
@@ -172,6 +151,10 @@ class PosePage:
         if self.complete:
             made.add_row(Text("all hits are in", style="bold green"))
         return made
+
+
+def _forms(hit: HitVerdict) -> list[Text]:
+    return [verdict_in_words(hit, whole=False), verdict_in_words(hit)]
 
 
 def keys_that_do(pairs: Sequence[tuple[str, str, bool]]) -> str:
