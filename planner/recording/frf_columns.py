@@ -15,11 +15,16 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.column_names import bare, direction_in, frequency_unit, hit_direction
+from planner.recording.column_names import (
+    bare,
+    direction_in,
+    frequency_unit,
+    hit_direction,
+    lookup,
+    lookup_ratio,
+)
 from planner.recording.named_columns import Named
-from planner.recording.plausible import check_numbers
-from planner.recording.records import AXES, FrfRecord
-from planner.recording.units import lookup, lookup_ratio
+from planner.recording.records import AXES, FrfRecord, check_numbers
 
 _OWN = re.compile(r"(accelerance|mobility|receptance|coherence)_([xyz])([xyz])(_re|_im|)$")
 _BETWEEN = re.compile(

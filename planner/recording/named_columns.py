@@ -14,12 +14,17 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.column_names import bare, direction_in, hit_direction, time_unit, unit_text
-from planner.recording.plausible import check_numbers
-from planner.recording.records import Channel, Record, TimeRecord
+from planner.recording.column_names import (
+    bare,
+    direction_in,
+    hit_direction,
+    lookup,
+    time_unit,
+    unit_text,
+)
+from planner.recording.records import Channel, Record, TimeRecord, check_numbers
 from planner.recording.sampling import UNEVEN, aligned, sampling_rate
 from planner.recording.stated import RATES, STEPS, number
-from planner.recording.units import lookup
 
 _AT = re.compile(r"acceleration_(.+)_[xyz]$")
 

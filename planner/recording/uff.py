@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.errors import ForeignFileError, InputError
-from planner.recording.plausible import check_numbers
-from planner.recording.records import Channel, FrfRecord, Record, TimeRecord
+from planner.recording.column_names import MOTIONS, Unit, lookup, lookup_ratio
+from planner.recording.records import Channel, FrfRecord, Record, TimeRecord, check_numbers
 from planner.recording.sampling import aligned, sampling_rate
-from planner.recording.units import MOTIONS, Unit, lookup, lookup_ratio
 
 if TYPE_CHECKING:
     import pyuff
@@ -91,7 +90,9 @@ def _sets(path: Path) -> list[dict[str, Any]]:
             one["system"] = system
             if one["binary"] and len(one["data"]) != int(one["num_pts"]):
                 _read_mixed(path, one, int(first), int(end))
-            _without_padding(one)
+            count = int(one["num_pts"])  # holds: what fills up the last line of text is left out
+            if not one["binary"] and 0 < len(one["data"]) - count < LAST_LINE:
+                one["x"], one["data"] = one["x"][:count], one["data"][:count]
     return sets
 
 
@@ -122,13 +123,6 @@ def _read_mixed(path: Path, s: dict[str, Any], first: int, end: int) -> None:
         values = np.frombuffer(body, line, count)
         s["x"] = values["x"].astype(float)
         s["data"] = values["y"] @ np.array([1.0, 1j][:parts])
-
-
-def _without_padding(s: dict[str, Any]) -> None:
-    """Leave out what fills up the last line of an ASCII dataset: the count that is stated holds."""
-    count = int(s["num_pts"])
-    if not s["binary"] and 0 < len(s["data"]) - count < LAST_LINE:
-        s["x"], s["data"] = s["x"][:count], s["data"][:count]
 
 
 def _check_numbers(path: Path, sets: list[dict[str, Any]]) -> None:

@@ -16,8 +16,13 @@ from planner.errors import NoPoseLeftError, PlannerError
 from planner.report.campaign_acts import redone, undone
 from planner.session import session_text
 from planner.session.course import BAD, Course, PoseInProgress
-from planner.session.page import can_take_back, page_with_hits, page_without_hits
-from planner.session.skipping import ask_why, on_reason_key
+from planner.session.page import (
+    ask_why,
+    can_take_back,
+    on_reason_key,
+    page_with_hits,
+    page_without_hits,
+)
 from planner.session.station import Station
 from planner.words import by_reason, counted, short_name
 

@@ -1,4 +1,4 @@
-"""The page of a pose, made of what the campaign expects there and of the hits that wait."""
+"""The page of a pose: what the campaign expects there, hits that wait, a reason that is typed."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,10 +8,18 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.campaign.taking_back import last_acts, last_undone
 from planner.robot.room_directions import axes_in_the_room
-from planner.session.course import BAD, Course
+from planner.session import session_text
+from planner.session.course import BAD, Course, PoseInProgress
 from planner.session.hit_verdicts import HitVerdict
 from planner.session.pose_screen import PosePage, keys_that_do
+from planner.session.station import Station
 from planner.words import counted, short_name
+
+ESCAPE, ERASE = "\x1b", ("\x7f", "\b")
+ASKED = (
+    "What stands in the way? Type it, then Enter: poses around it are left out too.\n"
+    "Enter alone skips this pose only, Escape goes back. "
+)
 
 
 def can_take_back(campaign: Campaign) -> tuple[bool, bool]:
@@ -105,3 +113,29 @@ def _named(path: Path, why: str) -> str:
     name = short_name(path)
     text = why.replace(str(path), name).replace(path.name, name)
     return text if name in text else f"{name} {text}"
+
+
+def ask_why(station: Station, visit: PoseInProgress, typed: str = "") -> PoseInProgress:
+    """The visit while a reason is typed, which the page shows in the place of the keys."""
+    station.screen.show(replace(visit.page, keys=f"{ASKED}{typed}_").page)
+    return replace(visit, typed=typed)
+
+
+def on_reason_key(
+    station: Station, course: Course, visit: PoseInProgress, key: str | None
+) -> Course:
+    """One more key of the reason; the pose is over with Enter."""
+    typed, pose = visit.typed or "", visit.proposal.pose
+    if key is None:
+        return course
+    if key == ESCAPE:
+        station.screen.show(visit.page.page)
+        return replace(course, visit=replace(visit, typed=None))
+    if key in ("\r", "\n"):
+        reason = typed.strip()
+        station.campaign.skip(pose, reason or "skipped in the session", neighbours=bool(reason))
+        which = f"{pose} and poses around it" if reason else pose
+        station.say(session_text.never_again(which))
+        return replace(course, visit=None)
+    typed = typed[:-1] if key in ERASE else typed + key * key.isprintable()
+    return replace(course, visit=ask_why(station, visit, typed))

@@ -78,11 +78,11 @@ class PosePage:
         rows = 1 + max(angles.row_count, hits.row_count)
         title = f"Measurement {self.number}: go to pose {self.proposal.pose}"
         parts = [Said([Text(title, style="bold reverse")]), *self._place(), *self._verdicts()]
-        parts += [Said([None, _said(text)], 5) for text in self.streams[-LAST:]]
+        parts += [Said([None, Text(text)], 5) for text in self.streams[-LAST:]]
         parts += [_unfinished(*one) for one in self.unfinished[-2:]]
-        parts += [Said([None, _said(self.progress)], 6)] if self.progress else []
+        parts += [Said([None, Text(self.progress)], 6)] if self.progress else []
         paths = _end(command(self.folder)), command(self.folder)
-        where = [_said(f"waiting for hits in {path}", "dim") for path in paths]
+        where = [Text(f"waiting for hits in {path}", "dim") for path in paths]
         parts.append(Said([None, *where], 4))
         parts.append(Said([Text(self.keys, style="reverse")]))
         lines = fitted(parts, width, height - rows)
@@ -96,8 +96,8 @@ class PosePage:
         expected = ", ".join(with_sd(hz, sd) for hz, sd in each)
         short = ", ".join(f"{hz:.2f}" for hz in self.expected_hz)
         return [
-            Said([None, _said(place), _said(f"{place}; {self.proposal.reason}")], 7),
-            Said([_said(f"expected (Hz): {text}", "bold") for text in (short, expected)], 8),
+            Said([None, Text(place), Text(f"{place}; {self.proposal.reason}")], 7),
+            Said([Text(f"expected (Hz): {text}", "bold") for text in (short, expected)], 8),
         ]
 
     def _verdicts(self) -> list[Said]:
@@ -119,10 +119,6 @@ class PosePage:
             angles.add_row(self.joints.names[i], Text(text, style="bold"))
         return angles
 
-    def _has(self, axis: str | None) -> bool:
-        """Whether as many hits as are asked for came along an axis ("+x")."""
-        return bool(axis) and self.counts.get(axis[-1], 0) >= self.per_axis
-
     def _hits(self) -> Table:
         made = Table(box=None, header_style="bold", pad_edge=False)
         made.add_column(f"hit along, axes of {self.frame}")
@@ -136,7 +132,8 @@ class PosePage:
             way = f"  +{axis} {ways[axis]}" if ways else ""
             made.add_row(row.append(way, style="not bold"))
         # Where an axis has its hits, a bad one more is nothing to do again.
-        again = [hit for hit in self.hits if hit.kind == "repeat" and not self._has(hit.axis)]
+        lacking = [axis for axis in "xyz" if self.counts[axis] < self.per_axis]
+        again = [h for h in self.hits if h.kind == "repeat" and h.axis[-1:] in ("", *lacking)]
         if again:
             axes = ", ".join(dict.fromkeys(hit.axis or "?" for hit in again))
             made.add_row(
@@ -188,10 +185,6 @@ def _unfinished(name: str, said: str) -> Said:
     """What is the matter with a file; what to do about it, if anything, comes first."""
     do, why = remedy_first(said)
     if not why:
-        return Said([None, _said(f"not whole yet: {said}", "dim")], 5)
+        return Said([None, Text(f"not whole yet: {said}", "dim")], 5)
     short = f"cannot be used: {name}: {do}"
-    return Said([None, _said(short, "dim"), _said(f"{short} {why}", "dim")], 5)
-
-
-def _said(text: str, style: str = "") -> Text:
-    return Text(text, style=style)
+    return Said([None, Text(short, "dim"), Text(f"{short} {why}", "dim")], 5)
