@@ -149,15 +149,10 @@ def _at_points(
     of_tool = any(node in known and stated.response_at("", node) == SENSOR for node in whole)
     if names.anywhere or not of_tool:
         return accelerations, ()
-    return [c for c in accelerations if c.node in known], tuple(
-        Fault(
-            "left_out",
-            f"{c.name} at node {c.node} is left out: that is no [[point]].",
-            refuse=False,
-        )
-        for c in accelerations
-        if c.node not in known
-    )
+    others = [c for c in accelerations if c.node not in known]
+    texts = (f"{c.name} at node {c.node} is left out: that is no [[point]]." for c in others)
+    told = tuple(Fault("left_out", text, refuse=False) for text in texts)
+    return [c for c in accelerations if c.node in known], told
 
 
 def _responses(
