@@ -125,7 +125,7 @@ class LowFidelity:
         if learned is None:
             return ""
         if learned.fits:
-            return " ".join(filter(None, (learned.scale, learned.words)))
+            return " ".join(filter(None, (learned.scale, learned.words, learned.departures)))
         text = (
             f"Fitted to the recordings, the simulation still differs from them by "
             f"{self.misses:.2g} times their noise: it lacks physics"

@@ -13,6 +13,7 @@ from planner.effects.effect import Operator
 from planner.fit.fitted import (
     StructureFit,
     converged,
+    evidence_of,
     removal_costs,
     settled,
     without,
@@ -117,7 +118,10 @@ class Explorer:
     def _further(self, base: StructureFit, afar: bool = False) -> list[StructureFit]:
         """With one effect more, settled, likeliest first."""
         starts = self.search.starts(base, SCREENED)
-        return self.search.compete(base, starts, count=SETTLED, unmoved=False, afar=afar)
+        ends = self.search.compete(base, starts, count=SETTLED, unmoved=False)
+        return sorted(
+            ends + self.search.from_afar(base) if afar else ends, key=evidence_of, reverse=True
+        )
 
 
 def _change(before: StructureFit, after: StructureFit) -> float:

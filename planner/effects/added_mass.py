@@ -20,13 +20,17 @@ from planner.effects.effect import (
 
 LEAST = 0.05  # of the mass's sd: a start needs some mass for its place to matter
 FARTHEST = 2.0  # prior sds, of a start's mass; its place begins within one of where it is tried
+TURNS = np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])  # (6, 6): a shape of rates of turn alone
 CENTRE = ((0.0, 0.0, 0.0),)
 AROUND = (*CENTRE, *map(tuple, np.vstack([np.eye(3), -np.eye(3)]).tolist()))
 
 
 @dataclass(frozen=True)
 class PointMass(Operator):
-    """A point mass of ψ₀ sds at a place (ψ₁..₃ sds about the link's centre of mass)."""
+    """A body of mass ψ₀ sds at a place (ψ₁..₃ sds about the link's centre of mass).
+
+    Its moments of inertia are alike about all axes, by a radius of gyration e^ψ₄ in m.
+    """
 
     joint: str = ""
     centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -38,13 +42,16 @@ class PointMass(Operator):
     absorbed = True
 
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
-        """m s² Jₚᵀ Jₚ at the place p."""
-        place = np.array(self.centre_m) + self.size_m * psi[1:]
+        """m s² (Jₚᵀ Jₚ + r² Jωᵀ Jω) at the place p, with the radius r."""
+        place = np.array(self.centre_m) + self.size_m * psi[1:4]
         ports = np.concatenate([poses.carried(self.joint, place), poses.body(self.joint)[:, 3:]], 1)
-        shapes = np.array([moving(np.eye(3)), *map(turning, ACROSS)])
+        shapes = np.array([moving(np.eye(3)), *map(turning, ACROSS), TURNS])
         unit = self.mass_kg * poses.s**2
         moved = [((1 + k, self.size_m * psi[0] * unit),) for k in range(3)]
-        return Impedance(ports, shapes, ((0, psi[0] * unit),), (((0, unit),), *moved))
+        about = np.exp(2 * psi[4]) * unit
+        terms = (0, psi[0] * unit), (4, psi[0] * about)
+        slopes = ((0, unit), (4, about)), *moved, ((4, 2 * psi[0] * about),)
+        return Impedance(ports, shapes, terms, slopes)
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """By the columns of the mass and of its first moments, at the likeliest of some places."""
@@ -52,18 +59,24 @@ class PointMass(Operator):
         return (max((self._start(motions, gain, place) for place in places), key=nats_of),)
 
     def _start(self, motions: Motions, gain: Gain, place: np.ndarray) -> Start:
-        columns = motions.changed_by(self.impedance(motions.poses, np.array([1.0, *place])))
+        there = self.impedance(motions.poses, np.array([1.0, *place, self.mean[4]]))
+        columns = motions.changed_by(there)[:, :4]
         nats, psi, moved = gain(columns, np.array([1.0, 0.7, 0.7, 0.7]))
         mass = float(np.clip(psi[0], -FARTHEST, FARTHEST))
         if abs(mass) < LEAST:
             mass = LEAST
-        place = place + np.clip(psi[1:] / mass, -1, 1)
-        return Start(self, np.array([mass, *place]), nats, moved)
+        place = place + np.clip(psi[1:4] / mass, -1, 1)
+        return Start(self, np.array([mass, *place, self.mean[4]]), nats, moved)
+
+    def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
+        """See `Operator.beside`: far off, the first order may have even the sign wrong."""
+        return (np.array([LEAST, 0.0, 0.0, 0.0, self.mean[4]]),)
 
     def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray]:
         """See `Operator.inertia`."""
-        x, y, z = np.array(self.centre_m) + self.size_m * psi[1:]
-        moments = [y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y]
+        x, y, z = np.array(self.centre_m) + self.size_m * psi[1:4]
+        r = np.exp(2 * psi[4])
+        moments = [y * y + z * z + r, -x * y, x * x + z * z + r, -x * z, -y * z, x * x + y * y + r]
         return self.joint, self.mass_kg * psi[0] * np.array([1.0, x, y, z, *moments])
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:

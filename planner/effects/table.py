@@ -38,6 +38,10 @@ DAMPING_S = 1e-4, 3e-3
 ALONG = 0.5  # cosine above which a stated axis already covers this one
 SHORT, BEND = 0.1, 0.3  # of the longest link: does not bend; of the joint's stiffness: a link's
 ADDED_MASS, ADDED_PLACE = 0.22, 0.35  # sds: of the links' mean mass, of the longest link
+RADIUS, RADIUS_SD = (
+    0.25,
+    0.7,
+)  # of gyration, of an added mass: of its place's sd; its logarithm's sd
 RESONATOR_MASS, RESONATOR_DAMPING = 0.05, 0.03  # medians: of the links' mean mass; ratio
 LOSS_FACTOR = 0.02  # median, with a factor of e as its sd
 ANGLE_SHARE = 0.3  # sd of a joint's stiffness that goes with its angle
@@ -196,7 +200,8 @@ def _operators(simulation: Simulation) -> list[Operator]:
         centre = x, y, z
         at = f"link_{number}"
         places = tuple(Number(f"position_{a}", "1", 0.0, 1.0) for a in "xyz")
-        numbers = (Number("mass", "1", 0.0, 1.0), *places)
+        radius = Number("radius", "m", float(np.log(RADIUS * size)), RADIUS_SD, True)
+        numbers = (Number("mass", "1", 0.0, 1.0), *places, radius)
         found.append(PointMass(at, (), numbers, joint, centre, ADDED_MASS * mean, size))
         numbers = (
             Number("mass", "kg", float(np.log(RESONATOR_MASS * mean)), 1.0, True),

@@ -16,7 +16,7 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
 from planner.fit.structure import RobotStructure
 from planner.frf.frf import Frf
-from planner.inference.least_squares import inverse
+from planner.inference.covariance import inverse
 from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR
 
 LINES, STEPS = 44, 5

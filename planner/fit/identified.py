@@ -6,6 +6,7 @@ import numpy as np
 
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import Parametrisation, Priors, parametrise
+from planner.fit.departures import departed
 from planner.fit.posterior import RobotPosterior
 from planner.fit.result import Identification, estimates, undetermined
 from planner.measurement.agreement import MODEL_ERROR
@@ -44,25 +45,23 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
     covariance = turned @ posterior.covariance @ turned.T
     covariance += np.diag(np.full(len(covariance), 1e-9))  # of bodies that nothing moves
     misfit, by_pose = posterior.misfits(MODEL_ERROR)
-    used = 2 * int(np.count_nonzero(posterior.found.misfit.data.measured.used))
     before = np.sqrt(np.diagonal(turned @ np.linalg.inv(structure.precision) @ turned.T))
+    far = departed(structure, posterior.x) if posterior.explains else range(structure.size)
+    doubted = {structure.names[i] for i in far}
     told = estimates(p, mean[: len(p.parameters)], covariance)
     result = Identification(
         simulation,
         tuple(
-            replace(one, explained=posterior.explains, prior_log_sd=float(sd))
+            replace(one, explained=one.name not in doubted, prior_log_sd=float(sd))
             for one, sd in zip(told, before, strict=False)
         ),
         p.nuisances,
         mean,
         covariance,
         misfit,
-        used,
         by_pose,
         undetermined(p, covariance),
-        (),
         posterior.found.settled,
-        0.0,
     )
     return model, result
 

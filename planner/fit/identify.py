@@ -41,8 +41,7 @@ def identify(
     Where what robot.toml states does not explain them, and `extend`, the effects that do are looked
     for (`Search`); from those of a `warm` record, if that is given. `band_hz` is robot.toml's
     unless given, `tolerances` what it says of hits, chain and readback. Raises InputError where
-    FRFs and poses do not fit together,
-    or springs as stated do not carry the weight.
+    FRFs and poses do not fit together, or springs as stated do not carry the weight.
     """
     q, robot = np.atleast_2d(np.asarray(q, dtype=float)), simulation.robot
     dof = len(robot.joint_names)

@@ -7,6 +7,7 @@ import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
 from planner.effects.parameters import Priors
+from planner.fit.departures import departures_text
 from planner.fit.fitted import StructureFit
 from planner.fit.frequency_uncertainty import frequency_sd
 from planner.fit.identified import ExtendedModel, as_identification
@@ -90,6 +91,11 @@ class Learned:
             f"though gains of sensor and hammer are stated to {significant(100 * allowed)} %: "
             f"check their sensitivities, and the masses in the URDF."
         )
+
+    @property
+    def departures(self) -> str:
+        """What robot.toml may state wrongly; empty where the fit is near it."""
+        return departures_text(self.posterior.structure, self.posterior.x)
 
     @property
     def words(self) -> str:

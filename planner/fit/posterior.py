@@ -11,7 +11,7 @@ from planner.fit.data import FrfData
 from planner.fit.fitted import StructureFit
 from planner.fit.misfit import SHARE, FrfMisfit
 from planner.fit.structure import RobotStructure, exported
-from planner.inference.least_squares import inverse
+from planner.inference.covariance import inverse
 from planner.measurement.measured_frfs import Measured
 from planner.recording.points import TOOL, Layout
 from planner.words import significant

@@ -18,7 +18,7 @@ class Estimate:
     """One parameter: value, the sd of its logarithm, and what was known before.
 
     `blocks` are the [[compliance]] blocks that share it, from 0. `identifiable`: the data at
-    least halved the sd of its logarithm, and what was fitted is `explained` by the simulation.
+    least halved the sd of its logarithm, and it is near what is stated (`explained`).
     """
 
     name: str
@@ -42,18 +42,6 @@ class Estimate:
         return self.explained and self.log_sd < TOLD * self.prior_log_sd
 
 
-@dataclass(frozen=True)
-class Direction:
-    """A combination of parameters (log, in prior sds) and the share of its prior sd that is left.
-
-    `weights` are those of the springs' parameters, of length 1 together with the inertial ones.
-    """
-
-    sd_ratio: float
-    weights: tuple[float, ...]
-    text: str
-
-
 @dataclass(frozen=True, eq=False)
 class Identification:
     """Result of `identify`.
@@ -61,8 +49,7 @@ class Identification:
     `mean` (P + R,) and `covariance` (P + R, P + R) are those of the parameters' logarithms, then
     of the inertial deviations in prior sds, named in `nuisances` (none where inertias were taken
     for exact). `misfit` is χ² per real value, 1 at the noise; the covariance is that of the stated
-    noise, or of the misfit where that is larger. `starts` lists the misfit that each start came to
-    before inertias were freed.
+    noise, or of the misfit where that is larger.
     """
 
     simulation: Simulation
@@ -71,13 +58,9 @@ class Identification:
     mean: np.ndarray
     covariance: np.ndarray
     misfit: float
-    values: int  # real values that were fitted
     misfit_by_pose: np.ndarray  # (n,)
-    undetermined: tuple[Direction, ...]
-    starts: tuple[float, ...]
+    undetermined: tuple[str, ...]
     converged: bool
-    seconds: float
-    remarks: tuple[str, ...] = ()
 
     def estimate(self, name: str) -> Estimate:
         """The parameter of a name; KeyError if there is none."""
@@ -104,7 +87,7 @@ def estimates(
     )
 
 
-def undetermined(parametrisation: Parametrisation, covariance: np.ndarray) -> tuple[Direction, ...]:
+def undetermined(parametrisation: Parametrisation, covariance: np.ndarray) -> tuple[str, ...]:
     """Directions of the springs' parameters of which the data told little, least told first.
 
     They are the directions in which the posterior's variance exceeds TOLD² of the prior's.
@@ -119,7 +102,7 @@ def undetermined(parametrisation: Parametrisation, covariance: np.ndarray) -> tu
         if value > TOLD**2:
             ratio, vector = float(np.sqrt(value)), root @ along / sd
             vector = vector / np.linalg.norm(vector)
-            found.append(Direction(ratio, tuple(map(float, vector)), _words(names, vector, ratio)))
+            found.append(_words(names, vector, ratio))
     return tuple(found)
 
 
@@ -130,12 +113,10 @@ def _words(names: list[str], vector: np.ndarray, ratio: float) -> str:
     left = f"{100 * min(ratio, 1.0):.0f} % of the prior's spread is left"
     if len(order) == 1:
         return f"The {names[order[0]]} is not determined: {left}."
-    same = [names[i] for i in order if vector[i] * vector[order[0]] > 0]
-    other = [names[i] for i in order if vector[i] * vector[order[0]] < 0]
+    same, other = (
+        " and ".join(names[i] for i in order if sign * vector[i] * vector[order[0]] > 0)
+        for sign in (1, -1)
+    )
     if not other:
-        return f"The product of {_list(same)} is not determined: {left}."
-    return f"The ratio of {_list(same)} to {_list(other)} is not determined: {left}."
-
-
-def _list(names: list[str]) -> str:
-    return " and ".join(", ".join(names).rsplit(", ", 1)) if len(names) > 1 else names[0]
+        return f"The product of {same} is not determined: {left}."
+    return f"The ratio of {same} to {other} is not determined: {left}."

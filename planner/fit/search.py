@@ -1,9 +1,9 @@
 """Which effects a robot has: by evidence, added, removed and exchanged until nothing gains.
 
-Two starts, as stated and with base and all bearings, lest what is missing be hidden by what it
-bent. Then all effects at all places compete: operators are ranked by their first-order columns,
-springs are always tried nonlinearly, a few steps each, where much is left from afar too, by
-logarithms; the best are settled.
+Starts: as stated, with base and all bearings, and, where much is left or numbers departed far, with
+each effect from what is stated, lest what is missing be hidden by what it bent. From each all
+effects at all places compete: operators are ranked by their first-order columns, springs are always
+tried nonlinearly, a few steps each; the best are settled.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -14,7 +14,9 @@ import numpy as np
 
 from planner.effects.effect import Operator, Start
 from planner.fit.data import FrfData
+from planner.fit.departures import departed
 from planner.fit.fitted import (
+    SIZES,
     FitRecord,
     StructureFit,
     converged,
@@ -36,7 +38,8 @@ from planner.measurement.truncated_decay import completed
 SEARCHED, SCREENED, LAST = 28, 64, 44  # lines a pose: while searching, for operators, at the end
 ROUGH, AFAR = 14, 12  # where many are tried a few steps each, and by logarithms from what is stated
 ANNEALED = ((0.5, 6), (0.2, 8), (0.07, 8))  # sizes by which a start comes near, and steps at each
-LOG_STEPS, NEARER, FEW, FURTHER = 60, 6, 6, 4  # steps: until near, of many from afar, of each tried
+LOG_STEPS, NEARER, FEW, FURTHER = 60, 24, 6, 4  # steps: until near, of many from afar, of each
+# tried, of the best
 HOPELESS = 4.0  # nats, below which a further step is not worth it while many are tried
 LEAST = 12.0  # nats that one more effect must gain
 SAME = 3.0  # nats that one less may cost
@@ -44,9 +47,8 @@ COMPLETIONS = 2  # rounds
 MOST_OPERATORS = 3  # beside springs: more would imitate what the fit lacks
 IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which nothing is followed
 STIFF_AT_FIRST, WIDENING = 3.0, 10  # prior sds of springs that may be there; steps
-FOLLOWED, SETTLED, FARTHEST = 6, 3, 5  # how many are followed, settled, come from afar
-# Sizes: with all lines at first; up to which nothing need be missing; from which many begin afar.
-CLOSE, EXPLAINED, UNEXPLAINED = 0.01, 0.008, 0.03
+FOLLOWED, SETTLED, FARTHEST = 6, 3, 3  # how many are followed, settled, come from afar
+AGAIN = 0.03  # least size with which what was found before goes on
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,20 +105,34 @@ class Search:
         plain = converged(self.begun(data, stated))
         if not self.extend:
             return self._last(plain)
-        if size_of(plain) <= EXPLAINED:  # nothing need be missing
-            best = plain
-        elif warm is None:
-            springs = tuple(e for e in self.prior.repertoire.effects if e.springs)
-            freed = replace(stated, effects=springs)
-            best = converged(self.begun(data, freed))
-        else:
-            misfit, x = self._again(warm, data, max(warm.size, UNEXPLAINED))
-            best = converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
-        best = self._evolved(best)
-        if plain.evidence > best.evidence and plain.structure.effects != best.structure.effects:
-            best = self._evolved(plain)
+        first, *others = self._beginnings(plain, warm)
+        best = self._evolved(first)
+        for other in others:
+            if other.evidence > best.evidence:
+                best = self._evolved(other)
+        while ends := self.from_afar(best):
+            if ends[0].evidence < best.evidence + LEAST:
+                break
+            best = self._evolved(ends[0])
         found = self._last(best)
         return replace(found, wider=self._widened(found)) if self.widen else found
+
+    def _beginnings(self, plain: StructureFit, warm: FitRecord | None) -> list[StructureFit]:
+        """Where effects are added and removed from: what is most likely to lack some first."""
+        if explained(plain):  # nothing need be missing
+            return [plain]
+        data = self.data(SEARCHED)
+        known = plain
+        if warm is not None:
+            misfit, x = self._again(warm, data, max(warm.size, AGAIN))
+            known = converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
+        afar = [] if explained(known) else self.from_afar(plain)
+        likeliest = max(plain, known, *afar, key=evidence_of)
+        if warm is not None or explained(likeliest):
+            return [likeliest]
+        springs = tuple(e for e in self.prior.repertoire.effects if e.springs)
+        freed = converged(self.begun(data, replace(plain.structure, effects=springs)))
+        return [freed, likeliest]
 
     def _again(self, known: FitRecord, data: FrfData, size: float) -> tuple[FrfMisfit, np.ndarray]:
         structure = RobotStructure(self.prior, known.effects, data.sensors)
@@ -162,11 +178,8 @@ class Search:
         return best
 
     def _added(self, best: StructureFit) -> StructureFit:
-        """With the one effect that gains most, if that is enough.
-
-        Where so many operators do not explain the FRFs, more would only imitate what does.
-        """
-        if sum(not e.springs for e in best.structure.effects) >= MOST_OPERATORS:
+        """With the one effect that gains most, if that is enough."""
+        if crowded(best):
             return best
         ends = self.compete(best, self.starts(best, SCREENED))
         if not ends or ends[0].evidence < best.evidence + LEAST:
@@ -180,7 +193,7 @@ class Search:
         motions, gain = misfit.first_order(base.at.x, base.at.own)
         free, every = effects_free(base.structure), self.prior.repertoire.effects
         again = (e for e in every if e.several and e not in free)  # more may hang on a link
-        far = size_of(base) >= UNEXPLAINED
+        far = not explained(base)
         tried = (e for e in (*free, *again) if far or pulled(base, e))
         return leaders([s for e in tried for s in e.starts(motions, gain)])
 
@@ -191,16 +204,10 @@ class Search:
         *,
         count: int = SETTLED,
         unmoved: bool = True,
-        afar: bool = True,
     ) -> list[StructureFit]:
-        """Starts beside a structure: a few steps each, the best farther, `count` settled.
-
-        `unmoved` as in `placed`; where much is left, and `afar`, from what is stated too.
-        """
+        """Starts (`placed`) beside it: a few steps each, the best farther, `count` settled."""
         rough = self._on(base, self.data(ROUGH))
         pool = [f for s in starts if (f := self._few(rough, s, unmoved)) is not None]
-        if afar and size_of(base) >= UNEXPLAINED:
-            pool += self._from_afar(rough, starts)
         near = _best_of_each(p for p in pool if p.evidence > rough.evidence - FAR)
         followed = [self._on(p, base.misfit.data) for p in near[:FOLLOWED]]
         followed = _best_of_each(stepped(p, FURTHER) for p in followed)
@@ -227,10 +234,15 @@ class Search:
             ends.append(StructureFit(misfit, at, misfit.evidence(at)))
         return max(ends, key=evidence_of, default=None)
 
-    def _from_afar(self, base: StructureFit, starts: Sequence[Start]) -> list[StructureFit]:
-        """Each effect from what is stated, by logarithms on few lines; the best go on."""
+    def from_afar(self, base: StructureFit) -> list[StructureFit]:
+        """Each effect beside others from what is stated, where `base` leaves some; likeliest first.
+
+        By logarithms on few lines; the best go on.
+        """
+        if explained(base) or crowded(base):
+            return []
         rough, found = self.data(AFAR), []
-        for start in starts:
+        for start in self.starts(base, SCREENED):
             structure = base.structure.with_effect(start.effect)
             misfit = FrfMisfit(structure, rough, self.tolerances, None, self.floor)
             for x in from_stated(structure, start):
@@ -238,7 +250,9 @@ class Search:
                     at = minimised(misfit, x, NEARER)
                     found.append((at.value, structure, at.x))
         found.sort(key=lambda one: one[0])
-        return [self.begun(base.misfit.data, s, x) for _, s, x in found[:FARTHEST]]
+        data = base.misfit.data
+        ends = [converged(self.begun(data, s, x)) for _, s, x in found[:FARTHEST]]
+        return sorted(ends, key=evidence_of, reverse=True)
 
     def _removed(self, best: StructureFit, newest: Operator | None) -> StructureFit:
         """Without what the others make superfluous, what seems to matter least first."""
@@ -307,6 +321,17 @@ class Search:
                 misfit, at = wider, minimised(wider, x, FURTHER, 1.0, at.own)
         at = minimised(misfit, at.x, WIDENING, 1.0, own=at.own)
         return StructureFit(misfit, at, misfit.evidence(at))
+
+
+def explained(found: StructureFit) -> bool:
+    """Whether nothing need be missing: as little is left as may be, near what is stated."""
+    least = max(SIZES[0], found.misfit.floor)
+    return size_of(found) <= least and not departed(found.structure, found.at.x)
+
+
+def crowded(found: StructureFit) -> bool:
+    """Whether it has so many operators that more would imitate what explains the FRFs."""
+    return sum(not e.springs for e in found.structure.effects) >= MOST_OPERATORS
 
 
 def _best_of_each(pool: Iterable[StructureFit]) -> list[StructureFit]:

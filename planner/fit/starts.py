@@ -54,8 +54,11 @@ def from_stated(structure: RobotStructure, start: Start) -> Iterable[np.ndarray]
     """Where a fit from afar begins: as stated, new springs as expected and softer."""
     effect, x = structure.effects[-1], structure.mean.copy()
     if not effect.springs:
-        x[structure.own[-1]] = start.psi
-        return (x,)
+        begun = []
+        for psi in (start.psi, *effect.beside(start.psi)):
+            begun.append(x.copy())
+            begun[-1][structure.own[-1]] = psi
+        return begun
     new = [i for i in range(structure.stiffnesses) if not structure.parameters[i].stated]
     mine = [i for i in new if set(structure.parameters[i].blocks) & set(effect.springs)]
     softer = x.copy()

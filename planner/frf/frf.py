@@ -110,7 +110,7 @@ def unreciprocal(frf: Frf) -> tuple[str, ...]:
         if apart > 0.9:
             found.append(
                 f"Hits along {AXES[i]} felt along {AXES[j]} and hits along {AXES[j]} felt along "
-                f"{AXES[i]} differ by {100 * apart:.0f} % of what is felt along the hits: they "
-                f"should be alike; check axes and signs of hits and sensor."
+                f"{AXES[i]} differ by {100 * apart:.0f} % of what is felt along the hits. Where "
+                f"the sensor is at the tip they are alike: check axes and signs of hits and sensor."
             )
     return tuple(found)

@@ -25,9 +25,3 @@ def _invert(lower: np.ndarray, out: np.ndarray) -> None:
     _invert(lower[first, first], out[first, first])
     _invert(lower[last, last], out[last, last])
     out[last, first] = -out[last, last] @ (lower[last, first] @ out[first, first])
-
-
-def solve(lower: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """x of L Lᵀ x = right (n,), for a Cholesky factor L (n, n)."""
-    whiten = inverse(lower)
-    return whiten.T @ (whiten @ right)

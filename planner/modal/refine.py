@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.inference.least_squares import Damping, Iterate, minimise
 from planner.modal.residues import Lines, Residues, basis, basis_slope, unpack
 
 MAX_ITERATIONS = 30
 # Few lines around a resonance are fitted nearly quadratically: the damping may vanish at once.
-DAMPING = Damping(first=1e-3, least=0.0, most=1e8, lighter=0.1, heavier=10.0)
+# At first, by how much less after a step that gained and more after one that did not, at most.
+DAMPING, LIGHTER, HEAVIER, MOST = 1e-3, 0.1, 10.0, 1e8
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +30,6 @@ class ReducedFit:
     normal: np.ndarray  # (2m, 2m) JᵀWJ
     inverse: np.ndarray  # (entries, columns, columns) of the linear normal matrix
     sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
-
-    @property
-    def value(self) -> float:
-        """χ²/2, which is minimised."""
-        return self.chi2 / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,25 +70,39 @@ def refine(
         return at(parts) if allowed(_complex(parts)) else None
 
     start = np.concatenate([poles.real, poles.imag])
-    found = minimise(
-        objective, start, 0.0, MAX_ITERATIONS,
-        longest=np.inf, at=at(start), rule=DAMPING, settled=_settled,
-    )  # fmt: skip
-    shape = outputs, inputs
-    return _finish(lines, _complex(found.x), found.at, shape, count)
+    parts, point = _minimised(objective, start, at(start))
+    return _finish(lines, _complex(parts), point, (outputs, inputs), count)
 
 
-def _settled(before: Iterate[ReducedFit], parts: np.ndarray, point: ReducedFit) -> bool:
-    """Whether a step changed nothing: far below a standard deviation, rounding may make it worse.
+def _minimised(
+    objective: Callable[[np.ndarray], ReducedFit | None], parts: np.ndarray, point: ReducedFit
+) -> tuple[np.ndarray, ReducedFit]:
+    """Where damped Gauss-Newton steps (Levenberg-Marquardt) lead; None where poles cannot be."""
+    damping = DAMPING
+    for _ in range(MAX_ITERATIONS):
+        # In units in which the diagonal is 1: the damping is relative to it.
+        diagonal = np.diagonal(point.normal)
+        unit = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+        damped = point.normal * np.outer(unit, unit) + damping * np.eye(len(unit))
+        step = -unit * np.linalg.lstsq(damped, unit * point.gradient)[0]
+        tried = objective(parts + step)
+        settled = tried is not None and damping < DAMPING and _still(point, tried, step)
+        if tried is not None and tried.chi2 < point.chi2:
+            parts, point, damping = parts + step, tried, LIGHTER * damping
+        else:
+            damping *= HEAVIER
+        if settled or damping > MOST:
+            break
+    return parts, point
+
+
+def _still(before: ReducedFit, after: ReducedFit, step: np.ndarray) -> bool:
+    """Whether a step changed nothing: far below a standard deviation, or by rounding alone.
 
     A short step tells nothing as long as damping keeps it short.
     """
-    sds = np.abs(parts - before.x) * np.sqrt(np.maximum(np.diag(before.at.normal), 0.0))
-    gain = abs(before.at.chi2 - point.chi2)
-    # Still: standard deviations by which the poles move in a step that is the last
-    # A share of χ² that a step gains by rounding alone
-    small = np.max(sds) < 1e-3 or gain < 1e-9 * before.at.chi2
-    return bool(small and before.damping < DAMPING.first)
+    sds = np.abs(step) * np.sqrt(np.maximum(np.diag(before.normal), 0.0))
+    return bool(np.max(sds) < 1e-3 or abs(before.chi2 - after.chi2) < 1e-9 * before.chi2)
 
 
 def shared_error(

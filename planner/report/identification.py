@@ -234,7 +234,7 @@ def identification_report(
         parameters=identified_springs(basis.fitted, final),
         fit=_change(judged.after, judged.before),
         held_out=_change(judged.held_out_after, judged.held_out_before, aside),
-        undetermined=tuple(direction.text for direction in final.undetermined),
+        undetermined=final.undetermined,
         misfit=final.misfit,
         misfit_by_pose=dict(zip(names, final.misfit_by_pose, strict=True)),
         converged=final.converged,
@@ -261,7 +261,7 @@ def _change(
 
 def _doubts(judged: "JudgedIdentification") -> list[str]:
     final = judged.final
-    said = [text for text in (final.words, final.scale) if text]
+    said = [text for text in (final.words, final.scale, final.departures) if text]
     if not final.fits:
         said.append(
             f"Nothing that was tried explains the recordings: {100 * final.posterior.size:.0f} % "

@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Proposal
+from planner.campaign.events import Proposal, Question
 from planner.design.stopping import Forecast
 from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer, plain
@@ -110,6 +110,11 @@ def target_sentence(waits_for: str) -> str:
     return f"The target is not reached yet; what lacks: {waits_for}."
 
 
+def unanswered(question: Question) -> str:
+    """Of hits that are held until it is answered."""
+    return f"Held, not used: {question.text} Answer with planner confirm, or withdraw."
+
+
 def forecast_json(forecast: Forecast) -> dict[str, Any]:
     """Its numbers and its sentence."""
     return {**plain(forecast), "text": forecast.text}
@@ -133,7 +138,7 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
         tuple(campaign.cell.robot.joint_names),
         model.forecast,
         model.repeat(),
-        tuple(campaign.cell.remarks),
+        (*campaign.cell.remarks, *map(unanswered, campaign.state.questions)),
         places=places_for(model, campaign.state, found[0]),
         joint_units=campaign.cell.robot.joints.declared,
         done=bool(model.done),

@@ -113,7 +113,7 @@ class RobotCheckReport(Answer):
         """What [[payload]] of robot.toml adds to the links that move, in words."""
         carried = self.found.robot.config.payload if self.found else ()
         mass = sum(body.mass for body in carried)
-        return f", and {mass:.4g} kg of [[payload]]" if mass else ""
+        return f", and {mass:.4g} kg of [[payload]]" if mass else ", no tool ([[payload]]) stated"
 
 
 def _cell(pose: CheckedPose, most_hz: float) -> str:

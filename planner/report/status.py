@@ -19,7 +19,7 @@ from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain
 from planner.report.imports import asked_of
 from planner.report.kept_diagnosis import diagnosis_of, read_diagnosis, two_answers
-from planner.report.proposals import forecast_json, target_sentence
+from planner.report.proposals import forecast_json, target_sentence, unanswered
 from planner.report.refitted_springs import (
     NOT_KNOWN,
     RefittedSpring,
@@ -219,7 +219,7 @@ class StatusReport(ModelStatus, Answer):
             "skipped: " + (", ".join(s.pose for s in self.skipped) or "none"),
             "sd of frequencies over the workspace: "
             + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)
-            + f" (target {self.target_frequency_sd_percent:g} %)",
+            + f" (all together: target {self.target_frequency_sd_percent:g} %)",
             f"{self.forecast.text} {target_sentence(self.waits_for)}",
             f"log: {counted(self.log.entries, 'entry', 'entries')}",
         ]
@@ -234,10 +234,7 @@ class StatusReport(ModelStatus, Answer):
                 f"{counted(len(self.stored_but_not_imported), 'recording')} stored, but the "
                 f"program stopped before the import: import again."
             )
-        lines += [
-            f"Held, not used: {h.question.text} Answer with planner confirm, or withdraw."
-            for h in self.held
-        ]
+        lines += [unanswered(h.question) for h in self.held]
         lines += [self.decision.text] if self.decision else []
         lines += [*self.remarks, *self.leave_one_out.text]
         told = by_reason((r.file, r.reason) for r in self.refused)

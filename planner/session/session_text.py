@@ -126,7 +126,7 @@ def uncertainty_line(model: Model) -> Text:
     sd = model.frequency_sd_percent
     each = ", ".join(f"mode {k + 1} {significant(v)} %" for k, v in enumerate(sd))
     target = model.cell.config.stop.frequency_sd_percent
-    return Text(f"sd of frequencies over the workspace: {each} (target {target:g} %)")
+    return Text(f"sd of frequencies over the workspace: {each} (all together: target {target:g} %)")
 
 
 def not_now(key: str) -> str:

@@ -10,6 +10,7 @@ from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
 from planner.fit.data import FrfData
+from planner.fit.departures import departures_text
 from planner.fit.frequency_uncertainty import structure_slope
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
@@ -18,7 +19,8 @@ from planner.fit.search import Search
 from planner.fit.structure import RobotPrior, RobotStructure, exported
 from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
-from tests.support.fitted_cases import Case, Judged, everyday
+from planner.words import significant
+from tests.support.fitted_cases import Case, Judged, everyday, forgotten
 
 
 @pytest.fixture(scope="module")
@@ -152,3 +154,26 @@ def test_what_was_found_is_recalled_as_it_was(case, prior):
     np.testing.assert_array_equal(again.at.x, found.at.x)
     assert again.structure.names == found.structure.names
     assert again.evidence == pytest.approx(found.evidence, abs=0.1)
+
+
+def test_a_tool_that_the_description_lacks_is_found_at_the_flange(tmp_path):
+    case = forgotten("irb6640", 2, tmp_path)
+    found = case.posterior()
+    judged = Judged.of(case, found)
+    assert "added_mass at link_6" in judged.named
+    assert judged.error < 0.04
+    assert not departures_text(found.structure, found.x)
+
+
+def test_what_the_fit_moved_far_is_told(prior):
+    structure = RobotStructure(prior)
+    x = structure.mean.copy()
+    assert not departures_text(structure, x)
+    spring = next(i for i, p in enumerate(structure.parameters) if p.stated)
+    mass = structure.names.index("mass of joint_5")
+    for number in (spring, mass):
+        x[number] += 5 * structure.sd[number]
+    told = departures_text(structure, x)
+    times = np.exp(5 * structure.sd[spring])
+    assert f"{significant(times)} times stiffer than stated" in told
+    assert "link_5 would have to weigh" in told

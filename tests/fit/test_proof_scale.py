@@ -2,7 +2,8 @@
 
     pytest -m slow -s tests/fit/test_proof_scale.py
 
-FITS_SEED is the first seed, FITS how many everyday cases (50), HARDER how many harder ones (15).
+FITS_SEED is the first seed, FITS how many everyday cases (50), HARDER how many harder ones (15),
+FORGOTTEN how many that have a tool which robot.toml lacks (30).
 """
 
 import os
@@ -14,10 +15,11 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from tests.support.fitted_cases import ARMS, Case, Judged, everyday, harder
+from tests.support.fitted_cases import ARMS, Case, Judged, everyday, forgotten, harder
 
 FIRST = int(os.environ.get("FITS_SEED", "5100"))
 EVERYDAY, HARDER = int(os.environ.get("FITS", "50")), int(os.environ.get("HARDER", "15"))
+FORGOTTEN = int(os.environ.get("FORGOTTEN", "30"))
 NAMES = {"soft base": ("soft_base", "shifting_base"), "bending link": ("link_flexibility",),
          "hose": ("local_resonator",)}  # fmt: skip
 
@@ -78,3 +80,15 @@ def test_the_common_scale_of_harder_robots(tmp_path):
     assert np.mean(within) >= 0.93
     assert np.mean(inside >= 0.88) >= 0.93
     assert np.mean(error <= 0.05) >= 0.93
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(14400)
+def test_a_forgotten_tool_is_named(tmp_path):
+    found = [j for _, j in judged(forgotten, FORGOTTEN, tmp_path)]
+    named = [any(n.startswith("added_mass") for n in j.named) for j in found]
+    error = np.array([j.error for j in found])
+    print(f"named in {sum(named)} of {len(named)}; error median {100 * np.median(error):.1f} %")
+    print(f"error <= 5 % in {np.sum(error <= 0.05)}")
+    assert np.mean(named) >= 0.9
+    assert np.mean(error <= 0.05) >= 0.9

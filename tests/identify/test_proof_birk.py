@@ -67,8 +67,8 @@ def say_parameters(runs):
             f"  {e.name:30s} {e.value:10.4g}  error {100 * np.expm1(off):8.2f} %  "
             f"sd {100 * e.log_sd:7.2f} %{said}"
         )
-    for direction in result.undetermined:
-        print(f"  {direction.text}")
+    for text in result.undetermined:
+        print(f"  {text}")
 
 
 def check_verdicts(runs):
@@ -85,7 +85,7 @@ def check_verdicts(runs):
     assert np.sqrt(np.mean(share[~told] ** 2)) > 0.4
     for result, _, _ in runs:
         for e in result.estimates:
-            named = any(e.name in d.text for d in result.undetermined)
+            named = any(e.name in text for text in result.undetermined)
             assert named or e.identifiable
 
 

@@ -8,7 +8,6 @@ import pytest
 import scipy.linalg
 from scipy.special import logsumexp, softmax
 
-from planner.inference import triangular
 from planner.inference.block_diagonal import block_diagonal
 from planner.inference.log_space import log_sum, shares
 
@@ -24,15 +23,6 @@ def test_they_give_what_scipy_gives():
     blocks = rng.normal(size=(2, 2)), rng.normal(size=(3, 3)), np.zeros((0, 0))
     beside = np.asarray(scipy.linalg.block_diag(*blocks[:2]))
     assert np.array_equal(block_diagonal(*blocks), beside)
-
-
-@pytest.mark.parametrize("size", [1, 5, 100])
-def test_two_triangles_are_solved(size):
-    rng = np.random.default_rng(4)
-    half = rng.normal(size=(size, size))
-    matrix, right = half @ half.T + np.eye(size), rng.normal(size=size)
-    found = triangular.solve(np.linalg.cholesky(matrix), right)
-    assert matrix @ found == pytest.approx(right, rel=1e-9, abs=1e-9)
 
 
 def test_commands_between_hits_do_not_import_it():

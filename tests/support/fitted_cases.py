@@ -1,8 +1,10 @@
 """Robots of another engine that lack several things at once, hit as people hit; FRFs and truth."""
 
+import tomllib
 import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -17,16 +19,16 @@ from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from planner.truth.deviation import Spring
+from planner.truth.deviation import AttachedMass, Spring
 from planner.truth.handling import EVERYDAY, Handling, together
 from planner.truth.hits import AXES
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
-from planner.truth.scene import deviate, log_uniform, triple
+from planner.truth.scene import deviate, log_uniform, some_direction, triple
 from planner.truth.secret import HitVisit, Secret, hit_poses
 from planner.truth.world import REAL
 from tests.support.counted_modes import true_modes
-from tests.support.lacking_robots import ROBOTS, added, known
+from tests.support.lacking_robots import ROBOTS, added, known, links_moved, mass_that_moves
 from tests.support.lacking_robots import Robot as Arm
 
 POSES, UNSEEN, REPEATS, LINES = 6, 8, 3, 300
@@ -110,6 +112,29 @@ def harder(name: str, seed: int, folder: Path) -> Case:
     return _measured(arm, secret, concealed, ROUGH, rng)
 
 
+def forgotten(name: str, seed: int, folder: Path) -> Case:
+    """A tool that robot.toml lacks, 2 to 20 % of what moves, three masses on a rod at the flange;
+    every other robot stands on a soft base."""
+    rng, arm = drawn_arm(name, seed, folder)
+    secret = Secret(REAL.scatter.of(int(rng.integers(2**31))))
+    urdf = ElementTree.parse(arm.toml.parent / tomllib.loads(arm.toml.read_text())["urdf"])
+    truth = load_truth(arm.toml, secret.deviation)
+    flange = list(links_moved(urdf.getroot(), truth.joint_names).values())[-1]
+    kg = mass_that_moves(urdf.getroot()) * log_uniform(rng, 0.02, 0.2)
+    middle = some_direction(rng) * rng.uniform(0.02, 0.25)
+    rod = some_direction(rng) * log_uniform(rng, 0.05, 0.25)
+    tool = [
+        AttachedMass(flange, triple(middle + at * rod), kg * share)
+        for at, share in zip((-1, 0, 1), rng.dirichlet([4.0, 4.0, 4.0]), strict=True)
+    ]
+    secret, concealed = deviate(secret, added=tool), ("tool",)
+    if rng.random() < 0.5:
+        secret, concealed = added(secret, "soft base", log_uniform(rng, 0.2, 1.0), arm, rng), (
+            "tool", "soft base",
+        )  # fmt: skip
+    return _measured(arm, secret, concealed, EVERYDAY, rng)
+
+
 def _bearings(truth: Truth) -> list[tuple[str, np.ndarray, float]]:
     """Joints 2 to 4, axes about which nothing gives yet, and the stiffness about their own."""
     k = np.array([s.stiffness for s in truth.springs])
@@ -166,8 +191,6 @@ def _measured(
 
 
 def limits(arm: Arm, simulation: Simulation) -> tuple[np.ndarray, np.ndarray]:
-    import tomllib
-
     table = tomllib.loads(arm.workspace)
     limits = table.get("joints_deg")
     if limits is None:

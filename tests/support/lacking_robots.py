@@ -97,7 +97,7 @@ def added(secret: Secret, kind: str, size: float, robot: Robot, rng: np.random.G
     k = np.array([s.stiffness for s in truth.springs])
     own = {name: float(truth.own(name) @ k) for name in truth.joint_names}
     damping_s = float(np.median([s.damping / s.stiffness for s in truth.springs]))
-    links = _children(root, truth.joint_names)
+    links = links_moved(root, truth.joint_names)
     if kind == "soft base":
         first = own[truth.joint_names[1]] * log_uniform(rng, 0.7, 4.0) / size
         tilts = first, first * log_uniform(rng, 0.7, 1.4)
@@ -115,7 +115,7 @@ def added(secret: Secret, kind: str, size: float, robot: Robot, rng: np.random.G
         secret = deviate(secret, beams=[BentLink(links[joint], bending, twist, damping_s)])
     elif kind == "hose":
         link = str(rng.choice(list(links.values())[1:]))
-        moving = _mass_that_moves(root)
+        moving = mass_that_moves(root)
         low, *_, high = truth.modes(np.mean([truth.lower_rad, truth.upper_rad], axis=0), 4)[0]
         small = AttachedResonator(
             link, triple(rng.uniform(0.3, 1.0) * beam_end(link, root)), triple(some_direction(rng)),
@@ -126,14 +126,14 @@ def added(secret: Secret, kind: str, size: float, robot: Robot, rng: np.random.G
     return secret
 
 
-def _mass_that_moves(root: ElementTree.Element) -> float:
+def mass_that_moves(root: ElementTree.Element) -> float:
     """Of all links but the one that stands on the floor, in kg."""
     carried = {child.get("link") for child in root.iterfind("joint/child")}
     moving = [link for link in root.findall("link") if link.get("name") in carried]
     return sum(float(m.get("value", 0)) for link in moving for m in link.iterfind("inertial/mass"))
 
 
-def _children(root: ElementTree.Element, joints: tuple[str, ...]) -> dict[str, str]:
+def links_moved(root: ElementTree.Element, joints: tuple[str, ...]) -> dict[str, str]:
     """The link that each joint moves."""
     found = {j.get("name", ""): j.find("child") for j in root.findall("joint")}
     return {name: str(found[name].get("link")) for name in joints}  # pyright: ignore

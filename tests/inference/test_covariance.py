@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.stats import ortho_group
 
-from planner.inference.least_squares import inverse
+from planner.inference.covariance import inverse
 
 
 def test_inverse_of_a_precision():
