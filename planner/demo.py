@@ -50,7 +50,7 @@ class Pool:
     def load(cls, folder: Path, joints: JointUnits | Sequence[str]) -> "Pool":
         """Read a recordings folder."""
         rows: dict[str, list[PoseRow]] = {}
-        for row in read_recordings(folder, joints).rows:
+        for row in read_recordings(folder, joints):
             rows.setdefault(row.pose, []).append(row)
         return cls(
             folder, JointUnits.of(joints), {pose: tuple(group) for pose, group in rows.items()}
@@ -123,7 +123,7 @@ def _summary(
     unused = [pose for pose in pool.rows if pose not in used]
     truth = _measured_hz(cell, pool, unused, progress)
     prediction = campaign.model.predict(pool.q(unused))
-    simulated = cell.simulate(pool.q(unused)).frequency_hz
+    simulated = cell.frozen.simulate(pool.q(unused)).frequency_hz
     inside = np.abs(truth - prediction.frequency_hz) <= Z_95 * prediction.frequency_sd_hz
     known = np.isfinite(truth)
     return DemonstrationReport(

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from planner.campaign import store
 from planner.campaign.deliveries import Delivery
 from planner.campaign.events import REFUSED, HitRecord, Imported
-from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.state import CampaignState
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
 from planner.recording.joints import JointUnits
@@ -31,6 +31,15 @@ class KeptFiles:
     fresh: tuple[Kept, ...]
     already: tuple[str, ...]
     left_out: tuple[HitRecord, ...]
+
+
+def record_of(source: Source, digest: str, suffix: str, reason: str) -> HitRecord:
+    """What the log keeps of a file, and of what is said of it; for a `reason` it is refused."""
+    return HitRecord(
+        source.name, digest, suffix, source.hit, source.repeat, not reason, reason,
+        hit_point=source.stated.hit_point, response_points=source.stated.response_points,
+        part=source.part, response=source.response, from_name=source.from_name,
+    )  # fmt: skip
 
 
 def at_their_poses(deliveries: tuple[Delivery, ...], state: CampaignState) -> tuple[Delivery, ...]:
@@ -67,7 +76,11 @@ def keep_files(
     """
     owner = _owners(state)
     known = state.measurements.get(delivery.pose)
-    withdrawn = _withdrawn(directory, known) if known is not None and known.withdrawn else ""
+    withdrawn = ""
+    if known is not None and known.withdrawn:
+        again = command("planner", "confirm", directory, known.pose)
+        withdrawn = f"{known.pose} was withdrawn; to use its hits again: {again}; else give the "
+        withdrawn += "new measurement another name"
     fresh: list[Kept] = []
     already, left_out, elsewhere = [], [], []
     seen: set[str] = set()
@@ -75,7 +88,7 @@ def keep_files(
         try:
             digest = store.recording_hash(source.path)
         except InputError as error:  # one bad file does not keep the others out
-            left_out.append(_left(source, "", str(error)))
+            left_out.append(record_of(source, "", "", str(error)))
             continue
         if owner.get(digest, delivery.pose) != delivery.pose:
             reason = (
@@ -84,12 +97,12 @@ def keep_files(
             )
             if len(delivery.sources) == 1 + len(elsewhere):
                 raise InputError(f"{source.path}: {reason}.")
-            elsewhere.append(_left(source, digest, reason))
+            elsewhere.append(record_of(source, digest, "", reason))
             continue
         named_itself = source.path in named
         reason = withdrawn or _reason_against(delivery, source, digest, named_itself, state)
         if reason:
-            left_out.append(_left(source, digest, reason))
+            left_out.append(record_of(source, digest, "", reason))
         elif digest in owner or (digest in seen and not source.part):
             already.append(source.name)
         else:
@@ -100,29 +113,12 @@ def keep_files(
     return KeptFiles(tuple(fresh), tuple(already), (*left_out, *elsewhere))
 
 
-def _withdrawn(directory: Path, known: Measurement) -> str:
-    """How to get the hits of a withdrawn pose back."""
-    again = command("planner", "confirm", directory, known.pose)
-    return (
-        f"{known.pose} was withdrawn; to use its hits again: {again}; else give the new "
-        f"measurement another name"
-    )
-
-
-@dataclass(frozen=True)
-class Superseded:
-    """An earlier hit that a newer file takes the place of, and why."""
-
-    hit: HitRecord
-    why: str
-
-
-def superseded(before: Sequence[HitRecord], sources: Sequence[Source]) -> tuple[Superseded, ...]:
-    """Which hits of a pose newer files take the place of.
+def superseded(before: Sequence[HitRecord], sources: Sequence[Source]) -> dict[HitRecord, str]:
+    """Which hits of a pose newer files take the place of, and why.
 
     Those written over, and those of the same name for the same axis and repeat of a table.
     """
-    found = []
+    found = {}
     for hit in before:
         name = hit.file.rpartition(" (hit ")[0] if hit.part else hit.file
         for source in sources:
@@ -132,9 +128,9 @@ def superseded(before: Sequence[HitRecord], sources: Sequence[Source]) -> tuple[
             elif (source.hit, source.repeat) != (hit.hit, hit.repeat):
                 same = False
             if same:
-                found.append(Superseded(hit, f"{REPLACED} {Path(name).name}"))
+                found[hit] = f"{REPLACED} {Path(name).name}"
                 break
-    return tuple(found)
+    return found
 
 
 def stated_otherwise(source: Source, record: HitRecord) -> bool:
@@ -156,7 +152,7 @@ def let_go(delivery: Delivery, held: Imported, joints: JointUnits) -> tuple[HitR
     if delivery.pose != held.pose:
         return () if delivery.said and not lacking else None
     both = ((brought[hit.sha256], hit) for hit in held.hits if hit.sha256 in brought)
-    gone = [one.hit for one in superseded(lacking, delivery.sources)]
+    gone = superseded(lacking, delivery.sources)
     stood = delivery.joints_deg
     moved = stood is not None and joints.apart(held.joints_deg, stood)
     anew = gone or moved or any(stated_otherwise(*one) for one in both)
@@ -200,10 +196,6 @@ def _digest(source: Source) -> str:
         return ""
 
 
-def _left(source: Source, digest: str, reason: str) -> HitRecord:
-    return HitRecord(source.name, digest, "", source.hit, source.repeat, False, reason)
-
-
 def _reason_against(
     delivery: Delivery, source: Source, digest: str, named: bool, state: CampaignState
 ) -> str:
@@ -219,7 +211,7 @@ def _reason_against(
         if any(hit.sha256 == digest for hit in held.hits):
             return ""
         return f"hits of {pose} wait for an answer: {held.question.text if held.question else ''}"
-    certain = delivery.by_table or (delivery.said and named)
+    certain = bool(delivery.row) or (delivery.said and named)
     shown = state.came(digest, pose)
     if shown != pose and not certain:
         return (

@@ -8,7 +8,7 @@ import numpy as np
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.frequencies_by_simulation import TunedFrequencies, tuned_frequencies
-from planner.campaign.hit_error_estimates import estimate, visits_of
+from planner.campaign.hit_error_estimates import Visited, estimate
 from planner.campaign.labels import LabelledPose, label, observations
 from planner.campaign.low_fidelity import LowFidelity, Recall, in_memory, learn
 from planner.campaign.model import FrfOf, Model
@@ -56,7 +56,10 @@ def build(
             seen = tuple(f.within(table.band_hz) for f in frfs)
             tuned = tuned_frequencies(simulation, seen, q, table.band_hz, cell.tolerances, count)
         if hits is not None and low.learned is not None:
-            visits = visits_of(joints, used, hits, frfs)
+            visits = [
+                Visited(one, h.columns, m.pose, tuple(hit.file for hit in m.accepted), f)
+                for one, m, h, f in zip(q, used, hits, frfs, strict=True)
+            ]
             errors = estimate(visits, low.learned, cell.tolerances, table.band_hz)
     fits = low.learned is None or low.learned.fits
     candidates = [_Guided.by(cell, used, low, tuned if fits else None)]

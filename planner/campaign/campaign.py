@@ -9,25 +9,8 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from planner.campaign import store
+from planner.campaign import events, store
 from planner.campaign.config import load_campaign_config
-from planner.campaign.events import (
-    REFUSED,
-    AnyEvent,
-    Configured,
-    Confirmed,
-    Entry,
-    FilesPlaced,
-    FilesShown,
-    Imported,
-    Proposal,
-    Proposed,
-    Refused,
-    Skipped,
-    Starred,
-    Undone,
-    Withdrawn,
-)
 from planner.campaign.journal import remove_parts
 from planner.campaign.reads import CampaignReads, as_logged
 from planner.campaign.taking_back import gave_way_to, last_acts, last_undone
@@ -56,7 +39,7 @@ class Campaign(CampaignReads):
         store.create_folder(Path(directory), Path(robot_toml), own, _first_entry)
         return cls(directory)
 
-    def next(self, count: int = 1, acquisition: str | None = None) -> tuple[Proposal, ...]:
+    def next(self, count: int = 1, acquisition: str | None = None) -> tuple[events.Proposal, ...]:
         """The next poses to measure; the same ones until something changes.
 
         Raises NoPoseLeftError when no reachable pose is left.
@@ -72,7 +55,7 @@ class Campaign(CampaignReads):
             if same and len(state.open) >= count:
                 return tuple(state.proposals[pose] for pose in state.open[:count])
             proposals = propose(self.model, state, count, name)
-            self._append(Proposed(name, count, proposals))
+            self._append(events.Proposed(name, count, proposals))
             return proposals
 
     def import_paths(
@@ -104,7 +87,10 @@ class Campaign(CampaignReads):
             )
             deliveries = at_their_poses(deliveries, self.state)
             if from_names:
-                deliveries = tuple(delivery.placed_by_names() for delivery in deliveries)
+                deliveries = tuple(
+                    replace(d, sources=tuple(replace(s, from_name=True) for s in d.sources))
+                    for d in deliveries
+                )
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
             named = frozenset(path for path in given if path.is_file())
             reports = []
@@ -130,7 +116,7 @@ class Campaign(CampaignReads):
         with self._acting():
             if paths:
                 hits = refusals(self.directory, paths, reasons or {}, stated or {})
-                self._append(Refused(pose, hits))
+                self._append(events.Refused(pose, hits))
 
     def confirm(self, pose: str) -> "ImportReport":
         """Held hits are from their pose indeed, or those of a withdrawn one good: they are used."""
@@ -141,7 +127,7 @@ class Campaign(CampaignReads):
             known, before = self.state.measurements.get(pose), self.model
             if known is None or not known.withdrawn:
                 self._held(pose)
-            self._append(Confirmed(pose))
+            self._append(events.Confirmed(pose))
             found = self.state.measurements[pose]
             return ImportReport(
                 pose, found.accepted, (), (), found, None, before, self.model,
@@ -155,51 +141,51 @@ class Campaign(CampaignReads):
 
         with self._acting():
             entry, event = self._held(pose)
-            sources = tuple(self.source_of(hit) for hit in event.hits)
+            sources = tuple(self.recordings.source(hit) for hit in event.hits)
             delivery = Delivery(other, None, sources)
             joints_deg = place(self.cell, self.state, delivery)
             if other in self.state.held:
                 raise InputError(f"Hits of {other} wait for an answer too; answer that first.")
-            self._append(Undone(entry.seq, gives_way=True))
+            self._append(events.Undone(entry.seq, gives_way=True))
             return self._import_pose(delivery, joints_deg, frozenset(s.path for s in sources))
 
-    def refuse_held(self, pose: str, reason: str = REFUSED) -> None:
+    def refuse_held(self, pose: str, reason: str = events.REFUSED) -> None:
         """The held hits of a pose are set aside, as if they had been refused when they came."""
         with self._acting():
             entry, event = self._held(pose)
             # In this order: stopped in between, the hits are asked for again.
-            self._append(Undone(entry.seq, gives_way=True))
+            self._append(events.Undone(entry.seq, gives_way=True))
             refused = (msgspec.structs.replace(h, accepted=False) for h in event.hits)
             asked = event.question
             why = f"{reason}; held before: {asked.text}" if asked else reason
             hits = (msgspec.structs.replace(h, reason=h.reason or why) for h in refused)
-            self._append(Refused(pose, tuple(hits)))
+            self._append(events.Refused(pose, tuple(hits)))
 
     def withdraw(self, pose: str, reason: str = "") -> None:
         """Set a measured pose aside, or held hits; the recordings stay."""
         if pose in self.state.held:
-            return self.refuse_held(pose, reason or REFUSED)
+            return self.refuse_held(pose, reason or events.REFUSED)
         with self._acting():
             measurement = self.state.hit_at(pose)
             if measurement is None or measurement.withdrawn:
                 raise InputError(f"Pose {pose} is not among the measured ones; see planner status.")
-            self._append(Withdrawn(pose, reason))
+            self._append(events.Withdrawn(pose, reason))
 
     def skip(self, pose: str, reason: str = "", neighbours: bool = False) -> None:
         """A proposed pose shall not be measured: never offered again, nor its `neighbours`."""
         with self._acting():
             if pose not in self.state.open:
                 raise InputError(f"Pose {pose} is not an open proposal; see planner status.")
-            self._append(Skipped(pose, reason, neighbours))
+            self._append(events.Skipped(pose, reason, neighbours))
 
     def star(self, pose: str) -> None:
         """Mark a pose as worth a second look."""
         with self._acting():
             if pose not in self.state.measurements and pose not in self.state.proposals:
                 raise InputError(f"Pose {pose} is not known; see planner status.")
-            self._append(Starred(pose))
+            self._append(events.Starred(pose))
 
-    def undo(self, decisions_only: bool = False) -> tuple[Entry, ...]:
+    def undo(self, decisions_only: bool = False) -> tuple[events.Entry, ...]:
         """Take back the last act (proposal, import, answer, refusal, withdrawal, skip, star).
 
         With `decisions_only` the last that is no proposal; those that followed it go with it and
@@ -210,12 +196,12 @@ class Campaign(CampaignReads):
             if not acts:
                 raise InputError(f"{self.directory} holds no act that could be taken back.")
             for entry in acts:
-                self._append(Undone(entry.seq))
+                self._append(events.Undone(entry.seq))
                 for gave_way in gave_way_to(self.entries, entry):
-                    self._append(Undone(gave_way.seq))
+                    self._append(events.Undone(gave_way.seq))
             return acts
 
-    def redo(self) -> tuple[Entry, ...]:
+    def redo(self) -> tuple[events.Entry, ...]:
         """Let hold again what `undo` took back last, while nothing else was decided since.
 
         The entries that hold again; proposals made since are taken back, as they followed.
@@ -228,8 +214,8 @@ class Campaign(CampaignReads):
                     f"act followed can be done again."
                 )
             for entry in (*since, *undone):
-                self._append(Undone(entry.seq))
-            acts = (e.event.act for e in undone if isinstance(e.event, Undone))
+                self._append(events.Undone(entry.seq))
+            acts = (e.event.act for e in undone if isinstance(e.event, events.Undone))
             return tuple(self.entries[act - 1] for act in acts)
 
     def show(self, pose: str, files: Sequence[str], at: str = "") -> None:
@@ -239,12 +225,12 @@ class Campaign(CampaignReads):
         """
         with self._acting():
             if new := tuple(file for file in files if file not in self.state.shown):
-                self._append(FilesShown(pose, new, at))
+                self._append(events.FilesShown(pose, new, at))
 
     def place(self, pose: str, files: Sequence[str]) -> None:
         """The engineer says that files (sha256) shown elsewhere were hit at this pose."""
         with self._acting():
-            self._append(FilesPlaced(pose, tuple(files)))
+            self._append(events.FilesPlaced(pose, tuple(files)))
 
     def holding(self):
         """A context in which nobody else can act in this campaign; InputError names who does."""
@@ -260,7 +246,7 @@ class Campaign(CampaignReads):
             self._log_configuration()
             yield
 
-    def _append(self, event: AnyEvent) -> Entry:
+    def _append(self, event: events.AnyEvent) -> events.Entry:
         return self._journal.append(event)
 
     def _log_configuration(self) -> None:
@@ -274,14 +260,14 @@ class Campaign(CampaignReads):
             store.keep_robot_files(self.directory, configured.robot)
             self._append(configured)
 
-    def _held(self, pose: str) -> tuple[Entry, Imported]:
+    def _held(self, pose: str) -> tuple[events.Entry, events.Imported]:
         """The import that is held at a pose; InputError if none is."""
         if pose not in self.state.held:
             raise InputError(f"No hits of pose {pose} wait for an answer; see planner status.")
         found = [
             (e, e.event)
             for e in self.entries
-            if isinstance(e.event, Imported) and e.event.pose == pose and e.event.question
+            if isinstance(e.event, events.Imported) and e.event.pose == pose and e.event.question
         ]
         return found[-1]
 
@@ -296,8 +282,8 @@ class Campaign(CampaignReads):
             entry, event = self._held(held_at)
             lacking = let_go(delivery, event, self.cell.robot.joints)
             if lacking is not None:
-                self._append(Undone(entry.seq, gives_way=True))
-                more = tuple(self.source_of(hit) for hit in lacking)
+                self._append(events.Undone(entry.seq, gives_way=True))
+                more = tuple(self.recordings.source(hit) for hit in lacking)
                 delivery = replace(delivery, sources=(*delivery.sources, *more))
         return delivery
 
@@ -305,8 +291,7 @@ class Campaign(CampaignReads):
         self, delivery: "Delivery", joints_deg: tuple[float, ...], named: frozenset[Path]
     ) -> "ImportReport":
         from planner.campaign.arrivals import keep_files
-        from planner.campaign.asking import NewHits, asked_of
-        from planner.campaign.contradictions import contradiction
+        from planner.campaign.contradictions import asked_of, contradiction
         from planner.campaign.importing import (
             ImportReport,
             JudgedFiles,
@@ -340,10 +325,10 @@ class Campaign(CampaignReads):
         if old and not judged.superseded:
             alone = measure_files((), fresh, table)[1]
         modes, new_modes = from_modal(measured.modal), from_modal(alone.modal)
-        new = NewHits(pose, joints_deg, alone)
-        asked = contradiction(pose, measured, len(old)) or asked_of(before, state, new)
+        asked = contradiction(pose, measured, len(old))
+        asked = asked or asked_of(before, state, pose, joints_deg, alone)
         drift = None if asked else suspected(before, state, pose, joints_deg, new_modes)
-        event = Imported(
+        event = events.Imported(
             pose=pose,
             joints_deg=joints_deg,
             hits=hits,
@@ -352,7 +337,7 @@ class Campaign(CampaignReads):
             amplitude=from_homogeneity(measured.homogeneity),
             question=asked,
             again=drift.again if drift else "",
-            replaced=tuple((one.hit.sha256, one.why) for one in judged.superseded),
+            replaced=tuple((hit.sha256, why) for hit, why in judged.superseded.items()),
         )
         told = alerts(before, state, event, measured, new_modes, drift)
         self._append(event)
@@ -376,7 +361,7 @@ class Campaign(CampaignReads):
                 *hits_of_files(measured.verdicts[len(old) :]),
                 *measured.remarks,
                 *told,
-                *(f"{one.hit.file} is set aside, {one.why}." for one in judged.superseded),
+                *(f"{hit.file} is set aside, {why}." for hit, why in judged.superseded.items()),
                 *taken_after_all(state, fresh),
                 *displacement(self.cell.robot.joints, state, delivery, stood),
                 *lacking(state, measurement),
@@ -402,5 +387,5 @@ def _first_entry(directory: Path) -> bytes:
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
     units = cell.robot.joints.declared
-    event = Configured(as_logged(config), hashes, __version__, units)
-    return encode_line("", Entry(1, now, event))[0]
+    event = events.Configured(as_logged(config), hashes, __version__, units)
+    return encode_line("", events.Entry(1, now, event))[0]

@@ -1,7 +1,6 @@
 """What stays the same while a campaign is measured: robot, simulation, workspace, candidates."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +14,6 @@ from planner.campaign.low_fidelity import LowFidelity
 from planner.check.examine import Examination, Plan, examine
 from planner.design.propose import check_name
 from planner.dynamics.simulation import Simulation
-from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
 from planner.measurement.nuisances import Tolerances
 from planner.milling.cut import Cut, load_cut
@@ -51,10 +49,14 @@ class Cell:
         check_name(config.acquisition.name, "campaign.toml, [acquisition] name")
         chosen, simulated = config.surrogate, config.fidelity.simulation != "none"
         check_choice(chosen.model, chosen.kernel, simulated, "campaign.toml, [surrogate]")
-        robot = _handled(robot or Robot.load(robot_toml), config)
+        robot = robot or Robot.load(robot_toml)
+        if given := config.of_the_cell():  # of hits, sensor, readback and diagnosis
+            robot = replace(robot, config=msgspec.structs.replace(robot.config, **given))
         simulation = Simulation(robot) if simulated else None
-        with _of_campaign_toml():
+        try:
             workspace = Workspace.from_table(config.workspace, robot)
+        except InputError as error:  # which names an entry of the file only
+            raise InputError(f"campaign.toml: {error}") from None
         _check_angles(robot, config)
         cut = _cut_of(robot_toml, config)
         return cls(config, robot, simulation, workspace, cut=cut)
@@ -99,7 +101,7 @@ class Cell:
     @property
     def spread(self) -> int:
         """How many of the candidates, the first ones, are spread evenly over the workspace."""
-        return len(self._spread.q) if self._own else len(self.candidates.q)
+        return len(self._spread.q)
 
     @property
     def _own(self) -> list[list[float]]:
@@ -136,10 +138,6 @@ class Cell:
         """The simulation as robot.toml states it."""
         return LowFidelity(self.config.modes.count, self.simulation, self.tolerances)
 
-    def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
-        """What the simulation of robot.toml says at q (n, dof) in rad; see `LowFidelity`."""
-        return self.frozen.simulate(q, more)
-
     def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
         """The pose in rad (m); InputError if the robot cannot stand there."""
         return checked_pose(self.robot, joints_deg, where)
@@ -150,15 +148,6 @@ class Cell:
         for number, row in enumerate(angles, 1):
             self.check_pose(tuple(row), f"joints_deg, pose {number}")
         return self.robot.joints.internal(angles)
-
-
-@contextmanager
-def _of_campaign_toml() -> Iterator[None]:
-    """Name the file in an InputError that names an entry of campaign.toml only."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"campaign.toml: {error}") from None
 
 
 def checked_pose(robot: Robot, joints_deg: Sequence[float], where: str) -> np.ndarray:
@@ -214,12 +203,6 @@ def _cut_of(robot_toml: Path, config: CampaignConfig) -> Cut | None:
             f"campaign.toml, or state the feed."
         )
     return cut
-
-
-def _handled(robot: Robot, config: CampaignConfig) -> Robot:
-    """The robot with what campaign.toml says of hits, sensor, readback and diagnosis."""
-    given = config.of_the_cell()
-    return replace(robot, config=msgspec.structs.replace(robot.config, **given)) if given else robot
 
 
 def examine_robot(robot_toml: Path, campaign_toml: Path | None = None) -> Examination:

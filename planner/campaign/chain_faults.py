@@ -100,12 +100,13 @@ def _turned() -> tuple[ChainFault, ...]:
 
 def _scaled(channels: tuple[int, ...]) -> tuple[ChainFault, ...]:
     large = np.exp(np.arange(LEAST, MOST, STEP))
-    found = []
-    for factor in (*(1 / large), *large):
-        diagonal = np.ones(3)
-        diagonal[list(channels)] = factor
-        found.append(ChainFault(np.diag(diagonal), channels, float(factor)))
-    return tuple(found)
+    return tuple(_times(channels, float(factor)) for factor in (*(1 / large), *large))
+
+
+def _times(channels: tuple[int, ...], factor: float) -> ChainFault:
+    diagonal = np.ones(3)
+    diagonal[list(channels)] = factor
+    return ChainFault(np.diag(diagonal), channels, factor)
 
 
 def fitted(matrix: np.ndarray) -> Iterator[ChainFault]:
@@ -116,9 +117,7 @@ def fitted(matrix: np.ndarray) -> Iterator[ChainFault]:
     for channels in ((0, 1, 2), (0,), (1,), (2,)):
         factor = float(np.median(np.diag(matrix)[list(channels)]))
         if factor > 0 and abs(np.log(factor)) > LEAST:
-            diagonal = np.ones(3)
-            diagonal[list(channels)] = factor
-            yield ChainFault(np.diag(diagonal), channels, factor)
+            yield _times(channels, factor)
     rotation, _ = polar(matrix)
     if np.linalg.det(rotation) > 0:
         yield ChainFault(rotation)

@@ -96,19 +96,15 @@ class Draws:
         many = [np.repeat(one, DRAWS, axis=0) for one in (m.mass, m.hit, m.sensor)]
         solved = solve_poles(many[0], c, k + m.geometric, many[1], many[2])
         each = (s**2 / (s - solved.poles[..., None])) @ _width(at)
-        drawn = self._with_more(np.imag(np.einsum("nmij,nm->nij", solved.residues, each)))
+        drawn = np.imag(np.einsum("nmij,nm->nij", solved.residues, each))
+        # With a mode more, of which the simulation knows nothing.
+        size = np.sqrt(np.abs(np.diagonal(drawn, axis1=1, axis2=2)))
+        more = MORE * np.random.default_rng(SEED + 1).standard_normal((len(drawn), 3)) * size
+        drawn = drawn + more[:, :, None] * more[:, None]
         width = _width(frf.frequency_hz)
         noise = np.sqrt(np.nan_to_num(frf.variance[:, known]) @ width**2 / 2)
         measured = np.imag(frf.accelerance[:, known]) @ width
         return Sums(measured, noise, drawn[:, :, known], self.tolerances)
-
-    @staticmethod
-    def _with_more(drawn: np.ndarray) -> np.ndarray:
-        """Sums (n, 3, 3) with a mode more, of which the simulation knows nothing."""
-        rng = np.random.default_rng(SEED + 1)
-        size = np.sqrt(np.abs(np.diagonal(drawn, axis1=1, axis2=2)))
-        shape = MORE * rng.standard_normal((len(drawn), 3)) * size
-        return drawn + shape[:, :, None] * shape[:, None]
 
 
 def _width(frequency_hz: np.ndarray) -> np.ndarray:

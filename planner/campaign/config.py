@@ -1,5 +1,6 @@
 """campaign.toml: what the engineer decided, as typed tables."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
@@ -169,50 +170,60 @@ def config_from_builtins(data: Any) -> CampaignConfig:
 
 def check_config(config: CampaignConfig, path: Path) -> None:
     """InputError where entries make no sense by themselves; `path` is named there."""
-    w = config.workspace
-    if (w.joints_deg is None) == (w.position_m is None):
-        raise InputError(
-            f"{path}: [workspace] needs either joints_deg or position_m; give exactly one of them."
-        )
-    if w.joints_deg is not None and (w.tool_axis or w.rotation_deg):
-        raise InputError(
-            f"{path}: [workspace] tool_axis and rotation_deg belong to position_m; remove them."
-        )
-    if w.position_m is not None and (len(w.position_m) != 3 or w.tool_axis is None):
-        raise InputError(
-            f"{path}: [workspace] position_m needs ranges of x, y, z and a tool_axis; add them."
-        )
+    for text in _wrong(config):
+        raise InputError(f"{path}: {text}")
+    for name, table in config.of_the_cell().items():
+        check_sds(table, f"{path}: [{name}]")
+
+
+def _wrong(config: CampaignConfig) -> Iterator[str]:
+    """What makes no sense, a sentence each; later ones rely on what earlier ones ask for."""
+    yield from _of_workspace(config.workspace)
     for name, number, (low, high) in _ranges(config):
         if not (abs(low) < 1e6 and abs(high) < 1e6 and low <= high):
             which = f", range {number}" if number else ""
-            raise InputError(
-                f"{path}: {name}{which} is [{low:g}, {high:g}]; give finite numbers, the lower "
-                f"one first."
-            )
+            yield f"{name}{which} is [{low:g}, {high:g}]; give finite numbers, the lower one first."
     band = config.modes.band_hz
     if not 0 < band[0] < band[1]:
-        raise InputError(f"{path}: [modes] band_hz {list(band)} must rise from above 0 Hz.")
-    _check_choices(config, path)
-    for name, table in config.of_the_cell().items():
-        check_sds(table, f"{path}: [{name}]")
-    limits = [
-        ("[cost] speed_share", config.cost.speed_share, 1e-3, 1.0),
-        ("[cost] minutes_per_pose", config.cost.minutes_per_pose, 0.0, 1e3),
-        ("[cost] minutes_per_hit", config.cost.minutes_per_hit, 1e-3, 1e3),
-        ("[cost] hits_per_axis", config.cost.hits_per_axis, 1, 100),
-        ("[cost] minutes_per_sensor", config.cost.minutes_per_sensor, 1e-3, 1e3),
-        ("[stop] probability", config.stop.probability, 0.5, 0.999),
+        yield f"[modes] band_hz {list(band)} must rise from above 0 Hz."
+    yield from _of_choices(config)
+    for name, value, low, high in _limits(config):
+        if not low <= value <= high:
+            yield f"{name} is {value}; it must lie between {low:g} and {high:g}."
+
+
+def _of_workspace(w: WorkspaceTable) -> Iterator[str]:
+    if (w.joints_deg is None) == (w.position_m is None):
+        yield "[workspace] needs either joints_deg or position_m; give exactly one of them."
+    if w.joints_deg is not None and (w.tool_axis or w.rotation_deg):
+        yield "[workspace] tool_axis and rotation_deg belong to position_m; remove them."
+    if w.position_m is not None and (len(w.position_m) != 3 or w.tool_axis is None):
+        yield "[workspace] position_m needs ranges of x, y, z and a tool_axis; add them."
+
+
+def _limits(config: CampaignConfig) -> list[tuple[str, float, float, float]]:
+    """Numbers with their least and largest values."""
+    cost, stop, chosen = config.cost, config.stop, config.acquisition
+    cut = [
+        ("[cut] speed_rpm", config.cut.speed_rpm, 1.0, 1e6),
+        ("[cut] depth_m", config.cut.depth_m, 1e-9, 1.0),
+    ] if config.cut else []  # fmt: skip
+    return [
+        *cut,
+        ("[cost] speed_share", cost.speed_share, 1e-3, 1.0),
+        ("[cost] minutes_per_pose", cost.minutes_per_pose, 0.0, 1e3),
+        ("[cost] minutes_per_hit", cost.minutes_per_hit, 1e-3, 1e3),
+        ("[cost] hits_per_axis", cost.hits_per_axis, 1, 100),
+        ("[cost] minutes_per_sensor", cost.minutes_per_sensor, 1e-3, 1e3),
+        ("[stop] probability", stop.probability, 0.5, 0.999),
         ("[modes] count", config.modes.count, 1, 20),
         ("[modes] window_rate_1_s", config.modes.window_rate_1_s, 0.0, 1000.0),
-        ("[acquisition] candidates", config.acquisition.candidates, 10, 20_000),
-        ("[stop] frequency_sd_percent", config.stop.frequency_sd_percent, 1e-6, 100.0),
-        ("[stop] measurements_min", config.stop.measurements_min, 0, 1000),
-        ("[stop] measurements_max", config.stop.measurements_max, 1, 1000),
-        ("[acquisition] singularity_margin", config.acquisition.singularity_margin, 0.0, 1.0),
+        ("[acquisition] candidates", chosen.candidates, 10, 20_000),
+        ("[stop] frequency_sd_percent", stop.frequency_sd_percent, 1e-6, 100.0),
+        ("[stop] measurements_min", stop.measurements_min, 0, 1000),
+        ("[stop] measurements_max", stop.measurements_max, 1, 1000),
+        ("[acquisition] singularity_margin", chosen.singularity_margin, 0.0, 1.0),
     ]
-    for name, value, low, high in limits:
-        if not low <= value <= high:
-            raise InputError(f"{path}: {name} is {value}; it must lie between {low} and {high}.")
 
 
 def _ranges(config: CampaignConfig) -> list[tuple[str, int, tuple[float, float]]]:
@@ -225,57 +236,41 @@ def _ranges(config: CampaignConfig) -> list[tuple[str, int, tuple[float, float]]
     ]  # fmt: skip
     for name, ranges in several:
         found += [(name, number, one) for number, one in enumerate(ranges or (), 1)]
-    for name, one in (
-        ("[workspace] rotation_deg", w.rotation_deg),
-        ("[acquisition] hammer_height_m", config.acquisition.hammer_height_m),
-        ("[goal] band_hz", config.goal.band_hz),
-    ):
+    for name, one in (("[workspace] rotation_deg", w.rotation_deg), *_rising(config)):
         found += [(name, 0, one)] if one else []
     return found
 
 
-def _check_choices(config: CampaignConfig, path: Path) -> None:
-    weights, count = config.acquisition.mode_weights, config.modes.count
+def _rising(config: CampaignConfig) -> tuple[tuple[str, tuple[float, float] | None], ...]:
+    height = "[acquisition] hammer_height_m", config.acquisition.hammer_height_m
+    return height, ("[goal] band_hz", config.goal.band_hz)
+
+
+def _of_choices(config: CampaignConfig) -> Iterator[str]:
+    chosen, count = config.acquisition, config.modes.count
+    weights = chosen.mode_weights
     if weights is not None and (len(weights) != count or min(weights) < 0 or not sum(weights) > 0):
-        raise InputError(
-            f"{path}: [acquisition] mode_weights needs {count} numbers from 0 up, not all of them "
-            f"0; correct it."
+        yield (
+            f"[acquisition] mode_weights needs {count} numbers from 0 up, not all of them 0; "
+            f"correct it."
         )
     for name, poses in (
-        ("[acquisition] own_poses_deg", config.acquisition.own_poses_deg),
+        ("[acquisition] own_poses_deg", chosen.own_poses_deg),
         ("[goal] joints_deg", config.goal.joints_deg),
     ):
         if poses is not None and (not poses or len({len(pose) for pose in poses}) != 1):
-            raise InputError(f"{path}: {name} needs one list of joint angles a pose; correct it.")
-    height, band = config.acquisition.hammer_height_m, config.goal.band_hz
-    for name, range_ in (("[acquisition] hammer_height_m", height), ("[goal] band_hz", band)):
+            yield f"{name} needs one list of joint angles a pose; correct it."
+    for name, range_ in _rising(config):
         if range_ is not None and not range_[0] < range_[1]:
-            raise InputError(f"{path}: {name} {list(range_)} must rise; correct it.")
-    if config.acquisition.own_only and not config.acquisition.own_poses_deg:
-        raise InputError(f"{path}: [acquisition] own_only needs own_poses_deg; add them.")
-    _check_cut(config, path)
+            yield f"{name} {list(range_)} must rise; correct it."
+    if chosen.own_only and not chosen.own_poses_deg:
+        yield "[acquisition] own_only needs own_poses_deg; add them."
+    if not config.cut and chosen.name == "stability":
+        yield 'acquisition "stability" needs [cut] with speed_rpm and depth_m; add it.'
+    if config.cut and config.cut.joints_deg is not None and not config.cut.joints_deg:
+        yield "[cut] joints_deg names no pose; add some, or leave it out."
     for zone in config.forbidden:
         if (zone.position_m is None) == (zone.joints_deg is None):
-            raise InputError(
-                f"{path}: [[forbidden]] needs either position_m or joints_deg; give one of them."
-            )
+            yield "[[forbidden]] needs either position_m or joints_deg; give one of them."
         if zone.position_m is not None and len(zone.position_m) != 3:
-            raise InputError(f"{path}: [[forbidden]] position_m needs ranges of x, y, z.")
-
-
-def _check_cut(config: CampaignConfig, path: Path) -> None:
-    cut = config.cut
-    if cut is msgspec.UNSET:
-        if config.acquisition.name == "stability":
-            raise InputError(
-                f'{path}: acquisition "stability" needs [cut] with speed_rpm and depth_m; add it.'
-            )
-        return
-    for name, value, low, high in (
-        ("speed_rpm", cut.speed_rpm, 1.0, 1e6),
-        ("depth_m", cut.depth_m, 1e-9, 1.0),
-    ):
-        if not low <= value <= high:
-            raise InputError(f"{path}: [cut] {name} is {value}; give {low:g} to {high:g}.")
-    if cut.joints_deg is not None and not cut.joints_deg:
-        raise InputError(f"{path}: [cut] joints_deg names no pose; add some, or leave it out.")
+            yield "[[forbidden]] position_m needs ranges of x, y, z."

@@ -1,13 +1,37 @@
-"""Hits of a pose that contradict each other, where nothing tells which of them is right."""
+"""What the engineer is asked of a pose's new hits before they are believed, one thing at a time."""
 
 from collections.abc import Iterable
 from pathlib import Path
 
+from planner.campaign.chain_question import chain_question
 from planner.campaign.events import Question
+from planner.campaign.model import Model
+from planner.campaign.question import question
+from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.recording.records import Hit
 from planner.recording.repeat_sizes import other_size
 from planner.recording.repeats import Doubt, doubts
+
+
+def asked_of(
+    model: Model,
+    state: CampaignState,
+    pose: str,
+    joints_deg: tuple[float, ...],
+    measured: MeasuredPose,
+) -> Question | None:
+    """Of the first pose's hits whether the chain can be so; of others, whether pose and chain can.
+
+    `measured` is of the new hits alone; `model` and `state` are those before the import; None:
+    nothing is asked.
+    """
+    known = state.measurements.get(pose)
+    if known is not None and known.question is not None:  # answered
+        return None
+    if not model.labelled:
+        return chain_question(model, pose, joints_deg, measured.frf)
+    return question(model, state, pose, joints_deg, measured)
 
 
 def contradiction(pose: str, measured: MeasuredPose, known: int) -> Question | None:

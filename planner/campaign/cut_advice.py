@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from planner.campaign.toolpath_poses import TURNS_DEG, Travelled
@@ -101,7 +102,8 @@ def turn_advice(travelled: Travelled, cut: Cut, rpm: float, tell: Tell = quietly
     """At a speed in rpm, of each pose and angle."""
     found = [(i, turn, q) for i in range(len(travelled.q)) for turn, q in travelled.turned(i)]
     depth = np.full((len(travelled.q), len(TURNS_DEG)), np.nan)
-    poses = travelled.standing(found).structures_with_feed(cut)
+    # With the feeds as they are in the base frame, whatever the cut says.
+    poses = travelled.standing(found).structures(msgspec.structs.replace(cut, feed_in="path"))
     for k, ((i, turn, _), (_, structure)) in enumerate(zip(found, poses, strict=True)):
         depth[i, int(np.argmin(np.abs(TURNS_DEG - turn)))] = limit_at(structure, cut, rpm)
         tell("turns", (k + 1) / len(found))

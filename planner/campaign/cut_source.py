@@ -70,13 +70,6 @@ class Asked:
             raise InputError(f"--{UNCHANGED.replace('_', '-', 2)}")
         return opened.struck_with(self.peak_force_n)
 
-    def check(self) -> None:
-        """InputError where options of a tool are given without one."""
-        if self.tool is None and (self.reference or self.robot or self.noise):
-            raise InputError(
-                "--reference, --robot and --noise go with --tool; name the tool that is put on."
-            )
-
 
 @dataclass(frozen=True, eq=False)
 class ToolChange:
@@ -91,8 +84,11 @@ class ToolChange:
         """None where no tool is named; InputError where its file and the cut's disagree."""
         from planner.milling.tool_file import load_tool
 
-        asked.check()
         if asked.tool is None:
+            if asked.reference or asked.robot or asked.noise:
+                raise InputError(
+                    "--reference, --robot and --noise go with --tool; name the tool that is put on."
+                )
             return None
         target = load_tool(asked.tool)
         tested = None if asked.reference is None else load_tool(asked.reference)
@@ -161,11 +157,12 @@ def structures_of_file(asked: Asked, cut: Cut) -> list[tuple[str, Structure]]:
     change = ToolChange.of(asked, cut)
     no_pose(cut, asked.source)
     names = names_in(asked.source)
-    if change is not None:
-        return [(name or asked.source.stem, _coupled(asked, change, name, cut)) for name in names]
-    return [
-        (name or asked.source.stem, of_frf(read_frf(asked.source, name), cut)) for name in names
-    ]
+    each = (
+        of_frf(read_frf(asked.source, name), cut)
+        if change is None else _coupled(asked, change, name, cut)
+        for name in names
+    )  # fmt: skip
+    return list(zip([name or asked.source.stem for name in names], each, strict=True))
 
 
 def _coupled(asked: Asked, change: ToolChange, pose: str | None, cut: Cut) -> Structure:

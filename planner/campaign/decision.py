@@ -12,13 +12,12 @@ from planner.design.frequency_posterior import FrequencyOutputs, Margins
 from planner.design.stability import share_left, stability, with_margins
 from planner.errors import InputError
 from planner.frf.synthesis import frequency_lines
-from planner.milling.cut import Cut, cuts_at
+from planner.milling.cut import cuts_at
 from planner.milling.cutter_frf import of_accelerance
 from planner.milling.path import PoseDecision, decide
 from planner.milling.structure import of_frf
 
 if TYPE_CHECKING:
-    from planner.campaign.config import CutTable
     from planner.campaign.model import Model
 
 POSES = 16  # of the workspace at which a cut is looked at, where no path is given
@@ -60,28 +59,19 @@ def decided(model: "Model") -> Decision | None:
     table, cut = cell.config.cut, cell.cut
     if table is msgspec.UNSET or cut is None:
         return None
-    q = _poses(model, table)
+    if table.joints_deg is not None:
+        q = cell.robot.joints.internal(table.joints_deg)
+    else:
+        q = cell.candidates.q[: min(POSES, cell.spread)]
     lines = frequency_lines(cell.config.modes.band_hz)
     mean, sd = model.frf(q, lines)
     names = [f"pose {i + 1} of the cut" for i in range(len(q))]
     cuts = cuts_at(cut, *cell.robot.forward_batch(q), names)
-    found = [
-        _at(cuts[i], table, names[i], lines, mean[i], sd[i]) for i in range(len(q))
-    ]  # fmt: skip
+    found = []
+    for at, name, one, unsure in zip(cuts, names, mean, sd, strict=True):
+        structure = of_frf(of_accelerance(name, lines, one, unsure), at)
+        found.append(decide(structure, at, table.speed_rpm, table.depth_m))
     return Decision(q, tuple(found))
-
-
-def _poses(model: "Model", table: "CutTable") -> np.ndarray:
-    if table.joints_deg is not None:
-        return model.cell.robot.joints.internal(table.joints_deg)
-    return model.cell.candidates.q[: min(POSES, model.cell.spread)]
-
-
-def _at(
-    cut: Cut, table: "CutTable", name: str, lines: np.ndarray, mean: np.ndarray, sd: np.ndarray
-) -> PoseDecision:
-    structure = of_frf(of_accelerance(name, lines, mean, sd), cut)
-    return decide(structure, cut, table.speed_rpm, table.depth_m)
 
 
 def deciding_outputs(model: "Model", outputs: FrequencyOutputs) -> FrequencyOutputs:

@@ -17,7 +17,7 @@ from planner.recording.records import PoseRow
 class Delivery:
     """Files of one pose; `joints_deg` is the readback, None where no table states it.
 
-    `said`: somebody stated the pose, a table of recordings (`by_table`) or who imports them.
+    `said`: somebody stated the pose, a table of recordings (it names its `row`) or who imports.
     """
 
     pose: str
@@ -25,15 +25,6 @@ class Delivery:
     sources: tuple[Source, ...]
     row: str = ""  # "file, row n" for messages
     said: bool = True
-
-    @property
-    def by_table(self) -> bool:
-        """Whether a table states the pose, file by file."""
-        return bool(self.row)
-
-    def placed_by_names(self) -> "Delivery":
-        """Files whose names say where their FRFs were felt and hit."""
-        return replace(self, sources=tuple(replace(s, from_name=True) for s in self.sources))
 
 
 def sort_paths(
@@ -75,32 +66,25 @@ def _from_tables(
     points: PointNames,
     pose: str | None,
 ) -> list[Delivery]:
-    """Deliveries of folders, each with a table of its own; `pose` picks one."""
-    if len(folders) == 1:
-        return _from_table(folders[0], joints, points, pose)
-    every = [d for folder in folders for d in _from_table(folder, joints, points, None)]
+    """Deliveries of folders, each with a table of its own; `pose` picks one, or renames the only.
+
+    Raises InputError where there is none of that name.
+    """
+    every = [d for folder in folders for d in _from_table(folder, joints, points)]
     found = [d for d in every if pose in (None, d.pose)]
+    if pose is not None and not found and len(folders) == len(every) == 1:
+        found = [replace(every[0], pose=pose)]
     if not found:
-        names = ", ".join(dict.fromkeys(d.pose for d in every))
-        raise InputError(f"No table in {path} has pose {pose}; their poses are {names}.")
+        names = list(dict.fromkeys(d.pose for d in every))
+        where = folders[0] / TABLE if len(folders) == 1 else path
+        raise InputError(f"{where} has no pose {pose}; its poses are {', '.join(names[:8])}.")
     return found
 
 
-def _from_table(
-    folder: Path, joints: JointUnits, points: PointNames, pose: str | None
-) -> list[Delivery]:
-    recordings = read_recordings(folder, joints, points, bare=True)
+def _from_table(folder: Path, joints: JointUnits, points: PointNames) -> list[Delivery]:
     rows: dict[str, list[PoseRow]] = {}
-    for row in recordings.rows:
+    for row in read_recordings(folder, joints, points, bare=True):
         rows.setdefault(row.pose, []).append(row)
-    if pose is not None and pose not in rows and len(rows) == 1:
-        rows = {pose: next(iter(rows.values()))}
-    elif pose is not None and pose not in rows:
-        raise InputError(
-            f"{folder / TABLE} has no pose {pose}; its poses are {', '.join(list(rows)[:8])}."
-        )
-    elif pose is not None:
-        rows = {pose: rows[pose]}
     return [
         Delivery(
             name,

@@ -60,7 +60,8 @@ def tables_of(kind: type[msgspec.Struct], name: str = "") -> Iterator[SchemaTabl
         else:
             path = f"{name.strip('[]')}.{field.encode_name}".strip(".")
             inner.append((struct, form.format(path)))
-    yield SchemaTable(name, _about(kind), tuple(entries), _choices(kind))
+    about = " ".join((inspect.getdoc(kind) or "").split())
+    yield SchemaTable(name, about, tuple(entries), _choices(kind))
     for struct, path in inner:
         yield from tables_of(struct, path)
 
@@ -76,11 +77,6 @@ def _choices(kind: type[msgspec.Struct]) -> tuple[SchemaChoice, ...]:
     from planner.design.propose import ACQUISITIONS, DESCRIPTIONS, DESIGNS
 
     return tuple(SchemaChoice(name, DESCRIPTIONS[name]) for name in (*ACQUISITIONS, *DESIGNS))
-
-
-def _about(kind: type) -> str:
-    paragraphs = (inspect.getdoc(kind) or "").split("\n\n")
-    return " ".join(" ".join(p.split()) for p in paragraphs)
 
 
 def _struct(given: types.Type) -> tuple[type[msgspec.Struct] | None, str]:

@@ -8,10 +8,8 @@ import numpy as np
 from planner.campaign.hit_errors import HitErrorEstimate, Pair, PoseHitErrors
 from planner.campaign.labels import LabelledPose
 from planner.campaign.log_conversion import to_mode
-from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.state import Measurement
-from planner.dataset.hit_columns import HitColumns, PoseHits
-from planner.dynamics.simulation import Simulation
+from planner.dataset.hit_columns import HitColumns
 from planner.fit.hit_misses import Misses, SolvedPoses, VisitHits, VisitMisses, tell_misses
 from planner.fit.learned import Learned
 from planner.fit.posterior import FOLLOWED
@@ -19,7 +17,6 @@ from planner.frf.frf import Frf
 from planner.measurement.nuisances import ACROSS, HIT_NUMBERS, OF_HIT, Tolerances
 from planner.modal.modes import Mode
 from planner.modal.residues import laplace, residue_changes
-from planner.recording.joints import JointUnits
 from planner.recording.records import AXES
 
 # Root mean square of the misses, in their sds before any data, from which they are not a hand's but
@@ -30,16 +27,11 @@ UNIT = Tolerances(angle_rad=1.0, offset_m=1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Visited:
-    """A pose with hits: its name, accepted files, joint angles (dof,) in rad, hits, the tool's FRF.
-
-    The FRF is the average of all hits.
-    """
+class Visited(VisitHits):
+    """A pose with hits: its name, accepted files, and the tool's FRF, the average of all hits."""
 
     pose: str
     files: tuple[str, ...]
-    q: np.ndarray
-    columns: HitColumns
     frf: Frf
 
 
@@ -119,41 +111,8 @@ def estimate(
     those = tuple(one for one in visited if len(one.columns.axis))
     if learned is None or not those:
         return CampaignHitErrors((), None, t, band_hz)
-    visits = [VisitHits(one.q, one.columns) for one in those]
-    told = tell_misses(learned.posterior, visits)
+    told = tell_misses(learned.posterior, those)
     return CampaignHitErrors(those, told, t, band_hz)
-
-
-def estimate_by(
-    nominal: Simulation,
-    visited: Sequence[Visited],
-    whole: Sequence[Frf],
-    t: Tolerances,
-    band_hz: tuple[float, float],
-) -> CampaignHitErrors:
-    """As `estimate`, by a simulation that is identified from the FRFs of all points first."""
-    q = np.array([one.q for one in visited])
-    learned = learn(LowFidelity(1, nominal, t), whole, q, band_hz).learned
-    return estimate(visited, learned, t, band_hz)
-
-
-def visits_of(
-    joints: JointUnits,
-    used: Sequence[Measurement],
-    hits: Sequence[PoseHits],
-    frfs: Sequence[Frf],
-) -> tuple[Visited, ...]:
-    """Measurements as visits, with their hits and the tool's FRFs."""
-    return tuple(
-        Visited(
-            m.pose,
-            tuple(hit.file for hit in m.accepted),
-            joints.internal(m.joints_deg),
-            h.columns,
-            f,
-        )
-        for m, h, f in zip(used, hits, frfs, strict=True)
-    )
 
 
 def _pose(visited: Visited, told: VisitMisses) -> PoseHitErrors:

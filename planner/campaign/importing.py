@@ -9,7 +9,13 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from planner.campaign import store
-from planner.campaign.arrivals import Kept, Superseded, still_refused, superseded, without
+from planner.campaign.arrivals import (
+    Kept,
+    record_of,
+    still_refused,
+    superseded,
+    without,
+)
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.deliveries import Delivery
@@ -93,12 +99,8 @@ def refusals(
     found = []
     for path in paths:
         digest, suffix = store.store_recording(directory, path)
-        row = stated.get(path, Source(path, str(path)))
-        found.append(HitRecord(
-            str(path), digest, suffix, row.hit, row.repeat, False, said.get(path, REFUSED),
-            hit_point=row.stated.hit_point, response_points=row.stated.response_points,
-            response=row.response,
-        ))  # fmt: skip
+        source = replaced(stated.get(path, Source(path, "")), name=str(path))
+        found.append(record_of(source, digest, suffix, said.get(path, REFUSED)))
     return tuple(found)
 
 
@@ -131,7 +133,7 @@ class JudgedFiles:
     measured: MeasuredPose
     still: tuple[HitRecord, ...]
     old: tuple[Source, ...]
-    superseded: tuple[Superseded, ...]
+    superseded: dict[HitRecord, str]
 
     @classmethod
     def of(
@@ -148,7 +150,7 @@ class JudgedFiles:
         newer, hits = [source for source, _, _ in fresh], ()
         while True:
             gone = superseded(before, newer)
-            old = tuple(kept.source(hit) for hit in before if hit not in [one.hit for one in gone])
+            old = tuple(kept.source(hit) for hit in before if hit not in gone)
             hits, measured = measure_files(old, fresh, table)
             good = [s for (s, _, _), hit in zip(fresh, hits, strict=True) if hit.accepted]
             if superseded(before, good) == gone:
@@ -167,25 +169,15 @@ def measure_files(
     """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
     new = tuple(source for source, _, _ in fresh)
     measured = measure((*old, *new), table.band_hz, window_rate_1_s=table.window_rate_1_s)
+    verdicts = zip(measured.verdicts[len(old) :], fresh, strict=True)
     records = tuple(
-        HitRecord(
-            file=source.name,
-            sha256=digest,
-            suffix=suffix,
+        replace(
+            record_of(source, digest, suffix, verdict.reason),
             hit=verdict.axis,
-            repeat=source.repeat,
             accepted=verdict.accepted,
-            reason=verdict.reason,
             simulated=verdict.simulated,
-            hit_point=source.stated.hit_point,
-            response_points=source.stated.response_points,
-            part=source.part,
-            response=source.response,
-            from_name=source.from_name,
         )
-        for verdict, (source, digest, suffix) in zip(
-            measured.verdicts[len(old) :], fresh, strict=True
-        )
+        for verdict, (source, digest, suffix) in verdicts
     )
     return records, measured
 

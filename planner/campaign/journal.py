@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any, TypeVar
 
 import msgspec
 from filelock import FileLock, Timeout
@@ -22,6 +23,8 @@ from planner.campaign.events import AnyEvent, Entry
 from planner.errors import InputError, JournalError
 from planner.version import __version__
 from planner.words import command
+
+T = TypeVar("T")
 
 _ENTRY = msgspec.json.Decoder(Entry)
 _ENCODER = msgspec.json.Encoder()
@@ -175,7 +178,9 @@ class Journal:
                 self._lock.acquire(timeout=seconds)
                 return
             except Timeout:
-                who = _text_of(holder)
+                who = "another planner"
+                with suppress(OSError, UnicodeDecodeError):
+                    who = holder.read_text(encoding="utf-8").strip() or who
                 if who.endswith(SESSION):
                     break
         raise InputError(f"{self.path.parent} is in use by {who}; close that one first.")
@@ -215,13 +220,6 @@ def _who() -> str:
         f"{command} (process {os.getpid()} of {getpass.getuser()} on {socket.gethostname()}, since "
         f"{datetime.now().astimezone():%H:%M})"
     )
-
-
-def _text_of(holder: Path) -> str:
-    try:
-        return holder.read_text(encoding="utf-8").strip() or "another planner"
-    except (OSError, UnicodeDecodeError):
-        return "another planner"
 
 
 def _append_synced(path: Path, data: bytes) -> None:
@@ -275,3 +273,26 @@ def sync_folder(path: Path) -> None:
         pass
     finally:
         os.close(handle)
+
+
+class _Checked(msgspec.Struct):
+    check: str
+    kept: msgspec.Raw
+
+
+def write_checked(path: Path, value: Any) -> None:
+    """Keep what msgspec can encode; the file is whole under its name, or absent."""
+    body = msgspec.json.encode(value)
+    check = hashlib.sha256(body).hexdigest()
+    write_synced(path, b'{"check":"%s","kept":%s}' % (check.encode(), body))
+
+
+def read_checked(path: Path, kind: type[T]) -> T | None:
+    """What was kept; None where nothing was, or where it is damaged (then the file exists)."""
+    try:
+        found = msgspec.json.decode(path.read_bytes(), type=_Checked)
+        if hashlib.sha256(bytes(found.kept)).hexdigest() != found.check:
+            return None
+        return msgspec.json.decode(found.kept, type=kind)
+    except (OSError, UnicodeDecodeError, msgspec.DecodeError):
+        return None

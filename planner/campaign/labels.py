@@ -16,17 +16,17 @@ from planner.surrogate.modal_surrogate import ModalObservations
 # Simulated modes above those modelled that a measured mode may be instead: where one of the
 # modelled ones cannot be seen (nodal point), the next one must not take its label.
 ABOVE = 2
+MODAL = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"  # of a mode
 
 
 @dataclass(frozen=True, eq=False)
 class LabelledPose:
-    """A measured pose with its modes by label (None: not found there).
+    """A measured pose, q (dof,) in rad, with its modes by label (None: not found there).
 
     `simulated` are the simulation's (1, count), NaN where it has no such mode.
     """
 
     pose: str
-    joints_deg: tuple[float, ...]
     q: np.ndarray
     modes: tuple[Mode | None, ...]
     probability: np.ndarray  # (count,) that the label is right
@@ -60,7 +60,6 @@ def label(
     return tuple(
         LabelledPose(
             m.pose,
-            m.joints_deg,
             q[i],
             tracks.modes[i][:count],
             tracks.probability[i, :count],
@@ -78,25 +77,17 @@ def frequencies(labelled: tuple[LabelledPose, ...]) -> np.ndarray:
 def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObservations:
     """The labelled modes as arrays, NaN where a mode was not found or a column not hit."""
     count, n = cell.config.modes.count, len(labelled)
-    frequency, frequency_sd = np.full((2, n, count), np.nan)
-    damping, damping_sd = np.full((2, n, count), np.nan)
-    residue = np.full((n, count, 3, 3), np.nan + 1j * np.nan)
-    residue_sd = np.full((n, count, 3, 3), np.nan)
+    values = {name: np.full((n, count), np.nan) for name in MODAL}
+    values |= {"residue": np.full((n, count, 3, 3), np.nan + 1j * np.nan)}
+    values |= {"residue_sd": np.full((n, count, 3, 3), np.nan)}
     for i, pose in enumerate(labelled):
         for k, mode in enumerate(pose.modes):
-            if mode is None:
-                continue
-            frequency[i, k], frequency_sd[i, k] = mode.frequency_hz, mode.frequency_sd_hz
-            damping[i, k], damping_sd[i, k] = mode.damping_ratio, mode.damping_sd
-            residue[i, k], residue_sd[i, k] = mode.residue, mode.residue_sd
+            for name, array in values.items() if mode is not None else ():
+                array[i, k] = getattr(mode, name)
     q = np.array([p.q for p in labelled]).reshape(n, len(cell.robot.joint_names))
-    simulated = SimulatedModes.joined([p.simulated for p in labelled]) if n else _none(count)
-    x = cell.features(q) if n else np.zeros((0, len(cell.workspace.feature_names)))
-    return ModalObservations(
-        x, frequency, frequency_sd, damping, damping_sd, residue, residue_sd, simulated
-    )
-
-
-def _none(count: int) -> SimulatedModes:
     empty = np.zeros((0, count))
-    return SimulatedModes(empty, empty, np.zeros((0, count, 3, 3), complex))
+    simulated = SimulatedModes(empty, empty, np.zeros((0, count, 3, 3), complex))
+    if n:
+        simulated = SimulatedModes.joined([p.simulated for p in labelled])
+    x = cell.features(q) if n else np.zeros((0, len(cell.workspace.feature_names)))
+    return ModalObservations(x, **values, simulated=simulated)

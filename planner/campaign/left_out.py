@@ -60,18 +60,11 @@ def left_out(model: "Model") -> LeftOutValues:
         return LeftOutValues(0, None, (), (), said)
     coverage = dict(zip(map(str, LEVELS), found.coverage().tolist(), strict=True))
     worst = tuple(poses[i] for i in found.worst().tolist())
-    rows = _rows(found, poses, frequencies(model.labelled))
-    return LeftOutValues(values, coverage, worst, rows, said)
-
-
-def _rows(
-    found: "LeaveOneOut", poses: tuple[str, ...], measured_hz: np.ndarray
-) -> tuple[LeftOutFrequency, ...]:
+    measured_hz = frequencies(model.labelled)
     predicted = measured_hz * np.exp(-found.error)
-    sd = predicted * found.sd
-    return tuple(
-        LeftOutFrequency(
-            poses[i], k + 1, *(float(a[i, k]) for a in (measured_hz, predicted, sd, found.rank))
-        )
+    numbers = measured_hz, predicted, predicted * found.sd, found.rank
+    rows = tuple(
+        LeftOutFrequency(poses[i], k + 1, *(float(values[i, k]) for values in numbers))
         for i, k in np.argwhere(np.isfinite(found.rank)).tolist()
     )
+    return LeftOutValues(values, coverage, worst, rows, said)

@@ -53,7 +53,8 @@ def simulated_shapes(
         if np.all(np.isfinite(residue)):
             shape = _in_world(rotation, rank_one(residue)[0])
             shape = shape * realign(shape[:split].ravel())
-            motion[k] = shape / _largest(shape[:split])
+            largest = np.max(np.linalg.norm(np.abs(shape[:split]), axis=-1))
+            motion[k] = shape / (largest or 1.0)
     return (
         PointShapes(drawn.names, place[:split], motion[:, :split]),
         PointShapes(layout.sensors, place[split:], motion[:, split:]),
@@ -141,7 +142,3 @@ def alone(measured: PointShapes) -> PointShapes:
         for known in (own[np.isfinite(own)] for own in measured.motion)
     ]
     return measured.scaled(np.array(size))
-
-
-def _largest(motion: np.ndarray) -> float:
-    return float(np.max(np.linalg.norm(np.abs(motion), axis=-1))) or 1.0

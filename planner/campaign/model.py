@@ -171,21 +171,16 @@ class Model:
     @cached_property
     def forecast(self) -> Forecast:
         """Predicted RMSE over the workspace, and what one more measurement would gain."""
-        outputs, _ = self.outlook
-        best = self._informed_pose(int(np.argmax(self._gains)))
+        outputs, poses = self.outlook
+        index = int(np.argmax(self._gains))
+        best, open_ = poses.one(index), open_parameters(self.cell, self.low, self.frf_noise)
+        if open_ is not None:  # what hits there tell of it
+            q = self.cell.candidates.q[index : index + 1]
+            best = replace(best, information=open_.information(q))
         stop = self.cell.config.stop
         found = forecast(outputs, best, stop.frequency_sd_percent, stop.probability)
         misses = self.low.misses
         return found.doubted(misses) if misses and found.measurements < FEW_POSES else found
-
-    def _informed_pose(self, index: int) -> Poses:
-        """The candidate (n = 1) of that index, and what hits there tell of open parameters."""
-        pose = self.outlook[1].one(index)
-        open_ = open_parameters(self.cell, self.low, self.frf_noise)
-        if open_ is None:
-            return pose
-        q = self.cell.candidates.q[index : index + 1]
-        return replace(pose, information=open_.information(q))
 
     @property
     def done(self) -> bool:

@@ -36,13 +36,12 @@ WANTED = "predict.csv"
 class ModeOfTip:
     """One mode at the postures x (n, d) that have it: parameters y (n, 2 + 4m) at m directions.
 
-    ln f, ln ζ, then right and left vector, real and imaginary part each; of the left vector entry
-    `reference` is 1.
+    ln f, ln ζ, then right and left vector, real and imaginary part each; one entry of the left
+    vector is 1.
     """
 
     x: np.ndarray
     y: np.ndarray
-    reference: int
 
 
 def posture_tip(folder: Path, tool: Tool | None, pose: str | None) -> TipReceptance:
@@ -77,16 +76,16 @@ def posture_tip(folder: Path, tool: Tool | None, pose: str | None) -> TipRecepta
 def _hit(folder: Path, pose: str | None) -> tuple[np.ndarray, np.ndarray, dict[str, FrfMatrix]]:
     """Postures x (n, d) that were hit, the wanted one (d,), both scaled, and FRFs by pose."""
     joints = joint_columns(folder)
-    table = read_recordings(folder, joints, ANYWHERE)
+    rows = read_recordings(folder, joints, ANYWHERE)
     wanted = {row.pose: row.joints_deg for row in read_poses(folder / WANTED, joints)}
     if pose not in wanted:
         raise InputError(f"Name a pose of {folder / WANTED}: --pose {next(iter(wanted))}.")
     sources: dict[str, list[Source]] = {}
-    for row in table.rows:
+    for row in rows:
         assert row.file is not None
         # Nodes and directions as the files have them: each holds hits along several.
         sources.setdefault(row.pose, []).append(Source(row.file, str(row.file)))
-    angles = {row.pose: row.joints_deg for row in table.rows}
+    angles = {row.pose: row.joints_deg for row in rows}
     q = joints.internal([angles[name] for name in sources])
     there, low, span = joints.internal([wanted[pose]])[0], q.min(axis=0), np.ptp(q, axis=0)
     moves = span > 0
@@ -161,7 +160,7 @@ def _parameters(x: np.ndarray, pairs: list[Found]) -> ModeOfTip:
     right = np.array([v[0] / (2j * mode.pole.imag) for mode, v in pairs]) * scale
     poles = np.array([[mode.frequency_hz, mode.damping_ratio] for mode, _ in pairs])
     both = np.concatenate([right, left / scale], axis=1)
-    return ModeOfTip(x, np.concatenate([np.log(poles), both.real, both.imag], axis=1), reference)
+    return ModeOfTip(x, np.concatenate([np.log(poles), both.real, both.imag], axis=1))
 
 
 def _predicted(

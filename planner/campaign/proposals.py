@@ -35,15 +35,12 @@ def propose(
     """
     if state.doubt is None:
         return _new_poses(model, state, count, acquisition)
-    again = _repeat(model, state, *state.doubt)
-    return (again, *(_new_poses(model, state, count - 1, acquisition) if count > 1 else ()))
-
-
-def _repeat(model: Model, state: CampaignState, again: str, hint: str) -> Proposal:
-    robot, joints_deg = model.cell.robot, state.measurements[again].joints_deg
+    robot, (pose, hint) = model.cell.robot, state.doubt
+    joints_deg = state.measurements[pose].joints_deg
     position_m = robot.forward_batch(robot.joints.internal([joints_deg]))[1][0]
-    reason = f"repeat: {hint} hints at drift, and {again} hit again tells whether the robot changed"
-    return Proposal(again, joints_deg, _xyz(position_m), None, reason)
+    reason = f"repeat: {hint} hints at drift, and {pose} hit again tells whether the robot changed"
+    again = Proposal(pose, joints_deg, _xyz(position_m), None, reason)
+    return (again, *(_new_poses(model, state, count - 1, acquisition) if count > 1 else ()))
 
 
 def _new_poses(

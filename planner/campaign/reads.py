@@ -21,7 +21,6 @@ from planner.campaign.events import Configured, Entry, HitRecord, Imported, Refu
 from planner.campaign.journal import Journal
 from planner.campaign.kept_recordings import KeptRecordings
 from planner.campaign.state import CampaignState, Measurement, fold
-from planner.dataset.screened_files import Source
 from planner.dataset.store import Store, user_store
 from planner.errors import InputError
 from planner.progress import Tell, quietly
@@ -229,10 +228,6 @@ class CampaignReads:
         if not found:
             raise InputError(f"{self.directory} holds no hits yet; import recordings first.")
         return found
-
-    def source_of(self, hit: HitRecord) -> Source:
-        """The kept copy of a recording; InputError where it is not what was imported."""
-        return self.recordings.source(hit)
 
     def orphans(self) -> list[str]:
         """Recordings stored without an import: the program was stopped in between."""

@@ -12,20 +12,17 @@ if TYPE_CHECKING:
     from planner.surrogate.frf_bands import ModalPrediction
 
 
+NUMBERS = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"
+
+
 def measured_records(
     joints: JointUnits, measurements: Iterable[Measurement]
 ) -> list[dict[str, Any]]:
     """One row a measured mode: pose, joint angles in degrees, Hz, ratios, sds, probability."""
     return [
         {
-            "pose": m.pose,
-            **_angles(joints, m.joints_deg),
-            "mode": k,
-            "frequency_hz": mode.frequency_hz,
-            "frequency_sd_hz": mode.frequency_sd_hz,
-            "damping_ratio": mode.damping_ratio,
-            "damping_sd": mode.damping_sd,
-            "probability": mode.probability,
+            **{"pose": m.pose, **_angles(joints, m.joints_deg), "mode": k},
+            **{name: getattr(mode, name) for name in (*NUMBERS, "probability")},
             "withdrawn": m.withdrawn,
         }
         for m in measurements
@@ -40,23 +37,16 @@ def predicted_records(
 
     `inside` (n,) says which of them lie in the workspace.
     """
-    p = prediction
     return [
         {
-            "pose": i + 1,
-            **_angles(joints, joints.shown(row).tolist()),
-            "mode": k + 1,
-            "frequency_hz": float(p.frequency_hz[i, k]),
-            "frequency_sd_hz": float(p.frequency_sd_hz[i, k]),
-            "damping_ratio": float(p.damping_ratio[i, k]),
-            "damping_sd": float(p.damping_sd[i, k]),
+            **{"pose": i + 1, **_angles(joints, joints.shown(row).tolist()), "mode": k + 1},
+            **{name: float(getattr(prediction, name)[i, k]) for name in NUMBERS},
             "outside": not inside[i],
         }
         for i, row in enumerate(q_rad)
-        for k in range(p.frequency_hz.shape[1])
+        for k in range(prediction.frequency_hz.shape[1])
     ]
 
 
 def _angles(joints: JointUnits, joints_deg: Sequence[float]) -> dict[str, float]:
-    pairs = zip(joints.columns, joints_deg, strict=True)
-    return {column: float(value) for column, value in pairs}
+    return dict(zip(joints.columns, map(float, joints_deg), strict=True))

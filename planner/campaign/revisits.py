@@ -21,8 +21,12 @@ LEAST_MODES = 2  # that have to lie to one side
 
 def hit_again(model: Model, known: Measurement, modes: Sequence[MeasuredMode]) -> tuple[str, ...]:
     """A remark on what further hits at a measured pose show beside those before."""
-    old = [mode for mode in known.modes if mode.likely]
-    found = _beside(old, [mode for mode in modes if mode.likely], _scatter(model))
+    scatter = np.sqrt(2) * _scatter(model)
+    before = [
+        (mode.frequency_hz, float(np.hypot(mode.frequency_sd_hz / mode.frequency_hz, scatter)))
+        for mode in known.modes if mode.likely
+    ]  # fmt: skip
+    found = _found_again(before, modes)
     if not found:
         return ()
     hz, off, sd = max(found, key=lambda one: abs(one[1]) / one[2])
@@ -55,12 +59,15 @@ def suspected(
     """
     if len(model.labelled) < LEAST_POSES or state.hit_at(pose) is not None:
         return None
-    off, in_sd = _off(model, joints_deg, [mode for mode in modes if mode.likely])
+    joints = model.cell.robot.joints
+    hz, sd = (row[0].tolist() for row in model.frequencies(joints.internal([joints_deg])))
+    expected = [(f, s / f) for f, s in zip(hz, sd, strict=True)]
+    found = np.array(_found_again(expected, modes)).reshape(-1, 3)
+    off, in_sd = found[:, 1], np.abs(found[:, 1]) / found[:, 2]
     one_sided = abs(np.sum(np.sign(off))) == len(off) >= LEAST_MODES
     if not one_sided or np.any(in_sd < SUSPECT_SD) or np.mean(np.abs(off)) < SMALLEST:
         return None
     early = _telling(state)
-    joints = model.cell.robot.joints
     which = "the first pose" if early is state.used[0] else "an early pose"
     return Suspicion(
         early.pose,
@@ -69,22 +76,6 @@ def suspected(
         f"{which}, again ({joints.listed(early.joints_deg, 3)}) and import with --pose "
         f"{early.pose}: it says whether. It is proposed next.",
     )
-
-
-def _off(
-    model: Model, joints_deg: tuple[float, ...], modes: Sequence[MeasuredMode]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Of each mode that is expected at a pose and found near by: ln f of it, and that in sds."""
-    hz, sd = (row[0] for row in model.frequencies(model.cell.robot.joints.internal([joints_deg])))
-    found = []
-    for expected, unsure in zip(hz, sd / hz, strict=True):
-        off = [float(np.log(mode.frequency_hz / expected)) for mode in modes]
-        k = int(np.argmin(np.abs(off))) if off else -1
-        if k >= 0 and abs(off[k]) < SAME_MODE:
-            own = modes[k].frequency_sd_hz / modes[k].frequency_hz
-            found.append((off[k], abs(off[k]) / np.hypot(unsure, own)))
-    away = np.array(found).reshape(-1, 2)
-    return away[:, 0], away[:, 1]
 
 
 def _telling(state: CampaignState) -> Measurement:
@@ -106,19 +97,17 @@ def _scatter(model: Model) -> float:
     return float(np.sqrt(np.mean(model.surrogate.visit_scatter**2)))
 
 
-def _beside(
-    old: Sequence[MeasuredMode], new: Sequence[MeasuredMode], scatter: float
+def _found_again(
+    expected: Sequence[tuple[float, float]], modes: Sequence[MeasuredMode]
 ) -> list[tuple[float, float, float]]:
-    """Of each mode of `old` that is found again: Hz, new less old in ln f, and the sd of that."""
-    found = []
-    for mode in old:
-        ratio = [float(np.log(other.frequency_hz / mode.frequency_hz)) for other in new]
-        if not ratio or min(map(abs, ratio)) > SAME_MODE:
-            continue
-        k = int(np.argmin(np.abs(ratio)))
-        own = [m.frequency_sd_hz / m.frequency_hz for m in (mode, new[k])]
-        sd = float(np.sqrt(own[0] ** 2 + own[1] ** 2 + 2 * scatter**2))
-        found.append((mode.frequency_hz, ratio[k], sd))
+    """Of each expected frequency (Hz, sd of ln f) near a mode: Hz, ln f of that, and its sd."""
+    likely, found = [mode for mode in modes if mode.likely], []
+    for hz, sd in expected:
+        off = [float(np.log(mode.frequency_hz / hz)) for mode in likely]
+        k = int(np.argmin(np.abs(off))) if off else -1
+        if k >= 0 and abs(off[k]) < SAME_MODE:
+            own = likely[k].frequency_sd_hz / likely[k].frequency_hz
+            found.append((hz, off[k], float(np.hypot(sd, own))))
     return found
 
 

@@ -226,15 +226,8 @@ def _taken_over(campaign_toml: Path, robot: str) -> str:
         raise InputError(
             f"{campaign_toml} is not a valid campaign.toml ({error}); correct it."
         ) from None
-    kept = document.body
-    fresh = tomlkit.document()
-    fresh.add("robot", tomlkit.item(robot))
-    for key, item in kept:
-        if key is None:
-            fresh.add(item)
-        elif key.key != "robot":
-            fresh.add(key, item)
-    return tomlkit.dumps(fresh)
+    document["robot"] = robot
+    return tomlkit.dumps(document)
 
 
 def _default(directory: Path, robot_file: str) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.campaign.hit_error_estimates import CampaignHitErrors, Visited, estimate_by
+from planner.campaign.hit_error_estimates import CampaignHitErrors, Visited, estimate
 from planner.campaign.labels import ABOVE
 from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.dataset.hit_columns import hits_of
@@ -59,13 +59,13 @@ def survey(
     """
     band, robot = band_hz or DEFAULT_BAND_HZ, Robot.load(robot_toml) if robot_toml else None
     joints = joint_columns(folder) if robot is None else robot.joints
-    table = read_recordings(folder, joints, None if robot is None else robot.points)
-    names = tuple(dict.fromkeys(row.pose for row in table.rows))
+    every_row = read_recordings(folder, joints, None if robot is None else robot.points)
+    names = tuple(dict.fromkeys(row.pose for row in every_row))
     found, every, refused, simulated = [], [], [], False
     visited: list[tuple[Visited, Frf]] = []
     for number, name in enumerate(names):
         progress(f"pose {name}", number / len(names))
-        rows = [row for row in table.rows if row.pose == name]
+        rows = [row for row in every_row if row.pose == name]
         sources = tuple(Source.of(row) for row in rows if row.file)
         measured = measure(in_parts(sources), band, estimator, window_rate_1_s)
         refused += [
@@ -75,7 +75,7 @@ def survey(
         found.append(measured.modal.modes if measured.modal else ())
         every.append(measured)
         if robot is not None and measured.frf is not None:
-            q = table.joints.internal(rows[0].joints_deg)
+            q = joints.internal(rows[0].joints_deg)
             visited.append(_visited(name, q, measured))
     if not any(found):
         reasons = [file.reason for file in refused] + [
@@ -84,8 +84,8 @@ def survey(
         raise RefusedError(
             f"{folder}: no pose gives a mode between {band[0]:g} and {band[1]:g} Hz: {reasons[0]}"
         )
-    first = {row.pose: row for row in reversed(table.rows)}
-    q = table.joints.internal([first[name].joints_deg for name in names])
+    first = {row.pose: row for row in reversed(every_row)}
+    q = joints.internal([first[name].joints_deg for name in names])
     nominal = None if robot is None else Simulation(robot)
     errors = _hit_errors(visited, nominal, band)
     found = [tuple(errors.without_misses(*one)) for one in zip(names, found, strict=True)]
@@ -107,7 +107,7 @@ def _visited(pose: str, q: np.ndarray, measured: MeasuredPose) -> tuple[Visited,
     hits = hits_of(sources, measured.band_hz, measured.window_rate_1_s)
     assert measured.frf is not None
     files = tuple(source.name for source in sources)
-    return Visited(pose, files, q, hits.columns, measured.frf), hits.whole
+    return Visited(q, hits.columns, pose, files, measured.frf), hits.whole
 
 
 def _hit_errors(
@@ -117,7 +117,9 @@ def _hit_errors(
     if nominal is None or not visited:
         return CampaignHitErrors((), None, Tolerances(), band)
     visits, whole = zip(*visited, strict=True)
-    return estimate_by(nominal, visits, whole, _tolerances(nominal), band)
+    t, q = _tolerances(nominal), np.array([one.q for one in visits])
+    learned = learn(LowFidelity(1, nominal, t), whole, q, band).learned
+    return estimate(visits, learned, t, band)
 
 
 def _tolerances(simulation: Simulation) -> Tolerances:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import msgspec
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.cut_source import Asked, ToolChange, at_poses
@@ -92,12 +92,6 @@ class Travelled:
         found = at_poses(self.campaign, self.names, self.q, cut, self.change, self.feeds)
         return list(zip(self.names, found, strict=True))
 
-    def structures_with_feed(self, cut: Cut) -> list[tuple[str, Structure]]:
-        """The same with the feeds as they are in the base frame, whatever the cut says."""
-        own = msgspec.structs.replace(cut, feed_in="path")
-        found = at_poses(self.campaign, self.names, self.q, own, self.change, self.feeds)
-        return list(zip(self.names, found, strict=True))
-
     def turned(self, pose: int) -> list[tuple[float, np.ndarray]]:
         """Angles in degrees, and q (dof,) turned by them about the tool, where the robot can stand.
 
@@ -160,11 +154,9 @@ def _turned(
 
 
 def about(axis: np.ndarray, turn_deg: float) -> np.ndarray:
-    """(3, 3) rotation about an axis (3,) by Rodrigues' formula."""
-    x, y, z = axis / np.linalg.norm(axis)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    turn = np.deg2rad(turn_deg)
-    return np.eye(3) + np.sin(turn) * cross + (1 - np.cos(turn)) * cross @ cross
+    """(3, 3) rotation about an axis (3,)."""
+    turn = turn_deg * axis / np.linalg.norm(axis)
+    return Rotation.from_rotvec(turn, degrees=True).as_matrix()
 
 
 def _program(robot: Robot, way: Way, cut: Cut) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from planner.campaign.checked_file import read_checked, write_checked
 from planner.campaign.config import ModesTable
+from planner.campaign.journal import read_checked, write_checked
 from planner.compare import cluster, pool, processes
 from planner.compare.bench import Bench
 from planner.compare.pool import PoolPose

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.frf.estimator import of_spectra
-from planner.frf.spectra import Spectra, Windows, transform
+from planner.frf.spectra import Windows, transform
 from planner.recording.force_levels import peak_n
 from planner.recording.records import Hit
 
@@ -51,8 +51,7 @@ def column(
     f, high = frf.frequency_hz, frf.usable_band_hz[1]
     lines = (f >= band_hz[0]) & (f <= band_hz[1])
     excited = (f < high) | (high == f[-1])
-    variance = frf.variance[:, axis] + _uncertain(spectra)
-    variance = np.where(excited, variance, np.inf)[:, lines]
+    variance = np.where(excited, frf.variance[:, axis], np.inf)[:, lines]
     power = np.array([np.abs(hit.force) ** 2 for hit in spectra.hits])[:, lines]
     turned = np.exp(2j * np.pi * f * spectra.peak_s) / hits[0].sampling_rate_hz
     return Column(
@@ -67,12 +66,3 @@ def column(
         hits,
         power / power.sum(axis=0),
     )
-
-
-def _uncertain(spectra: Spectra) -> np.ndarray | float:
-    """E|δH|² (r, F) by what was taken out of the hits and may be wrong."""
-    power = sum(np.abs(hit.force) ** 2 for hit in spectra.hits)
-    doubts = (
-        np.abs(hit.force * hit.doubtful) ** 2 for hit in spectra.hits if hit.doubtful is not None
-    )
-    return sum(doubts, np.zeros(1)) / power**2

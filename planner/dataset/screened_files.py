@@ -231,8 +231,7 @@ def read_one(
     reasons = [_why_refused(faults) for _, faults in judged]
     if all(reasons):
         return FileVerdict(source, False, " ".join(reasons), axis, simulated, told), (), []
-    good = [hit for (hit, _), reason in zip(judged, reasons, strict=True) if not reason]
-    hits = tuple(replace(hit, repeat=source.repeat or hit.repeat) for hit in good)
+    hits = tuple(hit for (hit, _), reason in zip(judged, reasons, strict=True) if not reason)
     refused = _refused_hits(source, reasons) if any(reasons) else ()
     return FileVerdict(source, True, "", axis, simulated, told, False, refused), hits, []
 

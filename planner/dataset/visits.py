@@ -111,7 +111,7 @@ def recordings_in(
     found: list[Recording] = []
     first: dict[str, tuple[Path, tuple[float, ...]]] = {}
     for folder in folders:
-        for row in read_recordings(folder, joints, points).rows:
+        for row in read_recordings(folder, joints, points):
             where, stood = first.setdefault(row.pose, (folder / TABLE, row.joints_deg))
             if off := joints.apart(stood, row.joints_deg):
                 raise InputError(

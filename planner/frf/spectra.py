@@ -37,8 +37,7 @@ class HitSpectra:
 
     They are along the `rows` of `layout`. `force_noise` and `noise` (r,) are the powers of the
     noise in them; `noise_known` is False where nothing was recorded before the pulse and `noise` is
-    no more than a bound. `doubtful` (r, F) is the uncertain share of what was taken out of the
-    responses (see `Hit`), None where nothing was.
+    no more than a bound.
     """
 
     axis: int
@@ -48,7 +47,6 @@ class HitSpectra:
     force_window_s: float
     noise: np.ndarray
     noise_known: bool
-    doubtful: np.ndarray | None = None
     layout: Layout = TOOL
     rows: tuple[int, ...] = (0, 1, 2)
 
@@ -131,10 +129,6 @@ def _transform(
     aside = (force / np.maximum(carried, FADED))[(near == 0) & (carried > FADED)]
     force_noise = float(np.var(aside, ddof=1)) if aside.size >= LEAST_QUIET else 0.0
     window = near * laid
-    doubtful = None
-    if hit.taken_out_m_s2 is not None:
-        whole = np.fft.rfft((hit.taken_out_m_s2 * laid)[:, used], length, axis=1)
-        doubtful = hit.taken_out_sd * whole[:, chosen]
     return HitSpectra(
         hit.axis_index,
         np.fft.rfft((hit.sign * force * window)[used], length)[chosen],
@@ -143,7 +137,6 @@ def _transform(
         float(np.sum(near)) / hit.sampling_rate_hz,
         noise * float(np.sum((laid * carried)[used] ** 2)),
         known,
-        doubtful,
         hit.layout,
         tuple(hit.rows),
     )

@@ -64,32 +64,24 @@ def by_good_sensors(hit: Hit) -> tuple[Hit, tuple[Fault, ...]]:
     good = [row for row, node in enumerate(named) if node not in bad]
     if not bad or not good:
         return hit, ()
-    told = tuple(
-        Fault(
-            fault.kind,
-            f"{fault.text} The other sensors of this hit are used, the one at {node} is not.",
-            refuse=False,
-        )
-        for node, fault in zip(named, found, strict=True)
-        if fault
-    )
-    return hit.with_channels(good), told
+    but = "The other sensors of this hit are used, the one at {} is not."
+    told = (
+        Fault(fault.kind, f"{fault.text} {but.format(node)}", refuse=False)
+        for node, fault in zip(named, found, strict=True) if fault
+    )  # fmt: skip
+    return hit.with_channels(good), tuple(told)
 
 
 def _of_acceleration(hit: Hit, row: int) -> Fault | None:
     samples, name = hit.acceleration_m_s2[row], hit.label(row)
     if not np.any(samples - samples[0]):
-        return Fault(
-            "dead", f"The acceleration along {name} is constant; check the cable of {name}."
-        )
+        text = f"The acceleration along {name} is constant"
+        return Fault("dead", f"{text}; check the cable of {name}.")
     rest = Rest.of(samples)
     if rest.steps > SURELY:
         seconds = (len(samples) - rest.start) / hit.sampling_rate_hz
-        return Fault(
-            "dead",
-            f"The acceleration along {name} repeats one value for the last {seconds:.2g} s, though "
-            f"it moved until then; check the cable of {name}.",
-        )
+        text = f"The acceleration along {name} repeats one value for the last {seconds:.2g} s"
+        return Fault("dead", f"{text}, though it moved until then; check the cable of {name}.")
     return _overload(f"acceleration {name}", "m/s²", samples, pulse=False)
 
 
@@ -103,11 +95,8 @@ def _overload(name: str, unit: str, samples: np.ndarray, pulse: bool) -> Fault |
         flat = _longest_run(equal) if pulse else int(np.sum(equal))
         if not _by_chance(np.maximum(sense * size, 0.0), flat, pulse):
             level = float(samples[int(np.argmax(sense * size))])
-            return Fault(
-                "clipped",
-                f"The {name} is clipped at {level:.4g} {unit} ({flat} samples); raise the range "
-                f"of {name} or hit more softly.",
-            )
+            text = f"The {name} is clipped at {level:.4g} {unit} ({flat} samples)"
+            return Fault("clipped", f"{text}; raise the range of {name} or hit more softly.")
     return None
 
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.recording import stated
-from planner.recording.column_names import time_unit, unit_text
+from planner.recording.column_names import Unit, lookup, time_unit, unit_text
 from planner.recording.entries import EntryTree, text_of
 from planner.recording.frf_columns import holds_frfs
-from planner.recording.named_columns import Named, check_finite
+from planner.recording.named_columns import Named
+from planner.recording.records import check_numbers
 from planner.recording.sampling import UNEVEN, sampling_rate
-from planner.recording.units import Unit, lookup
 
 Stated = Mapping[str, object]
 
@@ -44,37 +44,31 @@ class EntryColumn:
         return "/".join(self.path) or "data"
 
 
-def found_in(file: Path, root: EntryTree) -> tuple[EntryColumn, ...]:
-    """Every array of a file. Raises InputError where a channel's own times are uneven."""
-    return tuple(_found(file, root, (), []))
-
-
-def _found(
+def found_in(
     file: Path,
     tree: EntryTree,
-    path: tuple[str, ...],
-    above: list[tuple[bool, Stated]],
+    path: tuple[str, ...] = (),
+    above: Sequence[tuple[bool, Stated]] = (),
 ) -> Iterator[EntryColumn]:
-    """Arrays below a group; `above`: what groups state, and whether of one array alone."""
+    """Every array of a file, or below a group of it.
+
+    `above`: what groups state, and whether of one array alone. Raises InputError where a channel's
+    own times are uneven.
+    """
     tree = _with_own_times(file, tree)
     here = [*above, (_arrays(tree) == 1, {**tree.attributes, **_beside(tree)})]
     for name, part in tree.parts.items():
         at = (*path, name) if name else path
         if isinstance(part, EntryTree):
-            yield from _found(file, part, at, here)
+            yield from found_in(file, part, at, here)
         else:
             own = {k: v for alone, of in here if alone for k, v in of.items()}
             own |= _of_one(name, here[-1][1])
             if path and not (unit_text(name) or time_unit(name, "")):
-                own = {**_unit_of_all(here[-1][1]), **own}
+                unit = stated.unit_of(here[-1][1])  # of all that is in the group
+                own = {**({"unit": unit} if lookup(unit) else {}), **own}
             shared = {k: v for alone, of in here if not alone for k, v in of.items()}
             yield from _columns(at, part, own, shared)
-
-
-def _unit_of_all(attributes: Stated) -> dict[str, object]:
-    """The unit that a group states of all that is in it."""
-    unit = stated.unit_of(attributes)
-    return {"unit": unit} if lookup(unit) else {}
 
 
 def _of_one(name: str, beside: Stated) -> dict[str, object]:
@@ -131,7 +125,7 @@ def _with_own_times(file: Path, tree: EntryTree) -> EntryTree:
     at = arrays[name][0] * unit.factor
     if len({array.shape for array, _ in arrays.values()}) > 1 or not np.isrealobj(at):
         return tree
-    check_finite(file, name, at)
+    check_numbers(file, name, at)
     axis = {"dt": 1 / sampling_rate(file, at), "t0": float(at[0]), "x_unit": unit.si}
     rest = {n: p for n, p in tree.parts.items() if n != name}
     return EntryTree({**tree.attributes, **axis}, rest, tree.unread)

@@ -9,14 +9,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from planner.errors import InputError
-from planner.recording.column_names import frequency_unit, time_unit, unit_text
+from planner.recording.column_names import (
+    frequency_unit,
+    lookup,
+    lookup_ratio,
+    time_unit,
+    unit_text,
+)
 from planner.recording.entries import EntryTree
 from planner.recording.entry_columns import EntryColumn, found_in, named_from
 from planner.recording.frf_columns import holds_frfs
 from planner.recording.named_columns import Named, to_records
 from planner.recording.records import FrfRecord, Record, TimeRecord
 from planner.recording.sampling import LEAST_SAMPLES
-from planner.recording.units import lookup, lookup_ratio
 
 MOST_NAMED = 8  # arrays that a sentence names
 OF_HITS = ("force", "acceleration", "velocity", "displacement")
@@ -37,7 +42,7 @@ class _Whole:
 
 def records_of(path: Path, root: EntryTree) -> tuple[Record, ...]:
     """Records of a file. Raises InputError saying what it holds and what that lacks."""
-    found = found_in(path, root)
+    found = tuple(found_in(path, root))
     columns = tuple(f for f in found if not f.lacks)
     others = tuple(f for f in found if f.lacks and max(f.values.shape) >= LEAST_SAMPLES)
     wholes = _wholes(path, columns)

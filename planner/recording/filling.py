@@ -81,14 +81,11 @@ def lost_samples(record: TimeRecord) -> tuple[Fault, ...]:
         both = zip(after, steps, strict=True)
         if any(_jumps(x, own, begin, end) for x, own in both):
             rate = record.sampling_rate_hz
-            return (
-                Fault(
-                    "lost_samples",
-                    f"{(quiet + begin) / rate:.3g} s into the record all accelerations stand still "
-                    f"for {(end - begin) / rate:.2g} s and then jump: samples were lost; record "
-                    f"again.",
-                ),
+            text = (
+                f"{(quiet + begin) / rate:.3g} s into the record all accelerations stand still for "
+                f"{(end - begin) / rate:.2g} s and then jump: samples were lost; record again."
             )
+            return (Fault("lost_samples", text),)
     return ()
 
 

@@ -5,7 +5,7 @@ import io
 import math
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from planner.errors import InputError
 from planner.recording.column_names import hit_direction
 from planner.recording.joints import AxisColumn, JointUnits
 from planner.recording.points import PointNames, StatedPoints
-from planner.recording.records import PoseRow, RecordingsFolder
+from planner.recording.records import PoseRow
 from planner.recording.text_tables import decoded
 
 TABLE = "recordings.csv"
@@ -50,8 +50,8 @@ def read_recordings(
     joints: JointUnits | Sequence[str],
     points: PointNames | None = None,
     bare: bool = False,
-) -> RecordingsFolder:
-    """The table of a recordings folder; `joints` and `points` are the robot's.
+) -> tuple[PoseRow, ...]:
+    """Rows of a recordings folder's table, in recording order; the robot's `joints` and `points`.
 
     A `bare` table may have no column of joints at all, where poses alone tell how the robot stood:
     its rows then hold none.
@@ -70,23 +70,21 @@ def read_recordings(
     rows: list[PoseRow] = []
     seen: dict[tuple[object, ...], int] = {}
     for number, values in lines:
-        cells = dict(zip(header, values, strict=True))
-        row = _recording_row(path, inside, number, cells, columns)
-        row = _with_points(path, row, cells, points)
-        stated = row.stated
-        points_hit = stated.hit_point, stated.response_points
+        line = _Row(path, number, dict(zip(header, values, strict=True)))
+        row = _recording_row(line, inside, columns, points)
+        points_hit = row.stated.hit_point, row.stated.response_points
         key = row.pose, row.hit, row.response, *points_hit, row.repeat or 0
         if row.repeat is not None and key in seen:
-            raise InputError(
-                f"{path}, row {number}: pose {row.pose}, hit {row.hit}, repeat {row.repeat} is "
-                f"listed in row {seen[key]} already; number the repeats."
+            raise line.wrong(
+                f"pose {row.pose}, hit {row.hit}, repeat {row.repeat} is listed in row {seen[key]} "
+                f"already; number the repeats."
             )
         seen[key] = number
         rows.append(row)
     if columns:
         _same_angles(path, rows, units)
     rows = _one_row_a_file(path, rows)
-    return RecordingsFolder(folder, units, tuple(rows))
+    return tuple(rows)
 
 
 def read_poses(path: Path, joints: JointUnits | Sequence[str]) -> tuple[PoseRow, ...]:
@@ -98,24 +96,17 @@ def read_poses(path: Path, joints: JointUnits | Sequence[str]) -> tuple[PoseRow,
     rows: list[PoseRow] = []
     seen: dict[str, int] = {}
     for number, values in lines:
-        cells = dict(zip(header, values, strict=True))
-        pose = _pose(path, number, cells)
+        line = _Row(path, number, dict(zip(header, values, strict=True)))
+        pose = line.pose
         if pose in seen:
-            raise InputError(
-                f"{path}, row {number}: pose {pose} stands in row {seen[pose]} already; "
-                f"rename one of them."
-            )
+            raise line.wrong(f"pose {pose} stands in row {seen[pose]} already; rename one of them.")
         seen[pose] = number
-        force = None
-        if cells.get("peak_force_n", "").strip():
-            force = _number(path, number, "peak_force_n", cells["peak_force_n"])
-            if not force > 0:
-                raise InputError(
-                    f"{path}, row {number}: peak_force_n is {force:g}; give a force above 0 N, or "
-                    f"leave the cell empty."
-                )
-        angles = _angles(path, number, cells, columns)
-        rows.append(PoseRow(pose, angles, number, peak_force_n=force))
+        force = line.value("peak_force_n") if line.cell("peak_force_n") else None
+        if force is not None and not force > 0:
+            raise line.wrong(
+                f"peak_force_n is {force:g}; give a force above 0 N, or leave the cell empty."
+            )
+        rows.append(PoseRow(pose, line.angles(columns), number, peak_force_n=force))
     return tuple(rows)
 
 
@@ -198,104 +189,107 @@ def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[A
     return found
 
 
-def _pose(path: Path, number: int, cells: dict[str, str]) -> str:
-    pose = cells["pose"].strip()
-    if not pose or len(pose) > 100 or any(ord(c) < 32 for c in pose):
-        raise InputError(f"{path}, row {number}: the pose has no usable name; give it one.")
-    return pose
+@dataclass(frozen=True)
+class _Row:
+    """A row of a table: its line in the file, and its cells by column."""
 
+    path: Path
+    number: int
+    cells: dict[str, str]
 
-def _angles(
-    path: Path, number: int, cells: dict[str, str], columns: Sequence[AxisColumn]
-) -> tuple[float, ...]:
-    return tuple(c.stated(_number(path, number, c.name, cells[c.name])) for c in columns)
+    def wrong(self, text: str) -> InputError:
+        """An error that names the row."""
+        return InputError(f"{self.path}, row {self.number}: {text}")
 
+    def cell(self, column: str) -> str:
+        """ "" where there is no such column."""
+        return self.cells.get(column, "").strip()
 
-def _number(path: Path, number: int, column: str, cell: str) -> float:
-    try:
-        value = float(cell.replace(",", "."))  # decimals of half the world's spreadsheets
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or abs(value) > 1e5:
-        raise InputError(
-            f'{path}, row {number}: {column} is "{cell.strip()}", not a number; correct it '
-            f"(decimal point, {'millimetres' if column.endswith(SLIDE) else 'degrees'})."
-        )
-    return value
+    @property
+    def pose(self) -> str:
+        pose = self.cell("pose")
+        if not pose or len(pose) > 100 or any(ord(c) < 32 for c in pose):
+            raise self.wrong("the pose has no usable name; give it one.")
+        return pose
+
+    def angles(self, columns: Sequence[AxisColumn]) -> tuple[float, ...]:
+        return tuple(c.stated(self.value(c.name)) for c in columns)
+
+    def value(self, column: str) -> float:
+        try:
+            value = float(self.cell(column).replace(",", "."))  # decimals of half the spreadsheets
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value) or abs(value) > 1e5:
+            unit = "millimetres" if column.endswith(SLIDE) else "degrees"
+            raise self.wrong(
+                f'{column} is "{self.cell(column)}", not a number; correct it (decimal point, '
+                f"{unit})."
+            )
+        return value
+
+    def signed_axis(self, column: str, frame: str) -> str:
+        axis = self.cell(column).lower()
+        if not hit_direction(axis):
+            raise self.wrong(
+                f'{column} is "{self.cell(column)}"; give a signed axis of the {frame} frame such '
+                f"as +x."
+            )
+        return axis if axis[0] in "+-" else f"+{axis}"
+
+    def file(self, folder: Path) -> Path:
+        name = self.cell("file")
+        if not name:
+            raise self.wrong("no file is named; add it.")
+        try:
+            file = (folder / name).resolve()
+            inside = file.is_relative_to(folder)
+            found = inside and file.is_file()
+        except (OSError, ValueError, RuntimeError):  # RuntimeError: links that lead to themselves
+            raise self.wrong(f"{name!r} is no file name; correct it.") from None
+        if not inside:
+            raise self.wrong(f"{name} lies outside the recordings folder; move it inside.")
+        if not found:
+            raise self.wrong(f"{name} does not exist; correct the file name.")
+        return file
+
+    def points(self, names: PointNames) -> StatedPoints:
+        """The points that it names."""
+        hit_point, responses = self.cell("hit_point"), tuple(self.cell("response_points").split())
+        for column, name in (
+            ("hit_point", hit_point),
+            *(("response_points", n) for n in responses),
+        ):
+            if name and not names.anywhere and name not in names.known:
+                raise self.wrong(
+                    f'{column} names "{name}", which is none of robot.toml\'s points '
+                    f"({', '.join(names.known)}); correct it, or add a [[point]]."
+                )
+        twice = next((name for name in responses if responses.count(name) > 1), None)
+        if twice:
+            raise self.wrong(f"response_points names {twice} twice; name each point once.")
+        if not hit_point and not responses and names == PointNames():
+            return StatedPoints()
+        return StatedPoints(hit_point, responses, self.number, names)
 
 
 def _recording_row(
-    path: Path, folder: Path, number: int, cells: dict[str, str], columns: Sequence[AxisColumn]
+    row: _Row, folder: Path, columns: Sequence[AxisColumn], points: PointNames
 ) -> PoseRow:
-    angles = _angles(path, number, cells, columns)
-    frame = "hit point's" if cells.get("hit_point", "").strip() else "tcp"
-    hit = _signed_axis(path, number, "hit", cells["hit"], frame)
-    response = None
-    if cells.get("response", "").strip():
-        response = _signed_axis(path, number, "response", cells["response"], "sensor")
-    repeat = None
-    if cells.get("repeat", "").strip():
-        value = _number(path, number, "repeat", cells["repeat"])
-        if value != int(value) or value < 0:
-            raise InputError(f"{path}, row {number}: repeat is {value:g}; give a whole number.")
-        repeat = int(value)
+    response = row.signed_axis("response", "sensor") if row.cell("response") else None
+    repeat = row.value("repeat") if row.cell("repeat") else None
+    if repeat is not None and (repeat != int(repeat) or repeat < 0):
+        raise row.wrong(f"repeat is {repeat:g}; give a whole number.")
     return PoseRow(
-        _pose(path, number, cells),
-        angles,
-        number,
-        hit,
-        repeat,
-        _file(path, folder, number, cells["file"].strip()),
+        row.pose,
+        row.angles(columns),
+        row.number,
+        row.signed_axis("hit", "hit point's" if row.cell("hit_point") else "tcp"),
+        None if repeat is None else int(repeat),
+        row.file(folder),
         response=response,
+        stated=row.points(points),
     )
-
-
-def _signed_axis(path: Path, number: int, column: str, cell: str, frame: str) -> str:
-    axis = cell.strip().lower()
-    if not hit_direction(axis):
-        raise InputError(
-            f'{path}, row {number}: {column} is "{cell.strip()}"; give a signed axis of the '
-            f"{frame} frame such as +x."
-        )
-    return axis if axis[0] in "+-" else f"+{axis}"
-
-
-def _with_points(path: Path, row: PoseRow, cells: dict[str, str], points: PointNames) -> PoseRow:
-    """The row with the points that its cells name."""
-    hit_point = cells.get("hit_point", "").strip()
-    responses = tuple(cells.get("response_points", "").split())
-    for column, name in (("hit_point", hit_point), *(("response_points", n) for n in responses)):
-        if name and not points.anywhere and name not in points.known:
-            raise InputError(
-                f'{path}, row {row.row}: {column} names "{name}", which is none of robot.toml\'s '
-                f"points ({', '.join(points.known)}); correct it, or add a [[point]]."
-            )
-    twice = next((name for name in responses if responses.count(name) > 1), None)
-    if twice:
-        raise InputError(
-            f"{path}, row {row.row}: response_points names {twice} twice; name each point once."
-        )
-    if not hit_point and not responses and points == PointNames():
-        return row
-    return replace(row, stated=StatedPoints(hit_point, responses, row.row, points))
-
-
-def _file(path: Path, folder: Path, number: int, name: str) -> Path:
-    if not name:
-        raise InputError(f"{path}, row {number}: no file is named; add it.")
-    try:
-        file = (folder / name).resolve()
-        inside = file.is_relative_to(folder)
-        found = inside and file.is_file()
-    except (OSError, ValueError, RuntimeError):  # RuntimeError: links that lead to themselves
-        raise InputError(f"{path}, row {number}: {name!r} is no file name; correct it.") from None
-    if not inside:
-        raise InputError(
-            f"{path}, row {number}: {name} lies outside the recordings folder; move it inside."
-        )
-    if not found:
-        raise InputError(f"{path}, row {number}: {name} does not exist; correct the file name.")
-    return file
 
 
 def _same_angles(path: Path, rows: list[PoseRow], joints: JointUnits) -> None:

@@ -15,10 +15,16 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.column_names import bare, direction_in, frequency_unit, hit_direction
-from planner.recording.named_columns import Named, check_finite
-from planner.recording.records import AXES, FrfRecord
-from planner.recording.units import lookup, lookup_ratio
+from planner.recording.column_names import (
+    bare,
+    direction_in,
+    frequency_unit,
+    hit_direction,
+    lookup,
+    lookup_ratio,
+)
+from planner.recording.named_columns import Named
+from planner.recording.records import AXES, FrfRecord, check_numbers
 
 _OWN = re.compile(r"(accelerance|mobility|receptance|coherence)_([xyz])([xyz])(_re|_im|)$")
 _BETWEEN = re.compile(
@@ -82,7 +88,7 @@ def frf_record(path: Path, named: Named) -> FrfRecord:
                     f"{path}: column {name} has {len(named.columns[name])} values for "
                     f"{len(frequency)} frequencies; export them together."
                 )
-            check_finite(path, name, named.columns[name][keep])
+            check_numbers(path, name, named.columns[name][keep])
     read = [_values(path, entry, named) for entry in entries]
     kinds = {kind for kind, _, _ in read}
     if len(kinds) != 1:

@@ -56,12 +56,8 @@ def _add(
             for number, place in zip(s["node_nums"], places, strict=True):
                 position[str(int(number))] = scale * place
         elif s["type"] == TRACES:
-            lines += _trace([int(n) for n in s["nodes"]])
-
-
-def _trace(numbers: list[int]) -> list[tuple[str, str]]:
-    """Pairs of neighbours along a trace line; 0 lifts the pen."""
-    return [(str(a), str(b)) for a, b in pairwise(numbers) if a and b and a != b]
+            pairs = pairwise(int(n) for n in s["nodes"])  # 0 lifts the pen
+            lines += [(str(a), str(b)) for a, b in pairs if a and b and a != b]
 
 
 def _sets(path: Path) -> list[dict[str, Any]]:

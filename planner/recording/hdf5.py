@@ -32,17 +32,9 @@ def read_hdf5(path: Path) -> tuple[Record, ...]:
     """
     import h5py
 
-    try:
-        _check_texts(path)
-        with h5py.File(path, "r") as file:
-            _check(path, file)
-            root = _Reader(path).group(file)
-    except InputError:
-        raise
-    except Exception as error:  # the library raises whatever the junk makes it raise
-        raise InputError(
-            f"{path} is not a readable HDF5 file ({type(error).__name__}); export it again."
-        ) from None
+    _check_texts(path)
+    with h5py.File(path, "r") as file:
+        root = _Reader(path).group(file)
     return records_of(path, root)
 
 
@@ -64,36 +56,6 @@ def _check_texts(path: Path) -> None:
                 at += 16 + -(-size // 8) * 8 if number else size
 
 
-def _check(path: Path, file: "h5py.File") -> None:
-    """Raise InputError where a file holds too much, or leads to another."""
-    import h5py
-
-    seen, size = [0], [0]
-    elsewhere: list[str] = []
-
-    def link(name: str, what: object) -> None:
-        if isinstance(what, h5py.ExternalLink):
-            elsewhere.append(name)
-
-    def visit(name: str, item: object) -> None:
-        seen[0] += 1
-        if seen[0] > MOST_ENTRIES:
-            raise InputError(f"{path} holds more than {MOST_ENTRIES} objects; export a hit a file.")
-        if isinstance(item, h5py.Dataset):
-            size[0] += (item.size or 0) * item.dtype.itemsize
-            if item.is_virtual or item.external:
-                elsewhere.append(name)
-
-    file.visititems_links(link)
-    file.visititems(visit)
-    if elsewhere:
-        raise InputError(
-            f"{path}: {elsewhere[0]} lies in another file, which would not be kept; export all "
-            f"channels into one file."
-        )
-    check_size(path, size[0])
-
-
 class _Reader:
     """Reads a file's objects, not too many of them: references may lead in circles."""
 
@@ -103,15 +65,30 @@ class _Reader:
         self._bytes = 0
         self._seen: set[int] = set()
 
+    def _enter(self, depth: int) -> None:
+        self._left -= 1
+        if depth > DEEPEST:
+            raise InputError(f"{self._path} is nested too deep; export a hit a file.")
+        if self._left < 0:
+            raise InputError(f"{self._path} holds more than {MOST_ENTRIES} objects.")
+
+    def _refuse_elsewhere(self, name: str, elsewhere: bool) -> None:
+        if elsewhere:
+            raise InputError(
+                f"{self._path}: {name} lies in another file, which would not be kept; export all "
+                f"channels into one file."
+            )
+
     def group(self, group: "h5py.Group", depth: int = 0) -> EntryTree:
         """A group with what is in it; an array of structs is a list of them."""
         import h5py
 
-        if depth > DEEPEST:
-            raise InputError(f"{self._path} is nested too deep; export a hit a file.")
+        self._enter(depth)
         entries: dict[str, object] = {}
         for name in map(str, group):
-            if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            link = group.get(name, getlink=True)
+            self._refuse_elsewhere(name, isinstance(link, h5py.ExternalLink))
+            if name.startswith("#") or not isinstance(link, h5py.HardLink):
                 continue  # MATLAB's own, and links to what is read elsewhere
             item = group[name]
             address = h5py.h5o.get_info(item.id).addr
@@ -138,8 +115,6 @@ class _Reader:
     def _elements(self, dataset: "h5py.Dataset", depth: int) -> list[object]:
         import h5py
 
-        if depth > DEEPEST:
-            raise InputError(f"{self._path} is nested too deep; export a hit a file.")
         found: list[object] = []
         for reference in np.asarray(dataset[()]).ravel():
             item = dataset.file[reference] if reference else None
@@ -154,10 +129,10 @@ class _Reader:
         """Numbers, a text, a list, or a table's columns; with what is stated of them, a level."""
         import h5py
 
-        self._left -= 1
+        self._enter(depth)
+        elsewhere = dataset.is_virtual or bool(dataset.external)
+        self._refuse_elsewhere(str(dataset.name).lstrip("/"), elsewhere)
         self._bytes += (dataset.size or 0) * dataset.dtype.itemsize
-        if self._left < 0:
-            raise InputError(f"{self._path} holds more than {MOST_ENTRIES} objects.")
         check_size(self._path, self._bytes)
         kind = _stated(dataset, "MATLAB_class")
         if dataset.shape is None or "MATLAB_empty" in dataset.attrs:

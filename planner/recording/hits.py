@@ -1,5 +1,6 @@
 """Records to hits: force in N, accelerations in m/s², one stated axis; nothing guessed."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -148,15 +149,10 @@ def _at_points(
     of_tool = any(node in known and stated.response_at("", node) == SENSOR for node in whole)
     if names.anywhere or not of_tool:
         return accelerations, ()
-    return [c for c in accelerations if c.node in known], tuple(
-        Fault(
-            "left_out",
-            f"{c.name} at node {c.node} is left out: that is no [[point]].",
-            refuse=False,
-        )
-        for c in accelerations
-        if c.node not in known
-    )
+    others = [c for c in accelerations if c.node not in known]
+    texts = (f"{c.name} at node {c.node} is left out: that is no [[point]]." for c in others)
+    told = tuple(Fault("left_out", text, refuse=False) for text in texts)
+    return [c for c in accelerations if c.node in known], told
 
 
 def _responses(
@@ -269,9 +265,8 @@ def without_unit(record: TimeRecord) -> str:
 
 def describe(record: TimeRecord) -> str:
     """What a record holds, in words: "2 accelerations (m/s^2), 1 pressure (Pa)"."""
-    counts: dict[str, int] = {}
-    for channel in record.channels:
-        known = channel.quantity != "unknown"
-        text = f"{channel.quantity} ({channel.unit})" if known else "unlabelled record"
-        counts[text] = counts.get(text, 0) + 1
+    counts = Counter(
+        f"{c.quantity} ({c.unit})" if c.quantity != "unknown" else "unlabelled record"
+        for c in record.channels
+    )
     return ", ".join(f"{n} × {text}" for text, n in counts.items())

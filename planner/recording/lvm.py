@@ -15,13 +15,14 @@ import numpy as np
 from planner.errors import InputError
 from planner.recording.entries import MOST_ENTRIES, EntryTree, tree_of
 from planner.recording.entry_records import records_of
-from planner.recording.named_columns import check_finite
-from planner.recording.records import Record
+from planner.recording.records import Record, check_numbers
 from planner.recording.sampling import UNEVEN, sampling_rate
 from planner.recording.text_tables import MAX_BYTES, decoded, read_text
 
 FIRST_LINE = "LabVIEW Measurement"
 END, SPECIAL, END_SPECIAL = "***End_of_Header***", "***Start_Special***", "***End_Special***"
+# A row is of numbers if its first cell is one, or empty as without x columns.
+NUMBER = re.compile(r"[-+.,\d]|nan|inf|$", re.IGNORECASE)
 ABSCISSA, COMMENT = "X_Value", "Comment"
 
 
@@ -76,7 +77,10 @@ def read_lvm(path: Path) -> tuple[Record, ...]:
             raise InputError(f"{path} ends within a header; the file is cut off, export it again.")
         channels = list(_channels(path, segment))
         if parts and _goes_on(parts[-1], channels):
-            parts[-1] = [_joined(a, b) for a, b in zip(parts[-1], channels, strict=True)]
+            parts[-1] = [
+                replace(a, values=np.concatenate([a.values, b.values]))
+                for a, b in zip(parts[-1], channels, strict=True)
+            ]
         elif channels:
             parts.append(channels)
     if not parts:
@@ -98,7 +102,7 @@ def _segments(text: str) -> Iterator[_Segment]:
         first = cells[0]
         if special or first == SPECIAL:
             special = first != END_SPECIAL
-        elif current and any(cells) and _is_row(first):
+        elif current and any(cells) and NUMBER.match(first):
             current.rows.append(cells)
         elif current and current.rows:  # it ends with an empty line, or where a header begins
             yield current
@@ -117,11 +121,6 @@ def _segments(text: str) -> Iterator[_Segment]:
         current = _Segment(head, block, [], 0)
     if current:
         yield current
-
-
-def _is_row(first: str) -> bool:
-    """Whether a row is of numbers: its first cell is one, or empty as without x columns."""
-    return bool(re.match(r"[-+.,\d]|nan|inf|$", first, re.IGNORECASE))
 
 
 def _channels(path: Path, segment: _Segment) -> Iterator[_Channel]:
@@ -158,7 +157,7 @@ def _channel(
         )
     start, step = (_number(path, tag, stated(tag)) for tag in ("X0", "Delta_X"))
     if x.size:  # times have more digits than steps
-        check_finite(path, ABSCISSA, x)
+        check_numbers(path, ABSCISSA, x)
         start += float(x[0]) - _number(path, "X0", stated("X0", owner))
         step = 1 / sampling_rate(path, x - x[0])
     of_spectrum = stated("X_Dimension") == "Frequency" or stated("X_Unit_Label") in ("Hz", "hertz")
@@ -227,10 +226,6 @@ def _after(a: _Channel, b: _Channel) -> float:
     if a.date is not None and b.date is not None:
         apart = float((b.date - a.date) / np.timedelta64(1, "ns") * 1e-9)
     return b.start - a.start + apart
-
-
-def _joined(a: _Channel, b: _Channel) -> _Channel:
-    return replace(a, values=np.concatenate([a.values, b.values]))
 
 
 def _tree(channels: list[_Channel]) -> EntryTree:

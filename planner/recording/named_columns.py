@@ -14,11 +14,17 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.column_names import bare, direction_in, hit_direction, time_unit, unit_text
-from planner.recording.records import Channel, Record, TimeRecord
+from planner.recording.column_names import (
+    bare,
+    direction_in,
+    hit_direction,
+    lookup,
+    time_unit,
+    unit_text,
+)
+from planner.recording.records import Channel, Record, TimeRecord, check_numbers
 from planner.recording.sampling import UNEVEN, aligned, sampling_rate
 from planner.recording.stated import RATES, STEPS, number
-from planner.recording.units import lookup
 
 _AT = re.compile(r"acceleration_(.+)_[xyz]$")
 
@@ -67,22 +73,13 @@ def to_records(path: Path, named: Named) -> tuple[Record, ...]:
     if holds_frfs(named):
         return (frf_record(path, named),)
     for name, values in named.columns.items():
-        check_finite(path, name, values)
+        check_numbers(path, name, values)
         if np.iscomplexobj(values) and np.any(np.imag(values)):
             raise InputError(
                 f"{path}: {name} holds complex numbers, which no time history does; export time "
                 f"histories, or FRFs with their frequencies (frequency_hz, accelerance_xx)."
             )
     return (_time(path, named),)
-
-
-def check_finite(path: Path, name: str, values: np.ndarray) -> None:
-    """Raise InputError where a column (n,) holds what is no finite number."""
-    bad = np.flatnonzero(~np.isfinite(values))
-    if bad.size:
-        raise InputError(
-            f"{path}: column {name}, sample {bad[0] + 1} is not a finite number; export again."
-        )
 
 
 def _time(path: Path, named: Named) -> TimeRecord:

@@ -33,25 +33,23 @@ class Pulse(NamedTuple):
     peak_n: float
     noise_n: float
 
-    def around(
-        self, samples: int, ringing: int = RINGING_SAMPLES, widths: float = RINGING_WIDTHS
-    ) -> tuple[int, int]:
+    def around(self, samples: int) -> tuple[int, int]:
         """Range (first, end) of a record of `samples` that holds the anti-alias ringing too."""
-        margin = ringing + int(widths * (self.end - self.first))
+        margin = RINGING_SAMPLES + RINGING_WIDTHS * (self.end - self.first)
         return max(0, self.first - margin), min(samples, self.end + margin)
 
 
-def find_pulse(force_n: np.ndarray, share: float = PULSE_SHARE, sds: float = PULSE_SDS) -> Pulse:
+def find_pulse(force_n: np.ndarray) -> Pulse:
     """The main pulse of a force (n,) in N.
 
-    It reaches as far around the peak as the force stays above `share` of the peak and `sds` of
-    the noise. The noise is judged by the median, which a short pulse does not move.
+    It reaches as far around the peak as the force stays above PULSE_SHARE of the peak and PULSE_SDS
+    of the noise. The noise is judged by the median, which a short pulse does not move.
     """
     offset = float(np.median(force_n))
     size = np.abs(force_n - offset)
     peak, noise = int(np.argmax(size)), NORMAL_MAD * float(np.median(size))
     top = float(size[peak])
-    small = size <= max(share * top, sds * noise)
+    small = size <= max(PULSE_SHARE * top, PULSE_SDS * noise)
     before, after = np.flatnonzero(small[:peak]), np.flatnonzero(small[peak + 1 :])
     first = int(before[-1]) + 1 if before.size else 0
     end = peak + 1 + int(after[0]) if after.size else len(size)

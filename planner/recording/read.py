@@ -2,16 +2,15 @@
 
 import hashlib
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from threading import Lock
 
 import numpy as np
 
 from planner import file_content
 from planner.errors import InputError
-from planner.recording import plausible
 from planner.recording.entries import check_size, tree_of
 from planner.recording.entry_records import records_of
 from planner.recording.filling import without_filling
@@ -19,7 +18,7 @@ from planner.recording.hdf5 import read_hdf5
 from planner.recording.lvm import read_lvm
 from planner.recording.mat5 import is_version_5, read_mat5
 from planner.recording.named_columns import Named, to_records
-from planner.recording.records import FrfRecord, Record, TimeRecord
+from planner.recording.records import FrfRecord, Record, TimeRecord, check_records
 from planner.recording.stream import cut_into_hits
 from planner.recording.tdms import read_tdms
 from planner.recording.text_tables import read_text
@@ -36,35 +35,11 @@ class ReadFile:
     whole: tuple[Record, ...]
     hits: tuple[Record, ...]
 
-    @property
+    @cached_property
     def nbytes(self) -> int:
         """What its numbers take up."""
         arrays = {id(a): a.nbytes for r in (*self.whole, *self.hits) for a in _arrays(r)}
         return sum(arrays.values())
-
-
-class ReadFiles:
-    """The files read last, as many as `most_bytes` hold, the last one in any case."""
-
-    def __init__(self, most_bytes: int):
-        self._most_bytes, self._lock = most_bytes, Lock()
-        self._files: OrderedDict[Hashable, ReadFile] = OrderedDict()
-
-    def get(self, key: Hashable) -> ReadFile | None:
-        """What was read under a key; None where it is not remembered."""
-        with self._lock:
-            if key in self._files:
-                self._files.move_to_end(key)
-            return self._files.get(key)
-
-    def put(self, key: Hashable, file: ReadFile) -> None:
-        """Remember a file, and forget those that were asked for longest ago."""
-        with self._lock:
-            self._files[key] = file
-            while sum(f.nbytes for f in self._files.values()) > self._most_bytes:
-                if len(self._files) == 1:
-                    return
-                self._files.popitem(last=False)
 
 
 def _arrays(record: Record) -> list[np.ndarray]:
@@ -73,7 +48,9 @@ def _arrays(record: Record) -> list[np.ndarray]:
     return [channel.samples for channel in record.channels]
 
 
-REMEMBERED = ReadFiles(256 * 1024 * 1024)  # a file of many hits is read once, not once a hit
+MOST_REMEMBERED = 256 * 1024 * 1024  # bytes of what was read last, the last file in any case
+# A file of many hits is read once, not once a hit.
+_remembered: OrderedDict[tuple[Path, tuple[int, ...]], ReadFile] = OrderedDict()
 
 
 def read_mat(path: Path) -> tuple[Record, ...]:
@@ -99,12 +76,6 @@ def _older(path: Path) -> dict[str, object] | None:
         return scipy.io.loadmat(str(path))
     except NotImplementedError:
         return None
-    except InputError:
-        raise
-    except Exception as error:
-        raise InputError(
-            f"{path} is not a readable MAT file ({type(error).__name__}); export it again."
-        ) from None
 
 
 def _logged_spectra(path: Path, entries: dict[str, object]) -> Named:
@@ -220,10 +191,10 @@ def _read(path: Path) -> ReadFile:
         raise InputError(f"{path} is empty; export it again.")
     if size > MAX_BYTES:
         raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MiB; split it.")
-    found = REMEMBERED.get((path, mark))
-    if found is None:
-        found = _read_anew(path)
-        REMEMBERED.put((path, mark), found)
+    found = _remembered.pop((path, mark), None) or _read_anew(path)
+    _remembered[path, mark] = found
+    while len(_remembered) > 1 and sum(f.nbytes for f in _remembered.values()) > MOST_REMEMBERED:
+        _remembered.popitem(last=False)
     return found
 
 
@@ -232,11 +203,11 @@ def _read_anew(path: Path) -> ReadFile:
         records = READERS[path.suffix.lower()](path)
     except InputError:
         raise
-    except (ValueError, TypeError, LookupError, ArithmeticError, MemoryError, OSError) as error:
+    except Exception as error:  # libraries raise whatever the junk makes them raise
         raise InputError(
             f"{path} cannot be read as {path.suffix} ({type(error).__name__}); export it again."
         ) from error
-    plausible.check(path, records)
+    check_records(path, records)
     whole = tuple(without_filling(r) if isinstance(r, TimeRecord) else r for r in records)
     cut = (cut_into_hits(r) if isinstance(r, TimeRecord) else (r,) for r in whole)
     return ReadFile(whole, tuple(hit for hits in cut for hit in hits))

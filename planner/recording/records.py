@@ -1,18 +1,22 @@
-"""What a recording holds, before anything is computed from it."""
+"""What a recording holds, before anything is computed from it: what an instrument can give."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from planner.errors import InputError
 from planner.recording.dof import Dof
-from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, UNTOLD, Layout, StatedPoints
 from planner.recording.pulse import Pulse, find_pulse
 
 AXES = ("x", "y", "z")
 NOTICED = "noticed"  # kind of a fault that is no reason, but what the reader has to say
+# Chosen: far beyond any hammer, accelerometer or FRF in SI, and far from where squares overflow.
+LARGEST = 1e15
+SLOWEST_HZ, FASTEST_HZ = 1e-3, 1e9  # sampling rates; slower or faster is a wrong unit
 OF_TOOL = tuple(Dof(SENSOR, axis) for axis in AXES)
 
 
@@ -96,9 +100,7 @@ class Hit:
     acts on the structure along that signed axis, so that H_xx of a "-x" hit is −a_x/F. Rows of
     `acceleration_m_s2` are `responses`, point and axis of its frame; of the tool's sensor alone
     they are x, y and z (parallel to those of the tcp). `hit_point` and the responses' nodes are
-    names of points as in `points.Layout`. `taken_out_m_s2` (r, n) is what was taken out of the
-    accelerations as the answer to the hit's own miss, and `taken_out_sd` which share of that is
-    uncertain.
+    names of points as in `points.Layout`.
     """
 
     source: Path
@@ -106,12 +108,9 @@ class Hit:
     sampling_rate_hz: float
     force_n: np.ndarray  # (n,)
     acceleration_m_s2: np.ndarray  # (r, n)
-    repeat: int = 1
     simulated: bool = False
     hit_point: str = TCP
     responses: tuple[Dof, ...] = OF_TOOL
-    taken_out_m_s2: np.ndarray | None = None
-    taken_out_sd: float = 0.0
     faults: tuple[Fault, ...] = ()  # of its record, see `TimeRecord`
 
     @cached_property
@@ -139,13 +138,8 @@ class Hit:
 
     def with_channels(self, rows: list[int]) -> "Hit":
         """The hit as some of its channels have it."""
-        out = self.taken_out_m_s2
-        return replace(
-            self,
-            acceleration_m_s2=self.acceleration_m_s2[rows],
-            responses=tuple(self.responses[i] for i in rows),
-            taken_out_m_s2=None if out is None else out[rows],
-        )
+        responses = tuple(self.responses[i] for i in rows)
+        return replace(self, acceleration_m_s2=self.acceleration_m_s2[rows], responses=responses)
 
     def label(self, row: int) -> str:
         """A response in words: "x", of another sensor than the tool's "elbow x"."""
@@ -185,10 +179,47 @@ class PoseRow:
     stated: StatedPoints = field(default_factory=StatedPoints)
 
 
-@dataclass(frozen=True)
-class RecordingsFolder:
-    """A folder of recordings as recordings.csv lists it, in recording order."""
+def check_records(path: Path, records: Sequence[Record]) -> None:
+    """Raise InputError saying what of the records of a file no instrument can have given."""
+    for record in records:
+        if isinstance(record, TimeRecord):
+            _check_times(path, record)
+        else:
+            _check_frfs(path, record)
 
-    path: Path
-    joints: JointUnits
-    rows: tuple[PoseRow, ...] = field(default=())
+
+def check_numbers(path: Path, name: str, values: np.ndarray) -> None:
+    """Raise InputError where one of `values` (n,) is not finite or absurdly large."""
+    sane = np.abs(values) < LARGEST  # NaN is not
+    if not np.all(sane):
+        at = int(np.argmin(sane))
+        fault = "is not a finite number"
+        if np.isfinite(values[at]):
+            fault = f"is {abs(values[at]):.3g}, which no instrument gives"
+        raise InputError(f"{path}: {name}, sample {at + 1} {fault}; export it again.")
+
+
+def _check_times(path: Path, record: TimeRecord) -> None:
+    rate = record.sampling_rate_hz
+    if not SLOWEST_HZ <= rate <= FASTEST_HZ:
+        raise InputError(
+            f"{path} was sampled at {rate:.4g} Hz as it says; correct the time's unit or step."
+        )
+    for channel in record.channels:
+        check_numbers(path, channel.name, channel.samples)
+
+
+def _check_frfs(path: Path, record: FrfRecord) -> None:
+    lines, values = record.frequency_hz, record.values
+    if lines.ndim != 1 or len(lines) < 2 or values.ndim != 2 or values.shape[1] != len(lines):
+        raise InputError(
+            f"{path} holds FRFs of shape {values.shape} over {lines.size} frequency lines; export "
+            f"FRFs and their frequencies together."
+        )
+    check_numbers(path, "frequency", lines)
+    if lines[0] < 0 or not np.all(np.diff(lines) > 0):
+        raise InputError(f"{path}: the FRFs' frequency lines do not rise; export them in order.")
+    for number, row in enumerate(values, 1):
+        check_numbers(path, f"FRF {number}", row)
+    if record.coherence.shape != values.shape:
+        raise InputError(f"{path}: coherence and FRFs differ in length; export them together.")

@@ -1,6 +1,8 @@
 """Hits of a pose beside each other: whether repeats along an axis agree, as they should."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -31,49 +33,10 @@ def screen_repeats(
     """
     faults: list[tuple[Fault, ...]] = [() for _ in hits]
     for own in _groups(hits):
-        found = _screen_alike(tuple(hits[i] for i in own), band_hz)
-        for i, one in zip(own, found, strict=True):
-            faults[i] = one
-    return tuple(faults)
-
-
-def _screen_alike(
-    hits: tuple[Hit, ...], band_hz: tuple[float, float]
-) -> tuple[tuple[Fault, ...], ...]:
-    """The same of hits at one point that the same sensors heard."""
-    faults: list[tuple[Fault, ...]] = [() for _ in hits]
-    frfs = _frfs(hits, band_hz)
-    axes = np.array([hit.axis_index for hit in hits])
-    level = _levels(hits)
-    centres = {axis: _centre(frfs[axes == axis]) for axis in set(axes.tolist())}
-    for axis, centre in centres.items():
-        group = np.flatnonzero(axes == axis)
-        if len(group) < 3:
-            continue
-        across = {other: c for other, c in centres.items() if other != axis}
-        own = _Agreement(centre, tuple(across.values()))
-        alike = np.array([own.of(frf) for frf in frfs[group]])
-        typical = float(np.median(alike))
-        sizes = own.sizes(frfs[group])
-        for i, share, size in zip(group.tolist(), alike, sizes, strict=True):
-            if size and outvoted(sizes):
-                text = f"It {other_size(size, 'its repeats')} Correct the file, or hit again."
-                faults[i] = (Fault("other_size", text),)
-                continue
-            usual = share > UNLIKE or share > typical - FAR_BELOW
-            if usual and not _struck(frfs[i], centre, across):
-                continue
-            same = [frfs[j] for j in group if j != i and level[j] == level[i]]
-            told = _disagreement(frfs[i], own, across, same)
-            if told:
-                kind, text = told
-                faults[i] = (
-                    Fault(
-                        kind,
-                        f"Its FRF {text} (likeness {share:.2f}, others {typical:.2f}); check axis "
-                        f"and hit point, and hit again.",
-                    ),
-                )
+        alike = _Alike.of([hits[i] for i in own], band_hz)
+        for axis in alike.centres:
+            for i, fault in alike.faults(axis):
+                faults[own[i]] = (fault,)
     return tuple(faults)
 
 
@@ -100,9 +63,9 @@ def doubts(hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> tuple[Doubt |
     """
     found: list[Doubt | None] = [None] * len(hits)
     for own in _groups(hits):
-        group = _Few.of(tuple(hits[i] for i in own), band_hz)
+        alike = _Alike.of([hits[i] for i in own], band_hz)
         for i in range(len(own)):
-            doubt = group.doubt(i)
+            doubt = alike.doubt(i)
             if doubt is not None:
                 others = tuple(own[j] for j in doubt.others)
                 found[own[i]] = replace(doubt, others=others)
@@ -110,16 +73,42 @@ def doubts(hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> tuple[Doubt |
 
 
 @dataclass(frozen=True, eq=False)
-class _Few:
-    """FRFs (n, N) of hits at one place, with the axis and force level (n,) of each."""
+class _Alike:
+    """FRFs (n, N) of hits that can be compared, with the axis and force level (n,) of each."""
 
     frfs: np.ndarray
     axes: np.ndarray
     level: np.ndarray
 
     @classmethod
-    def of(cls, hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> "_Few":
+    def of(cls, hits: Sequence[Hit], band_hz: tuple[float, float]) -> "_Alike":
         return cls(_frfs(hits, band_hz), np.array([hit.axis_index for hit in hits]), _levels(hits))
+
+    @cached_property
+    def centres(self) -> dict[int, np.ndarray]:
+        """The usual FRF along each axis."""
+        return {axis: _centre(self.frfs[self.axes == axis]) for axis in set(self.axes.tolist())}
+
+    def faults(self, axis: int) -> Iterator[tuple[int, Fault]]:
+        """Hits that disagree with three or more along an axis, and how."""
+        group, across = np.flatnonzero(self.axes == axis), self._across(axis)
+        if len(group) < 3:
+            return
+        own = _Agreement(self.centres[axis], tuple(across.values()))
+        alike = np.array([own.of(frf) for frf in self.frfs[group]])
+        typical, sizes = float(np.median(alike)), own.sizes(self.frfs[group])
+        for i, share, size in zip(group.tolist(), alike, sizes, strict=True):
+            if size and outvoted(sizes):
+                text = f"It {other_size(size, 'its repeats')} Correct the file, or hit again."
+                yield i, Fault("other_size", text)
+                continue
+            usual = share > UNLIKE or share > typical - FAR_BELOW
+            if usual and not _struck(self.frfs[i], own.centre, across):
+                continue
+            same = [self.frfs[j] for j in group if j != i and self.level[j] == self.level[i]]
+            if told := _disagreement(self.frfs[i], own, across, same):
+                text = f"Its FRF {told[1]} (likeness {share:.2f}, others {typical:.2f})"
+                yield i, Fault(told[0], f"{text}; check axis and hit point, and hit again.")
 
     def doubt(self, i: int) -> Doubt | None:
         same = [int(j) for j in np.flatnonzero(self.axes == self.axes[i]) if j != i]
@@ -136,23 +125,24 @@ class _Few:
 
     def _sized(self, i: int, same: list[int]) -> Doubt | None:
         own = self.frfs[[i, *same]]
-        agreement = _Agreement(_centre(own), tuple(self._across(i).values()))
+        agreement = _Agreement(_centre(own), tuple(self._across(self.axes[i]).values()))
         sizes = agreement.sizes(own)
         if not sizes[0] or outvoted(sizes):
             return None
         other = tuple(j for j, size in zip(same, sizes[1:], strict=True) if size * sizes[0] <= 0)
         return Doubt(other, agreement.of(own[0]), size=float(sizes[0]))
 
-    def _across(self, i: int) -> dict[int, np.ndarray]:
-        others = set(self.axes.tolist()) - {int(self.axes[i])}
-        return {axis: _centre(self.frfs[self.axes == axis]) for axis in others}
+    def _across(self, axis: int) -> dict[int, np.ndarray]:
+        return {other: centre for other, centre in self.centres.items() if other != axis}
 
     def _elsewhere(self, i: int) -> bool:
         """Whether a hit answers as those along another axis do."""
-        return any(abs(_likeness(self.frfs[i], c)) > LIKE for c in self._across(i).values())
+        return any(
+            abs(_likeness(self.frfs[i], c)) > LIKE for c in self._across(self.axes[i]).values()
+        )
 
     def _contradicted(self, i: int, j: int) -> Doubt | None:
-        across = self._across(i)
+        across = self._across(self.axes[i])
         others = tuple(across.values())
         a, b = self.frfs[i], self.frfs[j]
         likeness = max(_Agreement(b, others).of(a), _Agreement(a, others).of(b))
@@ -166,7 +156,7 @@ class _Few:
         return None if odd[1] and not odd[0] else Doubt((j,), likeness)
 
     def _repeated(self, i: int) -> Doubt | None:
-        for axis, centre in self._across(i).items():
+        for axis, centre in self._across(self.axes[i]).items():
             sizes = np.linalg.norm(self.frfs[i]), np.linalg.norm(centre)
             ratio = float(min(sizes) / max(*sizes, SILENCE))
             alike = _likeness(self.frfs[i], centre)
@@ -255,7 +245,7 @@ def _struck(frf: np.ndarray, own: np.ndarray, across: dict[int, np.ndarray]) -> 
     )
 
 
-def _levels(hits: tuple[Hit, ...]) -> np.ndarray:
+def _levels(hits: Sequence[Hit]) -> np.ndarray:
     """Which force level each hit belongs to."""
     groups = levels(np.sort([peak_n(hit) for hit in hits]))
     weakest = [group[0] for group in groups[1:]]
@@ -284,7 +274,7 @@ def _groups(hits: tuple[Hit, ...]) -> list[list[int]]:
     return groups
 
 
-def _frfs(hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> np.ndarray:
+def _frfs(hits: Sequence[Hit], band_hz: tuple[float, float]) -> np.ndarray:
     """FRFs (n, 3·F) of hits that can be compared, of as many samples, over the same lines."""
     shortest = min(len(hit.force_n) for hit in hits)
     return np.array([_frf(hit, shortest, band_hz, hits[0].sampling_rate_hz) for hit in hits])

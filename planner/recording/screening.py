@@ -1,5 +1,6 @@
 """Screening of hits: what a careful engineer would refuse while standing at the robot."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,49 +34,30 @@ def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]
     faults = [*hit.faults, *_short(hit, limits), *_weak(hit, limits), *channel_faults(hit)]
     if any(f.kind == "too_weak" for f in faults):
         return tuple(faults)
-    return (
-        *faults,
-        *_polarity(hit),
-        *_pulse_whole(hit, limits),
-        *_double(hit, limits),
-        *_soft(hit, limits),
-    )
+    checks = (_pulse, _double, _soft)
+    return (*faults, *(fault for check in checks for fault in check(hit, limits)))
 
 
-def _short(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
+def _short(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
     low, high = limits.band_hz
     record_s = len(hit.force_n) / hit.sampling_rate_hz
-    if (high - low) * record_s >= LEAST_LINES:
-        return []
-    return [
-        Fault(
+    if (high - low) * record_s < LEAST_LINES:
+        yield Fault(
             "too_short",
             f"The record of {record_s:.3g} s resolves nothing between {low:g} and {high:g} Hz; "
             f"record for longer, or correct the unit of the time.",
         )
-    ]
 
 
-def _weak(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
-    faults, peak, noise = [], hit.pulse.peak_n, hit.pulse.noise_n
+def _weak(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
+    peak, noise, ratio = hit.pulse.peak_n, hit.pulse.noise_n, _response_snr(hit)
     if peak < limits.least_snr * noise:
-        faults.append(
-            Fault(
-                "too_weak",
-                f"The force peak of {peak:.3g} N is only {peak / noise:.1f} times the noise; "
-                f"hit harder.",
-            )
-        )
-    ratio = _response_snr(hit)
+        text = f"The force peak of {peak:.3g} N is only {peak / noise:.1f} times the noise"
+        yield Fault("too_weak", f"{text}; hit harder.")
     told = any(fault.kind == "not_at_rest" for fault in hit.faults)
     if ratio is not None and not told and ratio < limits.least_response_snr:
-        faults.append(
-            Fault(
-                "too_weak",
-                f"The response is only {ratio:.1f} times the noise before the hit; hit harder.",
-            )
-        )
-    return faults
+        text = f"The response is only {ratio:.1f} times the noise before the hit; hit harder."
+        yield Fault("too_weak", text)
 
 
 def _response_snr(hit: Hit) -> float | None:
@@ -95,29 +77,21 @@ def _response_snr(hit: Hit) -> float | None:
     return float(np.max(answer / np.maximum(noise, SILENCE)))
 
 
-def _polarity(hit: Hit) -> list[Fault]:
-    pulse = hit.pulse
-    if hit.force_n[pulse.peak] > pulse.offset_n:
-        return []
-    return [
-        Fault(
+def _pulse(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
+    pulse, samples = hit.pulse, len(hit.force_n)
+    if hit.force_n[pulse.peak] <= pulse.offset_n:
+        yield Fault(
             "polarity",
             f"The force pulse of {pulse.peak_n:.3g} N is negative: a hammer only pushes; check the "
             f"polarity of the force channel.",
         )
-    ]
-
-
-def _pulse_whole(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
-    pulse, samples = hit.pulse, len(hit.force_n)
     if pulse.first < limits.least_pretrigger:
-        return [Fault("truncated", "The pulse starts at the record's edge; set a pre-trigger.")]
-    if pulse.end > samples - 8 or pulse.peak > 0.8 * samples:
-        return [Fault("truncated", "The record ends right after the pulse; check the trigger.")]
-    return []
+        yield Fault("truncated", "The pulse starts at the record's edge; set a pre-trigger.")
+    elif pulse.end > samples - 8 or pulse.peak > 0.8 * samples:
+        yield Fault("truncated", "The record ends right after the pulse; check the trigger.")
 
 
-def _double(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
+def _double(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
     """A second pulse: force that rises again after it had fallen.
 
     An anti-alias filter rings after a pulse, but what it adds above zero is never more than what
@@ -130,15 +104,12 @@ def _double(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
     second = float(np.max(rest, initial=0.0))
     valley = _valley(force[pulse.first : pulse.end])
     least = max(limits.second_peak * peak, 6 * pulse.noise_n, 1.5 * ringing)
-    if max(second, valley) <= least:
-        return []
-    return [
-        Fault(
+    if max(second, valley) > least:
+        yield Fault(
             "double_hit",
             f"A second pulse of {max(second, valley):.3g} N follows the first of {peak:.3g} N; "
             f"hit once and let it bounce off.",
         )
-    ]
 
 
 def _valley(pulse: np.ndarray) -> float:
@@ -152,33 +123,28 @@ def _valley(pulse: np.ndarray) -> float:
     return rise
 
 
-def _soft(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
+def _soft(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
     force = hit.force_n - np.median(hit.force_n)
     size = 1 << int(np.ceil(np.log2(4 * len(force))))
     spectrum = np.abs(np.fft.rfft(force, size))
     frequency = np.fft.rfftfreq(size, 1 / hit.sampling_rate_hz)
     low, high = limits.band_hz
-    if high > 0.45 * hit.sampling_rate_hz:
-        return [
-            Fault(
-                "too_slow",
-                f"Sampled at {hit.sampling_rate_hz:g} Hz, its FRFs end at "
-                f"{0.45 * hit.sampling_rate_hz:.4g} Hz, before the end of the band of {low:g} to "
-                f"{high:g} Hz; sample at {2.56 * high:.0f} Hz or faster, state the unit "
-                f"where times are in ms, or give another band (--band-hz; [modes] band_hz).",
-            )
-        ]
+    last = 0.45 * hit.sampling_rate_hz
     inside = spectrum[(frequency >= low) & (frequency <= high)]
     end = spectrum[(frequency >= 0.9 * high) & (frequency <= high)]
-    if not inside.size or not end.size:
-        return []
-    drop = 20 * np.log10(np.max(inside) / max(float(np.mean(end)), 1e-30))
-    if drop > limits.roll_off_db:
-        return [
-            Fault(
+    if high > last:
+        yield Fault(
+            "too_slow",
+            f"Sampled at {hit.sampling_rate_hz:g} Hz, its FRFs end at {last:.4g} Hz, before the "
+            f"end of the band of {low:g} to {high:g} Hz; sample at {2.56 * high:.0f} Hz or faster, "
+            f"state the unit where times are in ms, or give another band (--band-hz; [modes] "
+            f"band_hz).",
+        )
+    elif inside.size and end.size:
+        drop = 20 * np.log10(np.max(inside) / max(float(np.mean(end)), 1e-30))
+        if drop > limits.roll_off_db:
+            yield Fault(
                 "too_soft",
-                f"The pulse is too soft: its spectrum has fallen by {drop:.0f} dB at "
-                f"{high:g} Hz; use a harder tip.",
+                f"The pulse is too soft: its spectrum has fallen by {drop:.0f} dB at {high:g} Hz; "
+                f"use a harder tip.",
             )
-        ]
-    return []

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
+from planner.recording.column_names import lookup
 from planner.recording.sampling import UNEVEN
-from planner.recording.units import lookup
 
 Attributes = Mapping[str, object]
 # Keys, letters and digits alone, as measuring programs write them.

@@ -127,20 +127,14 @@ def _part(record: TimeRecord, one: _Struck, struck: list[_Struck]) -> TimeRecord
     if one.cut_off:
         usual = min(s.stop - s.first for s in struck if not s.cut_off)
         ends = "the record ends" if last else "the next hit follows"
-        told.append(
-            Fault(
-                "cut_off",
-                f"It is cut off: {ends} {(one.stop - one.first) / rate:.2g} s after it, other hits "
-                f"have {usual / rate:.2g} s; wait as long after each.",
-            )
-        )
+        text = f"It is cut off: {ends} {(one.stop - one.first) / rate:.2g} s after it, other hits "
+        text += f"have {usual / rate:.2g} s; wait as long after each."
+        told.append(Fault("cut_off", text))
     if one.restless > RESTLESS:
-        told.append(
-            Fault(
-                "not_at_rest",
-                f"The structure was not at rest: before this hit it moved by "
-                f"{100 * one.restless:.0f} % of its answer; wait longer between hits.",
-                refuse=one.restless > 1 / ScreeningLimits().least_response_snr,
-            )
+        text = (
+            f"The structure was not at rest: before this hit it moved by {100 * one.restless:.0f}"
         )
+        text += " % of its answer; wait longer between hits."
+        refuse = one.restless > 1 / ScreeningLimits().least_response_snr
+        told.append(Fault("not_at_rest", text, refuse))
     return replace(part, faults=tuple(told))

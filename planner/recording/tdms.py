@@ -24,14 +24,7 @@ def read_tdms(path: Path) -> tuple[Record, ...]:
     Raises InputError where it is damaged, and where channels were not sampled together.
     """
     with _warnings() as warned:
-        try:
-            root = _root(path)
-        except InputError:
-            raise
-        except Exception as error:  # the library raises whatever the junk makes it raise
-            raise InputError(
-                f"{path} is not a readable TDMS file ({type(error).__name__}); export it again."
-            ) from None
+        root = _root(path)
     if warned:
         raise InputError(f"{path} is cut off ({warned[0].getMessage()}); export it again.")
     return records_of(path, root)

@@ -14,16 +14,22 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.errors import ForeignFileError, InputError
-from planner.recording.column_names import frequency_unit, time_unit, unit_text
+from planner.recording.column_names import (
+    frequency_unit,
+    lookup,
+    lookup_ratio,
+    time_unit,
+    unit_text,
+)
 from planner.recording.named_columns import Named, to_records
 from planner.recording.records import Record
-from planner.recording.units import lookup, lookup_ratio
 
 MAX_BYTES = 256 * 1024 * 1024
 LABELS = ("ch no.", "ch no", "channel", "name")  # head a row of names
 LEAST_ROWS = 8
 MOST_HEADER_LINES, MOST_HEADER_TEXT = 10_000, 2000  # lines, and characters of one, looked at
 SEPARATORS = re.compile(r"[=:,;\t]")  # between a key and its value
+PAIR = re.compile(r"no\.|title|date|hit|input|name")  # in keys
 BOMS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF32_LE: "utf-32", codecs.BOM_UTF32_BE: "utf-32",
         codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}  # fmt: skip
 
@@ -155,7 +161,8 @@ def _header(
     labelled = [i for i in full if rows[i][0].lower() in LABELS]
     likely = labelled or [
         i for i in full
-        if (width > 2 or not _is_pair(rows[i])) and not all(map(_is_unit, rows[i]))
+        # A header of two columns may be mistaken for a key and its value.
+        if (width > 2 or not PAIR.search(rows[i][0].lower())) and not all(map(_is_unit, rows[i]))
     ]  # fmt: skip
     attributes: dict[str, str] = {}
     for line, row in zip(lines, rows, strict=True):
@@ -223,11 +230,6 @@ def _pairs(line: str, row: Sequence[str]) -> list[tuple[str, str]]:
     value = re.split(r'[,;\t"]', value, maxsplit=1)[0].strip()
     usable = value and re.fullmatch(r"[\w .()/-]+", key)
     return [(key, value)] if usable else []
-
-
-def _is_pair(cells: Sequence[str]) -> bool:
-    """A two-column header may be mistaken for a key and its value."""
-    return bool(re.search(r"(no\.|title|date|hit|input|name)", cells[0].lower()))
 
 
 def _key(text: str) -> str:

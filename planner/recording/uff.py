@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.errors import ForeignFileError, InputError
-from planner.recording.records import Channel, FrfRecord, Record, TimeRecord
+from planner.recording.column_names import MOTIONS, Unit, lookup, lookup_ratio
+from planner.recording.records import Channel, FrfRecord, Record, TimeRecord, check_numbers
 from planner.recording.sampling import aligned, sampling_rate
-from planner.recording.units import MOTIONS, Unit, lookup, lookup_ratio
 
 if TYPE_CHECKING:
     import pyuff
@@ -75,22 +75,13 @@ def _sets(path: Path) -> list[dict[str, Any]]:
         end = file.read().rstrip()
     if not end.endswith(b"-1"):  # the parser would leave out the dataset that is cut off
         raise InputError(f"{path} does not end with a whole dataset; export it again.")
-    try:
-        with opened(path) as (file, kinds):
-            if not kinds:
-                raise ForeignFileError(
-                    f"{path} is no universal file (no dataset in it); export again."
-                )
-            if 0 in kinds:  # bytes between two datasets are damaged
-                raise InputError(f"{path} holds a dataset without a number; export it again.")
-            sets: list[Any] = [file.read_sets(i) for i in range(len(kinds))]
-            blocks = file._block_ind  # where datasets begin and end, which nothing public says
-    except InputError:
-        raise
-    except Exception as error:  # the parser raises whatever the junk makes it raise
-        raise InputError(
-            f"{path} cannot be read as a universal file ({type(error).__name__}); export it again."
-        ) from None
+    with opened(path) as (file, kinds):
+        if not kinds:
+            raise ForeignFileError(f"{path} is no universal file (no dataset in it); export again.")
+        if 0 in kinds:  # bytes between two datasets are damaged
+            raise InputError(f"{path} holds a dataset without a number; export it again.")
+        sets: list[Any] = [file.read_sets(i) for i in range(len(kinds))]
+        blocks = file._block_ind  # where datasets begin and end, which nothing public says
     system = None
     for kind, one, (first, end) in zip(kinds, sets, blocks, strict=True):
         if kind == 164:
@@ -99,7 +90,9 @@ def _sets(path: Path) -> list[dict[str, Any]]:
             one["system"] = system
             if one["binary"] and len(one["data"]) != int(one["num_pts"]):
                 _read_mixed(path, one, int(first), int(end))
-            _without_padding(one)
+            count = int(one["num_pts"])  # holds: what fills up the last line of text is left out
+            if not one["binary"] and 0 < len(one["data"]) - count < LAST_LINE:
+                one["x"], one["data"] = one["x"][:count], one["data"][:count]
     return sets
 
 
@@ -132,13 +125,6 @@ def _read_mixed(path: Path, s: dict[str, Any], first: int, end: int) -> None:
         s["data"] = values["y"] @ np.array([1.0, 1j][:parts])
 
 
-def _without_padding(s: dict[str, Any]) -> None:
-    """Leave out what fills up the last line of an ASCII dataset: the count that is stated holds."""
-    count = int(s["num_pts"])
-    if not s["binary"] and 0 < len(s["data"]) - count < LAST_LINE:
-        s["x"], s["data"] = s["x"][:count], s["data"][:count]
-
-
 def _check_numbers(path: Path, sets: list[dict[str, Any]]) -> None:
     for number, s in enumerate(sets, 1):
         data = np.asarray(s["data"])
@@ -147,12 +133,7 @@ def _check_numbers(path: Path, sets: list[dict[str, Any]]) -> None:
                 f"{path}: dataset {number} states {s['num_pts']} points and holds {len(data)}; "
                 f"the file is cut off, export it again."
             )
-        bad = np.flatnonzero(~np.isfinite(data))
-        if bad.size:
-            raise InputError(
-                f"{path}: dataset {number}, sample {bad[0] + 1} is not a finite number; "
-                f"export it again."
-            )
+        check_numbers(path, f"dataset {number}", data)
 
 
 def _simulated(sets: list[dict[str, Any]]) -> bool:

@@ -71,8 +71,8 @@ def sources_of(paths: Sequence[Path], from_names: bool = False) -> tuple[Source,
     found: list[Source] = []
     for path in paths:
         if (path / TABLE).is_file():
-            table = read_recordings(path, joint_columns(path), ANYWHERE, bare=True)
-            found += [_of_no_robot(Source.of(row)) for row in table.rows]
+            rows = read_recordings(path, joint_columns(path), ANYWHERE, bare=True)
+            found += [_of_no_robot(Source.of(row)) for row in rows]
         elif path.is_dir():
             found += [Source(file, str(file)) for file in files_in(path, READERS)]
         elif path.is_file():

@@ -1,47 +1,33 @@
 """What the engineer's keys do. Each act changes the campaign and gives the session's next value."""
 
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from rich.text import Text
 
-from planner.campaign.events import (
-    REFUSED,
-    Confirmed,
-    FilesPlaced,
-    Imported,
-    Refused,
-    Skipped,
-    Starred,
-    Undone,
-)
+from planner.campaign.events import REFUSED, Confirmed, Imported
 from planner.campaign.importing import ImportReport
 from planner.campaign.state import fold
-from planner.campaign.taking_back import last_acts
+from planner.campaign.taking_back import act, last_acts
 from planner.dataset.screened_files import Source
 from planner.errors import NoPoseLeftError, PlannerError
 from planner.report.campaign_acts import redone, undone
 from planner.session import session_text
 from planner.session.course import BAD, Course, PoseInProgress
-from planner.session.page import TakingBack, page_with_hits, page_without_hits
-from planner.session.skipping import ask_why, on_reason_key
+from planner.session.page import (
+    ask_why,
+    can_take_back,
+    on_reason_key,
+    page_with_hits,
+    page_without_hits,
+)
 from planner.session.station import Station
 from planner.words import by_reason, counted, short_name
 
 ENTER = ("a", "\n", "\r")
 IMPORTING = "importing and refitting"
-ACTS: dict[type, Callable[[Any], str]] = {  # in words, where an interruption has to say them
-    Imported: lambda event: f"the hits of {event.pose}",
-    Confirmed: lambda event: f"the answer about {event.pose}",
-    Refused: lambda event: f"the refusal of hits at {event.pose}",
-    Skipped: lambda event: f"the skip of {event.pose}",
-    FilesPlaced: lambda event: f"that late hits are of {event.pose}",
-    Starred: lambda event: f"the star of {event.pose}",
-    Undone: lambda event: f"that entry {event.act} is taken back",
-}
 
 
 def arrive(station: Station, course: Course) -> Course:
@@ -59,7 +45,7 @@ def arrive(station: Station, course: Course) -> Course:
     page = page_without_hits(
         campaign, proposal, station.hits_at(proposal), station.inbox.folder, course
     )
-    page = page_with_hits(page, (), (), TakingBack.of(campaign), station.auto, course)
+    page = page_with_hits(page, (), (), can_take_back(campaign), station.auto, course)
     station.screen.show(page.page)
     station.rerun_queue.show()
     before = station.pose_before(proposal.pose)
@@ -80,9 +66,9 @@ def say_last_import(station: Station) -> None:
 
 def on_key(station: Station, course: Course, visit: PoseInProgress, key: str | None) -> Course:
     """Act on a key at a pose; without a visit the pose is over."""
-    act = _act if visit.typed is None else on_reason_key
+    on = _act if visit.typed is None else on_reason_key
     try:
-        return act(station, course, visit, key)
+        return on(station, course, visit, key)
     except PlannerError as error:
         station.say(str(error), "red")
         return course
@@ -97,15 +83,15 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
     over = replace(course, visit=None)
     match key:
         case "a" | "\n" | "\r":
-            if visit.good and not visit.page.complete and not again:
+            if visit.any_of("good") and not visit.page.complete and not again:
                 station.say(session_text.incomplete(visit.page), "yellow")
                 return asked
-            out = visit.late | visit.unsure | visit.unstated
+            out = visit.any_of("late", "unsure", "unstated")
             files = [path for path in visit.whole if path not in out]
             return import_waiting(station, course, visit, files)
-        case "b" if visit.late:
+        case "b" if visit.any_of("late"):
             return _to_their_poses(station, course, visit)
-        case "h" if visit.late | visit.unsure:
+        case "h" if visit.any_of("late", "unsure"):
             return _right_here(station, course, visit)
         case "r" if visit.whole:
             bad = visit.paths("repeat") or visit.paths(*BAD)
@@ -158,14 +144,15 @@ def import_waiting(
     station: Station, course: Course, visit: PoseInProgress, files: Sequence[Path]
 ) -> Course:
     """Import the waiting hits; the pose is over when it gave modes."""
-    files = [path for path in files if path not in visit.weak]
+    weak = frozenset(verdict.path for verdict in visit.verdicts if verdict.weak)
+    files = [path for path in files if path not in weak]
     if not files:
-        waiting = len(visit.late | visit.unsure)
+        waiting = len(visit.any_of("late", "unsure"))
         asked = f"{counted(waiting, 'hit')} wait for your answer: [b] or [h]."
         station.say(asked if waiting else session_text.NOTHING_NEW, "yellow")
         return course
     # What the import would take as good, or ask for at every pose from here on.
-    _refuse(station, visit, visit.weak | (frozenset() if station.auto else visit.unsure))
+    _refuse(station, visit, weak | (frozenset() if station.auto else visit.any_of("unsure")))
     try:
         with station.screen.working(IMPORTING):
             reports = _imported_files(station, files, visit.proposal.pose)
@@ -291,18 +278,16 @@ def _to_their_poses(station: Station, course: Course, visit: PoseInProgress) -> 
 
 def _right_here(station: Station, course: Course, visit: PoseInProgress) -> Course:
     """The engineer says that late hits are of this pose, and unsure ones right."""
-    if visit.late:
-        files = [station.inbox.digest(path) for path in sorted(visit.late)]
+    if late := visit.any_of("late"):
+        files = [station.inbox.digest(path) for path in sorted(late)]
         station.campaign.place(visit.proposal.pose, files)
         station.rerun_queue.note()
-    return replace(course, here=course.here | visit.unsure)
+    return replace(course, here=course.here | visit.any_of("unsure"))
 
 
 def interrupted(station: Station) -> str:
     """Which acts of the engineer an interruption left in the log, in a sentence."""
-    said = [
-        ACTS[type(event)](event) for event in station.rerun_queue.gained() if type(event) in ACTS
-    ]
+    said = [act(entry) for entry in station.rerun_queue.gained()]
     if not said:
         return "Stopped: nothing that was begun is in the log; hits that were not imported wait."
     there = ", ".join(dict.fromkeys(said))

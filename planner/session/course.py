@@ -43,15 +43,9 @@ class PoseInProgress:
         others = {verdict.path for verdict in self.verdicts if verdict.kind not in kinds}
         return frozenset(verdict.path for verdict in self.verdicts) - others
 
-    @property
-    def weak(self) -> frozenset[Path]:
-        """Files with hits so weak that they are not to be imported."""
-        return frozenset(verdict.path for verdict in self.verdicts if verdict.weak)
-
-    @property
-    def unsure(self) -> frozenset[Path]:
-        """Files with hits that contradict others."""
-        return frozenset(verdict.path for verdict in self.verdicts if verdict.kind == "unsure")
+    def any_of(self, *kinds: str) -> frozenset[Path]:
+        """Files with a hit of one of these kinds."""
+        return frozenset(verdict.path for verdict in self.verdicts if verdict.kind in kinds)
 
     def reasons(self, files: Collection[Path]) -> dict[Path, str]:
         """What is wrong with the hits in these files, where something is."""
@@ -61,28 +55,13 @@ class PoseInProgress:
         }
 
     @property
-    def unstated(self) -> frozenset[Path]:
-        """Files that do not say along which axis they were hit: they wait until something does."""
-        return frozenset(verdict.path for verdict in self.verdicts if verdict.kind == "unstated")
-
-    @property
-    def late(self) -> frozenset[Path]:
-        """Files that are of another pose until the engineer says otherwise."""
-        return frozenset(verdict.path for verdict in self.verdicts if verdict.kind == "late")
-
-    @property
     def late_by_pose(self) -> dict[str, tuple[Path, ...]]:
-        """The late ones by the pose that they are of."""
-        found: dict[str, dict[Path, None]] = {}
-        for verdict in self.verdicts:
-            if verdict.kind == "late":
-                found.setdefault(verdict.came, {})[verdict.path] = None
-        return {pose: tuple(paths) for pose, paths in found.items()}
-
-    @property
-    def good(self) -> bool:
-        """Whether a hit that can be used waits."""
-        return any(verdict.kind == "good" for verdict in self.verdicts)
+        """Files that are of another pose, until the engineer says otherwise, by that pose."""
+        late = [verdict for verdict in self.verdicts if verdict.kind == "late"]
+        return {
+            pose: tuple(dict.fromkeys(v.path for v in late if v.came == pose))
+            for pose in dict.fromkeys(v.came for v in late)
+        }
 
 
 @dataclass(frozen=True, eq=False)

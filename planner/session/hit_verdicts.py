@@ -157,12 +157,15 @@ class Verdicts:
         late = [(v, at) for v in every if (at := came.get(v.path))]
         alike = [bool(self._alike(v, {at: hits.get(at, ())})) for v, at in late]
         return [
-            replace(v, kind=self._came(v), text="", came=at, alike=like)
+            replace(
+                v,
+                kind="elsewhere" if self.table.row(v.path) else "late",
+                text="",
+                came=at,
+                alike=like,
+            )
             for (v, at), like in zip(late, alike, strict=True)
         ]
-
-    def _came(self, verdict: HitVerdict) -> str:
-        return "late" if self.table.row(verdict.path) is None else "elsewhere"
 
     def _alike(self, verdict: HitVerdict, hits: Mapping[str, tuple[Hit, ...]]) -> str:
         """The pose of which hits are answered like one of these; "": none is."""

@@ -1,32 +1,31 @@
-"""The page of a pose, made of what the campaign expects there and of the hits that wait."""
+"""The page of a pose: what the campaign expects there, hits that wait, a reason that is typed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.campaign.taking_back import last_acts, last_undone
-from planner.dataset.screened_files import when
 from planner.robot.room_directions import axes_in_the_room
-from planner.session.course import BAD, Course
+from planner.session import session_text
+from planner.session.course import BAD, Course, PoseInProgress
 from planner.session.hit_verdicts import HitVerdict
-from planner.session.pose_screen import JudgedHit, PosePage, keys_that_do
+from planner.session.pose_screen import PosePage, keys_that_do
+from planner.session.station import Station
 from planner.words import counted, short_name
 
+ESCAPE, ERASE = "\x1b", ("\x7f", "\b")
+ASKED = (
+    "What stands in the way? Type it, then Enter: poses around it are left out too.\n"
+    "Enter alone skips this pose only, Escape goes back. "
+)
 
-@dataclass(frozen=True)
-class TakingBack:
+
+def can_take_back(campaign: Campaign) -> tuple[bool, bool]:
     """Whether there is an act to take back, and one that was and can hold again."""
-
-    undo: bool
-    redo: bool
-
-    @classmethod
-    def of(cls, campaign: Campaign) -> "TakingBack":
-        """Of a campaign as it is now."""
-        entries = campaign.entries
-        return cls(bool(last_acts(entries, decisions_only=True)), bool(last_undone(entries)[0]))
+    entries = campaign.entries
+    return bool(last_acts(entries, decisions_only=True)), bool(last_undone(entries)[0])
 
 
 def page_without_hits(
@@ -48,7 +47,7 @@ def page_with_hits(
     page: PosePage,
     verdicts: Sequence[HitVerdict],
     waiting: Sequence[tuple[Path, str]],
-    can: TakingBack,
+    can: tuple[bool, bool],
     auto: bool,
     course: Course,
 ) -> PosePage:
@@ -56,13 +55,13 @@ def page_with_hits(
     names = [one.path.name for one in verdicts]
     hits = tuple(_judged(one, names) for one in verdicts)
     unfinished = tuple((short_name(path), _named(path, why)) for path, why in waiting)
-    page = replace(page, hits=hits, unfinished=unfinished, progress=course.progress)
-    page = replace(page, streams=_streams(verdicts))
-    poses = {one.came for one in verdicts if one.kind == "late"}
-    return replace(page, keys="" if auto else _keys(page, poses, can))
+    page = replace(
+        page, hits=hits, unfinished=unfinished, progress=course.progress, streams=_streams(verdicts)
+    )
+    return replace(page, keys="" if auto else _keys(page, can))
 
 
-def _judged(verdict: HitVerdict, names: Sequence[str]) -> JudgedHit:
+def _judged(verdict: HitVerdict, names: Sequence[str]) -> HitVerdict:
     said = f"answers as {verdict.came} did" if verdict.alike else f"came at {verdict.came}"
     late = f"{said}: [b] it is from there, [h] from here"
     text = late if verdict.kind == "late" else verdict.text
@@ -72,7 +71,7 @@ def _judged(verdict: HitVerdict, names: Sequence[str]) -> JudgedHit:
         text = f"{text}, or [h]: it is right"
     for name in names:
         text = text.replace(name, short_name(name))
-    return JudgedHit(verdict.number, verdict.axis, verdict.kind, text, when(verdict.at_s))
+    return replace(verdict, text=text)
 
 
 def _streams(verdicts: Sequence[HitVerdict]) -> tuple[str, ...]:
@@ -87,8 +86,9 @@ def _streams(verdicts: Sequence[HitVerdict]) -> tuple[str, ...]:
     )
 
 
-def _keys(page: PosePage, late: set[str], can: TakingBack) -> str:
+def _keys(page: PosePage, can: tuple[bool, bool]) -> str:
     kinds = {hit.kind for hit in page.hits}
+    late = {hit.came for hit in page.hits if hit.kind == "late"}
     usable = bool(kinds & {"good", "elsewhere"})
     return keys_that_do([
         ("a", "accept" if page.complete else "accept as it is", usable),
@@ -97,7 +97,7 @@ def _keys(page: PosePage, late: set[str], can: TakingBack) -> str:
         ("b", f"late ones to {' and '.join(sorted(late))}", "late" in kinds),
         ("h", _right_here(kinds), bool(kinds & {"late", "unsure"})),
         ("s", "mark for a second look", True), ("k", "skip this pose", True),
-        ("u", "undo", can.undo), ("U", "redo", can.redo), ("q", "quit", True), ("?", "help", True),
+        ("u", "undo", can[0]), ("U", "redo", can[1]), ("q", "quit", True), ("?", "help", True),
     ])  # fmt: skip
 
 
@@ -113,3 +113,29 @@ def _named(path: Path, why: str) -> str:
     name = short_name(path)
     text = why.replace(str(path), name).replace(path.name, name)
     return text if name in text else f"{name} {text}"
+
+
+def ask_why(station: Station, visit: PoseInProgress, typed: str = "") -> PoseInProgress:
+    """The visit while a reason is typed, which the page shows in the place of the keys."""
+    station.screen.show(replace(visit.page, keys=f"{ASKED}{typed}_").page)
+    return replace(visit, typed=typed)
+
+
+def on_reason_key(
+    station: Station, course: Course, visit: PoseInProgress, key: str | None
+) -> Course:
+    """One more key of the reason; the pose is over with Enter."""
+    typed, pose = visit.typed or "", visit.proposal.pose
+    if key is None:
+        return course
+    if key == ESCAPE:
+        station.screen.show(visit.page.page)
+        return replace(course, visit=replace(visit, typed=None))
+    if key in ("\r", "\n"):
+        reason = typed.strip()
+        station.campaign.skip(pose, reason or "skipped in the session", neighbours=bool(reason))
+        which = f"{pose} and poses around it" if reason else pose
+        station.say(session_text.never_again(which))
+        return replace(course, visit=None)
+    typed = typed[:-1] if key in ERASE else typed + key * key.isprintable()
+    return replace(course, visit=ask_why(station, visit, typed))

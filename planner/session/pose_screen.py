@@ -11,8 +11,10 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.campaign.events import Proposal
+from planner.dataset.screened_files import when
 from planner.recording.joints import JointUnits
 from planner.report.text import with_sd
+from planner.session.hit_verdicts import HitVerdict
 from planner.session.screen import Said, fitted
 from planner.words import command
 
@@ -22,43 +24,20 @@ COLOURS = {"good": "bold green", "repeat": "bold red", "late": "bold yellow",
            "elsewhere": "yellow", "unsure": "bold yellow", "unstated": "bold yellow"}  # fmt: skip
 
 
-@dataclass(frozen=True)
-class JudgedHit:
-    """A hit that waits: its number at this pose, axis, kind as of its verdict, why.
-
-    `when`: " at 14.00 s" in a record of several hits.
-    """
-
-    number: int
-    axis: str
-    kind: str
-    text: str
-    when: str = ""
-
-    @property
-    def said(self) -> Text:
-        """In full, what to do before why, in colour."""
-        do, why = remedy_first(self.text)
-        return self._headed(" ".join([do, why]).strip())
-
-    @property
-    def shortly(self) -> Text:
-        """What to do alone."""
-        return self._headed(remedy_first(self.text)[0])
-
-    def _headed(self, text: str) -> Text:
-        axis = (self.axis or "axis not stated") + self.when
-        if self.kind == "good":
-            but = f"hit {self.number} ({axis}): good, but: {text}"
-            plain = Text(f"hit {self.number} ({axis}): good", style=COLOURS["good"])
-            return Text(but, style=COLOURS["late"]) if text else plain
-        named = f"{self.number} ({axis})"
-        said = {
-            "repeat": f"REPEAT HIT {named}:", "late": f"hit {named}, late?",
-            "unsure": f"hit {named}, right?", "elsewhere": f"hit {named}, not from here:",
-            "unstated": f"hit {self.number}{self.when}, along which axis?",
-        }  # fmt: skip
-        return Text(f"{said[self.kind]} {text}", style=COLOURS[self.kind])
+def verdict_in_words(hit: HitVerdict, whole: bool = True) -> Text:
+    """What is to be done about a hit, in colour; after it why, where the `whole` is said."""
+    do, why = remedy_first(hit.text)
+    text = f"{do} {why}".strip() if whole else do
+    named = f"{hit.number} ({(hit.axis or 'axis not stated') + when(hit.at_s)})"
+    if hit.kind == "good":
+        but = Text(f"hit {named}: good, but: {text}", style=COLOURS["late"])
+        return but if text else Text(f"hit {named}: good", style=COLOURS["good"])
+    said = {
+        "repeat": f"REPEAT HIT {named}:", "late": f"hit {named}, late?",
+        "unsure": f"hit {named}, right?", "elsewhere": f"hit {named}, not from here:",
+        "unstated": f"hit {hit.number}{when(hit.at_s)}, along which axis?",
+    }  # fmt: skip
+    return Text(f"{said[hit.kind]} {text}", style=COLOURS[hit.kind])
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +49,7 @@ class PosePage:
     joints: JointUnits
     frame: str  # whose axes the hits are along
     per_axis: int
-    hits: tuple[JudgedHit, ...]
+    hits: tuple[HitVerdict, ...]
     expected_hz: tuple[float, ...]
     expected_sd_hz: tuple[float, ...]
     folder: Path
@@ -99,11 +78,11 @@ class PosePage:
         rows = 1 + max(angles.row_count, hits.row_count)
         title = f"Measurement {self.number}: go to pose {self.proposal.pose}"
         parts = [Said([Text(title, style="bold reverse")]), *self._place(), *self._verdicts()]
-        parts += [Said([None, _said(text)], 5) for text in self.streams[-LAST:]]
+        parts += [Said([None, Text(text)], 5) for text in self.streams[-LAST:]]
         parts += [_unfinished(*one) for one in self.unfinished[-2:]]
-        parts += [Said([None, _said(self.progress)], 6)] if self.progress else []
+        parts += [Said([None, Text(self.progress)], 6)] if self.progress else []
         paths = _end(command(self.folder)), command(self.folder)
-        where = [_said(f"waiting for hits in {path}", "dim") for path in paths]
+        where = [Text(f"waiting for hits in {path}", "dim") for path in paths]
         parts.append(Said([None, *where], 4))
         parts.append(Said([Text(self.keys, style="reverse")]))
         lines = fitted(parts, width, height - rows)
@@ -117,18 +96,18 @@ class PosePage:
         expected = ", ".join(with_sd(hz, sd) for hz, sd in each)
         short = ", ".join(f"{hz:.2f}" for hz in self.expected_hz)
         return [
-            Said([None, _said(place), _said(f"{place}; {self.proposal.reason}")], 7),
-            Said([_said(f"expected (Hz): {text}", "bold") for text in (short, expected)], 8),
+            Said([None, Text(place), Text(f"{place}; {self.proposal.reason}")], 7),
+            Said([Text(f"expected (Hz): {text}", "bold") for text in (short, expected)], 8),
         ]
 
     def _verdicts(self) -> list[Said]:
         """The last hits; the very last one in any case."""
         *before, last = self.hits[-LAST:] or (None,)
         parts = [
-            Said([None, hit.shortly, hit.said], len(before) - i)
+            Said([None, *_forms(hit)], len(before) - i)
             for i, hit in enumerate(before) if hit
         ]  # fmt: skip
-        return [*parts, Said([last.shortly, last.said])] if last else parts
+        return [*parts, Said(_forms(last))] if last else parts
 
     def _angles(self) -> Table:
         angles = Table(box=None, header_style="bold", pad_edge=False)
@@ -139,10 +118,6 @@ class PosePage:
             text = self.joints.text(i, value, 3) if slides else f"{value:.3f}"
             angles.add_row(self.joints.names[i], Text(text, style="bold"))
         return angles
-
-    def _has(self, axis: str | None) -> bool:
-        """Whether as many hits as are asked for came along an axis ("+x")."""
-        return bool(axis) and self.counts.get(axis[-1], 0) >= self.per_axis
 
     def _hits(self) -> Table:
         made = Table(box=None, header_style="bold", pad_edge=False)
@@ -157,7 +132,8 @@ class PosePage:
             way = f"  +{axis} {ways[axis]}" if ways else ""
             made.add_row(row.append(way, style="not bold"))
         # Where an axis has its hits, a bad one more is nothing to do again.
-        again = [hit for hit in self.hits if hit.kind == "repeat" and not self._has(hit.axis)]
+        lacking = [axis for axis in "xyz" if self.counts[axis] < self.per_axis]
+        again = [h for h in self.hits if h.kind == "repeat" and h.axis[-1:] in ("", *lacking)]
         if again:
             axes = ", ".join(dict.fromkeys(hit.axis or "?" for hit in again))
             made.add_row(
@@ -172,6 +148,10 @@ class PosePage:
         if self.complete:
             made.add_row(Text("all hits are in", style="bold green"))
         return made
+
+
+def _forms(hit: HitVerdict) -> list[Text]:
+    return [verdict_in_words(hit, whole=False), verdict_in_words(hit)]
 
 
 def keys_that_do(pairs: Sequence[tuple[str, str, bool]]) -> str:
@@ -205,10 +185,6 @@ def _unfinished(name: str, said: str) -> Said:
     """What is the matter with a file; what to do about it, if anything, comes first."""
     do, why = remedy_first(said)
     if not why:
-        return Said([None, _said(f"not whole yet: {said}", "dim")], 5)
+        return Said([None, Text(f"not whole yet: {said}", "dim")], 5)
     short = f"cannot be used: {name}: {do}"
-    return Said([None, _said(short, "dim"), _said(f"{short} {why}", "dim")], 5)
-
-
-def _said(text: str, style: str = "") -> Text:
-    return Text(text, style=style)
+    return Said([None, Text(short, "dim"), Text(f"{short} {why}", "dim")], 5)

@@ -11,13 +11,14 @@ from rich.text import Text
 from planner.campaign.arrivals import stated_otherwise
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import (
-    AnyEvent,
+    Configured,
     Confirmed,
     Entry,
     FilesPlaced,
     FilesShown,
     Imported,
     Proposal,
+    Proposed,
     Refused,
 )
 from planner.campaign.importing import ImportReport
@@ -59,9 +60,14 @@ class RerunQueue:
             self._story.tell(*self._waiting[0])
             self._waiting.popleft()
 
-    def gained(self) -> list[AnyEvent]:
-        """What the log on disk holds since it was noted last."""
-        return [entry.event for entry in Campaign(self._campaign.directory).entries[self._noted :]]
+    def gained(self) -> list[Entry]:
+        """What the engineer did, as the log on disk has it, since it was noted last."""
+        new = Campaign(self._campaign.directory).entries[self._noted :]
+        return [
+            entry
+            for entry in new
+            if not isinstance(entry.event, Configured | Proposed | FilesShown)
+        ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ from planner.session.diagnosis_process import LEAST, DiagnosisProcess
 from planner.session.hit_verdicts import HitVerdict, Part, Verdicts
 from planner.session.inbox import FolderTable, Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys
-from planner.session.page import TakingBack, page_with_hits
+from planner.session.page import can_take_back, page_with_hits
 from planner.session.screen import Screen
 from planner.session.station import RerunQueue, Station
 
@@ -157,7 +157,8 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
     visit = _looked(station, course, visit)
     course = replace(course, visit=visit)
     waited = time.monotonic() - visit.since > 3 * station.inbox.quiet_s
-    ready = [path for path in visit.whole if path not in visit.unstated | visit.late]
+    unready = visit.any_of("unstated", "late")
+    ready = [path for path in visit.whole if path not in unready]
     hits = sum(verdict.path in ready for verdict in visit.verdicts)
     if station.auto and ready and (hits >= station.hits_at(visit.proposal) or waited):
         return import_waiting(station, course, visit, ready)
@@ -178,7 +179,7 @@ def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInPr
     now = (tuple(whole), tuple(waiting), tuple((v.kind, v.text) for v in verdicts))
     if now == visit.shown:
         return visit
-    can = TakingBack.of(station.campaign)
+    can = can_take_back(station.campaign)
     page = page_with_hits(visit.page, verdicts, waiting, can, station.auto, course)
     station.screen.ring({(str(v.path), v.number): v.kind for v in verdicts})
     station.screen.show(page.page)

@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 
 from planner import content_hash
-from planner.campaign.checked_file import read_checked, write_checked
+from planner.campaign.journal import read_checked, write_checked
 from planner.errors import InputError
 from planner.progress import Tell, within
 from planner.report.answer import encoded

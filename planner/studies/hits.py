@@ -126,5 +126,6 @@ def _along(visit: HitVisit, axes: str) -> HitVisit:
 
 def _recorded(hits: Sequence[SimulatedHit], hammer: Hammer) -> tuple[Hit, ...]:
     rate, source = hammer.sampling_rate_hz, Path("simulated")
-    made = [Hit(source, h.axis, rate, h.force_n, h.acceleration_m_s2, simulated=True) for h in hits]
-    return tuple(replace(hit, repeat=i + 1) for i, hit in enumerate(made))
+    return tuple(
+        Hit(source, h.axis, rate, h.force_n, h.acceleration_m_s2, simulated=True) for h in hits
+    )

@@ -65,7 +65,7 @@ def test_files_to_labelled_modes(cell, tmp_path):
     hammer = Hammer(sampling_rate_hz=1000.0, record_s=2.0)
     record_poses(truth, poses, tmp_path, hammer=hammer)
     q = np.array([q for _, q in poses])
-    simulated = cell.simulate(q, 2)
+    simulated = cell.frozen.simulate(q, 2)
     guide = Guide(simulated.frequency_hz, simulated.shape)
     files = [sorted((tmp_path / "data").glob(f"{name}_*.uff")) for name, _ in poses]
 

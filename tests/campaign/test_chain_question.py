@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import pyuff
 
-from planner.campaign.asking import NewHits, asked_of
 from planner.campaign.campaign import Campaign
 from planner.campaign.chain_faults import SCALED, TURNED, ChainFault
+from planner.campaign.contradictions import asked_of
 from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
 from planner.demo import NAME, Pool, shipped
@@ -95,6 +95,6 @@ def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
     # Of a chain that the engineer called right nothing is asked again.
     rows = pool.rows["A57"]
     sources = tuple(Source(row.file, row.file.name, row.hit) for row in rows)
-    other = NewHits("A57", rows[0].joints_deg, measure(sources, held.cell.config.modes.band_hz))
-    asked = asked_of(held.model, held.state, other)
+    other = measure(sources, held.cell.config.modes.band_hz)
+    asked = asked_of(held.model, held.state, "A57", rows[0].joints_deg, other)
     assert asked is None or asked.about != "chain"

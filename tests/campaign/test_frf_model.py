@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.frf_model import ErrorByZone, FrfModel, LeftOut, local_size
+from planner.campaign.frf_model import FrfModel
 from planner.dataset.store import Store
 from planner.demo import NAME, shipped
 from planner.frf.metrics import agreement, direct_mean
@@ -14,38 +14,6 @@ from planner.surrogate.leave_one_out import left_out_modes
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.frf_campaigns import FrfScore, make
 from tests.support.surrogates import observed
-
-BAND_HZ = 5.0, 50.0
-HERTZ = np.linspace(*BAND_HZ, 80)
-
-
-def left_out(rng, error: float, true: np.ndarray) -> LeftOut:
-    """A prediction that is off by `error` of its size, and nothing else known of it."""
-    noise = rng.standard_normal(true.shape) + 1j * rng.standard_normal(true.shape)
-    off = error / np.sqrt(2) * noise * local_size(true, HERTZ)
-    nothing, used = np.zeros(true.shape), np.ones(true.shape, dtype=bool)
-    return LeftOut(HERTZ, true, true + off, nothing, used)
-
-
-@pytest.fixture
-def true(rng):
-    return rng.standard_normal((3, 3, 80)) * np.exp(1j * HERTZ / 10)
-
-
-@pytest.fixture
-def rng():
-    return np.random.default_rng(0)
-
-
-def test_the_error_of_poses_left_out_is_found_again(rng, true):
-    found = ErrorByZone.of([left_out(rng, 0.2, true) for _ in range(20)], BAND_HZ)
-    assert np.all(np.abs(found.at(HERTZ) / 0.2 - 1) < 0.15)
-
-
-def test_what_is_known_of_an_error_counts_once(rng, true):
-    poses = [left_out(rng, 0.2, true) for _ in range(20)]
-    known = [replace(p, known=(0.2 * local_size(true, HERTZ)) ** 2) for p in poses]
-    assert np.max(ErrorByZone.of(known, BAND_HZ).relative) < 0.06
 
 
 def test_modes_left_out_are_those_of_a_fit_without_the_pose():

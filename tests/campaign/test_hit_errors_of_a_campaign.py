@@ -1,12 +1,18 @@
 """How each hit of a campaign missed: told against what another engine drew, and taken out."""
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
 from planner.campaign.build import build
 from planner.campaign.campaign import Campaign
+from planner.campaign.hit_error_estimates import CampaignHitErrors
 from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.dataset.store import Store
+from planner.fit.hit_misses import VisitMisses
+from planner.measurement.nuisances import Tolerances
 from planner.replay import replay
 from planner.report.imports import ImportedPoses
 from tests.support.missed_hits import MissedCell, missed_cell
@@ -80,3 +86,25 @@ def test_what_hits_have_in_common_is_said():
         "Your −x hits tilt by 2.0 ± 0.2° towards −z.",
     )
     assert systematic_errors([hit("+y", (0.3, 0.3), (1.0, 1.0))] * 3) == ()
+
+
+HAND = Tolerances()
+
+
+def campaign(times: float, discrepancy: float) -> CampaignHitErrors:
+    """Nine hits that miss by so many times what hands do."""
+    sd = np.repeat([HAND.angle_rad, HAND.offset_m], 2)
+    mean = times * sd * np.random.default_rng(2).choice([-1.0, 1.0], (9, 4))
+    told = SimpleNamespace(discrepancy=discrepancy, visits=(VisitMisses(mean, np.eye(36)),))
+    return CampaignHitErrors((), cast(Any, told), HAND, (4.0, 60.0))
+
+
+@pytest.mark.parametrize(
+    ("times", "discrepancy", "trusted"),
+    [(1.0, 1e-3, True), (2.5, 3e-2, True), (1.0, 0.3, False), (8.0, 1e-3, False)],
+)
+def test_hits_are_told_by_a_simulation_that_is_right_enough(times, discrepancy, trusted):
+    """What one lacks that is too wrong would be called the hand's."""
+    found = campaign(times, discrepancy)
+    assert found.trusted is trusted
+    assert trusted or found.poses == ()

@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-from planner.campaign.asking import NewHits, asked_of
 from planner.campaign.campaign import Campaign
+from planner.campaign.contradictions import asked_of
 from planner.campaign.question import SURE
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
@@ -47,8 +47,7 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path, poses):
 
     def asked(at: int, one: MeasuredPose):
         angles = tuple(np.rad2deg(q[at]).tolist())
-        new = NewHits("X", angles, one)
-        return asked_of(campaign.model, campaign.state, new)
+        return asked_of(campaign.model, campaign.state, "X", angles, one)
 
     assert not any(asked(i, found[i]) for i in range(6))
     repeated = [asked(i, again) for i in range(6)]

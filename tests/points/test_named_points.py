@@ -167,7 +167,7 @@ def table(folder: Path, *cells: str) -> Path:
 
 
 def test_the_table_names_points(tmp_path: Path) -> None:
-    row = read_recordings(table(tmp_path, "elbow", "base elbow"), ("j",), NAMES).rows[0]
+    row = read_recordings(table(tmp_path, "elbow", "base elbow"), ("j",), NAMES)[0]
     assert row.stated == StatedPoints("elbow", ("base", "elbow"), 2, NAMES)
 
 

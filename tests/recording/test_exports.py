@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
+from planner.recording.column_names import lookup, lookup_ratio
 from planner.recording.folder import read_poses, read_recordings
 from planner.recording.named_columns import Named, to_records
 from planner.recording.read import read
 from planner.recording.sampling import sampling_rate
-from planner.recording.units import lookup, lookup_ratio
 from tests.support.uff_files import NONE, dataset_58, dataset_58b_mixed, units_164, write
 
 RATE = 512.0
@@ -273,11 +273,11 @@ def test_rows_of_one_file_with_several_hits(tmp_path):
     head = "pose,joint_1_deg,hit,file\n"
     table = tmp_path / "recordings.csv"
     table.write_text(f"{head}P1,5,+x,all.uff\nP1,5,+y,all.uff\n")
-    (row,) = read_recordings(tmp_path, ["joint_1"]).rows
+    (row,) = read_recordings(tmp_path, ["joint_1"])
     ((), (record,)) = Source.of(row).read()
     assert len(record.values) == 6
     table.write_text(f"{head}P1,5,+x,all.uff\nP1,5,+z,all.uff\n")
-    (row,) = read_recordings(tmp_path, ["joint_1"]).rows
+    (row,) = read_recordings(tmp_path, ["joint_1"])
     with pytest.raises(InputError, match="was hit along x, y, the table lists"):
         Source.of(row).read()
     table.write_text(f"{head}P1,5,+x,all.uff\nP2,6,+y,all.uff\n")

@@ -35,10 +35,6 @@ def test_good_repeats_agree():
         assert screen_repeats(hits, BAND) == ((),) * 8
 
 
-def spoil(hit, **changes):
-    return replace(hit, **changes)
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_bad_hits_are_refused_for_the_right_reason(seed):
     rng = np.random.default_rng(seed)
@@ -48,12 +44,12 @@ def test_bad_hits_are_refused_for_the_right_reason(seed):
     cases = {
         "double_hit": make_hit(rng, second=rng.uniform(0.25, 0.9)),
         "too_soft": make_hit(rng, duration_s=0.04),
-        "polarity": spoil(good, force_n=-f),
-        "too_weak": spoil(good, force_n=rng.standard_normal(f.size)),
-        "clipped": spoil(good, acceleration_m_s2=np.clip(a, -clip, clip)),
-        "truncated": spoil(good, force_n=f[int(np.argmax(f)):],
+        "polarity": replace(good, force_n=-f),
+        "too_weak": replace(good, force_n=rng.standard_normal(f.size)),
+        "clipped": replace(good, acceleration_m_s2=np.clip(a, -clip, clip)),
+        "truncated": replace(good, force_n=f[int(np.argmax(f)):],
                            acceleration_m_s2=a[:, int(np.argmax(f)):]),
-        "too_slow": spoil(good, sampling_rate_hz=100.0),
+        "too_slow": replace(good, sampling_rate_hz=100.0),
     }  # fmt: skip
     for kind, hit in cases.items():
         assert kind in refused(hit), kind

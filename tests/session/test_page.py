@@ -13,29 +13,34 @@ from planner.campaign.events import HitRecord, Proposal
 from planner.recording.joints import JointUnits
 from planner.session.course import Course
 from planner.session.hit_verdicts import HitVerdict
-from planner.session.page import TakingBack, page_with_hits
-from planner.session.pose_screen import JudgedHit, PosePage, keys_that_do, remedy_first
+from planner.session.page import page_with_hits
+from planner.session.pose_screen import PosePage, keys_that_do, remedy_first
 from planner.session.screen import Said, Screen, fitted
 from planner.session.session_text import refusals
 from planner.words import short_name
 
-DOUBLE = JudgedHit(
+
+def judged(number: int, axis: str, kind: str, text: str) -> HitVerdict:
+    return HitVerdict(Path("hit.uff"), axis, kind, text, number=number)
+
+
+DOUBLE = judged(
     1, "+x", "repeat",
     "A second pulse of 120 N follows the first of 300 N; hit once and let it bounce off.",
 )  # fmt: skip
-AGAINST = JudgedHit(
+AGAINST = judged(
     2, "-x", "good",
     "The tool answers hits along -x against their direction (Im H < 0 along x, where it is hit); "
     "check the sign of the axis and the polarity of force and acceleration.",
 )  # fmt: skip
-CLIPPED = JudgedHit(
+CLIPPED = judged(
     3, "", "repeat",
     "The force is clipped at 312.5 N (3 samples); raise the range of force or hit more softly. The "
     "acceleration x is clipped at 5.1 m/s² (4 samples); raise the range of acceleration x or hit "
     "more softly.",
 )  # fmt: skip
-LATE = JudgedHit(4, "+z", "late", "answers as P001 did: [b] it is from there, [h] from here")
-OTHER = JudgedHit(
+LATE = judged(4, "+z", "late", "answers as P001 did: [b] it is from there, [h] from here")
+OTHER = judged(
     5, "+z", "repeat",
     "Its FRF is that of hits along x (likeness 0.12, others 0.99); check axis and hit point, and "
     "hit again.",
@@ -147,9 +152,7 @@ def test_names_of_files_leave_room_for_what_is_said_of_them(page):
     said = f"disagrees with hit 2 ({name}) (likeness 0.42): hit along x once more"
     verdict = HitVerdict(Path("exports") / name, "+x", "unsure", said, number=1)
     why = f"exports/{name} holds no force; export it again."
-    made = page_with_hits(
-        page, [verdict], [(verdict.path, why)], TakingBack(True, False), False, Course()
-    )
+    made = page_with_hits(page, [verdict], [(verdict.path, why)], (True, False), False, Course())
     text = whole(lines(made, height=40))
     assert name not in text
     assert "disagrees with hit 2 (measurem…n_hit_x_003.uff) (likeness 0.42)" in text

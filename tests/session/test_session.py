@@ -192,7 +192,7 @@ def test_undo_after_an_interrupted_import_takes_it_back_with_its_proposal(
     with monkeypatch.context() as patched:
         patched.setattr(RerunQueue, "note", interrupt)  # right after the import
         stopped = session(campaign, inbox, ("all hits are in", "a"))
-    assert "the hits of P001: that is in the log; planner undo" in stopped.flat
+    assert "imported 9 of 9 hits at P001: that is in the log; planner undo" in stopped.flat
     told = session(Campaign(campaign.directory), inbox, ("go to pose P002", "q")).flat
     assert re.search(r"The last import, P001: [\d.]+ Hz \(expected [\d.]+, .* sd\)", told)
     taken = Campaign(campaign.directory).undo(decisions_only=True)  # as the session's own key does

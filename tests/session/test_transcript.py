@@ -1,4 +1,4 @@
-"""A session at a terminal of 80 × 24 in which all goes wrong that can: nothing wrong gets in."""
+"""Sessions at a terminal of 80 × 24: keys, and all that can go wrong; nothing wrong gets in."""
 
 import fcntl
 import os
@@ -28,13 +28,13 @@ class Terminal:
     def __init__(self, *arguments: object):
         self.ours, theirs = pty.openpty()
         fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", ROWS, COLUMNS, 0, 0))
+        self.before = termios.tcgetattr(theirs)
         size = {"COLUMNS": str(COLUMNS), "LINES": str(ROWS), "TERM": "xterm-256color"}
         self.process = subprocess.Popen(
             [*PLANNER, "watch", *map(str, arguments)], stdin=theirs, stdout=theirs, stderr=theirs,
             close_fds=True, env={**os.environ, **size},
         )  # fmt: skip
-        os.close(theirs)
-        self.seen = ""
+        self.theirs, self.seen = theirs, ""
 
     @property
     def page(self) -> str:
@@ -59,6 +59,7 @@ class Terminal:
         self.process.kill()
         self.process.wait()
         os.close(self.ours)
+        os.close(self.theirs)
 
 
 class Analyser:
@@ -100,6 +101,24 @@ def used_files(directory: Path) -> set[str]:
     """Names of the hits in use, without folders."""
     state = Campaign(directory).state
     return {Path(h.file).name for m in state.used for h in m.accepted}
+
+
+def test_keys_act_without_enter_and_the_terminal_is_left_as_it_was(cell):
+    campaign, _, inbox = cell
+    terminal = Terminal(campaign.directory, inbox)
+    try:
+        shown = "go to pose P001", "joint_a1", "angle (°)", "tool at x", "expected (Hz)", "[?] help"
+        terminal.until(*shown)
+        terminal.press("a", "Nothing to import yet")
+        terminal.press("b", "b is not possible now")
+        terminal.press("k", "stands in the way?")
+        terminal.press("\n", "go to pose P002", "P001 will not be offered again ([u]")
+        terminal.press("q", "Session ended: quit")
+        assert terminal.process.wait(timeout=30) == 0
+        assert termios.tcgetattr(terminal.theirs) == terminal.before
+    finally:
+        terminal.close()
+    assert list(Campaign(campaign.directory).state.skipped) == ["P001"]
 
 
 def test_a_session_in_which_all_goes_wrong(measured):

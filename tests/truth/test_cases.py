@@ -91,7 +91,7 @@ def test_a_law_leaves_stiffness_in_a_joint_that_an_earlier_effect_made_soft(law,
 
 def test_the_folder_has_what_a_diagnosis_needs(case):
     robot = Robot.load(case.robot_toml)
-    rows = read_recordings(case.recordings, robot.joint_names).rows
+    rows = read_recordings(case.recordings, robot.joint_names)
     first = {row.pose for row in rows}
     assert len(first) == 9
     assert len(rows) in (81, 90)

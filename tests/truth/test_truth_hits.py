@@ -110,7 +110,7 @@ def test_readback_is_near_the_setpoint_and_is_where_the_truth_stands(kr10, tmp_p
     q = KR10.poses(1)[0]
     hammer = Hammer(80.0, 0.004, 640.0, 6.0, noise=0.0, force_noise=0.0, readback_deg=1.0)
     record_poses(kr10, [("P1", q)], tmp_path, ("+y",), 1, hammer, seed=1)
-    row = read_recordings(tmp_path, kr10.joint_names).rows[0]
+    row = read_recordings(tmp_path, kr10.joint_names)[0]
     readback = np.array(row.joints_deg)
     off = np.abs(readback - np.rad2deg(q))
     assert np.all(off <= 1.0)
