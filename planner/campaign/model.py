@@ -178,7 +178,10 @@ class Model:
             q = self.cell.candidates.q[index : index + 1]
             best = replace(best, information=open_.information(q))
         stop = self.cell.config.stop
-        found = forecast(outputs, best, stop.frequency_sd_percent, stop.probability)
+        learned, least = self.low.learned, 0.0
+        if learned is not None and learned.wider is not None:
+            least = float(np.mean((self.frequency_sd_percent / 100) ** 2))
+        found = forecast(outputs, best, stop.frequency_sd_percent, stop.probability, least)
         misses = self.low.misses
         return found.doubted(misses) if misses and found.measurements < FEW_POSES else found
 

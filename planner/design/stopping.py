@@ -88,10 +88,17 @@ def forecast(
     best: "Poses | None",
     target_percent: float,
     probability: float,
+    least: float = 0.0,
     seed: int = 0,
 ) -> Forecast:
-    """What the model expects of itself; `best` (n = 1) is the pose that would be measured next."""
+    """What the model expects of itself; `best` (n = 1) is the pose that would be measured next.
+
+    `least` is what the mean square of ln f is at least, where the outputs do not have all that few
+    poses leave open.
+    """
     squares = mean_squares(outputs, seed)
+    open_ = max(0.0, least - float(np.mean(squares)))
+    squares += open_
     count, size = left_out(outputs.posterior, outputs.count)
     rng = np.random.default_rng(seed)
     # The residuals of one pose go together: they count as one.
@@ -99,7 +106,7 @@ def forecast(
     scale = total / rng.chisquare(freedom, len(squares))
     rmse = 100 * np.sqrt(squares * scale)
     bound = float(np.quantile(rmse, probability))
-    after = squares if best is None else mean_squares(outputs.planning(best), seed)
+    after = squares if best is None else open_ + mean_squares(outputs.planning(best), seed)
     median = float(np.median(rmse))
     gain = median * (1 - np.sqrt(np.mean(after) / np.mean(squares)))
     return Forecast(

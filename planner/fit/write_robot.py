@@ -147,7 +147,8 @@ def _impossible(shares: Mapping[str, float]) -> tuple[str, ...]:
     return (
         f"Of what turns with {each} the URDF takes only that part of the identified change of "
         f"inertia, as no body can have all of it (moments below 0, or against the triangle "
-        f"inequality): how well the written robot fits, the line 'Written' says.",
+        f"inequality): the written robot fits less well than what was found; state what is mounted "
+        f"there ([[payload]]) or correct the URDF's masses.",
     )
 
 
