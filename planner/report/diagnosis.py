@@ -259,6 +259,9 @@ class DiagnosisReport(Answer):
         if self.robot is None or self.urdf is None:
             return []
         both = f"{self.robot}, which needs {self.urdf.name} beside it"
+        if self.verdict == "unexplained":
+            doubt = "what was found does not explain the recordings: no campaign should use it."
+            return [Text(f"Robot with what comes closest: {both}; {doubt}")]
         said = [Text(f"Robot with what was found: {both}")]
         if self.campaign_robot is None:
             return said
