@@ -13,7 +13,6 @@ from planner.effects.effect import Operator
 from planner.fit.fitted import (
     StructureFit,
     converged,
-    evidence_of,
     removal_costs,
     settled,
     without,
@@ -118,10 +117,7 @@ class Explorer:
     def _further(self, base: StructureFit, afar: bool = False) -> list[StructureFit]:
         """With one effect more, settled, likeliest first."""
         starts = self.search.starts(base, SCREENED)
-        ends = self.search.compete(base, starts, count=SETTLED, unmoved=False)
-        return sorted(
-            ends + self.search.from_afar(base) if afar else ends, key=evidence_of, reverse=True
-        )
+        return self.search.compete(base, starts, count=SETTLED, unmoved=False, afar=afar)
 
 
 def _change(before: StructureFit, after: StructureFit) -> float:

@@ -1,7 +1,4 @@
-"""Springs and bodies that a fit moved far from what robot.toml states.
-
-Something else may be missing that they stand in for: a tool, a load, a wrong number.
-"""
+"""Springs and bodies that a fit moved far from what robot.toml states: for a tool, a wrong number."""
 
 from collections.abc import Iterator
 

@@ -204,10 +204,14 @@ class Search:
         *,
         count: int = SETTLED,
         unmoved: bool = True,
+        afar: bool = False,
     ) -> list[StructureFit]:
-        """Starts (`placed`) beside it: a few steps each, the best farther, `count` settled."""
+        """Starts (`placed`) beside it: a few steps each, where much is left and `afar` from what is
+        stated too, the best farther, `count` settled."""
         rough = self._on(base, self.data(ROUGH))
         pool = [f for s in starts if (f := self._few(rough, s, unmoved)) is not None]
+        if afar and size_of(base) >= AGAIN:
+            pool += [self.begun(rough.misfit.data, s, x) for s, x in self._nearest(base, starts)]
         near = _best_of_each(p for p in pool if p.evidence > rough.evidence - FAR)
         followed = [self._on(p, base.misfit.data) for p in near[:FOLLOWED]]
         followed = _best_of_each(stepped(p, FURTHER) for p in followed)
@@ -235,14 +239,19 @@ class Search:
         return max(ends, key=evidence_of, default=None)
 
     def from_afar(self, base: StructureFit) -> list[StructureFit]:
-        """Each effect beside others from what is stated, where `base` leaves some; likeliest first.
-
-        By logarithms on few lines; the best go on.
-        """
+        """Each effect from what is stated, where `base` leaves some; likeliest first."""
         if explained(base) or crowded(base):
             return []
+        data, nearest = base.misfit.data, self._nearest(base, self.starts(base, SCREENED))
+        ends = [converged(self.begun(data, s, x)) for s, x in nearest]
+        return sorted(ends, key=evidence_of, reverse=True)
+
+    def _nearest(
+        self, base: StructureFit, starts: Sequence[Start]
+    ) -> list[tuple[RobotStructure, np.ndarray]]:
+        """Those that logarithms on few lines bring nearest to the recordings."""
         rough, found = self.data(AFAR), []
-        for start in self.starts(base, SCREENED):
+        for start in starts:
             structure = base.structure.with_effect(start.effect)
             misfit = FrfMisfit(structure, rough, self.tolerances, None, self.floor)
             for x in from_stated(structure, start):
@@ -250,9 +259,7 @@ class Search:
                     at = minimised(misfit, x, NEARER)
                     found.append((at.value, structure, at.x))
         found.sort(key=lambda one: one[0])
-        data = base.misfit.data
-        ends = [converged(self.begun(data, s, x)) for _, s, x in found[:FARTHEST]]
-        return sorted(ends, key=evidence_of, reverse=True)
+        return [(s, x) for _, s, x in found[:FARTHEST]]
 
     def _removed(self, best: StructureFit, newest: Operator | None) -> StructureFit:
         """Without what the others make superfluous, what seems to matter least first."""

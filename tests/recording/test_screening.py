@@ -67,6 +67,18 @@ def test_a_hit_on_the_wrong_axis_stands_out():
     assert screen_repeats(tuple(hits), BAND)[2][0].kind == "wrong_axis"
 
 
+@pytest.mark.parametrize("moved", [1.05, 1.06, 1.12])
+def test_a_hit_of_another_pose_among_repeats_is_refused(moved):
+    """Its first mode lies elsewhere: not unlike the others, but less like than they are."""
+    rng, poles = np.random.default_rng(3), POLES.copy()
+    poles[0] *= moved
+    hits = [make_hit(rng, axis) for axis in ("+x", "+y", "+z") for _ in range(4)]
+    hits[1] = make_hit(rng, poles=poles)
+    faults = screen_repeats(tuple(hits), BAND)
+    assert [number for number, found in enumerate(faults) if found] == [1]
+    assert faults[1][0].kind == "incoherent"
+
+
 def levelled(rng, changed=POLES, axes=("+x", "+y", "+z"), repeats=1):
     """Three levels; the strongest hits are those of a structure with `changed` poles."""
     return tuple(
