@@ -1,4 +1,4 @@
-"""Springs and bodies that a fit moved far from what robot.toml states: for a tool, a wrong number."""
+"""Springs and bodies that a fit moved far from what robot.toml states: something is missing."""
 
 from collections.abc import Iterator
 
