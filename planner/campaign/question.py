@@ -67,9 +67,7 @@ def question(
     learned, frf = model.low.learned or model.low.suspect, measured.one_hit_frf
     if frf is None or learned is None:
         return None
-    # Few poses tell no structure: what they leave open is no mistake of these hits.
-    known = (learned.wider or learned).posterior
-    expected = ExpectedFrfs(known, model.cell.config.modes.band_hz)
+    expected = ExpectedFrfs(learned.posterior, model.cell.config.modes.band_hz)
     q = model.cell.robot.joints.internal([joints_deg])[0]
     stated, typed = StatedHits(expected, q, frf), _setpoint(model, state, pose, joints_deg)
     if not stated.doubted and not stated.instead(typed):

@@ -13,7 +13,6 @@ from threadpoolctl import threadpool_limits
 
 from planner.campaign.chain_faults import AGAINST, TURNED, fitted
 from planner.campaign.chain_question import Draws
-from planner.campaign.low_fidelity import FEW_POSES
 from planner.campaign.question import SURE, Mistake, StatedHits, elsewhere
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
@@ -101,12 +100,8 @@ def answers(
         others = {name: there for name, there in poses.items() if name != f"P{n}"}
         one, chains = {}, CHAINS if mistaken else ()
         if n:
-            search = Search(
-                prior, case.frfs[:n], case.q[:n], case.band_hz, tolerances, widen=n < FEW_POSES
-            )
-            fit = search.found(warm)
-            known = RobotPosterior.of(fit.wider or fit)
-            expected, warm = ExpectedFrfs(known, case.band_hz), fit.remembered
+            fit = Search(prior, case.frfs[:n], case.q[:n], case.band_hz, tolerances).found(warm)
+            expected, warm = ExpectedFrfs(RobotPosterior.of(fit), case.band_hz), fit.remembered
             ask = replace(first, poses=n, expected=expected)
         if n and mistaken:
             strange = case.frfs[(n + 1) % len(case.q)]
