@@ -26,7 +26,7 @@ AROUND = (*CENTRE, *map(tuple, np.vstack([np.eye(3), -np.eye(3)]).tolist()))
 
 
 @dataclass(frozen=True)
-class PointMass(Operator):
+class AddedMass(Operator):
     """A body of mass ψ₀ sds at a place (ψ₁..₃ sds about the link's centre of mass).
 
     Its moments of inertia are alike about all axes, by a radius of gyration e^ψ₄ in m.

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.effects.added_mass import AROUND, PointMass
+from planner.effects.added_mass import AROUND, AddedMass
 from planner.effects.chain import ChannelDelay, Polarity, SensorGain, SensorRotation
 from planner.effects.effect import Number, Operator
 from planner.effects.far_off import FarOffSpring
@@ -38,10 +38,8 @@ DAMPING_S = 1e-4, 3e-3
 ALONG = 0.5  # cosine above which a stated axis already covers this one
 SHORT, BEND = 0.1, 0.3  # of the longest link: does not bend; of the joint's stiffness: a link's
 ADDED_MASS, ADDED_PLACE = 0.22, 0.35  # sds: of the links' mean mass, of the longest link
-RADIUS, RADIUS_SD = (
-    0.25,
-    0.7,
-)  # of gyration, of an added mass: of its place's sd; its logarithm's sd
+# Radius of gyration of an added mass: median, in its place's sd, and its logarithm's sd.
+RADIUS, RADIUS_SD = 0.25, 0.7
 RESONATOR_MASS, RESONATOR_DAMPING = 0.05, 0.03  # medians: of the links' mean mass; ratio
 LOSS_FACTOR = 0.02  # median, with a factor of e as its sd
 ANGLE_SHARE = 0.3  # sd of a joint's stiffness that goes with its angle
@@ -202,7 +200,7 @@ def _operators(simulation: Simulation) -> list[Operator]:
         places = tuple(Number(f"position_{a}", "1", 0.0, 1.0) for a in "xyz")
         radius = Number("radius", "m", float(np.log(RADIUS * size)), RADIUS_SD, True)
         numbers = (Number("mass", "1", 0.0, 1.0), *places, radius)
-        found.append(PointMass(at, (), numbers, joint, centre, ADDED_MASS * mean, size))
+        found.append(AddedMass(at, (), numbers, joint, centre, ADDED_MASS * mean, size))
         numbers = (
             Number("mass", "kg", float(np.log(RESONATOR_MASS * mean)), 1.0, True),
             Number("frequency", "Hz", float(np.log(low * high)) / 2,
@@ -245,7 +243,7 @@ def diagnosed(simulation: Simulation) -> list[Operator]:
     found += [Polarity(f"sensor_{a}") for a in turn]
     found.append(SensorRotation("sensor", (), angles))
     found.append(ChannelDelay("sensor", (), (Number("delay", "s", 0.0, DELAY_S),)))
-    masses = (e for e in _operators(simulation) if isinstance(e, PointMass))
+    masses = (e for e in _operators(simulation) if isinstance(e, AddedMass))
     found += [replace(e, places=AROUND) for e in masses]
     own = _own(robot)
     found += [_angle_spring((1, 2), *one) for one in own]

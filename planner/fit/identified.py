@@ -46,13 +46,16 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
     covariance += np.diag(np.full(len(covariance), 1e-9))  # of bodies that nothing moves
     misfit, by_pose = posterior.misfits(MODEL_ERROR)
     before = np.sqrt(np.diagonal(turned @ np.linalg.inv(structure.precision) @ turned.T))
-    far = departed(structure, posterior.x) if posterior.explains else range(structure.size)
-    doubted = {structure.names[i] for i in far}
+    doubted = {structure.names[i] for i in departed(structure, posterior.x)}
     told = estimates(p, mean[: len(p.parameters)], covariance)
     result = Identification(
         simulation,
         tuple(
-            replace(one, explained=one.name not in doubted, prior_log_sd=float(sd))
+            replace(
+                one,
+                explained=posterior.explains and one.name not in doubted,
+                prior_log_sd=float(sd),
+            )
             for one, sd in zip(told, before, strict=False)
         ),
         p.nuisances,

@@ -11,8 +11,10 @@ from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
 from planner.fit.data import FrfData
 from planner.fit.departures import departures_text
+from planner.fit.fitted import StructureFit
 from planner.fit.frequency_uncertainty import structure_slope
 from planner.fit.gauss_newton import minimised
+from planner.fit.identified import as_identification
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
@@ -163,6 +165,17 @@ def test_a_tool_that_the_description_lacks_is_found_at_the_flange(tmp_path):
     assert "added_mass at link_6" in judged.named
     assert judged.error < 0.04
     assert not departures_text(found.structure, found.x)
+
+
+@pytest.mark.parametrize(("size", "explained"), [(0.004, True), (0.3, False)])
+def test_nothing_counts_as_known_where_nothing_explains(prior, few, size, explained):
+    """Loss factors neither, which robot.toml does not have."""
+    structure = structure_of(prior, "structural_damping at joints")
+    misfit = FrfMisfit(structure, few, Tolerances(), size)
+    posterior = RobotPosterior.of(StructureFit(misfit, misfit(structure.mean), 0.0))
+    told = as_identification(posterior)[1].estimates
+    assert "loss_factor" in {estimate.kind for estimate in told}
+    assert {estimate.explained for estimate in told} == {explained}
 
 
 def test_what_the_fit_moved_far_is_told(prior):
