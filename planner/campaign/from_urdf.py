@@ -172,13 +172,13 @@ def _guesses(
     for body in config.payload:
         size = float(np.linalg.norm(body.com_m))
         yield Guess("tool's centre of mass beyond tcp_frame", size, TOOL_SD * size, "m")
-    told = set()
+    own, told = dict(zip(robot.joint_names, robot.joint_axes, strict=True)), set()
     for block in config.compliance:
-        if block.tie in told:
-            continue  # the same number as another
-        told |= {block.tie} if block.tie else set()
-        across = "across its axis" if block.tie else "about its axis"
-        where = f"{block.joint} {'along its axis' if block.slide else across}"
+        way = "about" if np.allclose(block.axis, own[block.joint]) else "across"
+        where = f"{block.joint} {'along' if block.slide else way} its axis"
+        if where in told:
+            continue  # the guess is the same
+        told.add(where)
         k, c = ("N/m", "N·s/m") if block.slide else ("N·m/rad", "N·m·s/rad")
         sd = _part(block.stiffness, block.stiffness_sd_percent)
         yield Guess(f"stiffness of {where}", block.stiffness, sd, k)

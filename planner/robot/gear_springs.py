@@ -69,7 +69,7 @@ def carried(robot: Robot, payload_kg: float) -> np.ndarray:
 
 
 def _springs(robot: Robot, name: str, axis: np.ndarray, load: float) -> list[Compliance]:
-    """A joint's own spring, and two across it that share their stiffness."""
+    """A joint's own spring, and two across it: as stiff by guess, in truth each as it is."""
     own = _direction(axis)
     if robot.slides(name):
         k = _rounded(load / GIVES_M)
@@ -77,13 +77,10 @@ def _springs(robot: Robot, name: str, axis: np.ndarray, load: float) -> list[Com
     k = _rounded(load / GIVES_RAD)
     blocks = [Compliance(name, own, k, 0.0, stiffness_sd_percent=SD_PERCENT)]
     across = np.linalg.svd(axis[None])[2][1:]
-    tie = f"bearing of {name}"
+    k_across = _rounded(ACROSS * load / GIVES_RAD)
     for direction in across:
         tilt = _direction(direction)
-        k_across = _rounded(ACROSS * load / GIVES_RAD)
-        blocks.append(
-            Compliance(name, tilt, k_across, 0.0, tie=tie, stiffness_sd_percent=SD_PERCENT)
-        )
+        blocks.append(Compliance(name, tilt, k_across, 0.0, stiffness_sd_percent=SD_PERCENT))
     return blocks
 
 
@@ -94,12 +91,10 @@ def _direction(axis: np.ndarray) -> tuple[float, float, float]:
 
 
 def _alike(blocks: list[Compliance], inertia: np.ndarray) -> list[float]:
-    """Inertia of each spring, of tied ones their mean."""
-    found: dict[str, list[float]] = {}
-    names = [block.tie or str(number) for number, block in enumerate(blocks)]
-    for name, value in zip(names, inertia, strict=True):
-        found.setdefault(name, []).append(float(value))
-    return [float(np.mean(found[name])) for name in names]
+    """Inertia of each spring, of a bearing's two their mean."""
+    places = [(block.joint, block.stiffness) for block in blocks]
+    return [float(np.mean([v for p, v in zip(places, inertia, strict=True) if p == place]))
+            for place in places]  # fmt: skip
 
 
 def _with(robot: Robot, blocks: list[Compliance]) -> Robot:
