@@ -80,7 +80,7 @@ def keep_files(
     if known is not None and known.withdrawn:
         again = command("planner", "confirm", directory, known.pose)
         withdrawn = f"{known.pose} was withdrawn; to use its hits again: {again}; else give the "
-        withdrawn += "new measurement another name"
+        withdrawn += "new measurement another pose name, in recordings.csv or by --pose"
     fresh: list[Kept] = []
     already, left_out, elsewhere = [], [], []
     seen: set[str] = set()

@@ -201,7 +201,7 @@ def _remarks(robot: Robot, chain: ArmChain, weights: StatedMasses) -> Iterator[s
             f"{chain.joints[-1]}; {', '.join(chain.others)} stay where [held] of robot.toml says."
         )
     first = f'tcp_frame = "{chain.tcp}", where the hammer hits (robot.toml says how to move it)'
-    first += "" if weights.tool else " and the tool's mass"
+    first += "" if weights.tool else " and the tool ([[payload]] there, or --tool-mass-kg here)"
     asked = ["[workspace] of campaign.toml", "floor, table and fence as [[obstacle]]"]
     asked += [] if weights.payload else ["the rated payload, by which springs are guessed"]
     yield f"Put right first: {first}; then {'; '.join(asked)}."

@@ -164,7 +164,7 @@ class RobotPosterior:
         pairs = zip(self.structure.effects, self.found.shares, strict=True)
         return tuple(
             f"{effect.words(self.values(effect)).replace(effect.at, effect.at.split('#')[0])} "
-            f"Without that, simulated FRFs would be {significant(100 * min(share, 1.0))} % off."
+            f"Without that, simulated FRFs would be {significant(100 * share)} % off."
             for effect, share in sorted(pairs, key=lambda pair: -pair[1])
             if share >= MATTERS
         )

@@ -17,7 +17,7 @@ from planner.dynamics.in_time import change_at_force
 from planner.effects.effect import Operator
 from planner.errors import InputError
 from planner.fit.posterior import RobotPosterior
-from planner.report.agreement import ThreeSimilarities
+from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
 from planner.report.text import command_line, remarks, table
 from planner.robot.place_names import place_names, with_names
@@ -133,6 +133,7 @@ class DiagnosisReport(Answer):
     place_names: Mapping[str, str]
     npz: str | None = None
     robot: str | None = None
+    written: FrfSimilarity | None = None  # of that robot alone at the measured poses
     urdf: Path | None = field(default=None, metadata=NOT_IN_JSON)
     campaign_robot: Path | None = field(default=None, metadata=NOT_IN_JSON)
     plots: tuple[str, ...] = ()
@@ -193,10 +194,13 @@ class DiagnosisReport(Answer):
 
         Raises InputError where they cannot be written.
         """
+        from planner.dynamics.simulation import Simulation
         from planner.fit.identified import as_identification
         from planner.fit.write_robot import write_robot
+        from planner.measurement.agreement import fit_similarity
         from planner.report.diagnosis_plots import diagnosis_figures
         from planner.report.pictures import Pictures
+        from planner.robot.robot import Robot
 
         found = self.found
         robot = found.search.prior.repertoire.stiff.robot
@@ -204,9 +208,13 @@ class DiagnosisReport(Answer):
         model, result = as_identification(found.robot)
         result = replace(result, simulation=found.simulation)
         made = write_robot(folder / "robot.toml", model.simulation.robot, result, found.laws)
+        again, search = Simulation(Robot.load(made.robot_toml)), found.search
+        alone = FrfSimilarity.of(fit_similarity(again, search.frfs, search.q, search.band_hz))
         drawn = self.with_figures(Pictures(folder), lambda: diagnosis_figures(found), robot.name)
         said = *self.remarks, *made.remarks, *_unwritten(found)
-        written = replace(drawn, robot=str(made.robot_toml), urdf=made.urdf, remarks=said)
+        written = replace(
+            drawn, robot=str(made.robot_toml), urdf=made.urdf, written=alone, remarks=said
+        )
         (folder / "diagnosis.json").write_bytes(encoded(written))  # for planner report
         return written
 
@@ -258,7 +266,9 @@ class DiagnosisReport(Answer):
         """Both files of the robot, and the commands that put them into the campaign."""
         if self.robot is None or self.urdf is None:
             return []
-        both = f"{self.robot}, which needs {self.urdf.name} beside it"
+        alone = self.written.frac if self.written else None
+        agrees = "" if alone is None else f" (FRAC {alone:.4f} as it is written)"
+        both = f"{self.robot}{agrees}, which needs {self.urdf.name} beside it"
         if self.verdict == "unexplained":
             doubt = "what was found does not explain the recordings: no campaign should use it."
             return [Text(f"Robot with what comes closest: {both}; {doubt}")]

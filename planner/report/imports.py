@@ -200,7 +200,7 @@ def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
         right = "they are" if asked.about else "each is"
         return (
             f"{asked.text} They are held, not used. Where files or recordings.csv are wrong, "
-            f"correct them and import again; to take the import back: "
+            f"correct them and import again (--pose {pose}); to take the import back: "
             f"{command('planner', 'undo', directory)}; if {right} right: {confirm}; to set all "
             f"aside: {withdraw}."
         )

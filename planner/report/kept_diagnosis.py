@@ -45,7 +45,7 @@ def two_answers(springs: Sequence[RefittedSpring], found: Mapping[str, Any]) -> 
     if not added or not told or added == told:
         return ""
     return (
-        f"Two answers: the campaign's model adds springs at {_listed(added)}, the diagnosis names "
+        f"The campaign's model adds springs at {_listed(added)}, the diagnosis names "
         f"{_listed(told)}. The model predicts, and so lets every joint and the floor tilt at once; "
         f"the diagnosis adds only what the recordings cannot do without, and is what to go by for "
         f"repairs."

@@ -117,7 +117,8 @@ def test_the_robot_that_is_written_is_read_back_and_predicts(tmp_path):
     assert told("check", answer["robot"])["ok"]
     again = told("diagnose", case.recordings, "--robot", answer["robot"])
     assert again["verdict"] == "consistent"
-    assert again["fit"]["nominal"]["frac"] > 0.99
+    assert again["fit"]["nominal"]["frac"] == pytest.approx(answer["written"]["frac"], abs=1e-3)
+    assert answer["written"]["frac"] > 0.99
     code, _, err = call("diagnose", case.recordings, "--robot", answer["robot"], "--out", out)
     assert code == 2
     assert "holds the robot that was given" in err
