@@ -22,7 +22,6 @@ from planner.effects.parameters import MOMENTS
 LEAST = 0.05  # of the mass's sd: a start needs some mass for its place to matter
 FARTHEST = 2.0  # prior sds, of a start's mass; its place begins within one of where it is tried
 BELOW = np.tril_indices(3, -1)
-PAIRS = tuple(np.transpose(np.triu_indices(3)).tolist())  # of a symmetric matrix
 CENTRE = ((0.0, 0.0, 0.0),)
 AROUND = (*CENTRE, *map(tuple, np.vstack([np.eye(3), -np.eye(3)]).tolist()))
 
@@ -55,7 +54,7 @@ class AddedMass(Operator):
 
         def turned(change: np.ndarray, factor: float = 1.0) -> Terms:
             moments = np.trace(change) * np.eye(3) - change
-            return tuple((4 + k, factor * moments[i, j] * unit) for k, (i, j) in enumerate(PAIRS))
+            return tuple((4 + k, factor * moments[i, j] * unit) for k, (i, j) in enumerate(MOMENTS))
 
         terms = (0, psi[0] * unit), *turned(spread, psi[0])
         slopes = ((0, unit), *turned(spread)), *moved, *(turned(d, psi[0]) for d in by_number)
@@ -106,9 +105,11 @@ class AddedMass(Operator):
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
         mass, sd = values["mass"]
+        at = (self.parameters(values)[f"position_{axis}"][0] for axis in "xyz")
         return (
             f"{self.at} carries {self.mass_kg * mass:.2g} ± {self.mass_kg * sd:.1g} kg that is not "
-            f"stated: check what is mounted there."
+            f"stated, centred at ({', '.join(f'{v:.2f}' for v in at)}) m of its frame: check what "
+            f"is mounted there."
         )
 
 
@@ -136,4 +137,4 @@ def _about(i: int, j: int) -> np.ndarray:
     return out
 
 
-TURNS = np.array([_about(i, j) for i, j in PAIRS])
+TURNS = np.array([_about(i, j) for i, j in MOMENTS])
