@@ -198,8 +198,10 @@ def _operators(simulation: Simulation) -> list[Operator]:
         centre = x, y, z
         at = f"link_{number}"
         places = tuple(Number(f"position_{a}", "1", 0.0, 1.0) for a in "xyz")
-        radius = Number("radius", "m", float(np.log(RADIUS * size)), RADIUS_SD, True)
-        numbers = (Number("mass", "1", 0.0, 1.0), *places, radius)
+        width = float(np.log(RADIUS * size / np.sqrt(2)))
+        spread = (Number(f"spread_{a}", "m", width, RADIUS_SD, True) for a in "xyz")
+        skew = (Number(f"skew_{a}", "1", 0.0, 1.0) for a in ("yx", "zx", "zy"))
+        numbers = (Number("mass", "1", 0.0, 1.0), *places, *spread, *skew)
         found.append(AddedMass(at, (), numbers, joint, centre, ADDED_MASS * mean, size))
         numbers = (
             Number("mass", "kg", float(np.log(RESONATOR_MASS * mean)), 1.0, True),
