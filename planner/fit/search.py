@@ -210,7 +210,7 @@ class Search:
         stated too, the best farther, `count` settled."""
         rough = self._on(base, self.data(ROUGH))
         pool = [f for s in starts if (f := self._few(rough, s, unmoved)) is not None]
-        if afar and size_of(base) >= AGAIN:
+        if afar and not explained(base):
             pool += [self.begun(rough.misfit.data, s, x) for s, x in self._nearest(base, starts)]
         near = _best_of_each(p for p in pool if p.evidence > rough.evidence - FAR)
         followed = [self._on(p, base.misfit.data) for p in near[:FOLLOWED]]
