@@ -233,16 +233,6 @@ class Dataset:
                 out.append(Visit(entry.pose, stay.q, stay.order, hits))
         return tuple(out)
 
-    @property
-    def visit_q(self) -> np.ndarray:
-        """Readback (v, dof) in rad."""
-        return np.array([visit.q for visit in self.visits])
-
-    @cached_property
-    def visit_frfs(self) -> tuple[Frf, ...]:
-        """Of each visit, all force levels together, as `frf`."""
-        return tuple(self.frf(visit.hits) for visit in self.visits)
-
     def frf(self, hits: tuple[Hit, ...]) -> Frf:
         """FRF of some hits of a visit, with an exponential window of rate LAID over them."""
         return estimate(hits, self.band_hz, "h1", LAID, window_rate_1_s=self.window_rate_1_s)

@@ -7,8 +7,7 @@ robot.toml says geometric_stiffness = false.
 """
 
 import copy
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -200,27 +199,6 @@ class Truth:
             if model.body(body).name and model.body_mass[body] > 0:
                 found.setdefault(model.body(body).name.split()[0], []).append(body)
         return found
-
-    @contextmanager
-    def other_inertia(
-        self, link: str, mass: float = 1.0, turn: float = 1.0, shift: np.ndarray | float = 0.0
-    ) -> Iterator[None]:
-        """Meanwhile a link has `mass` times its mass and inertia, `turn` times its inertia.
-
-        `shift` (3,) in m moves its centre, in the link's frame.
-        """
-        model: Any = self._model
-        bodies = self.links()[link]
-        arrays = model.body_mass, model.body_inertia, model.body_ipos
-        before = [np.array(array[bodies]) for array in arrays]
-        model.body_mass[bodies] *= mass
-        model.body_inertia[bodies] *= mass * turn
-        model.body_ipos[bodies] += shift
-        try:
-            yield
-        finally:
-            for array, old in zip(arrays, before, strict=True):
-                array[bodies] = old
 
     def changed(self, factor: float | np.ndarray) -> "Truth":
         """The same robot with the stiffness of every spring multiplied by a factor, or (e,)."""

@@ -68,7 +68,8 @@ def test_poses_and_visits_in_the_order_of_recording(read):
     assert read.poses == ("A", "B")
     np.testing.assert_allclose(np.rad2deg(read.q[:, 0]), [10.1, 50.1])
     assert [visit.pose for visit in read.visits] == ["A", "B", "A"]
-    np.testing.assert_allclose(np.rad2deg(read.visit_q[:, 0]), [10.0, 50.1, 10.2])
+    told_deg = np.rad2deg([visit.q[0] for visit in read.visits])
+    np.testing.assert_allclose(told_deg, [10.0, 50.1, 10.2])
     np.testing.assert_allclose([visit.order for visit in read.visits], [0, 1 / 3, 2 / 3])
 
 
@@ -86,7 +87,8 @@ def test_frfs_of_a_pose_and_of_a_visit(read):
     assert read.frfs[0].exponential_rate_1_s == 0
     ended = read.ended_frfs[0]
     assert ended.exponential_rate_1_s * read.frfs[0].tail_s == pytest.approx(OVER)
-    assert [frf.exponential_rate_1_s for frf in read.visit_frfs] == [LAID] * 3
+    rates = [read.frf(visit.hits).exponential_rate_1_s for visit in read.visits]
+    assert rates == [LAID] * 3
 
 
 def test_modes_of_each_pose(read):
@@ -97,7 +99,7 @@ def test_modes_of_each_pose(read):
 
 def test_columns_by_level_agree_with_the_frf_of_the_visit(read):
     assert len(read.level_n) == 2
-    frf = read.visit_frfs[1]
+    frf = read.frf(read.visits[1].hits)
     for column in read.columns[1]:
         same = np.isin(frf.frequency_hz, column.frequency_hz)
         if same.sum() == len(column.frequency_hz):
@@ -122,7 +124,7 @@ def test_files_wherever_they_are_give_the_same(folder, read, tmp_path):
             recordings.append(Recording(row["pose"], q, source))
     same = Dataset.of(recordings, BAND_HZ, store=NOTHING_KEPT)
     assert same.poses == read.poses
-    np.testing.assert_array_equal(same.visit_q, read.visit_q)
+    assert [v.q.tolist() for v in same.visits] == [v.q.tolist() for v in read.visits]
     for one, other in zip(same.frfs, read.frfs, strict=True):
         np.testing.assert_array_equal(one.accelerance, other.accelerance)
     assert [file for file, _ in same.refused] == ["stick/2Ax1.csv", "stick/none.csv"]
@@ -143,7 +145,7 @@ def test_corrected_hits_make_entries_of_their_own(read):
     assert now.poses == ("A", "B", "A")
     assert now.frfs[0].hits == (2, 2, 2)
     assert now.frfs[0].exponential_rate_1_s == 0.5
-    np.testing.assert_allclose(now.visit_q, now.q)
+    np.testing.assert_allclose([visit.q for visit in now.visits], now.q)
     assert (now.refused, now.remarks) == (read.refused, read.remarks)
     np.testing.assert_allclose(now.frfs[1].accelerance, 2 * read.frfs[1].accelerance)
     assert read.window_rate_1_s == 0
