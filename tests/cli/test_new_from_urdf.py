@@ -86,6 +86,8 @@ def test_it_goes_from_a_description_to_a_first_pose(kind, tmp_path):
     new = told("new", cell, "--urdf", urdf, *given, "--tool-mass-kg", 8)
     named = {guess["what"] for guess in new["guessed"]}
     assert {"stiffness of joint_1 about its axis", "workspace joints_deg"} <= named
+    assert len(named) == len(new["guessed"])
+    assert "tie" not in (cell / "robot" / "robot.toml").read_text()  # no bearing is alike all round
     assert ("mass of link_2" in named) == (kind is not whole)
     assert all({"what", "value", "sd"} <= set(guess) for guess in new["guessed"])
     masses = [g["value"] for g in new["guessed"] if g["what"].startswith("mass of")]

@@ -117,6 +117,7 @@ def test_what_was_found_is_a_simulation_of_its_own(prior, few):
     structure = structure_of(prior, *EVERYTHING[:5])
     x = structure.mean.copy()
     set_to(structure, x, "added_mass", 0, 0.5, 0.3, -0.2, 0.1)
+    set_to(structure, x, "added_mass", 7, 0.5, -0.4, 0.3)
     set_to(structure, x, "local_resonator", 3, 1.0, 0.5, 0.0)
     x[structure.chain] = 0.0
     simulation, _ = exported(structure, x)
@@ -164,6 +165,7 @@ def test_a_tool_that_the_description_lacks_is_found_at_the_flange(tmp_path):
     judged = Judged.of(case, found)
     assert "added_mass at link_6" in judged.named
     assert judged.error < 0.04
+    assert abs(judged.tool_sds) < 2.5
     assert not departures_text(found.structure, found.x)
 
 

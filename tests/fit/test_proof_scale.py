@@ -89,6 +89,10 @@ def test_a_forgotten_tool_is_named(tmp_path):
     named = [any(n.startswith("added_mass") for n in j.named) for j in found]
     error = np.array([j.error for j in found])
     print(f"named in {sum(named)} of {len(named)}; error median {100 * np.median(error):.1f} %")
-    print(f"error <= 5 % in {np.sum(error <= 0.05)}")
+    sds = np.array([j.tool_sds for j in found])
+    sds = np.abs(sds[np.isfinite(sds)])
+    print(f"error <= 5 % in {np.sum(error <= 0.05)}, masses within 2 sd in {np.sum(sds <= 2)} of "
+          f"{len(sds)}")  # fmt: skip
+    assert np.mean(sds <= 2) >= 0.85
     assert np.mean(named) >= 0.9
     assert np.mean(error <= 0.05) >= 0.9

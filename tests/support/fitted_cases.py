@@ -74,6 +74,7 @@ class Case:
     measured: tuple[MeasuredPose, ...]
     truth: Truth
     box_rad: np.ndarray  # (2, dof)
+    tool_kg: float  # of a tool that robot.toml lacks
 
     def posterior(self) -> RobotPosterior:
         """What a fit makes of it."""
@@ -186,7 +187,7 @@ def _measured(
     frfs = tuple(pose.one_hit_frf for pose in measured)
     return Case(
         arm.toml, arm.band_hz, q, frfs, unseen, lines, true, seen, concealed, tuple(measured),
-        truth, np.array([low, high]),
+        truth, np.array([low, high]), sum(m.mass_kg for m in secret.deviation.added),
     )  # fmt: skip
 
 
@@ -202,7 +203,10 @@ def limits(arm: Arm, simulation: Simulation) -> tuple[np.ndarray, np.ndarray]:
 @dataclass(frozen=True)
 class Judged:
     """Of a posterior at unseen poses: frequencies' RMSE in %, the FRFs' FRAC, common scale,
-    relative error, share of lines within 2 sd, and what was named."""
+    relative error, share of lines within 2 sd, and what was named.
+
+    `tool_sds` is by how many sds the mass of a forgotten tool is off; NaN where none is named.
+    """
 
     rmse_percent: float
     frac: float
@@ -213,6 +217,7 @@ class Judged:
     named: tuple[str, ...]
     shares: tuple[float, ...]
     size: float
+    tool_sds: float
 
     @classmethod
     def of(cls, case: Case, found: RobotPosterior) -> "Judged":
@@ -229,8 +234,13 @@ class Judged:
             np.nanmin(np.abs(row / f - 1))
             for row, true_hz in zip(hertz, case.true_hz, strict=True) for f in true_hz
         ]  # fmt: skip
+        tools = [
+            e.parameters(found.values(e))["mass"] for e in found.structure.effects
+            if e.kind == "added_mass"
+        ]  # fmt: skip
         return cls(
             100 * float(np.sqrt(np.mean(np.square(off)))), frac_of(true, mean), scale,
             found.scale_sd, error, float(np.mean(np.abs(mean - true) <= 2 * sd)),
             tuple(e.label for e in found.structure.effects), found.found.shares, found.size,
+            (tools[0][0] - case.tool_kg) / tools[0][1] if tools else np.nan,
         )  # fmt: skip
