@@ -205,17 +205,19 @@ def _either(joints: JointUnits, number: int, one: float, other: float) -> str:
 def _chains(
     state: CampaignState, expected: ExpectedFrfs, q: np.ndarray, frf: Frf
 ) -> Iterator[Mistake]:
-    """What the tool's chain may show instead; nothing once the engineer called it right."""
-    if frf.layout.sensors != TOOL.sensors or _called_right(state):
+    """What the tool's chain may show instead; not again what the engineer called right."""
+    if frf.layout.sensors != TOOL.sensors:
         return
+    answered = _called_right(state)
     for fault in (*TURNED, *AGAINST, *fitted(expected.shown(q, frf))):
-        yield Mistake(q, fault.asked, about="chain", fault=fault)
+        if not any(fault.asked in text for text in answered):
+            yield Mistake(q, fault.asked, about="chain", fault=fault)
 
 
-def _called_right(state: CampaignState) -> bool:
-    """Whether the engineer was asked of the chain before, and used the hits."""
+def _called_right(state: CampaignState) -> tuple[str, ...]:
+    """What the engineer was asked of the chain before, where the hits were used then."""
     asked = (m.question for m in state.measurements.values() if m.question is not None)
-    return any(question.about == "chain" for question in asked)
+    return tuple(question.text for question in asked if question.about == "chain")
 
 
 def _asked(pose: str, off_percent: float, fits: Mistake | None) -> Question:

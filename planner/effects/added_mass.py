@@ -18,6 +18,7 @@ from planner.effects.effect import (
     turning,
 )
 from planner.effects.parameters import MOMENTS
+from planner.words import significant
 
 LEAST = 0.05  # of the mass's sd: a start needs some mass for its place to matter
 FARTHEST = 2.0  # prior sds, of a start's mass; its place begins within one of where it is tried
@@ -106,10 +107,11 @@ class AddedMass(Operator):
         """See `Operator.words`."""
         mass, sd = values["mass"]
         at = (self.parameters(values)[f"position_{axis}"][0] for axis in "xyz")
+        centre = ", ".join(f"{v:.2f}" for v in at)
         return (
-            f"{self.at} carries {self.mass_kg * mass:.2g} ± {self.mass_kg * sd:.1g} kg that is not "
-            f"stated, centred at ({', '.join(f'{v:.2f}' for v in at)}) m of its frame: check what "
-            f"is mounted there."
+            f"{self.at} carries {significant(self.mass_kg * mass)} ± "
+            f"{significant(self.mass_kg * sd)} kg that is not stated, centred at ({centre}) m of "
+            f"its frame: check what is mounted there."
         )
 
 

@@ -186,6 +186,11 @@ class Operator(ABC):
         """Where fits may begin as well as at ψ."""
         return ()
 
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest ψ that there can be."""
+        return np.full(len(self.numbers), -np.inf), np.full(len(self.numbers), np.inf)
+
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """Changes of the first numbers of ψ at which it is no more, to first order."""
         return np.zeros(0)

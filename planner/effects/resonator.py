@@ -119,6 +119,13 @@ class LinkResonator(Operator):
         )
         return replace(self, numbers=(*self.numbers[:3], *directed, *self.numbers[6:]))
 
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `Operator.box`: what swings outside the band is a mass, or nothing, to what is in."""
+        low, high = super().box
+        low[1], high[1] = np.log(self.band_hz)
+        return low, high
+
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """See `Operator.vanishing`."""
         return np.array([-1.0])  # of ln mass

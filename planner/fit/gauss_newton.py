@@ -3,7 +3,6 @@
 import numpy as np
 
 from planner.fit.misfit import At, FrfMisfit
-from planner.fit.structure import REACH
 
 GOOD, GROWTH, MOST_REJECTED, MOST_DAMPED = 0.5, 3.0, 8, 1e9
 SOFTER, STIFFER = 6.0, 0.8  # of a new spring's step, in shares of its compliance
@@ -22,13 +21,14 @@ def minimised(
     `by_prior`: damped in the prior's sds, not the data's: so it follows what they leave open.
     """
     s = misfit.structure
-    low, high = s.least, s.mean + REACH * s.sd
+    low, high = s.least, s.most
     at, rejected, growth = misfit(x, own), 0, GROWTH
     damping = 1e-2 if by_prior else 1e-3
     for _ in range(steps):
         normal, gradient = at.normal + s.precision, at.gradient + s.precision @ (at.x - s.mean)
         scale = np.diag(s.precision) if by_prior else np.diag(normal)
-        free = ~((at.x <= low) & (gradient > 0))  # what is as small as it may be stays there
+        # What is as small, or as large, as it may be stays there.
+        free = ~((at.x <= low) & (gradient > 0) | (at.x >= high) & (gradient < 0))
         step = np.zeros(len(free))
         damped = (normal + damping * np.diag(scale))[np.ix_(free, free)]
         step[free] = -np.linalg.solve(damped, gradient[free])

@@ -6,7 +6,7 @@ import numpy as np
 
 from planner.effects.effect import Operator, Start
 from planner.fit.fitted import StructureFit
-from planner.fit.structure import REACH, RobotStructure
+from planner.fit.structure import RobotStructure
 
 KEPT = 6  # operators by first order beside the best of each kind
 PULLED = 1.5  # prior sds, from which another prior may pay
@@ -21,7 +21,7 @@ def placed(base: StructureFit, start: Start, unmoved: bool = True) -> list[np.nd
         moved = x
         if start.moved is not None:  # as the first order has it
             moved = structure.carried(base.structure, base.at.x + start.moved)
-            moved = np.clip(moved, structure.least, structure.mean + REACH * structure.sd)
+            moved = np.clip(moved, structure.least, structure.most)
         begun = [(x if unmoved else moved, p) for p in (start.psi, *effect.beside(start.psi))]
         if unmoved and moved is not x:
             begun.append((moved, start.psi))

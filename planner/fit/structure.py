@@ -177,7 +177,17 @@ class RobotStructure:
         low = self.mean - REACH * self.sd
         for i, known in self._known.items():
             low[i] = max(low[i], self.mean[i] - known.shift + known.least)
+        for effect, own in zip(self.effects, self.own, strict=True):
+            low[own] = np.maximum(low[own], effect.box[0])
         return low
+
+    @cached_property
+    def most(self) -> np.ndarray:
+        """Where it ends above."""
+        high = self.mean + REACH * self.sd
+        for effect, own in zip(self.effects, self.own, strict=True):
+            high[own] = np.minimum(high[own], effect.box[1])
+        return high
 
     @cached_property
     def mean(self) -> np.ndarray:
