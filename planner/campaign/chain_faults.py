@@ -22,13 +22,15 @@ class ChainFault:
     """What a chain shows is `matrix` (3, 3) times what it should, x, y, z being its channels.
 
     `scaled` are the channels that `factor` multiplies; () where axes or signs are exchanged.
-    `struck` are axes along which the hammer hit against the direction that is stated.
+    `struck` are axes along which the hammer hit against the direction that is stated; `order` along
+    which axis those hits were that are listed as along x, y, z.
     """
 
     matrix: np.ndarray
     scaled: tuple[int, ...] = ()
     factor: float = 1.0
     struck: tuple[int, ...] = ()
+    order: tuple[int, ...] = (0, 1, 2)
 
     @property
     def asked(self) -> str:
@@ -37,6 +39,9 @@ class ChainFault:
             axes = " and ".join(AXES[i] for i in self.struck)
             ways = " and ".join(f"−{AXES[i]}" for i in self.struck)
             return f"hits along {axes} look struck the other way, towards {ways}?"
+        wrong = [f"{AXES[i]} along {AXES[at]}" for i, at in enumerate(self.order) if i != at]
+        if wrong:
+            return f"hits look listed along wrong axes: were those along {', '.join(wrong)}?"
         if self.scaled:
             return self._of_scale
         exchanged = np.array_equal(np.abs(self.matrix).sum(axis=1), np.ones(3))
@@ -125,6 +130,7 @@ def fitted(matrix: np.ndarray) -> Iterator[ChainFault]:
 
 TURNED = _turned()  # all 47 ways to exchange axes and signs
 AGAINST = tuple(ChainFault(np.eye(3), struck=s) for n in (1, 2) for s in combinations(range(3), n))
+EXCHANGED = tuple(ChainFault(np.eye(3), order=order) for order in permutations(range(3)))[1:]
 SCALED = tuple(_scaled(channels) for channels in ((0, 1, 2), (0,), (1,), (2,)))
 
 

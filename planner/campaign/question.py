@@ -3,8 +3,8 @@
 What was found of the hits before tells which FRFs are to be expected anywhere, and how unsure that
 is. Where "something else" is likelier than the pose as stated, what that may be competes by
 evidence: another known pose, the setpoint, an angle with the other sign, axes of the sensor
-exchanged, a channel with a wrong scale, a sensor that turned, hits the other way, one joint
-elsewhere. Without a
+exchanged, a channel with a wrong scale, a sensor that turned, hits the other way or listed along
+wrong axes, one joint elsewhere. Without a
 simulation, or before the first measurement, nothing is expected.
 """
 
@@ -15,7 +15,14 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from planner.campaign.chain_faults import AGAINST, NONE, TURNED, ChainFault, fitted
+from planner.campaign.chain_faults import (
+    AGAINST,
+    EXCHANGED,
+    NONE,
+    TURNED,
+    ChainFault,
+    fitted,
+)
 from planner.campaign.chain_question import chain_question
 from planner.campaign.events import Question
 from planner.campaign.model import Model
@@ -118,7 +125,7 @@ class StatedHits:
         value, size = self.density
 
         def shown(one: Mistake) -> tuple[Frf, float]:
-            frf, volume = turned(self.frf, one.fault.matrix, one.fault.struck)
+            frf, volume = turned(self.frf, one.fault.matrix, one.fault.struck, one.fault.order)
             return frf, volume * columns * LINES
 
         def glanced(one: Mistake) -> float:
@@ -209,7 +216,7 @@ def _chains(
     if frf.layout.sensors != TOOL.sensors:
         return
     answered = _called_right(state)
-    for fault in (*TURNED, *AGAINST, *fitted(expected.shown(q, frf))):
+    for fault in (*TURNED, *AGAINST, *EXCHANGED, *fitted(expected.shown(q, frf))):
         if not any(fault.asked in text for text in answered):
             yield Mistake(q, fault.asked, about="chain", fault=fault)
 

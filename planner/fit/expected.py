@@ -119,13 +119,18 @@ class ExpectedFrfs:
         return np.linalg.lstsq(expected.T, measured.T)[0].T
 
 
-def turned(frf: Frf, matrix: np.ndarray, struck: Sequence[int] = ()) -> tuple[Frf, float]:
+def turned(
+    frf: Frf, matrix: np.ndarray, struck: Sequence[int] = (), order: Sequence[int] = (0, 1, 2)
+) -> tuple[Frf, float]:
     """FRF (3, c, F) of which `matrix` (3, 3) was shown, and ln of the Jacobian of one complex value
-    of every column; hits along axes of `struck` go the other way."""
+    of every column; hits along axes of `struck` go the other way, those listed along x, y, z went
+    along those of `order`."""
     inverse = np.linalg.inv(matrix)
     shown = np.einsum("ij,jcf->icf", inverse, frf.accelerance)
     for axis in struck:
         shown[:, axis::3] *= -1
     variance = np.einsum("ij,jcf->icf", inverse**2, frf.variance)
+    listed = np.argsort(order) + 3 * np.arange(shown.shape[1] // 3)[:, None]
+    shown, variance = shown[:, listed.ravel()], variance[:, listed.ravel()]
     volume = 2 * float(np.log(np.abs(np.linalg.det(inverse))))
     return replace(frf, accelerance=shown, variance=variance), volume

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from planner.campaign.chain_faults import AGAINST, TURNED, fitted
+from planner.campaign.chain_faults import AGAINST, EXCHANGED, TURNED, fitted
 from planner.campaign.chain_question import Draws
 from planner.campaign.question import SURE, Mistake, StatedHits, elsewhere
 from planner.dynamics.simulation import Simulation
@@ -76,7 +76,7 @@ class Asker:
         if self.poses >= SURE:
             angles = tuple(self.joints.shown(q))
             mistakes += elsewhere(self.joints, self.expected, frf, angles)
-        faults = (*TURNED, *AGAINST, *fitted(self.expected.shown(q, frf)))
+        faults = (*TURNED, *AGAINST, *EXCHANGED, *fitted(self.expected.shown(q, frf)))
         mistakes += [Mistake(q, "", about="chain", fault=fault) for fault in faults]
         found = stated.instead(mistakes)
         if found is not None:
@@ -109,12 +109,18 @@ def answers(
             typed = opposite(q, int(rng.integers(1, len(q))))
             misread = q + np.deg2rad(MISREAD_DEG) * np.eye(len(q))[int(rng.integers(1, len(q)))]
             against = replace(frf, accelerance=frf.accelerance * np.array([-1, 1, 1])[:, None])
+            exchanged = [1, 0, 2]
+            listed = replace(
+                frf, accelerance=frf.accelerance[:, exchanged],
+                variance=frf.variance[:, exchanged],
+            )  # fmt: skip
             one = {
                 "another pose": (ask.asked(q, strange, others), true),
                 "unlisted pose": (ask.asked(q, strange, unlisted), "?"),
                 "sign of an angle": (ask.asked(typed, frf, others), "readback"),
                 "an angle 3° off": (ask.asked(misread, frf, others), "readback"),
                 "x hit from behind": (ask.asked(q, against, others), "chain"),
+                "x listed as y": (ask.asked(q, listed, others), "chain"),
             }
         one |= {
             name: (ask.asked(q, shown(frf, fault(name, rng)), others), "chain") for name in chains
