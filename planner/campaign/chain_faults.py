@@ -15,6 +15,7 @@ LEAST, MOST, STEP = np.log(1.5), np.log(3e6), 0.12
 SCALE_SD = np.log(30.0)  # of the logarithm of a wrong factor
 UNITS = {4.448: "lbf or N", 9.81: "g or m/s²", 39.37: "in/s² or m/s²", 1000.0: "mm or m"}
 AS_UNIT = 0.2  # of the logarithm: as near a factor is told
+GAIN = 0.05  # of the logarithm, beyond which no sensor or hammer within its tolerance is
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +58,10 @@ class ChainFault:
         way, other = ("large", "small") if self.factor > 1 else ("small", "large")
         whole = len(self.scaled) == len(AXES)
         what = "accelerations are" if whole else f"channel {AXES[self.scaled[0]]} is"
+        if np.log(size) < LEAST:  # no unit is so near another
+            force = f", or forces {other} by as much" if whole else ""
+            percent = 100 * abs(self.factor - 1)
+            return f"{what} {percent:.0f} % too {way}: another sensitivity, a loose sensor{force}?"
         known = f" ({UNITS[unit]})" if near else ""
         force = f", or forces too {other}" if whole else ""
         load = ", or a tool that robot.toml lacks" if whole and self.factor < 1 else ""
@@ -117,11 +122,12 @@ def _times(channels: tuple[int, ...], factor: float) -> ChainFault:
 def fitted(matrix: np.ndarray) -> Iterator[ChainFault]:
     """What comes near to `matrix` (3, 3), by which hits show what is expected of them.
 
-    All channels by one factor, or one of them; a sensor that turned.
+    All channels by one factor, or one of them; a sensor that turned. Evidence says whether that is
+    more than what was fitted leaves open.
     """
     for channels in ((0, 1, 2), (0,), (1,), (2,)):
         factor = float(np.median(np.diag(matrix)[list(channels)]))
-        if factor > 0 and abs(np.log(factor)) > LEAST:
+        if factor > 0 and abs(np.log(factor)) > GAIN:
             yield _times(channels, factor)
     rotation, _ = polar(matrix)
     if np.linalg.det(rotation) > 0:
