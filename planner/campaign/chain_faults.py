@@ -119,15 +119,15 @@ def _times(channels: tuple[int, ...], factor: float) -> ChainFault:
     return ChainFault(np.diag(diagonal), channels, factor)
 
 
-def fitted(matrix: np.ndarray) -> Iterator[ChainFault]:
+def fitted(matrix: np.ndarray, sure: bool) -> Iterator[ChainFault]:
     """What comes near to `matrix` (3, 3), by which hits show what is expected of them.
 
-    All channels by one factor, or one of them; a sensor that turned. Evidence says whether that is
-    more than what was fitted leaves open.
+    All channels by one factor, or one of them; a sensor that turned. Where the expected hits are
+    not `sure`, springs and inertias may well bring a small factor.
     """
     for channels in ((0, 1, 2), (0,), (1,), (2,)):
         factor = float(np.median(np.diag(matrix)[list(channels)]))
-        if factor > 0 and abs(np.log(factor)) > GAIN:
+        if factor > 0 and abs(np.log(factor)) > (GAIN if sure else LEAST):
             yield _times(channels, factor)
     rotation, _ = polar(matrix)
     if np.linalg.det(rotation) > 0:

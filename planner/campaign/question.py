@@ -79,13 +79,15 @@ def question(
     stated, typed = StatedHits(expected, q, frf), _setpoint(model, state, pose, joints_deg)
     if not stated.doubted and not stated.instead(typed):
         return None
-    mistakes = [*typed, *_poses(model, state, pose, joints_deg), *_chains(state, expected, q, frf)]
-    if learned.poses >= SURE:
+    mistakes = [*typed, *_poses(model, state, pose, joints_deg)]
+    sure = learned.poses >= SURE
+    mistakes += _chains(state, expected, q, frf, sure)
+    if sure:
         mistakes += elsewhere(model.cell.robot.joints, expected, frf, joints_deg)
     fits = stated.instead(mistakes)
     if fits is None and not stated.impossible:
         return None
-    if fits is None and learned.poses < SURE:
+    if fits is None and not sure:
         called_right = _called_right(state)
         return None if called_right else chain_question(model, pose, joints_deg, measured.frf)
     return _asked(pose, 100 * expected.off(q, frf), fits)
@@ -210,13 +212,13 @@ def _either(joints: JointUnits, number: int, one: float, other: float) -> str:
 
 
 def _chains(
-    state: CampaignState, expected: ExpectedFrfs, q: np.ndarray, frf: Frf
+    state: CampaignState, expected: ExpectedFrfs, q: np.ndarray, frf: Frf, sure: bool
 ) -> Iterator[Mistake]:
     """What the tool's chain may show instead; not again what the engineer called right."""
     if frf.layout.sensors != TOOL.sensors:
         return
     answered = _called_right(state)
-    for fault in (*TURNED, *AGAINST, *EXCHANGED, *fitted(expected.shown(q, frf))):
+    for fault in (*TURNED, *AGAINST, *EXCHANGED, *fitted(expected.shown(q, frf), sure)):
         if not any(fault.asked in text for text in answered):
             yield Mistake(q, fault.asked, about="chain", fault=fault)
 

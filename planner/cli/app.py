@@ -190,8 +190,9 @@ def predict(
 ) -> int:  # fmt: skip
     """Modes and FRFs, with uncertainty, at given poses.
 
-    The npz holds for n poses: frf_mean and frf_sd (n, 3, 3, F) in m/s²/N (response, force; x, y, z
-    of the tcp frame), frequency_hz (F,), pose (n,), joints_deg (n, joints).
+    The npz holds for n poses: frf_mean and frf_sd (n, 3, 3, F) in m/s²/N (response where the sensor
+    is, by force at the tcp; x, y, z of the tcp frame: with sensor_frame = tcp_frame in robot.toml
+    both are at the tool's tip), frequency_hz (F,), pose (n,), joints_deg (n, joints).
 
     Example: planner predict cell7 poses.csv --out frfs.npz
     """

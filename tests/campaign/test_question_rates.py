@@ -76,7 +76,12 @@ class Asker:
         if self.poses >= SURE:
             angles = tuple(self.joints.shown(q))
             mistakes += elsewhere(self.joints, self.expected, frf, angles)
-        faults = (*TURNED, *AGAINST, *EXCHANGED, *fitted(self.expected.shown(q, frf)))
+        faults = (
+            *TURNED,
+            *AGAINST,
+            *EXCHANGED,
+            *fitted(self.expected.shown(q, frf), self.poses >= SURE),
+        )
         mistakes += [Mistake(q, "", about="chain", fault=fault) for fault in faults]
         found = stated.instead(mistakes)
         if found is not None:
