@@ -9,11 +9,10 @@ import numpy as np
 from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.errors import InputError
-from planner.robot.config import LOSS_FACTOR_BELOW, Compliance, RobotConfig
+from planner.robot.config import Compliance, RobotConfig
 from planner.robot.urdf_inertias import stated_shares
 from planner.robot.virtual_joints import inertia_basis
 
-NEAR = 6.0
 KINDS = ("stiffness", "damping", "loss_factor")
 UNITS = {"stiffness": "N·m/rad", "damping": "N·m·s/rad", "loss_factor": "1"}
 SLIDE_UNITS = {"stiffness": "N/m", "damping": "N·s/m", "loss_factor": "1"}
@@ -27,7 +26,7 @@ class Priors:
 
     `stiffness_factor` and so on are e^sd of the logarithm. `bounds` maps the name of a parameter
     to its least and largest plausible value; the log-normal then has mean and sd of a log-uniform
-    one; those named by `firm` are never below theirs. `bias_factor` is e^sd of what all stiffnesses
+    one. `bias_factor` is e^sd of what all stiffnesses
     have in common, those with bounds excepted. What robot.toml says of its stiffnesses goes before
     both factors. `mass`, `inertia` (relative) and `com_m` are sds of the inertias of robot and
     URDF; where all are 0, inertias are taken for exact. `elsewhere` is by how much of its radius of
@@ -40,7 +39,6 @@ class Priors:
     loss_factor_factor: float = 3.0
     bias_factor: float = 1.0
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    firm: frozenset[str] = frozenset()
     mass: float = 0.0
     inertia: float = 0.0
     com_m: float = 0.0
@@ -61,9 +59,8 @@ class Parameter:
     """One number to identify, shared by [[compliance]] blocks (counted from 0).
 
     Its logarithm has a normal prior with mean ln `median` and standard deviation `log_sd`, of which
-    `shared` is that of a deviation common to all stiffnesses; starts lie between `lower` and
-    `upper`. Where it is not `stated`, it is known to lie within bounds; where it is `firm`, never
-    below `lower`.
+    `shared` is that of a deviation common to all stiffnesses. Where it is not `stated`, it is known
+    to lie within bounds.
     """
 
     name: str
@@ -71,12 +68,9 @@ class Parameter:
     blocks: tuple[int, ...]
     median: float
     log_sd: float
-    lower: float
-    upper: float
     shared: float = 0.0
     slide: bool = False
     stated: bool = True
-    firm: bool = False
 
     @property
     def unit(self) -> str:
@@ -111,17 +105,6 @@ class Parametrisation:
         return np.array([p.log_sd for p in self.parameters])
 
     @cached_property
-    def most(self) -> np.ndarray:
-        """Largest θ (P,) that robot.toml takes: what is fitted can be written and read again."""
-        below = np.log(0.999 * LOSS_FACTOR_BELOW)
-        return np.array([below if p.kind == "loss_factor" else np.inf for p in self.parameters])
-
-    @cached_property
-    def least(self) -> np.ndarray:
-        """Smallest θ (P,) that may be."""
-        return np.array([np.log(p.lower) if p.firm else -np.inf for p in self.parameters])
-
-    @cached_property
     def covariance(self) -> np.ndarray:
         """Prior covariance of θ (P, P): springs stated too stiff may all be so."""
         shared = np.array([p.shared for p in self.parameters])
@@ -131,10 +114,6 @@ class Parametrisation:
     def precision(self) -> np.ndarray:
         """Its inverse (P, P)."""
         return np.linalg.inv(self.covariance)
-
-    def near(self, theta: np.ndarray) -> np.ndarray:
-        """θ (P,) brought within NEAR sds of the prior's mean."""
-        return np.clip(theta, self.mean - NEAR * self.log_sd, self.mean + NEAR * self.log_sd)
 
     def elasticity(self, theta: np.ndarray) -> Elasticity:
         """Springs at θ (P,)."""
@@ -176,8 +155,7 @@ def parametrise(simulation: Simulation, priors: Priors) -> Parametrisation:
                     factors = _factors(config, kind, blocks[0], priors)
                     parameters.append(_stated(name, kind, tuple(blocks), value, *factors))
                 slide = config.compliance[blocks[0]].slide
-                firm = name in priors.firm
-                parameters[-1] = replace(parameters[-1], slide=slide, firm=firm)
+                parameters[-1] = replace(parameters[-1], slide=slide)
                 columns.append(np.isin(np.arange(len(values)), k * e + np.array(blocks)))
     unknown = set(priors.bounds) - {p.name for p in parameters}
     if unknown:
@@ -224,7 +202,7 @@ def _bounded(name: str, kind: str, blocks: tuple[int, ...], low: float, high: fl
         raise InputError(f"Bounds {low}, {high} of {name} must rise from above 0; correct them.")
     log_sd = float(np.log(high / low) / np.sqrt(12))
     median = float(np.sqrt(low * high))
-    return Parameter(name, kind, blocks, median, log_sd, low, high, stated=False)
+    return Parameter(name, kind, blocks, median, log_sd, stated=False)
 
 
 def _stated(
@@ -233,8 +211,7 @@ def _stated(
     """Around a stated value: factors of its own deviation and of what it shares with others."""
     shared = float(np.log(bias))
     log_sd = float(np.hypot(np.log(own), shared))
-    reach = float(np.exp(1.5 * log_sd))
-    return Parameter(name, kind, blocks, value, log_sd, value / reach, value * reach, shared)
+    return Parameter(name, kind, blocks, value, log_sd, shared)
 
 
 def _factors(config: RobotConfig, kind: str, block: int, priors: Priors) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.frf.spectra import Windows, transform
-from planner.inference import exchangeable
+from planner.modal import exchangeable
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac
 from planner.modal.modes import ModalModel, Mode

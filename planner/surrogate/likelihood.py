@@ -7,7 +7,7 @@ from jax import Array
 from jax.scipy.linalg import cho_solve
 
 from planner import jax_setup
-from planner.inference.quasi_newton import maximise
+from planner.surrogate.quasi_newton import maximise
 from planner.surrogate.training_data import Padded, Prior, data_covariance
 
 # Likelihoods, and elements of their covariances, that are worked out together: whatever is asked of

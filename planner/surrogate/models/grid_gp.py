@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.inference.quasi_newton import maximise
 from planner.surrogate.kernels import parse
 from planner.surrogate.models.fidelity_levels import spread
 from planner.surrogate.models.multitask import KroneckerSolution, pull, solve_kronecker
+from planner.surrogate.quasi_newton import maximise
 
 NOISE, NOISE_SPREAD = 0.03, 2.0  # median sd of the noise over the output's, its log-sd
 LENGTH, LENGTH_SPREAD = 0.3, 1.5  # of the scales, and of the amplitude's logarithm

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 from scipy.stats import qmc
 
-from planner.inference.quasi_newton import RELATIVE_TOLERANCE, Peak, maximise
 from planner.surrogate.kernels import parse
 from planner.surrogate.likelihood import log_likelihood
 from planner.surrogate.models.fidelity_levels import Samples, spread
+from planner.surrogate.quasi_newton import RELATIVE_TOLERANCE, Peak, maximise
 from planner.surrogate.training_data import capacity
 
 # Of log θ: amplitudes and length scales from 1e-3 to 1e5 in units of y's and x's own scale.

@@ -18,8 +18,8 @@ from scipy.linalg import eigh
 
 from planner import jax_setup
 from planner.errors import InputError
-from planner.inference.quasi_newton import maximise
 from planner.surrogate.kernels import parse
+from planner.surrogate.quasi_newton import maximise
 
 RANK = 3  # columns of W: chosen on robots 1 and 2 of the study of Lei et al. 2023
 NOISE, NOISE_SPREAD = 0.1, 1.5  # median sd of a task's noise over its scale, its log-sd

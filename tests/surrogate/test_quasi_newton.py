@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.inference.quasi_newton import maximise
+from planner.surrogate.quasi_newton import maximise
 
 
 def gaussian(middle: np.ndarray, sd: np.ndarray):

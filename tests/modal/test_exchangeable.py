@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.inference import exchangeable
+from planner.modal import exchangeable
 
 DRAWS = 500
 
