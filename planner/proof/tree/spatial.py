@@ -15,14 +15,8 @@ def turn(axis: ArrayLike, angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
 
 
-def from_rpy(rpy: np.ndarray) -> np.ndarray:
-    """URDF's roll, pitch, yaw (rad): about fixed x, then y, then z."""
-    roll, pitch, yaw = rpy
-    return turn([0, 0, 1], yaw) @ turn([0, 1, 0], pitch) @ turn([1, 0, 0], roll)
-
-
 def to_rpy(rotation: np.ndarray) -> np.ndarray:
-    """Inverse of `from_rpy`; roll is 0 where pitch is +-90 deg."""
+    """URDF's roll, pitch, yaw (rad), about fixed x, then y, then z; roll is 0 at +-90° of pitch."""
     pitch = np.arcsin(np.clip(-rotation[2, 0], -1, 1))
     if abs(rotation[2, 0]) > 1 - 1e-10:
         return np.array([0.0, pitch, np.arctan2(-rotation[0, 1], rotation[1, 1])])
