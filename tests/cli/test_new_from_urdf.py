@@ -131,7 +131,7 @@ def test_the_screen_says_what_to_put_right_first(tmp_path):
     cell = tmp_path / "cell"
     screen = " ".join(said("new", cell, "--urdf", published(tmp_path), *GIVEN).split())
     assert 'Put right first: tcp_frame = "tool0", where the hammer hits' in screen
-    assert "and the tool's mass" in screen
+    assert "and the tool ([[payload]] there" in screen
     assert "a factor of 3" in screen
     assert "Masses are guessed" in screen
     assert "Masses are guessed" in said("check", cell / "robot" / "robot.toml")
