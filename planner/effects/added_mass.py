@@ -6,18 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.gradient import Impedance, Terms
-from planner.effects.effect import (
-    ACROSS,
-    Gain,
-    Motions,
-    Operator,
-    PosedBodies,
-    Start,
-    moving,
-    nats_of,
-    turning,
-)
+from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start, nats_of
 from planner.effects.parameters import MOMENTS
+from planner.robot.virtual_joints import inertia_basis
 from planner.words import significant
 
 LEAST = 0.05  # of the mass's sd: a start needs some mass for its place to matter
@@ -45,21 +36,16 @@ class AddedMass(Operator):
     absorbed = True
 
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
-        """m s² (Jₚᵀ Jₚ + Jωᵀ I/m Jω) at the place p, with moments I about it."""
-        place = np.array(self.centre_m) + self.size_m * psi[1:4]
-        ports = np.concatenate([poses.carried(self.joint, place), poses.body(self.joint)[:, 3:]], 1)
-        shapes = np.array([moving(np.eye(3)), *map(turning, ACROSS), *TURNS])
-        unit = self.mass_kg * poses.s**2
-        moved = [((1 + k, self.size_m * psi[0] * unit),) for k in range(3)]
-        spread, by_number = _spread(psi[4:])
+        """s² times its inertia, on what turns with the joint."""
+        unit = poses.s**2
 
-        def turned(change: np.ndarray, factor: float = 1.0) -> Terms:
-            moments = np.trace(change) * np.eye(3) - change
-            return tuple((4 + k, factor * moments[i, j] * unit) for k, (i, j) in enumerate(MOMENTS))
+        def terms(inertia: np.ndarray) -> Terms:
+            return tuple((k, value * unit) for k, value in enumerate(inertia))
 
-        terms = (0, psi[0] * unit), *turned(spread, psi[0])
-        slopes = ((0, unit), *turned(spread)), *moved, *(turned(d, psi[0]) for d in by_number)
-        return Impedance(ports, shapes, terms, slopes)
+        there, slopes = self._body(psi)
+        return Impedance(
+            poses.body(self.joint), inertia_basis(), terms(there), tuple(map(terms, slopes))
+        )
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """By the columns of the mass and of its first moments, at the likeliest of some places."""
@@ -82,11 +68,21 @@ class AddedMass(Operator):
 
     def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray]:
         """See `Operator.inertia`."""
-        place = np.array(self.centre_m) + self.size_m * psi[1:4]
-        spread = np.outer(place, place) + _spread(psi[4:])[0]
-        moments = np.trace(spread) * np.eye(3) - spread
-        about = [moments[i, j] for i, j in MOMENTS]
-        return self.joint, self.mass_kg * psi[0] * np.array([1.0, *place, *about])
+        return self.joint, self._body(psi)[0]
+
+    def _body(self, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Inertia (10,) about the joint's frame: kg, kg·m, kg·m²; and its slopes (10, 10) by ψ."""
+        place, step = np.array(self.centre_m) + self.size_m * psi[1:4], self.size_m * np.eye(3)
+        d, u = np.exp(psi[4:7]), np.eye(3)
+        u[BELOW] = psi[7:]
+        root = d[:, None] * u
+        roots = [root * np.eye(3)[k][:, None] for k in range(3)]
+        roots += [d[i] * np.outer(np.eye(3)[i], np.eye(3)[j]) for i, j in zip(*BELOW, strict=True)]
+        whole = _inertia(1.0, place, np.outer(place, place) + root @ root.T)
+        moved = [_inertia(0.0, e, np.outer(e, place) + np.outer(place, e)) for e in step]
+        spread = [_inertia(0.0, np.zeros(3), r @ root.T + root @ r.T) for r in roots]
+        slopes = np.array([whole, *(psi[0] * np.array([*moved, *spread]))])
+        return self.mass_kg * psi[0] * whole, self.mass_kg * slopes
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """See `Operator.vanishing`."""
@@ -115,28 +111,7 @@ class AddedMass(Operator):
         )
 
 
-def _spread(psi: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    """D U Uᵀ D in m², and its slopes by ψ (6,)."""
-    d, u = np.exp(psi[:3]), np.eye(3)
-    u[BELOW] = psi[3:]
-    root = d[:, None] * u
-    slopes = []
-    for k in range(6):
-        moved = np.zeros((3, 3))
-        if k < 3:
-            moved[k] = root[k]
-        else:
-            row, column = BELOW[0][k - 3], BELOW[1][k - 3]
-            moved[row, column] = d[row]
-        slopes.append(moved @ root.T + root @ moved.T)
-    return root @ root.T, tuple(slopes)
-
-
-def _about(i: int, j: int) -> np.ndarray:
-    """(6, 6): a shape of rates of turn i and j alone, and its transpose."""
-    out = np.zeros((6, 6))
-    out[3 + i, 3 + j] = out[3 + j, 3 + i] = 1.0
-    return out
-
-
-TURNS = np.array([_about(i, j) for i, j in MOMENTS])
+def _inertia(mass: float, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(10,) as Pinocchio has it, of mass, ∫ρ x (3,) and ∫ρ x xᵀ (3, 3)."""
+    moments = np.trace(second) * np.eye(3) - second
+    return np.array([mass, *first, *(moments[i, j] for i, j in MOMENTS)])
