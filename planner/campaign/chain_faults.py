@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg import polar
 from scipy.spatial.transform import Rotation
 
+from planner.measurement.nuisances import Tolerances
 from planner.recording.points import AXES
 
 # Factors that are looked for, or their inverses: less is what springs and inertias leave open.
@@ -15,7 +16,7 @@ LEAST, MOST, STEP = np.log(1.5), np.log(3e6), 0.12
 SCALE_SD = np.log(30.0)  # of the logarithm of a wrong factor
 UNITS = {4.448: "lbf or N", 9.81: "g or m/s²", 39.37: "in/s² or m/s²", 1000.0: "mm or m"}
 AS_UNIT = 0.2  # of the logarithm: as near a factor is told
-GAIN = 0.05  # of the logarithm, beyond which no sensor or hammer within its tolerance is
+BEYOND = 3.0  # sds of gains, from which a factor is none that a sound chain has
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,17 +120,19 @@ def _times(channels: tuple[int, ...], factor: float) -> ChainFault:
     return ChainFault(np.diag(diagonal), channels, factor)
 
 
-def fitted(matrix: np.ndarray, sure: bool) -> Iterator[ChainFault]:
-    """What comes near to `matrix` (3, 3), by which hits show what is expected of them.
+def possible(shown: np.ndarray, within: Tolerances | None) -> Iterator[ChainFault]:
+    """All that may be wrong, where hits show `shown` (3, 3) times what is expected of them.
 
-    All channels by one factor, or one of them; a sensor that turned. Where the expected hits are
-    not `sure`, springs and inertias may well bring a small factor.
+    `within` are the tolerances of a sound chain, None: springs and inertias that few poses leave
+    open may well bring a small factor, too.
     """
+    yield from (*TURNED, *AGAINST, *EXCHANGED)
+    least = LEAST if within is None else BEYOND * np.hypot(within.gain, within.force_gain)
     for channels in ((0, 1, 2), (0,), (1,), (2,)):
-        factor = float(np.median(np.diag(matrix)[list(channels)]))
-        if factor > 0 and abs(np.log(factor)) > (GAIN if sure else LEAST):
+        factor = float(np.median(np.diag(shown)[list(channels)]))
+        if factor > 0 and abs(np.log(factor)) > least:
             yield _times(channels, factor)
-    rotation, _ = polar(matrix)
+    rotation, _ = polar(shown)
     if np.linalg.det(rotation) > 0:
         yield ChainFault(rotation)
 

@@ -4,8 +4,8 @@ What was found of the hits before tells which FRFs are to be expected anywhere, 
 is. Where "something else" is likelier than the pose as stated, what that may be competes by
 evidence: another known pose, the setpoint, an angle with the other sign, axes of the sensor
 exchanged, a channel with a wrong scale, a sensor that turned, hits the other way or listed along
-wrong axes, one joint elsewhere. Without a
-simulation, or before the first measurement, nothing is expected.
+wrong axes, one joint elsewhere. Without a simulation, or before the first measurement, nothing is
+expected.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,14 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from planner.campaign.chain_faults import (
-    AGAINST,
-    EXCHANGED,
-    NONE,
-    TURNED,
-    ChainFault,
-    fitted,
-)
+from planner.campaign.chain_faults import NONE, ChainFault, possible
 from planner.campaign.chain_question import chain_question
 from planner.campaign.events import Question
 from planner.campaign.model import Model
@@ -217,8 +210,8 @@ def _chains(
     """What the tool's chain may show instead; not again what the engineer called right."""
     if frf.layout.sensors != TOOL.sensors:
         return
-    answered = _called_right(state)
-    for fault in (*TURNED, *AGAINST, *EXCHANGED, *fitted(expected.shown(q, frf), sure)):
+    answered, within = _called_right(state), expected.posterior.tolerances if sure else None
+    for fault in possible(expected.shown(q, frf), within):
         if not any(fault.asked in text for text in answered):
             yield Mistake(q, fault.asked, about="chain", fault=fault)
 

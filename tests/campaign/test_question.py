@@ -3,19 +3,24 @@
 import csv
 import json
 import shutil
+from dataclasses import replace
 
 import msgspec
 import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.contradictions import asked_of
 from planner.campaign.events import Proposed
 from planner.campaign.state import fold
+from planner.dataset.measure import MeasuredPose, measure
+from planner.dataset.screened_files import Source
 from planner.demo import NAME, Pool, shipped
 from planner.errors import InputError
 from planner.recording.folder import TABLE
 from planner.replay import replay
 from planner.report.status import status
+from tests.support.chain_cases import scaled
 from tests.support.outside import call
 
 MEASURED = ("A11", "A57")
@@ -49,10 +54,20 @@ def campaign(three, tmp_path):
     return Campaign(tmp_path / "campaign")
 
 
-def claim(folder, pool, pose=WRONG, at=CLAIMED, name="X1", off_deg=(0.0,) * 6, other_way=""):
+def claim(
+    folder,
+    pool,
+    pose=WRONG,
+    at=CLAIMED,
+    name="X1",
+    off_deg=(0.0,) * 6,
+    other_way="",
+    louder=1.0,
+):
     """A recordings folder whose table says that the hits of `pose` were made at `at`.
 
-    `off_deg` is added to its angles; hits along `other_way` are said to have the other direction.
+    `off_deg` is added to its angles; hits along `other_way` are said to have the other direction;
+    accelerations are `louder` times as large.
     """
     (folder / "data").mkdir(parents=True)
     with open(folder / TABLE, "w", newline="") as file:
@@ -60,7 +75,7 @@ def claim(folder, pool, pose=WRONG, at=CLAIMED, name="X1", off_deg=(0.0,) * 6, o
         joints = [f"joint_{i}_deg" for i in range(1, 7)]
         table.writerow(["pose", *joints, "hit", "repeat", "file"])
         for row in pool.rows[pose]:
-            shutil.copy(row.file, folder / "data")
+            scaled(row, folder / "data", louder)
             angles = np.add(pool.rows[at][0].joints_deg, off_deg)
             sign, axis = row.hit
             hit = f"{'-' if sign == '+' else '+'}{axis}" if axis == other_way else row.hit
@@ -100,12 +115,30 @@ def test_hits_of_another_pose_are_held_until_confirmed(campaign, pool, tmp_path)
     assert fresh.question is not None
 
 
+def test_hits_listed_along_wrong_axes_are_asked_about(campaign, pool):
+    """Of files that do not say their axes themselves."""
+    rows, band_hz = pool.rows[WRONG], campaign.cell.config.modes.band_hz
+    hits = measure([Source(row.file, row.file.name, row.hit) for row in rows], band_hz).hits
+
+    def asked(along):
+        listed = tuple(replace(h, axis=h.axis[0] + along[h.axis[1]]) for h in hits)
+        measured = MeasuredPose((), band_hz, given=listed)
+        return asked_of(campaign.model, campaign.state, "X1", rows[0].joints_deg, measured)
+
+    assert asked({"x": "x", "y": "y", "z": "z"}) is None
+    question = asked({"x": "x", "y": "z", "z": "y"})
+    assert question is not None
+    assert question.about == "chain"
+    assert "were those along y along z, z along y?" in question.text
+
+
 @pytest.mark.parametrize(
     ("wrong", "about", "said"),
     [
         ({"off_deg": (0, 0, 8.0, 0, 0, 0)}, "readback", "is joint_3"),
         ({"off_deg": (0, 0, 0, 0, 5.0, 0)}, "readback", "is joint_5"),
         ({"other_way": "x"}, "chain", "towards −x?"),
+        ({"louder": 1.12}, "chain", "12 % too large"),
     ],
 )
 def test_a_misread_angle_and_hits_from_behind_are_asked_about(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from planner.campaign.chain_faults import AGAINST, EXCHANGED, TURNED, fitted
+from planner.campaign.chain_faults import possible
 from planner.campaign.chain_question import Draws
 from planner.campaign.question import SURE, Mistake, StatedHits, elsewhere
 from planner.dynamics.simulation import Simulation
@@ -76,12 +76,8 @@ class Asker:
         if self.poses >= SURE:
             angles = tuple(self.joints.shown(q))
             mistakes += elsewhere(self.joints, self.expected, frf, angles)
-        faults = (
-            *TURNED,
-            *AGAINST,
-            *EXCHANGED,
-            *fitted(self.expected.shown(q, frf), self.poses >= SURE),
-        )
+        within = self.draws.tolerances if self.poses >= SURE else None
+        faults = possible(self.expected.shown(q, frf), within)
         mistakes += [Mistake(q, "", about="chain", fault=fault) for fault in faults]
         found = stated.instead(mistakes)
         if found is not None:

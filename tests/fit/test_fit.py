@@ -138,6 +138,18 @@ def test_a_step_never_leads_uphill_nor_to_what_no_body_can_be(prior, few):
     assert misfit.possible(found.x)
 
 
+def test_what_swings_stays_in_the_band(prior, few):
+    structure = structure_of(prior, "local_resonator at link_4")
+    misfit, x = FrfMisfit(structure, few, Tolerances(), 0.1), structure.mean.copy()
+    low, high = prior.repertoire.simulation.robot.config.band_hz
+    for hertz in (1.05 * low, high / 1.05):
+        set_to(structure, x, "local_resonator", 1, np.log(hertz))
+        set_to(structure, x, "local_resonator", 3, 1.0, 0.0, 0.0)
+        found = minimised(misfit, x, 12)
+        assert found.value < misfit(x).value
+        assert low <= np.exp(found.x[structure.own[0].start + 1]) <= high
+
+
 def test_a_soft_base_a_bending_link_and_a_hose_are_found_together(case):
     found = case.posterior()
     judged = Judged.of(case, found)

@@ -1,11 +1,13 @@
 """Cells hit as people hit, on true robots (MuJoCo), and what a measuring chain may do wrong."""
 
+import warnings
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pyuff
 from scipy.spatial.transform import Rotation
 
 from planner.campaign.cell import Cell as CampaignCell
@@ -98,3 +100,16 @@ def cases(folder: Path, seeds: range, poses: int) -> Iterator[Struck]:
     for seed in seeds:
         (folder / str(seed)).mkdir(parents=True)
         yield struck(folder / str(seed), seed, poses)
+
+
+def scaled(row, folder, factor: float):
+    """The file of a row with accelerations too large by a factor."""
+    path = folder / row.file.name
+    sets = pyuff.UFF(str(row.file)).read_sets()
+    for one in sets:
+        if one["ordinate_spec_data_type"] == 12:
+            one["data"] = factor * np.array(one["data"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)
+        pyuff.UFF(str(path)).write_sets(sets, "add")
+    return path
