@@ -128,7 +128,7 @@ def fitted(
         starts = [values] if searched is None else [values, searched]
         steps = FEW_STEPS if small else STEPS
     values, p = within_bounds(nominal, priors, frfs, q, starts, steps), parametrise(nominal, priors)
-    bounds = np.array([(x.lower, x.upper) for x in p.parameters])
+    bounds = np.array([priors.bounds[x.name] for x in p.parameters])
     return _model(hits, nominal.changed(p.elasticity(np.log(values))), misfit, values, bounds)
 
 
@@ -149,7 +149,7 @@ def within_bounds(
     by a global search of the paper's population, and so many generations.
     """
     p = parametrise(nominal, priors)
-    low, high = np.log([(x.lower, x.upper) for x in p.parameters]).T
+    low, high = np.log([priors.bounds[x.name] for x in p.parameters]).T
     lines = np.linspace(*BAND_HZ, LINES)
     measured = np.array([_direct(frf.accelerance, frf.frequency_hz, lines) for frf in frfs])
 
