@@ -226,8 +226,8 @@ class Model:
             return None
         pose = self.labelled[best].pose
         text = (
-            f"Better than a new pose: hit {pose} again, with as many hits as before. That lowers "
-            f"the uncertainty more, as the noise of its hits is now the largest part of it."
+            f"Hit {pose} again, with as many hits as before: that lowers the uncertainty more than "
+            f"any new pose."
         )
         return RepeatedPose(pose, float(gain[best]), new, text)
 

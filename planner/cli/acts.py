@@ -70,7 +70,7 @@ def withdraw(
     from planner.report.campaign_acts import withdrawn
 
     Campaign(directory).withdraw(pose, reason)
-    return respond(withdrawn(pose, reason), as_json)
+    return respond(withdrawn(directory, pose, reason), as_json)
 
 
 def skip(

@@ -43,7 +43,7 @@ def _springs(s: RobotStructure, x: np.ndarray, far: tuple[int, ...]) -> Iterator
             times = float(np.exp(abs(x[i] - s.mean[i])))
             way = "stiffer" if x[i] > s.mean[i] else "softer"
             place = s.parameters[i].name.removeprefix("stiffness of ")
-            yield f"{place} would have to be {significant(times)} times {way} than stated"
+            yield f"{place} would be {significant(times)} times {way} than robot.toml has it"
 
 
 def _bodies(s: RobotStructure, x: np.ndarray, far: tuple[int, ...]) -> Iterator[str]:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from planner.robot.robot import Robot
-from planner.robot.virtual_joints import OUTER, halves_moved, inertia_basis
+from planner.robot.virtual_joints import OUTER, cut_at, halves_moved, inertia_basis
 
 HALVES = float(np.sqrt(2.0))  # independent halves scatter by more than their sum
 # Of halves: sd of their centres' distance, of the share of mass that is moved, of moments.
@@ -30,11 +30,17 @@ def pseudo_inertia(inertia: np.ndarray) -> np.ndarray:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def _upper(matrix: np.ndarray) -> np.ndarray:
+    """U, upper triangular, with U Uᵀ = matrix."""
+    return np.linalg.cholesky(matrix[::-1, ::-1])[::-1, ::-1]
+
+
 @dataclass(frozen=True, eq=False)
 class BodyNumbers:
     """Names, nominal inertias (L, 10) and changes (L, R, 10) by each of R numbers in sds.
 
-    `scaled` (L,) says which number scales a body, `sigma` (L,) by how much.
+    `scaled` (L,) says which number scales a body, `sigma` (L,) by how much. `halves` says by outer
+    halves' names where they are cut off, (3,) in m of the frame of the inner half, which precedes.
     """
 
     bodies: tuple[str, ...]
@@ -43,6 +49,7 @@ class BodyNumbers:
     change: np.ndarray
     scaled: np.ndarray
     sigma: np.ndarray
+    halves: dict[str, np.ndarray]
 
     @property
     def size(self) -> int:
@@ -73,6 +80,33 @@ class BodyNumbers:
             whole = self.nominal[b] + relative @ self.change[b]
             own[at] = self.sigma[b] * f[b] * whole
             out.append(own)
+        return out
+
+    def regrouped(self, phi: np.ndarray, other: "BodyNumbers", psi: np.ndarray) -> np.ndarray:
+        """φ (R,) in which links that are cut, or whole, but not so in another weigh as at its ψ.
+
+        Their matter is that of the nominal ones, moved by the one affine map that makes it so.
+        """
+        out = phi.copy()
+        there = dict(zip(other.bodies, other.nominal + other.difference(psi), strict=True))
+        for outer in self.halves.keys() ^ other.halves.keys():
+            cut = self if outer in self.halves else other
+            moved = {cut.bodies[cut.bodies.index(outer) - 1]: np.eye(4), outer: np.eye(4)}
+            moved[outer][:3, 3] = cut.halves[outer]
+            mine = [self.bodies.index(n) for n in moved if n in self.bodies]
+            to = np.array([moved[self.bodies[b]] for b in mine])
+            nominal = to @ pseudo_inertia(self.nominal[mine]) @ np.swapaxes(to, 1, 2)
+            weighs = sum(a @ pseudo_inertia(there[n]) @ a.T for n, a in moved.items() if n in there)
+            affine = _upper(weighs) @ np.linalg.inv(_upper(nominal.sum(axis=0)))
+            wanted = affine @ nominal @ affine.T
+            factor = wanted[:, 3, 3] / nominal[:, 3, 3]
+            change = to @ np.swapaxes(pseudo_inertia(self.change[mine]), 0, 1)
+            change = change @ np.swapaxes(to, 1, 2)
+            change[self.scaled] = 0.0
+            some = np.flatnonzero(change.any(axis=(1, 2, 3)))
+            apart = wanted / factor[:, None, None] - nominal
+            out[some] = np.linalg.lstsq(change[some].reshape(len(some), -1).T, apart.ravel())[0]
+            out[self.scaled[mine]] = np.log(factor) / self.sigma[mine]
         return out
 
     def _relative(self, phi: np.ndarray) -> np.ndarray:
@@ -139,7 +173,8 @@ def body_numbers(
         mass > 0, change[np.arange(len(bodies)), scaled, 0] / np.where(mass > 0, mass, 1), 0
     )
     more = [f"halves {k} of {bodies[b]}" for b in halves for k in range(len(extra) // len(halves))]
-    return BodyNumbers(tuple(bodies), (*names, *more), nominal, change, scaled, sigma)
+    cut = {bodies[b]: cut_at(robot, bodies[b].removesuffix(OUTER)) for b in halves}
+    return BodyNumbers(tuple(bodies), (*names, *more), nominal, change, scaled, sigma, cut)
 
 
 def _halves(

@@ -28,7 +28,7 @@ from planner.fit.fitted import (
     without,
 )
 from planner.fit.gauss_newton import minimised
-from planner.fit.misfit import FrfMisfit
+from planner.fit.misfit import At, FrfMisfit
 from planner.fit.starts import from_stated, leaders, placed, pulled
 from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
 from planner.frf.frf import Frf
@@ -46,7 +46,7 @@ SAME = 3.0  # nats that one less may cost
 COMPLETIONS = 2  # rounds
 MOST_OPERATORS = 3  # beside springs: more would imitate what the fit lacks
 IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which nothing is followed
-STIFF_AT_FIRST, WIDENING = 3.0, 10  # prior sds of springs that may be there; steps
+STIFF_AT_FIRST = 3.0  # prior sds of springs that may be there
 FOLLOWED, SETTLED, FARTHEST = 6, 3, 3  # how many are followed, settled, come from afar
 AGAIN = 0.03  # least size with which what was found before goes on
 
@@ -108,8 +108,8 @@ class Search:
         first, *others = self._beginnings(plain, warm)
         best = self._evolved(first)
         for other in others:
-            if other.evidence > best.evidence:
-                best = self._evolved(other)
+            if other.evidence > best.evidence or not explained(best):
+                best = max(best, self._evolved(other), key=evidence_of)
         while ends := self.from_afar(best):
             if ends[0].evidence < best.evidence + LEAST:
                 break
@@ -249,17 +249,18 @@ class Search:
     def _nearest(
         self, base: StructureFit, starts: Sequence[Start]
     ) -> list[tuple[RobotStructure, np.ndarray]]:
-        """Those that logarithms on few lines bring nearest to the recordings."""
-        rough, found = self.data(AFAR), []
+        """Those that logarithms on few lines bring nearest to the recordings: few steps of all,
+        then as many as it takes of those that are followed."""
+        rough, ends = self.data(AFAR), list[tuple[At, FrfMisfit]]()
         for start in starts:
             structure = base.structure.with_effect(start.effect)
             misfit = FrfMisfit(structure, rough, self.tolerances, None, self.floor)
-            for x in from_stated(structure, start):
-                if misfit.possible(x):
-                    at = minimised(misfit, x, NEARER)
-                    found.append((at.value, structure, at.x))
-        found.sort(key=lambda one: one[0])
-        return [(s, x) for _, s, x in found[:FARTHEST]]
+            begun = (x for x in from_stated(structure, start) if misfit.possible(x))
+            ends += [(minimised(misfit, x, NEARER), misfit) for x in begun]
+        for count, steps in ((FOLLOWED, LOG_STEPS), (FARTHEST, 0)):
+            ends.sort(key=lambda end: end[0].value)
+            ends = [(minimised(m, at.x, steps), m) for at, m in ends[:count]]
+        return [(m.structure, at.x) for at, m in ends]
 
     def _removed(self, best: StructureFit, newest: Operator | None) -> StructureFit:
         """Without what the others make superfluous, what seems to matter least first."""
@@ -315,18 +316,18 @@ class Search:
 
         What poses not measured may show is open as it is here: few poses tell no structure.
         """
-        misfit, at = found.misfit, found.at
-        for effect in effects_free(found.structure):
-            if not effect.springs:
-                continue
-            structure = misfit.structure.with_effect(effect)
-            x, names = structure.carried(misfit.structure, at.x), misfit.structure.names
-            new = [i for i in range(structure.stiffnesses) if structure.names[i] not in names]
-            x[new] += STIFF_AT_FIRST * structure.sd[new]
-            wider = replace(misfit, structure=structure)
-            if wider.possible(x):
-                misfit, at = wider, minimised(wider, x, FURTHER, 1.0, at.own)
-        at = minimised(misfit, at.x, WIDENING, 1.0, own=at.own)
+        structure = found.structure
+        for effect in effects_free(structure):
+            structure = structure.with_effect(effect) if effect.springs else structure
+        x = structure.carried(found.structure, found.at.x)
+        new = [
+            i
+            for i in range(structure.stiffnesses)
+            if structure.names[i] not in found.structure.names
+        ]
+        x[new] += STIFF_AT_FIRST * structure.sd[new]
+        misfit = replace(found.misfit, structure=structure)
+        at = minimised(misfit, x, LOG_STEPS, 1.0, own=found.at.own)
         return StructureFit(misfit, at, misfit.evidence(at))
 
 

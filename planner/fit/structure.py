@@ -267,7 +267,10 @@ class RobotStructure:
     def carried(self, other: "RobotStructure", x: np.ndarray) -> np.ndarray:
         """Numbers x of another structure in this one; what that lacks is as expected."""
         known = dict(zip(other.names, x, strict=True))
-        return np.array([known.get(n, m) for n, m in zip(self.names, self.mean, strict=True)])
+        out = np.array([known.get(n, m) for n, m in zip(self.names, self.mean, strict=True)])
+        bodies, psi = self.bodies, x[other.inertial]
+        out[self.inertial] = bodies.regrouped(out[self.inertial], other.bodies, psi)
+        return out
 
     def with_effect(self, effect: Operator) -> "RobotStructure":
         """One more; of a label that is there already the place counts up."""

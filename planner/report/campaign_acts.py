@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -16,6 +17,7 @@ from planner.campaign.taking_back import act
 from planner.check.remark import CheckRemark
 from planner.report.answer import Answer, Done
 from planner.report.text import command_line, table
+from planner.words import command
 
 
 @dataclass(frozen=True)
@@ -126,9 +128,12 @@ def _told(entries: Sequence[Entry], what: str) -> tuple[dict[str, Any], str]:
     return keys, f"{act(entry)}{follow}"
 
 
-def withdrawn(pose: str, reason: str) -> Done:
+def withdrawn(directory: Path, pose: str, reason: str) -> Done:
     """Answer of `withdraw`."""
+    again = command("planner", "confirm", directory, pose)
+    anew = command("planner", "import", directory, "FOLDER", "--pose", f"{pose}b")
     return Done(
         {"withdrawn": pose, "reason": reason},
-        f"Pose {pose} is set aside; its recordings are kept: planner confirm uses them again.",
+        f"Pose {pose} is set aside; its recordings are kept. To use them again: {again}. Corrected "
+        f"or new ones take another name: {anew}.",
     )

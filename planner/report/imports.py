@@ -199,15 +199,16 @@ def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
     if asked.disagree or asked.about:
         right = "they are" if asked.about else "each is"
         return (
-            f"{asked.text} They are held, not used. Where files or recordings.csv are wrong, "
-            f"correct them and import again (--pose {pose}); to take the import back: "
+            f"{asked.text} The new hits of {pose} are held, not used. Where files or "
+            f"recordings.csv are wrong, correct them and import again (--pose {pose}); to take the "
+            f"import back: "
             f"{command('planner', 'undo', directory)}; if {right} right: {confirm}; to set all "
             f"aside: {withdraw}."
         )
     there = command(asked.fits or "OTHER")
     return (
-        f"{asked.text} They are held, not used. If it is: {confirm}; if it is at {there}: "
-        f"{confirm} --at {there}; else: {withdraw}."
+        f"{asked.text} The new hits of {pose} are held, not used. If it is: {confirm}; if it is at "
+        f"{there}: {confirm} --at {there}; else: {withdraw}."
     )
 
 

@@ -97,7 +97,7 @@ def _cards(state: CampaignState, now: StatusReport) -> Rows:
     return [
         (len(state.used), "poses measured and used"),
         (sum(len(m.accepted) for m in state.used), "hits used"),
-        (len(now.refused), "recordings refused"),
+        (len(now.refused), "recordings refused, not replaced since"),
         (rmse, "expected RMSE of frequencies over the workspace"),
         ("reached" if now.done else "not reached", target),
     ]

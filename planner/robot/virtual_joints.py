@@ -125,7 +125,7 @@ def halves_moved(robot: Robot, link: str) -> tuple[float, np.ndarray]:
     """
     carried = robot.carries(link)
     assert carried is not None  # otherwise the link has no halves
-    half = robot.model.jointPlacements[carried[1]].translation / 2
+    half = cut_at(robot, link)
     whole = body_inertia(robot, carried[0])
     inner, outer = _halves(whole, half)
     apart = float(np.linalg.norm(outer[1:4] / outer[0] + half - inner[1:4] / inner[0])) / 2
@@ -135,6 +135,13 @@ def halves_moved(robot: Robot, link: str) -> tuple[float, np.ndarray]:
         there, back = _halves(whole, half, further), _halves(whole, half, -further)
         slope[axis] = np.subtract(there, back) / (2 * step)
     return apart, slope
+
+
+def cut_at(robot: Robot, link: str) -> np.ndarray:
+    """Where a link that bends is cut into halves, (3,) in m of the frame that carries it."""
+    carried = robot.carries(link)
+    assert carried is not None  # otherwise the link has no halves
+    return robot.model.jointPlacements[carried[1]].translation / 2
 
 
 def _halves(

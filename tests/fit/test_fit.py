@@ -138,6 +138,22 @@ def test_a_step_never_leads_uphill_nor_to_what_no_body_can_be(prior, few):
     assert misfit.possible(found.x)
 
 
+def test_a_link_that_is_cut_and_whole_again_weighs_as_before(case, prior):
+    """However far the fit moved its mass, centre and moments; halves are such as can be."""
+    whole = RobotStructure(prior)
+    cut = structure_of(prior, "link_flexibility at link_2")
+    x, rng = whole.mean.copy(), np.random.default_rng(4)
+    x[whole.inertial] = rng.normal(0.0, 0.5, whole.bodies.size)
+    x[whole.names.index("mass of joint_2")] = 6.0
+    y = cut.carried(whole, x)
+    assert np.isfinite(cut.bodies.barrier(y[cut.inertial])[0])
+    np.testing.assert_allclose(whole.carried(cut, y), x, atol=1e-6)
+    y[[i for i, p in enumerate(cut.parameters) if "link" in p.name and p.kind == "stiffness"]] = 30
+    both = (whole, x), (cut, y)
+    told = [exported(s, z)[0].frequencies(case.q, 4).frequency_hz for s, z in both]
+    np.testing.assert_allclose(*told, rtol=1e-4)
+
+
 def test_what_swings_stays_in_the_band(prior, few):
     structure = structure_of(prior, "local_resonator at link_4")
     misfit, x = FrfMisfit(structure, few, Tolerances(), 0.1), structure.mean.copy()
@@ -202,5 +218,5 @@ def test_what_the_fit_moved_far_is_told(prior):
         x[number] += 5 * structure.sd[number]
     told = departures_text(structure, x)
     times = np.exp(5 * structure.sd[spring])
-    assert f"{significant(times)} times stiffer than stated" in told
+    assert f"{significant(times)} times stiffer than robot.toml has it" in told
     assert "link_5 would have to weigh" in told

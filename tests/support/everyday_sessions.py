@@ -159,9 +159,11 @@ class Engineer:
         if late and rng.random() < 0.4:
             self.done["answered"] += 1
             return late
-        keys = ["a", "a", "u", "U", "k", "r", "s", "R", "q", "\n"]
-        chances = [0.6, 0.1, 0.08, 0.06, 0.02, 0.02, 0.04, 0.02, 0.01, 0.03, 0.02]
-        key = str(rng.choice(keys, p=chances))
+        chances = {
+            "a": 0.7, "u": 0.08, "U": 0.06, "k": 0.04, "r": 0.04, "s": 0.02, "R": 0.01, "q": 0.03,
+            "\n": 0.02,
+        }  # fmt: skip
+        key = str(rng.choice([*chances], p=[*chances.values()]))
         self.done[key] += 1
         self.skipping = key == "k"
         return key
