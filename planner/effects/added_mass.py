@@ -66,9 +66,9 @@ class AddedMass(Operator):
         """See `Operator.beside`: far off, the first order may have even the sign wrong."""
         return (np.array([LEAST, 0.0, 0.0, 0.0, *self.mean[4:]]),)
 
-    def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray]:
+    def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray, np.ndarray]:
         """See `Operator.inertia`."""
-        return self.joint, self._body(psi)[0]
+        return self.joint, *self._body(psi)
 
     def _body(self, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Inertia (10,) about the joint's frame: kg, kg·m, kg·m²; and its slopes (10, 10) by ψ."""

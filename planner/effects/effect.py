@@ -195,8 +195,9 @@ class Operator(ABC):
         """Changes of the first numbers of ψ at which it is no more, to first order."""
         return np.zeros(0)
 
-    def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray] | None:
-        """The body whose inertia (10,) it changes, where it is nothing else, and by what."""
+    def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray, np.ndarray] | None:
+        """The body whose inertia it changes, where it is nothing else, by what (10,), and the
+        slopes (numbers, 10) of that by ψ."""
         return None
 
     def beyond(self, psi: np.ndarray, viscous: Mapping[int, float]) -> bool:

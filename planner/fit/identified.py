@@ -27,8 +27,9 @@ class ExtendedModel:
 def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identification]:
     """The structure with what was known of it before, and what the FRFs made of it.
 
-    Effects' own numbers are held where they were found; what else is known is as unsure as they
-    make it. Where nothing explains the FRFs, no parameter counts as known.
+    An added mass is inertia of its body; effects' other numbers are held where they were found, and
+    what else is known is as unsure as they make it. Where nothing explains the FRFs, no parameter
+    counts as known.
     """
     structure, repertoire = posterior.structure, posterior.structure.prior.repertoire
     simulation = posterior.simulation
@@ -104,4 +105,10 @@ def _translated(
         if name in bodies.bodies:
             k = bodies.bodies.index(name)
             turned[rows, structure.inertial.start + bodies.mine[k]] = onto @ slopes[k].T
+    for effect, own in zip(structure.effects, structure.own, strict=True):
+        added = effect.inertia(x[own])
+        if added is not None:
+            b = nominal.elastic.bodies.index(added[0])
+            rows = slice(count + b * per, count + (b + 1) * per)
+            turned[rows, own] = np.linalg.pinv(p.inertia[b].T) @ added[2].T
     return mean, turned

@@ -7,12 +7,16 @@ import numpy as np
 import pytest
 
 from planner.dynamics.simulation import Simulation
-from planner.effects.parameters import CAD_INERTIAS
+from planner.effects.parameters import CAD_INERTIAS, parametrise
 from planner.effects.table import Repertoire
 from planner.fit.data import FrfData
 from planner.fit.departures import departures_text
 from planner.fit.fitted import StructureFit
-from planner.fit.frequency_uncertainty import structure_slope
+from planner.fit.frequency_uncertainty import (
+    frequency_sd,
+    log_frequency_slope,
+    structure_slope,
+)
 from planner.fit.gauss_newton import minimised
 from planner.fit.identified import as_identification
 from planner.fit.misfit import FrfMisfit
@@ -126,6 +130,18 @@ def test_what_was_found_is_a_simulation_of_its_own(prior, few):
     fitted = FrfMisfit(structure, true, Tolerances()).motion(x, None).accelerance[0]
     again = simulation.accelerance(few.q[:1], lines)[0]
     np.testing.assert_allclose(again, fitted, rtol=0, atol=2e-3 * np.abs(fitted).max())
+
+
+def test_an_identification_with_an_added_mass_is_as_sure_of_frequencies_as_the_fit(prior, few):
+    structure = structure_of(prior, "added_mass at link_6")
+    misfit, x = FrfMisfit(structure, few, Tolerances(), 0.01), structure.mean.copy()
+    set_to(structure, x, "added_mass", 0, 1.0, 0.3, -0.2, 0.1)
+    posterior = RobotPosterior.of(StructureFit(misfit, misfit(x), 0.0))
+    model, found = as_identification(posterior)
+    modes, p = found.simulation.modes(few.q, 4), parametrise(model.simulation, model.priors)
+    slope = log_frequency_slope(found.simulation, p, few.q, modes)
+    sd = np.sqrt(np.einsum("nki,ij,nkj->nk", slope, found.covariance, slope))
+    np.testing.assert_allclose(sd, frequency_sd(posterior, few.q, modes), rtol=0.01)
 
 
 def test_a_step_never_leads_uphill_nor_to_what_no_body_can_be(prior, few):
