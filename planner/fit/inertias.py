@@ -96,7 +96,8 @@ class BodyNumbers:
             mine = [self.bodies.index(n) for n in moved if n in self.bodies]
             to = np.array([moved[self.bodies[b]] for b in mine])
             nominal = to @ pseudo_inertia(self.nominal[mine]) @ np.swapaxes(to, 1, 2)
-            weighs = sum(a @ pseudo_inertia(there[n]) @ a.T for n, a in moved.items() if n in there)
+            known = [a @ pseudo_inertia(there[n]) @ a.T for n, a in moved.items() if n in there]
+            weighs = np.sum(known, axis=0)
             affine = _upper(weighs) @ np.linalg.inv(_upper(nominal.sum(axis=0)))
             wanted = affine @ nominal @ affine.T
             factor = wanted[:, 3, 3] / nominal[:, 3, 3]
