@@ -98,6 +98,8 @@ def _translated(
     difference = simulation.elastic.inertia - nominal.elastic.inertia
     slopes = bodies.slopes(x[structure.inertial])
     per = p.inertia.shape[1]
+    pairs = zip(structure.effects, structure.own, strict=True)
+    added = [(own, *more) for effect, own in pairs if (more := effect.inertia(x[own]))]
     for b, name in enumerate(nominal.elastic.bodies):
         rows = slice(count + b * per, count + (b + 1) * per)
         onto = np.linalg.pinv(p.inertia[b].T)
@@ -105,10 +107,7 @@ def _translated(
         if name in bodies.bodies:
             k = bodies.bodies.index(name)
             turned[rows, structure.inertial.start + bodies.mine[k]] = onto @ slopes[k].T
-    for effect, own in zip(structure.effects, structure.own, strict=True):
-        added = effect.inertia(x[own])
-        if added is not None:
-            b = nominal.elastic.bodies.index(added[0])
-            rows = slice(count + b * per, count + (b + 1) * per)
-            turned[rows, own] = np.linalg.pinv(p.inertia[b].T) @ added[2].T
+        for own, body, _, moved in added:
+            if body == name:
+                turned[rows, own] = onto @ moved.T
     return mean, turned

@@ -83,9 +83,11 @@ class BodyNumbers:
         return out
 
     def regrouped(self, phi: np.ndarray, other: "BodyNumbers", psi: np.ndarray) -> np.ndarray:
-        """φ (R,) in which links that are cut, or whole, but not so in another weigh as at its ψ.
+        """φ (R,) in which links that are cut, or whole, but not so in another robot's bodies have
+        the mass, centre and moments that they have there at ψ; the rest as at `phi` (R,).
 
-        Their matter is that of the nominal ones, moved by the one affine map that makes it so.
+        Halves are the nominal ones under the one affine map that gives the whole what it has: their
+        pseudo-inertias A P Aᵀ stay positive (Lee, Wensing & Park 2020).
         """
         out = phi.copy()
         there = dict(zip(other.bodies, other.nominal + other.difference(psi), strict=True))

@@ -249,18 +249,20 @@ class Search:
     def _nearest(
         self, base: StructureFit, starts: Sequence[Start]
     ) -> list[tuple[RobotStructure, np.ndarray]]:
-        """Those that logarithms on few lines bring nearest to the recordings: few steps of all,
-        then as many as it takes of those that are followed."""
+        """Those that logarithms on few lines bring nearest to the recordings.
+
+        Few steps of all; those that are followed go on until they are near.
+        """
         rough, ends = self.data(AFAR), list[tuple[At, FrfMisfit]]()
         for start in starts:
             structure = base.structure.with_effect(start.effect)
             misfit = FrfMisfit(structure, rough, self.tolerances, None, self.floor)
             begun = (x for x in from_stated(structure, start) if misfit.possible(x))
             ends += [(minimised(misfit, x, NEARER), misfit) for x in begun]
-        for count, steps in ((FOLLOWED, LOG_STEPS), (FARTHEST, 0)):
-            ends.sort(key=lambda end: end[0].value)
-            ends = [(minimised(m, at.x, steps), m) for at, m in ends[:count]]
-        return [(m.structure, at.x) for at, m in ends]
+        nearest = sorted(ends, key=lambda end: end[0].value)[:FOLLOWED]
+        nearer = [(minimised(m, at.x, LOG_STEPS), m) for at, m in nearest]
+        nearer.sort(key=lambda end: end[0].value)
+        return [(m.structure, at.x) for at, m in nearer[:FARTHEST]]
 
     def _removed(self, best: StructureFit, newest: Operator | None) -> StructureFit:
         """Without what the others make superfluous, what seems to matter least first."""
@@ -320,11 +322,9 @@ class Search:
         for effect in effects_free(structure):
             structure = structure.with_effect(effect) if effect.springs else structure
         x = structure.carried(found.structure, found.at.x)
-        new = [
-            i
-            for i in range(structure.stiffnesses)
-            if structure.names[i] not in found.structure.names
-        ]
+        known = {p.name for p in found.structure.parameters}
+        new = [i for i, p in enumerate(structure.parameters[: structure.stiffnesses])
+               if p.name not in known]  # fmt: skip
         x[new] += STIFF_AT_FIRST * structure.sd[new]
         misfit = replace(found.misfit, structure=structure)
         at = minimised(misfit, x, LOG_STEPS, 1.0, own=found.at.own)

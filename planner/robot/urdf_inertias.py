@@ -10,7 +10,7 @@ from planner.robot.mesh_files import urdf_source
 from planner.robot.moments import PINOCCHIO, symmetric
 from planner.robot.robot import Robot
 from planner.robot.urdf_elements import link_inertia, state_inertias, write_inertia
-from planner.robot.virtual_joints import OUTER, SMALL, body_inertia
+from planner.robot.virtual_joints import OUTER, SMALL, body_inertia, cut_at
 
 SAFE = 0.99  # of the largest share of a change that leaves a body possible
 
@@ -45,8 +45,8 @@ def _of_whole(robot: Robot, link: str, values: np.ndarray) -> tuple[str, np.ndar
     """The joint that moves a link, and a change (10,) of its outer half as one of the link's."""
     carried = robot.carries(link)
     assert carried is not None  # otherwise the link has no halves
-    half = robot.model.jointPlacements[carried[1]].translation / 2
-    return str(robot.model.names[carried[0]]), _seen_from(pin.SE3(np.eye(3), -half), values)
+    there = pin.SE3(np.eye(3), -cut_at(robot, link))
+    return str(robot.model.names[carried[0]]), _seen_from(there, values)
 
 
 def _joint_of(robot: Robot, body: str) -> int:

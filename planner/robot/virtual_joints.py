@@ -213,9 +213,7 @@ def _end(
     bends = any(block.joint == link for block in robot.config.compliance)
     if not bends or link in robot.joint_names:
         return outer, pin.SE3.Identity()
-    carried = robot.carries(link)
-    assert carried is not None  # checked when the robot was loaded
-    half = robot.model.jointPlacements[carried[1]].translation / 2
+    half = cut_at(robot, link)
     return give(outer, pin.SE3(np.eye(3), half), link), pin.SE3(np.eye(3), -half)
 
 
