@@ -332,9 +332,13 @@ class Search:
 
 
 def explained(found: StructureFit) -> bool:
-    """Whether nothing need be missing: as little is left as may be, near what is stated."""
-    least = max(SIZES[0], found.misfit.floor)
-    return size_of(found) <= least and not departed(found.structure, found.at.x)
+    """Whether nothing need be missing: as little is left as may be, near what is stated.
+
+    What ended where it may go no farther stands in for something else.
+    """
+    least, s, x = max(SIZES[0], found.misfit.floor), found.structure, found.at.x
+    ended = bool(np.any((x <= s.least) | (x >= s.most)))
+    return size_of(found) <= least and not ended and not departed(s, x)
 
 
 def crowded(found: StructureFit) -> bool:

@@ -11,7 +11,7 @@ from planner.effects.parameters import CAD_INERTIAS, parametrise
 from planner.effects.table import Repertoire
 from planner.fit.data import FrfData
 from planner.fit.departures import departures_text
-from planner.fit.fitted import StructureFit
+from planner.fit.fitted import SIZES, StructureFit
 from planner.fit.frequency_uncertainty import (
     frequency_sd,
     log_frequency_slope,
@@ -21,7 +21,7 @@ from planner.fit.gauss_newton import minimised
 from planner.fit.identified import as_identification
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
-from planner.fit.search import Search
+from planner.fit.search import Search, explained
 from planner.fit.structure import RobotPrior, RobotStructure, exported
 from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
@@ -180,6 +180,15 @@ def test_what_swings_stays_in_the_band(prior, few):
         found = minimised(misfit, x, 12)
         assert found.value < misfit(x).value
         assert low <= np.exp(found.x[structure.own[0].start + 1]) <= high
+
+
+@pytest.mark.parametrize("at_its_bound", [False, True])
+def test_what_ends_at_its_bound_explains_nothing(prior, few, at_its_bound):
+    structure = structure_of(prior, "local_resonator at link_4")
+    misfit, x = FrfMisfit(structure, few, Tolerances(), SIZES[0]), structure.mean.copy()
+    if at_its_bound:
+        set_to(structure, x, "local_resonator", 1, structure.most[structure.own[0].start + 1])
+    assert explained(StructureFit(misfit, misfit(x), 0.0)) is not at_its_bound
 
 
 def test_a_soft_base_a_bending_link_and_a_hose_are_found_together(case):
