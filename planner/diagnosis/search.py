@@ -13,6 +13,7 @@ from planner.effects.effect import Operator
 from planner.fit.fitted import (
     StructureFit,
     converged,
+    evidence_of,
     removal_costs,
     settled,
     without,
@@ -83,36 +84,43 @@ class Explorer:
         return Explored(plain, best, tuple(pool.values()))
 
     def _exchanged(self, best: StructureFit, pool: dict[Key, StructureFit]) -> StructureFit:
-        """Each of several effects against all others in its place."""
-        for effect in added(best) if len(added(best)) > 1 else ():
+        """Each effect at other places, and each of several against all others in its place."""
+        for effect in added(best):
             if effect not in best.structure.effects:
                 continue
-            fewer = without(best, [effect])
-            if fewer is None:
-                continue
-            fewer = settled(fewer.misfit, fewer.at)
-            ends = self._further(fewer)
-            _keep(pool, [fewer, *ends])
-            if ends and ends[0].evidence > best.evidence + LEAST / 4:
-                self.search.tell(f"{effect.label} → {ends[0].structure.effects[-1].label}")
-                best = self._pruned(converged(ends[0]))
+            ends = self.search.displaced(best, effect)
+            if len(added(best)) > 1:
+                fewer = self._fewer(best, effect)
+                _keep(pool, [fewer])
+                ends += self._further(fewer)
+            _keep(pool, ends)
+            likeliest = max(ends, key=evidence_of, default=best)
+            if likeliest.evidence > best.evidence + LEAST / 4:
+                self.search.tell(f"{effect.label} → {likeliest.structure.effects[-1].label}")
+                best = self._pruned(converged(likeliest))
                 _keep(pool, [best])
         return best
 
     def _pruned(self, best: StructureFit) -> StructureFit:
         """Without what the others make superfluous."""
         costs = removal_costs(best)
-        for effect in sorted(added(best), key=lambda e: costs[e]):
-            if costs[effect] > 100 or len(added(best)) < 2:
-                break
-            fewer = without(best, [effect])
-            if fewer is None:
-                continue
-            fewer = settled(fewer.misfit, fewer.at)
+        for effect in sorted(added(best)[:-1], key=lambda e: costs[e]):
+            fewer = self._fewer(best, effect)
             if fewer.evidence > best.evidence - LEAST / 2:
                 self.search.tell(f"− {effect.label}")
                 best = fewer
         return best
+
+    def _fewer(self, best: StructureFit, effect: Operator) -> StructureFit:
+        """Without an effect: from where it is, and from what is stated, lest that be bent."""
+        structure = best.structure.without(effect)
+        x, of = structure.mean.copy(), best.structure
+        for kept, own in zip(structure.effects, structure.own, strict=True):
+            x[own] = best.at.x[of.own[of.effects.index(kept)]]
+        ends = [converged(self.search.begun(best.misfit.data, structure, x))]
+        near = without(best, [effect])
+        ends += [] if near is None else [settled(near.misfit, near.at)]
+        return max(ends, key=evidence_of)
 
     def _further(self, base: StructureFit, afar: bool = False) -> list[StructureFit]:
         """With one effect more, settled, likeliest first."""

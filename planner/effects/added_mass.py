@@ -62,6 +62,35 @@ class AddedMass(Operator):
         place = place + np.clip(psi[1:4] / mass, -1, 1)
         return Start(self, np.array([mass, *place, *self.mean[4:]]), nats, moved)
 
+    def elsewhere(self, found: Operator, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
+        """The same matter on another link: springs that move both feel it as they did."""
+        matter = found.inertia(psi)
+        assert matter is not None
+        here, there = (motions.poses.body(joint) for joint in (self.joint, matter[0]))
+        both = np.any(here, axis=(0, 1)) & np.any(there, axis=(0, 1))
+        columns, felt = (
+            np.einsum("nae,kab,nbf->nefk", j, inertia_basis(), j, optimize=True).reshape(-1, 10)
+            for j in (here[..., both], there[..., both])
+        )
+        same = self._numbers(np.linalg.lstsq(columns, felt @ matter[1], rcond=None)[0])
+        return self.starts(motions, gain)[0] if same is None else Start(self, same, 0.0)
+
+    def _numbers(self, inertia: np.ndarray) -> np.ndarray | None:
+        """ψ at which `_body` has this inertia, if matter can have it."""
+        if abs(inertia[0]) < LEAST * self.mass_kg:
+            return None
+        mass, place = inertia[0], inertia[1:4] / inertia[0]
+        moments = np.empty((3, 3))
+        for value, (i, j) in zip(inertia[4:] / mass, MOMENTS, strict=True):
+            moments[i, j] = moments[j, i] = value
+        second = 0.5 * np.trace(moments) * np.eye(3) - moments - np.outer(place, place)
+        if np.linalg.eigvalsh(second)[0] <= 0:
+            return None
+        root = np.linalg.cholesky(second)
+        d = np.diag(root)
+        place = (place - self.centre_m) / self.size_m
+        return np.array([mass / self.mass_kg, *place, *np.log(d), *(root / d[:, None])[BELOW]])
+
     def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
         """See `Operator.beside`: far off, the first order may have even the sign wrong."""
         return (np.array([LEAST, 0.0, 0.0, 0.0, *self.mean[4:]]),)

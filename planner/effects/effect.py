@@ -178,8 +178,8 @@ class Operator(ABC):
         """Where fits with it begin, by its first-order columns; springs are tried as they are."""
         return (Start(self, self.mean, np.inf),)
 
-    def elsewhere(self, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
-        """Where it begins, as one like it has ψ at another place."""
+    def elsewhere(self, found: "Operator", psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
+        """Where it begins, as `found`, one like it at another place, has ψ."""
         return self.starts(motions, gain)[0]
 
     def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:

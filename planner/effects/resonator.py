@@ -101,10 +101,10 @@ class LinkResonator(Operator):
         start[1], start[3:6] = np.log(hertz), ways[:, most]
         return Start(self.towards(ways[:, most]), start, nats, moved)
 
-    def elsewhere(self, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
+    def elsewhere(self, found: Operator, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
         """It keeps frequency and damping."""
-        found = self.at_frequency(float(np.exp(psi[1])), motions, gain)
-        return replace(found, psi=np.array([*found.psi[:2], psi[2], *found.psi[3:]]))
+        begun = self.at_frequency(float(np.exp(psi[1])), motions, gain)
+        return replace(begun, psi=np.array([*begun.psi[:2], psi[2], *begun.psi[3:]]))
 
     def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
         """A light one, too: it changes little and can only help."""

@@ -287,21 +287,25 @@ class Search:
     def _exchanged(self, best: StructureFit) -> StructureFit:
         """An operator at another place, where that is likelier."""
         for effect in best.structure.effects:
-            base = without(best, [effect])
-            if base is None or effect.springs:
-                continue
-            motions, gain = base.misfit.first_order(base.at.x, base.at.own)
-            psi = best.at.x[best.structure.own[best.structure.effects.index(effect)]]
-            others = [
-                e for e in effects_free(base.structure)
-                if type(e) is type(effect) and e.at != effect.at.split("#")[0]
-            ]  # fmt: skip
-            starts = [e.elsewhere(psi, motions, gain) for e in others]
-            ends = self.compete(base, starts)
+            ends = self.displaced(best, effect)
             if ends and ends[0].evidence > best.evidence + SAME:
                 self.tell(f"{effect.label} → {ends[0].structure.effects[-1].label}")
-                return converged(ends[0])
+                return ends[0]
         return best
+
+    def displaced(self, best: StructureFit, effect: Operator) -> list[StructureFit]:
+        """With an operator at other places than where it is, likeliest first."""
+        base = None if effect.springs else without(best, [effect], steps=0)
+        if base is None:
+            return []
+        motions, gain = base.misfit.first_order(base.at.x, base.at.own)
+        psi = best.at.x[best.structure.own[best.structure.effects.index(effect)]]
+        others = [
+            e for e in effects_free(base.structure)
+            if type(e) is type(effect) and e.at != effect.at.split("#")[0]
+        ]  # fmt: skip
+        ends = self.compete(base, [e.elsewhere(effect, psi, motions, gain) for e in others])
+        return [*map(converged, ends[:1]), *ends[1:]]
 
     def _last(self, best: StructureFit) -> StructureFit:
         """On all lines, and at last along what the data leave open."""

@@ -144,6 +144,29 @@ def test_an_identification_with_an_added_mass_is_as_sure_of_frequencies_as_the_f
     np.testing.assert_allclose(sd, frequency_sd(posterior, few.q, modes), rtol=0.01)
 
 
+def test_the_same_matter_on_another_link_gives_the_same_frfs(case, prior):
+    """The joint between both at one angle, and stiff."""
+    one, other = (structure_of(prior, f"added_mass at link_{k}") for k in (5, 6))
+    q, x, y = case.q[:2].copy(), one.mean.copy(), other.mean.copy()
+    q[:, 5] = 0.4
+    few = FrfData.of(prior, case.frfs[:2], q, case.band_hz, 12)
+    set_to(one, x, "added_mass", 0, 1.0, 0.6, -0.2, 0.1)
+    set_to(one, x, "added_mass", 7, 0.5, -0.4, 0.3)
+    before, after = (FrfMisfit(s, few, Tolerances(), 0.1) for s in (one, other))
+    base = FrfMisfit(RobotStructure(prior), few, Tolerances(), 0.1)
+    motions, gain = base.first_order(RobotStructure(prior).mean, base.nothing_open())
+    begun = other.effects[0].elsewhere(one.effects[0], x[one.own[0]], motions, gain)
+    y[other.own[0]] = begun.psi
+    for z, s in (x, one), (y, other):
+        joints = [i for i, p in enumerate(s.parameters) if "joint_6" in p.name]
+        z[[i for i in joints if s.parameters[i].kind == "stiffness"]] += 12.0
+    with_5, with_6 = (m.motion(z, None).accelerance for m, z in ((before, x), (after, y)))
+    without = base.motion(RobotStructure(prior).mean, None).accelerance
+    size = np.linalg.norm(with_5)
+    assert np.linalg.norm(with_6 - with_5) < 0.01 * size
+    assert np.linalg.norm(without - with_5) > 0.3 * size
+
+
 def test_a_step_never_leads_uphill_nor_to_what_no_body_can_be(prior, few):
     structure = structure_of(prior, *EVERYTHING)
     misfit = FrfMisfit(structure, few, Tolerances(), 0.1)
