@@ -24,7 +24,7 @@ from planner.fit.identify import TOO_SOFT
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
-from planner.fit.structure import RobotPrior, RobotStructure
+from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
 from planner.measurement.agreement import Similarity, similarity_of
 from planner.measurement.nuisances import Tolerances
@@ -168,7 +168,7 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
         recorded = recorded.corrected(recorded.visits, window.parameters["rate"][0])
     robot = simulation.robot
     search = searching(recorded.ended_frfs, recorded.q, simulation, _order(recorded))
-    stated = RobotStructure(search.prior)
+    stated = search.prior.stated()
     if not FrfMisfit(stated, search.data(1), search.tolerances).possible(stated.mean):
         raise InputError(TOO_SOFT)
     screened = tuple(f for f in (window, screen_tone(recorded)) if f is not None)
@@ -274,8 +274,7 @@ def _agreement(
 ) -> ThreefoldSimilarity:
     """At the data of `there`, of the structures as fitted in `seen`, and as stated."""
     data = there[0].misfit.data
-    plain = FrfMisfit(RobotStructure(seen[0].structure.prior, (), data.sensors), data,
-                      seen[0].misfit.tolerances)  # fmt: skip
+    plain = FrfMisfit(seen[0].structure.prior.stated(data.sensors), data, seen[0].misfit.tolerances)
     found = [similarity_of(data.measured, plain.motion(plain.structure.mean, None).accelerance)]
     for fit in seen:
         misfit = replace(fit.misfit, data=data)

@@ -7,7 +7,6 @@ import numpy as np
 
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
-from planner.fit.structure import RobotStructure
 from planner.words import significant
 
 if TYPE_CHECKING:
@@ -143,7 +142,7 @@ class MismatchShares:
 
 def simulated(found: "Diagnosis", data: "FrfData") -> list[np.ndarray]:
     """What the sensors hear (n, r, c, F) in m/s²/N: as stated, refitted, and explained."""
-    stated = RobotStructure(found.search.prior, (), data.sensors)
+    stated = found.search.prior.stated(data.sensors)
     sides = [(stated, stated.mean), *((f.structure, f.at.x) for f in (found.refitted, found.best))]
     out = []
     for structure, x in sides:

@@ -135,6 +135,8 @@ class Operator(ABC):
     artefact: ClassVar[bool] = False
     # Has freedom enough to imitate what the shape of a named effect lacks: where it is, not what.
     general: ClassVar[bool] = False
+    # robot.toml states it: it stays, and is not told of.
+    stated: ClassVar[bool] = False
     # Several may be at the same place.
     several: ClassVar[bool] = False
 

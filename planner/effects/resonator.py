@@ -1,6 +1,6 @@
 """Something loose on a link: a mass on a spring of its own (hose pack, bracket)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,11 +19,18 @@ from planner.effects.effect import (
     nats_of,
     turning,
 )
+from planner.robot.config import Resonator
 
 LIGHTER = np.log(6.0)  # it is begun once more by so much
 SCREENED = 30  # frequencies over the band
 SCREEN_DAMPING = 0.04  # so that none falls between them
 DIRECTION_SD = 0.5  # of a direction about the one it begins with: about 0 it shrinks to nothing
+PLACED = (("direction", "1"), ("position", "m"))
+NAMED = (("mass", "kg"), ("frequency", "Hz"), ("damping_ratio", "1"),
+         *((f"{what}_{axis}", unit) for what, unit in PLACED for axis in "xyz"))  # fmt: skip
+# Sds of a stated one's numbers: logarithms of the first three, direction, place in m; and the
+# factor of its frequency from which it is another.
+STATED, ANOTHER = (0.7, 0.2, 0.7, *(0.3,) * 3, *(0.1,) * 3), 5.0
 PAIRS = tuple((i, k) for i in range(3) for k in range(i, 3))
 
 
@@ -152,3 +159,26 @@ class LinkResonator(Operator):
             "damping_ratio": values["damping_ratio"][0],
         }
         return {"resonator": [block]}
+
+
+def resonator_numbers(means: Sequence[float], sds: Sequence[float]) -> tuple[Number, ...]:
+    """As `LinkResonator` has them, about means of ψ."""
+    told = enumerate(zip(NAMED, means, sds, strict=True))
+    return tuple(Number(*named, float(mean), sd, k < 3) for k, (named, mean, sd) in told)
+
+
+@dataclass(frozen=True)
+class StatedResonator(LinkResonator):
+    """One of robot.toml's own, whose numbers are refitted as those of its springs are."""
+
+    kind = "stated_resonator"
+    stated = True
+
+    @classmethod
+    def of(cls, at: str, block: Resonator) -> "StatedResonator":
+        """On a link, about the numbers that robot.toml has."""
+        way = np.array(block.direction) / np.linalg.norm(block.direction)
+        middle = *np.log([block.mass, block.frequency_hz, block.damping_ratio]), *way
+        numbers = resonator_numbers((*middle, *block.position_m), STATED)
+        hertz = block.frequency_hz
+        return cls(at, (), numbers, block.joint, (hertz / ANOTHER, hertz * ANOTHER))

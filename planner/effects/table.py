@@ -17,7 +17,7 @@ from planner.effects.effect import Number, Operator
 from planner.effects.far_off import FarOffSpring
 from planner.effects.links import PAIRS, BetweenLinks, GroundContact
 from planner.effects.parameters import Priors, place_name
-from planner.effects.resonator import LinkResonator
+from planner.effects.resonator import LinkResonator, StatedResonator, resonator_numbers
 from planner.effects.springs import (
     STIFFNESS,
     BendingLink,
@@ -52,7 +52,8 @@ GAIN, TURNED_RAD, DELAY_S, FAR_OFF, HAT, DRIFT = 0.5, 0.5, 5e-4, 1.2, 0.3, 0.2
 class Repertoire:
     """`simulation` with every spring, the first `stated` of which robot.toml states, and effects.
 
-    `stiff` is the stated simulation alone, with its own priors.
+    `stiff` is the stated simulation alone, with its own priors; of both the resonators that
+    robot.toml states are apart, as effects that are `there`.
     """
 
     stiff: Simulation
@@ -61,12 +62,17 @@ class Repertoire:
     priors: Priors
     stated: int
     effects: tuple[Operator, ...]
+    there: tuple[Operator, ...] = ()
 
     @classmethod
     def of(
         cls, simulation: Simulation, priors: Priors, further: Sequence[Operator] = ()
     ) -> "Repertoire":
         """Of a robot as robot.toml states it; `further` effects beside those of every campaign."""
+        there = _stated_resonators(simulation.robot)
+        if there:
+            bare = msgspec.structs.replace(simulation.robot.config, resonator=())
+            simulation = Simulation(replace(simulation.robot, config=bare))
         robot = simulation.robot
         config = msgspec.structs.replace(
             robot.config, payload=(*robot.config.payload, *massless_base(robot))
@@ -87,14 +93,14 @@ class Repertoire:
         effects += [*_operators(simulation), *further]
         effects = list({e.label: e for e in effects}.values())  # of one place the last counts
         widest = Simulation(wider)
-        return cls(
-            simulation, priors, widest, replace(priors, bounds=bounds), stated, tuple(effects)
-        )
+        wide = replace(priors, bounds=bounds)
+        return cls(simulation, priors, widest, wide, stated, tuple(effects), there)
 
     def as_built(self) -> tuple[Operator, ...]:
         """What every robot has: bearings that give slightly, and loss factors where none are."""
         bearings = [SlightBearing(e.at, e.springs) for e in self.effects if isinstance(e, Tilt)]
-        return (*bearings, *(e for e in self.effects if isinstance(e, LossFactors)))
+        losses = (e for e in self.effects if isinstance(e, LossFactors))
+        return (*self.there, *bearings, *losses)
 
     def priors_with(self, bounds: Mapping[str, tuple[float, float]]) -> Priors:
         """What is known of a robot that has some of the springs."""
@@ -203,19 +209,23 @@ def _operators(simulation: Simulation) -> list[Operator]:
         skew = (Number(f"skew_{a}", "1", 0.0, 1.0) for a in ("yx", "zx", "zy"))
         numbers = (Number("mass", "1", 0.0, 1.0), *places, *spread, *skew)
         found.append(AddedMass(at, (), numbers, joint, centre, ADDED_MASS * mean, size))
-        numbers = (
-            Number("mass", "kg", float(np.log(RESONATOR_MASS * mean)), 1.0, True),
-            Number("frequency", "Hz", float(np.log(low * high)) / 2,
-                   float(np.log(high / low)) / np.sqrt(12), True),
-            Number("damping_ratio", "1", float(np.log(RESONATOR_DAMPING)), 1.0, True),
-            *(Number(f"direction_{a}", "1", 0.0, 1.0) for a in "xyz"),
-            *(Number(f"position_{a}", "m", c, size) for a, c in zip("xyz", centre, strict=True)),
-        )  # fmt: skip
+        middle = np.log([RESONATOR_MASS * mean, np.sqrt(low * high), RESONATOR_DAMPING])
+        sds = 1.0, float(np.log(high / low)) / np.sqrt(12), 1.0, *(1.0,) * 3, *(size,) * 3
+        numbers = resonator_numbers((*middle, *(0.0,) * 3, *centre), sds)
         found.append(LinkResonator(at, (), numbers, joint, band))
     if not any(b.loss_factor for b in robot.config.compliance):
         found.append(_structural(robot))
     found += [_angle_spring((1,), *one) for one in _own(robot)]
     return found
+
+
+def _stated_resonators(robot: Robot) -> tuple[Operator, ...]:
+    found: list[Operator] = []
+    for block in robot.config.resonator:
+        at = f"link_{robot.joint_names.index(block.joint) + 1}"
+        again = sum(e.at.split("#")[0] == at for e in found)
+        found.append(StatedResonator.of(f"{at}#{again + 1}" if again else at, block))
+    return tuple(found)
 
 
 def _own(robot: Robot) -> list[tuple[int, int, Compliance]]:

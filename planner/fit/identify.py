@@ -13,7 +13,7 @@ from planner.fit.fitted import FitRecord
 from planner.fit.learned import Learned
 from planner.fit.misfit import FrfMisfit
 from planner.fit.search import Search
-from planner.fit.structure import RobotPrior, RobotStructure
+from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 
@@ -55,7 +55,7 @@ def identify(
     tolerances = tolerances or Tolerances.of(robot.config, robot.joints.slides)
     prior, band = RobotPrior(Repertoire.of(simulation, priors)), band_hz or robot.config.band_hz
     search = Search(prior, tuple(frfs), q, band, tolerances, tell, extend)
-    stated = RobotStructure(prior)
+    stated = prior.stated()
     if not FrfMisfit(stated, search.data(1), tolerances).possible(stated.mean):
         raise InputError(TOO_SOFT)
     return Learned.of(search.found(warm))

@@ -166,5 +166,5 @@ class RobotPosterior:
             f"{effect.words(self.values(effect)).replace(effect.at, effect.at.split('#')[0])} "
             f"Without that, simulated FRFs would be {significant(100 * share)} % off."
             for effect, share in sorted(pairs, key=lambda pair: -pair[1])
-            if share >= MATTERS
+            if share >= MATTERS and not effect.stated
         )

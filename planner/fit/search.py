@@ -100,9 +100,8 @@ class Search:
 
     def _found(self, warm: FitRecord | None) -> StructureFit:
         data = self.data(SEARCHED)
-        stated = RobotStructure(self.prior, (), data.sensors)
         self.tell("as stated")
-        plain = converged(self.begun(data, stated))
+        plain = converged(self.begun(data, self.prior.stated(data.sensors)))
         if not self.extend:
             return self._last(plain)
         first, *others = self._beginnings(plain, warm)
@@ -131,7 +130,9 @@ class Search:
         if warm is not None or explained(likeliest):
             return [likeliest]
         springs = tuple(e for e in self.prior.repertoire.effects if e.springs)
-        freed = converged(self.begun(data, replace(plain.structure, effects=springs)))
+        freed = converged(
+            self.begun(data, replace(plain.structure, effects=(*plain.structure.effects, *springs)))
+        )
         return [freed, likeliest]
 
     def _again(self, known: FitRecord, data: FrfData, size: float) -> tuple[FrfMisfit, np.ndarray]:
@@ -268,7 +269,8 @@ class Search:
         """Without what the others make superfluous, what seems to matter least first."""
         while True:
             costs = removal_costs(best)
-            least = sorted((e for e in costs if e is not newest), key=lambda e: costs[e])
+            mine = (e for e in costs if e is not newest and not e.stated)
+            least = sorted(mine, key=lambda e: costs[e])
             idle = [e for e in least if costs[e] < IDLE]
             groups = ([idle] if len(idle) > 1 else []) + [[e] for e in least if costs[e] < FAR]
             for group in groups:
@@ -295,7 +297,8 @@ class Search:
 
     def displaced(self, best: StructureFit, effect: Operator) -> list[StructureFit]:
         """With an operator at other places than where it is, likeliest first."""
-        base = None if effect.springs else without(best, [effect], steps=0)
+        held = effect.springs or effect.stated
+        base = None if held else without(best, [effect], steps=0)
         if base is None:
             return []
         motions, gain = base.misfit.first_order(base.at.x, base.at.own)
@@ -347,7 +350,7 @@ def explained(found: StructureFit) -> bool:
 
 def crowded(found: StructureFit) -> bool:
     """Whether it has so many operators that more would imitate what explains the FRFs."""
-    return sum(not e.springs for e in found.structure.effects) >= MOST_OPERATORS
+    return sum(not e.springs and not e.stated for e in found.structure.effects) >= MOST_OPERATORS
 
 
 def _best_of_each(pool: Iterable[StructureFit]) -> list[StructureFit]:

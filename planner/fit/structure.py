@@ -53,6 +53,10 @@ class RobotPrior:
         r = self.repertoire
         return parametrise(r.stiff, r.stiff_priors)
 
+    def stated(self, sensors: int = 1) -> "RobotStructure":
+        """The robot as robot.toml states it."""
+        return RobotStructure(self, self.repertoire.there, sensors)
+
     def bodies(self, springs: frozenset[int]) -> tuple[tuple[int, ...], BodyNumbers]:
         """Bodies that move by some of the springs: numbers among all, and theirs."""
         r = self.repertoire

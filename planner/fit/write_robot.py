@@ -33,8 +33,8 @@ def updated_toml(
 
     A new `urdf` is one of `urdf_with_inertias`, which has what [[link]] states in it.
     `added` blocks, which the identification counts last, follow those in the text, and so do
-    resonators and harmonics that it found. `laws` take the place of those stated for their joints,
-    and bring the pulse of the hits that told them.
+    resonators and harmonics that it found; those in the text take its numbers. `laws` replace
+    those stated for their joints, and bring the pulse of the hits that told them.
     """
     document = tomlkit.parse(text)
     listed = document["compliance"]
@@ -52,12 +52,13 @@ def updated_toml(
             at = entry_of(estimate.kind, blocks[number])
             blocks[number][at] = float(f"{estimate.value:.{DIGITS}g}")
     for kind in FOUND:
-        stated = len(document.get(kind, ()))
-        stated += sum(len(e.get(kind, ())) for e in document.get("effects", ()))
-        for block in getattr(result.simulation.robot.config, kind)[stated:]:
-            table = tomlkit.table()
+        stated = [*document.get(kind, ())]
+        stated += [b for e in document.get("effects", ()) for b in e.get(kind, ())]
+        for number, block in enumerate(getattr(result.simulation.robot.config, kind)):
+            table = stated[number] if number < len(stated) else tomlkit.table()
             table.update(msgspec.to_builtins(block))
-            document.setdefault(kind, tomlkit.aot()).append(table)
+            if number >= len(stated):
+                document.setdefault(kind, tomlkit.aot()).append(table)
     if laws:
         _state_laws(document, laws, result.simulation.robot.config.hammer.pulse_ms)
     if urdf is not None:

@@ -36,6 +36,8 @@ def urdf_with_inertias(
             body, values = _of_whole(robot, body.removesuffix(OUTER), values)
         if np.any(values) and not body.startswith(f"{SMALL} "):
             frame = _heaviest(robot, body, links)
+            if body == BASE and not link_inertia(links[frame.name]).mass:
+                continue  # what `massless_base` gave it is no matter
             share = _change(links[frame.name], _seen_from(frame.placement, values))
             shares |= {body: share} if share < 1 else {}
     return text[: text.index("<robot")] + ElementTree.tostring(root, encoding="unicode"), shares

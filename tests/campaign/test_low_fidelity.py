@@ -13,6 +13,7 @@ from planner.fit.frequency_uncertainty import (
     log_frequency_slope,
 )
 from planner.fit.inertias import pseudo_inertia
+from planner.fit.write_robot import updated_toml
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.recording.records import Hit
@@ -135,6 +136,29 @@ def test_physics_that_no_joint_has_is_found_and_named(tmp_path):
     assert np.all(
         np.linalg.eigvalsh(body[after.simulation.elastic.inertia[:, 0] > 0])[:, 0] > -1e-9
     )
+
+
+def test_a_resonator_that_is_stated_is_refitted_and_not_found_again(tmp_path):
+    hose = AttachedResonator("link_4", (0.0, 0.0, 0.1), (0.0, 1.0, 0.0), 6.0, 18.0, 0.02)
+    path = make_arm(tmp_path)
+    frfs, q, other, true_hz = measured(path, 3, resonators=(hose,))
+    joint = Robot.load(path).joint_names[3]
+    stated = (
+        f'\n[[resonator]]\njoint = "{joint}"\nposition_m = [0.02, 0.0, 0.08]\n'
+        "direction = [0.1, 1.0, 0.0]\nmass = 5.0\nfrequency_hz = 17.4\ndamping_ratio = 0.03\n"
+    )
+    path.write_text(path.read_text() + stated)
+    after = learn(LowFidelity(COUNT, Simulation(Robot.load(path))), frfs, q, BAND_HZ)
+    assert "swings" not in after.remark
+    assert after.simulation is not None
+    (found,) = after.simulation.robot.config.resonator
+    assert found.frequency_hz == pytest.approx(18.0, rel=0.003)
+    assert found.mass == pytest.approx(6.0, rel=0.1)
+    assert rmse(after, other, true_hz) < 0.005
+    assert after.learned is not None
+    written = updated_toml(path.read_text(), after.learned.identified)
+    assert written.count("[[resonator]]") == 1
+    assert f"frequency_hz = {found.frequency_hz}" in written
 
 
 def test_damping_that_is_partly_a_loss_factor_is_no_lack_of_compliance(tmp_path):
