@@ -43,6 +43,11 @@ class StructureFit:
         record = self._record(self.shares)
         return replace(record, wider=self.wider and self.wider._record(()))
 
+    @property
+    def tried(self) -> "Tried":
+        """What another process needs of it."""
+        return Tried(self._record(()), self.evidence)
+
     def _record(self, shares: tuple[float, ...]) -> "FitRecord":
         s = self.structure
         return FitRecord(s.effects, s.names, self.at.x, self.at.own, size_of(self), shares)
@@ -74,6 +79,14 @@ class FitRecord:
     size: float
     shares: tuple[float, ...]
     wider: "FitRecord | None" = None
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A fit by its numbers alone, and its evidence."""
+
+    record: FitRecord
+    evidence: float
 
 
 def settled(misfit: FrfMisfit, at: At, rounds: int = 1, steps: int = SETTLED) -> StructureFit:
@@ -129,13 +142,16 @@ def size_of(found: StructureFit) -> float:
     return _rho(found.misfit)
 
 
-def evidence_of(found: StructureFit) -> float:
+def evidence_of(found: "StructureFit | Tried") -> float:
     return found.evidence
 
 
-def stepped(found: StructureFit, steps: int) -> StructureFit:
-    at = minimised(found.misfit, found.at.x, steps, 1.0, found.at.own)
-    return StructureFit(found.misfit, at, found.misfit.evidence(at) + _of_size(found.misfit))
+def stepped(
+    misfit: FrfMisfit, x: np.ndarray, steps: int, own: np.ndarray | None = None
+) -> StructureFit:
+    """After some steps from x, the discrepancy as large as it is."""
+    at = minimised(misfit, x, steps, 1.0, own)
+    return StructureFit(misfit, at, misfit.evidence(at) + _of_size(misfit))
 
 
 def removal_costs(found: StructureFit) -> dict[Operator, float]:
@@ -164,5 +180,4 @@ def without(best: StructureFit, effects: Sequence[Operator], steps: int = 5) -> 
     x = np.maximum(structure.carried(best.structure, best.at.x), structure.least)
     if not misfit.possible(x):
         return None
-    at = minimised(misfit, x, steps, 1.0, best.at.own)
-    return StructureFit(misfit, at, misfit.evidence(at) + _of_size(misfit))
+    return stepped(misfit, x, steps, best.at.own)

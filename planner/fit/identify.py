@@ -54,7 +54,7 @@ def identify(
         priors = replace(priors, mass=EXACT, inertia=EXACT, com_m=EXACT)
     tolerances = tolerances or Tolerances.of(robot.config, robot.joints.slides)
     prior, band = RobotPrior(Repertoire.of(simulation, priors)), band_hz or robot.config.band_hz
-    search = Search(prior, tuple(frfs), q, band, tolerances, tell, extend)
+    search = Search(prior, tuple(frfs), q, band, tolerances, tell, extend=extend)
     stated = prior.stated()
     if not FrfMisfit(stated, search.data(1), tolerances).possible(stated.mean):
         raise InputError(TOO_SOFT)

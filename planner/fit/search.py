@@ -6,17 +6,12 @@ effects at all places compete: operators are ranked by their first-order columns
 tried nonlinearly, a few steps each; the best are settled.
 """
 
-from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
-from planner.effects.effect import Operator, Start
-from planner.fit.data import FrfData
-from planner.fit.departures import departed
+from planner.effects.effect import Operator
 from planner.fit.fitted import (
-    SIZES,
     FitRecord,
     StructureFit,
     converged,
@@ -24,59 +19,31 @@ from planner.fit.fitted import (
     removal_costs,
     settled,
     size_of,
-    stepped,
     without,
 )
 from planner.fit.gauss_newton import minimised
-from planner.fit.misfit import At, FrfMisfit
-from planner.fit.starts import from_stated, leaders, placed, pulled
-from planner.fit.structure import RobotPrior, RobotStructure, effects_free, exported
-from planner.frf.frf import Frf
-from planner.measurement.nuisances import Tolerances
+from planner.fit.misfit import FrfMisfit
+from planner.fit.structure import effects_free, exported
+from planner.fit.trials import FAR, LOG_STEPS, Trials, explained
+from planner.inference.parallel import side_by_side
 from planner.measurement.truncated_decay import completed
 
 SEARCHED, SCREENED, LAST = 28, 64, 44  # lines a pose: while searching, for operators, at the end
-ROUGH, AFAR = 14, 12  # where many are tried a few steps each, and by logarithms from what is stated
-ANNEALED = ((0.5, 6), (0.2, 8), (0.07, 8))  # sizes by which a start comes near, and steps at each
-LOG_STEPS, NEARER, FEW, FURTHER = 60, 24, 6, 4  # steps: until near, of many from afar, of each
-# tried, of the best
-HOPELESS = 4.0  # nats, below which a further step is not worth it while many are tried
 LEAST = 12.0  # nats that one more effect must gain
 SAME = 3.0  # nats that one less may cost
 COMPLETIONS = 2  # rounds
 MOST_OPERATORS = 3  # beside springs: more would imitate what the fit lacks
-IDLE, FAR = 2.0, 100.0  # nats of what goes at once; below which nothing is followed
+IDLE = 2.0  # nats of what goes at once
 STIFF_AT_FIRST = 3.0  # prior sds of springs that may be there
-FOLLOWED, SETTLED, FARTHEST = 6, 3, 3  # how many are followed, settled, come from afar
 AGAIN = 0.03  # least size with which what was found before goes on
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
-    """FRFs measured at q (n, dof) in rad, of a robot known before by `prior`."""
+class Search(Trials):
+    """Of the structure that explains FRFs best."""
 
-    prior: RobotPrior
-    frfs: tuple[Frf, ...]
-    q: np.ndarray
-    band_hz: tuple[float, float]
-    tolerances: Tolerances
-    tell: Callable[[str], None] = lambda _: None
     extend: bool = True  # where what is stated does not explain them
-    order: np.ndarray | None = None  # as in `FrfData.of`
-    floor: float = 0.0  # as in `FrfMisfit`
     widen: bool = False  # whether `StructureFit.wider` is asked for
-
-    @cached_property
-    def _data(self) -> dict[int, FrfData]:
-        return {}
-
-    def data(self, lines: int) -> FrfData:
-        """On so many lines a pose."""
-        if lines not in self._data:
-            self._data[lines] = FrfData.of(
-                self.prior, self.frfs, self.q, self.band_hz, lines, self.order
-            )
-        return self._data[lines]
 
     def found(self, warm: FitRecord | None = None) -> StructureFit:
         """The structure that explains them best; from what was found before, if that is given.
@@ -93,7 +60,7 @@ class Search:
         """With the decays that records cut off, as a structure has them."""
         if not any(np.isfinite(f.tail_s) for f in self.frfs):
             return self
-        misfit, x = self._again(known, self.data(SEARCHED), known.size)
+        misfit, x = self.again(known, self.data(SEARCHED), known.size)
         simulation = exported(misfit.structure, x)[0]
         out = [completed(frf, simulation, row) for frf, row in zip(self.frfs, self.q, strict=True)]
         return replace(self, frfs=tuple(out))
@@ -123,7 +90,7 @@ class Search:
         data = self.data(SEARCHED)
         known = plain
         if warm is not None:
-            misfit, x = self._again(warm, data, max(warm.size, AGAIN))
+            misfit, x = self.again(warm, data, max(warm.size, AGAIN))
             known = converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
         afar = [] if explained(known) else self.from_afar(plain)
         likeliest = max(plain, known, *afar, key=evidence_of)
@@ -135,34 +102,14 @@ class Search:
         )
         return [freed, likeliest]
 
-    def _again(self, known: FitRecord, data: FrfData, size: float) -> tuple[FrfMisfit, np.ndarray]:
-        structure = RobotStructure(self.prior, known.effects, data.sensors)
-        numbers = dict(zip(known.names, known.x, strict=True))
-        pairs = zip(structure.names, structure.mean, strict=True)
-        x = np.array([numbers.get(name, mean) for name, mean in pairs])
-        return FrfMisfit(structure, data, self.tolerances, size, self.floor), x
-
     def recalled(self, known: FitRecord) -> StructureFit:
         """What was found of these FRFs before, as it was."""
-        misfit, x = self._again(known, self._completed(known).data(LAST), known.size)
+        misfit, x = self.again(known, self._completed(known).data(LAST), known.size)
         at = misfit(x, known.own)
         wider = None if known.wider is None else self.recalled(known.wider)
         found = StructureFit(misfit, at, misfit.evidence(at), wider)
         vars(found)["shares"] = known.shares
         return found
-
-    def begun(
-        self, data: FrfData, structure: RobotStructure, x: np.ndarray | None = None
-    ) -> StructureFit:
-        """From x (the prior's mean): logarithms first, then FRFs that count more and more."""
-        misfit = FrfMisfit(structure, data, self.tolerances, None, self.floor)
-        at = minimised(misfit, structure.mean if x is None else x, LOG_STEPS)
-        own = None
-        for size, steps in ANNEALED:
-            misfit = misfit.with_rho(size)
-            at = minimised(misfit, at.x, steps, own=own)
-            own = at.own if size < 0.1 else None
-        return settled(misfit, at)
 
     def _evolved(self, best: StructureFit) -> StructureFit:
         """Effects added, removed and exchanged until nothing gains."""
@@ -188,82 +135,14 @@ class Search:
         self.tell(f"+ {ends[0].structure.effects[-1].label}")
         return converged(ends[0])
 
-    def starts(self, base: StructureFit, lines: int) -> list[Start]:
-        """All effects that it has not; of operators those that the first order ranks first."""
-        misfit = replace(base.misfit, data=self.data(lines))
-        motions, gain = misfit.first_order(base.at.x, base.at.own)
-        free, every = effects_free(base.structure), self.prior.repertoire.effects
-        again = (e for e in every if e.several and e not in free)  # more may hang on a link
-        far = not explained(base)
-        tried = (e for e in (*free, *again) if far or pulled(base, e))
-        return leaders([s for e in tried for s in e.starts(motions, gain)])
-
-    def compete(
-        self,
-        base: StructureFit,
-        starts: Sequence[Start],
-        *,
-        count: int = SETTLED,
-        unmoved: bool = True,
-        afar: bool = False,
-    ) -> list[StructureFit]:
-        """Starts (`placed`) beside it: a few steps each, where much is left and `afar` from what is
-        stated too, the best farther, `count` settled."""
-        rough = self._on(base, self.data(ROUGH))
-        pool = [f for s in starts if (f := self._few(rough, s, unmoved)) is not None]
-        if afar and not explained(base):
-            pool += [self.begun(rough.misfit.data, s, x) for s, x in self._nearest(base, starts)]
-        near = _best_of_each(p for p in pool if p.evidence > rough.evidence - FAR)
-        followed = [self._on(p, base.misfit.data) for p in near[:FOLLOWED]]
-        followed = _best_of_each(stepped(p, FURTHER) for p in followed)
-        ends = [settled(p.misfit, p.at) for p in followed[:count]]
-        return sorted(ends, key=evidence_of, reverse=True)
-
-    def _on(self, found: StructureFit, data: FrfData) -> StructureFit:
-        """The same on other lines."""
-        misfit = FrfMisfit(
-            found.structure, data, self.tolerances, found.misfit.rho, self.floor
-        )  # fmt: skip
-        at = misfit(found.at.x, found.at.own)
-        return StructureFit(misfit, at, misfit.evidence(at))
-
-    def _few(self, base: StructureFit, start: Start, unmoved: bool) -> StructureFit | None:
-        structure = base.structure.with_effect(start.effect)
-        misfit = replace(base.misfit, structure=structure)
-        # Where the first order leads to no robot that can be, it begins without the effect.
-        none = structure.carried(base.structure, base.at.x)
-        begun = [x for x in placed(base, start, unmoved) if misfit.possible(x)]
-        ends = []
-        for x in begun or [x for x in (none,) if misfit.possible(x)]:
-            at = minimised(misfit, x, FEW, HOPELESS, base.at.own)
-            ends.append(StructureFit(misfit, at, misfit.evidence(at)))
-        return max(ends, key=evidence_of, default=None)
-
     def from_afar(self, base: StructureFit) -> list[StructureFit]:
         """Each effect from what is stated, where `base` leaves some; likeliest first."""
         if explained(base) or crowded(base):
             return []
-        data, nearest = base.misfit.data, self._nearest(base, self.starts(base, SCREENED))
-        ends = [converged(self.begun(data, s, x)) for s, x in nearest]
-        return sorted(ends, key=evidence_of, reverse=True)
-
-    def _nearest(
-        self, base: StructureFit, starts: Sequence[Start]
-    ) -> list[tuple[RobotStructure, np.ndarray]]:
-        """Those that logarithms on few lines bring nearest to the recordings.
-
-        Few steps of all; those that are followed go on until they are near.
-        """
-        rough, ends = self.data(AFAR), list[tuple[At, FrfMisfit]]()
-        for start in starts:
-            structure = base.structure.with_effect(start.effect)
-            misfit = FrfMisfit(structure, rough, self.tolerances, None, self.floor)
-            begun = (x for x in from_stated(structure, start) if misfit.possible(x))
-            ends += [(minimised(misfit, x, NEARER), misfit) for x in begun]
-        nearest = sorted(ends, key=lambda end: end[0].value)[:FOLLOWED]
-        nearer = [(minimised(m, at.x, LOG_STEPS), m) for at, m in nearest]
-        nearer.sort(key=lambda end: end[0].value)
-        return [(m.structure, at.x) for at, m in nearer[:FARTHEST]]
+        nearest = self.nearest(base, self.starts(base, SCREENED))
+        ends = side_by_side(lambda at: converged(self.begun_with(base, *at)).tried, nearest)
+        found = (self._from(p, base.misfit.data) for p in ends)
+        return sorted(found, key=evidence_of, reverse=True)
 
     def _removed(self, best: StructureFit, newest: Operator | None) -> StructureFit:
         """Without what the others make superfluous, what seems to matter least first."""
@@ -338,23 +217,6 @@ class Search:
         return StructureFit(misfit, at, misfit.evidence(at))
 
 
-def explained(found: StructureFit) -> bool:
-    """Whether nothing need be missing: as little is left as may be, near what is stated.
-
-    What ended where it may go no farther stands in for something else.
-    """
-    least, s, x = max(SIZES[0], found.misfit.floor), found.structure, found.at.x
-    ended = bool(np.any((x <= s.least) | (x >= s.most)))
-    return size_of(found) <= least and not ended and not departed(s, x)
-
-
 def crowded(found: StructureFit) -> bool:
     """Whether it has so many operators that more would imitate what explains the FRFs."""
     return sum(not e.springs and not e.stated for e in found.structure.effects) >= MOST_OPERATORS
-
-
-def _best_of_each(pool: Iterable[StructureFit]) -> list[StructureFit]:
-    best: dict[frozenset[str], StructureFit] = {}
-    for one in sorted(pool, key=evidence_of):
-        best[frozenset(e.label for e in one.structure.effects)] = one
-    return sorted(best.values(), key=evidence_of, reverse=True)

@@ -284,7 +284,7 @@ class RobotStructure:
 
     def without(self, effect: Operator) -> "RobotStructure":
         """All but one."""
-        return replace(self, effects=tuple(e for e in self.effects if e is not effect))
+        return replace(self, effects=tuple(e for e in self.effects if e != effect))
 
 
 KINDS = ("stiffness", "damping", "loss_factor")

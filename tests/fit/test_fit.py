@@ -21,8 +21,9 @@ from planner.fit.gauss_newton import minimised
 from planner.fit.identified import as_identification
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
-from planner.fit.search import Search, explained
+from planner.fit.search import Search
 from planner.fit.structure import RobotPrior, RobotStructure, exported
+from planner.fit.trials import explained
 from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
 from planner.words import significant

@@ -1,0 +1,210 @@
+"""Fits of structures to FRFs: one from its beginning on, many beside one another.
+
+Many are tried a few steps each on few lines, and the best go on: on two cores, where there are two.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from planner.effects.effect import Start
+from planner.fit.data import FrfData
+from planner.fit.departures import departed
+from planner.fit.fitted import (
+    SIZES,
+    FitRecord,
+    StructureFit,
+    Tried,
+    evidence_of,
+    settled,
+    size_of,
+    stepped,
+)
+from planner.fit.gauss_newton import minimised
+from planner.fit.misfit import FrfMisfit
+from planner.fit.starts import from_stated, leaders, placed, pulled
+from planner.fit.structure import RobotPrior, RobotStructure, effects_free
+from planner.frf.frf import Frf
+from planner.inference.parallel import side_by_side
+from planner.measurement.nuisances import Tolerances
+
+ROUGH, AFAR = (
+    14,
+    12,
+)  # lines a pose: of many a few steps each, and by logarithms from what is stated
+ANNEALED = ((0.5, 6), (0.2, 8), (0.07, 8))  # sizes by which a start comes near, and steps at each
+LOG_STEPS, NEARER, FEW, FURTHER = 60, 24, 6, 4  # steps: until near, of many from afar, of each
+# tried, of the best
+HOPELESS = 4.0  # nats, below which a further step is not worth it while many are tried
+FAR = 100.0  # nats below which nothing is followed
+FOLLOWED, SETTLED, FARTHEST = 6, 3, 3  # how many are followed, settled, come from afar
+
+
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """FRFs measured at q (n, dof) in rad, of a robot known before by `prior`, to fit them."""
+
+    prior: RobotPrior
+    frfs: tuple[Frf, ...]
+    q: np.ndarray
+    band_hz: tuple[float, float]
+    tolerances: Tolerances
+    tell: Callable[[str], None] = lambda _: None
+    order: np.ndarray | None = None  # as in `FrfData.of`
+    floor: float = 0.0  # as in `FrfMisfit`
+
+    def __getstate__(self) -> Mapping[str, object]:
+        """For another process, which tells nothing."""
+        return vars(self) | {"tell": _quietly}
+
+    @cached_property
+    def _data(self) -> dict[int, FrfData]:
+        return {}
+
+    def data(self, lines: int) -> FrfData:
+        """On so many lines a pose."""
+        if lines not in self._data:
+            self._data[lines] = FrfData.of(
+                self.prior, self.frfs, self.q, self.band_hz, lines, self.order
+            )
+        return self._data[lines]
+
+    def again(self, known: FitRecord, data: FrfData, size: float) -> tuple[FrfMisfit, np.ndarray]:
+        structure = RobotStructure(self.prior, known.effects, data.sensors)
+        numbers = dict(zip(known.names, known.x, strict=True))
+        pairs = zip(structure.names, structure.mean, strict=True)
+        x = np.array([numbers.get(name, mean) for name, mean in pairs])
+        return FrfMisfit(structure, data, self.tolerances, size, self.floor), x
+
+    def begun(
+        self, data: FrfData, structure: RobotStructure, x: np.ndarray | None = None
+    ) -> StructureFit:
+        """From x (the prior's mean): logarithms first, then FRFs that count more and more."""
+        misfit = FrfMisfit(structure, data, self.tolerances, None, self.floor)
+        at = minimised(misfit, structure.mean if x is None else x, LOG_STEPS)
+        own = None
+        for size, steps in ANNEALED:
+            misfit = misfit.with_rho(size)
+            at = minimised(misfit, at.x, steps, own=own)
+            own = at.own if size < 0.1 else None
+        return settled(misfit, at)
+
+    def starts(self, base: StructureFit, lines: int) -> list[Start]:
+        """All effects that it has not; of operators those that the first order ranks first."""
+        misfit = replace(base.misfit, data=self.data(lines))
+        motions, gain = misfit.first_order(base.at.x, base.at.own)
+        free, every = effects_free(base.structure), self.prior.repertoire.effects
+        again = (e for e in every if e.several and e not in free)  # more may hang on a link
+        far = not explained(base)
+        tried = (e for e in (*free, *again) if far or pulled(base, e))
+        return leaders([s for e in tried for s in e.starts(motions, gain)])
+
+    def compete(
+        self,
+        base: StructureFit,
+        starts: Sequence[Start],
+        *,
+        count: int = SETTLED,
+        unmoved: bool = True,
+        afar: bool = False,
+    ) -> list[StructureFit]:
+        """Starts (`placed`) beside it: a few steps each, where much is left and `afar` from what is
+        stated too, the best farther, `count` settled."""
+        rough, data = self._on(base, self.data(ROUGH)), base.misfit.data
+        pool = side_by_side(lambda s: self._few(rough, s, unmoved), starts)
+        if afar and not explained(base):
+            near = self.nearest(base, starts)
+            pool += side_by_side(lambda at: self.begun_with(rough, *at).tried, near)
+        near = _best_of_each(p for p in pool if p and p.evidence > rough.evidence - FAR)
+        followed = side_by_side(lambda p: self._stepped(p, data), near[:FOLLOWED])
+        near = _best_of_each(followed)[:count]
+        ends = side_by_side(lambda p: self._settled(p, data), near)
+        return sorted((self._from(p, data) for p in ends), key=evidence_of, reverse=True)
+
+    def _stepped(self, tried: Tried, data: FrfData) -> Tried:
+        misfit, x = self.again(tried.record, data, tried.record.size)
+        return stepped(misfit, x, FURTHER, tried.record.own).tried
+
+    def _settled(self, tried: Tried, data: FrfData) -> Tried:
+        found = self._from(tried, data)
+        return settled(found.misfit, found.at).tried
+
+    def _from(self, tried: Tried, data: FrfData) -> StructureFit:
+        misfit, x = self.again(tried.record, data, tried.record.size)
+        return StructureFit(misfit, misfit(x, tried.record.own), tried.evidence)
+
+    def _on(self, found: StructureFit, data: FrfData) -> StructureFit:
+        """The same on other lines."""
+        misfit = FrfMisfit(
+            found.structure, data, self.tolerances, found.misfit.rho, self.floor
+        )  # fmt: skip
+        at = misfit(found.at.x, found.at.own)
+        return StructureFit(misfit, at, misfit.evidence(at))
+
+    def _few(self, base: StructureFit, start: Start, unmoved: bool) -> Tried | None:
+        structure = base.structure.with_effect(start.effect)
+        misfit = replace(base.misfit, structure=structure)
+        # Where the first order leads to no robot that can be, it begins without the effect.
+        none = structure.carried(base.structure, base.at.x)
+        begun = [x for x in placed(base, start, unmoved) if misfit.possible(x)]
+        ends = []
+        for x in begun or [x for x in (none,) if misfit.possible(x)]:
+            at = minimised(misfit, x, FEW, HOPELESS, base.at.own)
+            ends.append(StructureFit(misfit, at, misfit.evidence(at)).tried)
+        return max(ends, key=evidence_of, default=None)
+
+    def begun_with(self, base: StructureFit, start: Start, x: np.ndarray) -> StructureFit:
+        return self.begun(base.misfit.data, base.structure.with_effect(start.effect), x)
+
+    def nearest(
+        self, base: StructureFit, starts: Sequence[Start]
+    ) -> list[tuple[Start, np.ndarray]]:
+        """Those that logarithms on few lines bring nearest to the recordings, and where.
+
+        Few steps of all; those that are followed go on until they are near.
+        """
+        rough = self.data(AFAR)
+
+        def misfit(start: Start) -> FrfMisfit:
+            structure = base.structure.with_effect(start.effect)
+            return FrfMisfit(structure, rough, self.tolerances, None, self.floor)
+
+        def near(start: Start) -> list[tuple[float, np.ndarray]]:
+            there = misfit(start)
+            begun = (x for x in from_stated(there.structure, start) if there.possible(x))
+            ends = (minimised(there, x, NEARER) for x in begun)
+            return [(at.value, at.x) for at in ends]
+
+        def nearer(begun: tuple[Start, np.ndarray]) -> tuple[float, np.ndarray]:
+            at = minimised(misfit(begun[0]), begun[1], LOG_STEPS)
+            return at.value, at.x
+
+        pairs = zip(starts, side_by_side(near, starts), strict=True)
+        ends = sorted(((v, s, x) for s, each in pairs for v, x in each), key=lambda end: end[0])
+        followed = [(s, x) for _, s, x in ends[:FOLLOWED]]
+        both = zip(followed, side_by_side(nearer, followed), strict=True)
+        ends = sorted(((v, s, x) for (s, _), (v, x) in both), key=lambda end: end[0])
+        return [(s, x) for _, s, x in ends[:FARTHEST]]
+
+
+def _quietly(text: str) -> None:
+    """What another process tells."""
+
+
+def explained(found: StructureFit) -> bool:
+    """Whether nothing need be missing: as little is left as may be, near what is stated.
+
+    What ended where it may go no farther stands in for something else.
+    """
+    least, s, x = max(SIZES[0], found.misfit.floor), found.structure, found.at.x
+    ended = bool(np.any((x <= s.least) | (x >= s.most)))
+    return size_of(found) <= least and not ended and not departed(s, x)
+
+
+def _best_of_each(pool: Iterable[Tried]) -> list[Tried]:
+    best: dict[frozenset[str], Tried] = {}
+    for one in sorted(pool, key=evidence_of):
+        best[frozenset(e.label for e in one.record.effects)] = one
+    return sorted(best.values(), key=evidence_of, reverse=True)
