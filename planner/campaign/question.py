@@ -4,12 +4,12 @@ What was found of the hits before tells which FRFs are to be expected anywhere, 
 is. Where "something else" is likelier than the pose as stated, what that may be competes by
 evidence: another known pose, the setpoint, an angle with the other sign, axes of the sensor
 exchanged, a channel with a wrong scale, a sensor that turned, hits the other way or listed along
-wrong axes, one joint elsewhere. Without a simulation, or before the first measurement, nothing is
-expected.
+wrong axes, one joint elsewhere, and a wrong angle of an earlier pose, which bent what is expected.
+Without a simulation, or before the first measurement, nothing is expected.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,8 +21,13 @@ from planner.campaign.events import Question
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
+from planner.effects.table import Repertoire
 from planner.fit.expected import LINES, SIZES, ExpectedFrfs, turned
+from planner.fit.posterior import RobotPosterior
+from planner.fit.search import Search
+from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
+from planner.inference.parallel import side_by_side
 from planner.recording.joints import JointUnits
 from planner.recording.points import TOOL
 
@@ -33,6 +38,8 @@ BETTER = 3.0  # times less is left by a mistake that explains them
 SURE = 2
 # A joint is looked for elsewhere by 2^NEAREST to 2^(FARTHEST − 1) times as far as readbacks err.
 NEAREST, FARTHEST = 1, 7
+# Measured poses among which one may be wrong unnoticed; of more it stands out
+MOST_BEFORE = 3
 FOLLOWED = 3  # mistakes that are fitted, those that seem likeliest at once
 
 
@@ -68,7 +75,8 @@ def question(
     if frf is None or learned is None:
         return None
     expected = ExpectedFrfs(learned.posterior, model.cell.config.modes.band_hz)
-    q = model.cell.robot.joints.internal([joints_deg])[0]
+    joints = model.cell.robot.joints
+    q = joints.internal([joints_deg])[0]
     stated, typed = StatedHits(expected, q, frf), _setpoint(model, state, pose, joints_deg)
     if not stated.doubted and not stated.instead(typed):
         return None
@@ -76,8 +84,11 @@ def question(
     sure = learned.poses >= SURE
     mistakes += _chains(state, expected, q, frf, sure)
     if sure:
-        mistakes += elsewhere(model.cell.robot.joints, expected, frf, joints_deg)
+        mistakes += opposite(joints, joints_deg)
+        mistakes += elsewhere(joints, expected, frf, joints_deg)
     fits = stated.instead(mistakes)
+    if fits is None or (fits.about != "chain" and StatedHits(expected, fits.q, frf).doubted):
+        fits = _earlier(model, state, pose, joints_deg, frf) or fits
     if fits is None and not stated.impossible:
         return None
     if fits is None and not sure:
@@ -167,7 +178,7 @@ def _setpoint(
 def elsewhere(
     joints: JointUnits, expected: ExpectedFrfs, frf: Frf, joints_deg: tuple[float, ...]
 ) -> Iterator[Mistake]:
-    """An angle of the other sign; one joint where it explains the hits best, near its angle.
+    """One joint where it explains the hits best, near its angle.
 
     `joints_deg` (dof,) as stated: degrees, of slides mm. Each joint's place is found by a search
     along it alone, of the density of hits that are hardly what is expected.
@@ -180,10 +191,6 @@ def elsewhere(
         return -expected.strange(joints.internal([stated + by * axis])[0], frf)
 
     for i, axis in enumerate(np.diag(same)):
-        if abs(stated[i]) > same[i]:
-            other = stated * np.where(axis > 0, -1, 1)
-            what = f"fit the other sign of an angle: is {_either(joints, i, other[i], stated[i])}?"
-            yield Mistake(joints.internal([other])[0], what, about="readback")
         tried = np.concatenate([-steps[::-1], [0.0], steps])
         each = [less(float(by), axis) for by in tried]
         best = int(np.argmin(each))
@@ -196,6 +203,51 @@ def elsewhere(
         there = stated + by * axis
         what = f"fit another angle far better: is {_either(joints, i, there[i], stated[i])}?"
         yield Mistake(joints.internal([there])[0], what, about="readback", rarer=rarer)
+
+
+def opposite(joints: JointUnits, joints_deg: tuple[float, ...]) -> Iterator[Mistake]:
+    """An angle of the other sign."""
+    stated = np.array(joints_deg)
+    for i in np.flatnonzero(np.abs(stated) > joints.same()).tolist():
+        other = np.where(np.arange(len(stated)) == i, -stated, stated)
+        what = f"fit the other sign of an angle: is {_either(joints, i, other[i], stated[i])}?"
+        yield Mistake(joints.internal([other])[0], what, about="readback")
+
+
+def _earlier(
+    model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...], frf: Frf
+) -> Mistake | None:
+    """An angle mistyped at one of few poses measured before, where all are likelier so.
+
+    `frf` are the new hits of a pose at `joints_deg`. Each pose is left out in turn; the others are
+    fitted by all springs that there may be, which is quick.
+    """
+    joints, low, band = model.cell.robot.joints, model.low, model.cell.config.modes.band_hz
+    if low.nominal is None or len(model.used) > MOST_BEFORE or frf.layout.sensors != TOOL.sensors:
+        return None
+    known = [*((m.pose, m.joints_deg) for m in model.used), (pose, joints_deg)]
+    typed = [[*_setpoint(model, state, *one), *opposite(joints, one[1])] for one in known]
+    q, frfs = joints.internal([angles for _, angles in known]), (*model.frfs, frf)
+    prior, tolerances = RobotPrior(Repertoire.of(low.nominal, low.priors)), low.tolerances
+
+    def left_out(i: int) -> tuple[float, Mistake | None]:
+        others = [k for k in range(len(q)) if k != i]
+        search = Search(prior, tuple(frfs[k] for k in others), q[others], band, tolerances)
+        fit = RobotPosterior.of(search.freed())
+        expected = ExpectedFrfs(fit, band)
+        hits = StatedHits(expected, q[i], frfs[i])
+        found = hits.instead(typed[i])
+        its = max(hits.density[0], hits.strange)
+        if found is not None:
+            its = expected.density(found.q, frfs[i])[0] - found.rarer
+        return fit.found.evidence + its, found
+
+    told = side_by_side(left_out, range(len(q)))
+    best = int(np.argmax([value for value, _ in told]))
+    found = told[best][1]
+    if best == len(model.used) or found is None or told[best][0] < told[-1][0] + LOG_ODDS:
+        return None
+    return replace(found, pose=known[best][0], about="earlier")
 
 
 def _either(joints: JointUnits, number: int, one: float, other: float) -> str:
@@ -227,6 +279,11 @@ def _asked(pose: str, off_percent: float, fits: Mistake | None) -> Question:
         text = f"At {pose}, {fits.what} Are these hits right as they are?"
     elif fits is not None and fits.about == "readback":
         text = f"These hits {fits.what} Are the angles right as they are?"
+    elif fits is not None and fits.about == "earlier":
+        text = (
+            f"These hits contradict those of {fits.pose}, and those of {fits.pose} {fits.what} "
+            f"Are its angles right as they are?"
+        )
     else:
         instead = fits.what if fits else "fit no other known pose either"
         text = (

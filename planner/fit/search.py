@@ -96,11 +96,13 @@ class Search(Trials):
         likeliest = max(plain, known, *afar, key=evidence_of)
         if warm is not None or explained(likeliest):
             return [likeliest]
-        springs = tuple(e for e in self.prior.repertoire.effects if e.springs)
-        freed = converged(
-            self.begun(data, replace(plain.structure, effects=(*plain.structure.effects, *springs)))
-        )
-        return [freed, likeliest]
+        return [self.freed(), likeliest]
+
+    def freed(self) -> StructureFit:
+        """With every spring that there may be, and no operator."""
+        data, springs = self.data(SEARCHED), [e for e in self.prior.repertoire.effects if e.springs]
+        stated = self.prior.stated(data.sensors)
+        return converged(self.begun(data, replace(stated, effects=(*stated.effects, *springs))))
 
     def recalled(self, known: FitRecord) -> StructureFit:
         """What was found of these FRFs before, as it was."""

@@ -196,6 +196,15 @@ class ImportedPoses(Answer):
 def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
     """What is asked of held hits, and the commands that answer it, in one line."""
     confirm, withdraw = (command("planner", act, directory, pose) for act in ANSWERS)
+    if asked.about == "earlier":
+        wrong = command("planner", "withdraw", directory, asked.fits)
+        again = command("planner", "import", directory, "FOLDER", "--pose", f"{asked.fits}b")
+        return (
+            f"{asked.text} The new hits of {pose} are held, not used. Where the angles of "
+            f"{asked.fits} are wrong: {wrong}, correct them in recordings.csv, import its files "
+            f"once more as another pose ({again}), then {confirm}; if they are right, and those of "
+            f"{pose} are wrong: {withdraw}."
+        )
     if asked.disagree or asked.about:
         right = "they are" if asked.about else "each is"
         return (

@@ -19,6 +19,7 @@ from planner.demo import NAME, Pool, shipped
 from planner.errors import InputError
 from planner.recording.folder import TABLE
 from planner.replay import replay
+from planner.report.imports import how_to_answer
 from planner.report.status import status
 from tests.support.chain_cases import scaled
 from tests.support.outside import call
@@ -156,6 +157,21 @@ def test_a_misread_angle_and_hits_from_behind_are_asked_about(
         read = float(report.question.text.split(said)[1].split("°")[0])
         stated = np.array(pool.rows[WRONG][0].joints_deg)
         assert abs(read - stated[int(said[-1]) - 1]) < 0.5
+
+
+def test_a_wrong_angle_at_the_first_pose_is_asked_about_at_the_next(pool, tmp_path):
+    """Nothing tells then: the simulation alone lacks too much. It bends what is expected after."""
+    campaign, joint = begun(tmp_path), 4
+    true = pool.rows["A11"][0].joints_deg
+    off = -2 * np.array(true) * np.eye(6)[joint]
+    (first,) = campaign.import_paths((claim(tmp_path / "wrong", pool, "A11", "A11", "X1", off),))
+    assert first.question is None
+    (report,) = campaign.import_paths((pool.folder,), "A57")
+    asked = report.question
+    assert asked is not None
+    assert (asked.about, asked.fits) == ("earlier", "X1")
+    assert f"is joint_5 {true[joint]:.2f}° or {-true[joint]:.2f}°?" in asked.text
+    assert "--pose X1b" in how_to_answer(campaign.directory, "A57", asked)
 
 
 def test_hits_of_a_pose_left_unmoved_are_told_and_moved(campaign, pool, tmp_path):

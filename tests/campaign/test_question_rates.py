@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from planner.campaign.chain_faults import possible
 from planner.campaign.chain_question import Draws
-from planner.campaign.question import SURE, Mistake, StatedHits, elsewhere
+from planner.campaign.question import SURE, Mistake, StatedHits, elsewhere, opposite
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
@@ -45,7 +45,7 @@ def shown(frf: Frf, matrix: np.ndarray) -> Frf:
     )
 
 
-def opposite(q: np.ndarray, joint: int) -> np.ndarray:
+def flipped(q: np.ndarray, joint: int) -> np.ndarray:
     """With the other sign of an angle."""
     return np.where(np.arange(len(q)) == joint, -q, q)
 
@@ -75,6 +75,7 @@ class Asker:
         mistakes = [Mistake(there, "", name) for name, there in others.items()]
         if self.poses >= SURE:
             angles = tuple(self.joints.shown(q))
+            mistakes += opposite(self.joints, angles)
             mistakes += elsewhere(self.joints, self.expected, frf, angles)
         within = self.draws.tolerances if self.poses >= SURE else None
         faults = possible(self.expected.shown(q, frf), within)
@@ -107,7 +108,7 @@ def answers(
         if n and mistaken:
             strange = case.frfs[(n + 1) % len(case.q)]
             unlisted = {name: there for name, there in others.items() if name != true}
-            typed = opposite(q, int(rng.integers(1, len(q))))
+            typed = flipped(q, int(rng.integers(1, len(q))))
             misread = q + np.deg2rad(MISREAD_DEG) * np.eye(len(q))[int(rng.integers(1, len(q)))]
             against = replace(frf, accelerance=frf.accelerance * np.array([-1, 1, 1])[:, None])
             exchanged = [1, 0, 2]
