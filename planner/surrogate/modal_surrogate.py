@@ -23,7 +23,7 @@ FREQUENCY_PRIOR_ALONE = OutputPrior(1.0, 0.0, amplitude=0.2, nugget=0.002, mean=
 DAMPING_PRIOR = OutputPrior(1.0, 0.0, amplitude=0.15, nugget=0.05, mean=float(np.log(0.03)))
 DAMPING_KERNELS = ("bias", "cubic", "matern52")  # of Busch et al. 2022; any shape
 DAMPING_RANGE = -0.25, 1.25  # of coordinates; beyond it damping stays: polynomials run away
-LARGEST_LOG_SD = 10.0  # of a logarithm: exponentials of larger ones overflow
+LARGEST_LOG_SD = 1.0  # of a mode of which nothing is known: it lies within a factor of e
 RESIDUE_PRIOR = OutputPrior(bias_sd=0.2, slope_sd=0.5, amplitude=0.2, nugget=0.02)
 RESIDUE_PRIOR_ALONE = OutputPrior(bias_sd=0.7, slope_sd=0.0, amplitude=0.5, nugget=0.02)
 # Beside a simulation that was identified from these very recordings and fits them.
