@@ -48,13 +48,17 @@ class Search(Trials):
     def found(self, warm: FitRecord | None = None) -> StructureFit:
         """The structure that explains them best; from what was found before, if that is given.
 
-        Decays that the ends of records cut off are filled in as it has them, and it is found again.
+        Decays that the ends of records cut off are filled in as it has them, and it goes on.
         """
         best = self._found(warm)
         for _ in range(COMPLETIONS if any(np.isfinite(f.tail_s) for f in self.frfs) else 0):
-            known = best.remembered
-            best = self._completed(known)._found(known)
+            known = best.tried.record
+            best = self._completed(known)._gone_on(known)
         return best
+
+    def _gone_on(self, known: FitRecord) -> StructureFit:
+        best = self._recovered(known)
+        return self._ended(self._evolved(best) if self.extend else best)
 
     def _completed(self, known: FitRecord) -> "Search":
         """With the decays that records cut off, as a structure has them."""
@@ -70,7 +74,7 @@ class Search(Trials):
         self.tell("as stated")
         plain = converged(self.begun(data, self.prior.stated(data.sensors)))
         if not self.extend:
-            return self._last(plain)
+            return self._ended(plain)
         first, *others = self._beginnings(plain, warm)
         best = self._evolved(first)
         for other in others:
@@ -80,18 +84,22 @@ class Search(Trials):
             if ends[0].evidence < best.evidence + LEAST:
                 break
             best = self._evolved(ends[0])
+        return self._ended(best)
+
+    def _ended(self, best: StructureFit) -> StructureFit:
         found = self._last(best)
         return replace(found, wider=self._widened(found)) if self.widen else found
+
+    def _recovered(self, known: FitRecord) -> StructureFit:
+        """What was found of other data, of these."""
+        misfit, x = self.again(known, self.data(SEARCHED), max(known.size, AGAIN))
+        return converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
 
     def _beginnings(self, plain: StructureFit, warm: FitRecord | None) -> list[StructureFit]:
         """Where effects are added and removed from: what is most likely to lack some first."""
         if explained(plain):  # nothing need be missing
             return [plain]
-        data = self.data(SEARCHED)
-        known = plain
-        if warm is not None:
-            misfit, x = self.again(warm, data, max(warm.size, AGAIN))
-            known = converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
+        known = plain if warm is None else self._recovered(warm)
         afar = [] if explained(known) else self.from_afar(plain)
         likeliest = max(plain, known, *afar, key=evidence_of)
         if warm is not None or explained(likeliest):
@@ -115,15 +123,17 @@ class Search(Trials):
 
     def _evolved(self, best: StructureFit) -> StructureFit:
         """Effects added, removed and exchanged until nothing gains."""
+        held = None  # for which no other place is likelier
         for _ in range(12):
             added = self._added(best)
             newest = added.structure.effects[-1] if added is not best else None
             fewer = self._removed(added, newest)
             changed = fewer is not best
             best = converged(fewer) if changed else best
-            swapped = self._exchanged(best)
+            swapped = best if best is held else self._exchanged(best)
             if swapped is best and not changed:
                 break
+            held = best if swapped is best else None
             best = swapped
         return best
 
