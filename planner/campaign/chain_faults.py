@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from planner.measurement.nuisances import Tolerances
 from planner.recording.points import AXES
+from planner.words import significant
 
 # Factors that are looked for, or their inverses: less is what springs and inertias leave open.
 LEAST, MOST, STEP = np.log(1.5), np.log(3e6), 0.12
@@ -54,8 +55,7 @@ class ChainFault:
         size = float(np.exp(abs(np.log(self.factor))))
         unit = min(UNITS, key=lambda known: abs(np.log(size / known)))
         near = abs(np.log(size / unit)) < AS_UNIT
-        times = f"{unit:.3g} times" if near else f"about {size:.1g} times"
-        times = times.replace("1e+03", "1000")
+        times = f"{significant(unit, 3)} times" if near else f"about {significant(size, 1)} times"
         way, other = ("large", "small") if self.factor > 1 else ("small", "large")
         whole = len(self.scaled) == len(AXES)
         what = "accelerations are" if whole else f"channel {AXES[self.scaled[0]]} is"

@@ -20,6 +20,7 @@ from planner.effects.effect import (
     turning,
 )
 from planner.robot.config import Resonator
+from planner.words import significant
 
 LIGHTER = np.log(6.0)  # it is begun once more by so much
 SCREENED = 30  # frequencies over the band
@@ -140,7 +141,7 @@ class LinkResonator(Operator):
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
         return (
-            f"Something of {values['mass'][0]:.2g} kg on {self.at} swings on its own at "
+            f"Something of {significant(values['mass'][0])} kg on {self.at} swings on its own at "
             f"{values['frequency'][0]:.1f} Hz: check hose pack, brackets and covers there."
         )
 

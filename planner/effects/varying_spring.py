@@ -100,8 +100,8 @@ class Drift(VaryingSpring):
         name, (most, sd) = max(values.items(), key=lambda item: abs(item[1][0]))
         return (
             f"Stiffness changes in the course of the campaign, most at {name.split(' of ')[1]}: by "
-            f"{100 * most:.2g} ± {100 * sd:.1g} %. Let the robot warm up, check for what came "
-            "loose, and measure an early pose again."
+            f"{significant(100 * most)} ± {significant(100 * sd, 1)} %. Let the robot warm up, "
+            "check for what came loose, and measure an early pose again."
         )
 
 
