@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.campaign.events import Imported, MeasuredMode
+from planner.campaign.events import HitRecord, Imported, MeasuredMode
 from planner.campaign.model import FEW_POSES, Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose
@@ -111,6 +111,10 @@ def _found_again(
     return found
 
 
+def _axes(hits: Sequence[HitRecord]) -> set[str]:
+    return {hit.hit[-1] for hit in hits if hit.accepted and hit.hit}
+
+
 def alerts(
     model: Model,
     state: CampaignState,
@@ -137,5 +141,7 @@ def alerts(
         told += unreciprocal(measured.frf)
     known = state.hit_at(event.pose)
     if known is not None:
-        return told + hit_again(model, known, modes)
+        # Modes of fewer axes are others: what was lacking of a visit is no second one.
+        whole = _axes(event.hits) >= _axes(known.hits)
+        return told + (hit_again(model, known, modes) if whole else ())
     return told if suspicion is None else (*told, suspicion.text)

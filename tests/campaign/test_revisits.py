@@ -18,6 +18,7 @@ from planner.campaign.events import (
 )
 from planner.campaign.revisits import hit_again, suspected
 from planner.campaign.state import CampaignState, Measurement, fold
+from planner.recording.folder import TABLE
 from planner.recording.joints import JointUnits
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
@@ -114,3 +115,11 @@ def test_a_robot_that_softened_is_told_by_the_command(tmp_path):
         told("undo", cell)
         told("undo", cell)
         assert told("next", cell)["proposals"][0]["pose"] == "P001"
+    # What was lacking of a visit is no second one: fewer axes show other modes.
+    one = record(truth, tmp_path / "one", "P001", list(first.joints_deg), seed=9)
+    lines = (one / TABLE).read_text().splitlines()
+    along_x = [line for line in lines[1:] if "+x" in line or "-x" in line]
+    (one / TABLE).write_text("\n".join([lines[0], along_x[0]]) + "\n")
+    again = told("import", cell, one)
+    assert again["pose"] == "P001"
+    assert not any("was hit again" in text for text in again["remarks"])
