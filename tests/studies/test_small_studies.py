@@ -23,7 +23,7 @@ MUST_HOLD = {
 }
 
 
-LONG = {"busch2020", "busch2022"}  # half a minute each; the others take the same way
+LONG = {"birk2025", "busch2020", "busch2022"}  # minutes; the others take the same way
 
 
 @pytest.mark.parametrize(
