@@ -106,8 +106,14 @@ def question_panel(question: Question, pose: str, other: str) -> RenderableType:
     keys = f"[a] yes, use them at {pose}  [r] refuse, hit again  "
     keys += f"[o] no, they are from {other}  " if other else ""
     text = Text(question.text, style="bold red")
-    more = Text("They are kept, and not used until you answer.")
-    parts = Group(text, more, Text(f"{keys}[u] undo  [q] quit", style="dim"))
+    more = "They are kept, and not used until you answer."
+    if question.about == "earlier":
+        more += (
+            f" Where the angles of {question.fits} are wrong: [q], planner withdraw DIR "
+            f"{question.fits}, import its files once more as another pose with right angles, and "
+            f"go on with watch."
+        )
+    parts = Group(text, Text(more), Text(f"{keys}[u] undo  [q] quit", style="dim"))
     return Panel(parts, title=f"Pose {pose}: a question", title_align="left", expand=False)
 
 
