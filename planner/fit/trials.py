@@ -72,6 +72,8 @@ class Trials:
         return self._data[lines]
 
     def again(self, known: FitRecord, data: FrfData, size: float) -> tuple[FrfMisfit, np.ndarray]:
+        """The misfit of what was found before on `data`, and its numbers; those it lacks as
+        expected."""
         structure = RobotStructure(self.prior, known.effects, data.sensors)
         numbers = dict(zip(known.names, known.x, strict=True))
         pairs = zip(structure.names, structure.mean, strict=True)
@@ -156,6 +158,7 @@ class Trials:
         return max(ends, key=evidence_of, default=None)
 
     def begun_with(self, base: StructureFit, start: Start, x: np.ndarray) -> StructureFit:
+        """As `begun`, with one effect more than `base` has."""
         return self.begun(base.misfit.data, base.structure.with_effect(start.effect), x)
 
     def nearest(
