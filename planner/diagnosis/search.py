@@ -76,7 +76,7 @@ class Explorer:
             if not ends or ends[0].evidence < best.evidence + LEAST:
                 break
             search.tell(f"+ {ends[0].structure.effects[-1].label}")
-            before, best = best, self._pruned(converged(ends[0]))
+            before, best = best, self._pruned(converged(ends[0]), pool)
             _keep(pool, [best])
             if _change(before, best) < search.floor:
                 break  # what is smaller yet does not matter
@@ -97,15 +97,16 @@ class Explorer:
             likeliest = max(ends, key=evidence_of, default=best)
             if likeliest.evidence > best.evidence + LEAST / 4:
                 self.search.tell(f"{effect.label} → {likeliest.structure.effects[-1].label}")
-                best = self._pruned(converged(likeliest))
+                best = self._pruned(converged(likeliest), pool)
                 _keep(pool, [best])
         return best
 
-    def _pruned(self, best: StructureFit) -> StructureFit:
+    def _pruned(self, best: StructureFit, pool: dict[Key, StructureFit]) -> StructureFit:
         """Without what the others make superfluous."""
         costs = removal_costs(best)
         for effect in sorted(added(best)[:-1], key=lambda e: costs[e]):
             fewer = self._fewer(best, effect)
+            _keep(pool, [fewer])
             if fewer.evidence > best.evidence - LEAST / 2:
                 self.search.tell(f"− {effect.label}")
                 best = fewer
