@@ -5,7 +5,7 @@ from afar by logarithms first. What is settled is kept: the posterior is over al
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -114,11 +114,12 @@ class Explorer:
 
     def _fewer(self, best: StructureFit, effect: Operator) -> StructureFit:
         """Without an effect: from where it is, and from what is stated, lest that be bent."""
-        structure = best.structure.without(effect)
-        x, of = structure.mean.copy(), best.structure
-        for kept, own in zip(structure.effects, structure.own, strict=True):
-            x[own] = best.at.x[of.own[of.effects.index(kept)]]
-        ends = [converged(self.search.begun(best.misfit.data, structure, x))]
+        structure, search = best.structure.without(effect), self.search
+        x, own = structure.mean.copy(), slice(structure.inertial.stop, structure.chain.start)
+        x[own] = structure.carried(best.structure, best.at.x)[own]  # the other effects' numbers
+        if not replace(best.misfit, structure=structure).possible(x):
+            x = structure.mean
+        ends = [converged(search.begun(best.misfit.data, structure, x))]
         near = without(best, [effect])
         ends += [] if near is None else [settled(near.misfit, near.at)]
         return max(ends, key=evidence_of)

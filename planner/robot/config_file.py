@@ -55,6 +55,12 @@ def with_effects(config: RobotConfig, path: Path) -> RobotConfig:
         for name in ("mass", "frequency_hz", "damping_ratio"):
             where = f"{path}: {name} of the resonator at {block.joint}"
             _within(where, getattr(block, name), most=np.inf)
+        length = float(np.linalg.norm(block.direction))
+        if not 0 < length < np.inf:
+            raise InputError(
+                f"{path}: the direction of the resonator at {block.joint} has length {length:.4g}; "
+                f"give the way in which it swings, in the joint's frame."
+            )
     return whole
 
 

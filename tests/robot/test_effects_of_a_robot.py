@@ -78,3 +78,13 @@ def test_effect_of_a_joint_that_does_not_exist_is_named(tmp_path):
     path.write_text(path.read_text() + f'\n[[effects]]\neffect = "x"\nat = ""\n{block}')
     with pytest.raises(InputError, match="elbow"):
         Robot.load(path)
+
+
+def test_a_resonator_without_a_direction_is_refused(tmp_path):
+    path = ARMS["kr210"].write(tmp_path)
+    block = SMALL.replace("effects.resonator", "resonator").replace(
+        "0.0, 0.6, 0.8", "0.0, 0.0, 0.0"
+    )
+    path.write_text(f"{path.read_text()}\n{block}")
+    with pytest.raises(InputError, match="direction of the resonator at joint_3 has length 0"):
+        Robot.load(path)
