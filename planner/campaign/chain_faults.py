@@ -1,13 +1,15 @@
-"""What a measuring chain may do wrong, and how that is asked: signed axes, and factors."""
+"""What a measuring chain may do wrong, and how that is asked: signed axes, factors, filters."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
 
 import numpy as np
 from scipy.linalg import polar
 from scipy.spatial.transform import Rotation
 
+from planner.dynamics.gradient import laplace
+from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.recording.points import AXES
 from planner.words import significant
@@ -26,7 +28,9 @@ class ChainFault:
 
     `scaled` are the channels that `factor` multiplies; () where axes or signs are exchanged.
     `struck` are axes along which the hammer hit against the direction that is stated; `order` along
-    which axis those hits were that are listed as along x, y, z.
+    which axis those hits were that are listed as along x, y, z. Accelerations come `delay_s` late,
+    are high-passed at `corner_hz` (AC coupling; forces are where it is negative), and all channels
+    fade by an exponential window of `window_rate_1_s` more than is known.
     """
 
     matrix: np.ndarray
@@ -34,6 +38,30 @@ class ChainFault:
     factor: float = 1.0
     struck: tuple[int, ...] = ()
     order: tuple[int, ...] = (0, 1, 2)
+    delay_s: float = 0.0
+    corner_hz: float = 0.0
+    window_rate_1_s: float = 0.0
+
+    def undone(self, frf: Frf) -> tuple[Frf, float]:
+        """A tool's FRF (3, c, F) as a sound chain would show it.
+
+        And ln of the Jacobian of one complex value of every column.
+        """
+        inverse = np.linalg.inv(self.matrix)
+        s = laplace(frf.frequency_hz, frf.exponential_rate_1_s)[0]
+        passed = 1 + 2 * np.pi * abs(self.corner_hz) / s
+        filtered = np.exp(s * self.delay_s) * passed ** np.sign(self.corner_hz)
+        shown = np.einsum("ij,jcf->icf", inverse, frf.accelerance) * filtered
+        for axis in self.struck:
+            shown[:, axis::3] *= -1
+        size = np.abs(filtered)
+        variance = np.einsum("ij,jcf->icf", inverse**2, frf.variance) * size**2
+        listed = np.argsort(self.order) + 3 * np.arange(shown.shape[1] // 3)[:, None]
+        shown, variance = shown[:, listed.ravel()], variance[:, listed.ravel()]
+        rate = frf.exponential_rate_1_s + self.window_rate_1_s
+        volume = np.log(np.abs(np.linalg.det(inverse))) + 3 * np.mean(np.log(size))
+        changed = replace(frf, accelerance=shown, variance=variance, exponential_rate_1_s=rate)
+        return changed, 2 * float(volume)
 
     @property
     def asked(self) -> str:
@@ -47,6 +75,8 @@ class ChainFault:
             return f"hits look listed along wrong axes: were those along {', '.join(wrong)}?"
         if self.scaled:
             return self._of_scale
+        if self.delay_s or self.corner_hz or self.window_rate_1_s:
+            return self._of_filter
         exchanged = np.array_equal(np.abs(self.matrix).sum(axis=1), np.ones(3))
         return self._of_axes if exchanged else self._of_turn
 
@@ -67,6 +97,22 @@ class ChainFault:
         force = f", or forces too {other}" if whole else ""
         load = ", or a tool that robot.toml lacks" if whole and self.factor < 1 else ""
         return f"{what} {times} too {way}: units or sensitivity{known}{force}{load}?"
+
+    @property
+    def _of_filter(self) -> str:
+        if self.delay_s:
+            both = ("accelerations", "forces")[:: 1 if self.delay_s > 0 else -1]
+            late = f"{both[0]} come {1e3 * abs(self.delay_s):.2g} ms after {both[1]}"
+            return f"{late}: another trigger, filter or input?"
+        if self.corner_hz:
+            what = "accelerations" if self.corner_hz > 0 else "forces"
+            passed = f"{what} lack what is slow, as by a high-pass at {abs(self.corner_hz):.2g} Hz"
+            return f"{passed}: is that input AC-coupled?"
+        if self.window_rate_1_s > 0:
+            faster = f"all decays look {self.window_rate_1_s:.2g} 1/s faster"
+            return f"{faster}: does the analyser lay an exponential window over these records?"
+        slower = f"all decays look {-self.window_rate_1_s:.2g} 1/s slower"
+        return f"{slower}: was the analyser's exponential window off, or another one?"
 
     @property
     def _of_turn(self) -> str:
@@ -137,6 +183,12 @@ def possible(shown: np.ndarray, within: Tolerances | None) -> Iterator[ChainFaul
         yield ChainFault(rotation)
 
 
+# What one number does to all channels, in units of what a sound chain has or no one would see.
+FILTERS: tuple[Callable[[float], ChainFault], ...] = (
+    lambda by: ChainFault(np.eye(3), delay_s=by * Tolerances().delay_s),
+    lambda by: ChainFault(np.eye(3), corner_hz=0.1 * by),
+    lambda by: ChainFault(np.eye(3), window_rate_1_s=0.1 * by),
+)
 TURNED = _turned()  # all 47 ways to exchange axes and signs
 AGAINST = tuple(ChainFault(np.eye(3), struck=s) for n in (1, 2) for s in combinations(range(3), n))
 EXCHANGED = tuple(ChainFault(np.eye(3), order=order) for order in permutations(range(3)))[1:]

@@ -4,25 +4,26 @@ What was found of the hits before tells which FRFs are to be expected anywhere, 
 is. Where "something else" is likelier than the pose as stated, what that may be competes by
 evidence: another known pose, the setpoint, an angle with the other sign, axes of the sensor
 exchanged, a channel with a wrong scale, a sensor that turned, hits the other way or listed along
-wrong axes, one joint elsewhere, and a wrong angle of an earlier pose, which bent what is expected.
+wrong axes, a delay, a high-pass or a window, one joint elsewhere, and a wrong angle of an earlier
+pose, which bent what is expected.
 Without a simulation, or before the first measurement, nothing is expected.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from planner.campaign.chain_faults import NONE, ChainFault, possible
+from planner.campaign.chain_faults import FILTERS, NONE, ChainFault, possible
 from planner.campaign.chain_question import chain_question
 from planner.campaign.events import Question
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.effects.table import Repertoire
-from planner.fit.expected import LINES, SIZES, ExpectedFrfs, turned
+from planner.fit.expected import LINES, SIZES, ExpectedFrfs
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
@@ -36,10 +37,16 @@ BETTER = 3.0  # times less is left by a mistake that explains them
 # Measured poses before which another structure may explain what nothing known fits: until then
 # the simulation alone tells of the chain, as before the first; no joint is looked for elsewhere.
 SURE = 2
-# A joint is looked for elsewhere by 2^NEAREST to 2^(FARTHEST − 1) times as far as readbacks err.
-NEAREST, FARTHEST = 1, 7
+# What one number describes is looked for at 2 to 64 times what it is, or may be, where nothing is
+# wrong: a joint beside its readback, a delay, the corner of a high-pass and the rate of a window.
+STEPS = 2.0 ** np.arange(1, 7)
+FINE = 0.02  # of where it is likeliest: so finely that is told
 # Measured poses among which one may be wrong unnoticed; of more it stands out
 MOST_BEFORE = 3
+MUCH = 10.0  # times farther than `[hits]` says hits may have struck, and more slanted
+MISSED = (
+    "hits look struck far beside the tool's tip, or slanted: was it that point, and along its axes?"
+)
 FOLLOWED = 3  # mistakes that are fitted, those that seem likeliest at once
 
 
@@ -47,7 +54,8 @@ FOLLOWED = 3  # mistakes that are fitted, those that seem likeliest at once
 class Mistake:
     """Where the robot may be, q (dof,) in rad, and what the chain may show, instead; in words.
 
-    A `rival` is likelier beforehand than others: it need not leave less than what is stated. One
+    `expected` is what else is to be expected of hits that miss by far more than `[hits]` says. A
+    `rival` is likelier beforehand than others: it need not leave less than what is stated. One
     chosen among many that can be told apart is `rarer` by so many nats.
     """
 
@@ -58,6 +66,7 @@ class Mistake:
     fault: ChainFault = NONE
     rival: bool = False
     rarer: float = 0.0
+    expected: ExpectedFrfs | None = None
 
 
 def question(
@@ -76,24 +85,26 @@ def question(
         return None
     expected = ExpectedFrfs(learned.posterior, model.cell.config.modes.band_hz)
     joints = model.cell.robot.joints
-    q = joints.internal([joints_deg])[0]
-    stated, typed = StatedHits(expected, q, frf), _setpoint(model, state, pose, joints_deg)
-    if not stated.doubted and not stated.instead(typed):
+    q, frf = joints.internal([joints_deg])[0], frf.within(expected.band_hz)
+    stated, sure = StatedHits(expected, q, frf), learned.poses >= SURE
+    likely = _setpoint(model, state, pose, joints_deg)
+    likely += [missed(expected, q)] if sure else []
+    if not stated.doubted and not stated.instead(likely):
         return None
-    mistakes = [*typed, *_poses(model, state, pose, joints_deg)]
-    sure = learned.poses >= SURE
-    mistakes += _chains(state, expected, q, frf, sure)
+    mistakes = [*likely, *_poses(model, state, pose, joints_deg)]
     if sure:
         mistakes += opposite(joints, joints_deg)
         mistakes += elsewhere(joints, expected, frf, joints_deg)
+    answered = _called_right(state)
+    chains = (m for m in chain(expected, q, frf, sure) if m.fault.asked not in "".join(answered))
+    mistakes += chains
     fits = stated.instead(mistakes)
     if fits is None or (fits.about != "chain" and StatedHits(expected, fits.q, frf).doubted):
         fits = _earlier(model, state, pose, joints_deg, frf) or fits
     if fits is None and not stated.impossible:
         return None
     if fits is None and not sure:
-        called_right = _called_right(state)
-        return None if called_right else chain_question(model, pose, joints_deg, measured.frf)
+        return None if answered else chain_question(model, pose, joints_deg, measured.frf)
     return _asked(pose, 100 * expected.off(q, frf), fits)
 
 
@@ -131,17 +142,17 @@ class StatedHits:
         value, size = self.density
 
         def shown(one: Mistake) -> tuple[Frf, float]:
-            frf, volume = turned(self.frf, one.fault.matrix, one.fault.struck, one.fault.order)
+            frf, volume = one.fault.undone(self.frf)
             return frf, volume * columns * LINES
 
         def glanced(one: Mistake) -> float:
             frf, volume = shown(one)
-            return self.expected.strange(one.q, frf) + volume - one.rarer
+            return (one.expected or self.expected).strange(one.q, frf) + volume - one.rarer
 
         found = []
         for one in sorted(mistakes, key=glanced, reverse=True)[:FOLLOWED]:
             frf, volume = shown(one)
-            its, left = self.expected.density(one.q, frf)
+            its, left = (one.expected or self.expected).density(one.q, frf)
             gain = its + volume - one.rarer - value
             better = (1 if one.rival else BETTER) * left <= size
             if gain > LOG_ODDS and (better or its + volume > self.strange > value):
@@ -180,29 +191,63 @@ def elsewhere(
 ) -> Iterator[Mistake]:
     """One joint where it explains the hits best, near its angle.
 
-    `joints_deg` (dof,) as stated: degrees, of slides mm. Each joint's place is found by a search
-    along it alone, of the density of hits that are hardly what is expected.
+    `joints_deg` (dof,) as stated: degrees, of slides mm.
     """
     stated, same = np.array(joints_deg), joints.same()
-    steps = 2.0 ** np.arange(NEAREST, FARTHEST)
-    rarer = float(np.log(2 * steps[-1] * len(stated)))
+    axes = np.diag(same)
 
-    def less(by: float, axis: np.ndarray) -> float:
-        return -expected.strange(joints.internal([stated + by * axis])[0], frf)
+    def there(i: int, by: float) -> np.ndarray:
+        return joints.internal([stated + by * axes[i]])[0]
 
-    for i, axis in enumerate(np.diag(same)):
-        tried = np.concatenate([-steps[::-1], [0.0], steps])
-        each = [less(float(by), axis) for by in tried]
-        best = int(np.argmin(each))
-        if tried[best] == 0.0:
-            continue
-        around = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
-        by = minimize_scalar(less, bounds=around, args=(axis,), method="bounded").x
-        if abs(by) < steps[0]:
-            continue
-        there = stated + by * axis
-        what = f"fit another angle far better: is {_either(joints, i, there[i], stated[i])}?"
-        yield Mistake(joints.internal([there])[0], what, about="readback", rarer=rarer)
+    def best(i: int) -> float:
+        return _best(lambda by: -expected.strange(there(i, by), frf))
+
+    for i, by in enumerate(side_by_side(best, range(len(axes)))):
+        if by:
+            angle = stated[i] + by * same[i]
+            what = f"fit another angle far better: is {_either(joints, i, angle, stated[i])}?"
+            yield Mistake(there(i, by), what, about="readback", rarer=_rarer(len(axes)))
+
+
+def chain(expected: ExpectedFrfs, q: np.ndarray, frf: Frf, sure: bool) -> Iterator[Mistake]:
+    """What the tool's chain may show instead at q (dof,) in rad."""
+    if frf.layout.sensors != TOOL.sensors:
+        return
+    within = expected.posterior.tolerances if sure else None
+    for fault in possible(expected.shown(q, frf), within):
+        yield Mistake(q, fault.asked, about="chain", fault=fault)
+    for kind in FILTERS if sure else ():
+
+        def less(by: float, kind: Callable[[float], ChainFault] = kind) -> float:
+            shown, _ = kind(by).undone(frf)
+            return expected.off_by_line(q, shown) if shown.exponential_rate_1_s >= 0 else np.inf
+
+        by = _best(less)
+        if by:
+            fault = kind(by)
+            yield Mistake(q, fault.asked, about="chain", fault=fault, rarer=_rarer(len(FILTERS)))
+
+
+def missed(expected: ExpectedFrfs, q: np.ndarray) -> Mistake:
+    """Hits of another point, or slanted: they take it up as they are, so nothing else is wrong."""
+    return Mistake(q, MISSED, about="chain", rival=True, expected=replace(expected, times=MUCH))
+
+
+def _best(less: Callable[[float], float]) -> float:
+    """By how many units (`STEPS`) hits are explained best; 0: as stated."""
+    tried = np.concatenate([-STEPS[::-1], [0.0], STEPS])
+    best = int(np.argmin([less(float(by)) for by in tried]))
+    if tried[best] == 0.0:
+        return 0.0
+    around = tried[max(best - 1, 0)], tried[min(best + 1, len(tried) - 1)]
+    fine = {"xatol": FINE * abs(tried[best])}
+    by = float(minimize_scalar(less, bounds=around, method="bounded", options=fine).x)
+    return by if abs(by) >= STEPS[0] else 0.0
+
+
+def _rarer(kinds: int) -> float:
+    """Nats that one of so many, at one of many places, is rarer than a thing of its own."""
+    return float(np.log(2 * STEPS[-1] * kinds))
 
 
 def opposite(joints: JointUnits, joints_deg: tuple[float, ...]) -> Iterator[Mistake]:
@@ -254,18 +299,6 @@ def _either(joints: JointUnits, number: int, one: float, other: float) -> str:
     return (
         f"{joints.names[number]} {joints.text(number, one, 2)} or {joints.text(number, other, 2)}"
     )
-
-
-def _chains(
-    state: CampaignState, expected: ExpectedFrfs, q: np.ndarray, frf: Frf, sure: bool
-) -> Iterator[Mistake]:
-    """What the tool's chain may show instead; not again what the engineer called right."""
-    if frf.layout.sensors != TOOL.sensors:
-        return
-    answered, within = _called_right(state), expected.posterior.tolerances if sure else None
-    for fault in possible(expected.shown(q, frf), within):
-        if not any(fault.asked in text for text in answered):
-            yield Mistake(q, fault.asked, about="chain", fault=fault)
 
 
 def _called_right(state: CampaignState) -> tuple[str, ...]:

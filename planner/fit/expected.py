@@ -4,7 +4,6 @@ The posterior of the fit is the prior of one more pose, and is refitted with it:
 measured before, FRFs bend with the springs in a way that no first order follows.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,7 +16,7 @@ from planner.fit.posterior import RobotPosterior
 from planner.fit.structure import RobotStructure
 from planner.frf.frf import Frf
 from planner.inference.covariance import inverse
-from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR
+from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR, Tolerances
 
 LINES, STEPS = 44, 5
 SIZES = (0.2, 0.06, 0.015, 0.004)  # of the pose's own discrepancy, if it is what it is said to be
@@ -43,10 +42,20 @@ class _Informed(RobotStructure):
 
 @dataclass(frozen=True, eq=False)
 class ExpectedFrfs:
-    """Of one more pose, after what `posterior` knows; FRFs in `band_hz` count."""
+    """Of one more pose, after what `posterior` knows; FRFs in `band_hz` count.
+
+    Its hits may be so many `times` farther off and more slanted than is stated.
+    """
 
     posterior: RobotPosterior
     band_hz: tuple[float, float]
+    times: float = 1.0
+
+    @cached_property
+    def tolerances(self) -> Tolerances:
+        """Of the pose."""
+        t, by = self.posterior.tolerances, self.times
+        return replace(t, angle_rad=by * t.angle_rad, offset_m=by * t.offset_m)
 
     @cached_property
     def _structures(self) -> dict[tuple[str, ...], _Informed]:
@@ -74,7 +83,7 @@ class ExpectedFrfs:
     def _misfit(self, q: np.ndarray, frf: Frf, size: float) -> FrfMisfit:
         structure = self._structure(frf.layout.sensors)
         data = FrfData.of(structure.prior, (frf,), q[None], self.band_hz, LINES)
-        return FrfMisfit(structure, data, self.posterior.tolerances, size)
+        return FrfMisfit(structure, data, self.tolerances, size)
 
     def strange(self, q: np.ndarray, frf: Frf) -> float:
         """Log density of an FRF measured at q (dof,) in rad if it is hardly what is expected."""
@@ -98,39 +107,30 @@ class ExpectedFrfs:
 
     def off(self, q: np.ndarray, frf: Frf) -> float:
         """By what share of the FRFs these differ from the expected ones."""
-        misfit = self._misfit(q, frf, STRANGE)
-        m, h = misfit.data.measured, misfit.motion(misfit.structure.mean, None).accelerance
-        away = np.where(m.used, m.accelerance - h, 0.0)
-        return float(np.linalg.norm(away) / np.linalg.norm(np.where(m.used, h, 0.0)))
+        h, measured = self._both(q, frf)
+        return float(np.linalg.norm(measured - h) / np.linalg.norm(h))
+
+    def off_by_line(self, q: np.ndarray, frf: Frf) -> float:
+        """Root mean square of the same, line by line: each counts as much as another."""
+        h, measured = self._both(q, frf)
+        size = np.linalg.norm(h, axis=(1, 2))
+        each = np.linalg.norm(measured - h, axis=(1, 2)) / np.where(size > 0, size, 1.0)
+        return float(np.sqrt(np.mean(each**2)))
 
     def shown(self, q: np.ndarray, frf: Frf) -> np.ndarray:
         """(3s, 3s) real: what the sensors show, as a matrix of what is expected of them.
 
         By least squares over hits and lines, each line as much as another.
         """
+        h, measured = self._both(q, frf)
+        felt = (measured != 0).all(axis=1, keepdims=True)  # hits that all sensors felt
+        size = np.linalg.norm(h, axis=(1, 2), keepdims=True)
+        pair = (np.where(felt, one / size, 0.0)[0] for one in (h, measured))
+        expected, seen = (one.reshape(len(one), -1).view(float) for one in pair)
+        return np.linalg.lstsq(expected.T, seen.T)[0].T
+
+    def _both(self, q: np.ndarray, frf: Frf) -> tuple[np.ndarray, np.ndarray]:
+        """(1, r, c, F) as expected, and as measured; 0 where nothing was."""
         misfit = self._misfit(q, frf, STRANGE)
         m, h = misfit.data.measured, misfit.motion(misfit.structure.mean, None).accelerance
-        used = m.used.all(axis=1, keepdims=True)  # hits that all sensors felt
-        size = np.linalg.norm(h, axis=(1, 2), keepdims=True)
-        expected, measured = (
-            np.where(used, one / size, 0.0)[0].reshape(h.shape[1], -1).view(float)
-            for one in (h, m.accelerance)
-        )
-        return np.linalg.lstsq(expected.T, measured.T)[0].T
-
-
-def turned(
-    frf: Frf, matrix: np.ndarray, struck: Sequence[int] = (), order: Sequence[int] = (0, 1, 2)
-) -> tuple[Frf, float]:
-    """FRF (3, c, F) of which `matrix` (3, 3) was shown, and ln of the Jacobian of one complex value
-    of every column; hits along axes of `struck` go the other way, those listed along x, y, z went
-    along those of `order`."""
-    inverse = np.linalg.inv(matrix)
-    shown = np.einsum("ij,jcf->icf", inverse, frf.accelerance)
-    for axis in struck:
-        shown[:, axis::3] *= -1
-    variance = np.einsum("ij,jcf->icf", inverse**2, frf.variance)
-    listed = np.argsort(order) + 3 * np.arange(shown.shape[1] // 3)[:, None]
-    shown, variance = shown[:, listed.ravel()], variance[:, listed.ravel()]
-    volume = 2 * float(np.log(np.abs(np.linalg.det(inverse))))
-    return replace(frf, accelerance=shown, variance=variance), volume
+        return np.where(m.used, h, 0.0), np.where(m.used, m.accelerance, 0.0)
