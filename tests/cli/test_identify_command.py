@@ -104,41 +104,38 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
     copy = tmp_path / "robot"
     shutil.copytree(robot.parent, copy)
     toml, out = copy / robot.name, copy / "identified.toml"
+    few = part_of(folder, tmp_path / "few", {"P0", "P1", "P2"})
     options = ["--held-out", 0, "--plot", tmp_path / "plots"]
     options += ["--rrd", tmp_path / "found.rrd"]
-    code, said, _ = call("identify", folder, "--robot", toml, "--out", out, *options)
+    code, said, _ = call("identify", few, "--robot", toml, "--out", out, *options)
     said = " ".join(said.split())
     wanted = "joint_a1", "N·m/rad", "SIMULATED", "No pose was held out"
     assert (code, [words for words in wanted if words not in said]) == (0, [])
     assert (tmp_path / "plots" / "map_xx_after.png").stat().st_size > 10_000
     assert (tmp_path / "plots" / "frf_P0.png").stat().st_size > 10_000
     drawn = columns_of(tmp_path / "found.rrd")
-    assert drawn[("/pose/0/measured", "pose")] == list(range(1, POSES + 1))
+    assert drawn[("/pose/0/measured", "pose")] == [1, 2, 3]
     assert ("/figures/map_zz_after/frame", "EncodedImage:blob") in drawn
     assert tomllib.loads(out.read_text())["urdf"] == "identified.urdf"
     Robot.load(out)
 
 
-def test_two_poses_leave_none_to_judge_by(cell, tmp_path):
-    robot, folder, _ = cell
-    few = part_of(folder, tmp_path / "few", {"P0", "P1"})
-    answer = told("identify", few, "--robot", robot, "--no-inertias")
-    assert answer["held_out"]["frac"] is None
-    assert answer["held_out"]["frobenius"] is None
-    assert any("No pose was held out" in remark for remark in answer["remarks"])
-
-
-def test_a_refused_hit_is_told_and_the_rest_is_used(cell, tmp_path):
+def test_a_refused_hit_is_told_and_two_poses_leave_none_to_judge_by(cell, tmp_path):
     robot, folder, _ = cell
     few = part_of(folder, tmp_path / "few", {"P0", "P1"})
     victim = sorted((few / "data").iterdir())[0]
     victim.write_bytes(b"not a recording")
-    code, out, err = call("identify", few, "--robot", robot, "--json")
+    code, out, err = call(
+        "identify", few, "--robot", robot, "--no-extend", "--no-inertias", "--json"
+    )
     assert code == 3
     assert victim.name in err
     answer = json.loads(out)
     assert [entry["file"] for entry in answer["refused"]] == [str(victim.resolve())]
     assert len(answer["parameters"]) == 6
+    assert answer["held_out"]["frac"] is None
+    assert answer["held_out"]["frobenius"] is None
+    assert any("No pose was held out" in remark for remark in answer["remarks"])
 
 
 def part_of(folder, target, poses):

@@ -59,8 +59,8 @@ def session():
 
 @pytest.fixture
 def cell(tmp_path):
-    """A campaign, the robot's truth, and a folder to watch."""
-    robot, campaign_toml, truth = make_cell(tmp_path)
+    """A campaign whose simulation does not learn, which takes time; its truth, a folder to watch."""
+    robot, campaign_toml, truth = make_cell(tmp_path, learns=False)
     campaign = Campaign.new(tmp_path / "cell", robot, campaign_toml)
     (tmp_path / "inbox").mkdir()
     return campaign, truth, tmp_path / "inbox"

@@ -60,12 +60,18 @@ def modes(*arguments: object) -> tuple[int, Any, str]:
     return code, json.loads(out) if out else None, err
 
 
-def make_cell(root: Path) -> tuple[Path, Path, Truth]:
-    """A robot folder, a campaign.toml and a truth that deviates from the simulation."""
+FROZEN = '[fidelity]\nsimulation = "frozen"\n'
+
+
+def make_cell(root: Path, learns: bool = True) -> tuple[Path, Path, Truth]:
+    """A robot folder, a campaign.toml and a truth that deviates from the simulation.
+
+    Fits of a simulation that learns are most of an import's time.
+    """
     robot = make_arm(root / "robot")
     campaign = root / "plan" / "campaign.toml"
     campaign.parent.mkdir()
-    campaign.write_text(campaign_text())
+    campaign.write_text(campaign_text() + ("" if learns else FROZEN))
     truth = load_truth(
         robot, Deviation(seed=3, stiffness=0.12, damping=0.1, inertia=0.04, com_m=0.003)
     )
