@@ -59,7 +59,7 @@ def session():
 
 @pytest.fixture
 def cell(tmp_path):
-    """A campaign whose simulation does not learn, which takes time; its truth, a folder to watch."""
+    """A campaign whose simulation does not learn, which is quick, its truth, a watched folder."""
     robot, campaign_toml, truth = make_cell(tmp_path, learns=False)
     campaign = Campaign.new(tmp_path / "cell", robot, campaign_toml)
     (tmp_path / "inbox").mkdir()
