@@ -17,7 +17,7 @@ from tests.support.outside import call, make_cell, record
 @pytest.fixture
 def cell(tmp_path):
     """A campaign whose folder has a blank, a proposed pose, and what was recorded there."""
-    robot, plan, truth = make_cell(tmp_path)
+    robot, plan, truth = make_cell(tmp_path, learns=False)
     campaign = Campaign.new(tmp_path / "cell 7", robot, plan)
     pose = campaign.next()[0]
     made = record(truth, tmp_path / "made", pose.pose, pose.joints_deg)
