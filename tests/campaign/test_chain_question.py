@@ -11,6 +11,7 @@ from planner.campaign.contradictions import asked_of
 from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
 from planner.demo import NAME, Pool, shipped
+from planner.frf.frf import Frf
 from planner.recording.folder import TABLE
 from tests.support.chain_cases import FAULTS, SLIGHTEST, cases, fault, judged, scaled, shown_by
 from tests.support.outside import call
@@ -49,10 +50,37 @@ def test_faults_of_a_chain_are_asked_about_and_named(tmp_path):
         (ChainFault(np.eye(3)[[1, 0, 2]]), "axes look exchanged: x reads what y should"),
         (ChainFault(np.eye(3), order=(1, 0, 2)), "were those along x along y, y along x?"),
         (ChainFault(np.eye(3), (0, 1, 2), 0.89), "accelerations are 11 % too small"),
+        (ChainFault(np.eye(3), delay_s=2e-3), "accelerations come 2 ms after forces"),
+        (ChainFault(np.eye(3), delay_s=-2e-3), "forces come 2 ms after accelerations"),
+        (
+            ChainFault(np.eye(3), corner_hz=1.5),
+            "accelerations lack what is slow, as by",
+        ),
+        (ChainFault(np.eye(3), corner_hz=-1.5), "forces lack what is slow"),
+        (ChainFault(np.eye(3), window_rate_1_s=3.0), "3 1/s faster: does the analyser lay"),
+        (ChainFault(np.eye(3), window_rate_1_s=-3.0), "3 1/s slower: was the analyser's"),
     ],
 )
 def test_faults_in_words(one, said):
     assert said in one.asked
+
+
+def test_filters_are_undone():
+    """Of an oscillator under an exponential window, by what a delay and a high-pass are there."""
+    hz, rate = np.linspace(2.0, 40.0, 80), 3.0
+    s = 2j * np.pi * hz + rate
+    true = np.eye(3)[..., None] * s**2 / (s**2 + 6 * s + (2 * np.pi * 15) ** 2)
+    flat = np.ones((3, 3, 80))
+    fault = ChainFault(np.eye(3), delay_s=1e-3, corner_hz=1.5)
+    shown = true * np.exp(-1e-3 * s) * s / (s + 2 * np.pi * 1.5)
+    frf = Frf(hz, shown, 1e-4 * flat, flat, (1, 1, 1), (2.0, 40.0), rate)
+    found, volume = fault.undone(frf)
+    np.testing.assert_allclose(found.accelerance, true, rtol=1e-12, atol=1e-15)
+    grown = np.abs(found.accelerance[0, 0] / shown[0, 0])
+    np.testing.assert_allclose(found.variance[0, 0], 1e-4 * grown**2)
+    assert volume == pytest.approx(6 * np.mean(np.log(grown)))
+    windowed = ChainFault(np.eye(3), window_rate_1_s=2.0).undone(frf)[0]
+    assert windowed.exponential_rate_1_s == 5.0
 
 
 def test_every_fault_can_be_told_in_words():
