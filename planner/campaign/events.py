@@ -113,7 +113,7 @@ class Question(msgspec.Struct, frozen=True):
 
     Their FRFs are `off_percent` of the expected ones away from these; `fits` names the pose that
     they fit instead, if there is one. Where hits contradict each other instead, `disagree` are
-    their files. `about` is "chain" where units, signs or axes of the measuring chain look wrong,
+    their files. `about` is "chain" where units, signs, axes or filters of the chain look wrong,
     "readback" where the joint angles are to be typed otherwise, "earlier" where those of the
     measured pose `fits` are; "" else.
     """
