@@ -165,7 +165,7 @@ def test_how_often_is_asked(tmp_path):
     found: dict[str, list[list[tuple[str, str]]]] = {}
     for k in range(CASES):
         arm, make = [*ARMS][k % len(ARMS)], (everyday, harder)[k // len(ARMS) % 2]
-        case, mistaken = make(arm, SEED + k, tmp_path / str(k)), k // len(ARMS) % EACH == 0
+        case, mistaken = make(arm, SEED + k, tmp_path / str(k)), (k // len(ARMS) + 1) % EACH == 0
         with threadpool_limits(1):
             told = answers(case, np.random.default_rng(SEED + k), mistaken)
         for name in told[-1]:
