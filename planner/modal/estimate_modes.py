@@ -7,10 +7,10 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.frf.frf import Frf
 from planner.modal.fit_data import Data, too_few_lines
+from planner.modal.least_squares import WeightedSets, reduced_together, shared_error
 from planner.modal.mode_selection import PoleFit, fit, model, presences, scales, strongest, weakness
 from planner.modal.modes import LEAST_PROBABILITY, ModalModel, Mode
 from planner.modal.plscf import PoleSet, plscf
-from planner.modal.refine import evaluate, shared_error
 from planner.modal.residues import rank_one
 from planner.modal.stabilisation import Diagram, diagram, stable
 
@@ -68,9 +68,8 @@ def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndar
     where their variance is that of another place.
     """
     refined = fitted.refined
-    weight = 2 / fitted.variance[..., part].reshape(data.entries, -1)
-    response = data.response[..., part].reshape(data.entries, -1)
-    point = evaluate(data.lines.part(part), response, weight, refined.poles)
+    own = (both[..., part].reshape(data.entries, -1) for both in (data.response, fitted.variance))
+    point = reduced_together(WeightedSets.of(data.lines.part(part), *own), refined.poles)
     unit = np.sqrt(np.maximum(np.diag(refined.pole_covariance), 1e-300))
     turned = np.outer(unit, unit)
     # Of the information on the best held pole: below, rounding rules

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from planner.modal.fit_data import Data
+from planner.modal.least_squares import refine
 from planner.modal.mode_selection import doubt, excess, falls, presences, running_mean
-from planner.modal.refine import refine
 from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
 from planner.modal.set_search import Places, reestimated_sets
 from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from planner.modal.fit_data import Data
-from planner.modal.refine import Refined, refine
+from planner.modal.least_squares import Refined, refine
 from planner.modal.residues import basis, rank_one, synthesize, unit
 
 # Damping ratios of the atoms with which the error is searched.

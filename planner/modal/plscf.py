@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.modal.refine import proportional
+from planner.modal.least_squares import proportional
 
 # Relative ridge on the normal matrices: a band that leaves part of the circle empty makes them
 # singular to rounding, and only to rounding.

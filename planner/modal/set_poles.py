@@ -13,15 +13,8 @@ import numpy as np
 
 from planner.inference.student import wider
 from planner.modal.fit_data import Data
-from planner.modal.refine import slope_turn
+from planner.modal.least_squares import ReducedFit, WeightedSets, fitted, reduced, slope_turn
 from planner.modal.residues import Lines
-from planner.modal.set_points import (
-    SetData,
-    SetPoints,
-    fitted,
-    set_points,
-    significances,
-)
 
 ROUNDS = 4  # each a Gauss-Newton step of every set and of what is common
 # Farther from the common pole no set's strays: share of its frequency; half bandwidths in damping.
@@ -77,9 +70,9 @@ def fit_sets(
     spread, covariance = np.zeros(2 * m), np.zeros((2 * m, 2 * m))
     response = data.response[:, 0]
     chosen = slice(None) if lines is None else lines
-    part = SetData.of(data.lines.part(chosen), response[:, chosen], variance[:, chosen], sets)
+    part = WeightedSets.of(data.lines.part(chosen), response[:, chosen], variance[:, chosen], sets)
     for _ in range(rounds):
-        point = set_points(part, _complex(own))
+        point = reduced(part, _complex(own))
         spread = _spread(point, own, common)
         moved, covariance = _common(point, own, spread)
         # Longest step of a common pole in one round: half a bandwidth
@@ -104,7 +97,7 @@ def _complex(parts: np.ndarray) -> np.ndarray:
     return real + 1j * imag
 
 
-def _spread(point: SetPoints, own: np.ndarray, common: np.ndarray) -> np.ndarray:
+def _spread(point: ReducedFit, own: np.ndarray, common: np.ndarray) -> np.ndarray:
     """(2m,) variance from set to set beyond what each set's noise explains."""
     if len(own) < 3:
         return np.zeros(common.size)
@@ -134,7 +127,7 @@ def farthest(common: np.ndarray) -> np.ndarray:
     return np.concatenate([np.minimum(FARTHEST_DAMPING * np.abs(real), imag), FARTHEST * imag])
 
 
-def _held(point: SetPoints, spread: np.ndarray) -> np.ndarray:
+def _held(point: ReducedFit, spread: np.ndarray) -> np.ndarray:
     """(I + TN)⁻¹ (k, 2m, 2m) for the spread T and each set's curvature N."""
     one = np.eye(spread.size)
     return np.linalg.solve(
@@ -142,7 +135,9 @@ def _held(point: SetPoints, spread: np.ndarray) -> np.ndarray:
     )
 
 
-def _common(point: SetPoints, own: np.ndarray, spread: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _common(
+    point: ReducedFit, own: np.ndarray, spread: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """What all sets have in common, and its covariance, the sets' own parts integrated out."""
     held = _held(point, spread)
     # N(I + TN)⁻¹ x − (I + NT)⁻¹ g
@@ -155,7 +150,7 @@ def _common(point: SetPoints, own: np.ndarray, spread: np.ndarray) -> tuple[np.n
     return covariance @ right, covariance
 
 
-def _student(point: SetPoints, spread: np.ndarray) -> np.ndarray:
+def _student(point: ReducedFit, spread: np.ndarray) -> np.ndarray:
     """(2m,) factors of sds, since so many sets alone tell how much sets differ.
 
     Student's t over the normal quantile, for that part of the variance which comes from it.
@@ -168,7 +163,7 @@ def _student(point: SetPoints, spread: np.ndarray) -> np.ndarray:
     return np.sqrt(noise + (1 - noise) * wider(freedom) ** 2)
 
 
-def _own(point: SetPoints, x: np.ndarray, common: np.ndarray, spread: np.ndarray) -> np.ndarray:
+def _own(point: ReducedFit, x: np.ndarray, common: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """The sets' most probable poles (k, 2m), shrunk towards the common ones."""
     pull = np.einsum("kab,kb->ka", point.normal, x - common) - point.gradient
     off = np.einsum("kab,kb->ka", _held(point, spread) * spread, pull)
@@ -177,11 +172,11 @@ def _own(point: SetPoints, x: np.ndarray, common: np.ndarray, spread: np.ndarray
 
 
 def _finish(
-    data: SetData, lines: Lines, own: np.ndarray, common: np.ndarray,
+    data: WeightedSets, lines: Lines, own: np.ndarray, common: np.ndarray,
     spread: np.ndarray, covariance: np.ndarray,
 ) -> SetPoles:  # fmt: skip
     m = common.size // 2
-    point = set_points(data, _complex(own))
+    point = reduced(data, _complex(own))
     residue, response = fitted(data, point, _complex(own), lines)
     # Own poles are as sure as the set and the others make them: a set that tells its own poles
     # hardly depends on what is common.
@@ -197,5 +192,5 @@ def _finish(
     factor = _student(point, spread)
     return SetPoles(
         _complex(common), _complex(own), factor[:, None] * covariance * factor, spread, residue,
-        residue_variance, response, significances(point, data.weight, m),
+        residue_variance, response, point.significance(data.weight),
     )  # fmt: skip

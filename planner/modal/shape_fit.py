@@ -204,7 +204,7 @@ class _ShapeProblem:
             [fit_shape(self.entries, residue[:, k], variance[:, k], 0.5).shape for k in self.shaped]
         ).reshape(self.shaped.size, 1, self.entries.points)
         parts = np.concatenate([shape.real, shape.imag], axis=1)
-        free = refined.point.coefficients[:, self.left]
+        free = refined.coefficients[:, self.left]
         both = refined.poles.real, refined.poles.imag
         return self.at(np.concatenate([*both, parts.ravel(), free.ravel()]))
 

@@ -1,0 +1,328 @@
+"""Least squares over poles in the frequency domain, by maximum likelihood.
+
+The residues enter linearly and are eliminated (variable projection, Golub and Pereyra 1973, in
+Kaufman's form), so that Gauss–Newton runs over the poles only. The noise of a line is circular
+complex normal with the stated variance E|δH|²; at the solution the linearised equations give the
+covariance of poles and residues (Pintelon and Schoukens, System Identification, 2012, ch. 9).
+
+Entries whose variance is a level for each times one profile of lines share one matrix: they are a
+set. Sets of few entries are computed together; a loop over them would spend most of its time
+between the sums.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.modal.residues import Lines, Residues, basis, basis_slope, stack, synthesize, unpack
+
+MAX_ITERATIONS = 30
+# Few lines around a resonance are fitted nearly quadratically: the damping may vanish at once.
+# At first, by how much less after a step that gained and more after one that did not, at most.
+DAMPING, LIGHTER, HEAVIER, MOST = 1e-3, 0.1, 10.0, 1e8
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedSets:
+    """Responses by set, weighted: `values` (k, e, 2F) real, then imaginary parts.
+
+    Sets with fewer entries than others are filled up by entries of weight zero; `entries` (k, e)
+    are the indices of what is measured, −1 elsewhere, `weight` (k, e) is 2/level, `root` (k, 1, F)
+    that of the profile by which lines count.
+    """
+
+    lines: Lines
+    entries: np.ndarray
+    values: np.ndarray
+    weight: np.ndarray
+    root: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        lines: Lines,
+        response: np.ndarray,
+        variance: np.ndarray,
+        sets: tuple[np.ndarray, ...] | None = None,
+    ) -> "WeightedSets":
+        """From responses and variance (entries, F), in each set a level times a profile.
+
+        Without `sets` all entries are one, or one each where their profiles differ.
+        """
+        if sets is None:
+            every = np.arange(len(response))
+            sets = (every,) if proportional(variance) else tuple(every[:, None])
+        entries = np.full((len(sets), max(map(len, sets))), -1)
+        for row, chosen in zip(entries, sets, strict=True):
+            row[: len(chosen)] = chosen
+        first = variance[entries[:, :1]]
+        root = np.sqrt(first[..., :1] / first)
+        there = entries >= 0
+        values = stack(response[entries] * root) * there[..., None]
+        weight = np.where(there, 2 / variance[entries, 0], 0.0)
+        return cls(lines, entries, values, weight, root)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedFit:
+    """At poles of each set: residues at their best, and how χ² of the set goes on.
+
+    `coefficients` (k, e, columns); `chi2` (k,), the `gradient` (k, 2m) of half of it and `normal`
+    (k, 2m, 2m) by real, then imaginary parts of the poles; `inverse` (k, columns, columns) of the
+    linear normal matrix for weight one; `turned` (k, columns, 2m): change of coefficients by the
+    slope basis. Of all sets together k is left out where it can be summed.
+    """
+
+    coefficients: np.ndarray
+    chi2: np.ndarray
+    gradient: np.ndarray
+    normal: np.ndarray
+    inverse: np.ndarray
+    turned: np.ndarray
+
+    @property
+    def sensitivity(self) -> np.ndarray:
+        """(k, e, columns, 2m): change of the coefficients with the poles."""
+        turn = slope_turn(self.coefficients, self.turned.shape[-1] // 2)
+        return self.turned[:, None] @ turn
+
+    def significance(self, weight: np.ndarray) -> np.ndarray:
+        """(m,) Wald statistic of each mode's residues: 2 · entries degrees of freedom by chance."""
+        m = self.turned.shape[-1] // 2
+        pair = np.stack([np.arange(m), m + np.arange(m)], axis=1)
+        value = self.coefficients[..., pair]
+        block = np.linalg.pinv(self.inverse[:, pair[:, :, None], pair[:, None, :]], hermitian=True)
+        return np.einsum("ke,kemi,kmij,kemj->m", weight, value, block, value)
+
+
+def reduced(data: WeightedSets, poles: np.ndarray) -> ReducedFit:
+    """Evaluate sets at their poles (k, m), in the plane of the lines."""
+    k, m = poles.shape
+    # At once: values of one column for all poles and sets of a block, to stay in the cache
+    block = max(1, 30_000 // max(1, m * data.lines.x.size))
+    parts = [_block(data, poles[i : i + block], slice(i, i + block)) for i in range(0, k, block)]
+    return ReducedFit(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+
+
+def reduced_together(data: WeightedSets, poles: np.ndarray) -> ReducedFit:
+    """The same where all sets have the same poles (m,)."""
+    found = reduced(data, np.tile(poles, (len(data.entries), 1)))
+    total = (np.sum(part, axis=0) for part in (found.chi2, found.gradient, found.normal))
+    return replace(found, **dict(zip(("chi2", "gradient", "normal"), total, strict=True)))
+
+
+def _block(data: WeightedSets, poles: np.ndarray, which: slice) -> tuple[np.ndarray, ...]:
+    m, values, weight = poles.shape[1], data.values[which], data.weight[which]
+    linear = basis(data.lines, poles)
+    p = linear.shape[-2]
+    both = np.concatenate([linear, basis_slope(data.lines, poles)], axis=-2)
+    both = stack(both * data.root[which])
+    gram = both @ both.transpose(0, 2, 1)
+    norm = np.sqrt(np.maximum(np.einsum("kcc->kc", gram), 1e-300))
+    gram /= norm[:, :, None] * norm[:, None, :]
+    cross = values @ both.transpose(0, 2, 1) / norm[:, None]
+    # Ridge of the residues' normal matrix: keeps poles that coincide apart from rounding
+    inverse = np.linalg.inv(gram[:, :p, :p] + 1e-13 * p * np.eye(p))
+    found = cross[..., :p] @ inverse
+    turned = -inverse @ gram[:, :p, p:]
+    curve = gram[:, p:, p:] + gram[:, p:, :p] @ turned
+    curve *= norm[:, p:, None] * norm[:, None, p:]
+    off = (found @ gram[:, :p, p:] - cross[..., p:]) * norm[:, None, p:] * weight[..., None]
+    chi2 = np.sum(weight * (np.sum(values**2, -1) - np.sum(found * cross[..., :p], -1)), axis=1)
+    coefficients = found / norm[:, None, :p]
+    real, imag = coefficients[..., :m], coefficients[..., m : 2 * m]
+    first, second = off[..., :m], off[..., m:]
+    by_real = np.sum(real * first + imag * second, axis=1)
+    by_imag = np.sum(real * second - imag * first, axis=1)
+    return (
+        coefficients,
+        np.maximum(chi2, 0.0),
+        np.concatenate([by_real, by_imag], axis=-1),
+        _normal(real, imag, weight, curve),
+        inverse / norm[:, :p, None] / norm[:, None, :p],
+        turned * norm[:, None, p:] / norm[:, :p, None],
+    )
+
+
+def _normal(
+    real: np.ndarray, imag: np.ndarray, weight: np.ndarray, curve: np.ndarray
+) -> np.ndarray:
+    """Σ_e w TᵀPT (k, 2m, 2m) for T = [[Re R, −Im R], [Im R, Re R]] of each entry's residues."""
+    m = real.shape[-1]
+    aa, ab = curve[:, :m, :m], curve[:, :m, m:]
+    ba, bb = curve[:, m:, :m], curve[:, m:, m:]
+
+    def sums(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        return (weight[..., None] * one).transpose(0, 2, 1) @ other
+
+    rr, ri, ii = sums(real, real), sums(real, imag), sums(imag, imag)
+    ir = ri.transpose(0, 2, 1)
+    top = rr * aa + ri * ab + ir * ba + ii * bb
+    side = rr * ab - ri * aa + ir * bb - ii * ba
+    low = ii * aa - ir * ab - ri * ba + rr * bb
+    return np.block([[top, side], [side.transpose(0, 2, 1), low]])
+
+
+def proportional(weight: np.ndarray) -> bool:
+    """Whether the weights (entries, F) are a level for each entry times one profile of lines."""
+    product = weight[:, :1] * (weight[:1] / weight[0, 0])
+    return bool(np.all(np.abs(weight - product) <= 1e-12 * product))
+
+
+def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:
+    """(…, 2m, 2m) of (…, columns): how the slope basis combines into ∂H/∂Re λ and ∂H/∂Im λ."""
+    real, imag = coefficients[..., :m], coefficients[..., m : 2 * m]
+    turn = np.zeros((*real.shape[:-1], 2 * m, 2 * m))
+    index = np.arange(m)
+    turn[..., index, index] = turn[..., m + index, m + index] = real
+    turn[..., m + index, index], turn[..., index, m + index] = imag, -imag
+    return turn
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """Poles and residues at the minimum of χ² = Σ 2|H − fit|²/variance, and their covariance."""
+
+    poles: np.ndarray  # (m,) in the plane of the lines
+    residues: Residues  # (outputs, inputs, m)
+    chi2: float
+    degrees: int  # degrees of freedom left
+    pole_covariance: np.ndarray  # (2m, 2m) of real parts (all modes), then imaginary parts
+    residue_variance: np.ndarray  # (outputs, inputs, 2, m) of real and imaginary parts
+    significance: np.ndarray  # (m,) rise of χ² if the mode were left out, poles of others held
+    coefficients: np.ndarray  # (entries, columns) of `residues.basis`
+    inverse: np.ndarray  # (entries, columns, columns) of their normal matrix, poles held
+    sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
+
+
+def refine(
+    lines: Lines,
+    response: np.ndarray,
+    variance: np.ndarray,
+    poles: np.ndarray,
+    allowed: Callable[[np.ndarray], bool],
+) -> Refined:
+    """Minimise the weighted error over poles and residues, starting from `poles`.
+
+    response and variance (outputs, inputs, F), finite, variance > 0, at `lines`; poles (m,),
+    m ≥ 1, in the plane of `lines`; a step to poles that are not `allowed` is shortened.
+    """
+    outputs, inputs, count = response.shape
+    data = WeightedSets.of(lines, response.reshape(-1, count), variance.reshape(-1, count))
+    poles = np.asarray(poles, complex)
+
+    def at(parts: np.ndarray) -> ReducedFit:
+        return reduced_together(data, _complex(parts))
+
+    def objective(parts: np.ndarray) -> ReducedFit | None:
+        return at(parts) if allowed(_complex(parts)) else None
+
+    start = np.concatenate([poles.real, poles.imag])
+    parts, point = _minimised(objective, start, at(start))
+    return _finish(data, _complex(parts), point, (outputs, inputs), count)
+
+
+def _minimised(
+    objective: Callable[[np.ndarray], ReducedFit | None], parts: np.ndarray, point: ReducedFit
+) -> tuple[np.ndarray, ReducedFit]:
+    """Where damped Gauss-Newton steps (Levenberg-Marquardt) lead; None where poles cannot be."""
+    damping = DAMPING
+    for _ in range(MAX_ITERATIONS):
+        # In units in which the diagonal is 1: the damping is relative to it.
+        diagonal = np.diagonal(point.normal)
+        unit = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+        damped = point.normal * np.outer(unit, unit) + damping * np.eye(len(unit))
+        step = -unit * np.linalg.lstsq(damped, unit * point.gradient)[0]
+        tried = objective(parts + step)
+        settled = tried is not None and damping < DAMPING and _still(point, tried, step)
+        if tried is not None and tried.chi2 < point.chi2:
+            parts, point, damping = parts + step, tried, LIGHTER * damping
+        else:
+            damping *= HEAVIER
+        if settled or damping > MOST:
+            break
+    return parts, point
+
+
+def _still(before: ReducedFit, after: ReducedFit, step: np.ndarray) -> bool:
+    """Whether a step changed nothing: far below a standard deviation, or by rounding alone.
+
+    A short step tells nothing as long as damping keeps it short.
+    """
+    sds = np.abs(step) * np.sqrt(np.maximum(np.diag(before.normal), 0.0))
+    return bool(np.max(sds) < 1e-3 or abs(before.chi2 - after.chi2) < 1e-9 * before.chi2)
+
+
+def shared_error(
+    lines: Lines, variance: np.ndarray, refined: Refined, errors: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance of poles (2m, 2m) and variance of residues that errors common to lines add.
+
+    errors (n, outputs, inputs, F): what each of n independent sources, at one standard deviation,
+    adds to the response. The residues' variance (outputs, inputs, 2, m) is that of real and
+    imaginary part.
+    """
+    m, count = refined.poles.size, variance.shape[-1]
+    shape = variance.shape[:2]
+    if not len(errors):
+        return np.zeros((2 * m, 2 * m)), np.zeros((*shape, 2, m))
+    p = refined.coefficients.shape[1]
+    poles = refined.poles
+    columns = np.concatenate([basis(lines, poles), basis_slope(lines, poles)])
+    both = np.concatenate([columns.real, columns.imag], axis=1)
+    weighted = (errors * 2 / variance).reshape(len(errors), -1, count)
+    cross = np.concatenate([weighted.real, weighted.imag], axis=-1) @ both.T
+    turn = slope_turn(refined.coefficients, m)
+    gradient = np.einsum("eka,nek->na", turn, cross[..., p:])
+    gradient += np.einsum("eka,nek->na", refined.sensitivity, cross[..., :p])
+    change = gradient @ refined.pole_covariance
+    moved = np.einsum("ekl,nel->nek", refined.inverse, cross[..., :p])
+    moved += np.einsum("eka,na->nek", refined.sensitivity, change)
+    residue = np.sum(moved[..., : 2 * m] ** 2, axis=0)
+    return change.T @ change, residue.reshape(*shape, 2, m)
+
+
+def _complex(parts: np.ndarray) -> np.ndarray:
+    real, imag = np.split(parts, 2)
+    return real + 1j * imag
+
+
+def _finish(
+    data: WeightedSets, poles: np.ndarray, point: ReducedFit, shape: tuple[int, int], count: int
+) -> Refined:
+    m, entries, p = poles.size, shape[0] * shape[1], point.inverse.shape[-1]
+    covariance = np.linalg.pinv(point.normal, hermitian=True)
+    coefficients = point.coefficients.reshape(-1, p)
+    inverse = (point.inverse[:, None] / data.weight[..., None, None]).reshape(-1, p, p)
+    sensitivity = point.sensitivity.reshape(-1, p, 2 * m)
+    spread = np.einsum("eka,ab,ekb->ek", sensitivity, covariance, sensitivity)
+    # Of rounding, where lines without noise leave curvatures almost singular, variances below 0
+    variance = np.maximum(np.einsum("ekk->ek", inverse) + spread, 0.0)
+    return Refined(
+        poles,
+        unpack(coefficients.reshape(*shape, p), m),
+        float(point.chi2),
+        2 * count * entries - entries * p - 2 * m,
+        covariance,
+        variance[:, : 2 * m].reshape(*shape, 2, m),
+        point.significance(data.weight),
+        coefficients,
+        inverse,
+        sensitivity,
+    )
+
+
+def fitted(
+    data: WeightedSets, point: ReducedFit, poles: np.ndarray, lines: Lines
+) -> tuple[np.ndarray, np.ndarray]:
+    """Residues (entries, m) and the responses (entries, F) that they make at `lines`."""
+    m, entries = poles.shape[1], int(np.max(data.entries)) + 1
+    residue, response = np.zeros((entries, m), complex), np.zeros((entries, lines.x.size), complex)
+    for k, own in enumerate(poles):
+        there = data.entries[k] >= 0
+        found = unpack(point.coefficients[k, there], m)
+        residue[data.entries[k, there]] = found.residue
+        made = Residues(found.residue[:, None], found.rest[:, None])
+        response[data.entries[k, there]] = synthesize(lines, own, made)[:, 0]
+    return residue, response
