@@ -10,7 +10,7 @@ from planner.dataset.measure import DEFAULT_BAND_HZ, MeasuredPose
 from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.dataset.store import user_store
 from planner.errors import PlannerError, RefusedError, RefusedFile
-from planner.frf.exported import exported
+from planner.frf.exported import exported, places
 from planner.frf.matrix import FrfMatrix, matrix_of
 from planner.recording.geometry import read_geometry
 from planner.recording.points import ANYWHERE
@@ -188,17 +188,5 @@ def _of_one_point(frfs: Sequence[FrfRecord]) -> bool:
 
 def _pairs(frfs: Sequence[FrfRecord]) -> set[tuple[str, int, str, int]]:
     """Node and direction, without its sign, of every response and of its hit."""
-    found = set()
-    for record in frfs:
-        none = ("",) * len(record.values)
-        found |= {
-            (felt, abs(along), hit, abs(struck))
-            for felt, along, hit, struck in zip(
-                record.response_node or none,
-                record.response_direction,
-                record.reference_node or none,
-                record.reference_direction,
-                strict=True,
-            )
-        }
-    return found
+    every = (place for record in frfs for place in places(record))
+    return {(felt, abs(along), hit, abs(struck)) for felt, along, hit, struck in every}

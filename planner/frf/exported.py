@@ -1,14 +1,116 @@
-"""FRFs that an analyser exported, as the FRF matrix of a pose."""
+"""FRFs of files with their places: what is checked before any of them is used; a pose's matrix."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from planner.errors import RefusedError
+from planner.errors import PlannerError, RefusedError
 from planner.frf.frf import Frf
-from planner.frf.labelled import LabelledFrf, labelled_frfs
+from planner.frf.quantities import convert
 from planner.recording.points import SENSOR, TCP, TOOL, UNTOLD, Layout
 from planner.recording.records import AXES, FrfRecord
+
+# What a record states of each of its FRFs.
+OF_EACH = "response_direction", "reference_direction", "response_node", "reference_node"
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledFrf:
+    """One FRF at lines above 0 Hz, and where it was felt and hit.
+
+    Nodes are "" where the format knows none. `values` and `coherence` (F,) are along positive axes
+    (0, 1, 2 for x, y, z).
+    """
+
+    felt: tuple[str, int]
+    hit: tuple[str, int]
+    values: np.ndarray
+    coherence: np.ndarray
+
+
+def labelled_frfs(
+    records: Sequence[FrfRecord],
+    quantity: str,
+    refusal: type[PlannerError],
+    nodes: frozenset[str] | None = None,
+) -> tuple[np.ndarray, list[LabelledFrf]]:
+    """Lines (F,) above 0 Hz that all records share, and every FRF as `quantity` in SI units.
+
+    Raises `refusal`, in one sentence, where units, lines or directions do not allow it. With
+    `nodes`, FRFs between other nodes, or along no axis, are left out instead.
+    """
+    for record in records:
+        if record.quantity == "unknown" or not record.unit:
+            raise refusal(
+                f"{record.source}: it is not stated whether these FRFs are accelerance, mobility "
+                f"or receptance, and in which unit; label them."
+            )
+    frequency = common_lines(records, refusal)
+    keep, found = frequency > 0, []
+    for record in records:
+        values = convert(frequency[keep], record.values[:, keep], record.quantity, quantity)
+        for k, (felt, i, hit, j) in enumerate(places(record)):
+            along_axes = 1 <= abs(i) <= 3 and 1 <= abs(j) <= 3
+            if nodes is not None and not (along_axes and {felt, hit} <= nodes):
+                continue
+            if not along_axes:
+                raise refusal(
+                    f"{record.source}: FRF {k + 1} does not state its directions; label them."
+                )
+            turned = np.sign(i) * np.sign(j) * values[k]
+            ends = (felt, abs(i) - 1), (hit, abs(j) - 1)
+            found.append(LabelledFrf(*ends, turned, record.coherence[k][keep]))
+    return frequency[keep], found
+
+
+def common_lines(records: Sequence[FrfRecord], refusal: type[PlannerError]) -> np.ndarray:
+    """The frequency lines that all records have; `refusal` where they differ."""
+    first = records[0]
+    lines = np.asarray(first.frequency_hz, float)
+    for record in records[1:]:
+        other = np.asarray(record.frequency_hz, float)
+        # Relative, of one line in two files: headers state the spacing to five digits or so.
+        if other.size != lines.size or not np.allclose(other, lines, rtol=1e-4, atol=1e-9):
+            if record.source == first.source:
+                raise refusal(f"{record.source} mixes frequency lines; export one grid.")
+            raise refusal(
+                f"{record.source} has other frequency lines than {first.source}; export one grid."
+            )
+    return lines
+
+
+def joined(records: Sequence[FrfRecord]) -> FrfRecord:
+    """FRFs of several files as if of the first. Raises RefusedError where they do not go together.
+
+    For files that state no directions: what differs are rows.
+    """
+    first = records[0]
+    common_lines(records, RefusedError)
+    other = next((r for r in records if (r.quantity, r.unit) != (first.quantity, first.unit)), None)
+    if other is not None:
+        raise RefusedError(
+            f"{other.source} holds FRFs of kind {other.quantity}, {first.source} of kind "
+            f"{first.quantity}; name files of one kind."
+        )
+    return replace(
+        first,
+        values=np.concatenate([record.values for record in records]),
+        coherence=np.concatenate([record.coherence for record in records]),
+        remarks=tuple(dict.fromkeys(told for record in records for told in record.remarks)),
+        simulated=any(record.simulated for record in records),
+        **{name: tuple(chain(*(getattr(r, name) for r in records))) for name in OF_EACH},
+    )
+
+
+def places(record: FrfRecord) -> list[tuple[str, int, str, int]]:
+    """Node and direction where each FRF was felt, then where it was hit; nodes "" where none is."""
+    none = ("",) * len(record.values)
+    felt = record.response_node or none, record.response_direction
+    hit = record.reference_node or none, record.reference_direction
+    return list(zip(*felt, *hit, strict=True))
 
 
 def from_records(records: tuple[FrfRecord, ...], window_rate_1_s: float = 0.0) -> Frf:

@@ -1,12 +1,12 @@
 """FRFs between any points: a matrix of responses × references, as complete as it was measured."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.errors import InputError, RefusedError
-from planner.frf.labelled import common_lines
+from planner.frf.exported import common_lines, places
 from planner.frf.quantities import DERIVATIVE, convert
 from planner.recording.dof import Dof
 from planner.recording.records import FrfRecord
@@ -50,6 +50,23 @@ class FrfMatrix:
         found = ((self.index(d), i) for i, d in enumerate(self.references) if d in self.responses)
         return tuple((o, i) for o, i in found if self.measured[o, i])
 
+    @property
+    def hit(self) -> bool:
+        """Whether points were hit one after the other (a roving hammer), and few of them felt."""
+        return len(self.responses) < len(self.references)
+
+    @property
+    def roved(self) -> "FrfMatrix":
+        """The same with the longer side as responses, be they felt or hit."""
+        if not self.hit:
+            return self
+        values, coherence = (np.swapaxes(v, 0, 1) for v in (self.accelerance, self.coherence))
+        ended = self.ended and self.ended.roved
+        return replace(
+            self, responses=self.references, references=self.responses, accelerance=values,
+            coherence=coherence, ended=ended,
+        )  # fmt: skip
+
     def index(self, dof: Dof) -> int:
         """Which response a degree of freedom is."""
         return self.responses.index(dof)
@@ -70,7 +87,8 @@ def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfM
         kind, known = _kind(record, quantity, remarks)
         scaled &= known
         values = convert(frequency[keep], record.values[:, keep], kind, "accelerance")
-        for k, (felt, hit) in enumerate(_places(record)):
+        for k, one in enumerate(places(record)):
+            felt, hit = Dof.of_uff(*one[:2]), Dof.of_uff(*one[2:])
             if not np.any(values[k]):
                 dead.append(f"{felt} hit at {hit}")
                 continue
@@ -116,18 +134,6 @@ def by_number(dof: Dof) -> tuple[int, int, str, int]:
     """Order of degrees of freedom: numbers by size, then names; x before y before z."""
     digits = dof.node.lstrip("-").isdigit()
     return not digits, int(dof.node) if digits else 0, dof.node, abs(dof.number)
-
-
-def _places(record: FrfRecord) -> list[tuple[Dof, Dof]]:
-    ends = (
-        (record.response_node, record.response_direction),
-        (record.reference_node, record.reference_direction),
-    )
-    felt, hit = (
-        [Dof.of_uff(n, d) for n, d in zip(nodes, directions, strict=True)]
-        for nodes, directions in ends
-    )
-    return list(zip(felt, hit, strict=True))
 
 
 def _kind(record: FrfRecord, quantity: str | None, remarks: list[str]) -> tuple[str, bool]:

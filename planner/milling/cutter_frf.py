@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.frf.labelled import labelled_frfs
+from planner.frf.exported import labelled_frfs
 from planner.frf.quantities import convert
 from planner.milling.cut import Cut
 from planner.recording.file_names import read_frfs

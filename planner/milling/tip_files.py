@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from planner.errors import InputError
-from planner.frf.labelled import labelled_frfs
+from planner.frf.exported import labelled_frfs
 from planner.frf.synthesis import pole
 from planner.milling.coupling import TipReceptance
 from planner.milling.cutter_frf import CutterFrf, read_npz, row_of

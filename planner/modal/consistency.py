@@ -151,7 +151,7 @@ def _reciprocity(
 ) -> Reciprocity:
     # The heights of the peaks; the lines themselves differ wherever frequencies drift.
     height = found.fit.residue[:, modes] / np.abs(found.fit.poles[modes].real)
-    entry = {pair: k for k, pair in enumerate(zip(found.rows, found.columns, strict=True))}
+    entry = found.entries
     one, other = height[entry[o, i]], height[entry[p, j]]
     size = np.linalg.norm(one) * np.linalg.norm(other)
     ratio = float(np.real(np.vdot(one, other)) / max(np.linalg.norm(one) ** 2, 1e-300))

@@ -10,9 +10,8 @@ from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.least_squares import WeightedSets, reduced_together, shared_error
 from planner.modal.mode_selection import PoleFit, fit, model, presences, scales, strongest, weakness
 from planner.modal.modes import LEAST_PROBABILITY, ModalModel, Mode
-from planner.modal.plscf import PoleSet, plscf
+from planner.modal.plscf import Diagram, PoleSet, diagram, plscf, stable
 from planner.modal.residues import rank_one
-from planner.modal.stabilisation import Diagram, diagram, stable
 
 # Of the band's span, taken away above, then below; at most half of what lies beside a mode there,
 # so that it is judged by lines that hold it.

@@ -35,12 +35,10 @@ class Sides:
     @classmethod
     def of(cls, matrix: FrfMatrix, found: MatrixPoles, modes: np.ndarray) -> "Sides":
         """From residues of the modes (indices)."""
-        values = found.fit.residue[:, modes] * 2j * found.fit.poles[modes].imag
-        table = np.full((*matrix.measured.shape, modes.size), np.nan + 0j)
+        values, side = found.fit.residue[:, modes] * 2j * found.fit.poles[modes].imag, matrix.roved
+        table = np.full((*side.measured.shape, modes.size), np.nan + 0j)
         table[found.rows, found.columns] = values
-        if len(matrix.responses) >= len(matrix.references):
-            return cls(matrix.responses, matrix.references, table, False)
-        return cls(matrix.references, matrix.responses, np.swapaxes(table, 0, 1), True)
+        return cls(side.responses, side.references, table, matrix.hit)
 
     @property
     def driving(self) -> tuple[tuple[int, int], ...]:

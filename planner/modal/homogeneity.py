@@ -3,9 +3,14 @@
 A linear structure has one FRF however hard it is hit (homogeneity; Worden & Tomlinson,
 Nonlinearity in Structural Dynamics, 2001, section 2.3). Friction, play and hardening make its
 frequencies and damping depend on the level.
+
+Where the level says nothing of a hit, hits shared out among the levels at random differ from level
+to level as much as they really do (Anderson 2001, PERMANOVA): nothing is assumed of how large their
+scatter is.
 """
 
 from dataclasses import dataclass
+from math import factorial, prod
 
 import numpy as np
 
@@ -13,7 +18,6 @@ from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.frf.spectra import Windows, transform
-from planner.modal import exchangeable
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac
 from planner.modal.modes import ModalModel, Mode
@@ -152,10 +156,10 @@ def _chance(
         across = [frfs[axes == other].mean(axis=0) for other in set(axes.tolist()) - {axis}]
         off = frfs[own] - frfs[own].mean(axis=0)
         seen = untilted(off, np.array(across)) if across else off
-        possible *= exchangeable.ways(level[own])
-        real, random = exchangeable.between(seen.view(float), level[own], SHARED_OUT, rng)
+        possible *= ways(level[own])
+        real, random = between(seen.view(float), level[own], SHARED_OUT, rng)
         measured, shared = measured + real, shared + random
-    return exchangeable.chance(measured, shared) if 1 / possible <= CHANCE else None
+    return chance(measured, shared) if 1 / possible <= CHANCE else None
 
 
 def _level(
@@ -187,3 +191,36 @@ def _same(mode: Mode, found: tuple[Mode, ...]) -> Mode | None:
         and mac(other.shape, mode.shape) > 0.5
     ]
     return min(near, key=lambda other: abs(other.frequency_hz - mode.frequency_hz), default=None)
+
+
+def ways(labels: np.ndarray) -> float:
+    """Ways to share members out among the groups `labels` (n,) that make a difference."""
+    sizes = np.bincount(labels)
+    sizes = sizes[sizes > 0]
+    orders = prod(factorial(int(n)) for n in np.bincount(sizes))  # groups of equal size
+    return factorial(len(labels)) / prod(factorial(int(n)) for n in sizes) / orders
+
+
+def between(
+    values: np.ndarray, labels: np.ndarray, draws: int, rng: np.random.Generator
+) -> tuple[float, np.ndarray]:
+    """n/2 ln of all scatter of values (n, m) over that within groups: as it is, and at random.
+
+    Sums over independent sets of members say more; the chance of so much is `chance`.
+    """
+    off = values - values.mean(axis=0)
+    gram = off @ off.T
+    whole = max(float(np.trace(gram)), np.finfo(float).tiny)
+    orders = rng.permuted(np.tile(np.arange(len(off)), (draws, 1)), axis=1)
+    orders = np.concatenate([np.arange(len(off))[None], orders])
+    within = np.full(len(orders), whole)
+    for label in np.unique(labels):
+        own = orders[:, labels == label]
+        within -= gram[own[:, :, None], own[:, None, :]].sum(axis=(1, 2)) / own.shape[1]
+    told = -len(off) / 2 * np.log(np.maximum(within, 1e-12 * whole) / whole)
+    return float(told[0]), told[1:]
+
+
+def chance(measured: float, shared: np.ndarray) -> float:
+    """Of a sum as large as `measured`, from those shared out at random (draws,)."""
+    return (1 + int(np.count_nonzero(shared >= measured - 1e-9))) / (1 + len(shared))

@@ -77,10 +77,8 @@ def modes_of_matrix(
 
 def _put_right(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> MatrixPoles:
     """With residues of turned points as they should be; odd ones count for nothing."""
-    felt, hit = matrix.responses, matrix.references
-    named = [(felt[o], hit[i]) for o, i in zip(found.rows, found.columns, strict=True)]
-    if len(felt) < len(hit):
-        named = [(roved, stayed) for stayed, roved in named]
+    roved, stayed = matrix.roved.responses, matrix.roved.references
+    named = [(roved[r], stayed[c]) for r, c in zip(found.rows, found.columns, strict=True)]
     turned = [(r in checks.turned_rows) != (s in checks.turned) for r, s in named]
     sign = np.where(turned, -1.0, 1.0)[:, None]
     # A residue that does not fit the others counts with so many times its variance.
@@ -98,17 +96,16 @@ def _points(
     References whose column does not go with their row are points of their own, behind the others.
     A point that was only hit is among them where a driving point ties its size to the rest.
     """
+    responses, references = np.array(list(found.entries)).T
     tied = [d for d in matrix.references if d not in checks.untied] if checks.driving else []
-    seen = {matrix.responses[o] for o in found.rows}
+    seen = {matrix.responses[o] for o in responses}
     dofs = tuple(sorted({*seen, *tied}, key=by_number))
     apart = [d for d in matrix.references if d not in tied]
     place = {dof: k for k, dof in enumerate(dofs)}
     hit_at = place | {dof: len(dofs) + k for k, dof in enumerate(apart)}
-    felt = np.array([place[matrix.responses[o]] for o in found.rows])
-    hit = np.array([hit_at[matrix.references[i]] for i in found.columns])
-    roved = felt, hit
-    if len(matrix.responses) < len(matrix.references):
-        roved = hit, felt
+    felt = np.array([place[matrix.responses[o]] for o in responses])
+    hit = np.array([hit_at[matrix.references[i]] for i in references])
+    roved = (hit, felt) if found.hit else (felt, hit)
     return dofs, Entries(*roved, len(dofs) + len(apart))
 
 
@@ -137,7 +134,8 @@ def _vectors(matrix: FrfMatrix, found: MatrixPoles, modes: list[int]) -> list[Ei
     columns fall apart into groups that share no entry: nothing ties their scales.
     """
     felt, hit = len(matrix.responses), len(matrix.references)
-    entries = Entries(found.rows, felt + found.columns, felt + hit)
+    responses, references = np.array(list(found.entries)).T
+    entries = Entries(responses, felt + references, felt + hit)
     group, _ = entries.groups
     if len(np.unique(group[entries.rows])) > 1:
         return [None] * len(modes)

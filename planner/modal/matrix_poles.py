@@ -8,9 +8,8 @@ from planner.frf.matrix import FrfMatrix
 from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.matrix_selection import first_variance, judged, select_modes
-from planner.modal.plscf import PoleSet, plscf, row_errors
+from planner.modal.plscf import Diagram, PoleSet, diagram, plscf, row_errors, stable
 from planner.modal.set_poles import SetPoles
-from planner.modal.stabilisation import Diagram, diagram, stable
 
 MARGIN = 0.05  # of the band, beyond its edges
 # Of rows that fit the denominator of all the worse than the median by more than this, the weight is
@@ -22,6 +21,8 @@ ODD, REWEIGHED, LEAST_ROWS = 3.0, 3, 6
 class MatrixPoles:
     """Poles common to all FRFs and what they came from; entries by `rows` and `columns`.
 
+    Rows are the points of the longer side (which roved), `hit` or felt; columns those that stayed.
+
     `fit.residue` (e, m) of each entry; `scale` (m,) by which noise around a mode exceeds its
     variance; `weak` (m,) as `mode_selection.weakness`, `presence` (m,) share of the response.
     """
@@ -31,11 +32,17 @@ class MatrixPoles:
     diagram: Diagram
     rows: np.ndarray
     columns: np.ndarray
-    sets: tuple[np.ndarray, ...]
     scale: np.ndarray
     weak: np.ndarray
     presence: np.ndarray
     order: int
+    hit: bool
+
+    @property
+    def entries(self) -> dict[tuple[int, int], int]:
+        """Which entry is that of a response and a reference (indices)."""
+        pairs = zip(self.rows.tolist(), self.columns.tolist(), strict=True)
+        return {pair[::-1] if self.hit else pair: e for e, pair in enumerate(pairs)}
 
     @property
     def fit_error(self) -> float:
@@ -49,6 +56,7 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
 
     Raises RefusedError where too few lines lie in the band.
     """
+    hit, matrix = matrix.hit, matrix.roved
     f = matrix.frequency_hz
     chosen = (f >= band_hz[0] / (1 + MARGIN)) & (f <= band_hz[1] * (1 + MARGIN))
     # Least lines.
@@ -65,21 +73,20 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     if not start.size:
         return None
     start = data.with_one_above(start)
-    sets = _sets(matrix, rows, columns)
-    felt = len(matrix.responses) >= len(matrix.references)
-    places = (rows, columns) if felt else (columns, rows)
-    fit, variance = select_modes(data, sets, first_variance(data, start), start, places)
+    # Entries measured together: those of one node of the side that roved
+    nodes = np.array([matrix.responses[k].node for k in rows])
+    sets = tuple(np.flatnonzero(nodes == node) for node in dict.fromkeys(nodes.tolist()))
+    fit, variance = select_modes(data, sets, first_variance(data, start), start, (rows, columns))
     if not fit.poles.size:
         return None
     scale, weak, presence = judged(data, fit, variance)
-    return MatrixPoles(data, fit, found, rows, columns, sets, scale, weak, presence, orders[-1])
+    told = scale, weak, presence, orders[-1], hit
+    return MatrixPoles(data, fit, found, rows, columns, *told)
 
 
 def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Diagram]:
     """Poles of every model order, from the rows that hold all of the references used."""
     table, measured = matrix.accelerance[..., chosen], matrix.measured
-    if len(matrix.responses) < len(matrix.references):
-        table, measured = np.swapaxes(table, 0, 1), measured.T
     columns = _references(measured)
     complete = np.all(measured[:, columns], axis=1)
     block = table[complete][:, columns]
@@ -117,11 +124,3 @@ def _references(measured: np.ndarray) -> np.ndarray:
         if complete > size:
             best, size = columns[:count], complete
     return np.array(best)
-
-
-def _sets(matrix: FrfMatrix, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Entries measured together: those of one node of the side that roved (the longer one)."""
-    felt = len(matrix.responses) >= len(matrix.references)
-    dofs, index = (matrix.responses, rows) if felt else (matrix.references, columns)
-    nodes = np.array([dofs[k].node for k in index])
-    return tuple(np.flatnonzero(nodes == node) for node in dict.fromkeys(nodes.tolist()))

@@ -17,9 +17,8 @@ import scipy.signal
 from planner.errors import RefusedError
 from planner.modal.mac import mac, phase_collinearity, phase_deviation_deg
 from planner.modal.modes import Mode
-from planner.modal.plscf import PoleSet
+from planner.modal.plscf import Diagram, Line, PoleSet, diagram, stable
 from planner.modal.residues import realign
-from planner.modal.stabilisation import Diagram, Line, diagram, stable
 
 MAX_ORDER = 60
 BLOCKS = (12, 80)  # least and most lags

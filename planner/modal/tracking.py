@@ -17,14 +17,16 @@ import numpy as np
 
 from planner.inference import triangular
 from planner.inference.assignment import least_cost
-from planner.modal.mac import match_gain, unexpected_cost
+from planner.modal.mac import mac_matrix
 from planner.modal.mode_matching import best, chances, mixture, name_chances
 from planner.modal.modes import Mode
 
 # Log frequency: how far an unfitted guide may be off, by how much its error varies over the
 # workspace, and what is left between neighbours; the distance over which it varies (per √d).
 OFFSET_SD, VARIATION_SD, LOCAL_SD, LENGTH = 0.25, 0.08, 0.01, 0.4
-MISSING_COST, SHAPE_WEIGHT = 9.0, 8.0
+# Odds, in units of −2 log likelihood, of an expected mode that was not found and of a measured
+# mode that nobody expects; and the weight of 1 − MAC beside squared standard deviations.
+MISSING_COST, UNEXPECTED_COST, SHAPE_WEIGHT = 9.0, 9.0, 8.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +151,11 @@ def _first(modes: Sequence[Mode], expected_hz: np.ndarray, shape: np.ndarray) ->
     if not len(modes) or not len(order):
         return chosen
     ranked = np.argsort([mode.frequency_hz for mode in modes], kind="stable")
-    sd = np.full(len(order), OFFSET_SD)
-    gain = match_gain([modes[j] for j in ranked], expected_hz[order], shape[order], sd)
+    log_hz, own = _log_hz([modes[j] for j in ranked])
+    cost = (log_hz - np.log(expected_hz[order, None])) ** 2 / (OFFSET_SD**2 + own**2)
+    measured = np.array([modes[j].shape for j in ranked])
+    cost += SHAPE_WEIGHT * (1 - mac_matrix(shape[order], measured))
+    gain = MISSING_COST + _unexpected_cost([modes[j] for j in ranked]) - cost
     found = best(gain, ordered=True)
     chosen[order[found >= 0]] = ranked[found[found >= 0]]
     return chosen
@@ -216,8 +221,7 @@ class _Belief:
         k = self.log_hz.shape[1]
         if not len(modes):
             return np.zeros((k, 0))
-        log_hz = np.log([mode.frequency_hz for mode in modes])
-        own = np.nan_to_num([mode.frequency_sd_hz / mode.frequency_hz for mode in modes])
+        log_hz, own = _log_hz(modes)
         spread = self.sd[i][:, None] ** 2 + own**2
         # The sharper the expectation, the less likely is a stranger to meet it.
         # Typical sd of log frequency, for which the cost of a missing mode was chosen
@@ -233,8 +237,20 @@ class _Belief:
         # Of a mode whose shape was not said: as directions without preference are on average.
         alike = np.where(known, alike, 1 / 3)
         cost += SHAPE_WEIGHT * (1 - alike)
-        spurious = np.array([unexpected_cost(mode) for mode in modes])
-        return np.where(np.isfinite(cost), MISSING_COST + spurious - cost, -np.inf)
+        gain = MISSING_COST + _unexpected_cost(modes) - cost
+        return np.where(np.isfinite(cost), gain, -np.inf)
+
+
+def _log_hz(modes: Sequence[Mode]) -> tuple[np.ndarray, np.ndarray]:
+    """Log frequencies and their sds."""
+    hz, sd = np.array([(mode.frequency_hz, mode.frequency_sd_hz) for mode in modes]).T
+    return np.log(hz), np.nan_to_num(sd / hz)
+
+
+def _unexpected_cost(modes: Sequence[Mode]) -> np.ndarray:
+    """Of measured modes that nobody expects: the higher, the surer they are modes."""
+    chance = np.clip([mode.probability for mode in modes], 1e-3, 1 - 1e-3)
+    return UNEXPECTED_COST + 2 * np.log(chance / 0.9)
 
 
 def _kriged(

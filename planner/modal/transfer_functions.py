@@ -14,9 +14,8 @@ from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.mode_selection import presences
 from planner.modal.modes import ModalModel, Mode
-from planner.modal.plscf import plscf
+from planner.modal.plscf import Line, diagram, plscf, stable
 from planner.modal.residues import lsfd, rank_one
-from planner.modal.stabilisation import Line, diagram, stable
 from planner.recording.records import FrfRecord
 
 MAX_ORDER = 40

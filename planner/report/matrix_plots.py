@@ -96,10 +96,7 @@ def driving_figure(matrix: FrfMatrix, found: MatrixModes, title: str = "") -> Fi
     pairs = matrix.driving[:4]
     figure, grid = panels((12.0, 2.6 * len(pairs) + 1.2), title, len(pairs))
     data = found.found.data
-    places = {
-        (int(o), int(i)): e
-        for e, (o, i) in enumerate(zip(found.found.rows, found.found.columns, strict=True))
-    }
+    places = found.found.entries
     for panel, (o, i) in zip(grid[:, 0], pairs, strict=True):
         measured, fitted = matrix.accelerance[o, i], found.found.fit.fitted[places[o, i]]
         magnitude(panel, matrix.frequency_hz, measured, color=MEASURED, lw=1.0, label="measured")

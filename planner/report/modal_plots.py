@@ -17,7 +17,7 @@ from planner.modal.matrix_modes import MatrixModes
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel
 from planner.modal.operating import OperatingModes
-from planner.modal.stabilisation import Diagram, stable
+from planner.modal.plscf import Diagram, stable
 from planner.report.plot_marks import (
     AXES,
     COLUMNS,

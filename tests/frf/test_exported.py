@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError, RefusedError
-from planner.frf.exported import from_records
-from planner.frf.labelled import labelled_frfs
+from planner.frf.exported import from_records, labelled_frfs
 from planner.frf.matrix import matrix_of
 from planner.milling import cutter_frf, tip_files
 from planner.milling.tool import Point, Tool
