@@ -145,39 +145,20 @@ def _gains(found: RowPrediction, nodes: Sequence[Node]) -> np.ndarray:
     """(n, n) fall of −2 log likelihood where two nodes are exchanged, −∞ where they can't be."""
     gains = np.full((len(nodes), len(nodes)), -np.inf)
     for directions in {node.directions for node in nodes}:
-        index = np.array([k for k, node in enumerate(nodes) if node.directions == directions])
-        gains[np.ix_(index, index)] = _gains_alike(found, np.array([nodes[k].rows for k in index]))
-    np.fill_diagonal(gains, -np.inf)
+        alike = np.array([k for k, node in enumerate(nodes) if node.directions == directions])
+        a, b = alike[np.array(np.triu_indices(alike.size, 1))]
+        one, other = (np.array([nodes[k].rows for k in part]) for part in (a, b))
+        if a.size:
+            values = found.values[np.concatenate([other, one], axis=1)]
+            gains[a, b] = gains[b, a] = found.fall(np.concatenate([one, other], axis=1), values)
     return gains
-
-
-def _gains_alike(found: RowPrediction, rows: np.ndarray) -> np.ndarray:
-    """The same (n, n) of nodes with rows (n, k) in the same directions."""
-    values, pull = found.values[rows], (found.precision @ found.values)[rows]
-    joint = found.precision[rows[:, :, None, None], rows].transpose(0, 2, 1, 3)  # (n, n, k, k)
-    square = np.einsum("adm,bem->abde", values, values)
-    along = np.einsum("adm,bdm->ab", values, pull)
-    # With change c = b − a at node a and −c at b: −(2 c·(pull_a − pull_b) + Σ c cᵀ · curve).
-    slope = along + along.T - np.diag(along)[:, None] - np.diag(along)
-
-    def both_ways(pairs: np.ndarray) -> np.ndarray:
-        own = np.einsum("aade->ade", pairs)
-        return own[:, None] + own[None] - pairs - pairs.swapaxes(2, 3)
-
-    curve = np.einsum("abde,abde->ab", both_ways(square), both_ways(joint))
-    return -(2 * slope + curve)
 
 
 def _turned(found: RowPrediction, node: Node) -> float:
     """The same where signs of the node are turned, in whichever directions explain most."""
-    pull = found.precision @ found.values
-    best = -np.inf
-    for size in range(1, node.rows.size + 1):
-        for chosen in map(list, combinations(node.rows, size)):
-            change = -2 * found.values[chosen]
-            curve = found.precision[np.ix_(chosen, chosen)] @ change
-            best = max(best, -float(np.sum(change * (2 * pull[chosen] + curve))))
-    return best
+    sizes = range(1, node.rows.size + 1)
+    some = (np.array(rows) for size in sizes for rows in combinations(node.rows, size))
+    return max(float(found.fall(rows, -found.values[rows])) for rows in some)
 
 
 # Two rows are called exchanged where rows and columns then differ by less than FITS, and by less

@@ -11,6 +11,7 @@ is the opposite of that was measured with a turned sign.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -187,17 +188,27 @@ class RowPrediction:
     @property
     def surprise(self) -> np.ndarray:
         """(n, m) difference to what the others foretell, squared, over its variance."""
-        return (self.precision @ self.values) ** 2 / np.diag(self.precision)[:, None]
+        return self.pull**2 / np.diag(self.precision)[:, None]
+
+    @cached_property
+    def pull(self) -> np.ndarray:
+        """(n, m) half the slope of −2 log likelihood by the values."""
+        return self.precision @ self.values
+
+    def fall(self, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """(…) of −2 log likelihood, were rows (…, k) in truth the values (…, k, m)."""
+        change = values - self.values[rows]
+        curve = self.precision[rows[..., :, None], rows[..., None, :]] @ change
+        return -np.sum(change * (2 * self.pull[rows] + curve), axis=(-2, -1))
 
     @property
     def gain(self) -> np.ndarray:
-        """(n,) fall of −2 log likelihood where a row is turned."""
-        slope = np.sum(self.values * (self.precision @ self.values), axis=1)
-        return 4 * (slope - np.sum(self.values**2, axis=1) * np.diag(self.precision))
+        """(n,) fall where a row is turned."""
+        return self.fall(np.arange(len(self.values))[:, None], -self.values[:, None])
 
     def turning(self) -> tuple[np.ndarray, np.ndarray]:
         """(n,) relative squared difference to what is predicted: as stated, and turned."""
-        off = (self.precision @ self.values) / np.diag(self.precision)[:, None]
+        off = self.pull / np.diag(self.precision)[:, None]
         power = np.maximum(np.sum(self.values**2, axis=1), 1e-300)
         turned = np.sum((2 * self.values - off) ** 2, axis=1)
         return np.sum(off**2, axis=1) / power, turned / power
