@@ -33,13 +33,41 @@ def best(gain: np.ndarray, ordered: bool = False) -> np.ndarray:
 def chances(gain: np.ndarray, ordered: bool = False) -> np.ndarray:
     """(labels, modes + 1): probability of each label being each mode, or none (last column).
 
-    Sums exp(gain/2) over all matchings, not only the best.
+    Sums exp(gain/2) over all matchings, not only the best: forward and backward through the labels,
+    with a state for what is taken, the last mode in order or else a subset of the modes.
     """
     labels, modes = gain.shape
     out = np.zeros((labels, modes + 1))
-    out[:, :modes] = _chances_ordered(gain) if ordered else _chances_free(gain)
+    columns = np.arange(modes) if ordered else _worth_counting(gain)
+    odds = np.exp(np.clip(gain[:, columns], -400.0, 80.0) / 2)
+    n = len(columns)
+    if ordered:
+        before, mode = np.nonzero(np.arange(n + 1)[:, None] <= np.arange(n))
+        after, states = mode + 1, n + 1
+    else:
+        before, mode = np.nonzero((np.arange(2**n)[:, None] >> np.arange(n)) & 1 == 0)
+        after, states = before | 1 << mode, 2**n
+    behind = [np.ones(states)]
+    for row in odds[::-1]:
+        taken = np.bincount(before, behind[-1][after] * row[mode], states)
+        behind.append(behind[-1] + taken)
+    ahead = np.zeros(states)
+    ahead[0] = 1.0
+    for k, row in enumerate(odds):
+        taken = ahead[before] * row[mode]
+        each = np.bincount(mode, taken * behind[labels - 1 - k][after], n)
+        out[k, columns] = each / behind[-1][0]
+        ahead = ahead + np.bincount(after, taken, states)
     out[:, modes] = 1 - out[:, :modes].sum(axis=1)
     return np.clip(out, 0.0, 1.0)
+
+
+def _worth_counting(gain: np.ndarray) -> np.ndarray:
+    """Modes (indices) over whose subsets matchings are summed: the likeliest, none that are not."""
+    largest = np.max(gain, axis=0, initial=-np.inf)
+    columns = np.sort(np.argsort(-largest)[:12])
+    # Hopeless: gain below which a match is left out of the sum (odds of 2e-9)
+    return columns[largest[columns] > -40.0]
 
 
 def _best_ordered(gain: np.ndarray) -> np.ndarray:
@@ -62,71 +90,6 @@ def _best_ordered(gain: np.ndarray) -> np.ndarray:
             i, j = i - 1, j - 1
             choice[i] = j
     return choice
-
-
-def _chances_ordered(gain: np.ndarray) -> np.ndarray:
-    odds = np.exp(np.clip(gain, -400.0, 80.0) / 2)
-    ahead = _sums_ordered(odds)
-    behind = _sums_ordered(odds[::-1, ::-1])[::-1, ::-1]
-    return ahead[:-1, :-1] * odds * behind[1:, 1:] / ahead[-1, -1]
-
-
-def _sums_ordered(odds: np.ndarray) -> np.ndarray:
-    """Summed odds of all ordered matchings of leading parts; sets of matches counted once."""
-    total = [[1.0] * (odds.shape[1] + 1)]
-    for row in odds.tolist():
-        above, here = total[-1], [1.0]
-        for j, value in enumerate(row):
-            here.append(above[j + 1] + here[j] - above[j] + above[j] * value)
-        total.append(here)
-    return np.array(total)
-
-
-def _chances_free(gain: np.ndarray) -> np.ndarray:
-    """Forward and backward through the labels, an entry per subset of modes that are taken."""
-    labels, modes = gain.shape
-    out = np.zeros((labels, modes))
-    largest = np.max(gain, axis=0, initial=-np.inf)
-    # Matchings are summed over subsets of the measured modes; beyond this many, the dearest are
-    # out.
-    columns = np.sort(np.argsort(-largest)[:12])
-    # Hopeless: gain below which a match is left out of the sum (odds of 2e-9)
-    columns = columns[largest[columns] > -40.0]
-    odds = np.exp(np.clip(gain[:, columns], -400.0, 80.0) / 2)
-    n = len(columns)
-    taken = (np.arange(2**n)[:, None] >> np.arange(n)) & 1 == 1  # (subsets, modes)
-    ahead = [np.zeros(2**n)]
-    ahead[0][0] = 1.0
-    behind = [np.ones(2**n)]
-    for k in range(labels):
-        ahead.append(_spread(ahead[-1], odds[k], taken))
-        behind.append(_gather(behind[-1], odds[labels - 1 - k], taken))
-    behind.reverse()
-    total = behind[0][0]
-    for k in range(labels):
-        for j in range(n):
-            free = np.flatnonzero(~taken[:, j])
-            after = behind[k + 1][free | 1 << j]
-            out[k, columns[j]] = np.sum(ahead[k][free] * after) * odds[k, j] / total
-    return out
-
-
-def _spread(weight: np.ndarray, odds: np.ndarray, taken: np.ndarray) -> np.ndarray:
-    """Weight of every set of taken modes after one more label has chosen."""
-    out = weight.copy()
-    for j, o in enumerate(odds):
-        free = np.flatnonzero(~taken[:, j])
-        out[free | 1 << j] += weight[free] * o
-    return out
-
-
-def _gather(weight: np.ndarray, odds: np.ndarray, taken: np.ndarray) -> np.ndarray:
-    """Weight of what can follow every set of taken modes if one more label still chooses."""
-    out = weight.copy()
-    for j, o in enumerate(odds):
-        free = np.flatnonzero(~taken[:, j])
-        out[free] += weight[free | 1 << j] * o
-    return out
 
 
 # Log odds that neighbours' modes crossed: without any sign of it, with shapes that changed
