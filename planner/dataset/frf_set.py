@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from planner.dataset.measure import DEFAULT_BAND_HZ, MeasuredPose
 from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.dataset.store import user_store
@@ -24,8 +22,8 @@ class FrfSet:
     """FRFs, and what became of the files that they are from.
 
     `band_hz` is where modes are looked for, None: wherever there are lines. Not `placed` are those
-    that state neither where nor along which directions they were measured. Rate and tail as in
-    `Frf`; `ended` are FRFs of hits under a window by which decays are over, of that rate.
+    that state neither where nor along which directions they were measured. `struck` is the matrix
+    of hits, `records` are FRFs that were exported, with their rate as in `Frf`.
     """
 
     records: tuple[FrfRecord, ...]
@@ -35,19 +33,15 @@ class FrfSet:
     band_hz: tuple[float, float] | None
     placed: bool
     exponential_rate_1_s: float = 0.0
-    tail_s: float = np.inf
-    ended: FrfRecord | None = None
-    ended_rate_1_s: float = 0.0
+    struck: FrfMatrix | None = None
     remarks: tuple[str, ...] = ()
 
     def matrix(self, quantity: str | None) -> FrfMatrix:
         """The FRFs by places. Raises RefusedError or InputError as `matrix_of`."""
+        if self.struck is not None:
+            return self.struck
         found = matrix_of(self.records, quantity)
-        rate, ended = self.exponential_rate_1_s, None
-        if self.ended is not None:
-            ended = matrix_of((self.ended,))
-            ended = replace(ended, exponential_rate_1_s=self.ended_rate_1_s)
-        return replace(found, exponential_rate_1_s=rate, tail_s=self.tail_s, ended=ended)
+        return replace(found, exponential_rate_1_s=self.exponential_rate_1_s)
 
 
 def frf_set(
@@ -143,18 +137,23 @@ def _struck(
         raise RefusedError(f"No modes could be identified: {reasons[0]}")
     used = [v for v in verdicts if v.accepted]
     path, simulated = used[0].source.path, any(v.simulated for v in used)
+    plain, windowed = (
+        replace(
+            matrix_of((exported(one, path, simulated),)),
+            exponential_rate_1_s=one.exponential_rate_1_s,
+            tail_s=one.tail_s,
+        )
+        for one in (frf, ended)
+    )
     return FrfSet(
-        (exported(frf, path, simulated),),
+        (),
         tuple(source.path for source in sources),
         tuple(v.source.name for v in used),
         refused,
         band,
         True,
-        frf.exponential_rate_1_s,
-        frf.tail_s,
-        exported(ended, path, simulated),
-        ended.exponential_rate_1_s,
-        told_of_files(verdicts),
+        struck=replace(plain, ended=windowed),
+        remarks=told_of_files(verdicts),
     )
 
 

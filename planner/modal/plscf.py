@@ -53,14 +53,9 @@ def plscf(
     usually 1/variance. An order n gives n·inputs poles, of which those with positive frequency
     and damping are returned.
     """
-    omega = 2 * np.pi * np.asarray(frequency_hz)
-    circle = _circle(omega)
-    scale = np.sqrt(np.mean(np.abs(frf) ** 2, axis=(0, 2)))
-    scale = np.where(scale > 0, scale, 1.0)
-    scaled = frf / scale[:, None]
-    normal, coupling = _normal(
-        np.exp(1j * (omega - circle.base) * circle.step), scaled, weight, max(orders)
-    )
+    circle, z = _circle(2 * np.pi * np.asarray(frequency_hz))
+    scale, scaled = _scaled(frf)
+    normal, coupling = _normal(z, scaled, weight, max(orders))
     return tuple(_solve(order, normal, coupling, scale, circle) for order in orders)
 
 
@@ -72,11 +67,8 @@ def row_errors(
     One weight per row, the same for all lines. A row with a turned sign or with exchanged columns
     has other poles than the rest and stands out.
     """
-    omega = 2 * np.pi * np.asarray(frequency_hz)
-    circle = _circle(omega)
-    z = np.exp(1j * (omega - circle.base) * circle.step)
-    scale = np.sqrt(np.mean(np.abs(frf) ** 2, axis=(0, 2)))
-    scaled = frf / np.where(scale > 0, scale, 1.0)[:, None]
+    _, z = _circle(2 * np.pi * np.asarray(frequency_hz))
+    scaled = _scaled(frf)[1]
     normal, coupling = _normal(z, scaled, weight, order)
     inputs = frf.shape[1]
     coefficients = _denominator(order, normal, coupling)
@@ -91,11 +83,20 @@ def row_errors(
     return left.reshape(-1, inputs).sum(axis=1) / np.maximum(power, 1e-300)
 
 
-def _circle(omega: np.ndarray) -> _Circle:
+def _scaled(frf: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Root mean square (inputs,) of each column, and the columns divided by it."""
+    scale = np.sqrt(np.mean(np.abs(frf) ** 2, axis=(0, 2)))
+    scale = np.where(scale > 0, scale, 1.0)
+    return scale, frf / scale[:, None]
+
+
+def _circle(omega: np.ndarray) -> tuple[_Circle, np.ndarray]:
+    """The map of a band (rad/s), and where the lines lie on the circle."""
     low, high = omega[0], omega[-1]
     # A band far above zero is moved down, or most of the circle would hold no data.
     base = low if low > 0.5 * high else 0.0
-    return _Circle(base, np.pi / (high - base))
+    step = np.pi / (high - base)
+    return _Circle(base, step), np.exp(1j * (omega - base) * step)
 
 
 def _normal(
