@@ -51,7 +51,7 @@ class CutterFit:
                 f"{frf.name}: no mode shows between {ends[0]:g} and {ends[1]:g} Hz; measure over "
                 f"the band of the modes that chatter, at finer lines or with more averages."
             )
-        alone = np.zeros((2 * found.fit.refined.poles.size,) * 2)
+        alone = np.zeros((2 * found.fit.poles.size,) * 2)
         scale = scales(data, found.fit) * inflation(data, found.fit, alone)
         rows, columns = np.nonzero(there)
         return cls(frf, there, found, shape_fit(data, found.fit, Entries(rows, columns, 2), scale))

@@ -7,8 +7,8 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.frf.frf import Frf
 from planner.modal.fit_data import Data, too_few_lines
-from planner.modal.least_squares import WeightedSets, reduced_together, shared_error
-from planner.modal.mode_selection import PoleFit, fit, model, presences, scales, strongest, weakness
+from planner.modal.least_squares import PoleFit, WeightedSets, reduced_together, shared_error
+from planner.modal.mode_selection import fit, model, presences, scales, strongest, weakness
 from planner.modal.modes import LEAST_PROBABILITY, ModalModel, Mode
 from planner.modal.plscf import Diagram, PoleSet, diagram, plscf, stable
 from planner.modal.residues import rank_one
@@ -25,11 +25,11 @@ def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
     For poles in the s-plane (accelerance). `shared` (2m, 2m) is the covariance of the poles from
     errors that lines have in common: it moves the poles of parts of the band too.
     """
-    refined, scale = fitted.refined, scales(data, fitted)
-    m = refined.poles.size
-    own, common = _pairs(refined.pole_covariance) * scale[:, None], _pairs(shared)
+    scale = scales(data, fitted)
+    m = fitted.poles.size
+    own, common = _pairs(fitted.pole_covariance) * scale[:, None], _pairs(shared)
     factor = np.ones(m)
-    for part, judged in _parts(data, refined.poles).items():
+    for part, judged in _parts(data, fitted.poles).items():
         moved, covariance = _step(data, fitted, slice(*part))
         k = np.array(judged)
         variance = np.maximum(_pairs(covariance) * scale[:, None], own)[k]
@@ -66,10 +66,9 @@ def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndar
     Linearised where all lines have them: poles that a part does not hold would stray in a fit, to
     where their variance is that of another place.
     """
-    refined = fitted.refined
     own = (both[..., part].reshape(data.entries, -1) for both in (data.response, fitted.variance))
-    point = reduced_together(WeightedSets.of(data.lines.part(part), *own), refined.poles)
-    unit = np.sqrt(np.maximum(np.diag(refined.pole_covariance), 1e-300))
+    point = reduced_together(WeightedSets.of(data.lines.part(part), *own), fitted.poles)
+    unit = np.sqrt(np.maximum(np.diag(fitted.pole_covariance), 1e-300))
     turned = np.outer(unit, unit)
     # Of the information on the best held pole: below, rounding rules
     covariance = np.linalg.pinv(point.normal * turned, rcond=1e-10, hermitian=True) * turned
@@ -112,7 +111,7 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | Non
         return None
     fitted = fit(data, data.with_one_above(start))
     modes = modes_of_fit(data, fitted, sets)
-    error = np.linalg.norm(data.response - model(data, fitted.refined))
+    error = np.linalg.norm(data.response - model(data, fitted))
     relative = float(error / np.linalg.norm(data.response))
     return PoleIdentification(modes, data, found, fitted, relative, top)
 
@@ -129,26 +128,25 @@ def ladder(top: int) -> tuple[int, ...]:
 
 def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Mode, ...]:
     """The poles of a fit that are established, with standard deviations and probabilities."""
-    refined = fitted.refined
-    m = refined.poles.size
+    m = fitted.poles.size
     scale = scales(data, fitted)
     weak = weakness(data, fitted)
-    errors = data.force_errors(model(data, refined))
-    shared_pole, shared_residue = shared_error(data.lines, fitted.variance, refined, errors)
+    errors = data.force_errors(model(data, fitted))
+    shared_pole, shared_residue = shared_error(data.lines, fitted, errors)
     if data.step_s is None:
         scale = scale * inflation(data, fitted, shared_pole)
-    present = presences(data, refined.poles, refined.residues.residue)
+    present = presences(data, fitted.poles, fitted.residues.residue)
     modes = []
     for k in range(m):
         if weak[k] > 1:
             continue
         index = [k, m + k]
-        covariance = scale[k] * refined.pole_covariance[np.ix_(index, index)]
+        covariance = scale[k] * fitted.pole_covariance[np.ix_(index, index)]
         covariance = covariance + shared_pole[np.ix_(index, index)]
-        pole = complex(refined.poles[k])
+        pole = complex(fitted.poles[k])
         frequency, damping, sd = natural(pole, covariance)
-        residue = refined.residues.residue[..., k]
-        variance = scale[k] * np.mean(refined.residue_variance[..., k], axis=-1)
+        residue = fitted.residues.residue[..., k]
+        variance = scale[k] * np.mean(fitted.residue_variance[..., k], axis=-1)
         variance = variance + np.mean(shared_residue[..., k], axis=-1)
         supported = support(pole - data.rate_1_s, sets)
         residue_sd = np.sqrt(np.maximum(variance, 0.0))  # less by rounding alone

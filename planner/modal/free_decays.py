@@ -198,7 +198,7 @@ def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarr
     """Share of each channel's energy in the band that the modes explain."""
     data = found.data
     inside = (data.frequency_hz >= band[0]) & (data.frequency_hz <= band[1])
-    fitted = model(data, found.fit.refined)
+    fitted = model(data, found.fit)
     error = np.sum(np.abs(data.response - fitted)[..., inside] ** 2, axis=(1, 2))
     return 1 - error / np.sum(np.abs(data.response[..., inside]) ** 2, axis=(1, 2))
 

@@ -181,10 +181,15 @@ def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Refined:
-    """Poles and residues at the minimum of χ² = Σ 2|H − fit|²/variance, and their covariance."""
+class PoleFit:
+    """Poles and residues at the minimum of χ² = Σ 2|H − fit|²/variance, and their covariance.
 
-    poles: np.ndarray  # (m,) in the plane of the lines
+    Poles and their covariance are in the plane of the lines, of `mode_selection.fit` in rad/s.
+    `excess` (F,) ≥ 1 is χ² per degree of freedom (and of information) around a line, 1 where that
+    was not asked for.
+    """
+
+    poles: np.ndarray  # (m,)
     residues: Residues  # (outputs, inputs, m)
     chi2: float
     degrees: int  # degrees of freedom left
@@ -194,6 +199,8 @@ class Refined:
     coefficients: np.ndarray  # (entries, columns) of `residues.basis`
     inverse: np.ndarray  # (entries, columns, columns) of their normal matrix, poles held
     sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
+    variance: np.ndarray  # (outputs, inputs, F) that weighted the fit
+    excess: np.ndarray
 
 
 def refine(
@@ -202,13 +209,13 @@ def refine(
     variance: np.ndarray,
     poles: np.ndarray,
     allowed: Callable[[np.ndarray], bool],
-) -> Refined:
+) -> PoleFit:
     """Minimise the weighted error over poles and residues, starting from `poles`.
 
     response and variance (outputs, inputs, F), finite, variance > 0, at `lines`; poles (m,),
     m ≥ 1, in the plane of `lines`; a step to poles that are not `allowed` is shortened.
     """
-    outputs, inputs, count = response.shape
+    count = response.shape[-1]
     data = WeightedSets.of(lines, response.reshape(-1, count), variance.reshape(-1, count))
     poles = np.asarray(poles, complex)
 
@@ -220,7 +227,7 @@ def refine(
 
     start = np.concatenate([poles.real, poles.imag])
     parts, point = _minimised(objective, start, at(start))
-    return _finish(data, _complex(parts), point, (outputs, inputs), count)
+    return _finish(data, _complex(parts), point, variance)
 
 
 def _minimised(
@@ -254,31 +261,29 @@ def _still(before: ReducedFit, after: ReducedFit, step: np.ndarray) -> bool:
     return bool(np.max(sds) < 1e-3 or abs(before.chi2 - after.chi2) < 1e-9 * before.chi2)
 
 
-def shared_error(
-    lines: Lines, variance: np.ndarray, refined: Refined, errors: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def shared_error(lines: Lines, fit: PoleFit, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Covariance of poles (2m, 2m) and variance of residues that errors common to lines add.
 
     errors (n, outputs, inputs, F): what each of n independent sources, at one standard deviation,
     adds to the response. The residues' variance (outputs, inputs, 2, m) is that of real and
     imaginary part.
     """
-    m, count = refined.poles.size, variance.shape[-1]
-    shape = variance.shape[:2]
+    m, count = fit.poles.size, fit.variance.shape[-1]
+    shape = fit.variance.shape[:2]
     if not len(errors):
         return np.zeros((2 * m, 2 * m)), np.zeros((*shape, 2, m))
-    p = refined.coefficients.shape[1]
-    poles = refined.poles
+    p = fit.coefficients.shape[1]
+    poles = fit.poles
     columns = np.concatenate([basis(lines, poles), basis_slope(lines, poles)])
     both = np.concatenate([columns.real, columns.imag], axis=1)
-    weighted = (errors * 2 / variance).reshape(len(errors), -1, count)
+    weighted = (errors * 2 / fit.variance).reshape(len(errors), -1, count)
     cross = np.concatenate([weighted.real, weighted.imag], axis=-1) @ both.T
-    turn = slope_turn(refined.coefficients, m)
+    turn = slope_turn(fit.coefficients, m)
     gradient = np.einsum("eka,nek->na", turn, cross[..., p:])
-    gradient += np.einsum("eka,nek->na", refined.sensitivity, cross[..., :p])
-    change = gradient @ refined.pole_covariance
-    moved = np.einsum("ekl,nel->nek", refined.inverse, cross[..., :p])
-    moved += np.einsum("eka,na->nek", refined.sensitivity, change)
+    gradient += np.einsum("eka,nek->na", fit.sensitivity, cross[..., :p])
+    change = gradient @ fit.pole_covariance
+    moved = np.einsum("ekl,nel->nek", fit.inverse, cross[..., :p])
+    moved += np.einsum("eka,na->nek", fit.sensitivity, change)
     residue = np.sum(moved[..., : 2 * m] ** 2, axis=0)
     return change.T @ change, residue.reshape(*shape, 2, m)
 
@@ -289,8 +294,9 @@ def _complex(parts: np.ndarray) -> np.ndarray:
 
 
 def _finish(
-    data: WeightedSets, poles: np.ndarray, point: ReducedFit, shape: tuple[int, int], count: int
-) -> Refined:
+    data: WeightedSets, poles: np.ndarray, point: ReducedFit, variance: np.ndarray
+) -> PoleFit:
+    shape, count = variance.shape[:2], variance.shape[-1]
     m, entries, p = poles.size, shape[0] * shape[1], point.inverse.shape[-1]
     covariance = np.linalg.pinv(point.normal, hermitian=True)
     coefficients = point.coefficients.reshape(-1, p)
@@ -298,18 +304,20 @@ def _finish(
     sensitivity = point.sensitivity.reshape(-1, p, 2 * m)
     spread = np.einsum("eka,ab,ekb->ek", sensitivity, covariance, sensitivity)
     # Of rounding, where lines without noise leave curvatures almost singular, variances below 0
-    variance = np.maximum(np.einsum("ekk->ek", inverse) + spread, 0.0)
-    return Refined(
+    square = np.maximum(np.einsum("ekk->ek", inverse) + spread, 0.0)
+    return PoleFit(
         poles,
         unpack(coefficients.reshape(*shape, p), m),
         float(point.chi2),
         2 * count * entries - entries * p - 2 * m,
         covariance,
-        variance[:, : 2 * m].reshape(*shape, 2, m),
+        square[:, : 2 * m].reshape(*shape, 2, m),
         point.significance(data.weight),
         coefficients,
         inverse,
         sensitivity,
+        variance,
+        np.ones(count),
     )
 
 

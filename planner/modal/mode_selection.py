@@ -1,13 +1,13 @@
 """Which poles are modes: fit, leave out what the data do not need, add what they still miss."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from planner.modal.fit_data import Data
-from planner.modal.least_squares import Refined, refine
+from planner.modal.least_squares import PoleFit, refine
 from planner.modal.residues import basis, rank_one, synthesize, unit
 
 # Damping ratios of the atoms with which the error is searched.
@@ -67,15 +67,6 @@ MAX_DAMPING = 0.3
 TWIN_WIDTHS, TWIN_SHARE, TWIN_MAC = 1.5, 0.02, 0.95
 
 
-@dataclass(frozen=True, eq=False)
-class PoleFit:
-    """Refined poles, the variance that weighted them, and the excess of χ² per line."""
-
-    refined: Refined
-    variance: np.ndarray
-    excess: np.ndarray  # (F,) ≥ 1: χ² per degree of freedom (and of information) around a line
-
-
 def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
     """Fit from starting poles (m,), leaving out and adding modes until neither helps.
 
@@ -89,7 +80,7 @@ def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
         if candidate is None:
             break
         tried.append(candidate)
-        poles = np.append(current.refined.poles, candidate)
+        poles = np.append(current.poles, candidate)
         grown = _refine(data, poles, current)
         if _worth(data, current, grown):
             current = _prune(data, grown)
@@ -97,7 +88,7 @@ def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
 
 
 def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
-    """Refined fit; an unknown variance is taken from the error itself."""
+    """PoleFit fit; an unknown variance is taken from the error itself."""
     power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
     variance = data.variance
     if variance is None and before is not None:
@@ -114,11 +105,11 @@ def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
         if data.variance is None and k < rounds - 1:
             variance = _scatter(data, refined, power)
     assert refined is not None
-    error = _error(data, refined)
-    return PoleFit(refined, variance, excess(data, error, variance, refined.degrees))
+    beyond = excess(data, _error(data, refined), variance, refined.degrees)
+    return replace(refined, excess=beyond)
 
 
-def _scatter(data: Data, refined: Refined, power: np.ndarray) -> np.ndarray:
+def _scatter(data: Data, refined: PoleFit, power: np.ndarray) -> np.ndarray:
     """Variance from the error of the fit, a running mean over a tenth of the lines."""
     square = np.abs(_error(data, refined)) ** 2
     lines = data.frequency_hz.size
@@ -145,16 +136,16 @@ def _windows(lines: int, half: int) -> tuple[np.ndarray, np.ndarray]:
     return np.clip(index - half, 0, None), np.clip(index + half + 1, None, lines)
 
 
-def _error(data: Data, refined: Refined) -> np.ndarray:
+def _error(data: Data, refined: PoleFit) -> np.ndarray:
     return data.response - model(data, refined)
 
 
-def model(data: Data, refined: Refined) -> np.ndarray:
+def model(data: Data, refined: PoleFit) -> np.ndarray:
     """Fitted responses (outputs, inputs, F)."""
     return synthesize(data.lines, data.to_plane(refined.poles), refined.residues)
 
 
-def _in_rad_s(data: Data, refined: Refined) -> Refined:
+def _in_rad_s(data: Data, refined: PoleFit) -> PoleFit:
     """Poles and their covariance carried from the plane of the lines to the s-plane."""
     if data.step_s is None:
         return refined
@@ -184,9 +175,9 @@ def excess(data: Data, error: np.ndarray, variance: np.ndarray, degrees: int) ->
 
 def _prune(data: Data, current: PoleFit) -> PoleFit:
     """Leave out modes that the data do not carry, the weakest of each neighbourhood first."""
-    while current.refined.poles.size > 1:
+    while current.poles.size > 1:
         weak = weakness(data, current)
-        poles = current.refined.poles
+        poles = current.poles
         dropped: list[int] = []
         for k in np.argsort(-weak):
             apart = [abs(poles[k] - poles[d]) > 3 * abs(poles[[k, d]].real).max() for d in dropped]
@@ -206,10 +197,9 @@ def _merged_twins(data: Data, current: PoleFit) -> PoleFit:
     pole then has the same shape. Two modes of a structure within a bandwidth differ in shape.
     """
     while (pair := _twins(data, current)) is not None:
-        refined = current.refined
-        weight = refined.significance[list(pair)]
-        middle = np.sum(weight * refined.poles[list(pair)]) / np.sum(weight)
-        poles = np.append(np.delete(refined.poles, pair), middle)
+        weight = current.significance[list(pair)]
+        middle = np.sum(weight * current.poles[list(pair)]) / np.sum(weight)
+        poles = np.append(np.delete(current.poles, pair), middle)
         current = _refine(data, poles, current)
     return current
 
@@ -217,13 +207,12 @@ def _merged_twins(data: Data, current: PoleFit) -> PoleFit:
 def _twins(data: Data, current: PoleFit) -> tuple[int, int] | None:
     if data.response.shape[0] < 2:
         return None
-    refined = current.refined
-    order = np.argsort(refined.poles.imag)
-    shapes = [rank_one(refined.residues.residue[..., k])[0] for k in range(order.size)]
+    order = np.argsort(current.poles.imag)
+    shapes = [rank_one(current.residues.residue[..., k])[0] for k in range(order.size)]
     for a, b in pairwise(order):
-        apart = abs(refined.poles[a] - refined.poles[b])
-        width = np.max(data.rate_1_s - refined.poles[[a, b]].real)
-        near = apart < min(TWIN_WIDTHS * width, TWIN_SHARE * abs(refined.poles[a]))
+        apart = abs(current.poles[a] - current.poles[b])
+        width = np.max(data.rate_1_s - current.poles[[a, b]].real)
+        near = apart < min(TWIN_WIDTHS * width, TWIN_SHARE * abs(current.poles[a]))
         if near and abs(np.vdot(shapes[a], shapes[b])) ** 2 > TWIN_MAC:
             return int(a), int(b)
     return None
@@ -231,12 +220,11 @@ def _twins(data: Data, current: PoleFit) -> tuple[int, int] | None:
 
 def weakness(data: Data, current: PoleFit) -> np.ndarray:
     """(m,) above 1 where a mode is not established, 0 for the pole above the lines."""
-    refined = current.refined
     weak = doubt(
-        data, refined.poles, np.diag(refined.pole_covariance), refined.significance,
+        data, current.poles, np.diag(current.pole_covariance), current.significance,
         scales(data, current),
     )  # fmt: skip
-    return np.where(data.is_above(refined.poles), 0.0, weak)
+    return np.where(data.is_above(current.poles), 0.0, weak)
 
 
 def doubt(
@@ -256,14 +244,14 @@ def doubt(
 
 def scales(data: Data, current: PoleFit) -> np.ndarray:
     """(m,) factor on the covariance of each mode, from the error around it."""
-    frequency = np.abs(current.refined.poles) / (2 * np.pi)
+    frequency = np.abs(current.poles) / (2 * np.pi)
     return np.interp(frequency, data.frequency_hz, current.excess)
 
 
 def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:
     weight = 2 / before.variance
-    rise = np.sum(weight * np.abs(_error(data, before.refined)) ** 2)
-    rise -= np.sum(weight * np.abs(_error(data, after.refined)) ** 2)
+    rise = np.sum(weight * np.abs(_error(data, before)) ** 2)
+    rise -= np.sum(weight * np.abs(_error(data, after)) ** 2)
     new = int(np.argmax(weakness(data, after)))
     scale = scales(data, after)[new]
     if data.variance is None:
@@ -274,7 +262,7 @@ def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:
 def _missing(data: Data, current: PoleFit, tried: list[complex]) -> complex | None:
     """Pole of the atom that would lower χ² most, if by more than chance can (None: nowhere)."""
     weight = (2 / current.variance / current.excess).reshape(data.entries, -1)
-    error = weight * _error(data, current.refined).reshape(data.entries, -1)
+    error = weight * _error(data, current).reshape(data.entries, -1)
     poles, fall = falls(data, weight, error)
     for pole in tried:
         fall[np.abs(poles - pole) < 0.5 * abs(pole.real)] = 0.0

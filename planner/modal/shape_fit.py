@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from planner.modal.fit_data import Data
-from planner.modal.mode_selection import PoleFit
+from planner.modal.least_squares import PoleFit
 from planner.modal.rank_one_fit import Entries, fit_shape
 from planner.modal.residues import Residues, basis, basis_slope, unpack
 
@@ -92,7 +92,7 @@ def shape_fit(
     problem = _ShapeProblem.of(data, fit, entries)
     point = problem.settled(problem.start(fit), np.ones(problem.size, bool))
     unshaped = replace(problem, shaped=problem.shaped[:0])
-    if surely_worse(fit.refined.chi2, point.chi2, unshaped.size - problem.size):
+    if surely_worse(fit.chi2, point.chi2, unshaped.size - problem.size):
         problem, point = unshaped, unshaped.start(fit)
     every = np.ones(problem.size, bool)
     plain, kept = problem.without_nothings(point)
@@ -152,7 +152,7 @@ class _ShapeProblem:
 
     @classmethod
     def of(cls, data: Data, fit: PoleFit, entries: Entries) -> "_ShapeProblem":
-        poles, count = fit.refined.poles, data.entries
+        poles, count = fit.poles, data.entries
         apart = np.abs(poles[:, None] - poles) + np.diag(np.full(poles.size, np.inf))
         wide = np.maximum(np.abs(poles.real)[:, None], np.abs(poles.real))
         alone = np.all(apart > wide / 2, axis=1)
@@ -197,15 +197,15 @@ class _ShapeProblem:
 
     def start(self, fit: PoleFit) -> _ShapePoint:
         """Shapes that explain the free residues best."""
-        refined, m = fit.refined, self.modes
-        residue = refined.residues.residue.reshape(-1, m)
-        variance = np.mean(refined.residue_variance, axis=2).reshape(-1, m)
+        m = self.modes
+        residue = fit.residues.residue.reshape(-1, m)
+        variance = np.mean(fit.residue_variance, axis=2).reshape(-1, m)
         shape = np.array(
             [fit_shape(self.entries, residue[:, k], variance[:, k], 0.5).shape for k in self.shaped]
         ).reshape(self.shaped.size, 1, self.entries.points)
         parts = np.concatenate([shape.real, shape.imag], axis=1)
-        free = refined.coefficients[:, self.left]
-        both = refined.poles.real, refined.poles.imag
+        free = fit.coefficients[:, self.left]
+        both = fit.poles.real, fit.poles.imag
         return self.at(np.concatenate([*both, parts.ravel(), free.ravel()]))
 
     def at(self, values: np.ndarray) -> _ShapePoint:

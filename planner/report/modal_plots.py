@@ -139,7 +139,7 @@ def matrix_figure(
     columns = np.flatnonzero(frf.measured).tolist()
     layout = {"height_ratios": [3, 1.2] * 3}
     figure, grid = panels((13.0, 10.0), title, 6, len(columns), gridspec_kw=layout)
-    fitted = model(found.data, found.fit.refined)
+    fitted = model(found.data, found.fit)
     for i, k in np.ndindex(3, len(columns)):
         size, turn = grid[2 * i, k], grid[2 * i + 1, k]
         h, sd = frf.accelerance[i, columns[k]], np.sqrt(frf.variance[i, columns[k]] / 2)
