@@ -97,17 +97,18 @@ class ReducedFit:
 
 
 def reduced(data: WeightedSets, poles: np.ndarray) -> ReducedFit:
-    """Evaluate sets at their poles (k, m), in the plane of the lines."""
-    k, m = poles.shape
+    """Evaluate sets at their poles (k, m), or all at the same (1, m), in the plane of the lines."""
+    k, m = len(data.entries), poles.shape[1]
     # At once: values of one column for all poles and sets of a block, to stay in the cache
     block = max(1, 30_000 // max(1, m * data.lines.x.size))
-    parts = [_block(data, poles[i : i + block], slice(i, i + block)) for i in range(0, k, block)]
+    some = [slice(i, i + block) for i in range(0, k, block)]
+    parts = [_block(data, poles if len(poles) == 1 else poles[own], own) for own in some]
     return ReducedFit(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
 
 def reduced_together(data: WeightedSets, poles: np.ndarray) -> ReducedFit:
     """The same where all sets have the same poles (m,)."""
-    found = reduced(data, np.tile(poles, (len(data.entries), 1)))
+    found = reduced(data, poles[None])
     total = (np.sum(part, axis=0) for part in (found.chi2, found.gradient, found.normal))
     return replace(found, **dict(zip(("chi2", "gradient", "normal"), total, strict=True)))
 
