@@ -1,6 +1,9 @@
 """Errors that reach the user: one plain sentence each, and the exit code that goes with it."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 
 class PlannerError(Exception):
@@ -47,3 +50,12 @@ class RefusedFile:
 
     file: str
     reason: str
+
+
+@contextmanager
+def writing(where: Path, another: str = "another") -> Iterator[None]:
+    """Around what writes a file or folder: InputError with a remedy where that is impossible."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{where} cannot be written ({error.strerror}); name {another}.") from None

@@ -16,6 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.linalg import cho_factor, cho_solve
 
+from planner.report.plot_marks import empty
 from planner.studies import drawing
 from planner.studies.report import Table
 from planner.surrogate.kernels import parse
@@ -234,7 +235,7 @@ def modes_figure(table: Table) -> Figure:
 
 
 def _figure(table: Table, title: str, floor: float) -> Figure:
-    figure = drawing.new((10.0, 6.4), title)
+    figure = empty((10.0, 6.4), title)
     panels = figure.subplots(2, 1, sharex=True)
     values = np.array([row[1:] for row in table.rows], dtype=float)
     groups = [str(row[0]) for row in table.rows]

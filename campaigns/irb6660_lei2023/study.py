@@ -12,8 +12,8 @@ import time
 import numpy as np
 
 from planner.progress import Tell, within
-from planner.studies.claims import Bound, ClaimRule, judge
-from planner.studies.report import Paper, Report, Table, r_squared
+from planner.studies.claims import Bound, ClaimRule, in_order
+from planner.studies.report import Paper, Report, Table, on_each, r_squared
 from planner.surrogate.models.fidelity_levels import Samples
 from planner.surrogate.models.likelihood_gp import fit_likelihood
 from planner.surrogate.models.multitask import RANK, fit_multitask
@@ -104,22 +104,18 @@ RULES = (
 def study(progress: Tell, small: bool = False) -> Report:
     """R² by 5-fold cross-validation on several robots, and the time that training takes."""
     robots = ROBOTS[:1] if small else ROBOTS
-    scores = []
-    for i, seed in enumerate(robots):
-        part = within(progress, 0.95 * i / len(robots), 0.95 * (i + 1) / len(robots))
-        scores.append(_scores(seed, small, part))
+    part = within(progress, 0.0, 0.95)
+    scores = on_each(robots, lambda seed, tell: _scores(seed, small, tell), part)
     progress("cost against m", 0.96)
     table, modes, cost = by_kind(scores), by_mode(scores), cost_table(small)
-    each = [figures(one, cost) for one in scores]
-    together = {name: [one[name] for one in each] for name in each[0]}
     return Report(
-        PAPER,
         f"SIMULATED: the KR240 with spindle in MuJoCo, robots: {len(robots)}, two points of the "
         "tool hit and heard along two axes at three levels with everyday errors; "
         f"{PARTS * len(scores[0].labels)} parameters of modes that modal analysis finds nearly "
         "everywhere. The paper's target tool and its stability lobes are not done again here.",
         (table, modes, cost),
-        judge(RULES, together, _notes(scores, cost)),
+        [figures(one, cost) for one in scores],
+        _notes(scores, cost),
         {"lei2023_kinds": kinds_figure(table), "lei2023_modes": modes_figure(modes)},
     )
 
@@ -148,8 +144,7 @@ def figures(one: RobotScores, cost: Table) -> dict[str, float]:
         min(one.seconds[BY_KIND], one.seconds[AT_ONCE]),
         np.nan,
     )
-    names = [bound.figure for rule in RULES for bound in rule.bounds]
-    return dict(zip(names, map(float, values), strict=True))
+    return in_order(RULES, values)
 
 
 def _notes(scores: list[RobotScores], cost: Table) -> dict[str, str]:

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from planner.frf.metrics import Agreement
+from planner.report.plot_marks import empty
 from planner.studies import drawing
 from planner.studies.report import Table
 
@@ -97,7 +98,7 @@ def campbell(run: Run) -> Figure:
     maps = {"measured (simulated)": np.array(measured)}
     for name in MAIN:
         maps[name] = np.abs(run.models[name].simulation.accelerance(struck.q[rows], lines)[:, 1, 1])
-    figure = drawing.new((12.0, 4.2), "Figures 8 and 9: path S1, hit and response y")
+    figure = empty((12.0, 4.2), "Figures 8 and 9: path S1, hit and response y")
     panels = figure.subplots(1, len(maps), sharey=True)
     number = np.arange(len(rows)) + 1
     drawing.maps(figure, panels, {n: (number, lines, m.T) for n, m in maps.items()}, 45)
@@ -109,7 +110,7 @@ def campbell(run: Run) -> Figure:
 
 def directions_figure(table: Table) -> Figure:
     """The means over all paths as bars."""
-    figure = drawing.new((9.0, 4.4), "Global FRAC by direction and band")
+    figure = empty((9.0, 4.4), "Global FRAC by direction and band")
     rows = [row for row in table.rows if ", all, " in str(row[0])]
     values = np.array([row[1:4] for row in rows], dtype=float)
     panel = figure.subplots()

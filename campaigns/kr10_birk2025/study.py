@@ -9,8 +9,8 @@ chain leave open integrated out. The paper's outlook asks where to measure: D-op
 import numpy as np
 
 from planner.progress import Tell, within
-from planner.studies.claims import Bound, ClaimRule, judge
-from planner.studies.report import Paper, Report
+from planner.studies.claims import Bound, ClaimRule, in_order
+from planner.studies.report import Paper, Report, on_each
 
 from .data import BAND_HZ, PATHS, PathHits, load
 from .fits import (
@@ -112,21 +112,16 @@ RULES = (
 def study(progress: Tell, small: bool = False) -> Report:
     """FRAC and Frobenius similarity by path, direction and band, and which poses suffice."""
     seeds = SEEDS[:1] if small else SEEDS
-    runs = []
-    for i, seed in enumerate(seeds):
-        tell = within(progress, i / len(seeds), (i + 1) / len(seeds))
-        runs.append(_run(seed, small, tell))
-    each = [figures(run) for run in runs]
-    together = {name: [one[name] for one in each] for name in each[0]}
+    runs = on_each(seeds, lambda seed, tell: _run(seed, small, tell), progress)
     directions = direction_table(runs[0])
     return Report(
-        PAPER,
         f"SIMULATED: a KR10 in MuJoCo on three paths, {len(runs[0].hits.path)} points, nine hits "
         "each with everyday errors; its links bend, its gears stiffen in steps and rub, its table "
         "gives way, stated stiffnesses are off by ± 40 %, inertias by 12 %: no parameters of 12P "
         f"or 24P are its own. Robots: {len(runs)}; tables and pictures of the first.",
         (table_4(runs[0]), table_5(runs[0]), directions, design_table(runs[0])),
-        judge(RULES, together, _notes(runs)),
+        [figures(run) for run in runs],
+        _notes(runs),
         {
             "birk2025_campbell": campbell(runs[0]),
             "birk2025_directions": directions_figure(directions),
@@ -212,8 +207,7 @@ def figures(run: Run) -> dict[str, float]:
         *gained,
         *np.subtract(percent(models["24P"].limited), percent(models["24P, global search"].limited)),
     )
-    names = [bound.figure for rule in RULES for bound in rule.bounds]
-    return dict(zip(names, map(float, values), strict=True))
+    return in_order(RULES, values)
 
 
 def _notes(runs: list[Run]) -> dict[str, str]:

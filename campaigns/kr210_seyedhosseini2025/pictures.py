@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from planner.report.plot_marks import write_values
+from planner.report.plot_marks import empty, write_values
 from planner.studies import drawing
 from planner.studies.report import Table, r_squared
 
@@ -31,7 +31,7 @@ class Direct:
 
 def heatmap(correlation: Table) -> Figure:
     """Figure 2: correlation (6 joints, modes), by joint and mode."""
-    figure = drawing.new((5.6, 5.2), "Figure 2: correlation of joint angles with frequencies")
+    figure = empty((5.6, 5.2), "Figure 2: correlation of joint angles with frequencies")
     panel = figure.subplots()
     values = np.array([row[1:] for row in correlation.rows], dtype=float)
     image = panel.imshow(values, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
@@ -44,7 +44,7 @@ def heatmap(correlation: Table) -> Figure:
 
 def last_postures(data: PostureData, mean: np.ndarray, sd: np.ndarray) -> Figure:
     """Figure 4: f and ζ over the last postures, mean and sd (15, 48) of the columns."""
-    figure = drawing.new((12.0, 6.4), "Figure 4: the last 15 postures")
+    figure = empty((12.0, 6.4), "Figure 4: the last 15 postures")
     panels = figure.subplots(2, TABLED, sharex=True)
     number = np.arange(len(data.q) - HELD_OUT, len(data.q)) + 1
     for row, (scale, unit) in enumerate(((1.0, "frequency (Hz)"), (100.0, "damping ratio (%)"))):
@@ -66,7 +66,7 @@ def last_postures(data: PostureData, mean: np.ndarray, sd: np.ndarray) -> Figure
 
 def overlays(frfs: dict[int, Direct]) -> Figure:
     """Figure 5: amplitudes xx, yy, zz at some postures."""
-    figure = drawing.new((12.0, 6.4), "Figure 5: FRFs put together from predicted modes")
+    figure = empty((12.0, 6.4), "Figure 5: FRFs put together from predicted modes")
     panels = figure.subplots(len(frfs), 3, sharex=True)
     for row, (posture, frf) in zip(panels, frfs.items(), strict=True):
         for axis, panel in enumerate(row):

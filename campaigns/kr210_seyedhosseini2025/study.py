@@ -12,8 +12,8 @@ import numpy as np
 
 from planner.frf import synthesis
 from planner.progress import Tell, within
-from planner.studies.claims import Bound, ClaimRule, judge
-from planner.studies.report import Paper, Report, Table
+from planner.studies.claims import Bound, ClaimRule, in_order
+from planner.studies.report import Paper, Report, Table, on_each
 
 from .data import DAMPING, FREQUENCY, MODES, RESIDUE, TABLED, PostureData, load
 from .models import PAPER_MSE, Run, alone, fit, squares, why_mse
@@ -69,12 +69,7 @@ RULES = (
 def study(progress: Tell, small: bool = False) -> Report:
     """Errors and coverage at the last 15 postures, correlations, and FRFs."""
     seeds = SEEDS[:1] if small else SEEDS
-    runs = [
-        _run(seed, small, within(progress, i / len(seeds), (i + 1) / len(seeds)))
-        for i, seed in enumerate(seeds)
-    ]
-    each = [figures(run) for run in runs]
-    together = {name: [one[name] for one in each] for name in each[0]}
+    runs = on_each(seeds, lambda seed, tell: _run(seed, small, tell), progress)
     first = runs[0]
     correlation = _correlations(first.data)
     rows = tuple((f"posture {n}", *frf.r2) for n, frf in first.frfs.items())
@@ -82,12 +77,12 @@ def study(progress: Tell, small: bool = False) -> Report:
         "seyedhosseini2025_frfs", "R² of |H| over 5 to 40 Hz", ("", "xx", "yy", "zz"), rows
     )
     return Report(
-        PAPER,
         f"SIMULATED: a KR210-like robot in MuJoCo, hit at {len(first.data.q)} postures along a "
         "trajectory of its tool, nine hits each at three levels with everyday errors; joints rub, "
         f"brakes engage anew at each posture. Robots: {len(runs)}.",
         (_error_table(first), _models_table(first), _steps_table(first.data), correlation, quality),
-        judge(RULES, together, _notes(runs)),
+        [figures(run) for run in runs],
+        _notes(runs),
         {
             "seyedhosseini2025_figure_2": heatmap(correlation),
             "seyedhosseini2025_figure_4": last_postures(first.data, first.mean, first.sd),
@@ -130,8 +125,7 @@ def figures(run: Run) -> dict[str, float]:
         min(min(frf.r2) for frf in run.frfs.values()),
         *(single / multi),
     )
-    names = [bound.figure for rule in RULES for bound in rule.bounds]
-    return dict(zip(names, map(float, values), strict=True))
+    return in_order(RULES, values)
 
 
 def _notes(runs: list[Run]) -> dict[str, str]:

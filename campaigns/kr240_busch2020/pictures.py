@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from matplotlib.figure import Figure
 
+from planner.report.plot_marks import empty
 from planner.studies import drawing
 from planner.studies.report import Table, r_squared
 
@@ -91,7 +92,7 @@ SHOWN_DEG = (106.0, 113.0, 120.0)
 def sd_maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
     """Sd of the models as published over the whole sweep (Figures 8d to 8f)."""
     names = list(predicted.beyond_sd)
-    figure = drawing.new((11.0, 3.6), f"Sd of models as published, trained to {TRAINED_DEG:.0f}°")
+    figure = empty((11.0, 3.6), f"Sd of models as published, trained to {TRAINED_DEG:.0f}°")
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
     angles = np.concatenate([seen.angles_deg, BEYOND_DEG])
     for panel, name in zip(panels, names, strict=True):
@@ -107,7 +108,7 @@ def sd_maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
 
 def maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
     """What is measured, the truth beyond, and what each model predicts there, one colour scale."""
-    figure = drawing.new((11.0, 6.2), f"Driving-point accelerance, measured to {TRAINED_DEG:.0f}°")
+    figure = empty((11.0, 6.2), f"Driving-point accelerance, measured to {TRAINED_DEG:.0f}°")
     surfaces = {"measured": (seen.angles_deg, seen.lines_hz, seen.amplitude)}
     surfaces["truth (MuJoCo)"] = BEYOND_DEG, seen.lines_hz, seen.truth
     for name, amplitude in predicted.amplitude.items():
@@ -124,7 +125,7 @@ def maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
 
 def overlays(predicted: BeyondPrediction, seen: Sweep) -> Figure:
     """FRFs at three angles beyond the training."""
-    figure = drawing.new((9.0, 8.0), "FRFs beyond the training, at three angles")
+    figure = empty((9.0, 8.0), "FRFs beyond the training, at three angles")
     panels = figure.subplots(len(SHOWN_DEG), 1, sharex=True)
     colours = drawing.COLOURS
     for panel, angle in zip(panels, SHOWN_DEG, strict=True):
@@ -158,7 +159,7 @@ def overlays(predicted: BeyondPrediction, seen: Sweep) -> Figure:
 
 def experiments(thin: Table, steps: tuple[int, ...]) -> Figure:
     """R² with fewer experiments (Figure 10)."""
-    figure = drawing.new((7.0, 4.2), f"R² beyond {TRAINED_DEG:.0f}° with every n-th experiment")
+    figure = empty((7.0, 4.2), f"R² beyond {TRAINED_DEG:.0f}° with every n-th experiment")
     panel = figure.subplots()
     values = np.array([row[1:] for row in thin.rows], dtype=float)
     drawing.curves(panel, np.array(steps), thin.columns[1:], values)

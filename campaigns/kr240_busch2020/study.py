@@ -13,8 +13,8 @@ from planner.api import diagnose
 from planner.errors import InputError, RefusedError
 from planner.modal.tracking import Guide, Tracks, track
 from planner.progress import Tell, quietly, within
-from planner.studies.claims import Bound, ClaimRule, judge
-from planner.studies.report import Paper, Report, Table
+from planner.studies.claims import Bound, ClaimRule, gathered
+from planner.studies.report import Paper, Report, Table, on_each
 from planner.surrogate.frf_bands import frf_moments
 from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
 from planner.surrogate.models.frf_surface import SURFACES, Grid, fit_surface
@@ -100,30 +100,28 @@ RULES = (
 def study(progress: Tell, small: bool = False) -> Report:
     """R² beyond 105° of every model, with every, every 2nd, 3rd and 4th experiment."""
     steps, robots = ((4,), ROBOTS[:1]) if small else (EVERY, ROBOTS)
-    runs: dict[int, dict[int, BeyondPrediction]] = {}
-    seen: dict[int, Sweep] = {}
-    for i, seed in enumerate(robots):
-        part = within(progress, i / len(robots), (i + 1) / len(robots))
-        seen[seed] = sweep(seed, within(part, 0.0, 0.05))
+
+    def run(seed: int, tell: Tell) -> tuple[Sweep, dict[int, BeyondPrediction]]:
+        there, i = sweep(seed, within(tell, 0.0, 0.05)), robots.index(seed)
         if i < ALL_MODELS:
-            runs[seed] = _all_models(seen[seed], steps, i == 0, small, within(part, 0.05, 1.0))
-        else:
-            runs[seed] = {step: _fused(seen[seed].every(step)) for step in steps}
+            return there, _all_models(there, steps, i == 0, small, within(tell, 0.05, 1.0))
+        return there, {step: _fused(there.every(step)) for step in steps}
+
+    done = dict(zip(robots, on_each(robots, run, progress), strict=True))
+    seen, runs = ({seed: one[part] for seed, one in done.items()} for part in (0, 1))
     first, sweep_1 = runs[robots[0]], seen[robots[0]]
     main, trained = first[steps[0]], sweep_1.every(steps[0])
     each = [figures(runs[s], seen[s]) for s in robots]
-    names = dict.fromkeys(name for one in each for name in one)
-    together = {name: [one[name] for one in each if name in one] for name in names}
     thin = thin_table(first, sweep_1)
     return Report(
-        PAPER,
         "SIMULATED: the published robot in MuJoCo with a swaying dress pack, hit across the arm at "
         "three levels with everyday errors, friction and damping that scatters; its simulation "
         "lacks the dress pack and has nominal stiffnesses."
         + (f" {main.said}" if main.said else "")
         + f" Robots: {len(robots)}, of which {min(ALL_MODELS, len(robots))} with every model.",
         (score_table(main, trained), thin, _robot_table(runs, seen)),
-        judge(RULES, together, _notes(together, runs, main)),
+        each,
+        _notes(gathered(each), runs, main),
         {
             "busch2020_maps": maps(main, sweep_1),
             "busch2020_sd": sd_maps(main, trained),

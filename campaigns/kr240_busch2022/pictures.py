@@ -16,6 +16,7 @@ from scipy.stats import norm, qmc
 
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf import synthesis
+from planner.report.plot_marks import empty
 from planner.studies import drawing
 from planner.studies.report import r_squared
 from planner.surrogate.frf_bands import frf_moments
@@ -36,7 +37,7 @@ def figure_9(x: np.ndarray, y: np.ndarray, sd: np.ndarray, fits: Mapping[str, Fi
     train, test = split(x, 0)
     test = test[np.isfinite(y[test])]
     samples = Samples.of(x[train[:FEWEST]], y[train[:FEWEST]], sd[train[:FEWEST]])
-    figure = drawing.new((10.0, 4.6), "Figure 9: ω₂ predicted from three poses, 95 % interval")
+    figure = empty((10.0, 4.6), "Figure 9: ω₂ predicted from three poses, 95 % interval")
     panels = figure.subplots(1, len(fits), sharex=True, sharey=True)
     ends = float(np.min(y[test])) - 0.3, float(np.max(y[test])) + 0.3
     for panel, (name, fit) in zip(np.atleast_1d(panels), fits.items(), strict=True):
@@ -80,7 +81,7 @@ def _modes(count: int) -> list[str]:
 
 
 def _benchmark(scores: np.ndarray, names: tuple[str, ...], title: str, unit: str) -> Figure:
-    figure = drawing.new((9.0, 6.0), title)
+    figure = empty((9.0, 6.0), title)
     panels = figure.subplots(2, 1, sharex=True)
     modes = _modes(len(scores))
     drawing.bars(panels[0], modes, names, scores[..., 0], "R²", FLOOR)
@@ -92,7 +93,7 @@ def _benchmark(scores: np.ndarray, names: tuple[str, ...], title: str, unit: str
 def _figure_8(eight: np.ndarray, shown: tuple[int, ...]) -> Figure:
     counts = np.array(shown)
     modes = eight.shape[1]
-    figure = drawing.new(
+    figure = empty(
         (3.2 * modes, 6.4),
         "Figure 8: natural frequencies, predicted with N poses (medians over splits)",
     )
@@ -114,7 +115,7 @@ def _figure_8(eight: np.ndarray, shown: tuple[int, ...]) -> Figure:
 
 
 def _figure_11(eleven: np.ndarray) -> Figure:
-    figure = drawing.new((10.0, 6.4), "Figure 11: residues, 15 poses trained, 20 predicted")
+    figure = empty((10.0, 6.4), "Figure 11: residues, 15 poses trained, 20 predicted")
     panels = figure.subplots(2, 2, sharex=True)
     modes = _modes(eleven.shape[1])
     for row, direction in enumerate(("xx", "yy")):
@@ -260,7 +261,7 @@ def _draw(
     size: list[np.ndarray],
 ) -> Figure:  # fmt: skip
     title = f"Figure 12: FRFs at {TARGET_POSE}, predicted from five other poses"
-    figure = drawing.new((10.0, 6.4), title)
+    figure = empty((10.0, 6.4), title)
     panels = figure.subplots(2, 2, sharex=True)
     for k, (i, j) in enumerate(PAIRS):
         panel = panels[i, j]

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.progress import Tell, within
-from planner.studies.claims import Bound, ClaimRule, judge
-from planner.studies.report import Paper, Report, Table, r_squared
+from planner.studies.claims import Bound, ClaimRule, in_order
+from planner.studies.report import Paper, Report, Table, on_each, r_squared
 from planner.surrogate.models.averaged import fit_ar1_nargp, fit_gp, fit_recursive
 from planner.surrogate.models.fidelity_levels import Exact, Samples
 from planner.surrogate.models.likelihood_gp import LikelihoodGP, Normalisation, fit_likelihood
@@ -146,24 +146,19 @@ class Run:
 def study(progress: Tell, small: bool = False) -> Report:
     """All figures, and whether what the paper found in its own holds here."""
     counts, seeds = (FEW_COUNTS, SEEDS[:1]) if small else (COUNTS, SEEDS)
-    runs = []
-    for i, seed in enumerate(seeds):
-        tell = within(progress, i / len(seeds), (i + 1) / len(seeds))
-        runs.append(_run(seed, counts, small, tell))
+    runs = on_each(seeds, lambda seed, tell: _run(seed, counts, small, tell), progress)
     first = runs[0]
-    each = [figures(run, counts) for run in runs]
-    together = {name: [one[name] for one in each] for name in each[0]}
     parts = ("seven", "eight", "ten", "eleven")
     seven, eight, ten, eleven = (np.median([getattr(r, p) for r in runs], axis=0) for p in parts)
     second = first.frequencies[1]
     shown = {name: second.fits[name] for name in ("rbf", "AR1", "averaged AR1")}
     return Report(
-        PAPER,
         "SIMULATED: the KR240 in MuJoCo, hit at 35 positions, nine hits each at three levels with "
         "everyday errors; every gear has its own damping, joints rub, brakes engage anew at "
         f"each visit; modes as the planner finds them. Robots: {len(runs)}.",
         _tables(seven, eight, ten, eleven, counts),
-        judge(RULES, together, _notes(first)),
+        [figures(run, counts) for run in runs],
+        _notes(first),
         pictures(seven, eight, ten, eleven, counts)
         | {
             "busch2022_figure_9": figure_9(first.seen.x, second.y, second.sd, shown),
@@ -305,8 +300,7 @@ def figures(run: Run, counts: tuple[int, ...]) -> dict[str, float]:
         min(twelve.published_r2),
         np.mean(twelve.ours_r2) - np.mean(twelve.published_r2),
     )
-    names = [bound.figure for rule in RULES for bound in rule.bounds]
-    return dict(zip(names, map(float, values), strict=True))
+    return in_order(RULES, values)
 
 
 def _first_above(r2: np.ndarray, counts: tuple[int, ...]) -> int:

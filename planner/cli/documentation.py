@@ -21,7 +21,7 @@ def schema(
 
     Example: planner schema campaign
     """
-    from planner.report.schema import schema as entries
+    from planner.report.documentation import schema as entries
 
     return respond(entries(file), as_json)
 
@@ -37,7 +37,7 @@ def manual(
 
     Example: planner manual --out manual.html
     """
-    from planner.report.manual_page import write_manual
+    from planner.report.documentation import write_manual
 
     assert context.parent is not None
     commands = getattr(context.parent.command, "commands", {})

@@ -28,7 +28,7 @@ def report(
     """
     from planner.campaign.campaign import Campaign
     from planner.cli.progress import telling
-    from planner.report.campaign_report import write_report
+    from planner.report.page import write_report
 
     with telling("writing", quiet=as_json) as progress:
         progress("the report", 0.0)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.errors import InputError
+from planner.errors import writing
 from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_modes import MatrixModes
 from planner.recording.dof import Dof
@@ -48,7 +48,7 @@ def export(what: Exported, folder: Path) -> list[Path]:
 
     And vectors.uff (55) and vectors.csv: right and left vectors, where rows and columns are tied.
     """
-    try:
+    with writing(folder, "another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         files = [folder / name for name in ("modes.uff", "frfs.uff", "modes.csv", "shapes.csv")]
         _universal(files[0], [_header(what), *_geometry(what), *_shapes(what)])
@@ -59,10 +59,6 @@ def export(what: Exported, folder: Path) -> list[Path]:
             files += [folder / name for name in ("vectors.uff", "vectors.csv")]
             _universal(files[4], [_header(what), *_geometry(what), *_vector_sets(what, apart)])
             _vectors_table(apart, files[5])
-    except OSError as error:
-        raise InputError(
-            f"Nothing can be written to {folder} ({error.strerror}); name another folder."
-        ) from None
     return files
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planner.errors import InputError
+from planner.errors import writing
 from planner.recording.joints import JointUnits
 
 if TYPE_CHECKING:
@@ -45,9 +45,7 @@ def save_coupled(path: Path, coupled: "CoupledFrf", pose: str) -> None:
 
 
 def _save(path: Path, **arrays: Any) -> None:
-    try:
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         with open(path, "wb") as file:
             np.savez_compressed(file, allow_pickle=False, **arrays)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}); name another.") from None

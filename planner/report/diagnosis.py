@@ -15,7 +15,7 @@ from planner.design.next_hit import NextHit, in_words
 from planner.diagnosis.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
 from planner.dynamics.in_time import change_at_force
 from planner.effects.effect import Operator
-from planner.errors import InputError
+from planner.errors import InputError, writing
 from planner.fit.posterior import RobotPosterior
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
@@ -300,11 +300,9 @@ def _make_room(folder: Path, robot: "Robot") -> None:
     given = {robot.path.resolve(), robot.urdf_path.resolve()}
     if given & {file.resolve() for file in files}:
         raise InputError(f"--out {folder} holds the robot that was given; name another folder.")
-    try:
+    with writing(folder):
         for file in files:
             file.unlink(missing_ok=True)
-    except OSError as error:
-        raise InputError(f"{folder} cannot be written ({error.strerror}); name another.") from None
 
 
 def _unwritten(found: "Diagnosis") -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.errors import InputError
+from planner.errors import InputError, writing
 from planner.export import uff
 from planner.export.collected import Collected, collect
 from planner.export.model_file import LOADER, model_arrays
@@ -161,7 +161,7 @@ _WRITERS: dict[str, Callable[[Collected], dict[str, Any]]] = {
 
 def _write(folder: Path, files: dict[str, Any]) -> tuple[str, ...]:
     """Write texts, and arrays as .npz or .mat by the name; returns the paths."""
-    try:
+    with writing(folder, "another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in files.items():
             path = folder / name
@@ -174,8 +174,4 @@ def _write(folder: Path, files: dict[str, Any]) -> tuple[str, ...]:
             else:
                 with open(path, "wb") as file:
                     np.savez_compressed(file, allow_pickle=False, **content)
-    except OSError as error:
-        raise InputError(
-            f"{folder} cannot be written ({error.strerror}); name another folder."
-        ) from None
     return tuple(str(folder / name) for name in files)

@@ -1,4 +1,4 @@
-"""A diagnosis that was kept, and what it says beside the campaign's own model."""
+"""A diagnosis that was kept: its chapter of a report, what it says beside the campaign's model."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -9,6 +9,8 @@ from planner.errors import InputError
 from planner.report.refitted_springs import RefittedSpring
 
 KEPT = "diagnosis.json"  # as `diagnose --out` writes it
+LEAST_SHOWN = 5e-4  # of a probability in the table: 0.05 %
+MOST_PICTURES = 4
 
 
 def diagnosis_of(directory: Path, given: Path | None = None) -> Path | None:
@@ -55,3 +57,35 @@ def two_answers(springs: Sequence[RefittedSpring], found: Mapping[str, Any]) -> 
 def _listed(places: set[str]) -> str:
     *others, last = sorted(places)
     return f"{', '.join(others)} and {last}" if others else last
+
+
+def chapter(file: Path, springs: Sequence[RefittedSpring]) -> dict[str, Any]:
+    """Verdict, findings, what else was considered, agreement; beside the model's `springs`."""
+    found = read_diagnosis(file)
+    parts = (("fit", "poses used"), ("held_out", "poses held out"))
+    sides = [
+        (f"{name}, {side}", found.get(where, {}).get(side) or {})
+        for where, name in parts for side in ("nominal", "refitted", "explained")
+    ]  # fmt: skip
+    pictures = [Path(p) for p in found.get("plots", ())[:MOST_PICTURES]]
+    return {
+        "verdict": found.get("verdict_text", found["verdict"]),
+        "findings": [
+            (one["text"], [(name, f"{v['value']:.4g} ± {v['sd']:.2g}", v["unit"])
+                           for name, v in one["parameters"].items()])
+            for one in found["findings"]
+        ],
+        "two_answers": two_answers(springs, found),
+        "candidates": [
+            (c["effect"].replace("_", " "), c["at"] or "–", f"{100 * c['probability']:.1f}")
+            for c in found["candidates"] if c["probability"] >= LEAST_SHOWN
+        ],
+        "agreement": [
+            (name, f"{one['frac']:.4f}", f"{one['frobenius']:.4f}")
+            for name, one in sides if one.get("frac") is not None
+        ],
+        "remarks": found.get("remarks", ()),
+        "pictures": [
+            (p, p.stem.replace("_", " ")) for p in pictures if p.is_file() and p.suffix == ".png"
+        ],
+    }  # fmt: skip

@@ -63,7 +63,7 @@ def _grid(count: int, title: str, size: float, **options: Any) -> tuple[Figure, 
     """A figure of so many equal panels, side by side."""
     columns = min(count, int(np.ceil(np.sqrt(1.6 * count))))
     rows = -(-count // columns)
-    figure = empty((size * columns + 0.6, size * rows + 0.9), title, 11)
+    figure = empty((size * columns + 0.6, size * rows + 0.9), title)
     return figure, [figure.add_subplot(rows, columns, k + 1, **options) for k in range(count)]
 
 

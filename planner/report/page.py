@@ -1,30 +1,33 @@
-"""The report of a campaign and the manual: one HTML file each, from the templates beside."""
+"""The report of a campaign: one HTML file, from the template `report.html`."""
 
-import base64
+import time
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import jinja2
 import numpy as np
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.config import CampaignConfig
+from planner.campaign.left_out import found_without
 from planner.campaign.state import CampaignState, Measurement, taken_back
 from planner.campaign.taking_back import act
 from planner.design.stopping import percent
+from planner.errors import InputError
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP
-from planner.report.kept_diagnosis import read_diagnosis, two_answers
-from planner.report.page_pictures import frf_pictures, left_out_picture, map_pictures
+from planner.report.answer import Done
+from planner.report.campaign_plots import left_out_figure
+from planner.report.html import rendered, write_page
+from planner.report.kept_diagnosis import chapter, diagnosis_of
+from planner.report.page_pictures import frf_pictures, map_pictures
 from planner.report.proposals import target_sentence
-from planner.report.refitted_springs import COLUMNS, NOT_KNOWN, RefittedSpring
+from planner.report.refitted_springs import COLUMNS, NOT_KNOWN
 from planner.report.status import StatusReport, status
 from planner.report.text import SIMULATED, number, with_sd
 from planner.robot.link_bodies import guessed_masses
-from planner.version import __version__
-from planner.words import command, local_time, significant
+from planner.words import command, counted, local_time, significant
 
 if TYPE_CHECKING:
     from planner.campaign.cell import Cell
@@ -36,24 +39,35 @@ CHAPTERS = {
     "frfs": "FRFs", "learned": "simulation", "diagnosis": "diagnosis", "log": "log",
     "again": "reproduce", "meaning": "reading",
 }  # fmt: skip
-LEAST_SHOWN = 5e-4  # of a probability in the table: 0.05 %
-MOST_PICTURES = 4  # of a diagnosis
 CLASSES = {"error": "error", "warning": "warn"}
 
 
-def rendered(template: str, **values: object) -> str:
-    """A template filled in; whatever a value holds is text there, no markup."""
-    loader = jinja2.PackageLoader("planner.report", "templates")
-    made = jinja2.Environment(
-        loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    return made.get_template(template).render(version=__version__, **values)
+def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -> Done:
+    """Write the report of a campaign, by default report.html in its folder.
+
+    `diagnosis` names what `planner diagnose --out` has written. Raises InputError where the file
+    cannot be written.
+    """
+    started = time.perf_counter()
+    kept = diagnosis_of(campaign.directory, diagnosis)
+    file = (out or campaign.directory / "report.html").absolute()
+    if file.is_dir():
+        raise InputError(f"{file} is a folder; name a file for the report.")
+    if not file.parent.is_dir():
+        raise InputError(f"{file.parent} does not exist; make that folder, or name another.")
+    write_page(page(campaign, kept), file)
+    size, used, simulated = file.stat().st_size, len(campaign.state.used), campaign.state.simulated
+    keys = {
+        "report": str(file), "bytes": size, "measurements": used, "simulated": simulated,
+        "diagnosis": str(kept) if kept else None, "seconds": time.perf_counter() - started,
+    }  # fmt: skip
+    return Done(keys, f"Report of {counted(used, 'pose')} ({size / 1e6:.1f} MB): {file}")
 
 
 def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
     """The report; `kept_diagnosis` is the answer of a diagnosis in JSON."""
     state, now, cell = campaign.state, status(campaign), campaign.cell
-    found = diagnosis(kept_diagnosis, now.springs) if kept_diagnosis else None
+    found = chapter(kept_diagnosis, now.springs) if kept_diagnosis else None
     without = {"diagnosis"} if found is None else set()
     without |= set() if now.springs else {"learned"}
     folder = campaign.directory
@@ -74,7 +88,9 @@ def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
         **_measured(campaign, state, now),
         forecast=f"{now.forecast.text} {reached}" if state.used else nothing,
         modes=_mode_rows(campaign),
-        left_out=left_out_picture(campaign) if now.leave_one_out.values else None,
+        left_out=left_out_figure(*found_without(campaign.model))
+        if now.leave_one_out.values
+        else None,
         errors=_errors(now),
         **map_pictures(campaign),
         **frf_pictures(campaign, now.leave_one_out.worst),
@@ -225,36 +241,3 @@ def _files(state: CampaignState) -> Rows:
     robot = sorted(state.configured.robot.items()) if state.configured else []
     rows: Rows = [(f"robot/{name}", digest) for name, digest in robot]
     return rows + [(f"{m.pose}: {h.file}", h.sha256) for m in state.recorded for h in m.hits]
-
-
-def diagnosis(file: Path, springs: Sequence[RefittedSpring]) -> dict[str, Any]:
-    """Verdict, findings, what else was considered, agreement; beside the model's `springs`."""
-    found = read_diagnosis(file)
-    parts = (("fit", "poses used"), ("held_out", "poses held out"))
-    sides = [
-        (f"{name}, {side}", found.get(where, {}).get(side) or {})
-        for where, name in parts for side in ("nominal", "refitted", "explained")
-    ]  # fmt: skip
-    pictures = [Path(p) for p in found.get("plots", ())[:MOST_PICTURES]]
-    return {
-        "verdict": found.get("verdict_text", found["verdict"]),
-        "findings": [
-            (one["text"], [(name, f"{v['value']:.4g} ± {v['sd']:.2g}", v["unit"])
-                           for name, v in one["parameters"].items()])
-            for one in found["findings"]
-        ],
-        "two_answers": two_answers(springs, found),
-        "candidates": [
-            (c["effect"].replace("_", " "), c["at"] or "–", f"{100 * c['probability']:.1f}")
-            for c in found["candidates"] if c["probability"] >= LEAST_SHOWN
-        ],
-        "agreement": [
-            (name, f"{one['frac']:.4f}", f"{one['frobenius']:.4f}")
-            for name, one in sides if one.get("frac") is not None
-        ],
-        "remarks": found.get("remarks", ()),
-        "pictures": [
-            (base64.b64encode(p.read_bytes()).decode(), p.stem.replace("_", " "))
-            for p in pictures if p.is_file() and p.suffix == ".png"
-        ],
-    }  # fmt: skip

@@ -1,30 +1,16 @@
-"""Pictures in the report of a campaign: held-out quality, maps over the workspace, FRFs."""
+"""Pictures in the report of a campaign: maps over the workspace, FRFs."""
 
-import base64
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.left_out import found_without
 from planner.recording.joints import SCALES
-from planner.report.campaign_plots import frf_sheet, left_out_figure, workspace_map
-from planner.report.pictures import png
+from planner.report.campaign_plots import frf_sheet, workspace_map
 
 SHOWN_FRFS = 6  # poses whose FRFs are drawn: the ones furthest off, then the first
 SHOWN_MAPS = 8  # modes whose maps are drawn
-DPI = 100
-
-
-def _encoded(figure: Figure) -> str:
-    return base64.b64encode(png(figure, DPI)).decode()
-
-
-def left_out_picture(campaign: Campaign) -> str:
-    """Each pose predicted without it, as base64 of a PNG."""
-    return _encoded(left_out_figure(*found_without(campaign.model)))
 
 
 def map_pictures(campaign: Campaign) -> dict[str, Any]:
@@ -43,7 +29,7 @@ def map_pictures(campaign: Campaign) -> dict[str, Any]:
     means = " Several poses lie at one place of the map: shown is their mean, cell by cell."
     said = f"{len(x)} reachable poses stand for the workspace.{'' if flat else means}"
     said += f" Modes above {SHOWN_MAPS} are not drawn." if count > SHOWN_MAPS else ""
-    return {"maps": [_encoded(figure) for figure in drawn], "maps_say": said}
+    return {"maps": drawn, "maps_say": said}
 
 
 def _coordinates(
@@ -90,5 +76,5 @@ def frf_pictures(campaign: Campaign, worst: Sequence[str]) -> dict[str, Any]:
     for i, m in enumerate(shown):
         frf = campaign.frf_of(m, modes)
         figure = frf_sheet(lines, mean[i], sd[i], frf, expected.frequency_hz[i])
-        drawn.append((m.pose, _encoded(figure), not np.any(np.isfinite(frf.coherence))))
+        drawn.append((m.pose, figure, not np.any(np.isfinite(frf.coherence))))
     return {"frfs": drawn, "frfs_left": len(used) - len(shown)}

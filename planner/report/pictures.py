@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from planner.errors import InputError
+from planner.errors import InputError, writing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,14 +78,10 @@ def _files(figures: dict[str, "Figure"], folder: Path, form: str) -> list[Path]:
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file; name a folder for the pictures.")
     files = [folder.absolute() / f"{name}.{form}" for name in figures]
-    try:
+    with writing(folder, "another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         for file, figure in zip(files, figures.values(), strict=True):
             save(figure, file)
-    except OSError as error:
-        raise InputError(
-            f"The pictures cannot be written to {folder} ({error.strerror}); name another folder."
-        ) from None
     return files
 
 

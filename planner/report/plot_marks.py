@@ -50,11 +50,11 @@ def write_values(panel: Axes, image: "AxesImage", form: str, **style: Any) -> No
             panel.text(j, i, format(value, form), ha="center", va="center", color=colour, **style)
 
 
-def empty(size: tuple[float, float], title: str = "", fontsize: float = 10) -> Figure:
+def empty(size: tuple[float, float], title: str = "") -> Figure:
     """A figure (size in inches) with a title."""
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(plain_text(title), fontsize=fontsize)
+    figure.suptitle(plain_text(title), fontsize=11)
     return figure
 
 
@@ -62,7 +62,7 @@ def panels(
     size: tuple[float, float], title: str, rows: int = 1, columns: int = 1, **layout: Any
 ) -> tuple[Figure, Any]:
     """A figure (size in inches) with panels (rows, columns) that share the horizontal axis."""
-    figure = empty(size, title, 11)
+    figure = empty(size, title)
     return figure, figure.subplots(rows, columns, sharex=True, squeeze=False, **layout)
 
 

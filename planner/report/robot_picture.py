@@ -24,7 +24,7 @@ def robot_figure(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Fi
     """The robot at q (dof,) in rad: from the side, from above, and in space."""
     lines = _close(robot_lines(robot, q, links), robot.shoulder_m, robot.reach_m)
     stands = robot.joints.listed(robot.joints.shown(q), 0)
-    figure = empty((15.0, 6.0), f"At joint angles ({stands})", 12)
+    figure = empty((15.0, 6.0), f"At joint angles ({stands})")
     grid = figure.add_gridspec(1, 3)
     for column, (name, pair) in enumerate(VIEWS):
         panel = figure.add_subplot(grid[0, column])

@@ -145,7 +145,7 @@ def map_figure(
     their features (n, d), named, the depth hangs on most.
     """
     what = f"What {len(depth_m)} poses of the workspace allow at {rpm:.0f} rpm (ring: the tightest)"
-    figure = empty((13.0, 4.6), what, 11)
+    figure = empty((13.0, 4.6), what)
     above, side, over = figure.subplots(1, 3)
     shown = 1e3 * np.minimum(depth_m, deepest_m)
     tight, (x, y, z) = int(np.argmin(shown)), position_m.T

@@ -13,7 +13,7 @@ SIMULATED = Text(
 )
 
 
-def table(title: str, *columns: str) -> Table:
+def table(title: str | Text, *columns: str) -> Table:
     """A table whose first column is text and the others numbers."""
     made = Table(title=title, title_justify="left", header_style="bold")
     for i, column in enumerate(columns):

@@ -7,7 +7,7 @@ has them, and else in kind. A figure that was not computed cannot be judged, nor
 condition (`given`) is not met here.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -163,6 +163,18 @@ class PaperClaim:
 
 COLUMNS = ("verdict", "figure", "the paper's", "here (mean over seeds)", "spread over seeds",
            "false if, on any seed or within the spread", "reason")  # fmt: skip
+
+
+def in_order(rules: Sequence[ClaimRule], values: Iterable[float]) -> dict[str, float]:
+    """Figures by name, from values in the order in which the rules' bounds need them."""
+    names = [bound.figure for rule in rules for bound in rule.bounds]
+    return dict(zip(names, map(float, values), strict=True))
+
+
+def gathered(each: Sequence[Mapping[str, float]]) -> dict[str, list[float]]:
+    """Figures of all robots by name, from those of each, which may lack some."""
+    names = dict.fromkeys(name for one in each for name in one)
+    return {name: [one[name] for one in each if name in one] for name in names}
 
 
 def judge(

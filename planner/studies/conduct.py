@@ -1,28 +1,26 @@
 """One study or all of them: run, written as tables, pictures and pages, and not run twice."""
 
+import csv
 import time
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
 from planner import content_hash
 from planner.campaign.journal import read_checked, write_checked
-from planner.errors import InputError
+from planner.errors import InputError, writing
 from planner.progress import Tell, within
 from planner.report.answer import encoded
+from planner.report.html import rendered, write_page
+from planner.report.pictures import Pictures
 from planner.studies import registry
-from planner.studies.claims import COLUMNS
-from planner.studies.page import index_page, study_page, write_page
-from planner.studies.report import (
-    StudiesAnswer,
-    StudyAnswer,
-    Table,
-    check_folder,
-    write,
-    write_table,
-)
+from planner.studies.claims import COLUMNS, HOLDS, IN_KIND, NOT, UNTESTED, gathered, judge
+from planner.studies.report import StudiesAnswer, StudyAnswer, Table, shown_cell
 
 FINISHED = "study.json"  # written last: a folder that has it holds a whole study
+CLASSES = {HOLDS: "verdict holds", IN_KIND: "verdict kind", NOT: "verdict not", UNTESTED: "verdict"}
 
 
 class Finished(msgspec.Struct, frozen=True):
@@ -35,17 +33,19 @@ class Finished(msgspec.Struct, frozen=True):
 def conduct(name: str, folder: Path | None, small: bool, progress: Tell) -> StudyAnswer:
     """One study; its tables, pictures and page go to `folder`."""
     name = registry.named(name)
-    check_folder(folder)
-    start = time.perf_counter()
-    told = registry.load(name).study(progress, small)
+    _make(folder)
+    start, study = time.perf_counter(), registry.load(name)
+    told = study.study(progress, small)
+    findings = judge(study.RULES, gathered(told.figures), told.notes)
     files: list[str] = []
     answer = StudyAnswer(
-        name, told.data, told.tables, told.findings, files, time.perf_counter() - start,
-        told.paper.citation, small, told.paper.short,
+        name, told.data, told.tables, findings, files, time.perf_counter() - start,
+        study.PAPER.citation, small, study.PAPER.short,
     )  # fmt: skip
-    files += write(answer, told.figures, folder)
     if folder is not None:
-        files.append(write_page(study_page(answer), folder / f"{name}.html"))
+        files += [_write_table(each, folder) for each in (*told.tables, answer.claims)]
+        files += Pictures(folder).write(told.pictures, name)["plots"]
+        files.append(str(write_page(_page(answer), folder / f"{name}.html")))
     return answer
 
 
@@ -57,7 +57,7 @@ def conduct_all(folder: Path | None, small: bool, progress: Tell) -> StudiesAnsw
     if folder is None:
         raise InputError("All studies take long and are kept; name a folder with --out.")
     registry.named(registry.ALL)
-    check_folder(folder)
+    _make(folder)
     start, done, taken, damaged = time.perf_counter(), [], [], []
     count = len(registry.NAMES)
     for i, name in enumerate(registry.NAMES):
@@ -75,7 +75,7 @@ def conduct_all(folder: Path | None, small: bool, progress: Tell) -> StudiesAnsw
         done.append(before)
     claims = tuple((a.study, *row) for a in done for row in a.claims.rows)
     whole = Table("claims", "Claims of all papers", ("study", "claim", *COLUMNS), claims)
-    files = [write_page(index_page(done), folder / "index.html"), write_table(whole, folder)]
+    files = [str(write_page(_index(done), folder / "index.html")), _write_table(whole, folder)]
     seconds = time.perf_counter() - start
     return StudiesAnswer(tuple(done), tuple(taken), files, seconds, tuple(damaged))
 
@@ -96,3 +96,52 @@ def _finished(name: str, folder: Path, small: bool) -> StudyAnswer | None:
     except (msgspec.MsgspecError, KeyError, TypeError):
         return None
     return answer if all(Path(file).exists() for file in answer.files) else None
+
+
+def _make(folder: Path | None) -> None:
+    """InputError, before a study has run for minutes, if nothing can be written there."""
+    if folder is not None:
+        with writing(folder, "another folder"):
+            folder.mkdir(parents=True, exist_ok=True)
+
+
+def _write_table(made: Table, folder: Path) -> str:
+    """One table as CSV; the file's absolute path."""
+    path = folder.absolute() / f"{made.name}.csv"
+    with writing(path, "another folder"), path.open("w", newline="", encoding="utf-8") as out:
+        csv.writer(out).writerows([made.columns, *made.rows])
+    return str(path)
+
+
+def _page(answer: StudyAnswer) -> str:
+    """Whose paper, what stands in for its data, claims, tables, pictures."""
+    each = ", ".join(f"{v} {answer.count(v)}" for v in CLASSES)
+    return _study_html(
+        f"{answer.short}, done again",
+        paper=answer.paper,
+        data=answer.data,
+        said=[f"Of {len(answer.findings)} claims: {each}."],
+        tables=[answer.claims, *answer.tables],
+        pictures=[Path(file) for file in answer.files if file.endswith(".png")],
+        seconds=answer.seconds,
+    )
+
+
+def _index(answers: list[StudyAnswer]) -> str:
+    """What holds, study by study, with a link to each one's page and all claims below."""
+    rows = tuple((a.study, a.paper, *map(float, map(a.count, CLASSES)), a.seconds) for a in answers)
+    listed = Table("studies", "Studies", ("study", "paper", *CLASSES, "seconds"), rows)
+    return _study_html(
+        "Papers on pose-dependent robot dynamics, done again",
+        data="All recordings are SIMULATED; each study says how.",
+        tables=[listed, *(answer.claims for answer in answers)],
+        links={a.study: f"{a.study}/{a.study}.html" for a in answers},
+    )
+
+
+def _study_html(title: str, **values: Any) -> str:
+    empty: Mapping[str, Any] = {
+        "paper": "", "said": (), "links": {}, "pictures": (), "seconds": 0.0, "classes": CLASSES,
+        "shown": shown_cell,
+    }  # fmt: skip
+    return rendered("study.html", title=title, **(empty | values))

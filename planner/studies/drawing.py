@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 COLOURS = {
@@ -17,14 +16,6 @@ COLOURS = {
     "all at once": "tab:orange", "groups of three": "tab:green",
     "groups, others known": "limegreen",
 }  # fmt: skip
-
-
-def new(size: tuple[float, float], title: str = "") -> Figure:
-    """An empty figure, size in inches."""
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=11)
-    return figure
 
 
 def bars(

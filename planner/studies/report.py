@@ -1,9 +1,9 @@
 """What a study answers: tables, pictures and judged claims; its answer as JSON, text and files."""
 
-import csv
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -11,15 +11,15 @@ from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from planner.errors import InputError
+from planner.progress import Tell, within
 from planner.report.answer import Answer
-from planner.report.pictures import Pictures
 from planner.report.text import table
 from planner.studies.claims import COLUMNS, HOLDS, IN_KIND, NOT, UNTESTED, PaperClaim
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+R = TypeVar("R")
 Cell = str | float
 COLOURS = {HOLDS: "bold green", IN_KIND: "bold yellow", NOT: "bold red", UNTESTED: "bold"}
 
@@ -56,13 +56,16 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What a study found; `data` says what stands in for the paper's recordings."""
+    """What a study found; `data` says what stands in for the paper's recordings.
 
-    paper: Paper
+    `figures` of each robot are what claims are judged on, by name; `notes` say what lies behind.
+    """
+
     data: str
     tables: tuple[Table, ...]
-    findings: tuple[PaperClaim, ...]
-    figures: "dict[str, Figure]" = field(default_factory=dict)
+    figures: Sequence[Mapping[str, float]]
+    notes: Mapping[str, str]
+    pictures: "dict[str, Figure]" = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,10 @@ class StudyAnswer(Answer):
             for t in data["tables"]
         ]
         return msgspec.convert({**data, "tables": tables}, cls, strict=False)
+
+    def count(self, verdict: str) -> int:
+        """How many claims have this verdict."""
+        return sum(claim.verdict == verdict for claim in self.findings)
 
     @property
     def claims(self) -> Table:
@@ -136,43 +143,16 @@ def shown_cell(value: Cell) -> str:
     return "–" if value != value else f"{value:.4g}"
 
 
+def on_each(seeds: Sequence[int], run: Callable[[int, Tell], R], progress: Tell) -> list[R]:
+    """What `run` gives of the robot of every seed, one after the other."""
+    parts = (within(progress, i / len(seeds), (i + 1) / len(seeds)) for i in range(len(seeds)))
+    return [run(seed, part) for seed, part in zip(seeds, parts, strict=True)]
+
+
 def r_squared(predicted: np.ndarray, measured: np.ndarray, axis: int | None = None) -> np.ndarray:
     """Coefficient of determination R² over an axis (all if None); NaN was not measured."""
     off = np.nanmean((predicted - measured) ** 2, axis=axis)
     return 1 - off / np.nanvar(measured, axis=axis)
-
-
-def check_folder(folder: Path | None) -> None:
-    """InputError, before a study has run for minutes, if nothing can be written there."""
-    if folder is None:
-        return
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"The study cannot write to {folder} ({error.strerror}); name another folder."
-        ) from None
-
-
-def write(answer: StudyAnswer, figures: "dict[str, Figure]", folder: Path | None) -> list[str]:
-    """Tables as CSV and pictures as PNG; absolute paths of all files."""
-    if folder is None:
-        return []
-    files = [write_table(each, folder) for each in (*answer.tables, answer.claims)]
-    return [*files, *Pictures(folder).write(figures, answer.study)["plots"]]
-
-
-def write_table(made: Table, folder: Path) -> str:
-    """One table as CSV; the file's absolute path."""
-    path = folder.absolute() / f"{made.name}.csv"
-    try:
-        with path.open("w", newline="", encoding="utf-8") as out:
-            csv.writer(out).writerows([made.columns, *made.rows])
-    except OSError as error:
-        raise InputError(
-            f"{path} cannot be written ({error.strerror}); name another folder."
-        ) from None
-    return str(path)
 
 
 def _shown(entry: Table) -> RenderableType:

@@ -18,7 +18,7 @@ from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESCRIPTIONS, DESIGNS
 from planner.milling.cut import Cut, load_cut
 from planner.milling.tool_file import ToolTable, load_tool
-from planner.report.manual_page import manual
+from planner.report.documentation import manual
 from planner.robot.config import RobotConfig
 
 COMMANDS = typer.main.get_command(app).commands  # pyright: ignore[reportAttributeAccessIssue]

@@ -9,7 +9,7 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.cli.run import run
-from planner.report.campaign_report import write_report
+from planner.report.page import write_report
 from planner.report.text import SIMULATED
 from tests.support.named_campaign import DOLLAR, SCRIPT
 

@@ -9,9 +9,9 @@ import pytest
 
 from planner.errors import InputError
 from planner.progress import quietly
+from planner.report.plot_marks import empty
 from planner.studies import conduct, registry
-from planner.studies.claims import Bound, ClaimRule, judge
-from planner.studies.drawing import new
+from planner.studies.claims import Bound, ClaimRule
 from planner.studies.report import Paper, Report, StudyAnswer, Table
 
 AUTHORS = {"busch2022": "Busch, Zaeh", "lei2023": "Lei, Hou, Ding"}
@@ -32,14 +32,13 @@ def ran(monkeypatch):
         def study(progress, small):
             ran.append((name, small))
             progress("all of it", 0.5)
-            values = {"a": [0.5, 0.6], "b": [0.5, 0.4], "c": [0.7]}
-            claims = judge(RULES, values, {"b": "the data are too few: 3"})
+            values = [{"a": 0.5, "b": 0.5, "c": 0.7}, {"a": 0.6, "b": 0.4}]
+            notes = {"b": "the data are too few: 3"}
             table = Table(f"{name}_t", "T", ("a", "b"), (("x", float("nan")), ("y", 2.5)))
-            paper = Paper(AUTHORS[name], 2023, "T", "J")
-            figures = {f"{name}_f": new((3, 2), "empty")}
-            return Report(paper, "SIMULATED: nothing", (table,), claims, figures)
+            figures = {f"{name}_f": empty((3, 2), "empty")}
+            return Report("SIMULATED: nothing", (table,), values, notes, figures)
 
-        return SimpleNamespace(study=study)
+        return SimpleNamespace(study=study, RULES=RULES, PAPER=Paper(AUTHORS[name], 2023, "T", "J"))
 
     monkeypatch.setattr(registry, "NAMES", ("busch2022", "lei2023"))
     monkeypatch.setattr(registry, "load", load)

@@ -10,7 +10,7 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from planner.errors import InputError
+from planner.errors import writing
 
 PORT = 9876
 VIEWER = f"rerun+http://127.0.0.1:{PORT}/proxy"
@@ -37,11 +37,9 @@ def open_stream(
 def _sinks(rrd: Path | None, viewer: bool) -> list:
     sinks = []
     if rrd is not None:
-        try:
+        with writing(rrd):
             rrd.parent.mkdir(parents=True, exist_ok=True)
             rrd.write_bytes(b"")
-        except OSError as error:
-            raise InputError(f"{rrd} cannot be written ({error.strerror}); name another.") from None
         sinks.append(rr.FileSink(str(rrd)))
     if viewer and _start_viewer():
         sinks.append(rr.GrpcSink(VIEWER))

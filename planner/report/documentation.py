@@ -1,6 +1,8 @@
-"""Answer of `schema`: every entry of a TOML file that a user writes."""
+"""Every entry of the TOML files that a user writes (`schema`), and the manual."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -8,8 +10,10 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.file_entries import FILES, SchemaTable, tables_of
-from planner.errors import InputError
+from planner.campaign.store import EXAMPLE
+from planner.errors import InputError, writing
 from planner.report.answer import Answer
+from planner.report.html import rendered, write_page
 from planner.report.text import table
 
 
@@ -25,8 +29,7 @@ class SchemaReport(Answer):
         """One table after the other."""
         parts: list[Any] = []
         for one in self.tables:
-            made = table("", "entry", "takes", "if left out")
-            made.title = Text(one.name or self.file, style="bold")
+            made = table(Text(one.name or self.file, style="bold"), "entry", "takes", "if left out")
             for column in made.columns:
                 column.justify = "left"
             for entry in one.entries:
@@ -43,3 +46,24 @@ def schema(file: str) -> SchemaReport:
         raise InputError(f"There is no file {file}; name one of {', '.join(FILES)}.")
     kind = FILES[file]
     return SchemaReport(f"{file}.toml", tuple(tables_of(kind)), msgspec.json.schema(kind))
+
+
+def manual(commands: Sequence[tuple[str, str]]) -> str:
+    """Chapters of words, the files' entries, and commands, which are names and their help."""
+    files = {
+        name: (next(EXAMPLE.rglob(f"{name}.toml")).read_text("utf-8"), list(tables_of(kind)))
+        for name, kind in FILES.items()
+    }
+    told = []
+    for name, text in commands:
+        said, _, example = text.partition("Example: ")
+        paragraphs = [one for one in said.split("\n\n") if one.strip()]
+        told.append((name, paragraphs, " ".join(example.split())))
+    return rendered("manual.html", title="planner: manual", files=files, commands=told)
+
+
+def write_manual(out: Path, commands: Sequence[tuple[str, str]]) -> Path:
+    """Write it; InputError where that is impossible."""
+    with writing(out):
+        out.parent.mkdir(parents=True, exist_ok=True)
+    return write_page(manual(commands), out)
