@@ -40,7 +40,7 @@ def respond(answer: "Answer", as_json: bool, code: int = 0) -> int:
         sys.stdout.write(encoded(answer).decode() + "\n")
         sys.stdout.flush()
     else:
-        from planner.report.console import UnbrokenConsole
+        from planner.report.text import UnbrokenConsole
 
         text = answer.text()
         if text is not None:

@@ -17,7 +17,7 @@ FIRST_S, LAST_S = 5.0, 60.0  # between lines: the first one, and at most, doubli
 
 def console(quiet: bool, stderr: bool = True):
     """A rich console on stderr (or stdout), silent if `quiet`."""
-    from planner.report.console import UnbrokenConsole
+    from planner.report.text import UnbrokenConsole
 
     return UnbrokenConsole(stderr=stderr, quiet=quiet)
 

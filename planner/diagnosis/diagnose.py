@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from msgspec import UNSET, UnsetType
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.exponential_window import screen_window
@@ -26,7 +27,7 @@ from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
-from planner.measurement.agreement import Similarity, similarity_of
+from planner.measurement.agreement import NO_SIMILARITY, Similarity, similarity_of
 from planner.measurement.nuisances import Tolerances
 from planner.progress import Tell, quietly
 from planner.robot.joint_laws import LawTable
@@ -41,11 +42,15 @@ MOST_BETWEEN = 8  # poses between measured ones, at which sizes are told
 
 @dataclass(frozen=True)
 class ThreefoldSimilarity:
-    """Of the simulation as stated, refitted, and with what explains the recordings."""
+    """Of the simulation as stated, refitted, and with what explains the recordings.
 
-    nominal: Similarity
-    refitted: Similarity
-    explained: Similarity
+    At `poses` that no fit had seen, or at all.
+    """
+
+    nominal: Similarity = NO_SIMILARITY
+    refitted: Similarity = NO_SIMILARITY
+    explained: Similarity = NO_SIMILARITY
+    poses: tuple[str, ...] | UnsetType = UNSET
 
     def worse(self, matters: float) -> bool:
         """Whether what explains predicts worse than the robot refitted, by what matters of |H|."""

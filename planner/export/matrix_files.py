@@ -14,6 +14,7 @@ import numpy as np
 from planner.errors import writing
 from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_modes import MatrixModes
+from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 from planner.version import __version__
@@ -122,29 +123,33 @@ def _traces(what: Exported, numbers: dict[str, int]) -> list[dict[str, Any]]:
 
 
 def _shapes(what: Exported) -> list[dict[str, Any]]:
-    numbers, sets = what.numbers, []
-    for k, mode in enumerate(what.found.modes):
-        nodes, motion = _motion(what.found.dofs, mode.shape, numbers)
-        common = {
-            "type": 55, "id1": f"mode {k + 1}: {mode.frequency_hz:.6g} Hz",
-            "id2": "unit modal mass, kg^-1/2" if mode.scaled else "not scaled",
-            "model_type": 1, "data_ch": 2, "spec_data_type": 8, "load_case": 0, "mode_n": k + 1,
-            "node_nums": nodes, "n_data_per_node": 3,
-        }  # fmt: skip
+    sets = []
+    for k, mode in enumerate(what.found.modes, 1):
+        nodes, motion = _motion(what.found.dofs, mode.shape, what.numbers)
+        a = 2j * mode.pole.imag if mode.scaled else 0j
+        said = "unit modal mass, kg^-1/2" if mode.scaled else "not scaled"
+        one = _complex_mode(k, mode, said, nodes, motion.real if what.real else motion, a)
         if what.real:
-            values = [np.ascontiguousarray(column) for column in motion.real.T]
-            more = {
+            one |= {
                 "analysis_type": 2, "data_type": 2, "freq": mode.frequency_hz,
                 "modal_m": 1.0 if mode.scaled else 0.0, "modal_damp_vis": mode.damping_ratio,
                 "modal_damp_his": 0.0,
             }  # fmt: skip
-        else:
-            values = [np.ascontiguousarray(column) for column in motion.T]
-            a = 2j * mode.pole.imag if mode.scaled else 0j
-            more = {"analysis_type": 3, "data_type": 5, "eig": mode.pole, "modal_a": a,
-                    "modal_b": -mode.pole * a}  # fmt: skip
-        sets.append(common | more | dict(zip(("r1", "r2", "r3"), values, strict=True)))
+        sets.append(one)
     return sets
+
+
+def _complex_mode(
+    k: int, mode: Mode, said: str, nodes: list[int], motion: np.ndarray, a: complex
+) -> dict[str, Any]:
+    """Dataset 55 of a vector (n, 3) of a mode, counted from 1; `said` is its second line."""
+    columns = map(np.ascontiguousarray, motion.T)
+    return {
+        "type": 55, "id1": f"mode {k}: {mode.frequency_hz:.6g} Hz", "id2": said, "model_type": 1,
+        "data_ch": 2, "spec_data_type": 8, "load_case": 0, "mode_n": k, "node_nums": nodes,
+        "n_data_per_node": 3, "analysis_type": 3, "data_type": 5, "eig": mode.pole, "modal_a": a,
+        "modal_b": -mode.pole * a, **dict(zip(("r1", "r2", "r3"), columns, strict=True)),
+    }  # fmt: skip
 
 
 Vectors = list[tuple[int, str, tuple[Dof, ...], np.ndarray, np.ndarray]]
@@ -166,20 +171,11 @@ def _vectors(what: Exported) -> Vectors:
 
 def _vector_sets(what: Exported, apart: Vectors) -> list[dict[str, Any]]:
     """The format knows no left vectors: the second line of each set says which it is."""
-    sets, numbers = [], what.numbers
+    sets = []
     for k, side, dofs, vector, _ in apart:
-        mode, (nodes, motion) = what.found.modes[k - 1], _motion(dofs, vector, numbers)
-        a = 2j * mode.pole.imag
-        sets.append(
-            {
-                "type": 55, "id1": f"mode {k}: {mode.frequency_hz:.6g} Hz",
-                "id2": f"{side} vector: R = right left^T / (2 i w_d)", "model_type": 1,
-                "data_ch": 2, "spec_data_type": 8, "load_case": 0, "mode_n": k,
-                "node_nums": nodes, "n_data_per_node": 3, "analysis_type": 3, "data_type": 5,
-                "eig": mode.pole, "modal_a": a, "modal_b": -mode.pole * a,
-                **dict(zip(("r1", "r2", "r3"), map(np.ascontiguousarray, motion.T), strict=True)),
-            }
-        )  # fmt: skip
+        mode, (nodes, motion) = what.found.modes[k - 1], _motion(dofs, vector, what.numbers)
+        said = f"{side} vector: R = right left^T / (2 i w_d)"
+        sets.append(_complex_mode(k, mode, said, nodes, motion, 2j * mode.pole.imag))
     return sets
 
 

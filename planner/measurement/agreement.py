@@ -1,5 +1,6 @@
 """How well a simulation, identified or not, agrees with FRFs."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,10 +19,17 @@ MOST_LINES = 512  # a pose
 
 @dataclass(frozen=True)
 class Similarity:
-    """Global FRAC and Frobenius similarity, means over the direct FRFs (`planner.frf.metrics`)."""
+    """Global FRAC and Frobenius similarity over magnitudes, means over the direct FRFs.
 
-    frac: float
-    frobenius: float
+    As of `planner.frf.metrics` (Birk et al. 2025): 1 where equal, NaN where there is no pose to
+    compare at.
+    """
+
+    frac: float = math.nan
+    frobenius: float = math.nan
+
+
+NO_SIMILARITY = Similarity()
 
 
 def fit_similarity(

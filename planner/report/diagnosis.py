@@ -12,12 +12,13 @@ from rich.text import Text
 from planner.design.discrimination import LIKELY
 from planner.design.extra_sensor import ExtraSensor
 from planner.design.next_hit import NextHit, in_words
+from planner.diagnosis.diagnose import ThreefoldSimilarity
 from planner.diagnosis.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
 from planner.dynamics.in_time import change_at_force
 from planner.effects.effect import Operator
 from planner.errors import InputError, writing
 from planner.fit.posterior import RobotPosterior
-from planner.report.agreement import FrfSimilarity, ThreeSimilarities
+from planner.measurement.agreement import Similarity, fit_similarity
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
 from planner.report.text import command_line, remarks, table
 from planner.robot.place_names import place_names, with_names
@@ -123,8 +124,8 @@ class DiagnosisReport(Answer):
     undecided: tuple[tuple[tuple[str, str | None], ...], ...]
     sets: tuple[tuple[EffectAtPlace, ...], ...]
     where: MismatchPlaces
-    fit: ThreeSimilarities
-    held_out: ThreeSimilarities
+    fit: ThreefoldSimilarity
+    held_out: ThreefoldSimilarity
     misfit: TwoMisfits
     shares: MismatchShares
     refused: tuple[RefusedFile, ...]
@@ -133,7 +134,7 @@ class DiagnosisReport(Answer):
     place_names: Mapping[str, str]
     npz: str | None = None
     robot: str | None = None
-    written: FrfSimilarity | None = None  # of that robot alone at the measured poses
+    written: Similarity | None = None  # of that robot alone at the measured poses
     urdf: Path | None = field(default=None, metadata=NOT_IN_JSON)
     campaign_robot: Path | None = field(default=None, metadata=NOT_IN_JSON)
     plots: tuple[str, ...] = ()
@@ -197,7 +198,6 @@ class DiagnosisReport(Answer):
         from planner.dynamics.simulation import Simulation
         from planner.fit.identified import as_identification
         from planner.fit.write_robot import write_robot
-        from planner.measurement.agreement import fit_similarity
         from planner.report.diagnosis_plots import diagnosis_figures
         from planner.report.pictures import Pictures
         from planner.robot.robot import Robot
@@ -209,7 +209,7 @@ class DiagnosisReport(Answer):
         result = replace(result, simulation=found.simulation)
         made = write_robot(folder / "robot.toml", model.simulation.robot, result, found.laws)
         again, search = Simulation(Robot.load(made.robot_toml)), found.search
-        alone = FrfSimilarity.of(fit_similarity(again, search.frfs, search.q, search.band_hz))
+        alone = fit_similarity(again, search.frfs, search.q, search.band_hz)
         drawn = self.with_figures(Pictures(folder), lambda: diagnosis_figures(found), robot.name)
         said = *self.remarks, *made.remarks, *_unwritten(found)
         written = replace(
@@ -337,8 +337,8 @@ def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> Diagno
         undecided=tuple(c.places for c in undecided) if len(undecided) > 1 else (),
         sets=tuple(tuple(EffectAtPlace(*one) for one in members) for members in verdict.sets),
         where=MismatchPlaces.of(place, recorded.poses),
-        fit=ThreeSimilarities.of(found.fitted),
-        held_out=ThreeSimilarities.of(found.held_out, aside),
+        fit=found.fitted,
+        held_out=replace(found.held_out or ThreefoldSimilarity(), poses=aside),
         misfit=TwoMisfits(*sides),
         shares=MismatchShares.of(found),
         refused=tuple(RefusedFile(*entry) for entry in recorded.refused),

@@ -1,73 +1,40 @@
 """Answer of `identify`: elastic parameters, what they are worth, and what stays open."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planner.report.agreement import FrfSimilarity, SimilarityChange
+from planner.measurement.agreement import NO_SIMILARITY, Similarity, fit_similarity
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
 from planner.report.pictures import Pictures, entitle
-from planner.report.text import remarks, table, with_sd
+from planner.report.springs import IdentifiedSpring, identified_springs
+from planner.report.text import remarks, table
 
 if TYPE_CHECKING:
     from planner.dataset.dataset import Dataset
     from planner.dynamics.simulation import Simulation
     from planner.fit.held_out import JudgedIdentification
-    from planner.fit.result import Identification
-    from planner.measurement.agreement import Similarity
     from planner.report.frf_plots import ComparedFrfs
     from planner.robot.robot import Robot
 
 
-@dataclass(frozen=True)
-class StatedSpring:
-    """Stiffness (N·m/rad) and damping (N·m·s/rad) as robot.toml states them."""
+@dataclass(frozen=True, kw_only=True)
+class SimilarityChange(Similarity):
+    """After an identification, and before it; at `poses` that the fit did not see, or at all."""
 
-    stiffness: float
-    damping: float
+    before: Similarity
+    poses: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
 
-
-@dataclass(frozen=True)
-class IdentifiedSpring:
-    """A [[compliance]] block with its identified values; `identifiable` is the stiffness's.
-
-    A value whose sd is None was not fitted. With `unit` "N/m" it is a shift along the axis.
-    """
-
-    joint: str
-    axis: tuple[float, ...]
-    stiffness: float
-    stiffness_sd: float | None
-    identifiable: bool
-    damping: float
-    damping_sd: float | None
-    damping_identifiable: bool
-    loss_factor: float
-    loss_factor_sd: float | None
-    loss_factor_identifiable: bool
-    nominal: StatedSpring
-    unit: str | msgspec.UnsetType = msgspec.UNSET  # of the stiffness of a shift: "N/m"
-
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """A row of the table."""
-        letters = [letter for a, letter in zip(self.axis, "xyz", strict=True) if abs(a) == 1]
-        axis = letters[0] if letters else " ".join(f"{a:.3g}" for a in self.axis)
-        axis = axis if self.unit is msgspec.UNSET else f"along {axis} (N/m, N·s/m)"
-        return (
-            f"{self.joint} {axis}",
-            _with_sd(self.stiffness, self.stiffness_sd),
-            "yes" if self.identifiable else "no",
-            _with_sd(self.damping, self.damping_sd),
-            "yes" if self.damping_identifiable else "no",
-        )
+    @classmethod
+    def of(cls, after: Similarity | None, before: Similarity | None, **at: Any) -> Self:
+        """None where there is no pose to compare at."""
+        return cls(**vars(after or NO_SIMILARITY), before=before or NO_SIMILARITY, **at)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +105,7 @@ class IdentificationReport(Answer):
     plots: tuple[str, ...] = ()
     rrd: str | None = None
     urdf: str | msgspec.UnsetType = msgspec.UNSET
-    written: FrfSimilarity | msgspec.UnsetType = msgspec.UNSET
+    written: Similarity | msgspec.UnsetType = msgspec.UNSET
     seconds: float = 0.0
     basis: IdentificationBasis | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
@@ -172,7 +139,6 @@ class IdentificationReport(Answer):
         """
         from planner.dynamics.simulation import Simulation
         from planner.fit.write_robot import write_robot
-        from planner.measurement.agreement import fit_similarity
         from planner.robot.robot import Robot
 
         assert self.basis is not None
@@ -185,7 +151,7 @@ class IdentificationReport(Answer):
             remarks=(*self.remarks, *made.remarks),
             out=str(made.robot_toml),
             urdf=str(made.urdf),
-            written=FrfSimilarity.of(fit),
+            written=fit,
         )
 
     def text(self) -> Group:
@@ -202,8 +168,8 @@ class IdentificationReport(Answer):
             parts.append(Text("Not determined by these recordings:"))
             parts += [Text(f"  {text}") for text in self.undetermined]
         parts += [self._agreement(), *remarks(self.remarks)]
-        if self.out and isinstance(self.written, FrfSimilarity):
-            frac = 100 * (self.written.frac or math.nan)
+        if self.out and isinstance(self.written, Similarity):
+            frac = 100 * self.written.frac
             parts.append(Text(f"Written: {self.out} (FRAC {frac:.2f} %), {self.urdf}"))
         return Group(*parts, *self.end)
 
@@ -219,7 +185,7 @@ class IdentificationReport(Answer):
             rows.append((f"held out: {', '.join(aside.poses)}", aside))
         for name, of in rows:
             values = (of.before.frac, of.frac, of.before.frobenius, of.frobenius)
-            made.add_row(name, *("–" if v is None else f"{100 * v:.2f} %" for v in values))
+            made.add_row(name, *(f"{100 * v:.2f} %" if np.isfinite(v) else "–" for v in values))
         return made
 
 
@@ -232,8 +198,8 @@ def identification_report(
     aside = tuple(names[i] for i in judged.held_out)
     return IdentificationReport(
         parameters=identified_springs(basis.fitted, final),
-        fit=_change(judged.after, judged.before),
-        held_out=_change(judged.held_out_after, judged.held_out_before, aside),
+        fit=SimilarityChange.of(judged.after, judged.before),
+        held_out=SimilarityChange.of(judged.held_out_after, judged.held_out_before, poses=aside),
         undetermined=final.undetermined,
         misfit=final.misfit,
         misfit_by_pose=dict(zip(names, final.misfit_by_pose, strict=True)),
@@ -245,17 +211,6 @@ def identification_report(
         inertias=inertias,
         added=judged.final.structure.added,
         basis=basis,
-    )
-
-
-def _change(
-    after: "Similarity | None",
-    before: "Similarity | None",
-    poses: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET,
-) -> SimilarityChange:
-    found = FrfSimilarity.of(after)
-    return SimilarityChange(
-        found.frac, found.frobenius, before=FrfSimilarity.of(before), poses=poses
     )
 
 
@@ -275,35 +230,3 @@ def _doubts(judged: "JudgedIdentification") -> list[str]:
             "three poses or more."
         )
     return said
-
-
-def identified_springs(robot: "Robot", found: "Identification") -> tuple[IdentifiedSpring, ...]:
-    """One entry per [[compliance]] block, in its order."""
-    by_block = {(e.kind, number): e for e in found.estimates for number in e.blocks}
-    springs = []
-    for number, block in enumerate(robot.config.compliance):
-        values: dict[str, Any] = {}
-        for kind in ("stiffness", "damping", "loss_factor"):
-            estimate = by_block.get((kind, number))
-            values[kind] = getattr(block, kind) if estimate is None else estimate.value
-            values[f"{kind}_sd"] = None if estimate is None else estimate.sd
-            told = estimate is not None and estimate.identifiable
-            values["identifiable" if kind == "stiffness" else f"{kind}_identifiable"] = told
-        stated = StatedSpring(block.stiffness, block.damping)
-        axis = tuple(block.axis)
-        unit = "N/m" if block.slide else msgspec.UNSET
-        springs.append(IdentifiedSpring(block.joint, axis, nominal=stated, unit=unit, **values))
-    return tuple(springs)
-
-
-def _with_sd(value: float, sd: float | None) -> str:
-    return f"{with_exponent(value)} (kept)" if sd is None else with_exponent(value, sd)
-
-
-def with_exponent(value: float, sd: float | None = None) -> str:
-    """A value, and its sd where that is given, both with the exponent of the value."""
-    exponent = 0 if 0.1 <= value < 1000 or value == 0 else math.floor(math.log10(value))
-    power = f"e{exponent}" if exponent else ""
-    scaled = value / 10**exponent
-    said = f"{scaled:.3f}" if sd is None else with_sd(scaled, sd / 10**exponent, ".3f")
-    return f"{said}{power}"

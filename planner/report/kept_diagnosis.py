@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from planner.errors import InputError
-from planner.report.refitted_springs import RefittedSpring
+from planner.report.springs import RefittedSpring
 
 KEPT = "diagnosis.json"  # as `diagnose --out` writes it
 LEAST_SHOWN = 5e-4  # of a probability in the table: 0.05 %

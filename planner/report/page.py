@@ -23,7 +23,7 @@ from planner.report.html import rendered, write_page
 from planner.report.kept_diagnosis import chapter, diagnosis_of
 from planner.report.page_pictures import frf_pictures, map_pictures
 from planner.report.proposals import target_sentence
-from planner.report.refitted_springs import COLUMNS, NOT_KNOWN
+from planner.report.springs import COLUMNS, NOT_KNOWN
 from planner.report.status import StatusReport, status
 from planner.report.text import SIMULATED, number, with_sd
 from planner.robot.link_bodies import guessed_masses

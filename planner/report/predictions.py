@@ -1,6 +1,6 @@
 """Answer of `predict`: modes and FRFs with their uncertainty at given poses."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -129,13 +129,9 @@ def predictions(
         said = () if there.simulation else (UNCHANGED,)
     outside, joints = ~inside(campaign.cell, angles), campaign.cell.robot.joints
     save_frfs(npz, lines, mean, sd, names, joints, angles, outside, force_n if asked else None)
-    poses = (
-        PosePrediction(
-            name, ExpectedMode.all_of(prediction, i), bool(outside[i]), _stated(force_n, i)
-        )
-        for i, name in enumerate(names)
-    )
-    return PredictionReport(tuple(poses), str(npz.resolve()), len(campaign.state.used), said)
+    modes = (ExpectedMode.all_of(prediction, i) for i in range(len(angles)))
+    poses = _poses(names, modes, outside, force_n)
+    return PredictionReport(poses, str(npz.resolve()), len(campaign.state.used), said)
 
 
 def robot_predictions(
@@ -167,22 +163,24 @@ def robot_predictions(
         npz, lines, mean, None, names, robot.joints, q, None, force_n if asked.any() else None
     )
     expected = (
-        PosePrediction(
-            name,
-            tuple(
-                ExpectedMode(float(a), None, float(b), None)
-                for a, b in zip(f[i], ratio[i], strict=True)
-                if band[0] <= a <= band[1]
-            ),
-            peak_force_n=_stated(force_n, i),
+        tuple(
+            ExpectedMode(float(a), None, float(b), None)
+            for a, b in zip(*one, strict=True)
+            if band[0] <= a <= band[1]
         )
-        for i, name in enumerate(names)
+        for one in zip(f, ratio, strict=True)
     )
     said = () if robot.config.law or not asked.any() else (UNCHANGED,)
-    return PredictionReport(
-        tuple(expected), str(npz.resolve()), 0, said, str(robot.path.absolute())
+    shown = _poses(names, expected, np.zeros(len(names), bool), force_n)
+    return PredictionReport(shown, str(npz.resolve()), 0, said, str(robot.path.absolute()))
+
+
+def _poses(
+    names: Sequence[str], modes: Iterable[tuple[ExpectedMode, ...]], outside: np.ndarray,
+    force_n: np.ndarray | None,
+) -> tuple[PosePrediction, ...]:  # fmt: skip
+    forces = np.full(len(names), np.nan) if force_n is None else force_n
+    return tuple(
+        PosePrediction(name, one, bool(away), UNSET if np.isnan(n) else float(n))
+        for name, one, away, n in zip(names, modes, outside, forces, strict=True)
     )
-
-
-def _stated(force_n: np.ndarray | None, i: int) -> float | Unset:
-    return UNSET if force_n is None or np.isnan(force_n[i]) else float(force_n[i])

@@ -20,7 +20,7 @@ from planner.report.answer import NOT_IN_JSON, Answer, plain
 from planner.report.imports import asked_of
 from planner.report.kept_diagnosis import diagnosis_of, read_diagnosis, two_answers
 from planner.report.proposals import forecast_json, target_sentence, unanswered
-from planner.report.refitted_springs import (
+from planner.report.springs import (
     NOT_KNOWN,
     RefittedSpring,
     refitted_springs,

@@ -1,13 +1,23 @@
-"""Parts of answers as text."""
+"""Parts of answers as text, and the console for it: numbers stay with what goes with them."""
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
 from planner.words import command, small
 
+# No-break spaces, and those about ±, before a unit, and between a mode and what it has. Rich breaks
+# lines at no-break spaces, too: it is given a character that nobody uses in their place, and what
+# it made of that is put right again.
+UNIT = r"(?:%|°|sd|dB|Hz|kHz|mm|µm|min|rpm|kg|ms|m/s²|N·m/rad|N/m|[mNs])(?![\w/·])"
+NUMBERED = r"\u00a0|(?<=\bmode) (?=\d)|(?<=\bmode \d) (?=\d)"
+TOGETHER = re.compile(rf"(?<=\S) (?=± ?[<\d])|(?<= ±) (?=[<\d])|(?<=\d) (?={UNIT})|{NUMBERED}")
+STAND_IN = "\ue000"
 SIMULATED = Text(
     "SIMULATED RECORDINGS: nothing here was measured on a real robot", style="bold magenta"
 )
@@ -51,3 +61,25 @@ def drawn(plots: Sequence[str], rrd: str | None = None) -> list[Text]:
 def command_line(before: str, *words: object) -> Text:
     """A command to be copied: quoted as a shell needs it, and on one line however long it is."""
     return Text(f"{before}{command(*words)}", no_wrap=True, overflow="ignore")
+
+
+class UnbrokenConsole(Console):
+    """A console on which "2.3 ± 0.1 Hz" stays on one line, if the line is long enough for it."""
+
+    def __init__(self, **options):
+        super().__init__(markup=False, emoji=False, **options)  # names of poses are no markup
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """Of texts, also those within tables and panels."""
+        width = (options or self.options).max_width
+        kept = TOGETHER.sub(STAND_IN, renderable.plain) if isinstance(renderable, Text) else ""
+        if STAND_IN not in kept or max(map(len, kept.split())) > width:
+            yield from super().render(renderable, options)
+            return
+        assert isinstance(renderable, Text)
+        text = renderable.copy()
+        text.plain = kept
+        for made in super().render(text, options):
+            yield Segment(made.text.replace(STAND_IN, " "), made.style, made.control)

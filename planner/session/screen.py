@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
-from planner.report.console import UnbrokenConsole
+from planner.report.text import UnbrokenConsole
 
 NOTES = 4  # of the last sentences that stay on the page
 BELOW = 2  # lines under page and sentences: for what is being done, and for the cursor

@@ -12,17 +12,17 @@ from rich.text import Text
 
 from planner.cli.answer import respond
 from planner.design.stopping import percent
+from planner.diagnosis.diagnose import ThreefoldSimilarity
 from planner.diagnosis.mismatch import MismatchShares
 from planner.diagnosis.odd_pose import OddPose
-from planner.report.agreement import FrfSimilarity, ThreeSimilarities
+from planner.measurement.agreement import Similarity
 from planner.report.answer import Answer, RefusedFile
-from planner.report.console import STAND_IN, UnbrokenConsole
 from planner.report.diagnosis import DiagnosisReport, EffectAtPlace, RankedExplanation
 from planner.report.imports import PoseImport
 from planner.report.kept_diagnosis import two_answers
 from planner.report.predictions import ExpectedMode
-from planner.report.refitted_springs import RefittedSpring
-from planner.report.text import table, with_sd
+from planner.report.springs import RefittedSpring
+from planner.report.text import STAND_IN, UnbrokenConsole, table, with_sd
 from planner.robot.place_names import place_names, with_names
 from planner.robot.robot import Robot
 from planner.session.session_text import MOST_TOLD, poses_to_go, progress_line
@@ -114,11 +114,11 @@ def test_an_import_says_how_a_small_sd_changed():
 def report(verdict: str, *ranked) -> DiagnosisReport:
     """An answer with these explanations; FRAC 0.9999 with the best of them."""
     empty = {f.name: None for f in fields(DiagnosisReport)}
-    sides = (FrfSimilarity(f, f) for f in (0.9, 0.95, 0.9999))
+    sides = (Similarity(f, f) for f in (0.9, 0.95, 0.9999))
     given = {
         "verdict": verdict, "findings": (), "remarks": (), "plots": (), "simulated": False,
         "candidates": tuple(RankedExplanation.of(p, q) for p, q in ranked),
-        "fit": ThreeSimilarities(*sides), "place_names": {}, "seconds": 1.0,
+        "fit": ThreefoldSimilarity(*sides), "place_names": {}, "seconds": 1.0,
         "closest": tuple(EffectAtPlace(*one) for p, _ in ranked for one in p if one[1]),
         "where": Said(), "shares": Said(), "held_out": Said(),
     }  # fmt: skip

@@ -1,0 +1,159 @@
+"""Springs in answers: as identified, and as a campaign's simulation has them, by robot.toml's."""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+from rich.table import Table
+
+from planner.report.text import table, with_sd
+
+if TYPE_CHECKING:
+    from planner.campaign.model import Model
+    from planner.fit.result import Identification
+    from planner.robot.robot import Robot
+
+COLUMNS = "joint and axis", "stated", "refitted ± sd", "unit", "known"
+NOT_KNOWN = (
+    "Known, yes: the recordings tell this stiffness; its sd is half of what was assumed before, or "
+    "less. No: they tell less, and the value leans on what was assumed, or it is so far from that "
+    "that something else may have moved it."
+)
+
+
+@dataclass(frozen=True)
+class StatedSpring:
+    """Stiffness (N·m/rad) and damping (N·m·s/rad) as robot.toml states them."""
+
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class IdentifiedSpring:
+    """A [[compliance]] block with its identified values; `identifiable` is the stiffness's.
+
+    A value whose sd is None was not fitted. With `unit` "N/m" it is a shift along the axis.
+    """
+
+    joint: str
+    axis: tuple[float, ...]
+    stiffness: float
+    stiffness_sd: float | None
+    identifiable: bool
+    damping: float
+    damping_sd: float | None
+    damping_identifiable: bool
+    loss_factor: float
+    loss_factor_sd: float | None
+    loss_factor_identifiable: bool
+    nominal: StatedSpring
+    unit: str | msgspec.UnsetType = msgspec.UNSET  # of the stiffness of a shift: "N/m"
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of the table."""
+        axis = _axis(self.axis)
+        axis = axis if self.unit is msgspec.UNSET else f"along {axis} (N/m, N·s/m)"
+        return (
+            f"{self.joint} {axis}",
+            _with_sd(self.stiffness, self.stiffness_sd),
+            "yes" if self.identifiable else "no",
+            _with_sd(self.damping, self.damping_sd),
+            "yes" if self.damping_identifiable else "no",
+        )
+
+
+@dataclass(frozen=True)
+class RefittedSpring:
+    """A spring of the simulation as robot.toml states it and as refitted to all recordings.
+
+    `stated` is None for one that robot.toml lacks; `identifiable`: the recordings tell of it.
+    """
+
+    joint: str
+    axis: tuple[float, ...]
+    stated: float | None
+    stiffness: float
+    stiffness_sd: float
+    unit: str
+    identifiable: bool
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of the table."""
+        return (
+            f"{self.joint} {_axis(self.axis)}",
+            "not stated" if self.stated is None else with_exponent(self.stated),
+            with_exponent(self.stiffness, self.stiffness_sd),
+            self.unit,
+            "yes" if self.identifiable else "no",
+        )
+
+
+def refitted_springs(model: "Model") -> tuple[RefittedSpring, ...]:
+    """One entry for each spring that was fitted; none where the simulation does not learn."""
+    learned = model.low.learned
+    if learned is None:
+        return ()
+    blocks, stated = learned.structure.simulation.robot.config.compliance, learned.stated
+    told = {
+        number: estimate
+        for estimate in learned.identified.estimates if estimate.kind == "stiffness"
+        for number in estimate.blocks
+        if number < stated or estimate in learned.unstated
+    }  # fmt: skip
+    return tuple(
+        RefittedSpring(
+            blocks[n].joint, tuple(blocks[n].axis), blocks[n].stiffness if n < stated else None,
+            estimate.value, estimate.sd, estimate.unit, estimate.identifiable,
+        )
+        for n, estimate in sorted(told.items())
+    )  # fmt: skip
+
+
+def springs_table(springs: tuple[RefittedSpring, ...]) -> Table:
+    """Spring by spring."""
+    made = table("Stiffnesses of the simulation, refitted to all recordings", *COLUMNS)
+    for spring in springs:
+        made.add_row(*spring.cells)
+    return made
+
+
+def identified_springs(robot: "Robot", found: "Identification") -> tuple[IdentifiedSpring, ...]:
+    """One entry per [[compliance]] block, in its order."""
+    by_block = {(e.kind, number): e for e in found.estimates for number in e.blocks}
+    springs = []
+    for number, block in enumerate(robot.config.compliance):
+        values: dict[str, Any] = {}
+        for kind in ("stiffness", "damping", "loss_factor"):
+            estimate = by_block.get((kind, number))
+            values[kind] = getattr(block, kind) if estimate is None else estimate.value
+            values[f"{kind}_sd"] = None if estimate is None else estimate.sd
+            told = estimate is not None and estimate.identifiable
+            values["identifiable" if kind == "stiffness" else f"{kind}_identifiable"] = told
+        stated = StatedSpring(block.stiffness, block.damping)
+        axis = tuple(block.axis)
+        unit = "N/m" if block.slide else msgspec.UNSET
+        springs.append(IdentifiedSpring(block.joint, axis, nominal=stated, unit=unit, **values))
+    return tuple(springs)
+
+
+def _with_sd(value: float, sd: float | None) -> str:
+    return f"{with_exponent(value)} (kept)" if sd is None else with_exponent(value, sd)
+
+
+def with_exponent(value: float, sd: float | None = None) -> str:
+    """A value, and its sd where that is given, both with the exponent of the value."""
+    exponent = 0 if 0.1 <= value < 1000 or value == 0 else math.floor(math.log10(value))
+    power = f"e{exponent}" if exponent else ""
+    scaled = value / 10**exponent
+    said = f"{scaled:.3f}" if sd is None else with_sd(scaled, sd / 10**exponent, ".3f")
+    return f"{said}{power}"
+
+
+def _axis(axis: tuple[float, ...]) -> str:
+    """By its letter, where it is one of x, y, z."""
+    letters = [letter for a, letter in zip(axis, "xyz", strict=True) if abs(a) == 1]
+    return letters[0] if letters else " ".join(f"{a:.3g}" for a in axis)
