@@ -1,7 +1,7 @@
 """Every entry of the TOML files that a user writes (`schema`), and the manual."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +29,9 @@ class SchemaReport(Answer):
         """One table after the other."""
         parts: list[Any] = []
         for one in self.tables:
-            made = table(Text(one.name or self.file, style="bold"), "entry", "takes", "if left out")
-            for column in made.columns:
-                column.justify = "left"
-            for entry in one.entries:
-                made.add_row(*(Text(v) for v in (entry.name, entry.takes, entry.default)))
+            columns, title = ("entry", "takes", "if left out"), one.name or self.file
+            rows = (map(Text, astuple(entry)) for entry in one.entries)
+            made = table(Text(title, style="bold"), *columns, rows=rows, words=True)
             parts += [made, Text(one.about)]
             parts += [Text(f"  {choice.name}: {choice.about}") for choice in one.choices]
             parts.append(Text(""))

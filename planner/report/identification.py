@@ -160,9 +160,8 @@ class IdentificationReport(Answer):
         made = table(
             f"Elastic parameters from {len(self.misfit_by_pose)} poses, {low:g} to {high:g} Hz",
             *("joint and axis", "stiffness (N·m/rad)", "known", "damping (N·m·s/rad)", "known"),
+            rows=(spring.cells for spring in self.parameters),
         )
-        for spring in self.parameters:
-            made.add_row(*spring.cells)
         parts: list[RenderableType] = [made, Text("  known: identified by the recordings.")]
         if self.undetermined:
             parts.append(Text("Not determined by these recordings:"))

@@ -99,9 +99,8 @@ class PoseImport(Answer):
         made = table(
             f"Pose {self.pose}: {self._counts()}, {len(self.already_imported)} known before",
             *("mode", "frequency (Hz)", "expected (Hz)", "damping (%)"),
+            rows=(_cells(mode, "–" if self.question else "other") for mode in self.modes),
         )
-        for mode in self.modes:
-            made.add_row(*_cells(mode, "–" if self.question else "other"))
         if self.question:
             there = ", ".join(with_sd(mode.frequency_hz, mode.sd_hz) for mode in self.expected)
             said = Text(f"  Expected at {self.pose}: {there} Hz.")

@@ -220,10 +220,9 @@ class ModesReport(Answer):
             title += f" (fit error {100 * self.fit_error:.1f} %)"
         many = "MPC", "MPD (°)", "modal mass (kg)", "largest at"
         shape = ("shape x, y, z",) if isinstance(self.dofs, Unset) else many
-        made = table(title, "mode", "frequency (Hz)", "damping (%)", *shape, "physical (%)")
-        for k, mode in enumerate(self.modes, 1):
-            made.add_row(str(k), *mode.cells(self.dofs))
-        return made
+        columns = "mode", "frequency (Hz)", "damping (%)", *shape, "physical (%)"
+        rows = ((str(k), *mode.cells(self.dofs)) for k, mode in enumerate(self.modes, 1))
+        return table(title, *columns, rows=rows)
 
     def _by_pose(self) -> Table:
         poses = self.poses if isinstance(self.poses, tuple) else ()

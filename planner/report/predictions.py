@@ -92,10 +92,12 @@ class PredictionReport(Answer):
         title = f"After {counted(self.measurements, 'measured pose')}"
         if self.robot is not UNSET:
             title = f"As {self.robot} states the robot"
-        made = table(title, "pose", "mode", "frequency (Hz)", "damping (%)")
-        for pose in self.poses:
-            for k, mode in enumerate(pose.modes):
-                made.add_row(pose.title if k == 0 else "", str(k + 1), *mode.cells)
+        rows = (
+            (pose.title if k == 0 else "", str(k + 1), *mode.cells)
+            for pose in self.poses
+            for k, mode in enumerate(pose.modes)
+        )
+        made = table(title, "pose", "mode", "frequency (Hz)", "damping (%)", rows=rows)
         said = outside_remark([pose.pose for pose in self.poses if pose.outside])
         told = [Text(said, style="yellow")] if said else []
         told += remarks(self.remarks)

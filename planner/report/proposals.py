@@ -39,11 +39,11 @@ class ProposedPose(Answer):
     def parts(self, joints: JointUnits) -> list[RenderableType]:
         """Angles, place and expected modes as text."""
         proposal = self.proposal
-        angles = table(f"Pose {proposal.pose}", *joints.headings)
-        angles.add_row(*(f"{value:.3f}" for value in proposal.joints_deg))
-        expected = table("expected there", "mode", "frequency (Hz, ± 1 sd)", "damping (%)")
-        for k, mode in enumerate(self.expected):
-            expected.add_row(str(k + 1), *mode.cells)
+        values = (f"{value:.3f}" for value in proposal.joints_deg)
+        angles = table(f"Pose {proposal.pose}", *joints.headings, rows=[values])
+        columns = "mode", "frequency (Hz, ± 1 sd)", "damping (%)"
+        rows = ((str(k), *mode.cells) for k, mode in enumerate(self.expected, 1))
+        expected = table("expected there", *columns, rows=rows)
         x, y, z = proposal.position_m
         times = counted(self.hits_per_axis, "hit")
         hits = f"{times} along each of {', '.join(proposal.hits)} of the tcp frame"

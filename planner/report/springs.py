@@ -115,10 +115,8 @@ def refitted_springs(model: "Model") -> tuple[RefittedSpring, ...]:
 
 def springs_table(springs: tuple[RefittedSpring, ...]) -> Table:
     """Spring by spring."""
-    made = table("Stiffnesses of the simulation, refitted to all recordings", *COLUMNS)
-    for spring in springs:
-        made.add_row(*spring.cells)
-    return made
+    title = "Stiffnesses of the simulation, refitted to all recordings"
+    return table(title, *COLUMNS, rows=(spring.cells for spring in springs))
 
 
 def identified_springs(robot: "Robot", found: "Identification") -> tuple[IdentifiedSpring, ...]:

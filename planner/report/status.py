@@ -193,9 +193,8 @@ class StatusReport(ModelStatus, Answer):
         measured = table(
             f"{self.campaign}: {self._counts()}",
             *("pose", "hits", "refused", "frequencies (Hz)", "time"),
+            rows=(pose.cells for pose in self.measurements),
         )
-        for pose in self.measurements:
-            measured.add_row(*pose.cells)
         springs = [springs_table(self.springs), Text(f"  {NOT_KNOWN}")] if self.springs else []
         springs += [] if self.models is msgspec.UNSET else models_text(self.models)
         return Group(measured, *springs, Text("\n".join(self._lines())), *self.end)

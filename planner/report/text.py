@@ -23,11 +23,15 @@ SIMULATED = Text(
 )
 
 
-def table(title: str | Text, *columns: str) -> Table:
-    """A table whose first column is text and the others numbers."""
+def table(
+    title: str | Text, *columns: str, rows: Iterable[Iterable[str | Text]] = (), words: bool = False
+) -> Table:
+    """A table whose first column is text and the others numbers, or `words` too."""
     made = Table(title=title, title_justify="left", header_style="bold")
     for i, column in enumerate(columns):
-        made.add_column(column, justify="left" if i == 0 else "right", overflow="fold")
+        made.add_column(column, justify="right" if i and not words else "left", overflow="fold")
+    for row in rows:
+        made.add_row(*row)
     return made
 
 

@@ -105,7 +105,10 @@ class StudyAnswer(Answer):
     def text(self) -> Group:
         """All tables, then the claims."""
         parts: list[RenderableType] = [Text(self.data, style="bold magenta")]
-        parts += [_shown(entry) for entry in self.tables]
+        parts += [
+            table(one.title, *one.columns, rows=(map(shown_cell, row) for row in one.rows))
+            for one in self.tables
+        ]
         parts += _claims(self)
         if self.files:
             parts.append(f"{len(self.files)} files in {Path(self.files[0]).parent}")
@@ -153,13 +156,6 @@ def r_squared(predicted: np.ndarray, measured: np.ndarray, axis: int | None = No
     """Coefficient of determination R² over an axis (all if None); NaN was not measured."""
     off = np.nanmean((predicted - measured) ** 2, axis=axis)
     return 1 - off / np.nanvar(measured, axis=axis)
-
-
-def _shown(entry: Table) -> RenderableType:
-    made = table(entry.title, *entry.columns)
-    for row in entry.rows:
-        made.add_row(*map(shown_cell, row))
-    return made
 
 
 def _claims(answer: StudyAnswer) -> list[RenderableType]:
