@@ -13,14 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.errors import InputError
 from planner.modal.estimate_modes import identify
 from planner.modal.fit_data import Data
 from planner.modal.modes import LEAST_PROBABILITY, Mode
 from planner.modal.residues import rank_one
 from planner.modal.tracking import Guide, track
 from planner.progress import Tell
-from planner.truth import inverse
+from planner.studies.hits import upright
 from planner.truth.brakes import DampingScatter
 from planner.truth.deviation import Deviation
 from planner.truth.handling import EVERYDAY
@@ -51,21 +50,12 @@ def postures(truth: Truth) -> tuple[np.ndarray, np.ndarray]:
 
     InputError if the robot cannot stand somewhere.
     """
-    q, x = [], []
     upper = truth.upper_rad.copy()
     upper[4] = -0.01
-    for turn in np.deg2rad(TURN_DEG):
-        rotation = inverse.tool_rotation(np.array([0.0, 0.0, -1.0]), turn)
-        for place in (np.array([a, b, Z_M]) for a in X_M for b in Y_M):
-            found = inverse.joint_angles(
-                truth, rotation, place, np.deg2rad(START_DEG), upper_rad=upper
-            )
-            if found is None:
-                raise InputError(f"{truth.name} cannot reach {place} m; move the table.")
-            q.append(found)
-            x.append((turn, *place[:2]))
-    low, high = np.min(x, axis=0), np.max(x, axis=0)
-    return np.array(q), (np.array(x) - low) / (high - low)
+    x = np.array([(turn, a, b) for turn in np.deg2rad(TURN_DEG) for a in X_M for b in Y_M])
+    targets = ((np.array([a, b, Z_M]), turn) for turn, a, b in x)
+    q = upright(truth, targets, np.deg2rad(START_DEG), "the table", upper, follow=False)
+    return q, (x - x.min(axis=0)) / np.ptp(x, axis=0)
 
 
 def parameters(truth: Truth, q: np.ndarray, reference: np.ndarray | None = None) -> np.ndarray:

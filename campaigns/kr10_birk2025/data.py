@@ -12,10 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.errors import InputError
 from planner.progress import Tell
-from planner.studies.hits import StruckPoses, everyday, strike
-from planner.truth import inverse
+from planner.studies.hits import StruckPoses, everyday, strike, upright
 from planner.truth.deviation import AttachedResonator, BentLink, Deviation, Spring, StiffnessRipple
 from planner.truth.hits import Hammer
 from planner.truth.load import load_truth
@@ -103,18 +101,10 @@ def gears(truth: Truth) -> tuple[Port, ...]:
 
 def poses(truth: Truth, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles (n, 6) in rad and path (n,) of each; InputError if a point is out of reach."""
-    rotation = inverse.tool_rotation(np.array([0.0, 0.0, -1.0]))
-    q, path, last = [], [], np.deg2rad(START_DEG)
-    for name, (start, end) in ENDS_M.items():
-        for share in np.linspace(0, 1, points):
-            place = np.array(start) + share * (np.array(end) - np.array(start))
-            found = inverse.joint_angles(truth, rotation, place, last)
-            if found is None:
-                raise InputError(f"{truth.name} cannot reach {place} m; move the path {name}.")
-            last = found
-            q.append(found)
-            path.append(name)
-    return np.array(q), np.array(path)
+    places = np.concatenate([np.linspace(*ends, points) for ends in ENDS_M.values()])
+    targets = ((place, 0.0) for place in places)
+    q = upright(truth, targets, np.deg2rad(START_DEG), "the paths")
+    return q, np.repeat(list(ENDS_M), points)
 
 
 def load(seed: int, small: bool, progress: Tell) -> PathHits:

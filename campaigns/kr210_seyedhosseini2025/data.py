@@ -11,14 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.errors import InputError, RefusedError
+from planner.errors import RefusedError
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
 from planner.progress import Tell, within
 from planner.robot.robot import Robot
-from planner.studies.hits import everyday, strike
-from planner.truth import inverse
+from planner.studies.hits import everyday, strike, upright
 from planner.truth.arms import KR210
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer
@@ -97,15 +96,9 @@ def trajectory(truth: Truth) -> np.ndarray:
         for j, y in enumerate(Y_M[:: 1 - 2 * (k % 2)])
         for x in X_M[:: 1 - 2 * (j % 2)]
     ][:POSTURES]
-    q = [np.deg2rad(START_DEG)]
-    for place, t in zip(places, np.linspace(0, 1, POSTURES), strict=True):
-        turn = TURN_RAD * np.sin(2 * np.pi * TURNS * t)
-        rotation = inverse.tool_rotation(np.array([0.0, 0.0, -1.0]), turn)
-        found = inverse.joint_angles(truth, rotation, np.array(place), q[-1])
-        if found is None:
-            raise InputError(f"{truth.name} cannot reach {place} m; move the trajectory.")
-        q.append(found)
-    return np.array(q[1:])
+    turns = TURN_RAD * np.sin(2 * np.pi * TURNS * np.linspace(0, 1, POSTURES))
+    targets = zip(np.array(places), turns, strict=True)
+    return upright(truth, targets, np.deg2rad(START_DEG), "the trajectory")
 
 
 def parameters(f: np.ndarray, zeta: np.ndarray, residue: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ joints stand beside their readback, the floor rumbles (`planner.truth.handling.E
 rub, so that damping depends on the force, and their damping is another one at every visit.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,13 +13,14 @@ import numpy as np
 
 from planner.dataset.dataset import Dataset
 from planner.dataset.visits import Visit
-from planner.errors import RefusedError
+from planner.errors import InputError, RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import Mode
 from planner.progress import Tell
 from planner.recording.records import Hit
+from planner.truth import inverse
 from planner.truth.brakes import DampingScatter
 from planner.truth.handling import EVERYDAY, Handling
 from planner.truth.hits import Hammer, SimulatedHit, noisy
@@ -63,6 +64,26 @@ class StruckPoses:
             except RefusedError:
                 found.append(())
         return found
+
+
+def upright(
+    truth: Truth, targets: Iterable[tuple[np.ndarray, float]], start_rad: np.ndarray, what: str,
+    upper_rad: np.ndarray | None = None, follow: bool = True,
+) -> np.ndarray:  # fmt: skip
+    """Joint angles (n, dof) in rad, the tool downwards at places (3,) in m, turned by so many rad.
+
+    Each is looked for from the one before, or (`follow` False) from the start. InputError if the
+    robot cannot stand somewhere: `what` should be moved.
+    """
+    q: list[np.ndarray] = []
+    for place, turn in targets:
+        rotation = inverse.tool_rotation(np.array([0.0, 0.0, -1.0]), turn)
+        near = q[-1] if q and follow else start_rad
+        found = inverse.joint_angles(truth, rotation, place, near, upper_rad=upper_rad)
+        if found is None:
+            raise InputError(f"{truth.name} cannot reach {place} m; move {what}.")
+        q.append(found)
+    return np.array(q)
 
 
 def rubbing(truth: Truth, share: float = RUBBING) -> tuple[Port, ...]:
