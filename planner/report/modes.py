@@ -10,7 +10,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.campaign.events import Amplitude
+from planner.campaign.events import Amplitude, MeasuredMode
 from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.errors import RefusedFile
 from planner.modal.modes import Mode
@@ -29,21 +29,21 @@ SURE = 0.9  # probability of a label below which the text marks it as doubtful
 COMMON = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd", "probability"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ModeAnswer:
     """A mode with its sds; `probability`: that it is physical. What is not known of it is UNSET.
 
-    `label` counts the modelled modes from 1, None: it is none of them. `shape` is [re, im] per
+    `label` counts the modelled modes from 1, None: it is none of them. `shape` has an entry per
     response, in kg^-1/2 (unit modal mass) where `scaled`, else of unit length; `shape_sd` is of
     real and imaginary part each; `modal_mass_kg` belongs to the shape with largest component 1.
-    `residue` is [re, im, sd] in m/(N·s) of each response to each hit, row by row. Without
-    reciprocity it is right · leftᵀ / (2iω_d): `left` is [re, im] per hit axis or reference, `right`
+    `residue` is (real, imaginary, sd) in m/(N·s) of each response to each hit, row by row. Without
+    reciprocity it is right · leftᵀ / (2iω_d): `left` is per hit axis or reference, `right`
     per response (else the shape), both with sds; `participation_percent` is the size of each of
     `left` over the largest. `modal_stiffness_n_m` is ω²m/φ² of each response hit where it is felt,
-    None where none was. `scatter_hz`: how
-    the frequency differs from set to set (sd). `sensors_lowered_percent`: what the sensors' masses
-    had lowered the frequency by, which is given without them; None where the simulation has no
-    such mode. `expected`: what the model said before an import.
+    None where none was. `scatter_hz`: how the frequency differs from set to set (sd).
+    `sensors_lowered_percent`: what the sensors' masses had lowered the frequency by, which is given
+    without them; None where the simulation has no such mode. `expected`: what the model said before
+    an import.
     """
 
     label: int | Unset | None = UNSET
@@ -52,46 +52,33 @@ class ModeAnswer:
     frequency_sd_hz: float
     damping_ratio: float
     damping_sd: float
-    shape: tuple[tuple[float, float], ...]
-    shape_sd: tuple[float, ...] | Unset = UNSET
+    shape: np.ndarray
+    shape_sd: np.ndarray | Unset = UNSET
     scaled: bool | Unset = UNSET
     probability: float
     mpc: float | Unset = UNSET
     mpd_deg: float | Unset = UNSET
     modal_mass_kg: float | Unset = UNSET
-    modal_stiffness_n_m: tuple[float, ...] | Unset = UNSET
-    modal_stiffness_sd_n_m: tuple[float, ...] | Unset = UNSET
-    right: tuple[tuple[float, float], ...] | Unset = UNSET
-    right_sd: tuple[float, ...] | Unset = UNSET
-    left: tuple[tuple[float, float], ...] | Unset = UNSET
-    left_sd: tuple[float, ...] | Unset = UNSET
-    participation_percent: tuple[float, ...] | Unset = UNSET
+    modal_stiffness_n_m: np.ndarray | Unset = UNSET
+    modal_stiffness_sd_n_m: np.ndarray | Unset = UNSET
+    right: np.ndarray | Unset = UNSET
+    right_sd: np.ndarray | Unset = UNSET
+    left: np.ndarray | Unset = UNSET
+    left_sd: np.ndarray | Unset = UNSET
+    participation_percent: np.ndarray | Unset = UNSET
     scatter_hz: float | Unset = UNSET
-    residue: tuple[tuple[float, float, float], ...] | Unset = UNSET
+    residue: np.ndarray | Unset = UNSET
     sensors_lowered_percent: float | Unset | None = UNSET
     expected: ExpectedMode | Unset | None = UNSET
 
     @classmethod
-    def of(cls, mode: Any, **more: Any) -> "ModeAnswer":
+    def of(cls, mode: "Mode | MeasuredMode", **more: Any) -> "ModeAnswer":
         """Of a mode of any modal analysis, with other fields where they are known."""
         own: dict[str, Any] = {name: getattr(mode, name) for name in COMMON}
-        pairs = np.array(mode.shape)
-        pairs = np.stack([pairs.real, pairs.imag], -1) if np.iscomplexobj(pairs) else pairs
-        own["shape"] = tuple((float(re), float(im)) for re, im in pairs)
-        own |= _vectors(mode)
-        over_points = getattr(mode, "shape_sd", None) is not None
-        if hasattr(mode, "residue_sd") and not over_points:
-            both = zip(np.ravel(mode.residue), np.ravel(mode.residue_sd), strict=True)
-            own["residue"] = tuple((float(r.real), float(r.imag), float(sd)) for r, sd in both)
-        if over_points:
-            own |= {
-                "shape_sd": tuple(map(float, mode.shape_sd)),
-                "scaled": getattr(mode, "scaled", False),
-                "mpc": mode.collinearity,
-                "mpd_deg": mode.deviation_deg,
-                "modal_mass_kg": getattr(mode, "modal_mass_kg", UNSET),
-                "scatter_hz": getattr(mode, "scatter_hz", UNSET),
-            }
+        if isinstance(mode, Mode):
+            own |= {"shape": mode.shape} | _vectors(mode)
+        else:
+            own["shape"] = np.array(mode.shape) @ [1, 1j]
         return cls(**(own | more))
 
     def cells(self, dofs: "tuple[tuple[int | str, str], ...] | Unset") -> tuple[str, ...]:
@@ -100,11 +87,10 @@ class ModeAnswer:
         physical = f"{100 * self.probability:.0f}"
         if isinstance(dofs, Unset):
             damping = with_sd(100 * self.damping_ratio, 100 * self.damping_sd)
-            parts = [f"{re:+.2f}{im:+.2f}i" for re, im in self.shape]
+            parts = [f"{v.real:+.2f}{v.imag:+.2f}i" for v in self.shape]
             more = f"  and {len(parts) - 3} more" if len(parts) > 4 else ""
             return first, damping, "  ".join(parts[:3] if more else parts) + more, physical
-        sizes = [abs(complex(*value)) for value in self.shape]
-        at = " ".join(map(str, dofs[sizes.index(max(sizes))])).strip()
+        at = " ".join(map(str, dofs[int(np.argmax(np.abs(self.shape)))])).strip()
         mass = f"{self.modal_mass_kg:.3g}" if self.scaled is True else "not scaled"
         damping = with_sd(100 * self.damping_ratio, 100 * self.damping_sd, ".3f")
         return first, damping, f"{self.mpc:.3f}", f"{self.mpd_deg:.1f}", mass, at, physical
@@ -116,27 +102,28 @@ class ModeAnswer:
         return f"{self.frequency_hz:.2f}{' ?' if isinstance(sure, float) and sure < SURE else ''}"
 
 
-def _vectors(mode: Any) -> dict[str, Any]:
-    """What hits drive, how points move, and how stiff a mode is there."""
-    if not isinstance(mode, Mode):
-        return {}
+def _vectors(mode: Mode) -> dict[str, Any]:
+    """Shape or residues, what hits drive, how points move, and how stiff a mode is there."""
     told: dict[str, Any] = {}
-    stiffness = mode.modal_stiffness_n_m
+    if mode.shape_sd is not None:
+        told |= {
+            "shape_sd": mode.shape_sd, "scaled": mode.scaled, "mpc": mode.collinearity,
+            "mpd_deg": mode.deviation_deg, "modal_mass_kg": mode.modal_mass_kg,
+            "scatter_hz": mode.scatter_hz,
+        }  # fmt: skip
+    else:
+        parts = mode.residue.real, mode.residue.imag, mode.residue_sd
+        told["residue"] = np.stack(list(map(np.ravel, parts)), axis=-1)
+    stiffness, sd = mode.modal_stiffness_n_m
     if np.any(np.isfinite(stiffness)):
-        names = "modal_stiffness_n_m", "modal_stiffness_sd_n_m"
-        told |= {n: tuple(map(float, v)) for n, v in zip(names, stiffness, strict=True)}
+        told |= {"modal_stiffness_n_m": stiffness, "modal_stiffness_sd_n_m": sd}
     if mode.vectors is not None:
-        told |= {"right": _pairs(mode.vectors.right), "right_sd": tuple(mode.vectors.right_sd)}
+        told |= {"right": mode.vectors.right, "right_sd": mode.vectors.right_sd}
     left, sd = mode.driven
-    size = np.abs(left)
-    if np.any(size > 0):
-        share = 100 * size / np.nanmax(size)
-        told |= {"left": _pairs(left), "left_sd": tuple(sd), "participation_percent": tuple(share)}
+    if np.any(np.abs(left) > 0):
+        share = 100 * np.abs(left) / np.nanmax(np.abs(left))
+        told |= {"left": left, "left_sd": sd, "participation_percent": share}
     return told
-
-
-def _pairs(values: np.ndarray) -> tuple[tuple[float, float], ...]:
-    return tuple((float(v.real), float(v.imag)) for v in values)
 
 
 @dataclass(frozen=True)
