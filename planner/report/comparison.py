@@ -209,6 +209,4 @@ def _interval(value: float, interval: np.ndarray, form: str) -> str:
 
 def _spread(count: int) -> list[int]:
     """Up to SHOWN places of `count`, first and last among them."""
-    if count <= SHOWN:
-        return list(range(count))
-    return sorted({round(i * (count - 1) / (SHOWN - 1)) for i in range(SHOWN)})
+    return np.unique(np.linspace(0, count - 1, min(count, SHOWN)).round().astype(int)).tolist()

@@ -39,17 +39,10 @@ class Amplification:
     @classmethod
     def of(cls, frequency_hz: np.ndarray, values: np.ndarray) -> "Amplification":
         """From values (F,) line by line."""
-        worst = int(np.argmax(values))
-        over = np.concatenate([[0], (values > AMPLIFICATION_LIMIT).astype(int), [0]])
-        change = np.diff(over)
-        starts, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1) - 1
-        bands = (
-            (float(frequency_hz[a]), float(frequency_hz[b]))
-            for a, b in zip(starts, ends, strict=True)
-        )
-        return cls(
-            float(values[worst]), float(frequency_hz[worst]), AMPLIFICATION_LIMIT, tuple(bands)
-        )
+        worst, f = int(np.argmax(values)), frequency_hz
+        over = np.ma.clump_masked(np.ma.masked_greater(values, AMPLIFICATION_LIMIT))
+        bands = tuple((float(f[part.start]), float(f[part.stop - 1])) for part in over)
+        return cls(float(values[worst]), float(f[worst]), AMPLIFICATION_LIMIT, bands)
 
     @property
     def sentence(self) -> str:
@@ -110,7 +103,7 @@ class CouplingReport(Answer):
         """Receptances before and after, and how errors grow."""
         if self.coupled is None:
             return {}
-        from planner.report.coupling_plots import coupling_figure
+        from planner.report.milling_plots import coupling_figure
 
         title = "Receptances of the tip, before and after"
         before = "as measured" if self.reference is None else f"measured: {self.reference}"

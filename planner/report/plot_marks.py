@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
+from scipy.ndimage import median_filter
 from scipy.optimize import isotonic_regression
 
 from planner.report.text import with_sd
@@ -168,19 +169,10 @@ def _trusted(frf: "Frf", response: int, hit: int) -> list[tuple[float, float]]:
     if not np.any(np.isfinite(coherence)):
         power = np.abs(frf.accelerance[response, hit, lines]) ** 2
         coherence = power / (power + np.nan_to_num(frf.variance[response, hit, lines]))
-    coherence = np.nan_to_num(coherence)
-    if coherence.size < WINDOW:
-        good = coherence.size > 0 and np.median(coherence) >= COHERENT
-        return [(low, high)] if good else []
-    edge = WINDOW // 2
-    padded = np.pad(coherence, edge, mode="edge")
-    around = np.median(np.lib.stride_tricks.sliding_window_view(padded, WINDOW), axis=1)
-    good = np.concatenate([[False], around >= COHERENT, [False]])
-    first, beyond = np.flatnonzero(np.diff(good.astype(int))).reshape(-1, 2).T
-    half = float(frf.frequency_hz[1] - frf.frequency_hz[0]) / 2
-    hz = frf.frequency_hz[lines]
-    starts = np.maximum(hz[first] - half, low)
-    return list(zip(starts.tolist(), np.minimum(hz[beyond - 1] + half, high).tolist(), strict=True))
+    around = median_filter(np.nan_to_num(coherence), WINDOW, mode="nearest")
+    hz, half = frf.frequency_hz[lines], (frf.frequency_hz[1] - frf.frequency_hz[0]) / 2
+    good = np.ma.clump_masked(np.ma.masked_where(around >= COHERENT, hz))
+    return [(max(hz[part.start] - half, low), min(hz[part.stop - 1] + half, high)) for part in good]
 
 
 def label_ends(panel: Axes, values: np.ndarray, names: list[str]) -> None:

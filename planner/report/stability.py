@@ -109,7 +109,7 @@ def stability_of(
         answer = replace(answer, multiplier=there.size, multiplier_error=there.error)
 
     def figures() -> "dict[str, Figure]":
-        from planner.report.stability_plots import lobes_figure
+        from planner.report.milling_plots import lobes_figure
 
         return {"stability": lobes_figure(cut, found, drawn, point)}
 
@@ -195,7 +195,7 @@ def path_report(
         answer = replace(answer, feed=replace(answer.feed, direction_base=feed), remarks=said)
 
     def figures() -> "dict[str, Figure]":
-        from planner.report.stability_plots import path_figure, turns_figure
+        from planner.report.milling_plots import path_figure, turns_figure
 
         made = {"path": path_figure(limits, answer.best_spindle_rpm, answer.feed, cut)}
         if answer.turn is not None:

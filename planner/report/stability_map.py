@@ -113,7 +113,7 @@ def map_report(
     )  # fmt: skip
 
     def figures() -> "dict[str, Figure]":
-        from planner.report.stability_plots import map_figure
+        from planner.report.milling_plots import map_figure
 
         names = campaign.cell.workspace.feature_names
         where = answer.position_m, candidates.features[kept], names, robust

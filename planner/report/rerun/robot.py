@@ -7,6 +7,7 @@ import numpy as np
 import rerun as rr
 import rerun.urdf as rru
 from rerun.chunk import Chunk
+from scipy.spatial.transform import Rotation
 
 from planner.robot.robot import Robot
 from planner.robot.skeleton import BodyShape, bodies
@@ -92,8 +93,6 @@ def _has_shape(chunk: Chunk) -> bool:
 
 def _turn_from_z(direction: np.ndarray) -> np.ndarray:
     """Quaternion (x, y, z, w) of the shortest turn from the z axis to a direction (3,)."""
-    length = float(np.linalg.norm(direction))
-    x, y, z = direction / length if length > 0 else (0.0, 0.0, 1.0)
-    half = np.array([-y, x, 0.0, 1.0 + z])
-    size = float(np.linalg.norm(half))
-    return half / size if size > 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
+    if not np.any(direction):
+        return Rotation.identity().as_quat()
+    return Rotation.align_vectors(direction, (0.0, 0.0, 1.0))[0].as_quat()
