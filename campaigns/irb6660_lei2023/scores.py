@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.linalg import cho_factor, cho_solve
 
-from planner.report.plot_marks import empty
+from planner.report.plot_marks import name_axes, panels
 from planner.studies import drawing
 from planner.studies.report import Table
 from planner.surrogate.kernels import parse
@@ -235,14 +235,13 @@ def modes_figure(table: Table) -> Figure:
 
 
 def _figure(table: Table, title: str, floor: float) -> Figure:
-    figure = empty((10.0, 6.4), title)
-    panels = figure.subplots(2, 1, sharex=True)
+    figure, grid = panels((10.0, 6.4), title, 2)
     values = np.array([row[1:] for row in table.rows], dtype=float)
     groups = [str(row[0]) for row in table.rows]
     mean = values[:, [-1, *range(0, 2 * len(WAYS), 2)]]
     names = "scatter allows", *WAYS
-    drawing.bars(panels[0], groups, names, mean, "R², mean over folds", floor)
+    drawing.bars(grid[0, 0], groups, names, mean, "R², mean over folds", floor)
     spread = values[:, 1 : 2 * len(WAYS) : 2]
-    drawing.bars(panels[1], groups, WAYS, spread, "R², spread over folds")
-    drawing.legend(figure, panels[0])
+    drawing.bars(grid[1, 0], groups, WAYS, spread, "R², spread over folds")
+    name_axes(figure, grid)
     return figure

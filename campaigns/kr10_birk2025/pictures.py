@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from planner.frf.metrics import Agreement
-from planner.report.plot_marks import empty
+from planner.report.plot_marks import name_axes, panels
 from planner.studies import drawing
 from planner.studies.report import Table
 
@@ -98,24 +98,22 @@ def campbell(run: Run) -> Figure:
     maps = {"measured (simulated)": np.array(measured)}
     for name in MAIN:
         maps[name] = np.abs(run.models[name].simulation.accelerance(struck.q[rows], lines)[:, 1, 1])
-    figure = empty((12.0, 4.2), "Figures 8 and 9: path S1, hit and response y")
-    panels = figure.subplots(1, len(maps), sharey=True)
+    title = "Figures 8 and 9: path S1, hit and response y"
+    figure, grid = panels((12.0, 4.2), title, 1, len(maps), sharey=True)
     number = np.arange(len(rows)) + 1
-    drawing.maps(figure, panels, {n: (number, lines, m.T) for n, m in maps.items()}, 45)
-    for panel in panels:
-        panel.set_xlabel("point of the path")
-    panels[0].set_ylabel("frequency (Hz)")
+    drawing.maps(figure, grid[0], {n: (number, lines, m.T) for n, m in maps.items()}, 45)
+    name_axes(figure, grid, "point of the path", "frequency (Hz)")
     return figure
 
 
 def directions_figure(table: Table) -> Figure:
     """The means over all paths as bars."""
-    figure = empty((9.0, 4.4), "Global FRAC by direction and band")
+    figure, grid = panels((9.0, 4.4), "Global FRAC by direction and band")
     rows = [row for row in table.rows if ", all, " in str(row[0])]
     values = np.array([row[1:4] for row in rows], dtype=float)
-    panel = figure.subplots()
+    panel = grid[0, 0]
     drawing.bars(panel, [str(r[0]).replace(", all, ", "\n") for r in rows], ("x", "y", "z"),
                  values, "Global FRAC (%)")  # fmt: skip
     panel.set_ylim(0, 100)
-    drawing.legend(figure, panel)
+    name_axes(figure, grid)
     return figure

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from planner.report.plot_marks import empty, write_values
+from planner.report.plot_marks import empty, name_axes, panels, write_values
 from planner.studies import drawing
 from planner.studies.report import Table, r_squared
 
@@ -44,11 +44,10 @@ def heatmap(correlation: Table) -> Figure:
 
 def last_postures(data: PostureData, mean: np.ndarray, sd: np.ndarray) -> Figure:
     """Figure 4: f and ζ over the last postures, mean and sd (15, 48) of the columns."""
-    figure = empty((12.0, 6.4), "Figure 4: the last 15 postures")
-    panels = figure.subplots(2, TABLED, sharex=True)
+    figure, grid = panels((12.0, 6.4), "Figure 4: the last 15 postures", 2, TABLED)
     number = np.arange(len(data.q) - HELD_OUT, len(data.q)) + 1
     for row, (scale, unit) in enumerate(((1.0, "frequency (Hz)"), (100.0, "damping ratio (%)"))):
-        for k, panel in enumerate(panels[row]):
+        for k, panel in enumerate(grid[row]):
             c = MODES * row + k
             low, high = (scale * np.exp(mean[:, c] + z * sd[:, c]) for z in (-1.96, 1.96))
             measured, true = (scale * np.exp(v[-HELD_OUT:, c]) for v in (data.measured, data.clean))
@@ -57,24 +56,19 @@ def last_postures(data: PostureData, mean: np.ndarray, sd: np.ndarray) -> Figure
             panel.plot(number, true, "k", lw=0.8, label="truth (MuJoCo)")
             if row == 0:
                 panel.set_title(f"mode {k + 1}", fontsize=10)
-            else:
-                panel.set_xlabel("posture")
-        panels[row, 0].set_ylabel(unit)
-    drawing.legend(figure, panels[0, 0])
+        grid[row, 0].set_ylabel(unit)
+    name_axes(figure, grid, "posture")
     return figure
 
 
 def overlays(frfs: dict[int, Direct]) -> Figure:
     """Figure 5: amplitudes xx, yy, zz at some postures."""
-    figure = empty((12.0, 6.4), "Figure 5: FRFs put together from predicted modes")
-    panels = figure.subplots(len(frfs), 3, sharex=True)
-    for row, (posture, frf) in zip(panels, frfs.items(), strict=True):
+    title = "Figure 5: FRFs put together from predicted modes"
+    figure, grid = panels((12.0, 6.4), title, len(frfs), 3)
+    for row, (posture, frf) in zip(grid, frfs.items(), strict=True):
         for axis, panel in enumerate(row):
             title = f"posture {posture}, {'xyz'[axis] * 2}, R² {frf.r2[axis]:.3f}"
             drawing.frf(panel, LINES_HZ, frf.predicted[axis], frf.band[:, axis], title)
             panel.plot(LINES_HZ, frf.truth[axis], "k--", lw=1.1, label="truth (MuJoCo)")
-        row[0].set_ylabel("|H| (m/s²/N)")
-    for panel in panels[-1]:
-        panel.set_xlabel("frequency (Hz)")
-    drawing.legend(figure, panels[0, 0])
+    name_axes(figure, grid, "frequency (Hz)", "|H| (m/s²/N)")
     return figure

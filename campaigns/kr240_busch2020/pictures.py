@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from matplotlib.figure import Figure
 
-from planner.report.plot_marks import empty
+from planner.report.plot_marks import empty, name_axes, panels
 from planner.studies import drawing
 from planner.studies.report import Table, r_squared
 
@@ -92,17 +92,16 @@ SHOWN_DEG = (106.0, 113.0, 120.0)
 def sd_maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
     """Sd of the models as published over the whole sweep (Figures 8d to 8f)."""
     names = list(predicted.beyond_sd)
-    figure = empty((11.0, 3.6), f"Sd of models as published, trained to {TRAINED_DEG:.0f}°")
-    panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
+    title = f"Sd of models as published, trained to {TRAINED_DEG:.0f}°"
+    figure, grid = panels((11.0, 3.6), title, 1, len(names), sharey=True)
     angles = np.concatenate([seen.angles_deg, BEYOND_DEG])
-    for panel, name in zip(panels, names, strict=True):
+    for panel, name in zip(grid[0], names, strict=True):
         sd = np.hstack([predicted.trained_sd[name], predicted.beyond_sd[name]])
         image = panel.pcolormesh(angles, seen.lines_hz, sd, cmap="magma", vmin=0, rasterized=True)
         panel.axvline(TRAINED_DEG, color="w", ls="--", lw=1)
         panel.set_title(name, fontsize=9)
-        panel.set_xlabel("joint 3 (°)")
         figure.colorbar(image, ax=panel, label="sd (m/s²/N)")
-    panels[0].set_ylabel("frequency (Hz)")
+    name_axes(figure, grid, "joint 3 (°)", "frequency (Hz)")
     return figure
 
 
@@ -116,19 +115,16 @@ def maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
         surfaces[f"{name}, R² {r2:.3f}"] = BEYOND_DEG, seen.lines_hz, amplitude
     grid = figure.subplots(2, -(-len(surfaces) // 2), sharey=True, squeeze=False)
     drawing.maps(figure, list(grid.ravel()[: len(surfaces)]), surfaces, 40)
-    for panel in grid[1]:
-        panel.set_xlabel("joint 3 (°)")
-    for panel in grid[:, 0]:
-        panel.set_ylabel("frequency (Hz)")
+    name_axes(figure, grid, "joint 3 (°)", "frequency (Hz)")
     return figure
 
 
 def overlays(predicted: BeyondPrediction, seen: Sweep) -> Figure:
     """FRFs at three angles beyond the training."""
-    figure = empty((9.0, 8.0), "FRFs beyond the training, at three angles")
-    panels = figure.subplots(len(SHOWN_DEG), 1, sharex=True)
+    title = "FRFs beyond the training, at three angles"
+    figure, grid = panels((9.0, 8.0), title, len(SHOWN_DEG))
     colours = drawing.COLOURS
-    for panel, angle in zip(panels, SHOWN_DEG, strict=True):
+    for panel, angle in zip(grid[:, 0], SHOWN_DEG, strict=True):
         i = int(np.flatnonzero(angle == BEYOND_DEG)[0])
         for name in (n for n in predicted.amplitude if n in PAPER_R2):
             panel.plot(
@@ -148,12 +144,10 @@ def overlays(predicted: BeyondPrediction, seen: Sweep) -> Figure:
         )
         panel.plot(seen.lines_hz, seen.truth[:, i], "k--", lw=1.2, label="truth (MuJoCo)")
         panel.set_title(f"joint 3 at {angle:.0f}°", fontsize=9)
-        panel.set_ylabel("|H| (m/s²/N)")
         panel.set_xlim(seen.lines_hz[0], seen.lines_hz[-1])
         panel.set_ylim(0, 1.6 * seen.truth[:, i].max())
         panel.grid(True, alpha=0.25)
-    panels[-1].set_xlabel("frequency (Hz)")
-    drawing.legend(figure, panels[0])
+    name_axes(figure, grid, "frequency (Hz)", "|H| (m/s²/N)")
     return figure
 
 

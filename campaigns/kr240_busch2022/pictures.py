@@ -16,7 +16,7 @@ from scipy.stats import norm, qmc
 
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf import synthesis
-from planner.report.plot_marks import empty
+from planner.report.plot_marks import name_axes, panels
 from planner.studies import drawing
 from planner.studies.report import r_squared
 from planner.surrogate.frf_bands import frf_moments
@@ -25,7 +25,7 @@ from planner.surrogate.models.fidelity_levels import Exact, FidelityLevel, Sampl
 from planner.surrogate.models.likelihood_gp import Normalisation, fit_likelihood
 from planner.surrogate.models.nargp import fit_nargp, kennedy_ohagan
 
-from .data import COMPARED, FREQUENCY_MODELS, KERNELS, AnalysedPoses, nearest, split
+from .data import COMPARED, FREQUENCY_MODELS, KERNELS, RESIDUES, AnalysedPoses, nearest, split
 
 Predict = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 Fit = Callable[[Samples], Predict]
@@ -37,10 +37,10 @@ def figure_9(x: np.ndarray, y: np.ndarray, sd: np.ndarray, fits: Mapping[str, Fi
     train, test = split(x, 0)
     test = test[np.isfinite(y[test])]
     samples = Samples.of(x[train[:FEWEST]], y[train[:FEWEST]], sd[train[:FEWEST]])
-    figure = empty((10.0, 4.6), "Figure 9: ω₂ predicted from three poses, 95 % interval")
-    panels = figure.subplots(1, len(fits), sharex=True, sharey=True)
+    title = "Figure 9: ω₂ predicted from three poses, 95 % interval"
+    figure, grid = panels((10.0, 4.6), title, 1, len(fits), sharey=True)
     ends = float(np.min(y[test])) - 0.3, float(np.max(y[test])) + 0.3
-    for panel, (name, fit) in zip(np.atleast_1d(panels), fits.items(), strict=True):
+    for panel, (name, fit) in zip(grid[0], fits.items(), strict=True):
         mean, spread = fit(samples)(x[test])
         inside = np.abs(mean - y[test]) < 1.96 * np.hypot(spread, sd[test])
         panel.errorbar(
@@ -48,9 +48,8 @@ def figure_9(x: np.ndarray, y: np.ndarray, sd: np.ndarray, fits: Mapping[str, Fi
         )
         panel.plot(ends, ends, "k--", lw=0.8)
         panel.set_title(f"{name}: {inside.sum()} of {len(test)} inside", fontsize=10)
-        panel.set_xlabel("measured (Hz)")
         panel.grid(True, alpha=0.25)
-    np.atleast_1d(panels)[0].set_ylabel("predicted (Hz)")
+    name_axes(figure, grid, "measured (Hz)", "predicted (Hz)")
     return figure
 
 
@@ -81,51 +80,42 @@ def _modes(count: int) -> list[str]:
 
 
 def _benchmark(scores: np.ndarray, names: tuple[str, ...], title: str, unit: str) -> Figure:
-    figure = empty((9.0, 6.0), title)
-    panels = figure.subplots(2, 1, sharex=True)
+    figure, grid = panels((9.0, 6.0), title, 2)
     modes = _modes(len(scores))
-    drawing.bars(panels[0], modes, names, scores[..., 0], "R²", FLOOR)
-    drawing.bars(panels[1], modes, names, scores[..., 1], unit)
-    drawing.legend(figure, panels[0])
+    drawing.bars(grid[0, 0], modes, names, scores[..., 0], "R²", FLOOR)
+    drawing.bars(grid[1, 0], modes, names, scores[..., 1], unit)
+    name_axes(figure, grid)
     return figure
 
 
 def _figure_8(eight: np.ndarray, shown: tuple[int, ...]) -> Figure:
     counts = np.array(shown)
     modes = eight.shape[1]
-    figure = empty(
-        (3.2 * modes, 6.4),
-        "Figure 8: natural frequencies, predicted with N poses (medians over splits)",
-    )
-    panels = figure.subplots(2, modes, sharex=True)
+    title = "Figure 8: natural frequencies, predicted with N poses (medians over splits)"
+    figure, grid = panels((3.2 * modes, 6.4), title, 2, modes)
     for k in range(modes):
-        upper, lower = panels[:, k]
+        upper, lower = grid[:, k]
         drawing.curves(upper, counts, COMPARED, np.maximum(eight[:, k, :, 0], FLOOR))
         upper.axhline(0.9, color="black", ls="--", lw=0.8)
         upper.set_ylim(FLOOR - 0.03, 1.05)
         upper.set_title(f"mode {k + 1}", fontsize=10)
         drawing.curves(lower, counts, COMPARED, eight[:, k, :, 1])
         lower.set_ylim(0, 1.1 * float(np.quantile(eight[..., 1], 0.97)))
-        lower.set_xlabel("poses N")
         lower.set_xticks(counts[::2] if len(counts) > 5 else counts)
-    panels[0, 0].set_ylabel(f"R² (below {FLOOR:g}: drawn there)")
-    panels[1, 0].set_ylabel("RMSE (Hz)")
-    drawing.legend(figure, panels[0, 0])
+    grid[0, 0].set_ylabel(f"R² (below {FLOOR:g}: drawn there)")
+    grid[1, 0].set_ylabel("RMSE (Hz)")
+    name_axes(figure, grid, "poses N")
     return figure
 
 
 def _figure_11(eleven: np.ndarray) -> Figure:
-    figure = empty((10.0, 6.4), "Figure 11: residues, 15 poses trained, 20 predicted")
-    panels = figure.subplots(2, 2, sharex=True)
+    title = "Figure 11: residues, 15 poses trained, 20 predicted"
+    figure, grid = panels((10.0, 6.4), title, 2, 2)
     modes = _modes(eleven.shape[1])
-    for row, direction in enumerate(("xx", "yy")):
-        for column, part in enumerate(("real", "imaginary")):
-            panel = panels[row, column]
-            drawing.bars(
-                panel, modes, KERNELS, eleven[2 * row + column, ..., 1], "RMSE / mode's rms"
-            )
-            panel.set_title(f"R {direction}, {part} part", fontsize=10)
-    drawing.legend(figure, panels[0, 0])
+    for panel, name, scores in zip(grid.flat, RESIDUES, eleven, strict=True):
+        drawing.bars(panel, modes, KERNELS, scores[..., 1], "RMSE / mode's rms")
+        panel.set_title(f"R {name.replace(' ', ', ')} part", fontsize=10)
+    name_axes(figure, grid)
     return figure
 
 
@@ -261,18 +251,13 @@ def _draw(
     size: list[np.ndarray],
 ) -> Figure:  # fmt: skip
     title = f"Figure 12: FRFs at {TARGET_POSE}, predicted from five other poses"
-    figure = empty((10.0, 6.4), title)
-    panels = figure.subplots(2, 2, sharex=True)
+    figure, grid = panels((10.0, 6.4), title, 2, 2)
     for k, (i, j) in enumerate(PAIRS):
-        panel = panels[i, j]
+        panel = grid[i, j]
         title = f"response {'xyz'[i]}, hit {'xyz'[j]}"
         drawing.frf(panel, hz, middle[k], (band[0][k], band[1][k]), title)
         panel.plot(hz, np.abs(mean[i, j]), color="tab:green", lw=1.1, label="fused, ours")
         panel.plot(hz, size[k], "k", lw=0.9, label="measured (simulated)")
         panel.set_ylim(0, 2.0 * float(np.max(size[k])))
-    for panel in panels[1]:
-        panel.set_xlabel("frequency (Hz)")
-    for panel in panels[:, 0]:
-        panel.set_ylabel("|H| (m/s²/N)")
-    drawing.legend(figure, panels[0, 0])
+    name_axes(figure, grid, "frequency (Hz)", "|H| (m/s²/N)")
     return figure

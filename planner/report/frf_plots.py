@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from planner.report.plot_marks import AXES, empty, magnitude, panels, plain_text
+from planner.report.plot_marks import AXES, magnitude, name_axes, panels, plain_text
 
 # Dashes over wide lines: where two agree, both are seen.
 SEEN = {"label": "measured", "color": "0.25", "lw": 4.5}
@@ -70,16 +70,15 @@ class ComparedFrfs:
     def overlay(self, k: int) -> Figure:
         """Direct FRFs xx, yy, zz of the k-th pose."""
         role = f" ({self.roles[k]})" if self.roles else ""
-        figure = empty((7.5, 7.0), f"{self.place}Pose {self.names[k]}{role}")
-        below, hz = figure.subplots(3, 1, sharex=True), self.frequency_hz[k]
-        for i, panel in enumerate(below):
+        figure, grid = panels((7.5, 7.0), f"{self.place}Pose {self.names[k]}{role}", 3)
+        hz = self.frequency_hz[k]
+        for i, panel in enumerate(grid[:, 0]):
             magnitude(panel, hz, self.measured[k, i, i], **SEEN)
             for side in self.sides:
                 magnitude(panel, hz, side.h[k, i, i], label=side.label, **side.style)
             panel.set_ylabel(f"|H {AXES[i]}{AXES[i]}| (m/s²/N)", fontsize=8)
             panel.grid(True, which="both", alpha=0.25)
-        figure.legend(*below[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
-        below[-1].set_xlabel("frequency (Hz)")
+        name_axes(figure, grid, "frequency (Hz)")
         return figure
 
     def overlays(self) -> Iterator[Figure]:

@@ -13,7 +13,7 @@ from planner.milling.cut import Cut
 from planner.milling.lobes import Loss
 from planner.milling.path import PathLimits
 from planner.milling.uncertainty import SampledLimits
-from planner.report.plot_marks import AXES, MEASURED, MODEL, empty, magnitude, panels
+from planner.report.plot_marks import AXES, MEASURED, MODEL, empty, magnitude, name_axes, panels
 
 STABLE, UNSURE, LIMIT, POINT = "#dcefd9", "#f6e3b4", "black", "tab:red"
 ROWS = 240  # of depths at which probabilities are drawn
@@ -212,6 +212,5 @@ def coupling_figure(
     if f[-1] / f[0] > MANY_DECADES:
         grown.set_xscale("log")
     grown.set_xlim(f[0], f[-1])
-    handles, labels = grid[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
+    name_axes(figure, grid)
     return figure

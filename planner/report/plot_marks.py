@@ -27,6 +27,7 @@ MEASURED, MODEL = "black", "tab:red"
 WEIGHTS, ALIKE = (0.2126, 0.7152, 0.0722), 0.179
 MODE, USABLE = "tab:blue", "tab:green"
 COHERENT, WINDOW = 0.8, 7  # from this coherence (median of so many lines around) an FRF is shaded
+MOST_LABELS = 7  # of a legend that fit side by side
 COLUMNS = 9  # labels of several lines that fit side by side; more are turned upright
 
 
@@ -65,6 +66,20 @@ def panels(
     """A figure (size in inches) with panels (rows, columns) that share the horizontal axis."""
     figure = empty(size, title)
     return figure, figure.subplots(rows, columns, sharex=True, squeeze=False, **layout)
+
+
+def name_axes(
+    figure: Figure, grid: np.ndarray, x: str = "", y: str = "", fontsize: float | None = None
+) -> None:
+    """Labels at the outer panels of a grid, and one legend of the first panel's curves below."""
+    for panel in grid[-1] if x else ():
+        panel.set_xlabel(x, fontsize=fontsize)
+    for panel in grid[:, 0] if y else ():
+        panel.set_ylabel(y, fontsize=fontsize)
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    if handles:
+        columns = min(len(labels), MOST_LABELS)
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9)
 
 
 def magnitude(

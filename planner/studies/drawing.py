@@ -46,14 +46,6 @@ def bars(
     panel.grid(True, axis="y", alpha=0.25)
 
 
-def legend(figure: Figure, panel: Axes) -> None:
-    """One legend for all panels, below them."""
-    handles, labels = panel.get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside lower center", ncols=min(len(labels), 7), fontsize=9
-    )
-
-
 def band(
     panel: Axes, x: np.ndarray, predicted: np.ndarray, ends: Sequence[np.ndarray],
     label: str = "95 % band",
