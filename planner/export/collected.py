@@ -7,7 +7,6 @@ import numpy as np
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import MeasuredMode
-from planner.campaign.state import Measurement
 from planner.frf.frf import Frf
 from planner.recording.joints import JointUnits
 from planner.surrogate.frf_bands import ModalPrediction
@@ -24,26 +23,22 @@ class MeasuredOf:
 
 
 @dataclass(frozen=True, eq=False)
-class PredictedOf:
-    """The model at n poses: joints (n, dof) in degrees or mm, modes, FRFs (n, 3, 3, F) with sd."""
+class Collected:
+    """All of a campaign that other programs can use: measured poses, and the model at n `poses`.
 
+    There with joints (n, dof) in degrees or mm, modes, FRFs (n, 3, 3, F) with sd in m/s²/N.
+    """
+
+    name: str
+    joints: JointUnits
+    simulated: bool
+    measured: tuple[MeasuredOf, ...]
     poses: tuple[str, ...]
     joints_deg: np.ndarray
     frequency_hz: np.ndarray
     frf_mean: np.ndarray
     frf_sd: np.ndarray
     modes: ModalPrediction
-
-
-@dataclass(frozen=True, eq=False)
-class Collected:
-    """All of a campaign that other programs can use."""
-
-    name: str
-    joints: JointUnits
-    simulated: bool
-    measured: tuple[MeasuredOf, ...]
-    predicted: PredictedOf
 
     @property
     def label(self) -> str:
@@ -56,32 +51,26 @@ def collect(
 ) -> Collected:
     """Measured poses, and the model's predictions at `poses` (none: at the measured ones)."""
     state, cell = campaign.state, campaign.cell
-    table = cell.config.modes
-    measured = [_measured(campaign, m) for m in state.used]
+    used, lines = state.used, campaign.frequency_lines
     names, angles = tuple(poses), np.array(joints_deg, dtype=float)
     if not names:
-        names = tuple(m.pose for m in measured)
-        angles = np.array([m.joints_deg for m in measured])
+        names = tuple(m.pose for m in used)
+        angles = np.array([m.joints_deg for m in used])
     angles = angles.reshape(len(names), len(cell.robot.joint_names))
-    lines = campaign.frequency_lines
-    q = cell.robot.joints.internal(angles)
-    count = table.count
     if names:
+        q = cell.robot.joints.internal(angles)
         mean, sd = campaign.frf_at(q, lines)
         modes = campaign.model.predict(q)
     else:
         mean, sd = np.empty((0, 3, 3, len(lines)), complex), np.empty((0, 3, 3, len(lines)))
-        none = np.empty((0, count))
-        modes = ModalPrediction(none, none, none, none, np.empty((0, count, 3, 3)), none)
-    return Collected(
-        campaign.directory.name,
-        cell.robot.joints,
-        state.simulated,
-        tuple(measured),
-        PredictedOf(names, angles, lines, mean, sd, modes),
-    )
-
-
-def _measured(campaign: Campaign, m: Measurement) -> MeasuredOf:
-    frf = campaign.frf_of(m, campaign.cell.config.modes)
-    return MeasuredOf(m.pose, m.joints_deg, frf, tuple(mode for mode in m.modes if mode.likely))
+        none = np.empty((0, cell.config.modes.count))
+        modes = ModalPrediction(none, none, none, none, np.empty((*none.shape, 3, 3)), none)
+    measured = (
+        MeasuredOf(
+            m.pose, m.joints_deg, campaign.frf_of(m, cell.config.modes),
+            tuple(mode for mode in m.modes if mode.likely),
+        )
+        for m in used
+    )  # fmt: skip
+    found = tuple(measured), names, angles, lines, mean, sd, modes
+    return Collected(campaign.directory.name, cell.robot.joints, state.simulated, *found)

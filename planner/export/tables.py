@@ -26,12 +26,12 @@ def _mode_rows(found: Collected) -> Iterator[list[object]]:
             shape = [v for pair in m.shape for v in pair]
             numbers = m.frequency_hz, m.frequency_sd_hz, m.damping_ratio, m.damping_sd
             yield ["measured", one.pose, *one.joints_deg, k, *numbers, *shape]
-    p, modes = found.predicted, found.predicted.modes
-    for i, pose in enumerate(p.poses):
+    modes = found.modes
+    for i, pose in enumerate(found.poses):
         for k in range(modes.frequency_hz.shape[1]):
             columns = modes.frequency_hz, modes.frequency_sd_hz, modes.damping_ratio
             numbers = [float(c[i, k]) for c in (*columns, modes.damping_sd)]
-            yield ["predicted", pose, *p.joints_deg[i].tolist(), k + 1, *numbers, *[""] * 6]
+            yield ["predicted", pose, *found.joints_deg[i].tolist(), k + 1, *numbers, *[""] * 6]
 
 
 def frfs_csv(found: Collected) -> str:
@@ -42,8 +42,8 @@ def frfs_csv(found: Collected) -> str:
 
 
 def _frf_rows(found: Collected) -> Iterator[list[object]]:
-    p = found.predicted
-    low, high = (p.frequency_hz[0], p.frequency_hz[-1]) if len(p.frequency_hz) else (0.0, 0.0)
+    hz = found.frequency_hz
+    low, high = (hz[0], hz[-1]) if len(hz) else (0.0, 0.0)
     for one in found.measured:
         frf = one.frf.within((float(low), float(high)))
         sd = np.sqrt(frf.variance)
@@ -53,9 +53,9 @@ def _frf_rows(found: Collected) -> Iterator[list[object]]:
                            strict=True)  # fmt: skip
                 for f, h, s, c in rows:
                     yield ["measured", one.pose, AXES[i], AXES[j], f, h.real, h.imag, s, c]
-    for n, pose in enumerate(p.poses):
+    for n, pose in enumerate(found.poses):
         for i, j in np.ndindex(3, 3):
-            rows = zip(p.frequency_hz, p.frf_mean[n, i, j], p.frf_sd[n, i, j], strict=True)
+            rows = zip(hz, found.frf_mean[n, i, j], found.frf_sd[n, i, j], strict=True)
             for f, h, s in rows:
                 yield ["predicted", pose, AXES[i], AXES[j], f, h.real, h.imag, s, ""]
 
@@ -74,16 +74,16 @@ def _text(found: Collected, header: list[str], rows: Iterable[list[object]]) -> 
 
 def mat_arrays(found: Collected) -> dict[str, Any]:
     """Variables of the MAT file; poses come first in every array."""
-    p, modes = found.predicted, found.predicted.modes
+    modes = found.modes
     made: dict[str, Any] = {
         "label": found.label,
         "simulated": found.simulated,
         "joint_names": np.array(found.joints.names, dtype=object),
-        "predicted_pose": np.array(p.poses, dtype=object),
-        "predicted_joints_deg": p.joints_deg,
-        "frequency_hz": p.frequency_hz,
-        "frf_mean": p.frf_mean,
-        "frf_sd": p.frf_sd,
+        "predicted_pose": np.array(found.poses, dtype=object),
+        "predicted_joints_deg": found.joints_deg,
+        "frequency_hz": found.frequency_hz,
+        "frf_mean": found.frf_mean,
+        "frf_sd": found.frf_sd,
         "frf_unit": "m/s^2/N",
         "mode_frequency_hz": modes.frequency_hz,
         "mode_frequency_sd_hz": modes.frequency_sd_hz,

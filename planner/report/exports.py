@@ -1,6 +1,6 @@
 """Answer of `export`: a campaign's results or proposals in another program's format."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -83,7 +83,7 @@ def export(
         _refuse_contacts(campaign.cell.robot, poses_csv, rows)
         return _program(campaign, kind, folder, rows)
     found = collect(campaign, [r.pose for r in rows], [r.joints_deg for r in rows])
-    if not found.measured and not found.predicted.poses and kind != "model":
+    if not found.measured and not found.poses and kind != "model":
         raise InputError(f"{campaign.directory} has no measured pose yet; name poses with --poses.")
     loader = errors = None
     if kind == "model":
@@ -94,10 +94,14 @@ def export(
         loader = LOADER.format(file=file, coordinates=coordinates)
         files[f"{identifier(found.name)}_model.py"] = loader.lstrip()
         errors = tuple(arrays["error_percent"].tolist())
+    elif kind == "uff":
+        files = _uff(found)
+    elif kind == "mat":
+        files = {f"{identifier(found.name)}.mat": mat_arrays(found)}
     else:
-        files = _WRITERS[kind](found)
+        files = {"modes.csv": modes_csv(found), "frfs.csv": frfs_csv(found)}
     written = _write(folder, files)
-    poses = dict.fromkeys([*(m.pose for m in found.measured), *found.predicted.poses])
+    poses = dict.fromkeys([*(m.pose for m in found.measured), *found.poses])
     return ExportedFiles(kind, written, tuple(poses), found.simulated, loader, errors)
 
 
@@ -138,25 +142,12 @@ def _uff(found: Collected) -> dict[str, Any]:
         name, title = unique(identifier(one.pose), used), f"{found.label}, pose {one.pose}"
         files[f"{name}_measured.unv"] = uff.measured_sets(one.frf, f"{title}, measured")
         files[f"{name}_modes.unv"] = uff.mode_sets(one.modes, f"{title}, measured")
-    p, used = found.predicted, set[str]()
-    for i, pose in enumerate(p.poses):
+    used = set[str]()
+    for i, pose in enumerate(found.poses):
         title = f"{found.label}, pose {pose}, predicted"
-        text = uff.frf_sets(p.frequency_hz, p.frf_mean[i], title, None)
+        text = uff.frf_sets(found.frequency_hz, found.frf_mean[i], title, None)
         files[f"{unique(identifier(pose), used)}_predicted.unv"] = text
     return files
-
-
-def _csv(found: Collected) -> dict[str, Any]:
-    return {"modes.csv": modes_csv(found), "frfs.csv": frfs_csv(found)}
-
-
-def _mat(found: Collected) -> dict[str, Any]:
-    return {f"{identifier(found.name)}.mat": mat_arrays(found)}
-
-
-_WRITERS: dict[str, Callable[[Collected], dict[str, Any]]] = {
-    "uff": _uff, "mat": _mat, "csv": _csv,
-}  # fmt: skip
 
 
 def _write(folder: Path, files: dict[str, Any]) -> tuple[str, ...]:

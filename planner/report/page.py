@@ -18,10 +18,9 @@ from planner.errors import InputError
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP
 from planner.report.answer import Done
-from planner.report.campaign_plots import left_out_figure
+from planner.report.campaign_plots import frf_pictures, left_out_figure, map_pictures
 from planner.report.html import rendered, write_page
 from planner.report.kept_diagnosis import chapter, diagnosis_of
-from planner.report.page_pictures import frf_pictures, map_pictures
 from planner.report.proposals import target_sentence
 from planner.report.springs import COLUMNS, NOT_KNOWN
 from planner.report.status import StatusReport, status
