@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -24,9 +23,6 @@ from planner.errors import InputError
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded
 from planner.report.pictures import Pictures
 from planner.report.text import table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PICTURE, TABLE = "learning_curves", "comparison.json"
 SHOWN = 8  # columns of measurements that fit
@@ -85,7 +81,7 @@ class ComparisonReport(Answer):
             return self
         title = f"Pool of {self.pool} poses, {self.repeats} repeats, simulation {self.simulation}"
 
-        def figures() -> "dict[str, Figure]":
+        def figures():
             from planner.report.learning_curves import learning_figure
 
             return {PICTURE: learning_figure(curves, title)}

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from msgspec import UNSET
@@ -31,9 +31,6 @@ from planner.recording.read import READERS, read
 from planner.recording.records import Channel, TimeRecord
 from planner.report.modes import ModeAnswer, ModesReport, named
 from planner.report.pictures import Pictures
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 ESTIMATORS = ("h1", "h2", "hv")
 LONGEST_NAME = 40  # characters of a file's name in a title
@@ -185,7 +182,7 @@ def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -
 
     name = _titled((record.source.name, *given.accepted[1:]))
 
-    def figures() -> "dict[str, Figure]":
+    def figures():
         from planner.report.modal_plots import auto_mac_figure, stabilisation_figure
 
         low, high = modal.band_hz
@@ -248,7 +245,7 @@ def matrix_report(
         more = moving_shapes(found, geometry)
         note = "On the timeline shapes move, exaggerated; grey: at rest."
 
-    def figures() -> "dict[str, Figure]":
+    def figures():
         from planner.report.matrix_plots import matrix_figures
 
         return matrix_figures(matrix, found, geometry)
@@ -284,7 +281,7 @@ def operating_report(
         told.append(f"Tones, not modes, at {tones} Hz: what turns or hums there was left out.")
     name = _titled([sources[0].path.name])
 
-    def figures() -> "dict[str, Figure]":
+    def figures():
         from planner.report.modal_plots import (
             auto_mac_figure,
             poles_by_stability,

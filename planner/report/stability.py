@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -23,9 +23,6 @@ from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.pictures import Pictures
 from planner.report.text import number, remarks, table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 MOST_ROWS = 24  # of speeds that the text shows
 LOBES_SHARE = 0.2  # of the time, where samples follow
@@ -108,7 +105,7 @@ def stability_of(
         there = multiplier(machine, *point)
         answer = replace(answer, multiplier=there.size, multiplier_error=there.error)
 
-    def figures() -> "dict[str, Figure]":
+    def figures():
         from planner.report.milling_plots import lobes_figure
 
         return {"stability": lobes_figure(cut, found, drawn, point)}
@@ -194,7 +191,7 @@ def path_report(
         said = *outside(travelled.campaign, travelled.names, travelled.q), *answer.remarks
         answer = replace(answer, feed=replace(answer.feed, direction_base=feed), remarks=said)
 
-    def figures() -> "dict[str, Figure]":
+    def figures():
         from planner.report.milling_plots import path_figure, turns_figure
 
         made = {"path": path_figure(limits, answer.best_spindle_rpm, answer.feed, cut)}

@@ -1,7 +1,7 @@
 """Answer of `stability --map`: what a cut is allowed all over a campaign's workspace."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -17,9 +17,6 @@ from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.pictures import Pictures
 from planner.report.text import number, remarks, table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 MOST_SPEEDS = 24  # among which the best for the whole workspace is looked for
 MOST_ROWS = 10
@@ -112,7 +109,7 @@ def map_report(
         joint_units=joints.declared,
     )  # fmt: skip
 
-    def figures() -> "dict[str, Figure]":
+    def figures():
         from planner.report.milling_plots import map_figure
 
         names = campaign.cell.workspace.feature_names

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 from rerun.chunk import RrdReader
+from scipy.spatial.transform import Rotation
 
 SHAPES = ("Points3D", "Boxes3D", "Arrows3D", "Capsules3D", "Cylinders3D", "Ellipsoids3D", "Asset3D")
 WORLD = "tf#/"
@@ -71,11 +72,4 @@ def _matrix(row: dict) -> np.ndarray:
 
 def rotation(xyzw: list[float]) -> np.ndarray:
     """Rotation matrix (3, 3) of a quaternion (x, y, z, w)."""
-    x, y, z, w = xyzw
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return Rotation.from_quat(xyzw).as_matrix()
