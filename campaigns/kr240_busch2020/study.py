@@ -108,7 +108,8 @@ def study(progress: Tell, small: bool = False) -> Report:
         return there, {step: _fused(there.every(step)) for step in steps}
 
     done = dict(zip(robots, on_each(robots, run, progress), strict=True))
-    seen, runs = ({seed: one[part] for seed, one in done.items()} for part in (0, 1))
+    seen = {seed: there for seed, (there, _) in done.items()}
+    runs = {seed: told for seed, (_, told) in done.items()}
     first, sweep_1 = runs[robots[0]], seen[robots[0]]
     main, trained = first[steps[0]], sweep_1.every(steps[0])
     each = [figures(runs[s], seen[s]) for s in robots]

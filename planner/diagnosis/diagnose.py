@@ -287,7 +287,7 @@ def _agreement(
             vars(misfit).pop(name, None)
         h = misfit.heard(fit.at.x, misfit.motion(fit.at.x, None).accelerance)
         found.append(similarity_of(data.measured, h))
-    return ThreefoldSimilarity(*found)
+    return ThreefoldSimilarity(found[0], found[1], found[2])
 
 
 def _held_out(

@@ -9,6 +9,7 @@ condition (`given`) is not met here.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import SupportsFloat
 
 import numpy as np
 
@@ -165,7 +166,7 @@ COLUMNS = ("verdict", "figure", "the paper's", "here (mean over seeds)", "spread
            "false if, on any seed or within the spread", "reason")  # fmt: skip
 
 
-def in_order(rules: Sequence[ClaimRule], values: Iterable[float]) -> dict[str, float]:
+def in_order(rules: Sequence[ClaimRule], values: Iterable[SupportsFloat]) -> dict[str, float]:
     """Figures by name, from values in the order in which the rules' bounds need them."""
     names = [bound.figure for rule in rules for bound in rule.bounds]
     return dict(zip(names, map(float, values), strict=True))
