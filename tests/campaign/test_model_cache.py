@@ -19,7 +19,7 @@ from planner.demo import NAME, shipped
 from planner.fit.fitted import FitRecord
 from planner.replay import replay
 from planner.report.status import status
-from tests.support.outside import told
+from tests.support.outside import FROZEN, told
 
 POSES = "A11", "A33"
 
@@ -27,17 +27,18 @@ POSES = "A11", "A33"
 @pytest.fixture(scope="module")
 def two(tmp_path_factory):
     """A campaign of two poses, whose simulation stays as it is: no model takes long."""
-    return campaign_of_two(tmp_path_factory.mktemp("two"), "\n[fidelity]\nsimulation = 'frozen'\n")
+    parent = tmp_path_factory.mktemp("two")
+    return measured(parent, POSES, Store(None), "\n" + FROZEN).directory
 
 
-def campaign_of_two(parent, more=""):
+def measured(parent, poses, store, more=""):
     source, folder, config = shipped(NAME), parent / "campaign", parent / "campaign.toml"
     config.write_text((source / "campaign.toml").read_text() + more)
     Campaign.new(folder, source / "robot" / "robot.toml", config)
-    campaign = Campaign(folder, Store(None))
-    for pose in POSES:
+    campaign = Campaign(folder, store)
+    for pose in poses:
         campaign.import_paths((source / "recordings",), pose)
-    return folder
+    return campaign
 
 
 @pytest.fixture
@@ -76,18 +77,17 @@ def same(a, b):
 
 def test_a_kept_model_is_the_fitted_one(tmp_path, store, fitted):
     """Of a simulation that learns, too."""
-    folder = campaign_of_two(tmp_path)
+    campaign = measured(tmp_path, POSES[:1], store)
     fitted.clear()
-    first = Campaign(folder, store).model
-    again = Campaign(folder, store).model
-    assert len(fitted) == 1
+    first, again = campaign.model, Campaign(campaign.directory, store).model
+    assert len(fitted) == 0
     assert again is not first
-    anew = Campaign(folder, Store(None)).model
-    assert len(fitted) == 2
+    anew = Campaign(campaign.directory, Store(None)).model
+    assert len(fitted) == 1
     assert same(first, again)
     assert same(anew, again)
     assert again.remarks == anew.remarks
-    assert [p.pose for p in again.labelled] == list(POSES)
+    assert [p.pose for p in again.labelled] == list(POSES[:1])
 
 
 def test_a_damaged_entry_is_fitted_again(folder, store, fitted):

@@ -12,7 +12,7 @@ from tests.support.outside import call, make_cell, record, told
 def made(tmp_path_factory):
     """A new campaign with a proposal, what was recorded there, and a file that is no recording."""
     root = tmp_path_factory.mktemp("unhit")
-    robot, plan, truth = make_cell(root)
+    robot, plan, truth = make_cell(root, learns=False)
     assert call("new", root / "cell", "--robot", robot, "--campaign", plan)[0] == 0
     pose = told("next", root / "cell")["proposals"][0]
     bad = root / "notes.sh"

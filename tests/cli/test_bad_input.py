@@ -33,7 +33,7 @@ LIKE_COLUMNS = {name: np.arange(99.0) for name in (
 def bench(tmp_path_factory):
     """A campaign, a good recordings folder for it, and a table of poses."""
     root = tmp_path_factory.mktemp("bench")
-    robot, campaign_toml, truth = make_cell(root)
+    robot, campaign_toml, truth = make_cell(root, learns=False)
     assert call("new", root / "cell", "--robot", robot, "--campaign", campaign_toml)[0] == 0
     good = record(truth, root / "good", "G1", MIDDLE)
     poses = root / "predict.csv"

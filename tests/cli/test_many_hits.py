@@ -19,7 +19,7 @@ def joined(files: list[Path], target: Path) -> Path:
 
 
 def test_a_run_of_hits_in_one_file_is_imported_hit_by_hit(tmp_path):
-    robot, campaign_toml, truth = make_cell(tmp_path)
+    robot, campaign_toml, truth = make_cell(tmp_path, learns=False)
     cell = tmp_path / "cell"
     assert call("new", cell, "--robot", robot, "--campaign", campaign_toml)[0] == 0
     pose = json.loads(call("next", cell, "--json")[1])["proposals"][0]
@@ -54,7 +54,7 @@ def test_a_run_of_hits_in_one_file_is_imported_hit_by_hit(tmp_path):
 
 
 def test_hits_along_one_axis_or_a_single_hit_are_remarked_upon(tmp_path):
-    robot, campaign_toml, truth = make_cell(tmp_path)
+    robot, campaign_toml, truth = make_cell(tmp_path, learns=False)
     cell = tmp_path / "cell"
     assert call("new", cell, "--robot", robot, "--campaign", campaign_toml)[0] == 0
     pose = json.loads(call("next", cell, "--json")[1])["proposals"][0]

@@ -30,7 +30,7 @@ TRIED = ["an external link", "a flipped byte in gzip", "an acceleration of 1e200
 def bench(tmp_path_factory):
     """A new campaign, and a pose's recordings."""
     root = tmp_path_factory.mktemp("bench")
-    robot, campaign_toml, truth = make_cell(root)
+    robot, campaign_toml, truth = make_cell(root, learns=False)
     assert call("new", root / "cell", "--robot", robot, "--campaign", campaign_toml)[0] == 0
     return root, record(truth, root / "good", "G1", MIDDLE)
 

@@ -54,7 +54,7 @@ def test_a_record_of_a_single_hit_stays_as_it_was(tmp_path):
 @pytest.fixture
 def at_first_pose(tmp_path):
     """A campaign, and three streams of its first pose as WAV files."""
-    robot, campaign_toml, truth = make_cell(tmp_path)
+    robot, campaign_toml, truth = make_cell(tmp_path, learns=False)
     cell = tmp_path / "cell"
     assert call("new", cell, "--robot", robot, "--campaign", campaign_toml)[0] == 0
     pose = json.loads(call("next", cell, "--json")[1])["proposals"][0]

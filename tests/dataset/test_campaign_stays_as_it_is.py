@@ -13,6 +13,7 @@ from planner.cli.run import run
 from planner.demo import NAME, Pool, shipped
 from planner.errors import InputError
 from planner.progress import quietly
+from tests.support.outside import FROZEN
 
 
 def content(folder: Path) -> dict[str, tuple[str, int]]:
@@ -32,7 +33,9 @@ def campaign(tmp_path_factory):
     source = shipped(NAME)
     root = tmp_path_factory.mktemp("root")
     toml = source / "robot" / "robot.toml"
-    made = Campaign.new(root / "campaign", toml, source / "campaign.toml")
+    plan = root / "campaign.toml"
+    plan.write_text((source / "campaign.toml").read_text() + FROZEN)
+    made = Campaign.new(root / "campaign", toml, plan)
     band_hz = made.cell.config.modes.band_hz
     with pytest.raises(InputError, match="import"):
         made.dataset(band_hz)

@@ -4,10 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.dataset.store import Store
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.handling import EVERYDAY
 from planner.truth.model import Truth
@@ -19,10 +17,8 @@ PLAN += "[modes]\ncount = 3\nband_hz = [4.0, 80.0]\n"
 SOFT_FLOOR = tuple(Spring("base", axis, 1.1e6, 330.0) for axis in ((1.0, 0, 0), (0, 1.0, 0)))
 
 
-@pytest.fixture(scope="module")
-def cell(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Truth]:
+def measured(folder: Path) -> tuple[Campaign, Truth]:
     """Hit once along each axis at three poses, by hand, on a floor that gives way."""
-    folder = tmp_path_factory.mktemp("cell")
     toml = write_arm(folder / "robot")
     (folder / "campaign.toml").write_text(PLAN)
     secret = Secret(Deviation(31, 0.12, 0.3, 0.05, 0.006, extra=SOFT_FLOOR))
@@ -31,9 +27,9 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Truth]:
     stays = [(f"P{i}", q, "tcp", s) for i, (q, s) in enumerate(where)]
     hand = replace(EVERYDAY, angle_deg=2.0, offset_m=0.005)
     truth = record(folder / "hits", toml, stays, secret, hand, seed=5)
-    Campaign.new(folder / "new", toml, folder / "campaign.toml")
-    Campaign(folder / "new", Store(None)).import_paths((folder / "hits",))
-    return folder, truth
+    campaign = Campaign.new(folder / "new", toml, folder / "campaign.toml")
+    campaign.import_paths((folder / "hits",))
+    return campaign, truth
 
 
 def worst_percent(campaign: Campaign, truth: Truth) -> float:
@@ -44,9 +40,8 @@ def worst_percent(campaign: Campaign, truth: Truth) -> float:
     return float(100 * np.sqrt(np.mean(off**2, axis=0)).max())
 
 
-def test_the_simulation_explains_what_all_sensors_heard(cell: tuple[Path, Truth]) -> None:
-    folder, truth = cell
-    campaign = Campaign(folder / "new", Store(None))
+def test_the_simulation_explains_what_all_sensors_heard(tmp_path: Path) -> None:
+    campaign, truth = measured(tmp_path)
     model = campaign.model
     assert model.low.taught
     assert "The base gives way (about x" in model.remarks[0]
