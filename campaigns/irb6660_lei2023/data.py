@@ -20,13 +20,12 @@ from planner.modal.residues import rank_one
 from planner.modal.tracking import Guide, track
 from planner.progress import Tell
 from planner.studies.hits import upright
-from planner.truth.brakes import DampingScatter
 from planner.truth.deviation import Deviation
 from planner.truth.handling import EVERYDAY
 from planner.truth.hits import Hammer, SimulatedHit, noisy, pulse, sampled
 from planner.truth.load import load_truth
-from planner.truth.model import Truth
-from planner.truth.propagate import driven
+from planner.truth.model import Truth, driven
+from planner.truth.secret import DampingScatter
 
 X_M, Y_M, Z_M = np.linspace(1.3, 1.9, 4), np.linspace(-0.3, 0.3, 4), 0.8
 TURN_DEG = np.linspace(-60, 60, 7)

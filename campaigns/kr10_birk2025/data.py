@@ -16,10 +16,10 @@ from planner.progress import Tell
 from planner.studies.hits import StruckPoses, everyday, strike, upright
 from planner.truth.deviation import AttachedResonator, BentLink, Deviation, Spring, StiffnessRipple
 from planner.truth.hits import Hammer
+from planner.truth.laws import HarmonicDrive
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
 from planner.truth.nonlinear import Port
-from planner.truth.other_laws import HarmonicDrive
 
 PATHS = ("S1", "S2", "S3")
 POINTS, FEW_POINTS = 40, 4  # of a path; of the small version

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.campaign import Campaign
-from planner.compare.bench import assemble, cell_of
+from planner.compare.bench import Bench, assemble, cell_of
 from planner.compare.curves import Curves
 from planner.compare.pool import PoolPose
 from planner.compare.run import planned, play
@@ -15,64 +15,6 @@ from planner.design.space_filling import NESTED
 from planner.errors import InputError
 
 LEAST_POSES = 2 + LEFT  # measured: one to begin with, one to choose, and some to judge by
-
-
-@dataclass(frozen=True, eq=False)
-class Otherwise:
-    """The campaign in the order in which it was measured, and as the strategy would have chosen.
-
-    Both begin with the pose measured first and are judged on the poses not yet used.
-    """
-
-    acquisition: str
-    pool: int
-    measured: Run
-    instead: Run
-
-    @property
-    def text(self) -> str:
-        """One sentence for the engineer."""
-        was, other = (_to_goal(run) for run in (self.measured, self.instead))
-        return (
-            f"To an RMSE of 1 % on the poses not yet used, {self.acquisition} would have needed "
-            f"{other}, the campaign as it was {was} (chosen among the {self.pool} poses measured)."
-        )
-
-
-def otherwise(campaign: Campaign, acquisition: str) -> Otherwise | None:
-    """What `acquisition` would have saved; None with too few measured poses.
-
-    Raises InputError for an unknown acquisition.
-    """
-    if acquisition not in NESTED:
-        check_name(acquisition)
-    cell = campaign.cell
-    used = campaign.state.used
-    if len(used) < LEAST_POSES:
-        return None
-    table = cell.config.modes
-    poses = [PoolPose(m, campaign.frf_of(m, table), (), "", m.simulated) for m in used]
-    try:
-        bench, _ = assemble(cell.robot, cell.config, poses)
-    except InputError:
-        return None
-    count = len(bench.measurements)
-    if count < LEAST_POSES:
-        return None
-    task = Task(acquisition, 0, 1, count - LEFT)
-    order = list(range(count - LEFT))
-    with threadpool_limits(1):
-        rest = [i for i in planned(cell_of(bench), task) if i] if acquisition in NESTED else []
-        measured = play(bench, order[:1], order[1:], task)
-        instead = play(bench, order[:1], rest[: task.budget - 1], task)
-    return Otherwise(acquisition, count, measured, instead)
-
-
-def _to_goal(run: Run) -> str:
-    curve = Curves.of([run])
-    if curve.to_goal is None:
-        return f"more than {run.n[-1]}"
-    return f"{curve.to_goal} ({curve.minutes_to_goal:.0f} min of robot time)"
 
 
 @dataclass(frozen=True)
@@ -92,7 +34,11 @@ class LearningRun:
 
 @dataclass(frozen=True)
 class OtherAcquisition:
-    """What another acquisition would have saved among the poses measured; `runs` by name."""
+    """What another acquisition would have saved among the poses measured; `runs` by name.
+
+    The campaign in the order in which it was measured, and as the acquisition would have chosen:
+    both begin with the pose measured first and are judged on the poses not yet used.
+    """
 
     acquisition: str
     text: str
@@ -100,11 +46,47 @@ class OtherAcquisition:
 
     @classmethod
     def of(cls, campaign: Campaign, acquisition: str) -> "OtherAcquisition | None":
-        """None with too few measured poses to tell."""
-        found = otherwise(campaign, acquisition)
-        if found is None:
+        """None with too few measured poses to tell.
+
+        Raises InputError for an unknown acquisition.
+        """
+        if acquisition not in NESTED:
+            check_name(acquisition)
+        bench = _bench(campaign)
+        if bench is None:
             return None
-        runs = {"campaign": found.measured, found.acquisition: found.instead}
-        return cls(
-            found.acquisition, found.text, {name: LearningRun.of(r) for name, r in runs.items()}
+        count = len(bench.measurements)
+        task = Task(acquisition, 0, 1, count - LEFT)
+        order = list(range(count - LEFT))
+        with threadpool_limits(1):
+            rest = [i for i in planned(cell_of(bench), task) if i] if acquisition in NESTED else []
+            was = play(bench, order[:1], order[1:], task)
+            other = play(bench, order[:1], rest[: task.budget - 1], task)
+        text = (
+            f"To an RMSE of 1 % on the poses not yet used, {acquisition} would have needed "
+            f"{_to_goal(other)}, the campaign as it was {_to_goal(was)} (chosen among the {count} "
+            "poses measured)."
         )
+        runs = {"campaign": LearningRun.of(was), acquisition: LearningRun.of(other)}
+        return cls(acquisition, text, runs)
+
+
+def _bench(campaign: Campaign) -> Bench | None:
+    """The poses that were measured, if they are enough."""
+    cell, used = campaign.cell, campaign.state.used
+    if len(used) < LEAST_POSES:
+        return None
+    table = cell.config.modes
+    poses = [PoolPose(m, campaign.frf_of(m, table), (), "", m.simulated) for m in used]
+    try:
+        bench, _ = assemble(cell.robot, cell.config, poses)
+    except InputError:
+        return None
+    return bench if len(bench.measurements) >= LEAST_POSES else None
+
+
+def _to_goal(run: Run) -> str:
+    curve = Curves.of([run])
+    if curve.to_goal is None:
+        return f"more than {run.n[-1]}"
+    return f"{curve.to_goal} ({curve.minutes_to_goal:.0f} min of robot time)"

@@ -71,22 +71,22 @@ class Curves:
 
 
 @dataclass(frozen=True, eq=False)
-class Paired:
+class StrategyDifference:
     """A strategy less the baseline over the seeds (initial poses) of both; 95 % intervals.
 
-    `difference` (t,) is the median difference of the RMSE in percentage points, `interval` (t, 2)
-    its bootstrap interval over seeds; `to_goal` and `to_goal_interval` are the mean difference in
-    measurements to 1 %, where a run that did not get there counts as one more than the budget.
+    `difference_percent` (t,) is the median difference of the RMSE in percentage points, its
+    interval (t, 2) a bootstrap's over seeds; `measurements_to_one_percent` is the mean difference,
+    where a run that did not get there counts as one more than the budget.
     """
 
     seeds: int
-    difference: np.ndarray
-    interval: np.ndarray
-    to_goal: float
-    to_goal_interval: np.ndarray
+    difference_percent: np.ndarray
+    difference_percent_interval95: np.ndarray
+    measurements_to_one_percent: float
+    measurements_to_one_percent_interval95: np.ndarray
 
 
-def paired(strategy: Curves, baseline: Curves) -> Paired | None:
+def paired(strategy: Curves, baseline: Curves) -> StrategyDifference | None:
     """The difference of two strategies seed by seed; None if they share no seed."""
     shared = [seed for seed in strategy.seeds if seed in baseline.seeds]
     if not shared:
@@ -97,7 +97,8 @@ def paired(strategy: Curves, baseline: Curves) -> Paired | None:
     picks = np.random.default_rng(0).integers(len(shared), size=(BOOTSTRAP_RESAMPLES, len(shared)))
     interval = np.percentile(np.median(apart[picks], axis=1), (2.5, 97.5), axis=0).T
     goal = np.percentile(np.mean(saved[picks], axis=1), (2.5, 97.5))
-    return Paired(len(shared), np.median(apart, axis=0), interval, float(saved.mean()), goal)
+    middle, sooner = np.median(apart, axis=0), float(saved.mean())
+    return StrategyDifference(len(shared), middle, interval, sooner, goal)
 
 
 def baseline_of(strategies: Sequence[str]) -> str:
@@ -141,24 +142,4 @@ class StrategyCurve:
             wall_seconds=float(curve.wall_seconds.sum()),
             process_seconds=float(curve.process_seconds.sum()),
             runs=len(curve.seeds),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class StrategyDifference:
-    """A strategy less the baseline over the seeds of both; see `Paired`."""
-
-    seeds: int
-    difference_percent: np.ndarray
-    difference_percent_interval95: np.ndarray
-    measurements_to_one_percent: float
-    measurements_to_one_percent_interval95: np.ndarray
-
-    @classmethod
-    def of(cls, found: Paired | None) -> "StrategyDifference | None":
-        """None where the two share no seed."""
-        if found is None:
-            return None
-        return cls(
-            found.seeds, found.difference, found.interval, found.to_goal, found.to_goal_interval
         )

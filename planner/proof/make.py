@@ -7,7 +7,6 @@ folder tells what was concealed.
 """
 
 import argparse
-import importlib
 import json
 import secrets
 from collections.abc import Sequence
@@ -17,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from planner.proof.engine import Made, NothingShowsError
 from planner.proof.refit import left
+from planner.truth.cases import OUTSIDERS, SINGLES, Made, NothingShowsError, make
 
-ENGINES = {"arms": "planner.truth.cases", "tree": "planner.proof.tree.engine"}
-NULLS, OUTSIDERS, PAIRS = 0.15, 0.15, 0.2  # shares of the cases
+ENGINES = "arms", "tree"  # known arms by MuJoCo, robots drawn at random by a tree of frames
+NULL_SHARE, OUTSIDER_SHARE, PAIR_SHARE = 0.15, 0.15, 0.2  # shares of the cases
 SCENES, ANOTHER = 5, 1_000_003  # seeds of which something comes; step to the next one
 
 
@@ -33,7 +32,8 @@ def deck(count: int, singles: Sequence[str], outsiders: Sequence[str], seed: int
         rounds = -(-number // len(kinds))
         return [str(k) for _ in range(rounds) for k in rng.permutation(list(kinds))][:number]
 
-    nulls, outside, pairs = (round(share * count) for share in (NULLS, OUTSIDERS, PAIRS))
+    shares = NULL_SHARE, OUTSIDER_SHARE, PAIR_SHARE
+    nulls, outside, pairs = (round(share * count) for share in shares)
     plain = ["null"] * nulls + ["pair"] * pairs + some(outsiders, outside)
     kinds = plain + some(singles, count - len(plain))
     return [str(kind) for kind in rng.permutation(kinds)]
@@ -59,10 +59,9 @@ def answer(kind: str, engine: str, made: Made) -> str:
 
 def make_one(kind: str, engine: str, seed: int, folder: Path, laboratory: bool = False) -> str:
     """Write a case of an engine of ENGINES; its answer."""
-    module = importlib.import_module(ENGINES[engine])
     for attempt in range(SCENES):
         try:
-            made = module.make(kind, seed + attempt * ANOTHER, folder, laboratory)
+            made = make(kind, seed + attempt * ANOTHER, folder, laboratory, engine == "tree")
             return answer(kind, engine, made)
         except NothingShowsError:
             continue
@@ -78,13 +77,11 @@ def main() -> None:
     parser.add_argument("--number", type=int, default=1, help="of the case, from 1 on")
     parser.add_argument("--laboratory", action="store_true", help="no hit and no sensor errs")
     options = parser.parse_args()
-    engines = list(ENGINES)
-    place, own = (options.number - 1) % len(engines), (options.number - 1) // len(engines)
-    module = importlib.import_module(ENGINES[engines[place]])
-    count = len(range(place, options.cases, len(engines)))
-    kind = deck(count, module.SINGLES, module.OUTSIDERS, options.seed)[own]
+    place, own = (options.number - 1) % len(ENGINES), (options.number - 1) // len(ENGINES)
+    count = len(range(place, options.cases, len(ENGINES)))
+    kind = deck(count, SINGLES, OUTSIDERS, options.seed)[own]
     seed = 100_000 * options.seed + own
-    print(make_one(kind, engines[place], seed, options.folder, options.laboratory), end="")
+    print(make_one(kind, ENGINES[place], seed, options.folder, options.laboratory), end="")
 
 
 if __name__ == "__main__":

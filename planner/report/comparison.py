@@ -159,7 +159,7 @@ def comparison(
     curves = _by_name(study, found, failed)
     baseline = baseline_of(list(curves))
     against = {
-        name: StrategyDifference.of(paired(curve, curves[baseline]))
+        name: paired(curve, curves[baseline])
         for name, curve in curves.items()
         if name != baseline
     }

@@ -21,13 +21,12 @@ from planner.modal.modes import Mode
 from planner.progress import Tell
 from planner.recording.records import Hit
 from planner.truth import inverse
-from planner.truth.brakes import DampingScatter
 from planner.truth.handling import EVERYDAY, Handling
 from planner.truth.hits import Hammer, SimulatedHit, noisy
+from planner.truth.laws import BoucWen
 from planner.truth.model import Truth
 from planner.truth.nonlinear import Port
-from planner.truth.other_laws import BoucWen
-from planner.truth.secret import HitVisit, Secret, quiet_hits
+from planner.truth.secret import DampingScatter, HitVisit, Secret, quiet_hits
 from planner.truth.visits import Visits
 
 AT_ONCE = 12  # poses that are integrated together: what memory holds

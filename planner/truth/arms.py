@@ -18,7 +18,7 @@ class Joint:
     """Placement in the parent (m, quarter turns), axis, limits (°), speed (rad/s)."""
 
     xyz: Sequence[float]
-    quarters: Sequence[int]
+    quarters: Sequence[float]
     axis: Sequence[float]
     limits_deg: tuple[float, float]
     velocity: float
@@ -28,32 +28,35 @@ class Joint:
 class Body:
     """Mass (kg), centre of mass and its principal frame (rad), principal moments (kg·m²).
 
-    `box` (m) around `box_at` is what collides and what is drawn.
+    `box` (m) around `box_at` is what collides and what is drawn, if there is one.
     """
 
     mass: float
     com: Sequence[float]
     rpy: Sequence[float]
     moments: Sequence[float]
-    box: Sequence[float]
-    box_at: Sequence[float]
+    box: Sequence[float] = ()
+    box_at: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
 class Arm:
-    """Everything that a robot folder needs; bodies are base, links 1 to 6, spindle."""
+    """Everything that a robot folder needs; bodies are base, links, spindle."""
 
     name: str
     joints: tuple[Joint, ...]
     bodies: tuple[Body, ...]
-    tcp: Sequence[float]  # in link_6
+    tcp: Sequence[float]  # in the last link
     sensor: Sequence[float]
-    quarters: Sequence[int]  # of tcp and sensor in link_6
+    quarters: Sequence[float]  # of tcp and sensor in the last link
     torsion: tuple[float, ...]  # N·m/rad, about the joints' axes
     bending: tuple[float, ...]  # N·m/rad, across them
     damping_s: float  # C = damping_s · K
     joints_deg: tuple[tuple[float, float], ...]  # a workspace
     band_hz: tuple[float, float]
+    gravity_m_s2: float = -9.81  # upwards
+    payload_kg: float = 0.0  # of robots that are drawn
+    reach_m: float = 0.0
 
     def write(self, directory: Path, per_joint: int = 1) -> Path:
         """Write the folder, with 1, 2 or 3 elastic rotations a joint; returns robot.toml."""
@@ -65,14 +68,15 @@ class Arm:
 
     def urdf(self) -> str:
         """URDF with visual and collision boxes, frames tcp and sensor."""
-        names = ["base_link", *(f"link_{i}" for i in range(1, 7)), "spindle"]
+        links = [f"link_{i}" for i in range(1, len(self.joints) + 1)]
+        names = ["base_link", *links, "spindle"]
         text = [f'<robot name="{self.name.replace(" ", "_").lower()}">']
         text += [_link(name, body) for name, body in zip(names, self.bodies, strict=True)]
         for i, joint in enumerate(self.joints, 1):
             text.append(_joint(f"joint_{i}", names[i - 1], names[i], joint))
-        text.append(_fixed("spindle", (0, 0, 0), (0, 0, 0)))
+        text.append(_fixed("spindle", links[-1], (0, 0, 0), (0, 0, 0)))
         for name, place in (("tcp", self.tcp), ("sensor", self.sensor)):
-            text += [f'<link name="{name}"/>', _fixed(name, place, _turn(self.quarters))]
+            text += [f'<link name="{name}"/>', _fixed(name, links[-1], place, _turn(self.quarters))]
         return "\n".join([*text, "</robot>", ""])
 
     def toml(self, per_joint: int) -> str:
@@ -80,7 +84,7 @@ class Arm:
         lines = [
             f'name = "{self.name}"',
             'urdf = "robot.urdf"\ntcp_frame = "tcp"\nsensor_frame = "sensor"',
-            f"gravity = [0.0, 0.0, -9.81]\nband_hz = {list(self.band_hz)}",
+            f"gravity = [0.0, 0.0, {self.gravity_m_s2}]\nband_hz = {list(self.band_hz)}",
         ]
         for i, joint in enumerate(self.joints):
             own = int(np.argmax(np.abs(joint.axis)))
@@ -103,16 +107,16 @@ class Arm:
         )
 
     def poses(self, n: int, seed: int = 0) -> np.ndarray:
-        """Angles (n, 6) in rad, uniform in the workspace."""
+        """Angles (n, joints) in rad, uniform in the workspace."""
         low, high = np.deg2rad(np.array(self.joints_deg)).T
-        return np.random.default_rng(seed).uniform(low, high, (n, 6))
+        return np.random.default_rng(seed).uniform(low, high, (n, len(low)))
 
 
 def _text(values: Sequence[float]) -> str:
     return " ".join(repr(float(v)) for v in values)
 
 
-def _turn(quarters: Sequence[int]) -> list[float]:
+def _turn(quarters: Sequence[float]) -> list[float]:
     return [float(k) * np.pi / 2 for k in quarters]
 
 
@@ -122,13 +126,15 @@ def _origin(xyz: Sequence[float], rpy: Sequence[float]) -> str:
 
 def _link(name: str, body: Body) -> str:
     xx, yy, zz = body.moments
-    shape = (
-        _origin(body.box_at, (0, 0, 0)) + f'<geometry><box size="{_text(body.box)}"/></geometry>'
-    )
+    shape = ""
+    if body.box:
+        box = f'<geometry><box size="{_text(body.box)}"/></geometry>'
+        shape = _origin(body.box_at, (0, 0, 0)) + box
+        shape = f"<visual>{shape}</visual><collision>{shape}</collision>"
     return (
         f'<link name="{name}"><inertial>{_origin(body.com, body.rpy)}<mass value="{body.mass}"/>'
         f'<inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/></inertial>'
-        f"<visual>{shape}</visual><collision>{shape}</collision></link>"
+        f"{shape}</link>"
     )
 
 
@@ -141,9 +147,9 @@ def _joint(name: str, parent: str, child: str, joint: Joint) -> str:
     )
 
 
-def _fixed(child: str, xyz: Sequence[float], rpy: Sequence[float]) -> str:
+def _fixed(child: str, parent: str, xyz: Sequence[float], rpy: Sequence[float]) -> str:
     return (
-        f'<joint name="{child}_fixed" type="fixed"><parent link="link_6"/>'
+        f'<joint name="{child}_fixed" type="fixed"><parent link="{parent}"/>'
         f'<child link="{child}"/>{_origin(xyz, rpy)}</joint>'
     )
 

@@ -1,127 +1,235 @@
-"""Concealed cases of industrial arms: recordings of robots whose folders lack something."""
+"""Concealed cases: recordings of robots whose folders lack something.
+
+Known industrial arms by MuJoCo, and robots that are drawn at random by the tree of frames.
+"""
 
 import copy
-import json
 import zlib
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from planner.errors import InputError
-from planner.proof.engine import Concealed, Made
-from planner.truth import conceal
+from planner.proof.refit import Question
 from planner.truth.arms import ARMS, Arm
-from planner.truth.conceal import EVERYDAY, kinds
+from planner.truth.deviation import Deviation
+from planner.truth.effects import EFFECTS, LINEAR, NONLINEAR
+from planner.truth.handling import EVERYDAY, LABORATORY, ROUGH, Handling
 from planner.truth.hits import Hammer, write_predict
-from planner.truth.imperfections import Imperfect, imperfect
+from planner.truth.imperfections import imperfect
 from planner.truth.load import load_truth
-from planner.truth.mishaps import OUTSIDERS as FEW_OUTSIDERS
 from planner.truth.model import Truth
-from planner.truth.outsiders import MORE_OUTSIDERS
+from planner.truth.outsiders import ARTEFACTS
+from planner.truth.outsiders import OUTSIDERS as UNKNOWN
 from planner.truth.questions import Scored, lacking, question
-from planner.truth.scene import PULSE_S, Scene
+from planner.truth.random_arms import draw_arm, standing
+from planner.truth.scene import PULSE_S, Draw, Drawn, Scene, log_uniform
 from planner.truth.secret import Secret, frfs, once, quiet_hits
 from planner.truth.visits import Visits, record
-from planner.truth.world import CLEAN, REAL, World
 
-OUTSIDERS = (*FEW_OUTSIDERS, *MORE_OUTSIDERS)
-SINGLES = tuple(kind for kind in EVERYDAY if kind not in OUTSIDERS)
+TABLE: dict[str, Draw] = {**EFFECTS, **ARTEFACTS, **UNKNOWN}
+SINGLES, OUTSIDERS = (*EFFECTS, *ARTEFACTS), tuple(UNKNOWN)
+KINDS = ("null", *TABLE, "pair", "drives")  # "drives": one law in several of them
+DRIVES = 2, 4  # how many joints, at least and at most
+# By what robots differ from their folders, without anything being wrong with them. Stiffnesses
+# that are off together: see `imperfections.SOFT`.
+SCATTER = Deviation(stiffness=0.15, damping=0.4, inertia=0.08, com_m=0.01)
+SIZES = 0.03, 1.0  # of effects, log-uniform; 1 is a large one
+SMALLER = 3.0  # at most: the first of several effects over any other; chosen
+ATTEMPTS = 40
 # Peaks (N) of a middling hit: a tenth of a millimetre or two at the tool.
 PEAK_N = {"kr10": 150.0, "kr210": 1200.0, "irb6640": 1200.0}
-POSES, PREDICTED = 9, 4
+POSES, PREDICTED, OVERSAMPLING = 9, 4, 8
+RANDOM = "random"  # a robot that is drawn
 DAMPING_S = 9.5e-4  # C = s K: 3 % at 10 Hz, as robots in milling cells have
 
 
-def make(kind: str, seed: int, folder: Path, laboratory: bool = False) -> Made:
-    """Write folder/robot and folder/recordings of a kind of case; robots in turn.
-
-    Raises NothingShowsError for a seed of which nothing comes.
-    """
-    world = CLEAN if laboratory else REAL
-    return make_case(kind, sorted(ARMS)[seed % len(ARMS)], seed, folder, world).made
+class NothingShowsError(Exception):
+    """A seed of which nothing comes; take another one."""
 
 
 @dataclass(frozen=True)
-class Case:
-    """A case as an outsider sees it, and what was made of it."""
+class Concealed:
+    """An effect and its place as a diagnosis states them; true parameters in SI.
 
-    recordings: Path
-    robot_toml: Path
-    made: Made
+    `question` answers what tells of it; it is asked once the recordings have been written.
+    """
 
-    @property
-    def answer(self) -> str:
-        """JSON of what was concealed."""
-        made = self.made
-        effects = [{"effect": c.effect, "at": c.at, "parameters": c.parameters}
-                   for c in made.concealed]  # fmt: skip
-        return json.dumps({"robot": made.robot, "effects": effects, "held_out": made.held_out})
+    effect: str
+    at: str | None
+    parameters: Mapping[str, Any]
+    question: Callable[[], Question]
 
 
-def make_case(kind: str, robot: str, seed: int, folder: Path, world: World = CLEAN) -> Case:
-    """The same of one of `kinds` and a robot of ARMS; InputError for an unknown one."""
-    if kind not in kinds(world) or robot not in ARMS:
-        raise InputError(f"No case {kind} of robot {robot}; kinds are {', '.join(kinds(world))}.")
+@dataclass(frozen=True)
+class Made:
+    """A case; `imperfections` are places that a diagnosis may name, too small to be asked for.
+
+    `held_out`: names of poses, frequencies (F,) in Hz and true FRFs (real and imaginary parts;
+    pose, response, hit, F).
+    """
+
+    robot: str
+    concealed: Sequence[Concealed]
+    imperfections: Sequence[tuple[str, str]] = ()
+    held_out: Mapping[str, Any] = field(default_factory=dict)
+
+
+Load = Callable[[Deviation], Truth]
+
+
+def make(
+    kind: str, seed: int, folder: Path, laboratory: bool = False, random: bool = False
+) -> Made:
+    """Write folder/robot and folder/recordings of a kind of case; known robots in turn, or drawn.
+
+    Raises NothingShowsError for a seed of which nothing comes.
+    """
+    robot = RANDOM if random else sorted(ARMS)[seed % len(ARMS)]
+    handling = LABORATORY if laboratory else ROUGH if random else EVERYDAY
+    return make_case(kind, robot, seed, folder, handling)
+
+
+def make_case(
+    kind: str, robot: str, seed: int, folder: Path, handling: Handling = EVERYDAY
+) -> Made:
+    """The same of one of KINDS and a robot of ARMS or RANDOM; InputError for an unknown one."""
+    if kind not in KINDS or robot not in (*ARMS, RANDOM):
+        raise InputError(f"No case {kind} of robot {robot}; kinds are {', '.join(KINDS)}.")
     rng = np.random.default_rng([seed, zlib.crc32(f"{kind} {robot}".encode())])
-    arm = replace(ARMS[robot], damping_s=DAMPING_S)
-    per_joint = 1 if kind == "transverse_compliance" else int(rng.choice([1, 3]))
-    robot_toml = arm.write(folder / "robot", per_joint)
-    plain = Secret(world.scatter.of(int(rng.integers(2**31))))
-    low, high = np.deg2rad(np.array(arm.joints_deg)).T
-    poses = rng.uniform(low, high, (POSES + PREDICTED, 6))
-    hammer = Hammer(PEAK_N[robot], PULSE_S, noise=float(rng.uniform(0.005, 0.03)))
-    hammer = replace(hammer, oversampling=world.oversampling)
-    scene = Scene(arm, load_truth(robot_toml, plain.deviation), per_joint, poses, hammer.peak_n)
     own = np.random.default_rng([seed, zlib.crc32(b"handling")])
-    robot_is = imperfect(scene, plain, own) if world.imperfect else Imperfect(plain, ())
+    per_joint = 1 if kind == "transverse_compliance" else int(rng.choice([1, 3]))
+    scene, plain, hammer, load = _robot(robot, per_joint, folder / "robot", rng)
+    robot_is = imperfect(scene, plain, own)
     plain = robot_is.secret
-    scene = replace(scene, truth=load_truth(robot_toml, plain.deviation))
-    concealed = conceal.concealed(kind, scene, plain, robot_toml, hammer, world, rng)
-    secret = concealed[-1].secret if concealed else plain
-    truth = load_truth(robot_toml, secret.deviation)
-    measured = replace(secret, chain=world.handling.chain(own))
-    visits = Visits.planned(poses[:POSES], hammer, world.handling, rng, own)
+    scene = replace(scene, truth=load(plain.deviation))
+    found = concealed(kind, scene, plain, load, rng)
+    secret = found[-1].secret if found else plain
+    recorded = _recorded(folder / "recordings", scene, secret, load, hammer, handling, rng, own)
+    effects = [
+        Concealed(d.effect, d.at, {**d.parameters, "size": d.size},
+                  partial(question, recorded, lacking(recorded.measured, before, d.secret)))
+        for before, d in zip([plain, *(d.secret for d in found)], found, strict=False)
+    ]  # fmt: skip
+    name = scene.arm.name if robot == RANDOM else robot
+    return Made(name, effects, robot_is.places, _held_out(secret, recorded))
+
+
+def _robot(
+    robot: str, per_joint: int, folder: Path, rng: np.random.Generator
+) -> tuple[Scene, Secret, Hammer, Load]:
+    """A robot's folder, what it is without imperfections, and who hits it."""
+    known = ARMS.get(robot)
+    arm = replace(known, damping_s=DAMPING_S) if known else draw_arm(rng, folder, per_joint)
+    robot_toml = arm.write(folder, per_joint)
+    load: Load = partial(load_truth, robot_toml, engine="mujoco" if known else "tree")
+    plain = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
+    low, high = np.deg2rad(np.array(arm.joints_deg)).T
+    if known:
+        poses = rng.uniform(low, high, (POSES + PREDICTED, len(low)))
+    else:
+        poses = standing(rng, arm, load(Deviation()), POSES + PREDICTED)
+    noise = float(rng.uniform(0.005, 0.03))
+    hammer = Hammer(PEAK_N.get(robot, 0.0), PULSE_S, noise=noise, oversampling=OVERSAMPLING)
+    hammer = hammer if known else _drawn(rng, hammer, arm)
+    scene = Scene(arm, load(plain.deviation), per_joint, poses, hammer.peak_n)
+    return scene, plain, hammer, load
+
+
+def _drawn(rng: np.random.Generator, hammer: Hammer, arm: Arm) -> Hammer:
+    """The hammer and analyser for a robot that is drawn: peaks go with its payload."""
+    return replace(
+        hammer,
+        peak_n=150 * (arm.payload_kg / 20) ** 0.4 * float(rng.uniform(0.6, 1.6)),
+        sampling_rate_hz=float(rng.choice([400, 512, 640])),
+        record_s=float(rng.choice([2.0, 2.5, 3.2])),
+        corner_hz=float(rng.uniform(1, 10)),
+        bits=24 if rng.random() < 0.7 else 16,
+    )
+
+
+def _recorded(
+    folder: Path, scene: Scene, secret: Secret, load: Load, hammer: Hammer, handling: Handling,
+    rng: np.random.Generator, own: np.random.Generator,
+) -> Scored:  # fmt: skip
+    """Write the recordings; `own` draws what `handling` leaves open."""
+    truth = load(secret.deviation)
+    measured = replace(secret, chain=handling.chain(own))
+    wanted = scene.poses[POSES:]
+    visits = Visits.planned(scene.poses[:POSES], hammer, handling, rng, own)
     again = copy.deepcopy(rng)
     quiet = quiet_hits(truth, measured, visits.visits, hammer, rng)
-    hammer = world.handling.floor(hammer, [hit for hits in quiet for hit in hits], own)
-    record(folder / "recordings", truth, measured, visits, quiet, hammer, rng)
-    held_out = [(f"H{i + 1:02d}", q) for i, q in enumerate(poses[POSES:])]
-    write_predict(folder / "recordings", truth.joint_names, held_out, hammer.peak_n)
-    reach_m = sum(float(np.linalg.norm(joint.xyz)) for joint in arm.joints)
-    scored = Scored(
-        robot_toml, arm.band_hz, reach_m, measured, visits.visits, poses[POSES:], hammer, quiet,
-        again,
-    )  # fmt: skip
-    before = [plain, *(drawn.secret for drawn in concealed)]
-    made = Made(
-        robot,
-        [
-            Concealed(d.effect, d.at, {**d.parameters, "size": d.size},
-                      partial(question, scored, lacking(measured, b, d.secret)))
-            for b, d in zip(before, concealed, strict=False)
-        ],
-        robot_is.places,
-        _held_out(truth, secret, held_out, arm, hammer),
-    )  # fmt: skip
-    return Case(folder / "recordings", robot_toml, made)
+    hammer = handling.floor(hammer, [hit for hits in quiet for hit in hits], own)
+    record(folder, truth, measured, visits, quiet, hammer, rng)
+    write_predict(folder, truth.joint_names, _named(wanted), hammer.peak_n)
+    reach_m = sum(float(np.linalg.norm(joint.xyz)) for joint in scene.arm.joints)
+    return Scored(
+        load, scene.arm.band_hz, reach_m, measured, visits.visits, wanted, hammer, quiet, again
+    )
 
 
-def _held_out(
-    truth: Truth,
-    secret: Secret,
-    poses: list[tuple[str, np.ndarray]],
-    arm: Arm,
-    hammer: Hammer,
-) -> dict:
+def _named(wanted: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    return [(f"H{i + 1:02d}", q) for i, q in enumerate(wanted)]
+
+
+def concealed(
+    kind: str, scene: Scene, secret: Secret, load: Load, rng: np.random.Generator
+) -> list[Drawn]:
+    """Effects added one after the other.
+
+    Drawn again is what could not be: a robot that shakes by itself, a joint with two laws.
+    """
+    found: list[Drawn] = []
+    largest = log_uniform(rng, *SIZES)
+    for name in _names(kind, scene, rng):
+        size = largest
+        for _ in range(ATTEMPTS):
+            if found:
+                size = largest * log_uniform(rng, 1 / SMALLER, 1.0)
+            drawn = TABLE[name](replace(scene, size=size), secret, rng)
+            if kind == "drives" and not _joins(drawn, found):
+                continue
+            with_it = load(drawn.secret.deviation)
+            if all(np.all(with_it.poles(q)[0].real < 0) for q in scene.poses):
+                found.append(replace(drawn, size=size))
+                secret = drawn.secret
+                break
+        else:
+            raise NothingShowsError(f"No {name} of this robot can be; take another seed.")
+    return found
+
+
+def _names(kind: str, scene: Scene, rng: np.random.Generator) -> list[str]:
+    """Of the effects of a case; at most one of a pair is nonlinear."""
+    if kind == "pair":
+        linear = [n for n in LINEAR if n != "transverse_compliance" or scene.per_joint == 1]
+        first, second = (str(name) for name in rng.choice(linear, 2, replace=False))
+        return [first, str(rng.choice(list(NONLINEAR)))] if rng.random() < 0.3 else [first, second]
+    if kind == "drives":
+        return [str(rng.choice(list(NONLINEAR)))] * int(rng.integers(DRIVES[0], DRIVES[1] + 1))
+    return [] if kind == "null" else [kind]
+
+
+def _joins(drawn: Drawn, before: list[Drawn]) -> bool:
+    """Whether a law is at a joint of its own, and hardens or softens as the others do."""
+    numbers = [next(iter(d.parameters.values())) for d in (drawn, *before)]
+    signs = {v > 0 for v in numbers if isinstance(v, float)}
+    return len(signs) == 1 and all(d.at != drawn.at for d in before)
+
+
+def _held_out(secret: Secret, case: Scored) -> dict[str, Any]:
     """True FRFs (real and imaginary; pose, response, hit, F) without noise and artefacts."""
-    quiet = replace(hammer, noise=0.0, force_noise=0.0, record_s=2 * hammer.record_s)
-    plain = Secret(secret.deviation, secret.ports, secret.loss_factor)
-    visits = [once(q, hammer.peak_n) for _, q in poses]
-    frequency, H = frfs(truth, plain, visits, quiet, arm.band_hz)
+    hammer = case.hammer
+    quiet = replace(hammer, noise=0.0, force_noise=0.0, bits=0, record_s=2 * hammer.record_s)
+    visits = [once(q, hammer.peak_n) for q in case.wanted]
+    plain, truth = Secret(secret.deviation, secret.ports), case.load(secret.deviation)
+    frequency, H = frfs(truth, plain, visits, quiet, case.band_hz)
     return {
-        "poses": [name for name, _ in poses],
+        "poses": [name for name, _ in _named(case.wanted)],
         "frequency_hz": frequency.tolist(),
         "frf": [H.real.tolist(), H.imag.tolist()],
     }

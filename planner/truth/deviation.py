@@ -163,22 +163,3 @@ class Deviation:
     bridges: tuple[Bridge, ...] = ()
     servos: tuple[ServoLoop, ...] = ()
     spin: float = 0.0
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """By what robots differ from their folders without anything being wrong with them.
-
-    Relative standard deviations of each spring's stiffness and damping, of all stiffnesses
-    together (`common_sd`), of masses and inertias; of centres in m.
-    """
-
-    stiffness: float
-    damping: float
-    inertia: float
-    com_m: float
-    common_sd: float = 0.0
-
-    def of(self, seed: int) -> Deviation:
-        """A robot of this scatter, but for what all its stiffnesses have in common."""
-        return Deviation(seed, self.stiffness, self.damping, self.inertia, self.com_m)

@@ -1,35 +1,54 @@
 """The physics that a case can conceal: one function per effect of the library.
 
-Sizes follow the robot: its stiffnesses, its mass, and the joints' angles under a middling hit.
+Sizes follow the robot: its stiffnesses, its mass, and the joints' angles under a middling hit. Many
+come in shapes that the planner's own models do not have.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from planner.truth.deviation import AttachedMass, AttachedResonator, ScaledJoint, StiffnessRipple
-from planner.truth.laws import Backlash, Friction, Hardening, JointLaw
+from planner.truth.deviation import (
+    AttachedMass,
+    AttachedResonator,
+    BentLink,
+    ScaledJoint,
+    StiffnessRipple,
+)
+from planner.truth.imperfections import gas_spring
+from planner.truth.laws import (
+    AmplitudeSoftening,
+    Backlash,
+    BoucWen,
+    Friction,
+    Hardening,
+    HarmonicDrive,
+    ImpactDamping,
+    Iwan,
+    JointLaw,
+    LuGre,
+)
 from planner.truth.nonlinear import Port
 from planner.truth.scene import (
+    REFERENCE_HZ,
     Draw,
     Drawn,
     Parameters,
     Scene,
-    across,
     deviate,
     log_uniform,
     some_direction,
     some_joint,
     triple,
 )
-from planner.truth.secret import Secret, StiffnessDrift
+from planner.truth.secret import JointDrift, LoadChange, Secret
 
-PARALLEL_COSINE = 0.9  # from which a link runs along an axis
+CHANGED_TOOL = 0.25  # how often properties change because the tool does
 
 
 def joint_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """A joint about its own axis is far softer or stiffer than stated."""
-    joint = some_joint(rng)
+    joint = some_joint(scene, rng)
     factor = log_uniform(rng, 0.3, 0.55) if rng.random() < 0.7 else log_uniform(rng, 2.0, 3.5)
     factor = factor**scene.size
     parameters: Parameters = {"factor": factor, "stiffness": factor * scene.stiffness(joint)}
@@ -38,18 +57,19 @@ def joint_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
 
 
 def transverse_compliance(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """A joint's bearing tilts about both axes across its own."""
-    joint = some_joint(rng)
-    axis = np.array(scene.arm.joints[int(joint[-1]) - 1].axis, dtype=float)
-    stiffness = [scene.stiffness(joint) * log_uniform(rng, 0.4, 2.5) / scene.size]
-    stiffness.append(stiffness[0] * log_uniform(rng, 0.7, 1.4))
-    springs = [
-        scene.spring(joint, a, k)
-        for a, k in zip(np.eye(3)[np.abs(axis) < 0.5], stiffness, strict=True)
-    ]
-    return Drawn(
-        "transverse_compliance", joint, {"stiffness": stiffness}, deviate(secret, extra=springs)
-    )
+    """A bearing tilts about both axes across its joint's own, softer than the others."""
+    joint = some_joint(scene, rng)
+    first = scene.stiffness(joint) * log_uniform(rng, 0.4, 2.5) / scene.size
+    stiffness = [first, first * log_uniform(rng, 0.7, 1.4)]
+    before = secret.deviation.extra
+    own = [s.stiffness for s in before if s.joint == joint]
+    if own:  # one body between two springs about the same axis would have no inertia: in series
+        stiffness = [1 / (1 / k + 1 / float(np.mean(own))) for k in stiffness]
+    axes = np.eye(3)[np.abs(scene.axis(joint)) < 0.5]
+    springs = [scene.spring(joint, a, k) for a, k in zip(axes, stiffness, strict=True)]
+    others = (s for s in before if s.joint != joint)
+    change = replace(secret, deviation=replace(secret.deviation, extra=(*others, *springs)))
+    return Drawn("transverse_compliance", joint, {"stiffness": stiffness}, change)
 
 
 def base_compliance(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
@@ -60,10 +80,8 @@ def base_compliance(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
     parameters: Parameters = {"stiffness": tilts, "freedoms": 2.0}
     if rng.random() < 0.35:
         reach = float(np.linalg.norm(scene.length(2)))
-        shift, turn = (
-            2 * tilt / reach**2 * log_uniform(rng, 0.7, 2.0),
-            2 * tilt * log_uniform(rng, 0.7, 2.0),
-        )
+        shift = 2 * tilt / reach**2 * log_uniform(rng, 0.7, 2.0)
+        turn = 2 * tilt * log_uniform(rng, 0.7, 2.0)
         springs += [scene.spring("base", a, shift, slide=True) for a in np.eye(3)]
         springs.append(scene.spring("base", np.eye(3)[2], turn))
         parameters |= {"freedoms": 6.0, "shift_stiffness": shift, "turn_stiffness": turn}
@@ -71,35 +89,28 @@ def base_compliance(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
 
 
 def link_flexibility(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """A link bends about two axes, twists, or both.
-
-    Twist alone of a link along its joint's own axis is that joint's stiffness: it bends instead.
-    """
+    """A link is a beam of five elements or more; the one that bends a little anyway bends more."""
     lengths = {i: float(np.linalg.norm(scene.length(i))) for i in range(1, 5)}
     number = int(rng.choice([i for i, length in lengths.items() if length > 0.15]))
-    link, along = f"link_{number}", scene.length(number)
-    kind = str(rng.choice(["bending", "torsion", "both"], p=[0.5, 0.25, 0.25]))
-    axis = np.array(scene.arm.joints[number - 1].axis, dtype=float)
-    if kind == "torsion" and abs(axis @ along) > PARALLEL_COSINE * np.linalg.norm(along):
-        kind = "bending"
     own = scene.stiffness(f"joint_{number}") / scene.size
-    parameters: Parameters = {"kind": kind}
-    springs = []
-    if kind != "torsion":
-        bending = [own * log_uniform(rng, 0.4, 2.0)]
-        bending.append(bending[0] * log_uniform(rng, 0.7, 1.4))
-        springs += [scene.spring(link, a, k) for a, k in zip(across(along), bending, strict=True)]
-        parameters["bending_stiffness"] = bending
-    if kind != "bending":
-        torsion = own * log_uniform(rng, 0.2, 1.0)
-        springs.append(scene.spring(link, along / np.linalg.norm(along), torsion))
-        parameters["torsion_stiffness"] = torsion
-    return Drawn("link_flexibility", link, parameters, deviate(secret, extra=springs))
+    first = own * log_uniform(rng, 0.4, 2.0)
+    second, twist = first * log_uniform(rng, 0.7, 1.4), first * log_uniform(rng, 0.5, 3.0)
+    link, elements = f"link_{number}", int(rng.integers(5, 8))
+    for beam in (b for b in secret.deviation.beams if b.link == link):  # compliances in series
+        first, second = (
+            1 / (1 / k + 1 / b) for k, b in zip((first, second), beam.bending, strict=True)
+        )
+        twist = 1 / (1 / twist + 1 / beam.torsion)
+    beam = BentLink(link, (first, second), twist, scene.arm.damping_s, elements)
+    others = tuple(b for b in secret.deviation.beams if b.link != link)
+    change = replace(secret, deviation=replace(secret.deviation, beams=(*others, beam)))
+    parameters: Parameters = {"bending_stiffness": [first, second], "torsion_stiffness": twist}
+    return Drawn("link_flexibility", link, parameters, change)
 
 
 def added_mass(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """A lump on a link, or a payload missing from the robot folder."""
-    number = int(rng.integers(2, 7))
+    number = scene.some_link(rng)
     mass = scene.size * scene.moving_kg * log_uniform(rng, 0.03, 0.15)
     place = rng.uniform(0.1, 1.0) * scene.length(number) + 0.1 * some_direction(rng)
     lump = AttachedMass(f"link_{number}", triple(place), mass)
@@ -108,11 +119,11 @@ def added_mass(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
 
 
 def local_resonator(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """A hose pack, a bracket or a loose part on a spring of its own, tuned into the modes."""
-    number = int(rng.integers(2, 7))
-    low, *_, high = scene.truth.modes(scene.poses[0], 4)[0]
+    """A loose part, or a hose pack that swings at up to three frequencies in as many directions."""
+    number = scene.some_link(rng)
+    low, high = scene.band_of_modes
     place = rng.uniform(0.3, 1.0) * scene.length(number)
-    small = AttachedResonator(
+    main = AttachedResonator(
         f"link_{number}",
         triple(place),
         triple(some_direction(rng)),
@@ -120,38 +131,38 @@ def local_resonator(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
         log_uniform(rng, 0.9 * low, 1.1 * high),
         log_uniform(rng, 0.01, 0.05),
     )
+    more = [
+        replace(
+            main,
+            direction=triple(some_direction(rng)),
+            mass_kg=main.mass_kg * log_uniform(rng, 0.1, 0.5),
+            frequency_hz=main.frequency_hz * log_uniform(rng, 0.6, 1.7),
+        )
+        for _ in range(int(rng.integers(3)))
+    ]
     parameters: Parameters = {
-        "mass": small.mass_kg,
-        "frequency_hz": small.frequency_hz,
-        "damping_ratio": small.damping_ratio,
-        "direction": list(small.direction),
-        "position_m": list(small.position_m),
+        "mass": main.mass_kg,
+        "frequency_hz": main.frequency_hz,
+        "damping_ratio": main.damping_ratio,
+        "direction": list(main.direction),
+        "position_m": list(main.position_m),
     }
-    return Drawn("local_resonator", small.link, parameters, deviate(secret, resonators=(small,)))
+    change = deviate(secret, resonators=(main, *more))
+    return Drawn("local_resonator", main.link, parameters, change)
 
 
 def angle_dependent_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """Stiffness that goes with the joint's angle: first or second harmonic."""
-    joint, order = some_joint(rng), int(rng.integers(1, 3))
-    size, phase = scene.size * rng.uniform(0.3, 0.6), rng.uniform(0, 2 * np.pi)
-    wave = StiffnessRipple(joint, order, float(size * np.cos(phase)), float(size * np.sin(phase)))
-    parameters: Parameters = {"order": float(order), "cosine": wave.cosine, "sine": wave.sine}
-    change = deviate(secret, harmonics=(wave,))
-    return Drawn("angle_dependent_stiffness", joint, parameters, change)
-
-
-def structural_damping(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """K(1 + iη) in all joints instead of viscous damping."""
-    loss = scene.size * log_uniform(rng, 0.04, 0.15)
-    change = replace(secret, loss_factor=loss)
-    return Drawn("structural_damping", "joints", {"loss_factor": loss}, change)
-
-
-def _in_joint(
-    effect: str, joint: str, law: JointLaw, parameters: Parameters, secret: Secret
-) -> Drawn:
-    change = replace(secret, ports=(*secret.ports, Port(law, joint=joint)))
-    return Drawn(effect, joint, parameters, change)
+    """First or second harmonic of the angle, or a gas spring that robot.toml does not have."""
+    if rng.random() < 0.7:
+        joint, order = some_joint(scene, rng), int(rng.integers(1, 3))
+        cosine, sine = scene.ripple(rng)
+        parameters: Parameters = {"order": float(order), "cosine": cosine, "sine": sine}
+        change = deviate(secret, harmonics=(StiffnessRipple(joint, order, cosine, sine),))
+        return Drawn("angle_dependent_stiffness", joint, parameters, change)
+    spring = gas_spring(scene, (0.3 * scene.size, 0.6 * scene.size), rng)
+    parameters = {k: float(v) for k, v in vars(spring).items() if k != "joint"}
+    change = deviate(secret, compensators=(spring,))
+    return Drawn("angle_dependent_stiffness", spring.joint, parameters, change)
 
 
 def left(scene: Scene, secret: Secret, joint: str) -> float:
@@ -167,43 +178,76 @@ def left(scene: Scene, secret: Secret, joint: str) -> float:
     return share * scene.stiffness(joint)
 
 
+def _joint(scene: Scene, secret: Secret, rng: np.random.Generator) -> tuple[str, float, float]:
+    """A joint, what stiffness it has left, and its angle under a middling hit."""
+    joint = some_joint(scene, rng)
+    return joint, left(scene, secret, joint), scene.angle(joint)
+
+
+def _in_joint(
+    effect: str, secret: Secret, joint: str, laws: list[JointLaw], rng: np.random.Generator
+) -> Drawn:
+    """One of some laws at a joint, with its own numbers and its class as parameters."""
+    law = laws[int(rng.integers(len(laws)))]
+    numbers: Parameters = {k: float(v) for k, v in vars(law).items()}
+    change = replace(secret, ports=(*secret.ports, Port(law, joint=joint)))
+    return Drawn(effect, joint, {**numbers, "law": type(law).__name__}, change)
+
+
 def nonlinear_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """A gear that hardens or softens."""
-    joint = some_joint(rng)
-    factor = log_uniform(rng, 0.6, 2.0) if rng.random() < 0.6 else -rng.uniform(0.3, 0.6)
-    law = Hardening(
-        scene.size * factor * left(scene, secret, joint),
-        scene.angle(joint) * log_uniform(rng, 0.2, 1.0),
-    )
-    parameters: Parameters = {"stiffness_change": law.stiffness, "angle_rad": law.angle}
-    return _in_joint("nonlinear_stiffness", joint, law, parameters, secret)
+    """A gear that hardens or softens: smoothly, in steps of a catalogue, or with amplitude."""
+    joint, stiffness, angle = _joint(scene, secret, rng)
+    hardens = rng.random() < 0.6
+    share = log_uniform(rng, 0.6, 2.0) if hardens else rng.uniform(0.3, 0.6)
+    change = scene.size * stiffness * share
+    knee, sign = angle * log_uniform(rng, 0.2, 1.0), 1.0 if hardens else -1.0
+    laws: list[JointLaw] = [
+        Hardening(sign * change, knee),
+        HarmonicDrive(sign * change / 2, knee, knee * rng.uniform(1.5, 3.0)),
+        AmplitudeSoftening(-sign * change, knee),
+    ]
+    return _in_joint("nonlinear_stiffness", secret, joint, laws, rng)
 
 
 def friction(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """Presliding and Coulomb friction beside the spring."""
-    joint = some_joint(rng)
-    stiffness = scene.size * left(scene, secret, joint) * log_uniform(rng, 0.3, 1.5)
-    law = Friction(stiffness, stiffness * scene.angle(joint) * log_uniform(rng, 0.05, 0.4))
-    parameters: Parameters = {"presliding_stiffness": law.stiffness, "coulomb_torque": law.coulomb}
-    return _in_joint("friction", joint, law, parameters, secret)
+    """Hysteresis of Dahl, Bouc and Wen, Iwan, or bristles with Stribeck's fall."""
+    joint, stiffness, angle = _joint(scene, secret, rng)
+    stiffness = scene.size * stiffness * log_uniform(rng, 0.3, 1.5)
+    coulomb = stiffness * angle * log_uniform(rng, 0.05, 0.4)
+    speed = 2 * np.pi * REFERENCE_HZ * angle
+    stribeck, stiction = speed * log_uniform(rng, 0.05, 0.5), coulomb * rng.uniform(1.1, 1.6)
+    laws: list[JointLaw] = [
+        Friction(stiffness, coulomb),
+        BoucWen(stiffness, coulomb),
+        Iwan(stiffness, coulomb),
+        LuGre(stiffness, coulomb, float(stiction), stribeck, 0.02 * coulomb / speed),
+    ]
+    return _in_joint("friction", secret, joint, laws, rng)
 
 
 def backlash(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """Play in a gear, in which some stiffness is left."""
-    joint = some_joint(rng)
-    law = Backlash(
-        scene.size * left(scene, secret, joint) * rng.uniform(0.4, 0.8),
-        scene.angle(joint) * log_uniform(rng, 0.1, 0.5),
-    )
-    parameters: Parameters = {"lost_stiffness": law.stiffness, "half_gap_rad": law.gap}
-    return _in_joint("backlash", joint, law, parameters, secret)
+    """Play in a gear, in which some stiffness is left; its teeth may dissipate as they meet."""
+    joint, stiffness, angle = _joint(scene, secret, rng)
+    stiffness = float(scene.size * stiffness * rng.uniform(0.4, 0.8))
+    gap = angle * log_uniform(rng, 0.1, 0.5)
+    damping = stiffness / (2 * np.pi * REFERENCE_HZ * angle) * log_uniform(rng, 0.02, 0.2)
+    laws: list[JointLaw] = [Backlash(stiffness, gap), ImpactDamping(stiffness, gap, damping)]
+    return _in_joint("backlash", secret, joint, laws, rng)
 
 
 def drift(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """Stiffnesses change in the course of the campaign."""
+    """Joints warm up each by itself, some much, some hardly; or another tool half-way through."""
+    if rng.random() < CHANGED_TOOL:
+        factor = 1 + scene.size * log_uniform(rng, 0.1, 0.6)
+        load = LoadChange("spindle", factor, float(rng.uniform(0.3, 0.7)))
+        changed: Parameters = {"load_factor": factor, "start": load.start}
+        return Drawn("drift", "campaign", changed, replace(secret, load=load))
+    course = str(rng.choice(["linear", "warming", "step"]))
     size = scene.size * rng.uniform(0.12, 0.35) * rng.choice([-1, 1])
-    law = StiffnessDrift(float(size), str(rng.choice(["linear", "warming", "step"])))
-    parameters: Parameters = {"change": law.change, "course": law.course}
+    own = {joint: float(size * rng.uniform(0.1, 1.5)) for joint in scene.joints}
+    before = secret.drift.joints if isinstance(secret.drift, JointDrift) else ()
+    law = JointDrift((*before, *((joint, change, course) for joint, change in own.items())))
+    parameters: Parameters = {"course": course, **own}
     return Drawn("drift", "campaign", parameters, replace(secret, drift=law))
 
 
@@ -221,4 +265,4 @@ NONLINEAR: dict[str, Draw] = {
     "friction": friction,
     "backlash": backlash,
 }
-OTHER: dict[str, Draw] = {"structural_damping": structural_damping, "drift": drift}
+EFFECTS: dict[str, Draw] = {**LINEAR, **NONLINEAR, "drift": drift}

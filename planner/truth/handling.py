@@ -25,6 +25,9 @@ class Aim:
     direction: np.ndarray = field(default_factory=lambda: np.zeros(3))
     offset_m: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
+    def __add__(self, other: "Aim") -> "Aim":
+        return Aim(self.direction + other.direction, self.offset_m + other.offset_m)
+
     def wrench(self, axis: int) -> np.ndarray:
         """(6,): force and moment about the tcp in m of a unit hit along axis 0, 1 or 2."""
         force = np.eye(3)[axis] + self.direction
@@ -39,7 +42,8 @@ class Handling:
     axis in the campaign. `readback_deg`: of each joint at each pose. `gain`, `cross_axis`: of the
     sensor's channels and of what each feels of the others. `mounting_deg`, `position_m`: of the
     sensor. `force_gain`: of the hammer. `delay_s`: between force and accelerations. `rumble`: of
-    the floor's slow vibration, relative to the response to a middling hit.
+    the floor's slow vibration, relative to the response to a middling hit. `heavy`: misses of hits
+    have heavy tails (Student's t of 4 degrees of freedom).
     """
 
     angle_deg: float = 0.0
@@ -54,10 +58,13 @@ class Handling:
     force_gain: float = 0.0
     delay_s: float = 0.0
     rumble: float = 0.0
+    heavy: bool = False
 
-    def aims(self, axes: list[int], rng: np.random.Generator) -> list[Aim]:
-        """Of hits along axes 0..2; call `common` first where they share an aim."""
-        return [self._one(axis, self.angle_deg, self.offset_m, rng) for axis in axes]
+    def aims(
+        self, axes: Sequence[int], rng: np.random.Generator, common: Sequence[Aim] = (Aim(),) * 3
+    ) -> list[Aim]:
+        """Of hits along axes 0..2, beside what those along an axis have in common."""
+        return [common[a] + self._one(a, self.angle_deg, self.offset_m, rng) for a in axes]
 
     def common(self, rng: np.random.Generator) -> list[Aim]:
         """What all hits along x, y and z of a campaign have in common, three aims."""
@@ -65,8 +72,11 @@ class Handling:
 
     def _one(self, axis: int, angle_deg: float, offset_m: float, rng: np.random.Generator) -> Aim:
         across = 1.0 - np.eye(3)[axis]
-        direction = np.deg2rad(angle_deg) * across * rng.standard_normal(3)
-        return Aim(direction, offset_m * across * rng.standard_normal(3))
+        direction = np.deg2rad(angle_deg) * across * self._spread(rng)
+        return Aim(direction, offset_m * across * self._spread(rng))
+
+    def _spread(self, rng: np.random.Generator) -> np.ndarray:
+        return rng.standard_t(4, 3) / np.sqrt(2) if self.heavy else rng.standard_normal(3)
 
     def chain(self, rng: np.random.Generator) -> "MeasuringChain":
         """A measuring chain within its tolerances."""
@@ -103,18 +113,11 @@ class MeasuringChain:
     delay_s: float = 0.0
 
 
-def together(common: Aim, own: Aim) -> Aim:
-    """Both misses of one hit."""
-    return replace(
-        own,
-        direction=common.direction + own.direction,
-        offset_m=common.offset_m + own.offset_m,
-    )
-
-
 LABORATORY = Handling()
 EVERYDAY = Handling(
     angle_deg=1.5, offset_m=0.004, aim_deg=0.7, aim_m=0.002, readback_deg=0.05, gain=0.015,
     cross_axis=0.01, mounting_deg=1.0, position_m=0.004, force_gain=0.015, delay_s=3e-5,
     rumble=0.01,
 )  # fmt: skip
+# Of robots that are drawn: more of it.
+ROUGH = replace(EVERYDAY, readback_deg=0.07, cross_axis=0.02, position_m=0.006, heavy=True)

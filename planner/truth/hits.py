@@ -12,6 +12,8 @@ from scipy import signal
 
 OVERSAMPLING = 16  # time steps of the solution per sample of the analyser
 AXES = ("x", "y", "z")
+LEAST_HZ = 0.2  # below which 1/f noise grows no more
+FULL_SCALE = 4.0  # of a converter over what comes
 FLOOR_DAMPING = 0.3  # ratio, of a floor's first mode with machines on it; chosen
 
 
@@ -57,6 +59,8 @@ class Hammer:
     readback_deg: float = 0.01
     readback_mm: float = 0.1  # of joints that slide
     oversampling: int = OVERSAMPLING
+    corner_hz: float = 0.0  # below which noise grows as 1/f
+    bits: int = 0  # of the converter, whose full scale is four times what comes; 0: exact
     rumble_m_s2: float = 0.0  # rms of the floor's slow vibration, in every channel
     rumble_hz: float = 4.0  # where most of it is
 
@@ -115,18 +119,41 @@ def largest_rms(hit: SimulatedHit) -> float:
 def noisy(hit: SimulatedHit, hammer: Hammer, rng: np.random.Generator) -> SimulatedHit:
     """The hit with the noise of all channels, and the floor's rumble."""
     f, a = hit.force_n, hit.acceleration_m_s2
-    f = f + hammer.force_noise * np.max(f) * rng.standard_normal(f.size)
-    a = a + hammer.noise * largest_rms(hit) * rng.standard_normal(a.shape)
+    f = f + hammer.force_noise * np.max(f) * _noise(f.shape, hammer, rng)
+    a = a + hammer.noise * largest_rms(hit) * _noise(a.shape, hammer, rng)
     if hammer.rumble_m_s2 > 0:
         a = a + _rumble(a.shape, hammer, rng)
+    f, a = (_converted(samples, hammer) for samples in (f, a))
     return replace(hit, force_n=f, acceleration_m_s2=a)
 
 
 def noise_power(hit: SimulatedHit, hammer: Hammer) -> np.ndarray:
     """Mean square (lines,) of an acceleration channel's noise in each line of `rfft`; of `hit`."""
     n = hit.force_n.size
-    white = n * (hammer.noise * largest_rms(hit)) ** 2
-    return white + (n * hammer.rumble_m_s2) ** 2 * _rumble_shape(n, hammer)
+    own = n * (hammer.noise * largest_rms(hit)) ** 2 * _pink(n, hammer)
+    return own + (n * hammer.rumble_m_s2) ** 2 * _rumble_shape(n, hammer)
+
+
+def _noise(shape: tuple[int, ...], hammer: Hammer, rng: np.random.Generator) -> np.ndarray:
+    """White noise of 1, and 1/f below the corner."""
+    white = rng.standard_normal(shape)
+    if hammer.corner_hz == 0:
+        return white
+    shaped = np.fft.rfft(white) * np.sqrt(_pink(shape[-1], hammer))
+    return np.fft.irfft(shaped, shape[-1])
+
+
+def _pink(n: int, hammer: Hammer) -> np.ndarray:
+    """Power (lines,) of noise over that of white noise."""
+    frequency = np.fft.rfftfreq(n, 1 / hammer.sampling_rate_hz)
+    return 1 + hammer.corner_hz / np.maximum(frequency, LEAST_HZ)
+
+
+def _converted(samples: np.ndarray, hammer: Hammer) -> np.ndarray:
+    if hammer.bits == 0:
+        return samples
+    step = 2 * FULL_SCALE * np.max(np.abs(samples)) / 2**hammer.bits
+    return np.round(samples / step) * step
 
 
 def _rumble_shape(n: int, hammer: Hammer) -> np.ndarray:

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.truth.deviation import AttachedResonator, BentLink, Compensator, StiffnessRipple
-from planner.truth.laws import Friction, JointLaw
+from planner.truth.laws import AmplitudeSoftening, Friction, Iwan, JointLaw
 from planner.truth.nonlinear import Port
-from planner.truth.other_laws import AmplitudeSoftening, Iwan
-from planner.truth.scene import Scene, across, deviate, log_uniform, some_direction, triple
+from planner.truth.scene import Scene, deviate, log_uniform, some_direction, triple
 from planner.truth.secret import JointDrift, Secret
+from planner.truth.springs import across
 
 # All chosen, so that FRFs change by some percent together: what an engineer would let pass.
 SOFT_SHARE, SOFT = 0.4, (0.5, 1.3)  # of the cases: all stated stiffnesses times such a factor
@@ -38,14 +38,13 @@ def imperfect(scene: Scene, secret: Secret, rng: np.random.Generator) -> Imperfe
     """
     common = log_uniform(rng, *SOFT) if rng.random() < SOFT_SHARE else 1.0
     secret = replace(secret, deviation=replace(secret.deviation, common=common, mixed=1.0))
-    joints = [f"joint_{n}" for n in range(1, 7)]
     places = [("structural_damping", "joints"), ("drift", "campaign")]
-    for joint in joints:
+    for joint in scene.joints:
         secret, effects = _joint(scene, secret, joint, rng)
         places += [(effect, joint) for effect in effects]
         if abs(np.log(common)) > np.log(1.2):
             places.append(("joint_stiffness", joint))
-    drifts = tuple((j, DRIFT_SD * float(rng.standard_normal()), "warming") for j in joints)
+    drifts = tuple((j, DRIFT_SD * float(rng.standard_normal()), "warming") for j in scene.joints)
     secret = replace(secret, drift=JointDrift(drifts))
     for _ in range(HOSES + int(rng.integers(HOSES + 1))):
         secret, link = _hose(scene, secret, rng)
@@ -77,16 +76,15 @@ def _joint(
     secret = deviate(secret, harmonics=(wave,))
     effects = [effect, "angle_dependent_stiffness"]
     if scene.per_joint == 1:
-        axis = np.array(scene.arm.joints[int(joint[-1]) - 1].axis, dtype=float)
-        springs = [scene.spring(joint, a, own * log_uniform(rng, *BEARINGS)) for a in across(axis)]
+        axes = across(scene.axis(joint))
+        springs = [scene.spring(joint, a, own * log_uniform(rng, *BEARINGS)) for a in axes]
         secret = deviate(secret, extra=springs)
         effects.append("transverse_compliance")
     return secret, effects
 
 
 def _hose(scene: Scene, secret: Secret, rng: np.random.Generator) -> tuple[Secret, str]:
-    number = int(rng.integers(2, 7))
-    low, *_, high = scene.truth.modes(scene.poses[0], 4)[0]
+    number, (low, high) = scene.some_link(rng), scene.band_of_modes
     hose = AttachedResonator(
         f"link_{number}",
         triple(rng.uniform(0.1, 1.0) * scene.length(number)),

@@ -12,6 +12,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+SLIDERS = 8  # of an Iwan joint
+
+Pair = tuple[np.ndarray, np.ndarray]  # torque and new state
+
 
 class JointLaw(Protocol):
     """A torque added to the linear spring's, with an internal state (0 at rest)."""
@@ -24,9 +28,7 @@ class JointLaw(Protocol):
         """State of as many joints and hits."""
         ...
 
-    def torque(
-        self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
         """Torque and new state after θ went from `before` to `now` within a time step."""
         ...
 
@@ -35,7 +37,6 @@ class OneState:
     """A law whose state is one number."""
 
     def at_rest(self, shape: tuple[int, ...]) -> np.ndarray:
-        """See `JointLaw`."""
         return np.zeros(shape)
 
 
@@ -46,10 +47,7 @@ class Elastic(OneState, ABC):
     def at(self, angle: np.ndarray) -> np.ndarray:
         """Torque at an angle."""
 
-    def torque(
-        self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `JointLaw`."""
+    def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
         return self.at(now), state
 
 
@@ -75,7 +73,6 @@ class Hardening(Elastic):
         return 9 / 8 * abs(self.stiffness)
 
     def at(self, angle: np.ndarray) -> np.ndarray:
-        """See the class."""
         return self.stiffness * angle**3 / (angle**2 + self.angle**2)
 
 
@@ -94,7 +91,6 @@ class Backlash(Elastic):
         return self.stiffness
 
     def at(self, angle: np.ndarray) -> np.ndarray:
-        """See the class."""
         return -self.stiffness * np.clip(angle, -self.gap, self.gap)
 
 
@@ -113,10 +109,7 @@ class Friction(OneState):
         """Just after turning back it is up to twice the stiffness at rest."""
         return 2 * self.stiffness
 
-    def torque(
-        self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See the class."""
+    def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
         limit = self.coulomb / self.stiffness
         way = now - before
         end = np.sign(way) * limit
@@ -136,5 +129,179 @@ class Contact(Elastic):
         return self.stiffness
 
     def at(self, angle: np.ndarray) -> np.ndarray:
-        """See the class."""
         return self.stiffness * np.maximum(angle, -self.preload)
+
+
+@dataclass(frozen=True)
+class HarmonicDrive(Elastic):
+    """Stiffness in three steps: K, from `first` on K + `stiffness`, from `second` on twice more.
+
+    As catalogues state it. τ = k [|θ| - θ₁]₊ + k [|θ| - θ₂]₊ with θ's sign.
+    """
+
+    stiffness: float
+    first: float
+    second: float
+
+    def slope(self, step_s: float) -> float:
+        """2 k, beyond the second knee."""
+        return 2 * abs(self.stiffness)
+
+    def at(self, angle: np.ndarray) -> np.ndarray:
+        size = np.abs(angle)
+        over = np.maximum(size - self.first, 0) + np.maximum(size - self.second, 0)
+        return self.stiffness * np.sign(angle) * over
+
+
+@dataclass(frozen=True)
+class AmplitudeSoftening(Elastic):
+    """Stiffness from K at small angles to K - `stiffness` at large ones, as 1 / √(1 + θ²/a²).
+
+    τ = -k (θ - a asinh(θ/a)); `angle` is a. Negative k hardens.
+    """
+
+    stiffness: float
+    angle: float
+
+    def slope(self, step_s: float) -> float:
+        """k, far out."""
+        return abs(self.stiffness)
+
+    def at(self, angle: np.ndarray) -> np.ndarray:
+        return -self.stiffness * (angle - self.angle * np.arcsinh(angle / self.angle))
+
+
+@dataclass(frozen=True)
+class BoucWen(OneState):
+    """Hysteresis dz/dθ = 1 - |z/z_c|² (1 + sgn(z dθ)) / 2, τ = `stiffness` z, up to `coulomb`.
+
+    Straight while it unloads, tanh while it loads. The state is z.
+    """
+
+    stiffness: float
+    coulomb: float
+
+    def slope(self, step_s: float) -> float:
+        """k, while it unloads."""
+        return self.stiffness
+
+    def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
+        limit = self.coulomb / self.stiffness
+        way = now - before
+        sense = np.sign(way)
+        loaded = sense * state  # < 0 while it unloads
+        straight = np.minimum(np.abs(way), np.maximum(-loaded, 0))
+        start = np.clip((loaded + straight) / limit, -1 + 1e-12, 1 - 1e-12)
+        ends = limit * np.tanh(np.arctanh(start) + (np.abs(way) - straight) / limit)
+        after = np.where(way == 0, state, sense * ends)
+        return self.stiffness * after, after
+
+
+@dataclass(frozen=True)
+class Iwan(OneState):
+    """Masing's hysteresis: sliders in parallel, of limits spread evenly from 0 to 2 z_c.
+
+    All slide at `coulomb`; at rest they have `stiffness` together. States (sliders, ...) are their
+    springs' deflections.
+    """
+
+    stiffness: float
+    coulomb: float
+
+    def slope(self, step_s: float) -> float:
+        """k, while all stick."""
+        return self.stiffness
+
+    def at_rest(self, shape: tuple[int, ...]) -> np.ndarray:
+        return np.zeros((SLIDERS, *shape))
+
+    def limits(self) -> np.ndarray:
+        """Deflections (sliders, ...) at which they slide."""
+        share = (np.arange(SLIDERS) + 0.5) * 2 / SLIDERS
+        return np.multiply.outer(share, self.coulomb / self.stiffness)
+
+    def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
+        limit = self.limits()
+        poses = state.ndim - limit.ndim  # further axes, which limits do not have
+        limit = limit.reshape(SLIDERS, *[1] * poses, *limit.shape[1:])
+        after = np.minimum(np.maximum(state + (now - before), -limit), limit)
+        return self.stiffness * after.mean(axis=0), after
+
+
+@dataclass(frozen=True)
+class LuGre(OneState):
+    """Bristles of `stiffness`: `stiction` at rest falls to `coulomb` with speed (Stribeck).
+
+    dz/dt = v - σ₀ |v| z / g(v), g = F_c + (F_s - F_c) exp(-(v/v_s)²), τ = σ₀ z + `viscous` v.
+    """
+
+    stiffness: float
+    coulomb: float
+    stiction: float
+    stribeck: float  # v_s, rad/s
+    viscous: float
+
+    def slope(self, step_s: float) -> float:
+        """Just after turning back twice the bristles', and the viscous part of a step."""
+        return 2 * self.stiffness + self.viscous / step_s
+
+    def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
+        way = now - before
+        speed = way / step_s
+        drop = np.exp(-((speed / self.stribeck) ** 2))
+        limit = (self.coulomb + (self.stiction - self.coulomb) * drop) / self.stiffness
+        end = np.sign(way) * limit
+        after = end + (state - end) * np.exp(-np.abs(way) / limit)
+        return self.stiffness * after + self.viscous * speed, after
+
+
+@dataclass(frozen=True)
+class ImpactDamping(OneState):
+    """Play with teeth that dissipate as they meet: a dead zone, and beyond it c · depth · speed.
+
+    τ = -k clip(θ, -g, g) + c [|θ| - g]₊ v, after Hunt and Crossley.
+    """
+
+    stiffness: float
+    gap: float
+    damping: float  # c, N·m·s/rad²
+
+    def slope(self, step_s: float) -> float:
+        """k within the gap; beyond, that of a depth like the gap's."""
+        return self.stiffness + 2 * self.damping * self.gap / step_s
+
+    def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
+        depth = np.maximum(np.abs(now) - self.gap, 0)
+        lost = -self.stiffness * np.clip(now, -self.gap, self.gap)
+        return lost + self.damping * depth * (now - before) / step_s, state
+
+
+@dataclass(frozen=True)
+class QuadraticDamping(OneState):
+    """Torque with the square of the speed, as of oil that is pressed through a gap: τ = c v |v|."""
+
+    damping: float  # N·m·s²/rad²
+    fastest: float  # rad/s, for the bound of the slope
+
+    def slope(self, step_s: float) -> float:
+        """At the fastest."""
+        return 2 * self.damping * self.fastest / step_s
+
+    def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
+        speed = (now - before) / step_s
+        return self.damping * speed * np.abs(speed), state
+
+
+@dataclass(frozen=True)
+class Stops(Elastic):
+    """A loose part's stops: nothing within ± `gap`, `stiffness` beyond."""
+
+    stiffness: float
+    gap: float
+
+    def slope(self, step_s: float) -> float:
+        """k, beyond the gap."""
+        return self.stiffness
+
+    def at(self, angle: np.ndarray) -> np.ndarray:
+        return self.stiffness * (angle - np.clip(angle, -self.gap, self.gap))

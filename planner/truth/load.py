@@ -8,45 +8,43 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.truth.deviation import Deviation
-from planner.truth.mjcf import Builder
+from planner.truth.mechanics import ENGINES
 from planner.truth.model import Truth
+from planner.truth.parts import Builder
 from planner.truth.springs import check, springs
 
 
-def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
-    """The true robot behind a robot folder.
+def load_truth(
+    robot_toml: Path, deviation: Deviation | None = None, engine: str = "mujoco"
+) -> Truth:
+    """The true robot behind a robot folder, by one of ENGINES.
 
     Raises InputError without MuJoCo, and where the folder cannot be read or does not fit together.
     """
-    try:
-        import mujoco
-    except ImportError:
-        raise InputError(
-            "Simulated recordings need MuJoCo; install it with: pip install 'planner[truth]'"
-        ) from None
     deviation = deviation or Deviation()
     table, root = _read(robot_toml)
     check(table, root, deviation, robot_toml)
     rng = np.random.default_rng(deviation.seed)
     found, own = springs(table, root, deviation, rng)
     builder = Builder(root, table, found, deviation, rng)
-    # MuJoCo checks the springs' dynamics without their stiffness and warns into a file.
-    mujoco.set_mju_user_warning(lambda text: None)
-    model = mujoco.MjModel.from_xml_string(builder.xml())
-    model.opt.gravity[:] = table.get("gravity", (0.0, 0.0, -9.81))
-    held = [model.joint(name).dofadr[0] for name in builder.joint_names]
-    elastic = [model.joint(f"spring_{i}").dofadr[0] for i in range(len(found))]
+    try:
+        mechanics = ENGINES[engine](builder.parts, table.get("gravity", (0.0, 0.0, -9.81)))
+    except ImportError:
+        raise InputError(
+            "Simulated recordings need MuJoCo; install it with: pip install 'planner[truth]'"
+        ) from None
+    held = [mechanics.names.index(name) for name in builder.joint_names]
+    elastic = [mechanics.names.index(f"spring_{i}") for i in range(len(found))]
     lower, upper = np.array(builder.limits).T
     return Truth(
         table["name"],
         tuple(builder.joint_names),
         found,
         deviation,
-        f"MuJoCo {mujoco.__version__}, seed {deviation.seed}",
+        f"{mechanics.version}, seed {deviation.seed}",
         lower,
         upper,
-        model,
-        mujoco.MjData(model),
+        mechanics,
         np.array(held),
         np.array(elastic),
         own,

@@ -1,26 +1,23 @@
-"""The true robot: a MuJoCo model that deviates from the simulation in known ways.
+"""The true robot: a model that deviates from the simulation in known ways.
 
-This engine is there to make recordings whose causes are known. It shares no code with the
-planner's own models: it reads URDF and robot.toml itself, and MuJoCo gives mass matrix and weight.
+It is there to make recordings whose causes are known. It shares no code with the planner's own
+models: it reads URDF and robot.toml itself, and an engine of `mechanics` gives mass and weight.
 The robot vibrates about where it sags under gravity, whose own stiffness is part of K, unless
 robot.toml says geometric_stiffness = false.
 """
 
-import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import scipy.linalg
+from scipy import signal
 
 from planner.truth.deviation import Deviation, Spring
-from planner.truth.loss_factors import branches
-from planner.truth.propagate import driven
-from planner.truth.springs import compensation
+from planner.truth.mechanics import Frame, Mechanics
+from planner.truth.springs import branches, compensation
 
 SAG_STEPS = 30  # at most; each gains a digit or more where springs carry the weight at all
-TURN = 1e-4  # rad (or m), of the differences that give gravity's stiffness: exact to 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +31,8 @@ class Truth:
     description: str
     lower_rad: np.ndarray  # joint limits (dof,)
     upper_rad: np.ndarray
-    _model: object = field(repr=False)
-    _data: object = field(repr=False)
-    _held: np.ndarray = field(repr=False)  # places of the robot's own joints in q
+    _mechanics: Mechanics = field(repr=False)
+    _held: np.ndarray = field(repr=False)  # places of the robot's own joints in x
     _elastic: np.ndarray = field(repr=False)
     _own: dict[str, int] = field(repr=False)  # joint: its spring about its own axis
     _weighs: bool = field(repr=False)  # whether gravity is part of the model
@@ -55,18 +51,15 @@ class Truth:
 
         In their own frames.
         """
-        import mujoco
-
         stiffness = self._springs(q)
         bent = self._sag(q, stiffness)
         gravity = self._gravity(q, bent)
-        model, data = self._posed(q, bent)
-        mujoco.mj_crb(model, data)
-        mass = _full_mass(model, data)[np.ix_(self._elastic, self._elastic)]
-        hit, _ = self._site(model, data, self.hit_point)
+        mechanics = self._posed(q, bent)
+        mass = mechanics.mass()[np.ix_(self._elastic, self._elastic)]
+        hit = self._own_axes(mechanics.site(self.hit_point))[:3]
         each = []
         for name in self.sensors:
-            linear, turn = self._site(model, data, name)
+            linear, turn = np.split(self._own_axes(mechanics.site(name)), 2)
             own = self.sensor_offset_m if name == "sensor" else (0.0, 0.0, 0.0)
             each.append(linear - _cross(self.offsets_m.get(name, own)) @ turn)
             mass = mass + self.sensor_mass_kg.get(name, 0.0) * each[-1].T @ each[-1]
@@ -100,70 +93,52 @@ class Truth:
         return stiffness
 
     def _gravity(self, q: np.ndarray, bent: np.ndarray) -> np.ndarray:
-        steps = TURN * np.eye(len(bent)) if self._weighs else ()
-        change = [self._weight(q, bent + s) - self._weight(q, bent - s) for s in steps]
-        part = np.array(change) / (2 * TURN) if change else np.zeros((len(bent), len(bent)))
-        return (part + part.T) / 2
+        if not self._weighs:
+            return np.zeros((len(bent), len(bent)))
+        return self._mechanics.gravity_stiffness(self._coordinates(q, bent), self._elastic)
 
     def _sag(self, q: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
         """Angles (e,) at which the springs carry the weight."""
         bent = np.zeros(len(self.springs))
         for _ in range(SAG_STEPS if self._weighs else 0):
-            before, bent = bent, -np.linalg.solve(stiffness, self._weight(q, bent))
+            before, bent = (
+                bent,
+                -np.linalg.solve(stiffness, self._posed(q, bent).weight()[self._elastic]),
+            )
             if np.max(np.abs(bent - before)) < 1e-13:
                 break
         return bent
 
-    def _weight(self, q: np.ndarray, bent: np.ndarray) -> np.ndarray:
-        """Torques (e,) that hold the robot against gravity with its springs bent (e,)."""
-        import mujoco
-
-        model, data = self._posed(q, bent)
-        mujoco.mj_comVel(model, data)  # at rest: clears what a body would inherit
-        torque = np.zeros(model.nv)
-        mujoco.mj_rne(model, data, 0, torque)
-        return torque[self._elastic]
-
     def turning(self, q: np.ndarray) -> np.ndarray:
         """Angular Jacobian (3, e) of the hit point, in its frame: what a moment there acts on."""
-        model, data = self._posed(q, self._sag(q, self._springs(q)))
-        return self._site(model, data, self.hit_point)[1]
+        return self._own_axes(self._sagged(q).site(self.hit_point))[3:]
 
     def frames(self, q: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """Jacobians (6, e), linear first, in their own axes: of the sensor, and of each link."""
-        import mujoco
-
-        model, data = self._posed(q, self._sag(q, self._springs(q)))
-        sensor, parts = np.vstack(self._site(model, data, "sensor")), {}
-        for link, (first, *_) in self.links().items():
-            linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-            mujoco.mj_jacBody(model, data, linear, angular, first)
-            axes = data.xmat[first].reshape(3, 3).T
-            parts[link] = np.vstack([axes @ linear, axes @ angular])[:, self._elastic]
+        mechanics = self._sagged(q)
+        sensor = self._own_axes(mechanics.site("sensor"))
+        parts = {link: self._own_axes(mechanics.body(first))
+                 for link, (first, *_) in self.links().items()}  # fmt: skip
         return sensor, parts
 
     def pieces(self) -> dict[str, list[tuple[float, np.ndarray, np.ndarray]]]:
         """Mass, centre (3,), inertia about it (3, 3) of a link's bodies, in the first's frame."""
-        model, data = self._posed(np.zeros(len(self._held)))
+        mechanics = self._posed(np.zeros(len(self._held)))
         found = {}
         for link, numbers in self.links().items():
-            axes, place = data.xmat[numbers[0]].reshape(3, 3), data.xpos[numbers[0]]
-            found[link] = [
-                (float(model.body_mass[b]), axes.T @ (data.xipos[b] - place),
-                 turn @ np.diag(model.body_inertia[b]) @ turn.T)
-                for b in numbers
-                for turn in [axes.T @ data.ximat[b].reshape(3, 3)]
-            ]  # fmt: skip
+            axes, origin, _ = mechanics.body(numbers[0])
+            pieces = found[link] = []
+            for number in numbers:
+                part, (rotation, place, _) = mechanics.parts[number], mechanics.body(number)
+                turn = axes.T @ rotation
+                centre = axes.T @ (place - origin) + turn @ part.centre
+                pieces.append((part.mass, centre, turn @ part.tensor @ turn.T))
         return found
 
-    def _site(self, model: object, data: object, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Linear and angular Jacobian (3, e) of a site, in its own frame."""
-        import mujoco
-
-        linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-        mujoco.mj_jacSite(model, data, linear, angular, model.site(name).id)
-        rotation = data.site(name).xmat.reshape(3, 3)
-        return (rotation.T @ linear)[:, self._elastic], (rotation.T @ angular)[:, self._elastic]
+    def _own_axes(self, frame: Frame) -> np.ndarray:
+        """Jacobian (6, e) of a frame in its own axes, linear first."""
+        rotation, _, jacobian = frame
+        return np.kron(np.eye(2), rotation.T) @ jacobian[:, self._elastic]
 
     def factors(self, q: np.ndarray) -> np.ndarray:
         """What the stiffness of each spring (e,) is multiplied by at this pose."""
@@ -182,22 +157,20 @@ class Truth:
         self, q: np.ndarray, link: str, position_m: np.ndarray, direction: np.ndarray
     ) -> np.ndarray:
         """How a point of a link moves along a world direction (3,) with each spring (e,)."""
-        import mujoco
+        rotation, _, jacobian = self._sagged(q).body(self.links(massless=True)[link][0])
+        jacobian = jacobian[:, self._elastic]
+        lever = _cross(tuple(rotation @ position_m))
+        return np.asarray(direction) @ (jacobian[:3] - lever @ jacobian[3:])
 
-        model, data = self._posed(q, self._sag(q, self._springs(q)))
-        body = model.body(link).id
-        point = data.body(link).xpos + data.body(link).xmat.reshape(3, 3) @ position_m
-        jacobian = np.zeros((3, model.nv))
-        mujoco.mj_jac(model, data, jacobian, None, point, body)
-        return np.asarray(direction) @ jacobian[:, self._elastic]
+    def links(self, massless: bool = False) -> dict[str, list[int]]:
+        """Numbers of the bodies that have a link's mass, by the link's name: several if it bends.
 
-    def links(self) -> dict[str, list[int]]:
-        """The model's bodies that have a link's mass, by the link's name: several if it bends."""
-        model: Any = self._model
+        `massless`: also of links without a mass.
+        """
         found: dict[str, list[int]] = {}
-        for body in range(1, model.nbody):
-            if model.body(body).name and model.body_mass[body] > 0:
-                found.setdefault(model.body(body).name.split()[0], []).append(body)
+        for number, part in enumerate(self._mechanics.parts):
+            if part.name and (massless or part.mass > 0):
+                found.setdefault(part.name.split()[0], []).append(number)
         return found
 
     def changed(self, factor: float | np.ndarray) -> "Truth":
@@ -211,23 +184,27 @@ class Truth:
 
     def loaded(self, link: str, factor: float) -> "Truth":
         """The same robot with a link's mass and inertia multiplied by a factor."""
-        model: Any = copy.copy(self._model)
-        bodies = self.links()[link]
-        model.body_mass[bodies] *= factor
-        model.body_inertia[bodies] *= factor
-        return replace(self, _model=model)
+        numbers = self.links()[link]
+        parts = [
+            replace(p, mass=factor * p.mass, tensor=factor * p.tensor) if i in numbers else p
+            for i, p in enumerate(self._mechanics.parts)
+        ]
+        engine = type(self._mechanics)
+        return replace(self, _mechanics=engine(parts, self._mechanics.gravity))
 
-    def _posed(self, q: np.ndarray, bent: np.ndarray | float = 0.0) -> tuple:
-        """MuJoCo's model and data at joint angles q (dof,) with the springs bent (e,)."""
-        import mujoco
+    def _coordinates(self, q: np.ndarray, bent: np.ndarray | float) -> np.ndarray:
+        """Of the mechanics: joint angles q (dof,) with the springs bent (e,)."""
+        x = np.zeros(len(self._mechanics.names))
+        x[self._held], x[self._elastic] = q, bent
+        return x
 
-        model, data = self._model, self._data
-        data.qpos[:] = 0.0
-        data.qpos[self._held] = q
-        data.qpos[self._elastic] = bent
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        return model, data
+    def _posed(self, q: np.ndarray, bent: np.ndarray | float = 0.0) -> Mechanics:
+        self._mechanics.pose(self._coordinates(q, bent))
+        return self._mechanics
+
+    def _sagged(self, q: np.ndarray) -> Mechanics:
+        """At joint angles q (dof,), where the springs carry the weight."""
+        return self._posed(q, self._sag(q, self._springs(q)))
 
     def position(self, q: np.ndarray) -> np.ndarray:
         """Position (3,) of the hit point in the world in m."""
@@ -238,14 +215,8 @@ class Truth:
 
         The Jacobian is that of the robot's own joints, linear part first.
         """
-        import mujoco
-
-        model, data = self._posed(q)
-        linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-        mujoco.mj_jacSite(model, data, linear, angular, model.site("tcp").id)
-        jacobian = np.vstack([linear, angular])[:, self._held]
-        site = data.site("tcp")
-        return np.array(site.xmat).reshape(3, 3), np.array(site.xpos), jacobian
+        rotation, place, jacobian = self._posed(q).site("tcp")
+        return rotation, place, jacobian[:, self._held]
 
     def modal(
         self, q: np.ndarray
@@ -321,12 +292,15 @@ def _cross(vector: tuple[float, float, float]) -> np.ndarray:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def _full_mass(model: object, data: object) -> np.ndarray:
-    import mujoco
+def weights(pole: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """y(t + h) = grow y(t) + older f(t) + newer f(t + h), exact if f is linear between."""
+    z = pole * step_s
+    grow = np.exp(z)
+    newer = (grow - 1 - z) / (z * pole)
+    return grow, (grow - 1) / pole - newer, newer
 
-    full = np.zeros((model.nv, model.nv))
-    try:
-        mujoco.mj_fullM(model, data, full)
-    except TypeError:  # before MuJoCo 3.5 the arguments were (model, full, qM)
-        mujoco.mj_fullM(model, full, data.qM)
-    return full
+
+def driven(pole: complex, force: np.ndarray, step_s: float) -> np.ndarray:
+    """y (..., n) of y' = λy + f from rest, for f (..., n) linear between samples."""
+    grow, older, newer = weights(np.asarray(pole), step_s)
+    return np.asarray(signal.lfilter([newer, older], [1.0, -grow], force.astype(complex)))

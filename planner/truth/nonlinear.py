@@ -1,4 +1,4 @@
-"""Hits on robots whose joints are not linear, and on robots with structural damping.
+"""Hits on robots whose joints are not linear.
 
 At a pose the mass matrix is constant: the linear part is propagated exactly pole by pole, and
 nonlinear torques act on it as forces that are linear between samples.
@@ -8,16 +8,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from planner.errors import InputError
 from planner.truth.laws import JointLaw, side_by_side
-from planner.truth.model import Truth
-from planner.truth.propagate import driven, weights
+from planner.truth.model import Truth, driven, weights
 
 MOST_CONTRACTION = 0.5  # of the fixed-point iteration within a step
 TORQUE_ACCURACY = 1e-7  # relative to a step's change of torque
-FFT_PADDING = 4  # record lengths, so that the response does not wrap around
 
 
 @dataclass(frozen=True)
@@ -206,37 +203,3 @@ def _columns(modal: np.ndarray) -> np.ndarray:
 def _rows(modal: np.ndarray) -> np.ndarray:
     """What gives the real part of their product (poses, a, 2 p), from (poses, p, a)."""
     return np.moveaxis(np.concatenate([modal.real, -modal.imag], axis=1), 1, 2).copy()
-
-
-def structural(pose: StruckPose, loss_factor: float, step_s: float) -> np.ndarray:
-    """As `respond`, with K(1 + iη) instead of viscous damping: from the spectrum of the force."""
-    n = pose.forces_n.shape[1]
-    frequency = np.fft.rfftfreq(FFT_PADDING * n, step_s)
-    accelerance = structural_accelerance(pose.truth, loss_factor, pose.q, frequency, pose.wrench)
-    spectrum = np.fft.rfft(pose.forces_n, FFT_PADDING * n, axis=1)
-    response = np.moveaxis(accelerance, 1, 0) * spectrum[:, None]
-    return np.fft.irfft(response, FFT_PADDING * n, axis=2)[:, :, :n]
-
-
-def structural_accelerance(
-    truth: Truth,
-    loss_factor: float,
-    q: np.ndarray,
-    frequency_hz: np.ndarray,
-    wrench: np.ndarray | None = None,
-) -> np.ndarray:
-    """Accelerance (3, h, F) in m/s²/N: -ω² Σ φφᵀ / (μ - ω²) of K (1 + iη) + G.
-
-    μ are the complex eigenvalues of that matrix and M, G is gravity's part, which has no loss. Of
-    hits `wrench` (h, 6) as in `StruckPose`, or of those along the three axes.
-    """
-    mass, _, stiffness, hit, sensor = truth.matrices(q)
-    if wrench is not None:
-        hit = wrench @ np.vstack([hit, truth.turning(q)])
-    gravity = truth.gravity_stiffness(q)
-    springs = (stiffness + stiffness.T) / 2 - gravity
-    squares, shapes = scipy.linalg.eig(springs * (1 + 1j * loss_factor) + gravity, mass)[:2]
-    shapes = shapes / np.sqrt(np.einsum("ik,ij,jk->k", shapes, mass, shapes))
-    w2 = (2 * np.pi * np.asarray(frequency_hz)) ** 2
-    shares = -w2 / (squares[:, None] - w2)
-    return np.einsum("sk,hk,kf->shf", sensor @ shapes, hit @ shapes, shares)

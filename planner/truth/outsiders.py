@@ -1,14 +1,25 @@
-"""More causes that no effect of the library describes; the right answer to each is "unknown"."""
+"""Artefacts of the measurement, and causes that no effect of the library describes.
+
+The right answer to each of OUTSIDERS is "unknown".
+"""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from planner.truth.deviation import AttachedResonator, Bridge, ServoLoop, Spring, StiffnessRipple
-from planner.truth.laws import Backlash
+from planner.truth.deviation import (
+    AttachedResonator,
+    Bridge,
+    Feedback,
+    ServoLoop,
+    Spring,
+    StiffnessRipple,
+)
+from planner.truth.laws import Backlash, Contact, QuadraticDamping, Stops
 from planner.truth.nonlinear import Port
-from planner.truth.other_laws import QuadraticDamping, Stops
 from planner.truth.scene import (
+    REFERENCE_HZ,
     Draw,
     Drawn,
     Parameters,
@@ -19,41 +30,115 @@ from planner.truth.scene import (
     some_joint,
     triple,
 )
-from planner.truth.secret import Secret
+from planner.truth.secret import Secret, Tone
+
+
+def _artefact(
+    effect: str, at: str, parameters: Parameters, secret: Secret, **changes: Any
+) -> Drawn:
+    change = replace(secret, artefact=replace(secret.artefact, **changes))
+    return Drawn(effect, at, parameters, change)
+
+
+def sensor_rotation(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+    """The sensor is mounted askew."""
+    axis, angle = some_direction(rng), scene.size * np.deg2rad(rng.uniform(10, 45))
+    skew = np.cross(np.eye(3), axis)
+    rotation = np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
+    parameters: Parameters = {"axis": axis.tolist(), "angle_rad": float(angle)}
+    return _artefact("sensor_rotation", "sensor", parameters, secret, rotation=rotation)
+
+
+def _channel(effect: str, factor: float, secret: Secret, rng: np.random.Generator) -> Drawn:
+    which = int(rng.integers(3))
+    gain = tuple(g * factor if i == which else g for i, g in enumerate(secret.artefact.gain))
+    return _artefact(effect, f"sensor_{'xyz'[which]}", {"gain": factor}, secret, gain=gain)
+
+
+def sensor_gain(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+    """A wrong sensitivity of one channel."""
+    factor = log_uniform(rng, 0.5, 0.8) if rng.random() < 0.5 else log_uniform(rng, 1.25, 2.0)
+    return _channel("sensor_gain", factor**scene.size, secret, rng)
+
+
+def polarity(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+    """One channel has the wrong sign."""
+    return _channel("polarity", -1.0, secret, rng)
+
+
+def channel_delay(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+    """Responses come later than the force."""
+    delay = scene.size * log_uniform(rng, 0.8e-3, 6e-3)
+    return _artefact("channel_delay", "sensor", {"delay_s": delay}, secret, delay_s=delay)
+
+
+def exponential_window(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+    """The analyser's window is left in the recordings."""
+    time = log_uniform(rng, 0.25, 1.0) / scene.size
+    told: Parameters = {"time_constant_s": time}
+    return _artefact("exponential_window", "sensor", told, secret, window_s=time)
 
 
 def _unknown(cause: str, change: Secret, **numbers: float | str | list[float]) -> Drawn:
-    parameters: Parameters = {"cause": cause, **numbers}
-    return Drawn("unknown", None, parameters, change)
+    return Drawn("unknown", None, {"cause": cause, **numbers}, change)
+
+
+def environment_contact(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+    """Something presses against a link; it lets go when the link moves away far enough."""
+    number, direction = scene.some_link(rng, 3), some_direction(rng)
+    port = Port(Contact(1.0, 1.0), "", f"link_{number}", (0.0, 0.0, 0.0), triple(direction))
+    soft = scene.compliance(port.vector(scene.truth, scene.poses[0]))
+    stiffness = scene.size * log_uniform(rng, 0.5, 3.0) / soft
+    law = Contact(stiffness, log_uniform(rng, 1e-6, 1e-3))
+    change = replace(secret, ports=(*secret.ports, replace(port, law=law)))
+    return _unknown(
+        "environment_contact", change, link=port.link, stiffness=law.stiffness,
+        preload_m=law.preload, direction=direction.tolist(),
+    )  # fmt: skip
+
+
+def nonreciprocal_feedback(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+    """A controller turns one joint's twist into another's torque."""
+    driven, sensed = (f"joint_{i}" for i in rng.choice([1, 2, 3], 2, replace=False))
+    size = float(np.sqrt(scene.stiffness(driven) * scene.stiffness(sensed)))
+    gain = float(scene.size * size * rng.uniform(0.25, 0.6) * rng.choice([-1, 1]))
+    change = deviate(secret, feedback=(Feedback(driven, sensed, gain),))
+    return _unknown("nonreciprocal_feedback", change, driven=driven, sensed=sensed, gain=gain)
+
+
+def tonal_disturbance(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+    """A pump or fan shakes a link all the time."""
+    low, high = scene.band_of_modes
+    tone = Tone(
+        f"link_{rng.integers(2, 5)}",
+        triple(some_direction(rng)),
+        log_uniform(rng, 0.8 * low, 1.2 * high),
+        scene.size * scene.peak_n * log_uniform(rng, 0.01, 0.1),
+    )
+    told = {"frequency_hz": tone.frequency_hz, "force_n": tone.force_n}
+    return _unknown("tonal_disturbance", replace(secret, tone=tone), link=tone.link, **told)
 
 
 def bridging_cable(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """A cable or hose that is stretched from one link to another, past the joints between."""
-    low, high = int(rng.integers(1, 3)), int(rng.integers(4, 7))
+    low, high = int(rng.integers(1, 3)), scene.some_link(rng, 4)
     direction = some_direction(rng)
-    bridge = Bridge(
-        (f"link_{low}", f"link_{high}"),
-        (triple(rng.uniform(0.2, 1.0) * scene.length(low)), (0.0, 0.0, 0.0)),
-        triple(direction),
-        1.0,
-        scene.arm.damping_s,
-    )
-    q = scene.poses[0]
+    links = f"link_{low}", f"link_{high}"
+    places = triple(rng.uniform(0.2, 1.0) * scene.length(low)), (0.0, 0.0, 0.0)
     one, other = (
-        scene.truth.along(q, link, np.array(at), direction)
-        for link, at in zip(bridge.links, bridge.positions_m, strict=True)
+        scene.truth.along(scene.poses[0], link, np.array(at), direction)
+        for link, at in zip(links, places, strict=True)
     )
-    soft = float((one - other) @ np.linalg.solve(scene.truth.matrices(q)[2], one - other))
-    stiffness = scene.size * log_uniform(rng, 0.5, 3.0) / soft
-    bridge = replace(bridge, stiffness=stiffness, damping=scene.arm.damping_s * stiffness)
+    stiffness = scene.size * log_uniform(rng, 0.5, 3.0) / scene.compliance(one - other)
+    damping = scene.arm.damping_s * stiffness
+    bridge = Bridge(links, places, triple(direction), stiffness, damping)
     change = deviate(secret, bridges=(bridge,))
-    return _unknown("bridging_cable", change, links=" ".join(bridge.links), stiffness=stiffness)
+    return _unknown("bridging_cable", change, links=" ".join(links), stiffness=stiffness)
 
 
 def rattling_part(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """A part that is hardly held, and knocks against stops."""
-    number = int(rng.integers(2, 7))
-    low, *_ = scene.truth.modes(scene.poses[0], 4)[0]
+    number, (low, _) = scene.some_link(rng), scene.band_of_modes
     mass = scene.size * scene.moving_kg * log_uniform(rng, 0.01, 0.05)
     place = triple(rng.uniform(0.3, 1.0) * scene.length(number))
     part = AttachedResonator(
@@ -76,11 +161,10 @@ def turning_spindle(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
 
 def servo_loop(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """A drive's controller gives way slowly and holds against fast motion: a relaxing joint."""
-    joint = some_joint(rng, 3)
-    loss = scene.size * log_uniform(rng, 0.3, 1.5)
-    loop = ServoLoop(joint, loss, log_uniform(rng, 3.0, 30.0))
-    change = deviate(secret, servos=(loop,))
-    return _unknown("servo_loop", change, joint=joint, share=loss)
+    joint = some_joint(scene, rng, 3)
+    share = scene.size * log_uniform(rng, 0.3, 1.5)
+    loop = ServoLoop(joint, share, log_uniform(rng, 3.0, 30.0))
+    return _unknown("servo_loop", deviate(secret, servos=(loop,)), joint=joint, share=share)
 
 
 def loose_anchor(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
@@ -99,26 +183,36 @@ def loose_anchor(scene: Scene, secret: Secret, rng: np.random.Generator) -> Draw
 
 def quadratic_damping(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """A balancer's oil: torque with the square of a joint's speed."""
-    joint = some_joint(rng, 3)
-    speed = 2 * np.pi * 15.0 * scene.angle(joint)  # at the middle of the bands
+    joint = some_joint(scene, rng, 3)
+    speed = 2 * np.pi * REFERENCE_HZ * scene.angle(joint)
     viscous = scene.arm.damping_s * scene.stiffness(joint)
     size = scene.size * viscous / speed * log_uniform(rng, 1.0, 4.0)
-    law = QuadraticDamping(size, 5 * speed)
-    change = replace(secret, ports=(*secret.ports, Port(law, joint=joint)))
+    port = Port(QuadraticDamping(size, 5 * speed), joint=joint)
+    change = replace(secret, ports=(*secret.ports, port))
     return _unknown("quadratic_damping", change, joint=joint, damping=size)
 
 
 def coupled_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """One joint's stiffness goes with another's angle, as of a belt or a coupled wrist."""
-    driven, by = (f"joint_{n}" for n in rng.choice(np.arange(1, 6), 2, replace=False))
-    size, phase = scene.size * rng.uniform(0.3, 0.6), rng.uniform(0, 2 * np.pi)
-    cosine, sine = float(size * np.cos(phase)), float(size * np.sin(phase))
+    driven, by = (str(joint) for joint in rng.choice(scene.joints[:5], 2, replace=False))
+    cosine, sine = scene.ripple(rng)
     wave = StiffnessRipple(driven, int(rng.integers(1, 4)), cosine, sine, by)
+    size = float(np.hypot(cosine, sine))
     change = deviate(secret, harmonics=(wave,))
-    return _unknown("coupled_stiffness", change, joint=driven, by=by, size=float(size))
+    return _unknown("coupled_stiffness", change, joint=driven, by=by, size=size)
 
 
-MORE_OUTSIDERS: dict[str, Draw] = {
+ARTEFACTS: dict[str, Draw] = {
+    "sensor_rotation": sensor_rotation,
+    "sensor_gain": sensor_gain,
+    "polarity": polarity,
+    "channel_delay": channel_delay,
+    "exponential_window": exponential_window,
+}
+OUTSIDERS: dict[str, Draw] = {
+    "environment_contact": environment_contact,
+    "nonreciprocal_feedback": nonreciprocal_feedback,
+    "tonal_disturbance": tonal_disturbance,
     "bridging_cable": bridging_cable,
     "rattling_part": rattling_part,
     "turning_spindle": turning_spindle,

@@ -1,16 +1,15 @@
 """What tells of each effect of a case: the robot without it, and what is seen with it."""
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from planner.proof import refit
+from planner.truth.deviation import Deviation
 from planner.truth.hits import AXES, Hammer, SimulatedHit, noise_power
-from planner.truth.load import load_truth
 from planner.truth.model import Truth
 from planner.truth.secret import HitVisit, Secret, quiet_hits
 
@@ -22,7 +21,7 @@ FALL = 4.0  # of the window under which hits with a law are compared: e^-4 is le
 class Scored:
     """A case as it was made; `rng` as it was when its noise-free hits `quiet` were made."""
 
-    robot_toml: Path
+    load: Callable[[Deviation], Truth]  # of the case's robot
     band_hz: tuple[float, float]
     reach_m: float
     measured: Secret
@@ -35,8 +34,8 @@ class Scored:
 
 def question(case: Scored, without: Secret) -> refit.Question:
     """Of the effect that `without` lacks."""
-    with_it = load_truth(case.robot_toml, case.measured.deviation)
-    truth = load_truth(case.robot_toml, without.deviation)
+    with_it = case.load(case.measured.deviation)
+    truth = case.load(without.deviation)
     in_hits = without.ports != case.measured.ports or without.tone != case.measured.tone
     in_time = without.drift != case.measured.drift or without.load != case.measured.load
     n, step_s = case.quiet[0][0].force_n.size, 1 / case.hammer.sampling_rate_hz

@@ -11,6 +11,7 @@ from planner.truth.model import Truth
 from planner.truth.secret import Secret
 
 PULSE_S = 0.008  # duration of a middling hit
+REFERENCE_HZ = 15.0  # at which speeds of joints are estimated: the middle of the bands
 
 Parameters = dict[str, float | str | list[float]]
 
@@ -34,6 +35,34 @@ class Scene:
         """Mass of links and spindle."""
         return sum(body.mass for body in self.arm.bodies[1:])
 
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints' names."""
+        return tuple(f"joint_{n}" for n in range(1, len(self.arm.joints) + 1))
+
+    @property
+    def band_of_modes(self) -> tuple[float, float]:
+        """Lowest and highest of the first four natural frequencies at the first pose, in Hz."""
+        low, *_, high = self.truth.modes(self.poses[0], 4)[0]
+        return float(low), float(high)
+
+    def axis(self, joint: str) -> np.ndarray:
+        """A joint's axis (3,) in its own frame."""
+        return np.array(self.arm.joints[int(joint[-1]) - 1].axis, dtype=float)
+
+    def some_link(self, rng: np.random.Generator, first: int = 2) -> int:
+        """Number of one of the links from `first` on."""
+        return int(rng.integers(first, len(self.arm.joints) + 1))
+
+    def ripple(self, rng: np.random.Generator) -> tuple[float, float]:
+        """Cosine and sine, at any phase, of a stiffness that goes with an angle."""
+        size, phase = self.size * rng.uniform(0.3, 0.6), rng.uniform(0, 2 * np.pi)
+        return float(size * np.cos(phase)), float(size * np.sin(phase))
+
+    def compliance(self, port: np.ndarray) -> float:
+        """How far a unit force on a port (e,) moves it at the first pose."""
+        return float(port @ np.linalg.solve(self.truth.matrices(self.poses[0])[2], port))
+
     def stiffness(self, joint: str) -> float:
         """Of a joint about its own axis, in N·m/rad."""
         return float(self.truth.own(joint) @ [spring.stiffness for spring in self.truth.springs])
@@ -44,7 +73,7 @@ class Scene:
 
     def length(self, number: int) -> np.ndarray:
         """From link `number`'s origin to the next joint's, or the tcp (3,), in m."""
-        end = self.arm.joints[number].xyz if number < 6 else self.arm.tcp
+        end = self.arm.joints[number].xyz if number < len(self.arm.joints) else self.arm.tcp
         return np.array(end, dtype=float)
 
     def spring(self, joint: str, axis: np.ndarray, stiffness: float, slide: bool = False) -> Spring:
@@ -90,22 +119,14 @@ def some_direction(rng: np.random.Generator) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-def across(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors normal to one."""
-    along = along / np.linalg.norm(along)
-    first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-    first /= np.linalg.norm(first)
-    return first, np.cross(along, first)
-
-
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     """Log-uniform between two bounds."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def some_joint(rng: np.random.Generator, last: int = 5) -> str:
+def some_joint(scene: Scene, rng: np.random.Generator, last: int = 5) -> str:
     """Name of one of the first joints."""
-    return f"joint_{rng.integers(1, last + 1)}"
+    return f"joint_{rng.integers(1, min(last, len(scene.arm.joints)) + 1)}"
 
 
 def deviate(secret: Secret, **changes: Iterable) -> Secret:

@@ -6,13 +6,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import ndimage
 
-from planner.errors import InputError
-from planner.truth.brakes import DampingScatter
 from planner.truth.deviation import Deviation
 from planner.truth.handling import Aim, MeasuringChain
 from planner.truth.hits import AXES, Hammer, SimulatedHit, noisy, pulse, sampled
 from planner.truth.model import Truth
-from planner.truth.nonlinear import Port, StruckPose, respond, structural
+from planner.truth.nonlinear import Port, StruckPose, respond
 
 
 @dataclass(frozen=True)
@@ -52,6 +50,28 @@ class JointDrift:
             factor = StiffnessDrift(change, course).factor(progress)
             factors[[s.joint == joint for s in truth.springs]] *= factor
         return truth.changed(factors)
+
+
+@dataclass(frozen=True)
+class DampingScatter:
+    """Every joint's damping times a factor of its own at each visit, of log-sd `sd`.
+
+    Brakes engage anew, grease is warm or cold.
+    """
+
+    sd: float
+    seed: int = 0
+
+    def applied(self, truth: Truth, progress: float) -> Truth:
+        """The robot at a time of the campaign: the same at the same `progress`."""
+        rng = np.random.default_rng([self.seed, round(1e6 * progress)])
+        names = dict.fromkeys(spring.joint for spring in truth.springs)
+        factors = {name: float(np.exp(self.sd * rng.standard_normal())) for name in names}
+        springs = tuple(
+            replace(s, damping=factors[s.joint] * s.damping, loss=factors[s.joint] * s.loss)
+            for s in truth.springs
+        )
+        return replace(truth, springs=springs)
 
 
 @dataclass(frozen=True)
@@ -98,7 +118,6 @@ class Secret:
 
     deviation: Deviation
     ports: tuple[Port, ...] = ()
-    loss_factor: float | None = None
     drift: StiffnessDrift | JointDrift | DampingScatter | None = None
     load: LoadChange | None = None
     tone: Tone | None = None
@@ -191,12 +210,7 @@ def _responses(
         aims = visit.aims or [Aim()] * len(axes)
         wrench = np.array([a.wrench(axis) for a, axis in zip(aims, axes, strict=True)])
         poses.append(StruckPose(now, visit.q, senses[:, None] * forces, wrench))
-    if secret.loss_factor is None:
-        responses = respond(poses, secret.ports, step_s)
-    elif not secret.ports:
-        responses = [structural(pose, secret.loss_factor, step_s) for pose in poses]
-    else:
-        raise InputError("Structural damping goes with no nonlinear law; leave one of them out.")
+    responses = respond(poses, secret.ports, step_s)
     if secret.tone is None:
         return responses
     return [

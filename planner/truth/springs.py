@@ -1,6 +1,10 @@
-"""All springs of a true robot: those that robot.toml states, as they are, and those it lacks."""
+"""All springs of a true robot: those that robot.toml states, as they are, and those it lacks.
+
+Damping is partly a loss factor: Maxwell branches whose losses hardly go with frequency.
+"""
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,13 +18,16 @@ from planner.truth.deviation import (
     Deviation,
     Spring,
 )
-from planner.truth.loss_factors import mixed
 
 STATED = ("stiffness", "n_m"), ("damping", "n_s_m")  # entries of a shift, with their units
 
 ANGLE_STEP = 1e-4  # rad, for the change of a gas spring's torque
 
 OF_TOOL = "tcp", "sensor"  # points that need no link: robot.toml names their frames
+
+LOSS_BAND_HZ = 1.5, 300.0  # where a loss factor is nearly the same: all bands of the arms
+BRANCHES = 5  # a factor of 3.8 apart: within the band the loss factor varies by a tenth
+MIDDLE_HZ = 15.0  # where a loss factor takes as much as the viscous damping it replaces
 
 
 def check(table: dict, root: ElementTree.Element, deviation: Deviation, robot_toml: Path) -> None:
@@ -132,6 +139,14 @@ def _small(small: AttachedResonator, number: int) -> Spring:
     return Spring(f"resonator {number}", small.direction, small.mass_kg * w**2, damping, slide=True)
 
 
+def across(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors normal to one."""
+    along = along / np.linalg.norm(along)
+    first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    first /= np.linalg.norm(first)
+    return first, np.cross(along, first)
+
+
 def beam_end(link: str, root: ElementTree.Element) -> np.ndarray:
     """(3,) in m: the farthest frame that a link carries, in its own."""
     ends = []
@@ -145,10 +160,7 @@ def beam_end(link: str, root: ElementTree.Element) -> np.ndarray:
 def _beam(beam: BentLink, root: ElementTree.Element) -> list[Spring]:
     """Three springs an element; in series they are the link's compliances."""
     along = beam_end(beam.link, root)
-    along = along / np.linalg.norm(along)
-    first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-    first /= np.linalg.norm(first)
-    axes = first, np.cross(along, first), along
+    axes = *across(along), along / np.linalg.norm(along)
     found = []
     for element in range(beam.elements):
         for axis, whole in zip(axes, (*beam.bending, beam.torsion), strict=True):
@@ -157,3 +169,27 @@ def _beam(beam: BentLink, root: ElementTree.Element) -> list[Spring]:
             name = f"{beam.link} element {element}"
             found.append(Spring(name, (x, y, z), k, beam.damping_s * k))
     return found
+
+
+def mixed(springs: Sequence[Spring], deviation: Deviation) -> list[Spring]:
+    """Springs of which a drawn share of the damping is a loss factor's."""
+    rng = np.random.default_rng([deviation.seed, 1])
+    out = []
+    for spring in springs:
+        share = deviation.mixed * float(rng.random())
+        loss = share * 2 * np.pi * MIDDLE_HZ * spring.damping / spring.stiffness
+        out.append(replace(spring, damping=(1 - share) * spring.damping, loss=float(loss)))
+    return out
+
+
+def branches(springs: Sequence[Spring], stiffness: np.ndarray) -> list[tuple[int, float, float]]:
+    """(spring, stiffness, rate in 1/s) of Maxwell branches beside springs of `stiffness` (e,)."""
+    rates = 2 * np.pi * np.geomspace(*LOSS_BAND_HZ, BRANCHES)
+    # Σ x / (1 + x²) over branches a ratio r apart is π / (2 ln r).
+    each = 2 * np.log(rates[1] / rates[0]) / np.pi
+    return [
+        (j, float(each * spring.loss * stiffness[j]), float(rate))
+        for j, spring in enumerate(springs)
+        if spring.loss > 0
+        for rate in rates
+    ]

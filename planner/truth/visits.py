@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.truth.handling import Handling, together
+from planner.truth.handling import Handling
 from planner.truth.hits import AXES, Hammer, SimulatedHit, noisy, write_recordings
 from planner.truth.model import Truth
 from planner.truth.secret import HitVisit, Secret, windowed
@@ -32,7 +32,7 @@ class Visits:
         rng: np.random.Generator,
         own: np.random.Generator,
     ) -> "Visits":
-        """Three axes and three force levels at each pose (n, 6) in rad.
+        """Three axes and three force levels at each pose (n, dof) in rad.
 
         `own` draws what `handling` leaves open, so that all else is the same in the laboratory.
         """
@@ -41,13 +41,10 @@ class Visits:
         planned, readbacks = [], []
         common, axes = handling.common(own), [AXES.index(axis[1]) for axis, _ in shots]
         for number, index in enumerate(numbers):
-            scatter = hammer.readback_deg * rng.uniform(-1, 1, 6)
+            scatter = hammer.readback_deg * rng.uniform(-1, 1, len(poses[index]))
             readbacks.append(np.round(np.rad2deg(poses[index]) + scatter, 4))
-            off = np.deg2rad(handling.readback_deg) * own.standard_normal(6)
-            aims = [
-                together(common[a], aim)
-                for a, aim in zip(axes, handling.aims(axes, own), strict=True)
-            ]
+            off = np.deg2rad(handling.readback_deg) * own.standard_normal(len(poses[index]))
+            aims = handling.aims(axes, own, common)
             there = np.deg2rad(readbacks[-1]) + off
             planned.append(HitVisit(there, shots, number / max(len(numbers) - 1, 1), aims))
         return cls(planned, numbers, readbacks)

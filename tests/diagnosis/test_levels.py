@@ -26,10 +26,9 @@ from planner.truth.cases import DAMPING_S, PEAK_N
 from planner.truth.deviation import Deviation
 from planner.truth.handling import EVERYDAY
 from planner.truth.hits import AXES, Hammer
-from planner.truth.laws import Backlash, Friction, Hardening, JointLaw
+from planner.truth.laws import Backlash, Friction, Hardening, JointLaw, QuadraticDamping
 from planner.truth.load import load_truth
 from planner.truth.nonlinear import Port
-from planner.truth.other_laws import QuadraticDamping
 from planner.truth.scene import Scene
 from planner.truth.secret import HitVisit, Secret, hit_poses
 

@@ -18,7 +18,7 @@ import numpy as np
 from planner.campaign.campaign import Campaign
 from planner.campaign.model import Model
 from planner.dataset.store import Store
-from planner.truth.handling import EVERYDAY, Aim, together
+from planner.truth.handling import EVERYDAY, Aim
 from planner.truth.hits import AXES, Hammer, noisy, write_recordings
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
@@ -62,10 +62,7 @@ class Cell:
         """Hits at a pose where the robot was sent; the robot stands a little beside."""
         rng = self.rng
         axes = [axis for axis in range(3) for _ in range(REPEATS)]
-        aims = [
-            together(self.habits[axis], aim)
-            for axis, aim in zip(axes, EVERYDAY.aims(axes, rng), strict=True)
-        ]
+        aims = EVERYDAY.aims(axes, rng, self.habits)
         off = np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(len(joints_deg))
         there = np.deg2rad(joints_deg) + off
         shots = [(f"+{AXES[axis]}", self.hammer.peak_n) for axis in axes]

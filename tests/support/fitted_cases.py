@@ -19,14 +19,14 @@ from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
+from planner.truth.cases import SCATTER
 from planner.truth.deviation import AttachedMass, Spring
-from planner.truth.handling import EVERYDAY, Handling, together
+from planner.truth.handling import EVERYDAY, Handling
 from planner.truth.hits import AXES
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
 from planner.truth.scene import deviate, log_uniform, some_direction, triple
 from planner.truth.secret import HitVisit, Secret, hit_poses
-from planner.truth.world import REAL
 from tests.support.counted_modes import true_modes
 from tests.support.lacking_robots import ROBOTS, added, known, links_moved, mass_that_moves
 from tests.support.lacking_robots import Robot as Arm
@@ -87,7 +87,7 @@ class Case:
 def everyday(name: str, seed: int, folder: Path) -> Case:
     """A soft base, a link that bends and a hose at once, each of a size of its own."""
     rng, arm = drawn_arm(name, seed, folder)
-    secret = Secret(REAL.scatter.of(int(rng.integers(2**31))))
+    secret = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
     kinds = "soft base", "bending link", "hose"
     for kind in kinds:
         secret = added(secret, kind, log_uniform(rng, 0.2, 1.0), arm, rng)
@@ -98,7 +98,7 @@ def harder(name: str, seed: int, folder: Path) -> Case:
     """A soft floor, two bearings and a hose, a spindle 3 % heavier, springs that scatter by 0.5 %
     from visit to visit, hits 3° and 5 mm off."""
     rng, arm = drawn_arm(name, seed, folder)
-    secret = Secret(REAL.scatter.of(int(rng.integers(2**31))))
+    secret = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
     for kind in ("soft base", "hose"):
         secret = added(secret, kind, log_uniform(rng, 0.5, 1.0), arm, rng)
     truth = load_truth(arm.toml, secret.deviation)
@@ -117,7 +117,7 @@ def forgotten(name: str, seed: int, folder: Path) -> Case:
     """A tool that robot.toml lacks, 2 to 20 % of what moves, three masses on a rod at the flange;
     every other robot stands on a soft base."""
     rng, arm = drawn_arm(name, seed, folder)
-    secret = Secret(REAL.scatter.of(int(rng.integers(2**31))))
+    secret = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
     urdf = ElementTree.parse(arm.toml.parent / tomllib.loads(arm.toml.read_text())["urdf"])
     truth = load_truth(arm.toml, secret.deviation)
     flange = list(links_moved(urdf.getroot(), truth.joint_names).values())[-1]
@@ -169,9 +169,8 @@ def _measured(
     visits = []
     for number, one in enumerate(q):
         there = one + np.deg2rad(handling.readback_deg) * rng.standard_normal(len(one))
-        aims = zip(axes, handling.aims(axes, rng), strict=True)
-        aimed = [together(common[axis], aim) for axis, aim in aims]
-        visits.append(HitVisit(there, shots, number / POSES, aims=aimed))
+        aims = handling.aims(axes, rng, common)
+        visits.append(HitVisit(there, shots, number / POSES, aims=aims))
     measured = []
     for recorded in hit_poses(truth, secret, visits, hammer, rng):
         hits = tuple(

@@ -22,9 +22,9 @@ from planner.modal.estimate_modes import estimate_modes
 from planner.recording.records import Hit
 from planner.truth.arms import ARMS
 from planner.truth.cases import DAMPING_S, PEAK_N
-from planner.truth.conceal import EFFECTS
 from planner.truth.deviation import Deviation
-from planner.truth.handling import EVERYDAY, together
+from planner.truth.effects import EFFECTS
+from planner.truth.handling import EVERYDAY
 from planner.truth.hits import AXES, Hammer
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
@@ -117,9 +117,7 @@ def _measured(
     visits = []
     for one in q:
         there = one + np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(6)
-        own = zip(axes, EVERYDAY.aims(axes, rng), strict=True)
-        aims = [together(common[axis], aim) for axis, aim in own]
-        visits.append(HitVisit(there, shots, aims=aims))
+        visits.append(HitVisit(there, shots, aims=EVERYDAY.aims(axes, rng, common)))
     measurements, frfs, one_hit = [], {}, {}
     for number, recorded in enumerate(hit_poses(truth, secret, visits, hammer, rng)):
         rate = hammer.sampling_rate_hz

@@ -11,14 +11,13 @@ import numpy as np
 
 from planner.demo import shipped
 from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N
+from planner.truth.cases import DAMPING_S, PEAK_N, SCATTER
 from planner.truth.deviation import AttachedResonator, BentLink, Spring
 from planner.truth.hits import Hammer
 from planner.truth.load import load_truth
 from planner.truth.scene import PULSE_S, deviate, log_uniform, some_direction, triple
 from planner.truth.secret import Secret
 from planner.truth.springs import beam_end
-from planner.truth.world import REAL
 from tests.support import generated_arms
 from tests.support.arm_with_points import NODES, write_arm
 
@@ -85,7 +84,7 @@ ROBOTS: dict[str, Callable[[Path, np.random.Generator], Robot]] = {
 
 def lacking(kind: str, robot: Robot, rng: np.random.Generator) -> tuple[Secret, float]:
     """What the simulation lacks, beside the scatter of springs and inertias, and its size."""
-    secret, size = Secret(REAL.scatter.of(int(rng.integers(2**31)))), log_uniform(rng, *SIZES)
+    secret, size = Secret(replace(SCATTER, seed=int(rng.integers(2**31)))), log_uniform(rng, *SIZES)
     return added(secret, kind, size, robot, rng), size
 
 

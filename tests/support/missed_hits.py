@@ -10,7 +10,7 @@ from planner.campaign.model import Model
 from planner.truth.arms import ARMS
 from planner.truth.cases import PEAK_N
 from planner.truth.deviation import Deviation
-from planner.truth.handling import EVERYDAY, Aim, MeasuringChain, together
+from planner.truth.handling import EVERYDAY, Aim, MeasuringChain
 from planner.truth.hits import AXES, Hammer, write_recordings
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
@@ -83,8 +83,7 @@ def missed_cell(folder: Path, robot: str, poses: int, repeats: int, seed: int) -
         readback[name] = np.round(np.rad2deg(q), 4)
         off = np.deg2rad(HAND.readback_deg) * rng.standard_normal(len(q))
         stood[name] = np.deg2rad(readback[name]) + off
-        own = HAND.aims(axes, rng)
-        aimed[name] = [together(common[a], aim) for a, aim in zip(axes, own, strict=True)]
+        aimed[name] = HAND.aims(axes, rng, common)
         visits.append(HitVisit(stood[name], shots, i / poses, aimed[name]))
     found = hit_poses(truth, Secret(deviation, chain=chain), visits, hammer, noise)
     rows = [

@@ -10,6 +10,7 @@ import time
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from planner.proof.refit import left
 from planner.recording.points import SENSOR
 from planner.report.diagnosis import DiagnosisReport
 from planner.robot.robot import Robot
+from planner.truth.cases import SCATTER
 from planner.truth.deviation import (
     AttachedResonator,
     BentLink,
@@ -27,13 +29,12 @@ from planner.truth.deviation import (
     Spring,
     StiffnessRipple,
 )
-from planner.truth.handling import EVERYDAY, together
+from planner.truth.handling import EVERYDAY
 from planner.truth.hits import Hammer, write_recordings
 from planner.truth.load import load_truth
 from planner.truth.questions import Scored, question
 from planner.truth.scene import log_uniform, some_direction, triple
 from planner.truth.secret import HitVisit, Secret, hit_poses, quiet_hits
-from planner.truth.world import REAL
 from tests.support.arm_with_points import (
     AXES,
     BAND_HZ,
@@ -99,7 +100,7 @@ class Concealed:
 
 def concealed(kind: str, rng: np.random.Generator) -> Concealed:
     """One effect in a robot with imperfections; sizes from hardly to be told to large."""
-    plain = REAL.scatter.of(int(rng.integers(2**31)))
+    plain = replace(SCATTER, seed=int(rng.integers(2**31)))
     sizes = RIPPLE * rng.standard_normal((4, 2))
     wave = tuple(
         StiffnessRipple(f"a{n}", 1, float(c), float(s)) for n, (c, s) in enumerate(sizes, 1)
@@ -157,8 +158,7 @@ def make(kind: str, seed: int, folder: Path) -> tuple[Place, float]:
     shots = [(f"+{axis}", 250.0) for axis in "xyz"]
     stated, visits = poses(POSES, int(rng.integers(2**31))), []
     for number, q in enumerate(stated):
-        own = EVERYDAY.aims([0, 1, 2], rng)
-        aims = [together(*both) for both in zip(common, own, strict=True)]
+        aims = EVERYDAY.aims([0, 1, 2], rng, common)
         there = q + np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(4)
         visits.append(HitVisit(there, shots, number / POSES, aims, "tcp", SENSORS))
     hammer = Hammer(peak_n=250.0, noise=float(rng.uniform(0.004, 0.02)))
@@ -183,7 +183,8 @@ def _told_by_the_tool(
     truth = load_truth(toml, secrets[0].deviation)
     quiet = quiet_hits(truth, secrets[0], alone, hammer, np.random.default_rng(0))
     nowhere = np.empty((0, 4))
-    case = Scored(toml, BAND_HZ, REACH_M, secrets[0], alone, nowhere, hammer, quiet, rng)
+    load = partial(load_truth, toml)
+    case = Scored(load, BAND_HZ, REACH_M, secrets[0], alone, nowhere, hammer, quiet, rng)
     return left(question(case, secrets[1])).nats
 
 

@@ -7,16 +7,20 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from planner.truth.laws import Backlash, Friction, Hardening, JointLaw, side_by_side
-from planner.truth.other_laws import (
+from planner.truth.laws import (
     AmplitudeSoftening,
+    Backlash,
     BoucWen,
+    Friction,
+    Hardening,
     HarmonicDrive,
     ImpactDamping,
     Iwan,
+    JointLaw,
     LuGre,
     QuadraticDamping,
     Stops,
+    side_by_side,
 )
 
 K, COULOMB, A, RATE = 6e4, 9.0, 4e-4, 60.0  # N·m/rad, N·m, rad, rad/s

@@ -15,8 +15,7 @@ from planner.truth.deviation import (
     StiffnessRipple,
 )
 from planner.truth.load import load_truth
-from planner.truth.loss_factors import LOSS_BAND_HZ, branches
-from planner.truth.springs import compensation
+from planner.truth.springs import LOSS_BAND_HZ, branches, compensation
 
 Q = KR210.poses(1)[0]
 

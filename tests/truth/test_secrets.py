@@ -18,7 +18,7 @@ from planner.truth.hits import Hammer
 from planner.truth.laws import Contact
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
-from planner.truth.nonlinear import Port, structural_accelerance
+from planner.truth.nonlinear import Port
 from planner.truth.secret import (
     Artefact,
     HitVisit,
@@ -127,20 +127,6 @@ def test_feedback_breaks_reciprocity_and_nothing_else_does(tmp_path):
     small = AttachedResonator("link_4", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 1.0, 20.0, 0.02)
     assert asymmetry(Deviation(extra=(flexible,), resonators=(small,))) < 1e-8
     assert asymmetry(Deviation(feedback=(Feedback("joint_1", "joint_2", 3e4),))) > 0.05
-
-
-def test_structural_damping_loses_as_much_in_a_cycle_at_every_frequency(path):
-    truth, eta = load_truth(path), 0.08
-    mass, _, stiffness, hit, sensor = truth.matrices(Q)
-    lossy = stiffness + 1j * eta * (stiffness - truth.gravity_stiffness(Q))  # the weight has none
-    f = np.linspace(5, 60, 23)
-    exact = [-(w**2) * sensor @ np.linalg.solve(lossy - w**2 * mass, hit.T) for w in 2 * np.pi * f]
-    ours = structural_accelerance(truth, eta, Q, f)
-    assert np.max(np.abs(ours - np.moveaxis(exact, 0, 2))) < 1e-9 * np.max(np.abs(exact))
-    g, H = frfs(truth, Secret(Deviation(), loss_factor=eta), [once(Q, 1e3)],
-                replace(QUIET, record_s=10.24), BAND)  # fmt: skip
-    exact = structural_accelerance(truth, eta, Q, g)
-    assert np.max(np.abs(H[0] - exact)) < 0.02 * np.max(np.abs(exact))
 
 
 def test_a_tight_contact_is_a_spring_and_a_loose_one_is_not(path):
