@@ -159,9 +159,7 @@ def comparison(
     curves = _by_name(study, found, failed)
     baseline = baseline_of(list(curves))
     against = {
-        name: paired(curve, curves[baseline])
-        for name, curve in curves.items()
-        if name != baseline
+        name: paired(curve, curves[baseline]) for name, curve in curves.items() if name != baseline
     }
     return ComparisonReport(
         strategies={name: StrategyCurve.of(curve) for name, curve in curves.items()},
