@@ -12,9 +12,7 @@ from planner.campaign.material import Material
 from planner.dataset.dataset import Dataset
 from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import in_parts
-from planner.design.discrimination import tied
-from planner.design.extra_sensor import extra_sensor
-from planner.design.next_hit import next_hit
+from planner.design.discrimination import extra_sensor, next_hit, tied
 from planner.diagnosis.diagnose import explain
 from planner.diagnosis.odd_pose import odd_pose
 from planner.dynamics.simulation import Simulation

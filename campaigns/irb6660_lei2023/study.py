@@ -14,8 +14,7 @@ import numpy as np
 from planner.progress import Tell, within
 from planner.studies.claims import Bound, ClaimRule, in_order
 from planner.studies.report import Paper, Report, Table, on_each, r_squared
-from planner.surrogate.models.fidelity_levels import Samples
-from planner.surrogate.models.likelihood_gp import fit_likelihood
+from planner.surrogate.models.likelihood_gp import Samples, fit_likelihood
 from planner.surrogate.models.multitask import RANK, fit_multitask
 
 from .data import measured, parameters, postures, true_robot

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.surrogate.models.fidelity_levels import Samples
-from planner.surrogate.models.likelihood_gp import fit_likelihood
+from planner.surrogate.models.likelihood_gp import Samples, fit_likelihood
 from planner.surrogate.models.multitask import fit_multitask
 
 from .data import DAMPING, FREQUENCY, MODES, RESIDUE, TABLED, PostureData, stiffnesses

@@ -150,7 +150,7 @@ def figures(run: dict[int, BeyondPrediction], seen: Sweep) -> dict[str, float]:
     step = next(iter(run))
     main, there = run[step], seen.every(step)
     found = {"least R² of fused modes over all steps": min(each[FUSED] for each in r2.values())}
-    for name in r2[step].keys() & SURFACES.keys():
+    for name in r2[step].keys() & set(SURFACES):
         found[f"R² of {name} over both"] = everywhere(name, main, there)
         grown = main.beyond_sd[name][:, -1].mean() / main.trained_sd[name].mean()
         found[f"{name}'s sd at 120° over that in the training"] = float(grown)

@@ -21,9 +21,15 @@ from planner.studies import drawing
 from planner.studies.report import r_squared
 from planner.surrogate.frf_bands import frf_moments
 from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
-from planner.surrogate.models.fidelity_levels import Exact, FidelityLevel, Samples
-from planner.surrogate.models.likelihood_gp import Normalisation, fit_likelihood
-from planner.surrogate.models.nargp import fit_nargp, kennedy_ohagan
+from planner.surrogate.models.likelihood_gp import (
+    Exact,
+    FidelityLevel,
+    Normalisation,
+    Samples,
+    fit_likelihood,
+    fit_nargp,
+    kennedy_ohagan,
+)
 
 from .data import COMPARED, FREQUENCY_MODELS, KERNELS, RESIDUES, AnalysedPoses, nearest, split
 

@@ -13,9 +13,16 @@ from planner.progress import Tell, within
 from planner.studies.claims import Bound, ClaimRule, in_order
 from planner.studies.report import Paper, Report, Table, on_each, r_squared
 from planner.surrogate.models.averaged import fit_ar1_nargp, fit_gp, fit_recursive
-from planner.surrogate.models.fidelity_levels import Exact, Samples
-from planner.surrogate.models.likelihood_gp import LikelihoodGP, Normalisation, fit_likelihood
-from planner.surrogate.models.nargp import NARGP, fit_nargp, kennedy_ohagan
+from planner.surrogate.models.likelihood_gp import (
+    NARGP,
+    Exact,
+    LikelihoodGP,
+    Normalisation,
+    Samples,
+    fit_likelihood,
+    fit_nargp,
+    kennedy_ohagan,
+)
 
 from .data import (
     COMPARED,

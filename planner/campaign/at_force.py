@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.dynamics.at_force import averaged, modes_at_force
-from planner.dynamics.in_time import change_at_force
+from planner.dynamics.at_force import averaged, change_at_force, modes_at_force
 from planner.dynamics.simulation import Simulation
 from planner.recording.force_levels import peak_n
 from planner.surrogate.frf_bands import ModalPrediction

@@ -7,21 +7,15 @@ from typing import Any, Literal
 import msgspec
 
 from planner.errors import InputError
-from planner.robot.config import DiagnoseTable, HitsTable, ReadbackTable, SensorTable
+from planner.robot.config import (
+    DiagnoseTable,
+    HitsTable,
+    ReadbackTable,
+    SensorTable,
+    WorkspaceTable,
+)
 from planner.robot.config_file import check_sds
 from planner.toml_file import load_toml
-
-
-class WorkspaceTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the model has to be good: a joint box, or positions with a tool axis.
-
-    In `joints_deg`, here and elsewhere, the numbers of joints that slide are millimetres.
-    """
-
-    joints_deg: list[tuple[float, float]] | None = None
-    position_m: list[tuple[float, float]] | None = None
-    tool_axis: tuple[float, float, float] | None = None
-    rotation_deg: tuple[float, float] | None = None
 
 
 class ModesTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

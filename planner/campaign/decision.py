@@ -8,8 +8,8 @@ import numpy as np
 from scipy.stats import norm
 
 from planner.campaign.acquisition_inputs import open_parameters, poses_at
+from planner.design.acquisitions import share_left, stability, with_margins
 from planner.design.frequency_posterior import FrequencyOutputs, Margins
-from planner.design.stability import share_left, stability, with_margins
 from planner.errors import InputError
 from planner.frf.synthesis import frequency_lines
 from planner.milling.cut import cuts_at

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.dynamics.gradient import response_turned
+from planner.dynamics.gradient import moved
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf import synthesis
@@ -61,10 +61,11 @@ def tuned_frequencies(
     measured = stack(frfs, band_hz, lines, MODEL_ERROR)
     matrices = matrices_at(simulation.elastic, q, frfs, True)
     s = measured.s
-    h, turned = response_turned(matrices, simulation.elasticity, s, matrices.mass)
+    motion = moved(matrices, simulation.elasticity, s, matrices.mass)
+    h = motion.accelerance
     if np.isfinite(measured.tail_s).any():
         h = h - cut_off(simulation.poles(q), s, measured.tail_s)
-    open_ = basis(h, turned, s, tolerances)
+    open_ = basis(h, motion, s, tolerances)
     modes = simulation.modes(q, count)
     told = [_told(_at(modes, i), measured, h[i], open_[i], i) for i in range(len(q))]
     hertz, sd = (np.array(values) for values in zip(*told, strict=True))

@@ -16,13 +16,17 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.arm_chain import ArmChain, arm_chain
 from planner.robot.config import Compliance, LinkTable, Obstacle, Payload, RobotConfig
-from planner.robot.front import tool_direction, workspace_in_front
-from planner.robot.gear_springs import PAYLOAD_KG_M3, guessed_springs
-from planner.robot.guessed_inertias import guess_inertias, nothing_stated, total_stated
+from planner.robot.guesses import (
+    PAYLOAD_KG_M3,
+    guess_inertias,
+    guessed_springs,
+    nothing_stated,
+    total_stated,
+)
 from planner.robot.link_bodies import guessed_masses, link_bodies, lowest_m
 from planner.robot.robot import Robot
 from planner.robot.urdf import read_tree
-from planner.robot.workspace import ranges_inside
+from planner.robot.workspace import ranges_inside, tool_direction, workspace_in_front
 
 MODES = 4  # asked for
 POSES = 12  # of the workspace, at which modes are looked for to state a band

@@ -13,8 +13,8 @@ from planner.frf.frf import Frf
 from planner.modal.mac import mac_matrix
 from planner.modal.residues import lsfd, rank_one, realign
 from planner.recording.points import TCP, Layout
+from planner.robot.link_bodies import Skeleton, placements
 from planner.robot.robot import Robot
-from planner.robot.skeleton import Skeleton, placements
 
 
 @dataclass(frozen=True, eq=False)

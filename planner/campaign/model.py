@@ -15,10 +15,9 @@ from planner.campaign.hit_errors import PoseHitErrors
 from planner.campaign.labels import LabelledPose, observations
 from planner.campaign.low_fidelity import FEW_POSES, LowFidelity
 from planner.campaign.state import Measurement
-from planner.design.acquisitions import mixed
+from planner.design.acquisitions import mixed, repeat_gain
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.design.parameter_sensitivity import FrfNoise
-from planner.design.reductions import repeat_gain
 from planner.design.stopping import Forecast, forecast
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf.frf import Frf

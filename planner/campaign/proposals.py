@@ -14,10 +14,10 @@ from planner.campaign.acquisition_inputs import (
 from planner.campaign.events import Proposal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
-from planner.design.hit_axes import axis_shares
+from planner.design.cost import axis_shares
+from planner.design.parameter_sensitivity import BetterPlaces, better_places
 from planner.design.propose import DESCRIPTIONS, INFORMED, Pick, Travel
 from planner.design.propose import propose as choose
-from planner.design.sensor_places import BetterPlaces, better_places
 from planner.design.space_filling import DESIGNS
 from planner.errors import NoPoseLeftError
 from planner.words import small

@@ -15,9 +15,9 @@ from planner.check.springs import check_band, check_springs
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.collision import Collisions
+from planner.robot.config import WorkspaceTable
 from planner.robot.link_bodies import LinkBody, link_bodies
 from planner.robot.robot import Robot
-from planner.robot.workspace import WorkspaceRanges
 
 POSES = 4  # poses looked at where no workspace is stated
 TRIES = 60  # poses tried to find them
@@ -29,7 +29,7 @@ class Plan:
     """What a campaign asks of a robot; `file` is its campaign.toml."""
 
     file: str
-    workspace: WorkspaceRanges
+    workspace: WorkspaceTable
     band_hz: tuple[float, float]
     count: int
     simulated: bool  # whether it uses the simulation

@@ -5,9 +5,10 @@ import numpy as np
 from planner.check.remark import CheckRemark
 from planner.errors import InputError, NoPoseLeftError
 from planner.robot.collision import Collisions
+from planner.robot.config import WorkspaceTable
 from planner.robot.link_bodies import LinkBody
 from planner.robot.robot import Robot
-from planner.robot.workspace import Candidates, Workspace, WorkspaceRanges
+from planner.robot.workspace import Candidates, Workspace
 
 SPREAD = 8  # poses of the workspace that are looked at
 RADIANS = 6.3  # ranges of joints in degrees that stay below are most likely radians
@@ -54,7 +55,7 @@ def check_collision(
 
 
 def look_around(
-    robot: Robot, table: WorkspaceRanges, file: str
+    robot: Robot, table: WorkspaceTable, file: str
 ) -> tuple[Candidates | None, list[CheckRemark]]:
     """A few poses of the workspace, and what looks wrong in it."""
     where, found = (
@@ -75,7 +76,7 @@ def look_around(
     return candidates, found
 
 
-def _redundant(robot: Robot, table: WorkspaceRanges, file: str) -> list[CheckRemark]:
+def _redundant(robot: Robot, table: WorkspaceTable, file: str) -> list[CheckRemark]:
     """Places of the tool do not say how a robot stands that has more joints than they fix."""
     count = len(robot.tool_joints)
     if table.position_m is None or count <= FIXED_BY_A_PLACE:
@@ -88,7 +89,7 @@ def _redundant(robot: Robot, table: WorkspaceRanges, file: str) -> list[CheckRem
     return [CheckRemark("warning", text, f"{file}, [workspace] position_m", remedy)]
 
 
-def _units(robot: Robot, table: WorkspaceRanges, file: str) -> list[CheckRemark]:
+def _units(robot: Robot, table: WorkspaceTable, file: str) -> list[CheckRemark]:
     joints_deg, position_m = table.joints_deg, table.position_m
     if joints_deg is not None:
         box, slides = np.array(joints_deg, dtype=float), np.array(robot.joints.slides)

@@ -1,4 +1,4 @@
-"""Which hit best discriminates between explanations that the recordings leave tied.
+"""Which hit, or sensor, best discriminates between explanations that recordings leave tied.
 
 T-optimal design (Atkinson & Fedorov 1975): for each pair of fits, the χ² misfit that remains when
 one is refitted, by one linear step, to the FRFs that the other predicts, its present posterior
@@ -6,10 +6,12 @@ being the prior. (Hunter & Reiner 1965 compare without refitting, which counts d
 refitting removes.)
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
+from typing import Any, Self
 
+import msgspec
 import numpy as np
 
 from planner.diagnosis.diagnose import Diagnosis
@@ -20,12 +22,19 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
 from planner.inference.block_diagonal import block_diagonal
 from planner.measurement.nuisances import OF_HAMMER
-from planner.recording.points import TCP, Layout
+from planner.recording.joints import JointUnits
+from planner.recording.points import SENSOR, TCP, Layout
+from planner.words import probable
 
 LIKELY = 0.05  # probability from which an explanation counts as tied with the likeliest
 MOST_TIED = 4  # compared: the likeliest
 LINES = 48  # over the band at which FRFs are compared, evenly spaced
 AXES = 3
+MOST_POSES, SENSOR_POSES = 40, 12  # at which hits, and sensors, are compared, evenly taken
+# A sensor is only worth being moved where it tells so much more than the same hit without it;
+# chosen: odds of 20.
+WORTH = float(np.log(20.0))
+MOST_ODDS = 1e4  # what is said of a robot is never surer
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,3 +129,155 @@ class _Predicted:
             inner = self.precision + columns @ columns.T
             found.append(float(r @ r - pull @ np.linalg.solve(inner, pull)))
         return np.array(found)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TellingHit:
+    """A hit at a pose along an axis ("x", "y", "z"); `log_odds` of what it would tell.
+
+    `between` are the explanations, in words, that it tells apart; joint angles are in degrees.
+    """
+
+    pose: str
+    joints_deg: tuple[float, ...]
+    hit: str
+    log_odds: float
+    between: tuple[str, ...]
+    joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
+
+    @classmethod
+    def best(
+        cls, tied: Sequence[Tied], joints: JointUnits, poses: tuple[list[str], np.ndarray],
+        gain: np.ndarray, **more: Any,
+    ) -> Self:  # fmt: skip
+        """The hit of the largest `gain` (n, 3) at one of n poses, by name and in rad (n, dof)."""
+        names, q = poses
+        place, axis = np.unravel_index(np.argmax(gain), gain.shape)
+        return cls(
+            pose=names[place],
+            joints_deg=tuple(round(float(v), 3) for v in joints.shown(q[place])),
+            hit="xyz"[axis],
+            log_odds=float(gain[place, axis]),
+            between=tuple(in_words(t.places, t.probability) for t in tied),
+            joint_units=joints.declared,
+            **more,
+        )
+
+    @property
+    def where(self) -> str:
+        """Axis, pose and its angles."""
+        names = [""] * len(self.joints_deg)
+        angles = JointUnits.declared_as(names, self.joint_units).listed(self.joints_deg)
+        return f"along {self.hit} at {self.pose} ({angles})"
+
+
+@dataclass(frozen=True, kw_only=True)
+class NextHit(TellingHit):
+    """The hit that best tells apart what a diagnosis leaves tied, and its peak forces in N."""
+
+    force_n: tuple[float, ...]
+
+    @property
+    def sentence(self) -> str:
+        """For the engineer."""
+        force = " and ".join(f"{n:g}" for n in self.force_n)
+        force = f" with about {force} N" if force else ""
+        return (
+            f"To tell apart {' from '.join(self.between)}: hit{force} {self.where}; this hit "
+            f"should separate them {as_ratio(self.log_odds)}."
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExtraSensor(TellingHit):
+    """A `point` of robot.toml, and the hit at the tcp that a sensor there should listen to.
+
+    `log_odds_without` is what the best hit without the sensor would tell.
+    """
+
+    point: str
+    log_odds_without: float
+
+    @property
+    def sentence(self) -> str:
+        """For the engineer."""
+        return (
+            f"A sensor at {self.point} would tell {' from '.join(self.between)}: hit {self.where}; "
+            f"this should separate them {as_ratio(self.log_odds)}, without the sensor "
+            f"{as_ratio(self.log_odds_without)}."
+        )
+
+
+def next_hit(
+    found: Diagnosis, tied: Sequence[Tied], offered: Mapping[str, np.ndarray]
+) -> NextHit | None:
+    """The best hit at one of the `offered` poses, by name: joint angles (dof,) in rad.
+
+    None if nothing is tied or no pose is offered.
+    """
+    if not offered or len(tied) < 2:
+        return None
+    poses = _evenly(offered, MOST_POSES)
+    # All explanations answer in proportion: the harder, the less noise.
+    hardest = [float(found.recorded.level_n[-1])] if found.recorded.visits else []
+    force_n = tuple(_at_most(force) for force in hardest)
+    joints = found.search.prior.repertoire.stiff.robot.joints
+    return NextHit.best(tied, joints, poses, separation(tied, poses[1]), force_n=force_n)
+
+
+def extra_sensor(
+    found: Diagnosis, tied: Sequence[Tied], offered: Mapping[str, np.ndarray]
+) -> ExtraSensor | None:
+    """At which point of robot.toml that no sensor was at one would part most.
+
+    Hits are at the poses that were measured or are `offered`, by name: joint angles (dof,) in rad.
+    None where nothing is tied, no such point is stated, or none tells much more than the sensors
+    that there were.
+    """
+    recorded, robot = found.recorded, found.search.prior.repertoire.stiff.robot
+    there = found.best.misfit.data.measured.layout.sensors
+    places = {robot.points.sensor(name) for name in robot.points.axes} - {*there, SENSOR, TCP}
+    if len(tied) < 2 or not places:
+        return None
+    measured = dict(zip(recorded.poses, recorded.q, strict=True))
+    poses = _evenly({**measured, **offered}, SENSOR_POSES)
+    without = float(separation(tied, poses[1]).max())
+    each = {place: separation(tied, poses[1], (place,)) for place in sorted(places)}
+    point = max(each, key=lambda place: each[place].max())
+    if float(each[point].max()) < without + WORTH:
+        return None
+    told = {"point": point, "log_odds_without": without}
+    return ExtraSensor.best(tied, robot.joints, poses, each[point], **told)
+
+
+def _evenly(poses: Mapping[str, np.ndarray], most: int) -> tuple[list[str], np.ndarray]:
+    """At most so many of named poses, evenly taken: names (n,), joint angles (n, dof) in rad."""
+    names = list(poses)
+    kept = np.unique(np.linspace(0, len(names) - 1, most).round().astype(int))
+    return [names[i] for i in kept], np.array([poses[names[i]] for i in kept])
+
+
+def _at_most(force_n: float) -> float:
+    """Two digits of it, rounded down: nobody is asked to hit harder than before."""
+    unit = 10.0 ** (np.floor(np.log10(force_n)) - 1)
+    return float(np.floor(force_n / unit) * unit)
+
+
+def in_words(places: Sequence[tuple[str, str | None]], probability: float) -> str:
+    """A candidate's effects at their places, and its probability."""
+    said = [
+        "no effect at all"
+        if name == "none"
+        else "something unknown"
+        if at is None
+        else f"{name.replace('_', ' ')} at {at}"
+        for name, at in places
+    ]
+    return f"{' and '.join(said)} ({probable(probability)})"
+
+
+def as_ratio(log_odds: float) -> str:
+    """Natural logarithm of odds as "30 : 1", as an engineer reads them."""
+    if log_odds > np.log(MOST_ODDS):
+        return f"more than {MOST_ODDS:g} : 1"
+    return f"about {float(f'{np.exp(max(log_odds, 0.0)):.2g}'):g} : 1"

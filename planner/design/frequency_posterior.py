@@ -100,7 +100,7 @@ class FrequencyOutputs:
     exact, for it does not depend on what will be measured there.
     """
 
-    posterior: Posterior
+    posteriors: tuple[Posterior, ...]  # (k,)
     workspace: Target
     goal: Target
     noise: np.ndarray  # (k,) variance of one measurement
@@ -118,11 +118,11 @@ class FrequencyOutputs:
         covariance: np.ndarray | None = None,
     ) -> "FrequencyOutputs":
         """As a surrogate leaves them, and the parameters' covariance (p, p) if any are open."""
-        k, posterior = surrogate.count, surrogate.primary.posterior
-        noise = posterior.nugget_variance()[:k] + MEASUREMENT_SD**2
+        k, primary = surrogate.count, surrogate.primary
+        noise = primary.nugget_variance[:k] + MEASUREMENT_SD**2
         open_ = np.zeros((0, 0)) if covariance is None else covariance
         return cls(
-            posterior,
+            primary.likeliest.outputs[:k],
             workspace,
             goal or workspace,
             noise,
@@ -184,4 +184,4 @@ class FrequencyOutputs:
         return np.linalg.solve(root, cross)
 
     def _measured(self, k: int, a: Poses, b: Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.posterior.covariance(k, a.x, a.low[:, k], b.x, b.low[:, k])
+        return self.posteriors[k].covariance(a.x, a.low[:, k], b.x, b.low[:, k])

@@ -10,15 +10,14 @@ from planner.design.acquisitions import (
     integrated_variance,
     mixed,
     mutual_information,
+    parameter_information,
     parameter_variance,
+    stability,
     variance,
 )
-from planner.design.cost import Cost, shortest_tour
+from planner.design.cost import Cost, best_axes, shortest_tour
 from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses, Target
-from planner.design.hit_axes import best_axes
-from planner.design.reductions import parameter_information
 from planner.design.space_filling import DESIGNS
-from planner.design.stability import stability
 from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
 from planner.surrogate.modal_surrogate import Surrogate
@@ -157,7 +156,7 @@ def _one_after_another(
         index, axes, spent = int(free[best]), ALL_AXES, float(minutes[best])
         if travel is not None and travel.shares is not None:
             there = float(travel.cost.travel(travel.q[[index]], at)[0])
-            axes, _ = best_axes(outputs, poses.one(index), travel.shares[index], travel.cost, there)
+            axes = best_axes(outputs, poses.one(index), travel.shares[index], travel.cost, there)
             spent = there + travel.cost.per_pose + travel.cost.hitting(axes)
         picks.append(Pick(index, float(gain[best]), spent, axes))
         at = None if travel is None else travel.q[index]

@@ -5,6 +5,7 @@ square. The model's sds are corrected: leave-one-out residuals, in units of the 
 posterior of a common factor on them (scaled inverse χ², Gelman et al. 2013, section 2.6).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -99,7 +100,7 @@ def forecast(
     squares = mean_squares(outputs, seed)
     open_ = max(0.0, least - float(np.mean(squares)))
     squares += open_
-    count, size = left_out(outputs.posterior, outputs.count)
+    count, size = left_out(outputs.posteriors)
     rng = np.random.default_rng(seed)
     # The residuals of one pose go together: they count as one.
     freedom, total = PRIOR_COUNT + count, PRIOR_COUNT + count * size**2
@@ -121,7 +122,7 @@ def mean_squares(outputs: "FrequencyOutputs", seed: int = 0) -> np.ndarray:
     poses = outputs.workspace.poses[:WORKSPACE_POINTS]
     importance = outputs.workspace.importance[:WORKSPACE_POINTS]
     importance = importance / importance.sum()
-    samples = outputs.posterior.theta.shape[1]
+    samples = len(outputs.posteriors[0].theta)
     each = -(-FIELD_SAMPLES // samples)
     p = len(outputs.covariance_root)
     parameters = rng.standard_normal((samples * each, p)) @ outputs.covariance_root.T
@@ -129,7 +130,7 @@ def mean_squares(outputs: "FrequencyOutputs", seed: int = 0) -> np.ndarray:
     for k in range(outputs.count):
         error = outputs.trust[k] * parameters @ poses.slope[:, k].T
         between, _, _ = outputs.covariance(k, poses, poses)
-        apart = _means_apart(outputs.posterior, k, poses)
+        apart = _means_apart(outputs.posteriors[k], poses.x, poses.low[:, k])
         for s, one in enumerate(between):
             root = _root(one)
             drawn = rng.standard_normal((each, len(poses))) @ root.T
@@ -138,18 +139,17 @@ def mean_squares(outputs: "FrequencyOutputs", seed: int = 0) -> np.ndarray:
     return total
 
 
-def left_out(posterior: "Posterior", count: int) -> tuple[int, float]:
+def left_out(posteriors: "Sequence[Posterior]") -> tuple[int, float]:
     """Measured poses, and the size (rms) of their residuals, left out, in sds of the prediction.
 
     In closed form (Rasmussen & Williams 2006, eq. 5.12), averaged over the hyperparameters.
     """
     squares, poses = [], 0
-    for k in range(count):
-        known = posterior.known(k)
-        poses = max(poses, len(known))
-        if len(known) < 2:
+    for posterior in posteriors:
+        poses = max(poses, len(posterior.x))
+        if len(posterior.x) < 2:
             continue
-        solved = posterior.solved(k)
+        solved = posterior.solved
         variance = 1 / np.sum(solved.whiten**2, axis=1)
         residual = solved.weights * variance
         mixed = np.mean(variance, axis=0) + np.var(residual, axis=0)
@@ -159,10 +159,9 @@ def left_out(posterior: "Posterior", count: int) -> tuple[int, float]:
     return poses, float(np.sqrt(np.mean(np.concatenate(squares))))
 
 
-def _means_apart(posterior: "Posterior", k: int, poses: "Poses") -> np.ndarray:
+def _means_apart(posterior: "Posterior", x: np.ndarray, low: np.ndarray) -> np.ndarray:
     """How far the mean of each hyperparameter sample (s, u) is from that of all."""
-    cross, _ = posterior.cross(k, poses.x, poses.low[:, k])
-    means = (posterior.solved(k).weights[:, None] @ cross)[:, 0]
+    means, _ = posterior.predictive(x, low)
     return means - means.mean(axis=0)
 
 

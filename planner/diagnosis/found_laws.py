@@ -8,7 +8,7 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.dataset.visits import Visit
 from planner.diagnosis.levels import LevelLaw
-from planner.dynamics.in_time import change_at_force
+from planner.dynamics.at_force import change_at_force
 from planner.dynamics.simulation import Simulation
 from planner.recording.force_levels import peak_n, pulse_s
 from planner.recording.records import Hit

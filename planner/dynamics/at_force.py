@@ -1,9 +1,12 @@
-"""A robot whose joints are not linear, linearised for a hit of a stated force.
+"""A robot whose joints are not linear, at a hit of a stated force: linearised, and in time.
 
-How far a joint swings after the hit says which spring and damper come nearest to its law along
-that swing (least squares of the torque), and these say how far it swings: a fixed point. Hits along
-different axes swing joints differently, so that each column of an FRF matrix has springs of its
-own; modes are those of the three hits together.
+Linearised: how far a joint swings after the hit says which spring and damper come nearest to its
+law along that swing (least squares of the torque), and these say how far it swings: a fixed point.
+Hits along different axes swing joints differently, so that each column of an FRF matrix has springs
+of its own; modes are those of the three hits together.
+
+In time: the robot without its laws is propagated pole by pole, exactly for forces and torques that
+are straight between instants; the laws' torques along that motion add their own answer to its FRFs.
 """
 
 from collections.abc import Sequence
@@ -28,6 +31,7 @@ PER_PERIOD = 10  # instants of the highest frequency of the band
 # Time constants of the slowest decay, for which a swing is followed; instants, at most.
 FADED, LONGEST = 4.0, 4000
 TOGETHER = 60  # poses, for which swings are held in memory
+CORRECTED = 3  # times, of a torque at the end of a step
 ROUNDS, SETTLED = 60, 1e-4  # of the fixed point: most, and the change of k that ends it
 
 
@@ -135,8 +139,7 @@ def _after(
     force_n: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Swings and speeds of springs of joints after hits, as of `_swings`."""
-    config, size = simulation.robot.config, m.mass.shape[1]
-    ports = np.broadcast_to(np.eye(size)[own], (len(force_n), len(own), size))
+    config, ports = simulation.robot.config, _ports(m.mass.shape[1], own, len(force_n))
     step_s = 1 / (PER_PERIOD * config.band_hz[1])
     return _swings(_poles(m, springs, ports), force_n, config.hammer.pulse_ms / 1e3, step_s)
 
@@ -157,14 +160,116 @@ def _swings(
     The pulse is sin² over twice `pulse_s`, which is its impulse over its peak.
     """
     poles, length = solved.poles, 2 * pulse_s
-    decay = np.min(np.maximum(-poles.real, FADED / (LONGEST * step_s)))
-    t = step_s * np.arange(np.ceil(FADED / (decay * step_s)))
+    t = step_s * np.arange(np.ceil(_fading_s(poles, step_s) / step_s))
     turn = (2 * np.pi / length) ** 2
     given = np.expm1(poles * length) * turn / (2 * poles * (poles**2 + turn)) * force_n[:, None]
-    # Of conjugate poles one is enough, and all that there is where damping is structural.
-    weight = np.where(poles.imag > 0, 2.0, np.where(poles.imag < 0, 0.0, 1.0))
-    sized = solved.residues * (weight * given)[..., None, None]
+    sized = solved.residues * (_one_of_pairs(poles) * given)[..., None, None]
     course = np.exp(poles[..., None] * t)
     swing = np.einsum("nkjh,nkt->njht", sized, course, optimize=True).real
     speed = np.einsum("nkjh,nkt->njht", sized * poles[..., None, None], course, optimize=True).real
     return swing, speed
+
+
+def _fading_s(poles: np.ndarray, step_s: float) -> float:
+    """How long the slowest decay of poles (n, 2e) is followed."""
+    return float(FADED / np.min(np.maximum(-poles.real, FADED / (LONGEST * step_s))))
+
+
+def _one_of_pairs(poles: np.ndarray) -> np.ndarray:
+    """Weights of poles: of conjugate ones one is enough, and all that there is where damping is
+    structural."""
+    return np.where(poles.imag > 0, 2.0, np.where(poles.imag < 0, 0.0, 1.0))
+
+
+def _ports(size: int, own: Sequence[int], count: int) -> np.ndarray:
+    """Jacobians (count, L, size) of springs themselves, the same at each pose."""
+    return np.broadcast_to(np.eye(size)[list(own)], (count, len(own), size))
+
+
+def change_at_force(
+    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray,
+    in_time: bool = True,
+) -> np.ndarray:  # fmt: skip
+    """By how much (n, 3, 3, F) the accelerance is another than that of springs as stated.
+
+    `in_time` as hits of peak force_n (n,) would measure it, else linearised. 0 where no force is
+    stated (NaN), or the robot has no laws. Raises as `accelerance_at_force`.
+    """
+    change = np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
+    known = np.flatnonzero(np.isfinite(force_n))
+    if known.size and simulation.robot.config.law:
+        of = measured_at_force if in_time else accelerance_at_force
+        there = of(simulation, q[known], force_n[known], frequency_hz)
+        change[known] = there - simulation.accelerance(q[known], frequency_hz)
+    return change
+
+
+def measured_at_force(
+    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray
+) -> np.ndarray:
+    """Accelerance (n, 3, 3, F) in m/s²/N at q (n, dof) in rad, by hits of peak force_n (n,)."""
+    config, m = simulation.robot.config, simulation.elastic.matrices(q)
+    own = [simulation.elastic.own_spring(law.joint) for law in config.law]
+    ports = _ports(m.mass.shape[1], own, len(q))
+    rows = (np.concatenate([one, ports], axis=1) for one in (m.hit, m.sensor))
+    base = _without_laws(simulation, own).solved(replace(m, hit=next(rows), sensor=next(rows)))
+    step_s = 1 / (PER_PERIOD * config.band_hz[1])
+    torque, pulse = _marched(simulation, base, force_n, step_s)
+    force = force_n[:, None] * _spectrum(pulse, frequency_hz, step_s)
+    shares = _spectrum(torque, frequency_hz, step_s) / force[:, None, None]
+    whole = accelerance(base, frequency_hz)
+    return whole[:, :3, :3] - np.einsum("nslf,nlhf->nshf", whole[:, :3, 3:], shares)
+
+
+def _without_laws(simulation: Simulation, own: list[int]) -> Simulation:
+    """The springs and dampers beside the laws."""
+    e = simulation.elasticity
+    stiffness, damping = e.stiffness.copy(), e.damping.copy()
+    for law, spring in zip(simulation.robot.config.law, own, strict=True):
+        stiffness[spring] -= law.k * law.in_spring
+        damping[spring] -= law.k * law.in_damper_s
+    return simulation.changed(Elasticity(stiffness, np.maximum(damping, 0.0), e.loss_factor))
+
+
+def _marched(
+    simulation: Simulation, base: Poles, force_n: np.ndarray, step_s: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Torques (n, L, 3, T) of L laws after hits from rest, and the pulse (T,) of peak 1.
+
+    The pulse is sin² over twice the hammer's `pulse_ms`, which is its impulse over its peak.
+    """
+    laws, length_s = simulation.robot.config.law, 2e-3 * simulation.robot.config.hammer.pulse_ms
+    poles = base.poles
+    t = step_s * np.arange(np.ceil((length_s + _fading_s(poles, step_s)) / step_s))
+    pulse = np.where(t < length_s, np.sin(np.pi * t / length_s) ** 2, 0.0)
+    # By hits, then by torques.
+    felt = base.residues[:, :, 3:] * _one_of_pairs(poles)[..., None, None]
+    z = (poles * step_s)[..., None, None]
+    grow, newer = np.exp(z), step_s * (np.expm1(z) - z) / z**2
+    older = step_s * (1 + np.exp(z) * (z - 1)) / z**2
+    gives = np.sum(newer * felt[..., 3:], axis=1).real
+    sizes = np.array([law.k for law in laws])[:, None]
+    struck, turned = np.zeros((2, *poles.shape, len(laws), 3), dtype=complex)
+    torque, before, states = np.zeros((3, len(poles), len(laws), 3))
+    out = np.zeros((len(t), *torque.shape))
+    for i in range(1, len(t)):
+        struck = grow * struck + older * pulse[i - 1] + newer * pulse[i]
+        turned = grow * turned + older * torque[:, None]
+        free = force_n[:, None, None] * np.sum(felt[..., :3] * struck, axis=1).real
+        free -= np.einsum("nkjl,nklh->njh", felt[..., 3:], turned).real
+        now = free
+        for _ in range(CORRECTED):
+            now = free - gives @ torque
+            each = [law.step(states[:, j], before[:, j], now[:, j], np.array(law.a))
+                    for j, law in enumerate(laws)]  # fmt: skip
+            torque = sizes * np.stack(each, axis=1)
+        turned += newer * torque[:, None]
+        out[i], before, states = torque, now, torque / sizes
+    return np.moveaxis(out, 0, -1), pulse
+
+
+def _spectrum(values: np.ndarray, frequency_hz: np.ndarray, step_s: float) -> np.ndarray:
+    """(…, F) of values (…, T) that begin at 0 and stay as they end."""
+    iw, t = 2j * np.pi * frequency_hz, step_s * np.arange(values.shape[-1])
+    end = np.exp(-iw * t[-1]) * (1 / iw - step_s / 2)
+    return step_s * values @ np.exp(-iw * t[:, None]) + values[..., -1:] * end

@@ -11,7 +11,7 @@ from functools import cache
 
 import numpy as np
 
-from planner.dynamics.motion import ActualPorts, Motion, Turned, synthesis, times_real
+from planner.dynamics.motion import ActualPorts, Motion, synthesis, times_real
 from planner.dynamics.simulation import Elasticity
 from planner.robot.elastic_model import Matrices
 
@@ -26,11 +26,6 @@ class Inertias:
 
     jacobians: np.ndarray
     basis: np.ndarray
-
-    def mass_change(self, values: np.ndarray) -> np.ndarray:
-        """Change (n, e, e) of M for values (B · p,) of the parameters."""
-        weighted = np.einsum("bpij,bp->bij", self.basis, values.reshape(self.basis.shape[:2]))
-        return np.sum(np.swapaxes(self.jacobians, 2, 3) @ weighted @ self.jacobians, axis=1)
 
 
 Terms = tuple[tuple[int, np.ndarray], ...]
@@ -77,27 +72,6 @@ def response(
 ) -> np.ndarray:
     """Accelerance (n, 3s, 3h, F) in m/s²/N at s (n, F); `mass` (n, e, e) takes M's place."""
     return synthesis(matrices.sensor, _solutions(matrices, elasticity, s, mass, matrices.hit), s)
-
-
-def response_turned(
-    matrices: Matrices, elasticity: Elasticity, s: np.ndarray, mass: np.ndarray | None = None
-) -> tuple[np.ndarray, Turned]:
-    """Accelerance (n, 3s, 3h, F) at s (n, F), and what goes with it."""
-    motion = moved(matrices, elasticity, s, mass)
-    return motion.accelerance, Turned((motion,))
-
-
-def response_gradient(
-    matrices: Matrices,
-    elasticity: Elasticity,
-    s: np.ndarray,
-    mass: np.ndarray | None = None,
-    inertias: Inertias | None = None,
-    added: Sequence[Impedance] = (),
-) -> tuple[np.ndarray, np.ndarray]:
-    """Accelerance (n, 3s, 3h, F) at s (n, F), and its derivatives as of `motion_slopes`."""
-    motion = moved(matrices, elasticity, s, mass, added)
-    return motion.accelerance, motion_slopes(motion, elasticity, inertias, added)
 
 
 def moved(

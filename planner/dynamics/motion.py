@@ -5,14 +5,12 @@ its place, or turned, shows accelerations and angular accelerations of the state
 measured is between *actual ports*: real combinations of those that robot.toml states.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from planner.robot.angle_slopes import AngleSlopes
-from planner.robot.elastic_model import Matrices
+from planner.robot.elastic_model import AngleSlopes, Matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,10 +28,6 @@ class ActualPorts:
     matrix: np.ndarray
     scale: np.ndarray
     angle: np.ndarray
-
-    def at(self, poses: slice | np.ndarray) -> "ActualPorts":
-        """Of some of the poses."""
-        return ActualPorts(*(getattr(self, name)[poses] for name in self.__dataclass_fields__))
 
     def struck(self, matrices: Matrices) -> np.ndarray:
         """(n, 3h, e) of the hits."""
@@ -119,6 +113,21 @@ class Motion:
         return self.scaled(np.swapaxes(synthesis(ports, self.x_sensor, self.s), 1, 2))
 
     @property
+    def forces(self) -> np.ndarray:
+        """(n, 3s, 3h, F) in m/s² per N along the stated axes, as the sensors show them."""
+        return self.shown_of(self.matrices.hit)
+
+    @property
+    def moment(self) -> np.ndarray:
+        """(n, 3s, 3h, F) in m/s² per N·m at the hit point."""
+        return self.shown_of(self.matrices.hit_turn)
+
+    @property
+    def turning(self) -> np.ndarray:
+        """(n, 3s, 3h, F) in rad/s² per N: how the sensor turns."""
+        return self.moving(self.matrices.sensor_turn)
+
+    @property
     def by_angle(self) -> np.ndarray | None:
         """(n, dof, 3s, 3h, F) in m/s²/N per rad of each joint; None where slopes are not known."""
         slopes = self.matrices.by_angle
@@ -127,65 +136,6 @@ class Motion:
         if self.actual is not None:
             slopes = self.actual.slopes(slopes)
         return self.scaled(_by_angle(slopes, self.x_hit, self.x_sensor, self.s))
-
-
-@dataclass(frozen=True, eq=False)
-class Turned:
-    """What goes with accelerances (n, 3s, 3h, F): responses to moments, to turned joints.
-
-    Made of the motions of poses one after another, each where it is first asked for. What is
-    recorded is `left` (n, 3s, 3s, F), if that is given, times what the sensors show.
-    """
-
-    motions: tuple[Motion, ...]
-    left: np.ndarray | None = None
-
-    @cached_property
-    def forces(self) -> np.ndarray:
-        """(n, 3s, 3h, F) in m/s² per N along the stated axes, as the sensors show them."""
-        return self._joined(lambda m: m.shown_of(m.matrices.hit))
-
-    @cached_property
-    def moment(self) -> np.ndarray:
-        """(n, 3s, 3h, F) in m/s² per N·m at the hit point."""
-        return self._joined(lambda m: m.shown_of(m.matrices.hit_turn))
-
-    @cached_property
-    def felt(self) -> np.ndarray:
-        """(n, 3s, 3h, F) in m/s² per hit in N, as faultless sensors would show it."""
-        return self._joined(lambda m: m.felt)
-
-    @cached_property
-    def turning(self) -> np.ndarray:
-        """(n, 3s, 3h, F) in rad/s² per N: how the sensor turns."""
-        return self._joined(lambda m: m.moving(m.matrices.sensor_turn))
-
-    @cached_property
-    def by_angle(self) -> np.ndarray | None:
-        """(n, dof, 3s, 3h, F) in m/s²/N per rad of each joint; None where slopes are not known."""
-        found = [values for m in self.motions if (values := m.by_angle) is not None]
-        return self._recorded(found) if len(found) == len(self.motions) else None
-
-    @property
-    def actual(self) -> ActualPorts | None:
-        """Where hits and sensors were, if that is known."""
-        known = [m.actual for m in self.motions if m.actual is not None]
-        if len(known) < len(self.motions):
-            return None
-        names = ActualPorts.__dataclass_fields__
-        return ActualPorts(*(np.concatenate([getattr(one, n) for one in known]) for n in names))
-
-    def _joined(self, of: Callable[[Motion], np.ndarray]) -> np.ndarray:
-        return self._recorded([of(motion) for motion in self.motions])
-
-    def _recorded(self, parts: list[np.ndarray]) -> np.ndarray:
-        whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
-        return whole if self.left is None else recorded(self.left, whole)
-
-
-def recorded(left: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """`left` (n, r, r, F) times values (n, …, r, c, F)."""
-    return np.einsum("nijf,n...jkf->n...ikf", left, values, optimize=True)
 
 
 def synthesis(rows: np.ndarray, x: np.ndarray, s: np.ndarray) -> np.ndarray:

@@ -46,22 +46,16 @@ class SimulatedModes:
     residue: np.ndarray
 
     def __getitem__(self, poses: np.ndarray | slice) -> "SimulatedModes":
-        return SimulatedModes(
-            self.frequency_hz[poses], self.damping_ratio[poses], self.residue[poses]
-        )
+        return SimulatedModes(*(values[poses] for values in vars(self).values()))
 
     @classmethod
     def joined(cls, parts: "Sequence[SimulatedModes]") -> "SimulatedModes":
         """Of the poses of all parts, in their order."""
-        both = ("frequency_hz", "damping_ratio", "residue")
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in both))
+        return cls(*map(np.concatenate, zip(*(vars(part).values() for part in parts), strict=True)))
 
     def lowest(self, count: int) -> "SimulatedModes":
         """The `count` lowest of them."""
-        kept = slice(count)
-        return SimulatedModes(
-            self.frequency_hz[:, kept], self.damping_ratio[:, kept], self.residue[:, kept]
-        )
+        return SimulatedModes(*(values[:, :count] for values in vars(self).values()))
 
     @property
     def shape(self) -> np.ndarray:

@@ -30,8 +30,8 @@ from planner.effects.structural_damping import LossFactors
 from planner.effects.varying_spring import HATS, AngleSpring, Drift, FrequencyDependentJoint
 from planner.errors import InputError
 from planner.robot.config import BASE, Compliance
-from planner.robot.massless_base import massless_base
 from planner.robot.robot import Robot
+from planner.robot.virtual_joints import massless_base
 
 # Damping of what is not stated, in s of stiffness: 0.1 to 3 % of critical at 5 to 30 Hz.
 DAMPING_S = 1e-4, 3e-3

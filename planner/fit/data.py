@@ -9,8 +9,7 @@ from planner.effects.effect import PosedBodies
 from planner.fit.structure import RobotPrior, RobotStructure
 from planner.frf.frf import Frf
 from planner.measurement.measured_frfs import Measured, common_band, matrices_at, stack
-from planner.robot.angle_slopes import AngleSlopes
-from planner.robot.elastic_model import Matrices
+from planner.robot.elastic_model import AngleSlopes, Matrices
 
 SMALLEST = 1e-4  # relative sd of any value: no record is more exact
 

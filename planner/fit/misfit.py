@@ -12,7 +12,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from planner.dynamics.gradient import Impedance, Inertias, motion_slopes, moved
-from planner.dynamics.motion import Motion, Turned
+from planner.dynamics.motion import Motion
 from planner.effects.effect import Gain, Motions
 from planner.fit.data import FrfData, among
 from planner.fit.inertias import spatial
@@ -245,8 +245,8 @@ class FrfMisfit:
         column is for the residual.
         """
         motion, s = self.motion(x, eta), self.structure
-        h, turned = motion.accelerance, Turned((motion,))
-        open_ = basis(h, turned, self.data.measured.s, self.tolerances)
+        h = motion.accelerance
+        open_ = basis(h, motion, self.data.measured.s, self.tolerances)
         numbers, joints = self.open_numbers
         own = s.size + numbers.hits + joints
         out = np.empty((len(h), own + len(s.springs) + 1, *h.shape[1:]), dtype=complex)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.dynamics.motion import Turned
+from planner.dynamics.motion import Motion
 from planner.robot.config import HitsTable, ReadbackTable, RobotConfig, SensorTable
 
 ACROSS = ((1, 2), (2, 0), (0, 1))  # the two directions across each axis, in cyclic order
@@ -138,60 +138,32 @@ def chain_basis(
     return out
 
 
-def basis(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> np.ndarray:
-    """All of them of the poses, (n, l, r, c, F): as `OpenNumbers` counts them.
+def basis(h: np.ndarray, motion: Motion, s: np.ndarray, t: Tolerances) -> np.ndarray:
+    """All of them of the poses, (n, l, r, c, F), of FRFs h: as `OpenNumbers` counts them.
 
-    Those of the joints are there where the matrices behind `turned` have their slopes. Where it
+    Those of the joints are there where the matrices behind `motion` have their slopes. Where it
     knows of actual ports, h and the changes are around those.
     """
-    return _basis(_Answers.of(h, turned), s, t)
-
-
-@dataclass(frozen=True, eq=False)
-class _Answers:
-    """FRFs h (n, r, c, F), and what the changes are made of: see `Turned`.
-
-    `matrix` (n, r, r) is what the sensors show of what they feel, None where that is everything.
-    """
-
-    h: np.ndarray
-    forces: np.ndarray
-    moment: np.ndarray
-    felt: np.ndarray
-    turning: np.ndarray
-    by_angle: np.ndarray | None
-    matrix: np.ndarray | None
-
-    @classmethod
-    def of(cls, h: np.ndarray, turned: Turned) -> "_Answers":
-        actual, by_angle = turned.actual, turned.by_angle
-        if actual is None:
-            return cls(h, h, turned.moment, h, turned.turning, by_angle, None)
-        return cls(
-            h, turned.forces, turned.moment, turned.felt, turned.turning, by_angle, actual.matrix
-        )
-
-
-def _basis(a: _Answers, s: np.ndarray, t: Tolerances) -> np.ndarray:
-    n, rows, columns, lines = a.h.shape
-    numbers = OpenNumbers.of(a.h)
-    joints = 0 if a.by_angle is None else a.by_angle.shape[1]
+    n, rows, columns, lines = h.shape
+    numbers, by_angle, actual = OpenNumbers.of(h), motion.by_angle, motion.actual
+    joints = 0 if by_angle is None else by_angle.shape[1]
     # All is written once, in place: such arrays are large.
     out = np.zeros((n, numbers.known + joints, rows, columns, lines), dtype=complex)
     by_axis = out[:, : numbers.hits].reshape(n, columns, OF_HIT, rows, columns, lines)
+    forces, felt = (h, h) if actual is None else (motion.forces, motion.felt)
     # A miss along an axis changes the column of that axis only: a view of these.
-    hit_basis(a.forces, a.moment, t, np.einsum("namiaf->namif", by_axis))
+    hit_basis(forces, motion.moment, t, np.einsum("namiaf->namif", by_axis))
     of_chain = out[:, numbers.hits : numbers.known]
-    chain_basis(a.felt, a.turning, s, t, of_chain)
-    if a.matrix is not None:
+    chain_basis(felt, motion.turning, s, t, of_chain)
+    if actual is not None:  # of what the sensors feel, they show so much
         for sensor in range(rows // 3):
             places = of_chain[:, OF_SENSOR * sensor + 9 : OF_SENSOR * (sensor + 1)]
-            places[:] = np.einsum("nij,nkjcf->nkicf", a.matrix, places)
-        np.multiply(a.h, t.force_gain, out=of_chain[:, -2])
-        np.multiply(a.h, -t.delay_s * s[:, None, None], out=of_chain[:, -1])
-    if a.by_angle is not None:
+            places[:] = np.einsum("nij,nkjcf->nkicf", actual.matrix, places)
+        np.multiply(h, t.force_gain, out=of_chain[:, -2])
+        np.multiply(h, -t.delay_s * s[:, None, None], out=of_chain[:, -1])
+    if by_angle is not None:
         sd = np.broadcast_to(t.joint_rad, joints).reshape(-1, 1, 1, 1)
-        np.multiply(a.by_angle, sd, out=out[:, numbers.known :])
+        np.multiply(by_angle, sd, out=out[:, numbers.known :])
     return out
 
 

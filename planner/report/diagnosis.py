@@ -9,12 +9,10 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planner.design.discrimination import LIKELY
-from planner.design.extra_sensor import ExtraSensor
-from planner.design.next_hit import NextHit, in_words
+from planner.design.discrimination import LIKELY, ExtraSensor, NextHit, in_words
 from planner.diagnosis.diagnose import ThreefoldSimilarity
 from planner.diagnosis.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
-from planner.dynamics.in_time import change_at_force
+from planner.dynamics.at_force import change_at_force
 from planner.effects.effect import Operator
 from planner.errors import InputError, writing
 from planner.fit.posterior import RobotPosterior

@@ -148,8 +148,7 @@ def robot_predictions(
     Raises InputError where its simulation is not possible there, or the file cannot be written.
     """
     from planner.campaign.at_force import UNCHANGED
-    from planner.dynamics.at_force import modes_at_force
-    from planner.dynamics.in_time import change_at_force
+    from planner.dynamics.at_force import change_at_force, modes_at_force
     from planner.dynamics.simulation import Simulation
 
     simulation, band = Simulation(robot), robot.config.band_hz

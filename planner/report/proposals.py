@@ -19,7 +19,7 @@ from planner.words import counted
 
 if TYPE_CHECKING:
     from planner.campaign.model import RepeatedPose
-    from planner.design.sensor_places import BetterPlaces
+    from planner.design.parameter_sensitivity import BetterPlaces
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
     """Of the poses that `Campaign.next` gave."""
     # Status needs none of what these import.
     from planner.campaign.proposals import places_for
-    from planner.robot.room_directions import axes_in_the_room
+    from planner.robot.place_names import axes_in_the_room
 
     robot, model = campaign.cell.robot, campaign.model
     each = campaign.cell.config.cost.hits_per_axis

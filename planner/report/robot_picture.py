@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
 from planner.report.plot_marks import empty, plain_text
-from planner.robot.link_bodies import LinkBody
+from planner.robot.link_bodies import LinkBody, RobotLines, robot_lines
 from planner.robot.robot import Robot
-from planner.robot.skeleton import RobotLines, robot_lines
 
 LINK, SHAPE, OBSTACLE, MASS = "0.25", "tab:blue", "tab:brown", "tab:orange"
 AXIS_COLOURS = "tab:red", "tab:green", "tab:blue"  # x, y, z, as CAD programs have them

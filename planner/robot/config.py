@@ -1,9 +1,10 @@
 """robot.toml: what URDF cannot say."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import msgspec
+import numpy as np
 
 from planner.robot.joint_laws import LawTable
 
@@ -247,6 +248,18 @@ class ControllerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     speed_percent: float = 10.0
 
 
+class WorkspaceTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where the model has to be good: a joint box, or positions with a tool axis.
+
+    In `joints_deg`, here and elsewhere, the numbers of joints that slide are millimetres.
+    """
+
+    joints_deg: list[tuple[float, float]] | None = None
+    position_m: list[tuple[float, float]] | None = None
+    tool_axis: tuple[float, float, float] | None = None
+    rotation_deg: tuple[float, float] | None = None
+
+
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
@@ -295,3 +308,15 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 LISTS = "compliance", "payload", "resonator", "harmonic"  # that effects add to
+
+Order = Sequence[tuple[int, int]]
+STATED: Order = (0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)  # robot.toml, as in a URDF
+PINOCCHIO: Order = (0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)
+
+
+def symmetric(values: Sequence[float] | np.ndarray, order: Order) -> np.ndarray:
+    """(3, 3) of its six numbers in some order."""
+    found = np.zeros((3, 3))
+    for (i, j), value in zip(order, values, strict=True):
+        found[i, j] = found[j, i] = value
+    return found

@@ -13,20 +13,25 @@ from planner.robot.config import (
     BASE,
     LISTS,
     LOSS_FACTOR_BELOW,
+    STATED,
     Compliance,
     DiagnoseTable,
     HitsTable,
     ReadbackTable,
     RobotConfig,
     SensorTable,
+    symmetric,
 )
 from planner.robot.joint_laws import NUMBER_ENTRIES, LawTable
-from planner.robot.moments import STATED, symmetric
 from planner.toml_file import load_toml
 from planner.words import command
 
 if TYPE_CHECKING:
     from planner.robot.robot import Robot
+from dataclasses import replace
+
+from planner.recording.joints import AxisColumn
+from planner.robot.config import ControllerTable
 
 LARGEST_SD_PERCENT = 1000.0  # a factor of 11 either way: beyond, nothing is stated
 # Of springs (N·m/rad, N/m) and dampers: 10⁷ times a heavy robot's.
@@ -268,3 +273,49 @@ def check_entries(robot: "Robot") -> None:
             f"{robot.urdf_path}: {robot.joint_names[bad[0]]} has no range between its limits; "
             f"give lower and upper in {'m' if robot.joints.slides[bad[0]] else 'rad'}."
         )
+
+
+def axes_of(
+    table: ControllerTable, joints: JointUnits, path: Path
+) -> list[tuple[str, float, float]]:
+    """The controller's axes in order: joint of the URDF, sign, offset in degrees (slides: mm).
+
+    Raises InputError, naming robot.toml's `path`, where they do not suit the robot.
+    """
+    names = joints.names
+    order = table.joints or names
+    if sorted(order) != sorted(names):
+        raise InputError(
+            f"{path}: [controller] joints names {', '.join(order)}; it needs each of "
+            f"{', '.join(names)} once."
+        )
+    for entry, values in (("signs", table.signs), ("offsets_deg", table.offsets_deg)):
+        if values and len(values) != len(order):
+            raise InputError(
+                f"{path}: [controller] {entry} has {len(values)} numbers, the robot "
+                f"{len(order)} joints; give one a joint."
+            )
+    missing = [name for name in table.external if name not in names]
+    if missing:
+        raise InputError(
+            f'{path}: [controller] external names "{missing[0]}", which is no joint of the '
+            f"robot; it has {', '.join(names)}."
+        )
+    signs = table.signs or (1.0,) * len(order)
+    offsets = table.offsets_deg or (0.0,) * len(order)
+    return list(zip(order, signs, offsets, strict=True))
+
+
+def column_names(arm: int, external: int) -> list[str]:
+    """What tables call so many axes of the arm and external ones, without their units."""
+    return [f"{k}{i}" for k, n in (("A", arm), ("E", external)) for i in range(1, n + 1)]
+
+
+def with_axes(table: ControllerTable, joints: JointUnits, path: Path) -> JointUnits:
+    """Joints whose tables may be in the controller's axes too, as `export poses` writes them."""
+    axes = sorted(axes_of(table, joints, path), key=lambda axis: axis[0] in table.external)
+    external = len(table.external)
+    named = zip(axes, column_names(len(axes) - external, external), strict=True)
+    unit = dict(zip(joints.names, joints.units, strict=True))
+    found = {j: AxisColumn(f"{name}_{unit[j]}", s, o) for (j, s, o), name in named}
+    return replace(joints, axes=tuple(found[name] for name in joints.names))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from planner.errors import InputError
 from planner.robot.collision import Collisions
 from planner.robot.config import ControllerTable
-from planner.robot.controller_axes import axes_of, column_names
+from planner.robot.config_file import axes_of, column_names
 from planner.robot.robot import Robot
 from planner.words import counted
 

@@ -4,23 +4,46 @@ Each [[compliance]] of robot.toml is a small rotation right after (outboard of) 
 about an axis of the joint's child frame; joints themselves are held by their brakes. The mass
 matrix does not depend on stiffness or damping (Birk et al. 2025, section 2; Busch et al. 2020,
 section 2.1), and is linear in the inertias of the bodies.
+
+How all that changes with the robot's own joint angles: a body's Jacobian in the body's own frame
+has the columns J_c. Turning joint k changes those of all that lies between the floor and it by
+−[J_k, J_c], the bracket of two motions (Lynch & Park 2017, section 5.1.2 and exercise 5.14), and
+leaves the others as they are.
 """
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
 from planner.recording.points import TOOL, Layout
-from planner.robot.angle_slopes import AngleSlopes, mass_slopes, turned
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import inertia_basis, virtual_model
 
 SINGULAR = 1e-12  # smallest eigenvalue of the mass matrix scaled to ones on its diagonal
 SAG_STEPS = 4  # each gains three digits or more where sagging is small at all
+
+
+@dataclass(frozen=True, eq=False)
+class AngleSlopes:
+    """By each of `dof` joint angles, of n poses and e elastic degrees of freedom.
+
+    `mass` (n, dof, e, e) in kg·m²/rad, `hit` (n, dof, 3h, e) and `sensor` (n, dof, 3s, e) in
+    m/rad², `stiffness` (n, dof, e) in N·m/rad² of springs that go with the angle. Left out is
+    what moves with the weight: sag and gravity's stiffness change by a thousandth as much.
+    """
+
+    mass: np.ndarray
+    hit: np.ndarray
+    sensor: np.ndarray
+    stiffness: np.ndarray
+
+    def at(self, poses: slice | np.ndarray) -> "AngleSlopes":
+        """Of some of the poses."""
+        return AngleSlopes(*(values[poses] for values in vars(self).values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,11 +163,12 @@ class ElasticModel:
         hits: Sequence[str] = (),
         sensors: Sequence[str] = (),
         layout: Layout = TOOL,
+        slopes: bool = False,
     ) -> Matrices:
         """Matrices of poses q (n, dof) in rad, between named frames of the URDF.
 
-        Where none are named, between the points of a layout. Raises InputError where a frame does
-        not exist.
+        Where none are named, between the points of a layout; `slopes` are asked for by
+        `with_slopes`. Raises InputError where a frame does not exist.
         """
         q = np.atleast_2d(q)
         n, e, robot = len(q), self.size, self.robot
@@ -168,43 +192,29 @@ class ElasticModel:
                     jacobians[i, k] = pin.computeFrameJacobian(
                         self._model, data, full, frame, pin.LOCAL
                     )
+        by_angle = self._slopes(q, *out) if slopes else None
         out = [jacobians @ self._elastic for jacobians in out]
         # Of the mass matrix the upper half is given.
         whole = np.triu(whole) + np.swapaxes(np.triu(whole, 1), 1, 2)
         mass = self._elastic.T @ whole @ self._elastic
         hit, sensor = (jacobians[:, :, :3].reshape(n, -1, e) for jacobians in out)
         hit_turn, sensor_turn = (jacobians[:, :, 3:].reshape(n, -1, e) for jacobians in out)
-        return Matrices(mass, hit, sensor, geometric, hit_turn, sensor_turn)
+        return Matrices(mass, hit, sensor, geometric, hit_turn, sensor_turn, by_angle)
 
     def with_slopes(self, q: np.ndarray, layout: Layout = TOOL) -> Matrices:
         """Matrices of poses q (n, dof) in rad, and how they change with the joint angles."""
-        q = np.atleast_2d(q)
-        return replace(self.matrices(q, layout=layout), by_angle=self._slopes(q, layout))
+        return self.matrices(q, layout=layout, slopes=True)
 
-    def _slopes(self, q: np.ndarray, layout: Layout) -> AngleSlopes:
-        data, weight = self._model.createData(), self._weighed.createData()
-        joints, size = self._virtual.carriers, self._model.nv
-        bodies = np.empty((len(q), len(joints), 6, size))
-        hits, sensors = self.robot.layout_ids(layout)
-        ends = np.empty((len(q), len(hits) + len(sensors), 6, size))
-        stiffness = np.empty((len(q), len(self.robot.joint_names), self.size))
-        frames = [self._virtual.frames[k] for k in (*hits, *sensors)]
-        for i, row in enumerate(q):
-            pin.computeJointJacobians(self._model, data, self._standing(row, weight))
-            for b, joint in enumerate(joints):
-                bodies[i, b] = pin.getJointJacobian(self._model, data, joint, pin.LOCAL)
-            for k, frame in enumerate(frames):
-                pin.updateFramePlacement(self._model, data, frame)
-                ends[i, k] = pin.getFrameJacobian(self._model, data, frame, pin.LOCAL)
-            stiffness[i] = self._angle_slope(row)
+    def _slopes(self, q: np.ndarray, hits: np.ndarray, sensors: np.ndarray) -> AngleSlopes:
+        """Of Jacobians (n, points, 6, v) of hits and sensors."""
         places = self._virtual.rigid, self._elastic
         inertia = np.einsum("bk,kij->bij", self.inertia, inertia_basis())
-        moved = turned(ends, *places)[..., :3, :]
+        mass = mass_slopes(self._bodies(q), inertia, *places)
+        stiffness = np.array([self._angle_slope(row) for row in q])
         # (n, points, dof, 3, e), the points side by side with their axes.
-        moved = np.moveaxis(moved, 1, 2).reshape(len(q), len(stiffness[0]), -1, self.size)
-        mass = mass_slopes(bodies, inertia, *places)
-        at_hits = 3 * len(hits)
-        return AngleSlopes(mass, moved[:, :, :at_hits], moved[:, :, at_hits:], stiffness)
+        moved = (np.moveaxis(turned(ends, *places)[..., :3, :], 1, 2) for ends in (hits, sensors))
+        both = (one.reshape(*stiffness.shape[:2], -1, self.size) for one in moved)
+        return AngleSlopes(mass, *both, stiffness)
 
     def body_jacobians(self, q: np.ndarray) -> np.ndarray:
         """(n, bodies, 6, e) at q (n, dof) in rad: how the elastic rotations move the bodies.
@@ -212,14 +222,17 @@ class ElasticModel:
         In the frame of the joint that carries the body, linear part (m/rad) first. With the
         spatial inertias I of the bodies (`virtual.inertia_basis`), M = Σ Jᵀ I J.
         """
-        q = np.atleast_2d(q)
+        return self._bodies(np.atleast_2d(q)) @ self._elastic
+
+    def _bodies(self, q: np.ndarray) -> np.ndarray:
+        """The same (n, bodies, 6, v) by all coordinates of the virtual model."""
         data, weight = self._model.createData(), self._weighed.createData()
         out = np.empty((len(q), len(self.bodies), 6, self._model.nv))
         for i, row in enumerate(q):
             pin.computeJointJacobians(self._model, data, self._standing(row, weight))
             for b, joint in enumerate(self._virtual.carriers):
                 out[i, b] = pin.getJointJacobian(self._model, data, joint, pin.LOCAL)
-        return out @ self._elastic
+        return out
 
     def sag(self, q: np.ndarray) -> np.ndarray:
         """By how much the springs give (n, e) under the weight at q (n, dof), in rad (slides: m).
@@ -275,3 +288,35 @@ class ElasticModel:
         gradient = pin.computeGeneralizedGravityDerivatives(self._weighed, data, full)
         part = self._elastic.T @ np.array(gradient) @ self._elastic
         return (part + part.T) / 2
+
+
+def turned(jacobian: np.ndarray, rigid: np.ndarray, elastic: np.ndarray) -> np.ndarray:
+    """Slopes (..., dof, 6, e) of a Jacobian (..., 6, v) in its own frame, of elastic rotations.
+
+    `rigid` (v, dof) and `elastic` (v, e) say how the joints and the elastic rotations move the v
+    coordinates; those nearer to the floor come first.
+    """
+    turning, giving = (np.flatnonzero(moves.any(axis=1)) for moves in (rigid, elastic))
+    joint = np.moveaxis(jacobian[..., turning], -1, -2)[..., None]  # (..., turning, 6, 1)
+    inner = (giving < turning[:, None])[:, None]
+    column = np.where(inner, jacobian[..., None, :, giving], 0.0)
+    linear, angular = slice(0, 3), slice(3, 6)
+
+    def cross(a: slice, b: slice) -> np.ndarray:
+        return np.cross(joint[..., a, :], column[..., b, :], axis=-2)
+
+    moved = cross(angular, linear) + cross(linear, angular)
+    slopes = -np.concatenate([moved, cross(angular, angular)], axis=-2) @ elastic[giving]
+    return np.moveaxis(np.tensordot(rigid[turning], slopes, axes=(0, -3)), 0, -3)
+
+
+def mass_slopes(
+    bodies: np.ndarray, inertia: np.ndarray, rigid: np.ndarray, elastic: np.ndarray
+) -> np.ndarray:
+    """(n, dof, e, e) of M = Σ Jᵀ I J, of Jacobians (n, B, 6, v) and inertias (B, 6, 6)."""
+    slope = turned(bodies, rigid, elastic)
+    momentum = inertia @ (bodies @ elastic)
+    n, _, dof, _, e = slope.shape
+    rows = np.moveaxis(slope, (2, 4), (1, 2)).reshape(n, dof * e, -1)
+    half = (rows @ momentum.reshape(n, -1, e)).reshape(n, dof, e, e)
+    return half + np.swapaxes(half, 2, 3)

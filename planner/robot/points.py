@@ -40,11 +40,8 @@ def check_points(points: Sequence[PointTable], path: Path) -> None:
             raise InputError(f"{entry} has a position_m or rpy_deg that is no finite number.")
 
 
-def with_points(
-    model: pin.Model, points: Sequence[PointTable], ids: Iterable[int]
-) -> tuple[int, ...]:
-    """Numbers of new frames of the model, at the points; `ids` are those of their links' frames."""
-    found = []
+def add_points(model: pin.Model, points: Sequence[PointTable], ids: Iterable[int]) -> None:
+    """New frames of the model, at the points; `ids` are the numbers of their links' frames."""
     for point, number in zip(points, ids, strict=True):
         frame = model.frames[number]
         turn = pin.rpy.rpyToMatrix(*np.deg2rad(point.rpy_deg))
@@ -52,8 +49,7 @@ def with_points(
         added = pin.Frame(
             PREFIX + point.name, frame.parentJoint, number, place, pin.FrameType.OP_FRAME
         )
-        found.append(int(model.addFrame(added)))
-    return tuple(found)
+        model.addFrame(added)
 
 
 def names_of(

@@ -12,13 +12,18 @@ from planner.errors import InputError
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout, PointNames
 from planner.robot.config import Compliance, PointTable, RobotConfig
-from planner.robot.config_file import check_entries, check_laws, check_own_springs, load_config
-from planner.robot.controller_axes import with_axes
-from planner.robot.linkage import Linkage
-from planner.robot.points import PREFIX, check_points, names_of, with_points
+from planner.robot.config_file import (
+    check_entries,
+    check_laws,
+    check_own_springs,
+    load_config,
+    with_axes,
+)
+from planner.robot.points import PREFIX, add_points, check_points, names_of
 from planner.robot.shapes import UnusableShape, leave_out_unusable
 from planner.robot.urdf import build_model, read_urdf
 from planner.robot.urdf_elements import state_inertias
+from planner.robot.urdf_joints import Linkage
 
 LEVER_M = 0.3  # half the length of a carriage, chosen
 # A link and the joint that carries it may share a name; the link is meant.
@@ -78,7 +83,7 @@ class Robot:
         joints = with_axes(config.controller, joints, robot_toml)
         robot = cls(config, robot_toml, urdf, text, model, linkage, joints, left_out)
         check_points(config.point, robot_toml)
-        with_points(model, config.point, (robot._link_of_point(p) for p in config.point))
+        add_points(model, config.point, (robot._link_of_point(p) for p in config.point))
         check_entries(robot)
         check_own_springs(config, joints, robot.joint_axes, robot_toml)
         check_laws(robot)
@@ -108,11 +113,15 @@ class Robot:
 
     def link_of(self, joint: str) -> str:
         """The link that a joint moves, of all joints; KeyError if there is no such joint."""
-        number = (None, *self.linkage.names).index(joint)
-        for frame in self.model.frames:
-            if frame.type == pin.FrameType.BODY and frame.parentJoint == number:
-                return frame.name
-        raise KeyError(joint)
+        frames = self.body_frames((None, *self.linkage.names).index(joint))
+        if not frames:
+            raise KeyError(joint)
+        return frames[0].name
+
+    def body_frames(self, joint: int) -> list[pin.Frame]:
+        """Frames of the links that a joint carries, by Pinocchio's number; 0: the base."""
+        bodies = (f for f in self.model.frames if f.type == pin.FrameType.BODY)
+        return [frame for frame in bodies if frame.parentJoint == joint]
 
     def slides(self, joint: str) -> bool:
         """Whether a joint slides along its axis."""

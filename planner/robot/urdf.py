@@ -38,11 +38,6 @@ def read_urdf(urdf: Path, robot_toml: Path, held: Mapping[str, float]) -> Elemen
             f"{robot_toml}: its URDF {urdf} cannot be read ({error.strerror}); correct the entry "
             f"urdf."
         ) from None
-    return parse_urdf(text, urdf, held)
-
-
-def parse_urdf(text: bytes | str, urdf: Path, held: Mapping[str, float]) -> ElementTree.Element:
-    """The same of a URDF's text; errors name the file `urdf`."""
     root = _root(text, urdf)
     if not settle_joints(root, urdf, held):
         raise InputError(f"{urdf} has no joint that moves; name the URDF of a robot arm.")

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pinocchio as pin
 
-from planner.robot.config import LinkTable
-from planner.robot.moments import STATED, symmetric
+from planner.robot.config import STATED, LinkTable, symmetric
 
 TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
 ENTRIES = dict(zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), STATED, strict=True))

@@ -7,7 +7,6 @@ import pinocchio as pin
 
 from planner.robot.config import BASE
 from planner.robot.mesh_files import urdf_source
-from planner.robot.moments import PINOCCHIO, symmetric
 from planner.robot.robot import Robot
 from planner.robot.urdf_elements import link_inertia, state_inertias, write_inertia
 from planner.robot.virtual_joints import OUTER, SMALL, body_inertia, cut_at
@@ -59,13 +58,11 @@ def _joint_of(robot: Robot, body: str) -> int:
 
 
 def _heaviest(robot: Robot, body: str, links: dict) -> pin.Frame:
-    joint = _joint_of(robot, body)
-    frames = [
-        frame
-        for frame in robot.model.frames
-        if frame.type == pin.FrameType.BODY and frame.parentJoint == joint and frame.name in links
-    ]
-    return max(frames, key=lambda frame: link_inertia(links[frame.name]).mass)
+    frames = robot.body_frames(_joint_of(robot, body))
+    return max(
+        (frame for frame in frames if frame.name in links),
+        key=lambda frame: link_inertia(links[frame.name]).mass,
+    )
 
 
 def stated_shares(robot: Robot, body: str) -> tuple[tuple[float, float], ...]:
@@ -79,28 +76,19 @@ def stated_shares(robot: Robot, body: str) -> tuple[tuple[float, float], ...]:
     if body.endswith(OUTER):
         body, _ = _of_whole(robot, body.removesuffix(OUTER), np.zeros(10))
     joint = _joint_of(robot, body)
+    carried = {frame.name for frame in robot.body_frames(joint)}
     whole, found = float(body_inertia(robot, joint)[0]), []
     for link in ElementTree.fromstring(robot.urdf_text).findall("link"):
         name = link.get("name", "")
-        if name in stated and _carrier(robot, name) == joint and whole > 0:
+        if name in stated and name in carried and whole > 0:
             found.append((link_inertia(link).mass / whole, stated[name]))
     return tuple(found)
 
 
-def _carrier(robot: Robot, link: str) -> int:
-    """Number of the joint that a link turns with."""
-    return robot.model.frames[robot.frame_id("[[link]] link", link)].parentJoint
-
-
 def _seen_from(placement: pin.SE3, values: np.ndarray) -> np.ndarray:
     """Inertial numbers (10,), or a change of them, in a frame that is placed in theirs."""
-    turn, at = placement.rotation, placement.translation
-    toward = np.eye(4)
-    toward[:3, :3], toward[:3, 3] = turn.T, -turn.T @ at
-    moved = toward @ _spread(values) @ toward.T
-    second = moved[:3, :3]
-    moments = np.trace(second) * np.eye(3) - second
-    return np.array([moved[3, 3], *moved[:3, 3], *(moments[ij] for ij in PINOCCHIO)])
+    toward = placement.inverse().homogeneous
+    return pin.PseudoInertia.FromMatrix(toward @ _spread(values) @ toward.T).toDynamicParameters()
 
 
 def _spread(values: np.ndarray) -> np.ndarray:
@@ -108,26 +96,21 @@ def _spread(values: np.ndarray) -> np.ndarray:
 
     Wensing, Kim & Slotine 2018, eq. 12.
     """
-    moments = symmetric(values[4:], PINOCCHIO)
-    second = np.trace(moments) / 2 * np.eye(3) - moments
-    return np.block([[second, values[1:4, None]], [values[None, 1:4], values[:1, None]]])
+    return pin.PseudoInertia.FromDynamicParameters(values).toMatrix()
 
 
 def _change(link: ElementTree.Element, values: np.ndarray) -> float:
-    """Add the share of `values` (10,) that is possible to a link; returns it."""
-    nominal = np.array(link_inertia(link).toDynamicParameters())
-    share = _possible(_spread(nominal), _spread(values))
-    if share > 0:
-        write_inertia(link, pin.Inertia.FromDynamicParameters(nominal + share * values))
-    return share
+    """Add the share of `values` (10,) that is possible to a link; returns it.
 
-
-def _possible(nominal: np.ndarray, change: np.ndarray) -> float:
-    """Share of a change of a pseudo-inertia that keeps it positive; 0 where it is not so before."""
+    That is the one that keeps the pseudo-inertia positive; 0 where it is not so before.
+    """
     import scipy.linalg  # 0.2 s, which reading inertias does not need
 
+    nominal = np.array(link_inertia(link).toDynamicParameters())
     try:
-        least = scipy.linalg.eigh(change, nominal, eigvals_only=True)[0]
+        least = scipy.linalg.eigh(_spread(values), _spread(nominal), eigvals_only=True)[0]
     except np.linalg.LinAlgError:
         return 0.0
-    return 1.0 if least > -SAFE else float(SAFE / -least)
+    share = 1.0 if least > -SAFE else float(SAFE / -least)
+    write_inertia(link, pin.Inertia.FromDynamicParameters(nominal + share * values))
+    return share

@@ -7,8 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
-from planner.robot.config import BASE
-from planner.robot.moments import PINOCCHIO, STATED, symmetric
+from planner.robot.config import BASE, PINOCCHIO, STATED, Payload, symmetric
 from planner.robot.points import PREFIX
 from planner.robot.robot import Robot
 
@@ -261,3 +260,24 @@ def inertia_basis() -> np.ndarray:
     for number, (i, j) in enumerate(PINOCCHIO, 4):
         basis[number, 3 + i, 3 + j] = basis[number, 3 + j, 3 + i] = 1.0
     return basis
+
+
+SHARE = 1e-5  # of the robot's mass: changes no frequency in the band by a millionth
+
+
+def massless_base(robot: Robot) -> tuple[Payload, ...]:
+    """A little mass for a base to which neither the URDF nor a [[payload]] gives any, else none.
+
+    Many URDFs state none, as the base stands still. Where it gives beside a joint 1 that gives
+    about all axes, the mass matrix would have no inverse.
+    """
+    model = robot.model
+    if model.inertias[0].mass > 0:
+        return ()
+    mass = SHARE * sum(inertia.mass for inertia in model.inertias)
+    reach = max(float(np.linalg.norm(place.translation)) for place in model.jointPlacements)
+    moment = mass * reach**2
+    fixed = [frame.name for frame in robot.body_frames(0)]
+    own = Payload(fixed[0], mass, (0.0, 0.0, 0.0), (moment, 0.0, 0.0, moment, 0.0, moment))
+    others = any(block.link in fixed and block != own for block in robot.config.payload)
+    return () if others else (own,)

@@ -7,7 +7,7 @@ from pathlib import Path
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.campaign.taking_back import last_acts, last_undone
-from planner.robot.room_directions import axes_in_the_room
+from planner.robot.place_names import axes_in_the_room
 from planner.session import session_text
 from planner.session.course import BAD, Course, PoseInProgress
 from planner.session.hit_verdicts import HitVerdict

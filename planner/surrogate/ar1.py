@@ -5,13 +5,13 @@ simulation is deterministic and costs milliseconds, so the low-fidelity level is
 modelled. An output without simulation is a plain GP: the same with no ρ·y_L.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from planner.surrogate.gp import Posterior, fit
 from planner.surrogate.kernels import Kernel, parse
-from planner.surrogate.training_data import Prior, TrainingData, pad, widened
+from planner.surrogate.training_data import Prior, TrainingData, pad
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,20 @@ class AR1:
     Where the simulation has no value, it is taken as `centre` ± `unknown_sd` (m,).
     """
 
-    posterior: Posterior
+    outputs: tuple[Posterior, ...]
     uses_low: np.ndarray
     centre: np.ndarray
     unknown_sd: np.ndarray
+
+    @property
+    def log_evidence(self) -> np.ndarray:
+        """(m,)."""
+        return np.array([one.log_evidence for one in self.outputs])
+
+    @property
+    def asked(self) -> np.ndarray:
+        """(m,) whether there is something to doubt the simulation by: measurements beside it."""
+        return self.uses_low & np.array([len(one.x) > 0 for one in self.outputs], dtype=bool)
 
     def predict(
         self,
@@ -71,10 +81,11 @@ class AR1:
         """
         base, offset = self.split(low)
         blind = (self.uses_low[None, :] & ~np.isfinite(low)) * self.unknown_sd[None, :]
-        if outputs is not None:
-            base, blind = base[:, outputs], blind[:, outputs]
-        mean, sd = self.posterior.predict(x, offset, outputs, nugget)
-        return mean + base, np.hypot(sd, blind)
+        asked = np.arange(len(self.outputs)) if outputs is None else outputs
+        mean, sd = np.empty((2, len(x), len(asked)))
+        for i, j in enumerate(asked):
+            mean[:, i], sd[:, i] = self.outputs[j].predict(x, offset[:, j], nugget)
+        return mean + base[:, asked], np.hypot(sd, blind[:, asked])
 
     def split(self, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What ρ = 1 predicts, and the centred value that ρ − 1 multiplies; (q, m) each."""
@@ -109,16 +120,13 @@ def fit_ar1(
     sd = np.hypot(np.where(np.isnan(data.sd), 0.0, data.sd), blind * unknown_sd[None, :])
     padded = pad(TrainingData(data.x, data.y - low, sd, low - centre[None, :]), uses_low)
     prior = _stack(priors, uses_low, parse(kernel, data.x.shape[1] + sees_low))
-    scale, start, plain = None, None, padded.x
-    if sees_low:
-        scale = unknown_sd
-        padded = replace(padded, x=widened(padded.x, padded.low, scale))
+    scale, start = unknown_sd if sees_low else None, None
     if thorough:
         from planner.surrogate.likelihood import laplace  # by JAX, which takes a second to import
 
-        start = laplace(kernel, padded, prior)
-    posterior = fit(padded, prior, samples, kept, kernel, 2 if thorough else 1, start)
-    return AR1(replace(posterior, x=plain, low_scale=scale), uses_low, centre, unknown_sd)
+        start = laplace(kernel, padded if scale is None else padded.widened(scale), prior)
+    outputs = fit(padded, prior, samples, kept, kernel, 2 if thorough else 1, start, scale)
+    return AR1(outputs, uses_low, centre, unknown_sd)
 
 
 def _uses_low(data: TrainingData, centre: np.ndarray) -> np.ndarray:

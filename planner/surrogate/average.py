@@ -16,7 +16,7 @@ import numpy as np
 from planner.inference.log_space import log_sum, shares
 from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
 from planner.surrogate.gp import Posterior
-from planner.surrogate.training_data import Prior, TrainingData
+from planner.surrogate.training_data import TrainingData
 
 PRIOR_BELIEF = 0.5  # in the simulation, before anything is measured
 NEGLIGIBLE_WEIGHT = 1e-3  # up to which a model is not evaluated for an output
@@ -39,41 +39,29 @@ class Average:
     weights: np.ndarray
     log_evidence: np.ndarray
 
-    @property
-    def posterior(self) -> Posterior:
-        """Of the likeliest models."""
-        return self.likeliest.posterior
+    @classmethod
+    def of_one(cls, model: AR1) -> "Average":
+        """One model alone."""
+        return cls((model,), np.ones((1, len(model.outputs))), model.log_evidence)
 
     @property
     def counted(self) -> list[int]:
         """Which of the models are not negligible for every output."""
         return np.flatnonzero(self.weights.max(axis=1) > NEGLIGIBLE_WEIGHT).tolist()
 
-    @property
-    def posteriors(self) -> tuple[Posterior, ...]:
-        """Of the models that count."""
-        return tuple(self.models[i].posterior for i in self.counted)
-
     @cached_property
     def likeliest(self) -> AR1:
         """Of every output the likeliest model, the first of equals; all have one kernel."""
-        chosen = np.argmax(self.weights, axis=0)
+        best = [self.models[i] for i in np.argmax(self.weights, axis=0)]
+        given = [(m.uses_low[j], m.centre[j], m.unknown_sd[j]) for j, m in enumerate(best)]
+        uses_low, centre, unknown_sd = np.array(given).reshape(-1, 3).T
+        outputs = tuple(model.outputs[j] for j, model in enumerate(best))
+        return AR1(outputs, uses_low.astype(bool), centre, unknown_sd)
 
-        def pick(arrays: Sequence[np.ndarray]) -> np.ndarray:
-            return np.choose(chosen.reshape(-1, *[1] * (arrays[0].ndim - 1)), arrays)
-
-        def picked(names: Sequence[str], owners: Sequence[object]) -> dict[str, np.ndarray]:
-            return {name: pick([getattr(one, name) for one in owners]) for name in names}
-
-        each = [model.posterior for model in self.models]
-        names = ("y", "variance", "low", "mask", "theta", "slope_sd", "log_evidence")
-        posterior = replace(
-            each[0],
-            prior=Prior(**picked(tuple(vars(each[0].prior)), [p.prior for p in each])),
-            jitter=max(p.jitter for p in each),
-            **picked(names, each),
-        )
-        return AR1(posterior, **picked(("uses_low", "centre", "unknown_sd"), self.models))
+    @property
+    def nugget_variance(self) -> np.ndarray:
+        """Mean nugget variance (m,) of the likeliest models."""
+        return np.array([one.nugget_variance for one in self.likeliest.outputs])
 
     def predict(
         self, x: np.ndarray, low: np.ndarray, nugget: bool = False
@@ -83,8 +71,7 @@ class Average:
         For `nugget` see `Posterior.predict`.
         """
         counted = np.where(self.weights > NEGLIGIBLE_WEIGHT, self.weights, 0.0)
-        shape = len(self.models), len(x), self.weights.shape[1]
-        means, sds = np.zeros(shape), np.zeros(shape)
+        means, sds = np.zeros((2, len(self.models), len(x), self.weights.shape[1]))
         for model, weight, mean, sd in zip(self.models, counted, means, sds, strict=True):
             some = np.flatnonzero(weight)
             if len(some):
@@ -119,10 +106,9 @@ def fit_hedged(
     fused = fit_fused(data, with_low, without_low, centre, *how)
     nothing = np.full(len(centre), np.nan)
     alone = fit_ar1(unsimulated(data), with_low, without_low, nothing, *how)
-    evidence = np.array([m.posterior.log_evidence for m in (fused, alone)])
+    evidence = np.array([m.log_evidence for m in (fused, alone)])
     odds = evidence + np.log([[belief], [1 - belief]])
-    # Without a measurement there is nothing to doubt the simulation by.
-    odds[1, ~(fused.uses_low & fused.posterior.mask.any(axis=1))] = -np.inf
+    odds[1, ~fused.asked] = -np.inf
     return Average((fused, alone), shares(odds, axis=0), log_sum(evidence, axis=0))
 
 
@@ -145,7 +131,7 @@ def fit_shapes(
         for seen, there in sides
         for kernel in kernels
     )
-    evidence = np.array([m.posterior.log_evidence for m in models])
+    evidence = np.array([m.log_evidence for m in models])
     whole = log_sum(evidence, axis=0) - np.log(len(models))
     return Average(models, shares(evidence, axis=0), whole)
 
@@ -171,43 +157,36 @@ def fit_plain_or_free(
     """
     how = samples, kept, kernel
     free = fit_ar1(data, with_low, without_low, centre, *how)
-    asked = free.uses_low & free.posterior.mask.any(axis=1)
-    if not asked.any():
+    if not free.asked.any():
         return free
-    plain = tuple(map(_plain, with_low))
+    plain = tuple(
+        replace(p, slope_sd=0.0, amplitude=NO_DISCREPANCY, spread=0.0,
+                nugget_spread=p.spread if p.nugget_spread is None else p.nugget_spread)
+        for p in with_low
+    )  # fmt: skip
     models = [free, fit_ar1(data, plain, without_low, centre, PLAIN_SAMPLES, kept, "bias")]
     if max(prior.slope_sd for prior in with_low) > GENTLE_SLOPE_SD:
         gentle = tuple(replace(p, slope_sd=min(p.slope_sd, GENTLE_SLOPE_SD)) for p in with_low)
         models.append(fit_ar1(data, gentle, without_low, centre, *how))
-    return _samples_of_all(models, asked)
+    each = zip(free.asked, *(model.outputs for model in models), strict=True)
+    outputs = tuple(_samples_of_all(of) if asked else of[0] for asked, *of in each)
+    return replace(free, outputs=outputs)
 
 
-def _plain(prior: OutputPrior) -> OutputPrior:
-    nugget_spread = prior.spread if prior.nugget_spread is None else prior.nugget_spread
-    return replace(
-        prior, slope_sd=0.0, amplitude=NO_DISCREPANCY, spread=0.0, nugget_spread=nugget_spread
-    )
-
-
-def _samples_of_all(models: list[AR1], asked: np.ndarray) -> AR1:
-    """Samples of all models, of each as many as its weight says; of the first where not `asked`."""
-    posteriors = [model.posterior for model in models]
-    first = posteriors[0]
-    _, kept, size = first.theta.shape
-    evidence = np.array([p.log_evidence for p in posteriors])
-    evidence[1:, ~asked] = -np.inf
-    edges = np.cumsum(shares(evidence, axis=0), axis=0)[:-1]  # (models − 1, m)
+def _samples_of_all(each: Sequence[Posterior]) -> Posterior:
+    """Samples of all fits of an output, of each as many as its weight says."""
+    kept, size = each[0].theta.shape
+    evidence = np.array([one.log_evidence for one in each])
     # Samples stand in an order; those that stay of each model are spread over it.
     place = (np.argsort(np.argsort((np.arange(kept) * GOLDEN_RATIO) % 1.0)) + 0.5) / kept
-    chosen = np.sum(place[None, None, :] > edges[:, :, None], axis=0)  # (m, kept)
+    chosen = np.searchsorted(np.cumsum(shares(evidence, axis=0))[:-1], place)  # (kept,)
     # Length scales of no discrepancy mean nothing.
-    thetas = [np.pad(p.theta, [(0, 0), (0, 0), (0, size - p.theta.shape[2])]) for p in posteriors]
-    posterior = replace(
-        first,
-        theta=np.choose(chosen[:, :, None], thetas),
-        slope_sd=np.choose(chosen, [p.slope_sd for p in posteriors]),
+    thetas = [np.pad(one.theta, [(0, 0), (0, size - one.theta.shape[1])]) for one in each]
+    return replace(
+        each[0],
+        theta=np.choose(chosen[:, None], thetas),
+        slope_sd=np.choose(chosen, [one.slope_sd for one in each]),
         # Each is believed as much as a GP that ignores the simulation, with which this is compared.
-        log_evidence=log_sum(evidence, axis=0),
-        jitter=max(p.jitter for p in posteriors),
+        log_evidence=float(log_sum(evidence, axis=0)),
+        jitter=max(one.jitter for one in each),
     )
-    return replace(models[0], posterior=posterior)

@@ -35,8 +35,7 @@ class FrequencyData:
     """What a model is fitted to: `data` of n poses, and the simulation at others.
 
     `elsewhere` are their coordinates (N, d) and the simulation's ln f (N, m). Priors and `centre`
-    are as of `fit_ar1`; `belief` is the simulation's probability before these data, `scatter`
-    whether the scatter from visit to visit is learned.
+    are as of `fit_ar1`; `belief` is the simulation's probability before these data.
     """
 
     data: TrainingData
@@ -45,7 +44,6 @@ class FrequencyData:
     centre: np.ndarray
     elsewhere: tuple[np.ndarray, np.ndarray] | None = None
     belief: float = PRIOR_BELIEF
-    scatter: bool = True
     kernel: str = KERNEL
 
     def ar1(self, data: TrainingData, kernel: str = "", **how: bool) -> AR1:
@@ -73,51 +71,49 @@ class Predicting(Average):
     ) -> tuple[np.ndarray, np.ndarray]:
         """As of `Average.predict`."""
         mean, sd = self.other.predict(x, low)
-        return mean, np.hypot(sd, np.sqrt(self.posterior.nugget_variance())) if nugget else sd
-
-
-def _alone(model: AR1) -> Average:
-    evidence = model.posterior.log_evidence
-    return Average((model,), np.ones((1, len(evidence))), evidence)
+        return mean, np.hypot(sd, np.sqrt(self.nugget_variance)) if nugget else sd
 
 
 def _default(seen: FrequencyData) -> Average:
-    fused = fit_plain_or_free if seen.scatter else fit_ar1
     priors = seen.with_low, seen.without_low, seen.centre
-    how = SAMPLES, KEPT, seen.belief, fused, seen.kernel
+    how = SAMPLES, KEPT, seen.belief, fit_plain_or_free, seen.kernel
     return fit_hedged(seen.data, *priors, *how)
 
 
 def _gp(seen: FrequencyData) -> Average:
     nothing = replace(seen, centre=np.full_like(seen.centre, np.nan))
-    return _alone(nothing.ar1(unsimulated(seen.data)))
+    return Average.of_one(nothing.ar1(unsimulated(seen.data)))
 
 
 def _ar1(seen: FrequencyData) -> Average:
-    return _alone(seen.ar1(seen.data))
+    return Average.of_one(seen.ar1(seen.data))
 
 
 def _nargp(seen: FrequencyData) -> Average:
-    from planner.surrogate.models.nargp import perdikaris  # by JAX, which takes a second to import
+    from planner.surrogate.models.likelihood_gp import (
+        perdikaris,  # by JAX, which takes a second to import
+    )
 
     product = perdikaris(seen.data.x.shape[1], seen.kernel)
-    return _alone(seen.ar1(seen.data, product, sees_low=True, thorough=len(seen.data.x) > 1))
+    return Average.of_one(
+        seen.ar1(seen.data, product, sees_low=True, thorough=len(seen.data.x) > 1)
+    )
 
 
 def _none(seen: FrequencyData) -> Average:
     exact = {"bias_sd": NO_DISCREPANCY, "slope_sd": 0.0, "amplitude": NO_DISCREPANCY}
     plain = tuple(replace(prior, **exact) for prior in seen.with_low)
-    return _alone(replace(seen, with_low=plain).ar1(seen.data, "bias"))
+    return Average.of_one(replace(seen, with_low=plain).ar1(seen.data, "bias"))
 
 
 def _multitask(seen: FrequencyData) -> Average:
-    from planner.surrogate.models.chosen import fit_tasks
+    from planner.surrogate.models.multitask import fit_tasks
 
     return _predicting(seen, fit_tasks)
 
 
 def _mfdgp(seen: FrequencyData) -> Average:
-    from planner.surrogate.models.chosen import fit_deep
+    from planner.surrogate.models.mfdgp import fit_deep
 
     return _predicting(seen, fit_deep)
 

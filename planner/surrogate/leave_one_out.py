@@ -6,10 +6,12 @@ have seen the measurement, are weighed by how little they needed it (importance 
 truncated weights, Ionides 2008).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from planner.surrogate.ar1 import AR1
 from planner.surrogate.average import mixed
 from planner.surrogate.frf_bands import ModalPrediction
 from planner.surrogate.gp import Posterior
@@ -43,16 +45,15 @@ class LeaveOneOut:
         return np.argsort(-size, kind="stable")[:count]
 
 
-def leave_one_out(posterior: Posterior, measurements: int) -> LeaveOneOut:
-    """Of the first `measurements` (n) rows that the posterior was fitted to."""
+def leave_one_out(outputs: Sequence[Posterior], measurements: int) -> LeaveOneOut:
+    """Of the first `measurements` (n) rows that the outputs were fitted to."""
     from scipy.special import ndtr  # 0.1 s, which predictions do not need
 
-    shape = (measurements, len(posterior.mask))
+    shape = (measurements, len(outputs))
     error, sd, rank = (np.full(shape, np.nan) for _ in range(3))
-    for j in range(shape[1]):
-        known = posterior.known(j)
-        known = known[known < measurements]
-        count, solved = len(known), posterior.solved(j)
+    for j, output in enumerate(outputs):
+        known = output.rows[output.rows < measurements]
+        count, solved = len(known), output.solved
         precision = np.sum(solved.whiten**2, axis=1)[:, :count]  # (k, i): diagonal of K⁻¹
         off, spread = solved.weights[:, :count] / precision, 1 / np.sqrt(precision)
         needed = 0.5 * (off / spread) ** 2 + np.log(spread) + 0.5 * np.log(2 * np.pi)
@@ -74,17 +75,17 @@ def left_out_modes(surrogate: Surrogate, seen: ModalObservations) -> ModalPredic
     n, k = seen.frequency_hz.shape
     plain = surrogate.predict(seen.x, seen.simulated)
     assert surrogate.residue is not None
-    frequency = _without([surrogate.primary.posterior], np.ones((1, k)), np.log(seen.frequency_hz))
+    frequency = _without([surrogate.primary.likeliest], np.ones((1, k)), np.log(seen.frequency_hz))
     fits = surrogate.damping
     weights = fits.weights[fits.counted]
-    damping = _without(list(fits.posteriors), weights, np.log(seen.damping_ratio))
+    damping = _without([fits.models[i] for i in fits.counted], weights, np.log(seen.damping_ratio))
     hertz = _log_normal(frequency, plain.frequency_hz, plain.frequency_sd_hz)
     zeta = _log_normal(damping, plain.damping_ratio, plain.damping_sd)
     scale = surrogate.scale[:, None, None]
     parts = np.stack([seen.residue.real, seen.residue.imag], axis=-1) / scale[..., None]
     parts[np.isnan(seen.residue)] = np.nan
     mean, sd = _without(
-        [surrogate.residue.posterior], np.ones((1, 18 * k)), parts.reshape(n, 18 * k)
+        [surrogate.residue.likeliest], np.ones((1, 18 * k)), parts.reshape(n, 18 * k)
     )
     mean, sd = (v.reshape(n, k, 3, 3, 2) for v in (mean, sd))
     known = np.isfinite(mean).all(axis=-1)
@@ -94,10 +95,10 @@ def left_out_modes(surrogate: Surrogate, seen: ModalObservations) -> ModalPredic
 
 
 def _without(
-    posteriors: list[Posterior], weights: np.ndarray, y: np.ndarray
+    models: list[AR1], weights: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean and sd (n, m) of y (n, m) left out, models (a, m) by weight; NaN where y is."""
-    found = [leave_one_out(posterior, len(y)) for posterior in posteriors]
+    found = [leave_one_out(model.outputs, len(y)) for model in models]
     return mixed(weights, np.array([y - f.error for f in found]), np.array([f.sd for f in found]))
 
 

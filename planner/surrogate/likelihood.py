@@ -1,13 +1,16 @@
 """Likelihood of data under a GP by JAX: at many hyperparameters, and their most probable values."""
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.scipy.linalg import cho_solve
+from scipy.optimize import minimize
 
 from planner import jax_setup
-from planner.surrogate.quasi_newton import maximise
 from planner.surrogate.training_data import Padded, Prior, data_covariance
 
 # Likelihoods, and elements of their covariances, that are worked out together: whatever is asked of
@@ -17,6 +20,12 @@ REACH = 4.0  # sds of the prior beyond which nothing is looked for
 SUBSET_POINTS = 128  # that are enough to find the neighbourhood of the MAP
 JITTER = 1e-12  # of the prior variance, added where the MAP is looked for
 
+LogDensity = Callable[[np.ndarray], tuple[float, np.ndarray]]
+
+# Stands for the objective where it is not finite, as beyond a failed Cholesky factor: larger than
+# any −log density met, yet finite, so that the line search comes back by a shorter step.
+INFEASIBLE = 1e10
+RELATIVE_TOLERANCE = 2.22e-9  # scipy's default: 1e7 times the rounding of a double
 _Data = tuple[np.ndarray, ...]  # x (c, d), y, low, mask, variance (c,), sds of b and ρ'
 
 
@@ -137,3 +146,59 @@ def _precision(kernel: str, z: Array, mean: Array, sd: Array, *data: Array) -> A
     factor, slopes = jnp.linalg.cholesky(covariance(z)), jax.jacfwd(covariance)(z)
     solved = jax.vmap(lambda s: cho_solve((factor, True), s), in_axes=2)(slopes)
     return 0.5 * jnp.einsum("iab,jba->ij", solved, solved) + jnp.eye(z.shape[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Peak:
+    """The highest point found: x (p,) and the log density there (−∞ if none was finite)."""
+
+    x: np.ndarray
+    log_density: float
+
+
+def maximise(
+    log_density: LogDensity,
+    starts: Sequence[np.ndarray],
+    lower: float | np.ndarray,
+    upper: float | np.ndarray,
+    most_steps: int = 200,
+    relative_tolerance: float = RELATIVE_TOLERANCE,
+) -> Peak:
+    """The best end of L-BFGS-B (Byrd et al. 1995) from each of `starts`.
+
+    Args:
+        log_density: maps x (p,) to the log density and its gradient (p,); where either is not
+            finite, x is infeasible and the step is shortened. jax arrays may be returned.
+        starts: points (p,) to begin at, one at least.
+        lower: least value of each entry of x, one for all or (p,).
+        upper: greatest value of each entry of x, one for all or (p,).
+        most_steps: iterations from each start.
+        relative_tolerance: an iteration that gains less than this share of the log density is the
+            last.
+
+    Returns:
+        The highest end; the first start with −∞ where the log density was nowhere finite.
+    """
+
+    def negative(x: np.ndarray) -> tuple[float, np.ndarray]:
+        value, slope = log_density(x)
+        value, slope = float(value), np.array(slope, dtype=float)
+        if not (np.isfinite(value) and np.isfinite(slope).all()):
+            return INFEASIBLE, np.zeros(len(x))
+        return -value, -slope
+
+    ones = np.ones(len(starts[0]))
+    bounds = list(zip(lower * ones, upper * ones, strict=True))
+    best = Peak(np.asarray(starts[0]), -np.inf)
+    for start in starts:
+        done = minimize(
+            negative,
+            start,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=bounds,
+            options={"maxiter": most_steps, "ftol": relative_tolerance},
+        )
+        if done.fun < min(INFEASIBLE, -best.log_density):
+            best = Peak(done.x, -float(done.fun))
+    return best

@@ -15,11 +15,18 @@ from planner.surrogate.ar1 import OutputPrior
 from planner.surrogate.average import PRIOR_BELIEF, Average, fit_hedged, fit_shapes
 from planner.surrogate.frequency_models import DEFAULT, KERNEL, MODELS, FrequencyData
 from planner.surrogate.frf_bands import ModalPrediction
+from planner.surrogate.gp import remarks
 from planner.surrogate.training_data import TrainingData
 
-# Stiffnesses off by ±30 % move frequencies by 15 %; EMA repeats a frequency to about 0.1 %.
-FREQUENCY_PRIOR = OutputPrior(bias_sd=0.15, slope_sd=0.2, amplitude=0.03, nugget=0.002)
-FREQUENCY_PRIOR_ALONE = OutputPrior(1.0, 0.0, amplitude=0.2, nugget=0.002, mean=float(np.log(20.0)))
+# Visits to a pose scatter by 0 to 1 % of ln f (temperature, clamping, readback) beyond what EMA
+# states: median of the scatter, its log-sd, and the share of the latter's square that modes have
+# in common, chosen on generated cells. Stiffnesses off by ±30 % move frequencies by 15 %.
+FREQUENCY_PRIOR = OutputPrior(
+    bias_sd=0.15, slope_sd=0.2, amplitude=0.03, nugget=0.003, nugget_spread=1.0, nugget_shared=0.7
+)
+FREQUENCY_PRIOR_ALONE = replace(
+    FREQUENCY_PRIOR, bias_sd=1.0, slope_sd=0.0, amplitude=0.2, mean=float(np.log(20.0))
+)
 DAMPING_PRIOR = OutputPrior(1.0, 0.0, amplitude=0.15, nugget=0.05, mean=float(np.log(0.03)))
 DAMPING_KERNELS = ("bias", "cubic", "matern52")  # of Busch et al. 2022; any shape
 DAMPING_RANGE = -0.25, 1.25  # of coordinates; beyond it damping stays: polynomials run away
@@ -30,11 +37,6 @@ RESIDUE_PRIOR_ALONE = OutputPrior(bias_sd=0.7, slope_sd=0.0, amplitude=0.5, nugg
 DAMPING_PRIOR_IDENTIFIED = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nugget=0.02)
 RESIDUE_PRIOR_IDENTIFIED = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
 TYPICAL_RESIDUE = 1e-5  # m/(N·s), a robot's, where neither data nor simulation say anything
-FITTED_NUGGET = 1e-3  # of ln f beside an identified simulation
-# Visits to a pose scatter by 0 to 1 % of ln f (temperature, clamping, readback) beyond what EMA
-# states: median of the scatter, its log-sd, and the share of the latter's square that modes have
-# in common, chosen on generated cells.
-VISIT_SCATTER, VISIT_SCATTER_SPREAD, VISIT_SCATTER_SHARED = 0.003, 1.0, 0.7
 RESIDUE_SAMPLES, RESIDUE_KEPT = 64, 8
 
 
@@ -69,7 +71,6 @@ class Surrogate:
     damping: Average  # log ζ of every label
     residue: Average | None  # real and imaginary parts, scaled; None: they were not asked for
     scale: np.ndarray  # (k,) m/(N·s)
-    visits: bool = True  # whether the scatter from visit to visit is learned
 
     @property
     def count(self) -> int:
@@ -79,14 +80,14 @@ class Surrogate:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What went wrong in the fits, each once."""
-        fits = [self.primary.posterior, *self.damping.posteriors]
-        fits += [self.residue.posterior] if self.residue is not None else []
-        return tuple(dict.fromkeys(remark for fit in fits for remark in fit.remarks))
+        fits = [self.primary.likeliest, *(self.damping.models[i] for i in self.damping.counted)]
+        fits += [self.residue.likeliest] if self.residue is not None else []
+        return tuple(dict.fromkeys(said for fit in fits for said in remarks(fit.outputs)))
 
     @property
     def visit_scatter(self) -> np.ndarray:
         """(k,) sd of ln f from visit to visit, beyond what the modal analysis states."""
-        return np.sqrt(self.primary.posterior.nugget_variance())
+        return np.sqrt(self.primary.nugget_variance)
 
     @property
     def frequency_trust(self) -> np.ndarray:
@@ -133,7 +134,7 @@ class Surrogate:
         self, x: np.ndarray, simulated_hz: np.ndarray, visit: bool = True
     ) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies and their sds (q, k) in Hz, as of `predict`."""
-        mean, sd = self.primary.predict(x, _log(simulated_hz), self.visits and visit)
+        mean, sd = self.primary.predict(x, _log(simulated_hz), visit)
         f = np.exp(mean)
         return f, f * _relative_sd(sd)
 
@@ -167,7 +168,6 @@ def fit_primary(
     seen: ModalObservations,
     discrepancy: np.ndarray | None = None,
     belief: float = PRIOR_BELIEF,
-    visits: bool = True,
     model: str = DEFAULT,
     kernel: str | None = None,
     elsewhere: tuple[np.ndarray, np.ndarray] | None = None,
@@ -179,26 +179,19 @@ def fit_primary(
         discrepancy: how far ln f (k,) of a simulation that was fitted to these very modes is off
             elsewhere; its error at the measured poses says too little. None: it was not fitted.
         belief: probability of the simulation before these frequencies.
-        visits: whether the scatter from visit to visit is looked for, in all modes together. If
-            not, this is the model of campaigns that began before it was.
         model, kernel: names in `frequency_models.MODELS` and `kernels.KERNELS`.
         elsewhere: poses (N, d) and the simulation's frequencies (N, k) in Hz there, for models that
             learn the simulation too.
     """
     k = seen.frequency_hz.shape[1]
     y, low = _log(seen.frequency_hz), _log(seen.simulated.frequency_hz)
-    with_low = _frequency_priors(k, discrepancy)
-    alone = FREQUENCY_PRIOR_ALONE
-    if visits:
-        with_low, alone = [_scattering(prior) for prior in with_low], _scattering(alone)
     data = FrequencyData(
         TrainingData(seen.x, y, seen.frequency_sd_hz / np.exp(y), low),
-        tuple(with_low),
-        (alone,) * k,
+        tuple(_frequency_priors(k, discrepancy)),
+        (FREQUENCY_PRIOR_ALONE,) * k,
         _centre(low, np.full(k, FREQUENCY_PRIOR_ALONE.mean)),
         None if elsewhere is None else (elsewhere[0], _log(elsewhere[1])),
         belief,
-        visits,
         kernel or KERNEL,
     )
     return MODELS[model].fit(data)
@@ -229,7 +222,6 @@ def fit_surrogate(
     primary: Average | None = None,
     residues: bool = True,
     identified: bool = False,
-    visits: bool = True,
     kernel: str | None = None,
 ) -> Surrogate:
     """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
@@ -240,13 +232,13 @@ def fit_surrogate(
         residues: whether residues are fitted too, which takes two thirds of the time.
         identified: whether the simulation was identified from these measurements' own FRFs and fits
             them, so that damping and residues are nearly its own.
-        visits, kernel: as of `fit_primary`; a kernel that is named is the damping's, too.
+        kernel: as of `fit_primary`; one that is named is the damping's, too.
     """
     if primary is None:
-        primary = fit_primary(seen, visits=visits, kernel=kernel)
+        primary = fit_primary(seen, kernel=kernel)
     scale = _scale(seen)
     residue = _fit_residues(seen, scale, identified) if residues else None
-    return Surrogate(primary, fit_damping(seen, identified, kernel), residue, scale, visits)
+    return Surrogate(primary, fit_damping(seen, identified, kernel), residue, scale)
 
 
 def _fit_residues(seen: ModalObservations, scale: np.ndarray, identified: bool) -> Average:
@@ -264,28 +256,11 @@ def _fit_residues(seen: ModalObservations, scale: np.ndarray, identified: bool) 
     )
 
 
-def _scattering(prior: OutputPrior) -> OutputPrior:
-    """The prior of frequencies that scatter from visit to visit."""
-    return replace(
-        prior,
-        nugget=VISIT_SCATTER,
-        nugget_spread=VISIT_SCATTER_SPREAD,
-        nugget_shared=VISIT_SCATTER_SHARED,
-    )
-
-
 def _frequency_priors(k: int, discrepancy: np.ndarray | None) -> list[OutputPrior]:
     if discrepancy is None:
         return [FREQUENCY_PRIOR] * k
     return [
-        replace(
-            FREQUENCY_PRIOR,
-            bias_sd=size,
-            slope_sd=size,
-            amplitude=size,
-            nugget=FITTED_NUGGET,
-            spread=0.5,
-        )
+        replace(FREQUENCY_PRIOR, bias_sd=size, slope_sd=size, amplitude=size, spread=0.5)
         for size in map(float, discrepancy)
     ]
 

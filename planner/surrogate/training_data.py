@@ -1,6 +1,6 @@
 """Training data of many outputs over one set of poses, their prior, and their covariance."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,12 @@ class Padded:
     variance: np.ndarray  # (m, c)
     low: np.ndarray  # (m, c)
     mask: np.ndarray  # (m, c)
+
+    def widened(self, scale: np.ndarray) -> "Padded":
+        """With coordinates (m, c, d + 1): x, and low over its scale (m,)."""
+        x = np.broadcast_to(self.x, (*self.low.shape, self.x.shape[-1]))
+        own = self.low[..., None] / scale[:, None, None]
+        return replace(self, x=np.concatenate([x, own], axis=-1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,12 +101,6 @@ def thinned(data: Padded, size: int) -> Padded:
     picked = (v[each, rows] for v in (data.y, data.variance, data.low, data.mask))
     x = np.broadcast_to(data.x, (len(rows), *data.x.shape[-2:]))
     return Padded(x[each, rows], *picked)
-
-
-def widened(x: Any, low: Any, scale: np.ndarray) -> np.ndarray:
-    """Coordinates (m, c, d + 1): x (c, d), and low (m, c) over its scale (m,)."""
-    own = low[..., None] / scale[:, None, None]
-    return np.concatenate([np.broadcast_to(x, (*low.shape, x.shape[-1])), own], axis=-1)
 
 
 def _spread(mask: np.ndarray, size: int) -> np.ndarray:

@@ -53,16 +53,16 @@ assert not jax._src.xla_bridge.backends_are_initialized()
 FITTING = """
 import jax, numpy as np
 from planner.surrogate import gp
-from planner.surrogate.training_data import Padded
+from planner.surrogate.training_data import Padded, Prior
 before = state()
 x = np.linspace(0, 1, 4)[:, None]
 one = np.ones((1, 4))
 padded = Padded(x, np.sin(x.T), 1e-6 * one, 0 * one, one)
 theta = np.array([[0.0, -7.0, 0.0]])
-prior = gp.Prior(np.zeros(1), np.ones(1), np.ones(1), theta, 0.3 * np.ones((1, 3)))
-found = gp.fit(padded, prior, samples=16, kept=4)
-assert found.log_evidence.dtype == np.float64
-assert abs(found.predict(x, 0 * x)[0] - np.sin(x)).max() < 1e-2
+prior = Prior(np.zeros(1), np.ones(1), np.ones(1), theta, 0.3 * np.ones((1, 3)))
+(found,) = gp.fit(padded, prior, samples=16, kept=4)
+assert found.theta.dtype == np.float64
+assert abs(found.predict(x, 0 * x[:, 0])[0] - np.sin(x[:, 0])).max() < 1e-2
 same(before, state(), "fit")
 assert jax.numpy.ones(1).dtype == np.float32
 assert (jax.numpy.ones((2, 2)) + jax.numpy.ones(2)).shape == (2, 2)

@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.design.acquisitions import reduction
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
-from planner.design.reductions import reduction
 from planner.surrogate.gp import Posterior
 from planner.surrogate.kernels import matern52
-from planner.surrogate.training_data import Prior
 from tests import support
 
 PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)
@@ -28,18 +27,17 @@ JITTER = 1e-8  # that GPy adds to the diagonal of the training covariance
 LENGTHS = np.array([0.5, 0.8, 1.1, 0.6])
 
 
-def posterior(outputs: int) -> Posterior:
-    """A GP with a Matérn kernel and no linear terms, one hyperparameter sample, N points."""
+def posteriors(outputs: int) -> tuple[Posterior, ...]:
+    """GPs with a Matérn kernel and no linear terms, one hyperparameter sample, N points."""
     rng = np.random.default_rng(0)
     x = rng.random((N, D))
     lengths = LENGTHS * np.linspace(1, 1.5, outputs)[:, None]
     theta = np.column_stack([np.zeros(outputs), np.full(outputs, -50.0), np.log(lengths)])
-    none = np.zeros(outputs)
-    prior = Prior(none, none, none, theta, theta)
-    values, shape = np.zeros((outputs, 1)), (outputs, N)
-    return Posterior(
-        x, np.zeros(shape), np.full(shape, NOISE), np.zeros(shape), np.ones(shape), theta[:, None],
-        values, prior, "matern52", none, JITTER,
+    zero, variance = np.zeros(N), np.full(N, NOISE)
+    return tuple(
+        Posterior(np.arange(N), x, zero, variance, zero, one[None], np.zeros(1), 0.0, 0.0,
+                  "matern52", 0.0, JITTER)
+        for one in theta
     )  # fmt: skip
 
 
@@ -48,7 +46,7 @@ def problem(outputs: int, points: int, candidates: int):
     at, x = rng.random((points, D)), rng.random((candidates, D))
     target = Target.evenly(Poses.plain(at, np.zeros((points, outputs))))
     seen = FrequencyOutputs(
-        posterior(outputs), target, target, np.full(outputs, NOISE), target.poses[:0],
+        posteriors(outputs), target, target, np.full(outputs, NOISE), target.poses[:0],
         np.ones(outputs), np.zeros((0, 0)),
     )  # fmt: skip
     return seen, Poses.plain(x, np.zeros((candidates, outputs)))
@@ -63,7 +61,7 @@ def timed(call):
 
 def test_a_small_problem_by_the_formula():
     seen, poses = problem(1, 7, 5)
-    x, at, some = seen.posterior.x, seen.workspace.poses.x, poses.x
+    x, at, some = seen.posteriors[0].x, seen.workspace.poses.x, poses.x
 
     def k(a, b):
         return matern52(np, a / LENGTHS, b / LENGTHS)
@@ -80,7 +78,7 @@ def test_a_small_problem_by_the_formula():
 @pytest.mark.skipif(not HAS_PEERS, reason="pip install 'planner[peers]', or set PEERS_PYTHON")
 def test_beside_emukit(tmp_path: Path):
     seen, poses = problem(1, 1000, 10_000)
-    post = seen.posterior
+    post = seen.posteriors[0]
     y = np.random.default_rng(2).standard_normal(N)
     np.savez(
         tmp_path / "job.npz", x=post.x, y=y, variance=1.0, lengths=LENGTHS, noise=NOISE,

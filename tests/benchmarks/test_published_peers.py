@@ -20,9 +20,14 @@ import pytest
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
-from planner.surrogate.models.fidelity_levels import Samples
-from planner.surrogate.models.likelihood_gp import Normalisation, at_hyperparameters
-from planner.surrogate.models.nargp import NARGP, fit_nargp, perdikaris
+from planner.surrogate.models.likelihood_gp import (
+    NARGP,
+    Normalisation,
+    Samples,
+    at_hyperparameters,
+    fit_nargp,
+    perdikaris,
+)
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
 from tests.support import published_peers

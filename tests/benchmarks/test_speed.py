@@ -9,7 +9,7 @@ from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
 from planner.demo import Pool, shipped
-from planner.dynamics.gradient import Inertias, laplace, response, response_gradient
+from planner.dynamics.gradient import Inertias, laplace, motion_slopes, moved, response
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
@@ -124,10 +124,14 @@ def test_gradient_against_differences(tmp_path):
                 values[kind][j] *= 1 + 1e-6
                 _ = response(m, Elasticity(*values, springs.loss_factor), s) - before
 
-    ours = seconds(lambda: response_gradient(m, springs, s), 15)
-    whole = seconds(lambda: response_gradient(m, springs, s, inertias=inertias), 15)
+    def slopes(*inertias):
+        motion = moved(m, springs, s)
+        return motion.accelerance, motion_slopes(motion, springs, *inertias)
+
+    ours = seconds(slopes, 15)
+    whole = seconds(lambda: slopes(inertias), 15)
     peer = seconds(differences, 3)
-    assert response_gradient(m, springs, s)[1].shape == (9, 36, 3, 3, 127)
+    assert slopes()[1].shape == (9, 36, 3, 3, 127)
     print(
         f"\nFRFs and 36 derivatives, 9 poses × 127 lines: {1e3 * ours:.1f} ms (with 60 of inertias "
         f"{1e3 * whole:.1f} ms), forward differences {1e3 * peer:.0f} ms, ratio {peer / ours:.0f}"

@@ -3,13 +3,19 @@
 import numpy as np
 import pytest
 
-from planner.design.acquisitions import goal, mixed, mutual_information
-from planner.design.cost import Cost, shortest_tour
+from planner.design.acquisitions import (
+    SUBSETS,
+    goal,
+    mixed,
+    mutual_information,
+    parameter_reduction,
+    reduction,
+    repeat_gain,
+)
+from planner.design.cost import Cost, axis_shares, best_axes, shortest_tour
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
-from planner.design.hit_axes import axis_shares, best_axes
 from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
 from planner.design.propose import ACQUISITIONS, Travel, propose
-from planner.design.reductions import SUBSETS, parameter_reduction, reduction, repeat_gain
 from planner.design.stopping import forecast, left_out, mean_squares
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import Priors, parametrise
@@ -128,7 +134,7 @@ def test_mutual_information_is_a_difference_of_entropies(surrogate):
         whole, parts = np.linalg.slogdet(cov)[1], np.linalg.slogdet(cov[:-1, :-1])[1]
         return 0.5 * (parts + np.log(cov[-1, -1]) - whole)
 
-    samples = range(outputs.posterior.theta.shape[1])
+    samples = range(len(outputs.posteriors[0].theta))
     for i in (0, 4, 9, 11):
         expected = (
             np.mean([[information(i, k, s) for s in samples] for k in range(4)], axis=1)
@@ -139,23 +145,19 @@ def test_mutual_information_is_a_difference_of_entropies(surrogate):
 
 def test_repeating_is_a_refit_with_half_the_variance(surrogate):
     outputs, _ = over(surrogate, X, 30)
-    post, n = outputs.posterior, 6
-    variance = np.full((n, 4), 1e-7)
+    variance = np.full((6, 4), 1e-7)
     gain, target = repeat_gain(outputs, variance), outputs.workspace
     for i in (0, 5):
         drop = 0.0
-        for k in range(4):
-            known = np.flatnonzero(post.mask[k])
-            cross = post._prior(
-                k, post.x[known], post.low[k][known], target.poses.x, target.poses.low[:, k]
-            )
-            for s in range(len(post.theta[k])):
-                whiten = post.solved(k).whiten[s]
+        for k, post in enumerate(outputs.posteriors):
+            cross = post.prior(post.x, post.low, target.poses.x, target.poses.low[:, k])
+            for s in range(len(post.theta)):
+                whiten = post.solved.whiten[s]
                 noisy = np.linalg.inv(whiten.T @ whiten)
                 less = noisy.copy()
                 less[i, i] -= 1e-7 / 2
                 white = [np.sum(cross[s] * np.linalg.solve(c, cross[s]), 0) for c in (less, noisy)]
-                drop += (white[0] - white[1]) @ target.importance[:, k] / len(post.theta[k])
+                drop += (white[0] - white[1]) @ target.importance[:, k] / len(post.theta)
         assert gain[i] == pytest.approx(drop, rel=1e-4)
 
 
@@ -232,21 +234,20 @@ def test_forecast_speaks_of_its_own_samples(surrogate):
 
 def test_left_out_residuals_are_those_of_refits(surrogate):
     """Leave one out by solving without it, at the hyperparameters held."""
-    post, squares = surrogate.primary.posterior, []
-    for k in range(4):
-        known = np.flatnonzero(post.mask[k])
-        for i in range(len(known)):
+    outputs, squares = surrogate.primary.likeliest.outputs, []
+    for post in outputs:
+        for i in range(len(post.x)):
             means, variances = [], []
-            for s in range(len(post.theta[k])):
-                whiten = post.solved(k).whiten[s]
+            for s in range(len(post.theta)):
+                whiten = post.solved.whiten[s]
                 noisy = np.linalg.inv(whiten.T @ whiten)
-                y = noisy @ post.solved(k).weights[s]
-                rest = np.arange(len(known)) != i
+                y = noisy @ post.solved.weights[s]
+                rest = np.arange(len(post.x)) != i
                 pull = np.linalg.solve(noisy[np.ix_(rest, rest)], noisy[rest, i])
                 means.append(y[i] - pull @ y[rest])
                 variances.append(noisy[i, i] - pull @ noisy[rest, i])
             squares.append(np.mean(means) ** 2 / (np.mean(variances) + np.var(means)))
-    poses, size = left_out(post, 4)
+    poses, size = left_out(outputs)
     assert poses == 6
     assert size == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-6)
 
@@ -282,10 +283,10 @@ def test_axes_are_saved_where_one_shows_every_mode(surrogate):
     along_x = np.tile([0.8, 0.1, 0.1], (4, 1))
     hidden = along_x.copy()
     hidden[2] = [0.01, 0.5, 0.49]  # mode 3 does not show along x
-    assert best_axes(outputs, poses.one(60), along_x, cost, 0.0)[0] == (0,)
-    assert best_axes(outputs, poses.one(60), hidden, cost, 0.0)[0] in ((1,), (2,))
+    assert best_axes(outputs, poses.one(60), along_x, cost, 0.0) == (0,)
+    assert best_axes(outputs, poses.one(60), hidden, cost, 0.0) in ((1,), (2,))
     free = Cost(np.ones(6), per_pose=1.0, per_hit=1e-9)
-    assert best_axes(outputs, poses.one(60), along_x, free, 0.0)[0] == (0, 1, 2)
+    assert best_axes(outputs, poses.one(60), along_x, free, 0.0) == (0, 1, 2)
 
 
 def test_shares_of_the_axes_add_up():

@@ -7,8 +7,7 @@ import pytest
 
 from planner.design.cost import Cost
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
-from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
-from planner.design.sensor_places import better_places
+from planner.design.parameter_sensitivity import FrfNoise, OpenParameters, better_places
 from planner.design.stopping import forecast
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import Priors, parametrise

@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.design.discrimination import Tied, separation
-from planner.design.extra_sensor import WORTH, extra_sensor
-from planner.design.next_hit import next_hit
+from planner.design.discrimination import WORTH, Tied, extra_sensor, next_hit, separation
 from planner.diagnosis.diagnose import searching
 from planner.diagnosis.search import FITTED
 from planner.dynamics.simulation import Simulation

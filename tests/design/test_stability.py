@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from planner.design.acquisitions import _wrong, share_left, stability, with_margins
 from planner.design.frequency_posterior import Margins
-from planner.design.stability import _wrong, share_left, stability, with_margins
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.scored_poses import X, over, with_parameters
 from tests.support.surrogates import observed

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planner import diagnose
-from planner.dynamics.in_time import change_at_force
+from planner.dynamics.at_force import change_at_force
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.truth.arms import ARMS

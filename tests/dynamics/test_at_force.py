@@ -7,8 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.dynamics.at_force import accelerance_at_force, averaged, modes_at_force
-from planner.dynamics.in_time import change_at_force, measured_at_force
+from planner.dynamics.at_force import (
+    accelerance_at_force,
+    averaged,
+    change_at_force,
+    measured_at_force,
+    modes_at_force,
+)
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.robot.robot import Robot
 from planner.truth.arms import ARMS

@@ -8,9 +8,9 @@ import pytest
 from planner.dynamics.gradient import (
     Inertias,
     laplace,
+    motion_slopes,
+    moved,
     response,
-    response_gradient,
-    response_turned,
 )
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
@@ -38,11 +38,19 @@ def everything(tmp_path, loss, rate):
     return simulation, elastic.matrices(q), inertias, s
 
 
+def mass_change(inertias, values):
+    """Change (n, e, e) of M for values (B · 10,) of the bodies' parameters."""
+    weighted = np.einsum("bpij,bp->bij", inertias.basis, values.reshape(inertias.basis.shape[:2]))
+    jacobians = inertias.jacobians
+    return np.sum(np.swapaxes(jacobians, 2, 3) @ weighted @ jacobians, axis=1)
+
+
 @pytest.mark.parametrize(("loss", "rate"), [(0.0, 0.0), (0.08, 0.0), (0.0, 7.0)])
 def test_springs_against_finite_differences(tmp_path, loss, rate):
     simulation, matrices, _, s = everything(tmp_path, loss, rate)
     elasticity = simulation.elasticity
-    h, gradient = response_gradient(matrices, elasticity, s)
+    motion = moved(matrices, elasticity, s)
+    h, gradient = motion.accelerance, motion_slopes(motion, elasticity)
     assert np.array_equal(h, response(matrices, elasticity, s))
     kinds = ("stiffness", "damping", "loss_factor")[: 3 if loss else 2]
     assert gradient.shape == (3, 12 * len(kinds), 3, 3, LINES.size)
@@ -65,14 +73,15 @@ def test_inertias_against_finite_differences(tmp_path):
     """All ten parameters of every body; the mass matrix is linear in them, exactly."""
     simulation, matrices, inertias, s = everything(tmp_path, 0.0, 0.0)
     elasticity, nominal = simulation.elasticity, simulation.elastic.inertia
-    h, gradient = response_gradient(matrices, elasticity, s, inertias=inertias)
-    whole = inertias.mass_change(nominal.ravel())
+    motion = moved(matrices, elasticity, s)
+    h, gradient = motion.accelerance, motion_slopes(motion, elasticity, inertias)
+    whole = mass_change(inertias, nominal.ravel())
     np.testing.assert_allclose(whole, matrices.mass, atol=1e-12 * np.abs(matrices.mass).max())
     for j in range(nominal.size):
         step = np.zeros(nominal.size)
         step[j] = 1e-4 * (1e-2 + abs(nominal.flat[j]))
         sides = [
-            response(matrices, elasticity, s, matrices.mass + inertias.mass_change(sign * step))
+            response(matrices, elasticity, s, matrices.mass + mass_change(inertias, sign * step))
             for sign in (1, -1)
         ]
         expected = (sides[0] - sides[1]) / (2 * step[j])
@@ -85,7 +94,7 @@ def test_changed_inertia_is_the_linear_change(tmp_path):
     change = 0.05 * np.random.default_rng(1).standard_normal((6, 10)) * simulation.elastic.inertia
     other = simulation.changed(simulation.elasticity, change)
     mass = other.elastic.matrices(KR10.poses(3)).mass
-    expected = matrices.mass + inertias.mass_change(change.ravel())
+    expected = matrices.mass + mass_change(inertias, change.ravel())
     np.testing.assert_allclose(mass, expected, atol=1e-12 * np.abs(mass).max())
 
 
@@ -123,7 +132,7 @@ def test_slopes_by_joint_angles_are_those_of_the_whole_response(tmp_path):
     path.write_text(f"geometric_stiffness = false\n{path.read_text()}{MORE}")
     simulation, q = Simulation(Robot.load(path)), KR10.poses(3)
     elastic, springs, s = simulation.elastic, simulation.elasticity, laplace(np.tile(LINES, (3, 1)))
-    turned = response_turned(elastic.with_slopes(q), springs, s)[1]
+    turned = moved(elastic.with_slopes(q), springs, s)
     for joint, turn in enumerate(STEP * np.eye(6)):
         there, back = (response(elastic.matrices(p), springs, s) for p in (q + turn, q - turn))
         change = (there - back) / (2 * STEP)

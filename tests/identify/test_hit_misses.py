@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planner.dataset.hit_columns import HitColumns
-from planner.dynamics.gradient import response_turned
+from planner.dynamics.gradient import moved
 from planner.dynamics.simulation import Simulation
 from planner.fit.hit_misses import VisitHits, tell_misses
 from planner.fit.identify import identify
@@ -26,13 +26,14 @@ def test_misses_are_told(tmp_path):
     rng = np.random.default_rng(2)
     s = np.tile(2j * np.pi * HZ + RATE, (len(Q), 1))
     matrices = simulation.elastic.with_slopes(Q)
-    h, turned = response_turned(matrices, simulation.elasticity, s)
-    moved = basis(h, turned, s, T)
-    chain = np.einsum("k,nkijf->nijf", 0.5 * rng.standard_normal(14), moved[:, 12:26])
+    motion = moved(matrices, simulation.elasticity, s)
+    h = motion.accelerance
+    changes = basis(h, motion, s, T)
+    chain = np.einsum("k,nkijf->nijf", 0.5 * rng.standard_normal(14), changes[:, 12:26])
     axis = np.repeat([0, 1, 2], REPEATS)
     visits, frfs, true = [], [], rng.standard_normal((len(Q), len(axis), 4))
     for i, q in enumerate(Q):
-        by_axis = np.einsum("akiaf->akif", moved[i, :12].reshape(3, 4, 3, 3, -1))
+        by_axis = np.einsum("akiaf->akif", changes[i, :12].reshape(3, 4, 3, 3, -1))
         each = np.array([(h[i] + chain[i])[:, a] for a in axis])
         each = each + np.einsum("nk,nkif->nif", true[i], by_axis[axis])
         sd = NOISE * np.abs(each).max()

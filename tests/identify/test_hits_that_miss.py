@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.dynamics.gradient import moved, response_turned
+from planner.dynamics.gradient import moved
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.fit.identify import identify
@@ -79,7 +79,7 @@ def test_hits_beside_their_points_under_a_chain_that_errs_are_those_of_the_truth
     place, mixing = (0.004, -0.006, 0.005), np.eye(3) + 0.02 * np.arange(9.0).reshape(3, 3) / 9
     moved_ = replace(truth, sensor_offset_m=place)
     s, matrices = np.tile(2j * np.pi * LINES, (2, 1)), simulation.elastic.with_slopes(Q[:2])
-    h, _ = response_turned(matrices, simulation.elasticity, s)
+    h = moved(matrices, simulation.elasticity, s).accelerance
     numbers = OpenNumbers.of(h)
     eta = np.zeros((2, numbers.known + 6))
     eta[:, 8:12] = [0.03 / t.angle_rad, -0.02 / t.angle_rad, 4 / 5, 3 / 5]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planner.dataset.dataset import Dataset
-from planner.dynamics.gradient import laplace, response, response_turned
+from planner.dynamics.gradient import laplace, moved, response
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.fit.identify import identify
@@ -88,7 +88,7 @@ def test_slopes_by_joint_angles_hold_between_points(toml: Path) -> None:
         return response(matrices, simulation.elasticity, s)
 
     matrices = simulation.elastic.with_slopes(q, WIDE)
-    by_angle = response_turned(matrices, simulation.elasticity, s)[1].by_angle
+    by_angle = moved(matrices, simulation.elasticity, s).by_angle
     assert by_angle is not None
     for joint, unit in list(enumerate(np.eye(4)))[1:]:  # turning about the vertical changes nothing
         measured = (h(step * unit) - h(-step * unit)) / (2 * step)

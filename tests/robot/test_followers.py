@@ -17,8 +17,8 @@ from planner.errors import InputError
 from planner.robot.collision import Collisions
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.inverse_kinematics import solve
+from planner.robot.link_bodies import placements
 from planner.robot.robot import Robot
-from planner.robot.skeleton import placements
 from tests.support.outside import said, told
 from tests.support.robots import campaign_text, make_arm
 

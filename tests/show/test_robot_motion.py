@@ -11,8 +11,8 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import accelerance
 from planner.frf.frf import Frf
 from planner.recording.points import Layout
+from planner.robot.link_bodies import skeleton
 from planner.robot.robot import Robot
-from planner.robot.skeleton import skeleton
 from tests.support.arm_with_points import poses, write_arm
 
 COUNT = 3

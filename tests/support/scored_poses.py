@@ -28,19 +28,17 @@ def with_parameters(surrogate, x, p=6, seed=1):
 
 def conditioned_variance(outputs, k, c, low_c):
     """Mean variance over the workspace once c is measured, by adding a row to the GP itself."""
-    post, total = outputs.posterior, []
-    known = np.flatnonzero(post.mask[k])
-    x = np.vstack([post.x[known], c[None]])
-    low = np.append(post.low[k][known], low_c)
-    for s in range(len(post.theta[k])):
-        whiten = post.solved(k).whiten[s]
+    post, total = outputs.posteriors[k], []
+    x, low = np.vstack([post.x, c[None]]), np.append(post.low, low_c)
+    for s in range(len(post.theta)):
+        whiten = post.solved.whiten[s]
         noisy = np.linalg.inv(whiten.T @ whiten)  # covariance of what was measured, with noise
-        cross = post._prior(k, post.x[known], low[:-1], c[None], low[-1:])[s]
-        own = post._prior(k, c[None], low[-1:], c[None], low[-1:])[s] + outputs.noise[k]
+        cross = post.prior(post.x, low[:-1], c[None], low[-1:])[s]
+        own = post.prior(c[None], low[-1:], c[None], low[-1:])[s] + outputs.noise[k]
         grown = np.block([[noisy, cross], [cross.T, own]])
         xu, lu = outputs.workspace.poses.x, outputs.workspace.poses.low[:, k]
-        at = post._prior(k, x, low, xu, lu)[s]
-        there = post._prior(k, xu, lu, xu, lu)[s]
+        at = post.prior(x, low, xu, lu)[s]
+        there = post.prior(xu, lu, xu, lu)[s]
         reduced = np.sum(at * np.linalg.solve(grown, at), axis=0)
         total.append(np.mean(np.diag(there) - reduced))
     return float(np.mean(total))

@@ -7,7 +7,7 @@ from scipy.stats import norm
 from planner.errors import InputError
 from planner.surrogate import gp
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
-from planner.surrogate.training_data import Padded, TrainingData
+from planner.surrogate.training_data import Padded, Prior, TrainingData
 
 PRIOR = OutputPrior(bias_sd=0.15, slope_sd=0.2, amplitude=0.03, nugget=0.002)
 QUERY = np.linspace(0, 1, 9)[:, None]
@@ -81,11 +81,11 @@ def test_one_best_sample_would_be_too_sure():
     """What averaging is for: with the likeliest θ alone intervals are narrower at few points."""
     ratio = []
     for seed in range(8):
-        post = fit_ar1(problem(4, seed), (PRIOR,), (PRIOR,), np.zeros(1), 256, 32).posterior
+        post = fit_ar1(problem(4, seed), (PRIOR,), (PRIOR,), np.zeros(1), 256, 32).outputs[0]
         offset = low(QUERY)
-        _, variance, _ = post.covariance(0, QUERY, offset[:, 0], QUERY[:1], offset[:1, 0])
-        _, sd = post.predict(QUERY, offset)
-        ratio.append(np.mean(np.median(np.sqrt(variance), axis=0) / sd[:, 0]))
+        _, variance, _ = post.covariance(QUERY, offset[:, 0], QUERY[:1], offset[:1, 0])
+        _, sd = post.predict(QUERY, offset[:, 0])
+        ratio.append(np.mean(np.median(np.sqrt(variance), axis=0) / sd))
     assert np.mean(ratio) < 0.97
 
 
@@ -93,10 +93,10 @@ def test_without_data_the_prior_is_sampled():
     padded = Padded(
         np.zeros((16, 1)), np.zeros((1, 16)), np.ones((1, 16)), np.zeros((1, 16)), np.zeros((1, 16))
     )
-    prior = gp.Prior(
+    prior = Prior(
         np.zeros(1), np.ones(1), np.ones(1), np.array([[0, -3, 0.5]]), np.array([[1, 0.5, 0.8]])
     )  # fmt: skip
-    z = (gp.fit(padded, prior, 256, 64).theta[0] - prior.theta_mean) / prior.theta_sd
+    z = (gp.fit(padded, prior, 256, 64)[0].theta - prior.theta_mean) / prior.theta_sd
     np.testing.assert_allclose(z.mean(axis=0), 0, atol=0.2)
     np.testing.assert_allclose(z.std(axis=0), 1, atol=0.2)
     for column in z.T:  # not only two moments: quartiles too

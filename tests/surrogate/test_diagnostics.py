@@ -28,18 +28,18 @@ def fit(training):
 
 def test_it_is_what_refits_without_the_measurement_say():
     training = data(9)
-    found = leave_one_out(fit(training).posterior, 9)
+    found = leave_one_out(fit(training).outputs, 9)
     for i in range(9):
         rest = TrainingData(*(np.delete(a, i, axis=0) for a in vars(training).values()))
         model = fit(rest)
         mean, sd = model.predict(training.x[i : i + 1], training.low[i : i + 1])
-        noise = np.sqrt(model.posterior.nugget_variance()[0] + 0.005**2)
+        noise = np.sqrt(model.outputs[0].nugget_variance + 0.005**2)
         assert abs(training.y[i, 0] - mean[0, 0] - found.error[i, 0]) < 0.25 * np.hypot(sd, noise)
         assert 0.6 < found.sd[i, 0] / np.hypot(sd[0, 0], noise) < 1.6
 
 
 def test_intervals_cover_what_they_say():
-    ranks = [leave_one_out(fit(data(n, seed)).posterior, n) for seed in range(8) for n in (6, 12)]
+    ranks = [leave_one_out(fit(data(n, seed)).outputs, n) for seed in range(8) for n in (6, 12)]
     for level in (0, 3):
         shares = np.array([r.coverage()[level] for r in ranks])
         expected = (0.5, 0.8, 0.9, 0.95)[level]
@@ -47,7 +47,7 @@ def test_intervals_cover_what_they_say():
 
 
 def test_a_wrong_measurement_is_named():
-    found = leave_one_out(fit(data(15, wrong=4)).posterior, 15)
+    found = leave_one_out(fit(data(15, wrong=4)).outputs, 15)
     assert found.worst(1).tolist() == [4]
     lines = report(found, tuple(f"P{i:03d}" for i in range(15)), ("mode 1",))
     assert any(line.startswith("P004: mode 1 is") for line in lines)
@@ -56,8 +56,8 @@ def test_a_wrong_measurement_is_named():
 def test_gaps_and_nothing_at_all():
     training = data(5)
     training.y[2] = np.nan
-    found = leave_one_out(fit(training).posterior, 5)
+    found = leave_one_out(fit(training).outputs, 5)
     assert np.isnan(found.error[2]).all()
     assert np.isfinite(np.delete(found.sd, 2, axis=0)).all()
     none = TrainingData(*(a[:0] for a in vars(training).values()))
-    assert "too few" in report(leave_one_out(fit(none).posterior, 0), (), ("mode 1",))[0]
+    assert "too few" in report(leave_one_out(fit(none).outputs, 0), (), ("mode 1",))[0]

@@ -88,6 +88,13 @@ def test_acquisitions_ask_for_a_pose_away_from_those_measured(name: str) -> None
         assert np.isfinite(gain).all()
         if name != WITHOUT_GP:
             assert int(np.argmax(gain)) >= POSES
+    target, expected = outputs.workspace, np.zeros(len(candidates))
+    for k in range(MODES):
+        cross, own, _ = outputs.covariance(k, poses, target.poses)
+        squares = cross**2 @ target.importance[:, k] / (own + outputs.noise[k])
+        expected += np.mean(squares, axis=0)
+    told = ACQUISITIONS["integrated_variance"](outputs, poses)
+    np.testing.assert_allclose(told, expected, rtol=1e-6, atol=1e-15)
 
 
 @every
@@ -109,8 +116,8 @@ def test_a_kept_model_is_the_same(name: str) -> None:
 @pytest.mark.parametrize("name", ["gp", "ar1", "nargp", "default"])
 def test_a_kernel_that_is_named_is_used(name: str) -> None:
     one = fit(name, seen(), "rbf")
-    assert all("matern52" not in p.kernel for p in one.posteriors)
-    assert any("rbf" in p.kernel for p in one.posteriors)
+    assert all("matern52" not in p.kernel for m in one.models for p in m.outputs)
+    assert any("rbf" in p.kernel for m in one.models for p in m.outputs)
 
 
 def test_without_a_simulation_the_campaign_s_weight_of_it_is_zero() -> None:

@@ -32,13 +32,13 @@ def fit(training, **options):
 def test_posterior_is_the_textbook_one(kernel):
     training = data(9)
     fitted = fit(training, kernel=kernel)
-    post, rng = fitted.posterior, np.random.default_rng(3)
+    rng = np.random.default_rng(3)
     xq, low = rng.random((20, 2)), rng.random((20, 3))
     base, offset = fitted.split(low)
     mean, sd = fitted.predict(xq, low)
     for j in range(3):
         means, variances = [], []
-        for theta in post.theta[j]:
+        for theta in fitted.outputs[j].theta:
             k = _covariance(
                 kernel, training.x, training.low[:, j], training.x, training.low[:, j], theta
             )

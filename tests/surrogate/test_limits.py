@@ -7,7 +7,6 @@ from planner.surrogate import gp, likelihood
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
 from planner.surrogate.average import fit_hedged, fit_shapes
 from planner.surrogate.kernels import parse
-from planner.surrogate.models.multitask import fit_multitask
 from planner.surrogate.training_data import TrainingData
 
 GRID = np.random.default_rng(8).random((30, 2))
@@ -46,8 +45,9 @@ def test_jitter_that_was_needed_is_told(monkeypatch):
     data = TrainingData(x, np.ones((3, 1)), np.zeros((3, 1)), np.full((3, 1), np.nan))
     certain = OutputPrior(bias_sd=0.5, slope_sd=0.0, amplitude=0.3, nugget=1e-12, spread=1e-9)
     fitted = fit_ar1(data, (certain,), (certain,), np.full(1, np.nan))
-    assert fitted.posterior.remarks == (gp.SINGULAR_REMARK.format(1e-7),)
-    assert fit_ar1(training(4), (PRIOR,), (PRIOR,), np.full(1, np.nan)).posterior.remarks == ()
+    assert gp.remarks(fitted.outputs) == (gp.SINGULAR_REMARK.format(1e-7),)
+    plain = fit_ar1(training(4), (PRIOR,), (PRIOR,), np.full(1, np.nan))
+    assert gp.remarks(plain.outputs) == ()
 
 
 def test_what_the_kernels_are_averaged_over_follows_the_data():
@@ -65,39 +65,9 @@ def test_what_the_kernels_are_averaged_over_follows_the_data():
     assert sd[:, 0].max() < 0.05
 
 
-def test_of_one_kernel_the_average_is_that_fit():
-    data, nothing = training(7), np.full(1, np.nan)
-    one = fit_shapes(data, (PRIOR,), (PRIOR,), nothing, ("matern52",))
-    plain = fit_ar1(data, (PRIOR,), (PRIOR,), nothing, 64, 16, "matern52")
-    low = np.full((30, 1), np.nan)
-    np.testing.assert_allclose(one.predict(GRID, low), plain.predict(GRID, low), atol=1e-12)
-    np.testing.assert_allclose(one.log_evidence, plain.posterior.log_evidence)
-
-
 def test_without_a_simulation_the_hedge_is_a_gp():
     data, nothing = training(7), np.full(1, np.nan)
     low = np.full((30, 1), np.nan)
     hedged = fit_hedged(data, (PRIOR,), (PRIOR,), nothing).predict(GRID, low)
     plain = fit_ar1(data, (PRIOR,), (PRIOR,), nothing).predict(GRID, low)
     np.testing.assert_allclose(hedged, plain, atol=1e-12)
-
-
-def test_one_task_is_a_gp_at_its_hyperparameters():
-    x, y = samples(10)
-    fitted = fit_multitask(x, y)
-    h, kernel = fitted.hyperparameters, parse("rbf", 2)
-    b = h.task_covariance[0, 0]
-    k = b * kernel.covariance(np, h.theta, x, x) + h.noise[0] * np.eye(10)
-    cross = b * kernel.covariance(np, h.theta, x, GRID)
-    scaled = (y[:, 0] - fitted.tasks.centre[0]) / fitted.tasks.scale[0]
-    mean = fitted.tasks.centre[0] + fitted.tasks.scale[0] * cross.T @ np.linalg.solve(k, scaled)
-    variance = b * kernel.variance(np, h.theta, GRID) - np.sum(
-        cross * np.linalg.solve(k, cross), axis=0
-    )
-    np.testing.assert_allclose(fitted.predict(GRID)[0][:, 0], mean, atol=1e-5)
-    np.testing.assert_allclose(
-        fitted.predict(GRID)[1][:, 0],
-        fitted.tasks.scale[0] * np.sqrt(variance),
-        rtol=1e-3,
-        atol=1e-6,
-    )

@@ -2,13 +2,17 @@
 
 from dataclasses import replace
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from planner import jax_setup
 from planner.surrogate.kernels import parse
-from planner.surrogate.models.fidelity_levels import Samples
-from planner.surrogate.models.mfdgp import TiedKernel, Training, bound, fit_mfdgp
+from planner.surrogate.models.likelihood_gp import Samples
+from planner.surrogate.models.mfdgp import TiedKernel, Training, fit_mfdgp
+from planner.surrogate.models.mfdgp import bound as bound_of_a_batch
 
 # Data and inducing points of one size throughout, so that it is compiled once.
 HOW = Training(held_steps=400, free_steps=600, inducing=8)
@@ -21,6 +25,14 @@ def wave(x):
 
 def bent(x):
     return wave(x) ** 2 + 0.5 * x[:, 0]
+
+
+@jax_setup.compiled(static_argnums=3)
+def bound(layers, data, seed, draws):
+    """With all points and so many draws of f_1 at each expensive one."""
+    noise = jax.random.normal(jax.random.key(seed), (draws, len(data.y_high)))
+    every = jnp.arange(len(data.y_low)), jnp.arange(len(data.y_high))
+    return bound_of_a_batch(layers, data, *every, noise)
 
 
 @pytest.fixture(scope="module")

@@ -82,17 +82,6 @@ def test_predictions_are_those_of_the_dense_gp(rank):
     told = fitted.predict(there)
     np.testing.assert_allclose(told[0], data.centre + data.scale * mean, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(told[1] ** 2, data.scale**2 * variance, rtol=1e-3, atol=1e-6)
-    assert np.all(np.abs(fitted.correlation) <= 1 + 1e-9)
-
-
-def test_unrelated_tasks_are_separate_gps():
-    x, _, y = related(12, 3)
-    data, h = Tasks.of(x, y), hyperparameters(3, None)
-    h = Hyperparameters(np.diag([1.0, 0.5, 2.0]), h.log_own, h.log_noise, h.theta)
-    k, solved = parse("rbf", 2).covariance(np, h.theta, x, x), solve(data, h)
-    for j, b in enumerate((1.0, 0.25, 4.0)):
-        alpha = np.linalg.solve(b * k + h.noise[j] * np.eye(12), data.y[:, j])
-        np.testing.assert_allclose(solved.alpha[:, j], alpha, rtol=1e-5)
 
 
 def test_related_outputs_are_followed_and_many_tell_more_than_each_alone():

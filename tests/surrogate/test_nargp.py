@@ -4,14 +4,15 @@ import numpy as np
 from scipy.stats import multivariate_normal
 
 from planner.surrogate.kernels import parse
-from planner.surrogate.models.fidelity_levels import Exact, Samples
 from planner.surrogate.models.likelihood_gp import (
+    Exact,
     Normalisation,
+    Samples,
     at_hyperparameters,
     fit_growing,
     fit_likelihood,
+    fit_nargp,
 )
-from planner.surrogate.models.nargp import fit_nargp
 from tests.support.nargp_levels import fit_low
 
 

@@ -28,7 +28,7 @@ from planner.recording.geometry import Geometry
 from planner.recording.points import Layout
 from planner.report.modal_plots import mac_figure
 from planner.report.rerun.figures import More, draw, figure_view
-from planner.robot.skeleton import Skeleton, skeleton
+from planner.robot.link_bodies import Skeleton, skeleton
 
 VIBRATION = "vibration"
 FRAMES, FRAME_MS = 24, 100  # of one period on the screen

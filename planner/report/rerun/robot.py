@@ -9,8 +9,8 @@ import rerun.urdf as rru
 from rerun.chunk import Chunk
 from scipy.spatial.transform import Rotation
 
+from planner.robot.link_bodies import BodyShape, bodies
 from planner.robot.robot import Robot
-from planner.robot.skeleton import BodyShape, bodies
 
 WORLD = "tf#/"  # Rerun's frame of the root entity, in which entities lie that name no frame
 GREY = (150, 150, 155)

@@ -1,31 +1,103 @@
 """Busch et al. 2020 as published: GP, NARGP and MFDGP of the amplitude over (frequency, angle).
 
 The amplitude itself is modelled, in m/s²/N, over x = (f, φ) (section 3 there): GP with RBF kernel
-(eq. 7) of the measured points alone; NARGP (`nargp`) and MFDGP (`mfdgp`) of both levels. The
-cheap level of NARGP is an exact GP of the whole simulated grid (`grid_gp`), which is what a GP of
-its 12,801 points is. What differs: GP has the data's mean where the paper adds a bias kernel; there
-is a length scale for f and one for φ, as Perdikaris et al. have it, where eqs. 6 and 7 show one;
-MFDGP has fewer inducing points and steps than the paper's 800 and 35,000, and a larger rate in the
-second stage (`Training`). Not as published, the logarithm of the amplitude, which stays positive,
-may be modelled instead.
+(eq. 7) of the measured points alone; NARGP and MFDGP of both levels. The cheap level of NARGP is an
+exact GP of the whole simulated grid, which is what a GP of its 12,801 points is. What differs: GP
+has the data's mean where the paper adds a bias kernel; there is a length scale for f and one for φ,
+as Perdikaris et al. have it, where eqs. 6 and 7 show one; MFDGP has fewer inducing points and steps
+than the paper's 800 and 35,000, and a larger rate in the second stage (`Training`). Not as
+published, the logarithm of the amplitude, which stays positive, may be modelled instead.
+
+On a grid cov = k_a(a, a') k_b(b, b') + noise: two small eigendecompositions (Kronecker structure,
+Saatçi 2011, chapter 5) do what a Cholesky factor of ten thousand points could not. Hyperparameters
+are the most probable ones, for thousands of points leave little doubt about them.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.errors import InputError
-from planner.surrogate.models.fidelity_levels import FidelityLevel, Samples
-from planner.surrogate.models.grid_gp import GridGP, fit_grid
-from planner.surrogate.models.likelihood_gp import Normalisation, fit_growing
+from planner.surrogate.kernels import parse
+from planner.surrogate.likelihood import maximise
+from planner.surrogate.models.likelihood_gp import (
+    NARGP,
+    FidelityLevel,
+    Normalisation,
+    Samples,
+    fit_growing,
+    perdikaris,
+    widened,
+)
 from planner.surrogate.models.mfdgp import Training, fit_mfdgp
-from planner.surrogate.models.nargp import NARGP, perdikaris, widened
+from planner.surrogate.models.multitask import KroneckerSolution, pull, solve_kronecker
 
+SURFACES = "GP", "NARGP", "MFDGP"
 # NARGP's climb begins with so many of the measured points, which costs next to nothing, goes on
 # with more, and ends with all.
 SOME_POINTS, STARTS = (250, 900), 32
 SURFACE_TRAINING = Training(4000, 4000, inducing=200)
+NOISE, NOISE_SPREAD = 0.03, 2.0  # median sd of the noise over the output's, its log-sd
+LENGTH, LENGTH_SPREAD = 0.3, 1.5  # of the scales, and of the amplitude's logarithm
+SHORT = -1.5  # sds of the prior by which the second start's length scales are shorter
+REACH = 5.0  # sds of the prior beyond which nothing is looked for
+JITTER = 1e-9  # added to the covariances' diagonals
+RBF = parse("rbf", 1)  # of either axis
+
+
+@dataclass(frozen=True, eq=False)
+class GridGP:
+    """Fitted; θ of both axes' RBF kernels, the noise in the nugget's place of `theta_a`."""
+
+    a: np.ndarray  # (n, 1)
+    b: np.ndarray  # (t, 1)
+    theta_a: np.ndarray
+    theta_b: np.ndarray
+    solved: KroneckerSolution
+    units: Normalisation
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q,) of the noise-free output at x (q, 2) = (a, b)."""
+        cross_a = RBF.covariance(np, self.theta_a, x[:, :1], self.a)
+        cross_b = RBF.covariance(np, self.theta_b, x[:, 1:], self.b)
+        mean = np.einsum("qi,it,qt->q", cross_a, self.solved.alpha, cross_b, optimize="optimal")
+        v, w, u = self.solved.rotation
+        explained = np.einsum(
+            "qi,it,qt->q", (cross_a @ v) ** 2, 1 / w, (cross_b @ u) ** 2, optimize="optimal"
+        )
+        own = RBF.variance(np, self.theta_a, x[:, :1]) * RBF.variance(np, self.theta_b, x[:, 1:])
+        return self.units.restored(mean, np.sqrt(np.maximum(own - explained, 0.0)))
+
+
+def fit_grid(a: np.ndarray, b: np.ndarray, y: np.ndarray) -> GridGP:
+    """GP of y (n, t) over a (n,) by b (t,), each scaled to about [0, 1], without gaps."""
+    a, b, units = a[:, None], b[:, None], Normalisation.of(y.reshape(-1))
+    prior = RBF.prior(1.0, NOISE, LENGTH, LENGTH_SPREAD, LENGTH_SPREAD)
+    mean, width = (np.tile(part, 2) for part in prior)
+    width[1] = NOISE_SPREAD  # the nugget's place in θ_a holds the noise
+    width[RBF.size : RBF.size + 2] = 1e-6  # θ_b's amplitude and nugget: θ_a's are enough
+
+    def solve(z: np.ndarray) -> tuple[KroneckerSolution, np.ndarray, np.ndarray]:
+        theta_a, theta_b = np.split(mean + width * z, 2)
+        ka, kb = (
+            RBF.covariance(np, theta, p, p) + JITTER * np.eye(len(p))
+            for theta, p in ((theta_a, a), (theta_b, b))
+        )
+        noise = np.full(len(b), np.exp(2 * theta_a[1]))
+        return solve_kronecker(units.normalised(y), ka, kb, noise), theta_a, theta_b
+
+    def posterior(z: np.ndarray) -> tuple[float, np.ndarray]:
+        solved, theta_a, theta_b = solve(z)
+        slope_a = np.array(pull("rbf", theta_a, a, solved.slope_k))
+        slope_b = np.array(pull("rbf", theta_b, b, solved.slope_b))
+        slope_a[1] += np.sum(solved.slope_log_noise)
+        slope = np.concatenate([slope_a, slope_b]) * width
+        return solved.value - 0.5 * float(z @ z), slope - z
+
+    starts = np.zeros((2, len(mean)))
+    starts[1, 2 : RBF.size] = starts[1, RBF.size + 2 :] = SHORT
+    solved, theta_a, theta_b = solve(maximise(posterior, list(starts), -REACH, REACH).x)
+    return GridGP(a, b, theta_a, theta_b, solved, units)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,34 +174,21 @@ def fit_surface(
         measured, simulated = (
             replace(grid, amplitude=np.log(grid.amplitude)) for grid in (measured, simulated)
         )
-    return Surface(SURFACES[model](frame, measured, simulated, training), frame, logarithm)
+    return Surface(_fitted(model, frame, measured, simulated, training), frame, logarithm)
 
 
-def _samples(frame: Frame, grid: Grid) -> Samples:
-    return Samples.of(frame.points(grid.frequency_hz, grid.pose), grid.amplitude.ravel())
-
-
-def _grid(frame: Frame, grid: Grid) -> GridGP:
-    return fit_grid(*frame.axes(grid.frequency_hz, grid.pose), grid.amplitude)
-
-
-def _gp(frame: Frame, measured: Grid, simulated: Grid, training: Training) -> GridGP:
-    return _grid(frame, measured)
-
-
-def _nargp(frame: Frame, measured: Grid, simulated: Grid, training: Training) -> NARGP:
-    low, s = _grid(frame, simulated), _samples(frame, measured)
-    units = Normalisation.of(simulated.amplitude.ravel())
-    wide = Samples(widened(s.x, low.predict(s.x)[0], units), s.y, s.sd)
+def _fitted(
+    model: str, frame: Frame, measured: Grid, simulated: Grid, training: Training
+) -> FidelityLevel:
+    if model == "GP":
+        return fit_grid(*frame.axes(measured.frequency_hz, measured.pose), measured.amplitude)
+    cheap, seen = (
+        Samples.of(frame.points(grid.frequency_hz, grid.pose), grid.amplitude.ravel())
+        for grid in (simulated, measured)
+    )
+    if model == "MFDGP":
+        return fit_mfdgp(cheap, seen, training)
+    low = fit_grid(*frame.axes(simulated.frequency_hz, simulated.pose), simulated.amplitude)
+    units = Normalisation.of(cheap.y)
+    wide = Samples(widened(seen.x, low.predict(seen.x)[0], units), seen.y, seen.sd)
     return NARGP(low, fit_growing(wide, SOME_POINTS, perdikaris(2), STARTS), units)
-
-
-def _mfdgp(frame: Frame, measured: Grid, simulated: Grid, training: Training) -> FidelityLevel:
-    return fit_mfdgp(_samples(frame, simulated), _samples(frame, measured), training)
-
-
-SURFACES: dict[str, Callable[[Frame, Grid, Grid, Training], FidelityLevel]] = {
-    "GP": _gp,
-    "NARGP": _nargp,
-    "MFDGP": _mfdgp,
-}

@@ -1,22 +1,31 @@
-"""GP of one output as it is usually published: hyperparameters of the greatest likelihood.
+"""GPs of one output as they are usually published: hyperparameters of the greatest likelihood.
 
 y ~ N(0, K + τ² I); log p(y | θ) = −½ yᵀ(K + τ²I)⁻¹y − ½ log|K + τ²I| − (n/2) log 2π (Rasmussen &
 Williams 2006, eq. 5.8) is climbed from several starts, the best taken; no prior, no averaging.
 Predictions are eqs. 2.23 and 2.24 there. With few points this is over-confident (`averaged`
 averages instead): it is here because the papers do so.
+
+NARGP (Perdikaris et al. 2017): each level is a GP of the pose and the level below,
+f_t(x) = g_t(x, f_{t−1}(x)) with g_t ~ GP(0, k_ρ(x, x') k_f(f(x), f(x')) + k_δ(x, x')), nothing in
+front; all kernels RBF with a length scale per coordinate, level after level, g_t trained at the
+posterior mean of the level below. A prediction is the integral over the level below, by
+Gauss–Hermite quadrature with its mean and variance, where the paper and emukit use Monte Carlo: the
+same integral without its noise. AR1 as published (Kennedy & O'Hagan 2000), y = ρ·l(x) + δ(x), is
+the same with another kernel: ρ is integrated over a normal prior whose width is climbed, which with
+a linear kernel in l is one GP.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 from scipy.stats import qmc
 
+from planner.errors import InputError
 from planner.surrogate.kernels import parse
-from planner.surrogate.likelihood import log_likelihood
-from planner.surrogate.models.fidelity_levels import Samples, spread
-from planner.surrogate.quasi_newton import RELATIVE_TOLERANCE, Peak, maximise
+from planner.surrogate.likelihood import RELATIVE_TOLERANCE, Peak, log_likelihood, maximise
 from planner.surrogate.training_data import capacity
 
 # Of log θ: amplitudes and length scales from 1e-3 to 1e5 in units of y's and x's own scale.
@@ -41,6 +50,53 @@ STARTS = 5  # "five optimization runs" (Busch et al. 2022, section 2.3.1)
 
 
 @dataclass(frozen=True, eq=False)
+class Samples:
+    """n values of one output: x (n, d), scaled to about [0, 1], y (n,) and its sd (n,)."""
+
+    x: np.ndarray
+    y: np.ndarray
+    sd: np.ndarray
+
+    @classmethod
+    def of(cls, x: np.ndarray, y: np.ndarray, sd: np.ndarray | float = 0.0) -> "Samples":
+        """The finite ones; an sd of 0 (or NaN) leaves all noise to the nugget."""
+        x = np.atleast_2d(np.asarray(x, dtype=float))
+        y = np.asarray(y, dtype=float)
+        if x.shape[0] != len(y):
+            raise InputError(f"{len(y)} values at {x.shape[0]} poses: give one value per pose.")
+        sd = np.broadcast_to(np.nan_to_num(np.asarray(sd, dtype=float)), y.shape)
+        known = np.isfinite(y) & np.isfinite(x).all(axis=1)
+        return cls(x[known], y[known], sd[known])
+
+
+class FidelityLevel(Protocol):
+    """What predicts one output with its uncertainty: a simulation or a fitted model."""
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Best estimate and sd (q,) of the noise-free output at x (q, d)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Exact:
+    """A simulation that can be evaluated at every pose: values (q,) of x (q, d)."""
+
+    function: Callable[[np.ndarray], np.ndarray]
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Its value (q,), with sd 0."""
+        value = np.asarray(self.function(x), dtype=float)
+        return value, np.zeros_like(value)
+
+
+def spread(y: np.ndarray) -> float:
+    """Sd of y, 1 where it is unknown (fewer than two values) or 0."""
+    sd = float(np.std(y)) if len(y) > 1 else 0.0
+    size = float(np.max(np.abs(y), initial=0.0))
+    return sd if sd > 1e-12 * max(size, 1e-300) else 1.0
+
+
+@dataclass(frozen=True, eq=False)
 class Normalisation:
     """y is modelled as (y − centre) / scale."""
 
@@ -51,6 +107,14 @@ class Normalisation:
     def of(cls, y: np.ndarray) -> "Normalisation":
         """Mean and sd of y."""
         return cls(float(np.mean(y)), spread(y))
+
+    def normalised(self, y: np.ndarray) -> np.ndarray:
+        """y in these units."""
+        return (y - self.centre) / self.scale
+
+    def restored(self, mean: np.ndarray, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd in y's own unit."""
+        return self.centre + self.scale * mean, self.scale * sd
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +135,7 @@ class LikelihoodGP:
         cross = kernel.covariance(np, self.theta, self.x, x)
         explained = np.sum(solve_triangular(self.root, cross, lower=True) ** 2, axis=0)
         sd = np.sqrt(np.maximum(kernel.variance(np, self.theta, x) - explained, 0.0))
-        units = self.units
-        return units.centre + units.scale * (self.alpha @ cross), units.scale * sd
+        return self.units.restored(self.alpha @ cross, sd)
 
 
 def fit_likelihood(
@@ -81,7 +144,6 @@ def fit_likelihood(
     noise: float | None = None,
     units: Normalisation | None = None,
     starts: int = STARTS,
-    seed: int = 0,
     isotropic: bool = False,
 ) -> LikelihoodGP:
     """Maximum-likelihood GP of `samples`.
@@ -92,12 +154,11 @@ def fit_likelihood(
         noise: τ over y's scale, where it is known; None: it is fitted.
         units: by what y is normalised; None: its own mean and sd.
         starts: how many; the first is in the middle, the others random around it.
-        seed: of the random starts.
         isotropic: one length scale for all columns of a factor (Busch et al. 2022, eqs. 4 to 7).
     """
     units = units or Normalisation.of(samples.y)
     hill = _Hill.of(samples, kernel, noise, units, isotropic)
-    ends = sorted(hill.roughly(starts, seed, noise), key=lambda peak: -peak.log_density)[:LAST]
+    ends = sorted(hill.roughly(starts, noise), key=lambda peak: -peak.log_density)[:LAST]
     best = max((hill.climb(e.x) for e in ends), key=lambda peak: peak.log_density)
     return at_hyperparameters(samples, kernel, best.x[hill.own], units)
 
@@ -159,7 +220,7 @@ class _Hill:
         cls, samples: Samples, kernel: str, noise: float | None, units: Normalisation,
         isotropic: bool,
     ) -> "_Hill":  # fmt: skip
-        x, y = samples.x, (samples.y - units.centre) / units.scale
+        x, y = samples.x, units.normalised(samples.y)
         own = _free(kernel, x.shape[1], isotropic)
         kept = np.unique(own, return_index=True)[1]
         middle = parse(kernel, x.shape[1]).prior(1.0, NOISES[0], LENGTH, 0.0, 0.0)[0][kept]
@@ -172,9 +233,9 @@ class _Hill:
         data = x, y, none, mask, none + JITTER, np.zeros(()), np.zeros(())
         return cls(kernel, len(samples.y), data, own, kept, middle, lower, upper)
 
-    def starts(self, count: int, seed: int) -> np.ndarray:
+    def starts(self, count: int) -> np.ndarray:
         """The middle, and normal around it (count, …)."""
-        normal = np.random.default_rng(seed).standard_normal((count - 1, len(self.kept)))
+        normal = np.random.default_rng(0).standard_normal((count - 1, len(self.kept)))
         return self.middle + np.vstack([np.zeros(len(self.kept)), normal])
 
     def everywhere(self, count: int) -> np.ndarray:
@@ -187,11 +248,11 @@ class _Hill:
         even = qmc.Halton(len(self.kept), rng=0).random(count)
         return low[self.kept] + even * (high - low)[self.kept]
 
-    def roughly(self, starts: int, seed: int, noise: float | None = None) -> list[Peak]:
+    def roughly(self, starts: int, noise: float | None = None) -> list[Peak]:
         """Where climbs from several starts end roughly."""
         levels = NOISES[:1] if noise is None else [level for level in NOISES if level > noise]
         ends = []
-        for i, z in enumerate(self.starts(starts, seed)):
+        for i, z in enumerate(self.starts(starts)):
             for held in levels[i % (len(levels) + 1) :]:
                 z = self.climb(z, *ROUGHLY, held).x
             ends.append(self.climb(z, *ROUGHLY))
@@ -218,7 +279,7 @@ def at_hyperparameters(
     samples: Samples, kernel: str, theta: np.ndarray, units: Normalisation
 ) -> LikelihoodGP:
     """The GP of `samples` with given hyperparameters (p,), log τ in their second place."""
-    y = (samples.y - units.centre) / units.scale
+    y = units.normalised(samples.y)
     root = np.linalg.cholesky(_covariance(kernel, theta, samples.x))
     white = solve_triangular(root, y, lower=True)
     size = np.sum(np.log(np.diag(root))) + len(y) * (0.5 * np.log(2 * np.pi) + np.log(units.scale))
@@ -240,3 +301,67 @@ def _covariance(kernel: str, theta: np.ndarray, x: np.ndarray) -> np.ndarray:
     k = parse(kernel, x.shape[1]).covariance(np, theta, x, x)
     noise = np.exp(2 * theta[1]) + JITTER
     return k + noise * np.eye(len(x))
+
+
+NODE_COUNT = 21  # of the quadrature: exact for polynomials of degree 41
+NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(NODE_COUNT)
+WEIGHTS = WEIGHTS / WEIGHTS.sum()
+
+
+@dataclass(frozen=True, eq=False)
+class NARGP:
+    """Fitted by `fit_nargp`: the level below, and g of (x, f_low)."""
+
+    low: FidelityLevel
+    high: LikelihoodGP
+    low_units: Normalisation
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q,) of the noise-free expensive output at x (q, d)."""
+        below, unsure = self.low.predict(x)
+        nodes = below[None, :] + NODES[:, None] * unsure[None, :]
+        wide = widened(np.tile(x, (NODE_COUNT, 1)), nodes.reshape(-1), self.low_units)
+        mean, sd = (part.reshape(NODE_COUNT, len(x)) for part in self.high.predict(wide))
+        middle = WEIGHTS @ mean
+        return middle, np.sqrt(WEIGHTS @ (sd**2 + (mean - middle) ** 2))
+
+
+def perdikaris(d: int, shape: str = "rbf") -> str:
+    """Kernel expression k_ρ(x) k_f(l) + k_δ(x) over the columns (x_1 … x_d, l)."""
+    return f"{shape}[0:{d}]*{shape}[{d}:{d + 1}]+{shape}[0:{d}]"
+
+
+def kennedy_ohagan(d: int) -> str:
+    """Kernel expression σ² l l' + k_δ(x) over the same columns: AR1."""
+    return f"linear[{d}:{d + 1}]+rbf[0:{d}]"
+
+
+def fit_nargp(
+    measured: Samples,
+    low: FidelityLevel,
+    low_units: Normalisation,
+    noise: float | None = None,
+    units: Normalisation | None = None,
+    starts: int = STARTS,
+    isotropic: bool = False,
+    kernel: Callable[[int], str] = perdikaris,
+) -> NARGP:
+    """NARGP of the measured samples over a cheap level, which is fitted already or exact.
+
+    Args:
+        measured: expensive values at x (n, d).
+        low: the cheap level.
+        low_units: by what the cheap level's value is normalised as an input.
+        noise, units, starts, isotropic: as of `fit_likelihood`.
+        kernel: `perdikaris`, or `kennedy_ohagan` for AR1.
+    """
+    below, _ = low.predict(measured.x)
+    wide = Samples(widened(measured.x, below, low_units), measured.y, measured.sd)
+    expression = kernel(measured.x.shape[1])
+    high = fit_likelihood(wide, expression, noise, units, starts, isotropic)
+    return NARGP(low, high, low_units)
+
+
+def widened(x: np.ndarray, below: np.ndarray, units: Normalisation) -> np.ndarray:
+    """x (n, d), and the value (n,) of the level below in its own units: (n, d + 1)."""
+    return np.column_stack([x, units.normalised(below)])

@@ -14,6 +14,7 @@ written for L⁻¹u (the same model in other coordinates), inducing inputs are d
 prediction integrates over f_1(x) by quadrature, where the paper draws samples of it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -25,10 +26,10 @@ from jax.example_libraries.optimizers import adam
 from jax.scipy.linalg import solve_triangular
 
 from planner import jax_setup
+from planner.surrogate.ar1 import AR1
+from planner.surrogate.frequency_models import FEWEST, FrequencyData
 from planner.surrogate.kernels import Kernel, parse
-from planner.surrogate.models.fidelity_levels import Samples
-from planner.surrogate.models.likelihood_gp import Normalisation
-from planner.surrogate.models.nargp import NODES, WEIGHTS
+from planner.surrogate.models.likelihood_gp import NODES, WEIGHTS, Normalisation, Samples
 
 JITTER = 1e-6  # of the inducing points' covariance, relative to the prior variance
 LENGTH = 0.15  # of x at the start, times √d; x is scaled to about [0, 1]
@@ -36,7 +37,6 @@ START_OWN = 0.3  # amplitude of k_δ at the start, over the output's sd
 START_NOISE = 0.1  # sd over the output's, held in the first stage
 START_SPREAD = 0.1  # of q(L⁻¹u) at the start, held in the first stage
 MOST_TO_BEGIN = 1500  # points from which q(u) begins
-DRAWS, MOST_DRAWN = 256, 20_000  # of f_1 in the bound that is told: at a point, and in all
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +96,10 @@ class Training:
     inducing: int = 100
 
 
+# As a campaign chooses it: few measured poses, and a simulation without noise.
+CHOSEN = Training(held_steps=500, free_steps=1500, inducing=60)
+
+
 class TwoLevelData(NamedTuple):
     """Both levels' points and values, normalised; inducing inputs of both layers."""
 
@@ -114,23 +118,18 @@ class MFDGP:
     layers: tuple[Layer, Layer]
     data: TwoLevelData
     high_units: Normalisation
-    bound: float  # of the normalised data, with many samples
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the noise-free expensive output at x (q, d)."""
         mean, variance = _predicted(self.layers, self.data, np.asarray(x, dtype=float))
-        units = self.high_units
-        return units.centre + units.scale * mean, units.scale * np.sqrt(variance)
+        return self.high_units.restored(mean, np.sqrt(variance))
 
 
-def fit_mfdgp(
-    cheap: Samples, measured: Samples, how: Training | None = None, seed: int = 0
-) -> MFDGP:
+def fit_mfdgp(cheap: Samples, measured: Samples, how: Training | None = None) -> MFDGP:
     """Train both layers on cheap and measured samples, x (n, d) scaled to about [0, 1]."""
     how = how or Training()
     low_units, high_units = Normalisation.of(cheap.y), Normalisation.of(measured.y)
-    y_low = (cheap.y - low_units.centre) / low_units.scale
-    y_high = (measured.y - high_units.centre) / high_units.scale
+    y_low, y_high = low_units.normalised(cheap.y), high_units.normalised(measured.y)
     d = measured.x.shape[1]
     near = np.argmin(
         np.sum((measured.x[:, None] - cheap.x[None]) ** 2, axis=-1), axis=1
@@ -148,11 +147,8 @@ def fit_mfdgp(
     )
     stages = (how.held_steps, how.held_rate, 0.0), (how.free_steps, how.free_rate, 1.0)
     for i, (steps, rate, free) in enumerate(stages):
-        stage = 3 * seed + i
-        layers = _climbed(layers, data, stage, rate, free, steps, how.batch, how.draws)
-    draws = max(1, min(DRAWS, MOST_DRAWN // len(y_high)))
-    value = float(bound(layers, data, 3 * seed + 2, draws))
-    return MFDGP(layers, data, high_units, value)
+        layers = _climbed(layers, data, i, rate, free, steps, how.batch, how.draws)
+    return MFDGP(layers, data, high_units)
 
 
 def choose_inducing(k: TiedKernel, theta: np.ndarray, x: np.ndarray, count: int) -> np.ndarray:
@@ -219,7 +215,7 @@ def _divergence(layer: Layer) -> Array:
     return 0.5 * (jnp.sum(root**2) + jnp.sum(layer.mean**2) - len(layer.mean)) - size
 
 
-def _bound(
+def bound(
     layers: tuple[Layer, Layer], data: TwoLevelData, low: Array, high: Array, noise: Array
 ) -> Array:
     """The bound from a batch `low` (b,) and `high` (b',) of points and ε (s, b')."""
@@ -236,14 +232,6 @@ def _bound(
     y = jnp.tile(data.y_high[high], len(noise))
     total += jnp.mean(_expected(second, y, mean, variance)) * len(data.y_high)
     return total - _divergence(first) - _divergence(second)
-
-
-@jax_setup.compiled(static_argnums=3)
-def bound(layers: tuple[Layer, Layer], data: TwoLevelData, seed: int, draws: int) -> Array:
-    """The bound with all points and so many draws of f_1 at each expensive one."""
-    noise = jax.random.normal(jax.random.key(seed), (draws, len(data.y_high)))
-    low, high = jnp.arange(len(data.y_low)), jnp.arange(len(data.y_high))
-    return _bound(layers, data, low, high, noise)
 
 
 @jax_setup.compiled("quick", static_argnums=(6, 7))
@@ -267,7 +255,7 @@ def _climbed(
         low = jax.random.randint(one, (min(batch, n_low),), 0, n_low)
         high = jax.random.randint(two, (min(batch, n_high),), 0, n_high)
         noise = jax.random.normal(three, (draws, min(batch, n_high)))
-        return -_bound(now, data, low, high, noise)
+        return -bound(now, data, low, high, noise)
 
     begun, updated, layers_of = adam(rate)
 
@@ -289,3 +277,28 @@ def _predicted(layers: tuple[Layer, Layer], data: TwoLevelData, x: Array) -> tup
     mean, variance = (part.reshape(len(NODES), -1) for part in parts)
     middle = WEIGHTS @ mean
     return middle, WEIGHTS @ (variance + (mean - middle[None, :]) ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class DeepOutputs:
+    """A deep GP of each output."""
+
+    each: Sequence[MFDGP]
+
+    def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q, m) at x (q, d)."""
+        found = [one.predict(x) for one in self.each]
+        return np.stack([m for m, _ in found], axis=1), np.stack([s for _, s in found], axis=1)
+
+
+def fit_deep(seen: FrequencyData, ar1: AR1) -> DeepOutputs | None:
+    """None where an output has too few values, or the simulation none of it."""
+    if seen.elsewhere is None:
+        return None
+    data, (x, low) = seen.data, seen.elsewhere
+    cheap = [Samples.of(x, column) for column in low.T]
+    measured = [Samples.of(data.x, y, sd) for y, sd in zip(data.y.T, data.sd.T, strict=True)]
+    if min(len(s.y) for s in (*cheap, *measured)) < FEWEST:
+        return None
+    pairs = zip(cheap, measured, strict=True)
+    return DeepOutputs([fit_mfdgp(few, high, CHOSEN) for few, high in pairs])

@@ -18,8 +18,10 @@ from scipy.linalg import eigh
 
 from planner import jax_setup
 from planner.errors import InputError
+from planner.surrogate.ar1 import AR1
+from planner.surrogate.frequency_models import FEWEST, FrequencyData
 from planner.surrogate.kernels import parse
-from planner.surrogate.quasi_newton import maximise
+from planner.surrogate.likelihood import maximise
 
 RANK = 3  # columns of W: chosen on robots 1 and 2 of the study of Lei et al. 2023
 NOISE, NOISE_SPREAD = 0.1, 1.5  # median sd of a task's noise over its scale, its log-sd
@@ -28,7 +30,7 @@ FREE_SPREAD, LOW_RANK_SPREAD = 1.0, 0.5  # log-sd of k's scales; the second chos
 OWN, OWN_SPREAD = 0.1, 1.5  # κ's square root over the output's sd: median, log-sd
 WEIGHT_SD = 1.0  # of L's or W's entries around those of the data's own covariance
 REACH = 6.0  # sds of the prior beyond which nothing is looked for
-FIRST_STEPS, FTOL = 40, 1e-6
+FIRST_STEPS, MOST_STEPS, FTOL = 40, 200, 1e-6
 RELATIVE_JITTER = 1e-9
 
 
@@ -103,13 +105,6 @@ class MultiTaskGP:
         sd = np.sqrt(np.maximum(own - self.solved.explained(cross, b), 0.0))
         return tasks.centre + tasks.scale * (cross @ self.solved.alpha @ b), tasks.scale * sd
 
-    @property
-    def correlation(self) -> np.ndarray:
-        """Correlation (t, t) of the outputs, as identified."""
-        b = self.hyperparameters.task_covariance
-        sd = np.sqrt(np.maximum(np.diag(b), 1e-300))
-        return b / np.outer(sd, sd)
-
 
 @dataclass(frozen=True, eq=False)
 class KroneckerSolution:
@@ -165,10 +160,9 @@ def solve_kronecker(
 
 
 def fit_multitask(
-    x: np.ndarray, y: np.ndarray, kernel: str = "rbf", iterations: int = 200, prior: bool = True,
-    rank: int | None = None,
-) -> MultiTaskGP:  # fmt: skip
-    """Fit y (n, t) at x (n, d) scaled to about [0, 1], of at most `iterations` steps.
+    x: np.ndarray, y: np.ndarray, kernel: str = "rbf", prior: bool = True, rank: int | None = None
+) -> MultiTaskGP:
+    """Fit y (n, t) at x (n, d) scaled to about [0, 1].
 
     `rank` of W; None: B is free. Without `prior` it is the greatest likelihood, as published.
     InputError where a value is missing.
@@ -186,7 +180,7 @@ def fit_multitask(
     # B last: a long first step would end where an output is given up as noise.
     z = np.zeros(len(middle))
     others = np.arange(len(z)) >= guess.weights.size + guess.log_own.size
-    for free, steps in ((others, FIRST_STEPS), (np.ones(len(z)), iterations)):
+    for free, steps in ((others, FIRST_STEPS), (np.ones(len(z)), MOST_STEPS)):
         z = maximise(posterior, [z], -REACH * free, REACH * free, steps, FTOL).x
     h = guess.like(middle + width * z)
     return MultiTaskGP(tasks, h, solve(tasks, h))
@@ -245,3 +239,28 @@ def prior_sds(h: Hyperparameters, rank: int | None) -> np.ndarray:
         np.full_like(h.log_noise, NOISE_SPREAD),
         theta,
     ).flat()
+
+
+@dataclass(frozen=True, eq=False)
+class TaskedDeviations:
+    """One GP of how far all outputs are off what `ar1` says of the simulation with a factor 1."""
+
+    ar1: AR1
+    gp: MultiTaskGP
+
+    def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q, m) at x (q, d), simulation low (q, m)."""
+        mean, sd = self.gp.predict(x)
+        unknown = (self.ar1.uses_low & ~np.isfinite(low)) * self.ar1.unknown_sd
+        return mean + self.ar1.split(low)[0], np.hypot(sd, unknown)
+
+
+def fit_tasks(seen: FrequencyData, ar1: AR1) -> TaskedDeviations | None:
+    """At poses where every output is known; None where these are fewer than FEWEST."""
+    data = seen.data
+    off = data.y - ar1.split(data.low)[0]
+    blind = (ar1.uses_low & ~np.isfinite(data.low)).any(axis=1)
+    whole = np.isfinite(off).all(axis=1) & ~blind
+    if whole.sum() < FEWEST:
+        return None
+    return TaskedDeviations(ar1, fit_multitask(data.x[whole], off[whole], seen.kernel))
