@@ -10,8 +10,7 @@ from planner.campaign.question import question
 from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.recording.records import Hit
-from planner.recording.repeat_sizes import other_size
-from planner.recording.repeats import Doubt, doubts
+from planner.recording.repeats import Doubt, doubts, other_size
 
 
 def asked_of(

@@ -82,7 +82,7 @@ class ToolChange:
     @classmethod
     def of(cls, asked: Asked, cut: Cut) -> "ToolChange | None":
         """None where no tool is named; InputError where its file and the cut's disagree."""
-        from planner.milling.tool_file import load_tool
+        from planner.milling.tool import load_tool
 
         if asked.tool is None:
             if asked.reference or asked.robot or asked.noise:

@@ -9,7 +9,7 @@ from msgspec import inspect as types
 
 from planner.campaign.config import AcquisitionTable, CampaignConfig, SurrogateTable
 from planner.milling.cut import Cut
-from planner.milling.tool_file import ToolTable
+from planner.milling.tool import ToolTable
 from planner.robot.config import RobotConfig
 
 FILES: dict[str, type[msgspec.Struct]] = {

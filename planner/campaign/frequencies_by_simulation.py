@@ -15,9 +15,8 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf import synthesis
 from planner.frf.frf import Frf
-from planner.measurement.measured_frfs import Measured, matrices_at, stack
+from planner.measurement.measured_frfs import Measured, cut_off, matrices_at, stack
 from planner.measurement.nuisances import Tolerances, basis, real_rows
-from planner.measurement.truncated_decay import cut_off
 from planner.surrogate.modal_surrogate import ModalObservations
 
 LINES, LEAST, MOST = 600, 40, 120  # of all poses together, and of one at least and at most

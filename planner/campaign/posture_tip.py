@@ -17,8 +17,7 @@ from planner.errors import InputError, RefusedError
 from planner.frf.matrix import FrfMatrix
 from planner.frf.synthesis import pole
 from planner.milling.coupling import TipReceptance
-from planner.milling.rotations import TwoPoints, two_point_receptance
-from planner.milling.tip_files import two_points_of
+from planner.milling.tip_files import TwoPoints, two_point_receptance, two_points_of
 from planner.milling.tool import Tool
 from planner.modal.matrix_modes import modes_of_matrix
 from planner.modal.modes import Mode

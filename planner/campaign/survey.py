@@ -18,7 +18,7 @@ from planner.frf.frf import Frf
 from planner.measurement.measured_frfs import common_band
 from planner.measurement.nuisances import Tolerances
 from planner.measurement.point_places import misplaced, questions
-from planner.measurement.sensor_masses import WithoutSensors, without_sensors
+from planner.measurement.sensor_loading import WithoutSensors, without_sensors
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
 from planner.progress import Tell

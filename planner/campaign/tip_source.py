@@ -10,11 +10,9 @@ from planner.campaign.posture_tip import posture_tip
 from planner.campaign.store import is_campaign
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
-from planner.milling.contact_fit import ContactFit, fit_contact
-from planner.milling.coupling import TipReceptance
+from planner.milling.coupling import ContactFit, TipReceptance, fit_contact
 from planner.milling.cutter_frf import CutterFrf, read_frf
-from planner.milling.rotations import completed
-from planner.milling.tip_files import MEASURE, read_tip
+from planner.milling.tip_files import MEASURE, completed, read_tip
 from planner.milling.tool import Tool
 from planner.recording.folder import several_poses
 from planner.robot.robot import Robot

@@ -7,9 +7,13 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from planner.check.joints import check_frames, check_joints
-from planner.check.links import check_links
-from planner.check.remark import CheckRemark, worst_first
+from planner.check.description import (
+    CheckRemark,
+    check_frames,
+    check_joints,
+    check_links,
+    worst_first,
+)
 from planner.check.room import check_collision, look_around
 from planner.check.springs import check_band, check_springs
 from planner.dynamics.simulation import Simulation

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planner.check.remark import CheckRemark
+from planner.check.description import CheckRemark
 from planner.errors import InputError, NoPoseLeftError
 from planner.robot.collision import Collisions
 from planner.robot.config import WorkspaceTable

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planner.check.remark import CheckRemark
+from planner.check.description import CheckRemark
 from planner.dynamics.simulation import Simulation
 from planner.robot.config import BASE, Compliance
 

@@ -55,7 +55,7 @@ def couple(
     """
     from planner.campaign.tip_source import fitted_contact, tip_of, within
     from planner.milling.coupling import couple as coupling
-    from planner.milling.tool_file import load_tool
+    from planner.milling.tool import load_tool
     from planner.report.coupling import coupling_report
     from planner.report.pictures import Pictures
 

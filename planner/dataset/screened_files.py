@@ -68,8 +68,8 @@ class Source:
 
     def placed(self, record: RecordT) -> RecordT:
         """FRFs with the places that they do not state themselves; time histories as they are."""
-        from planner.recording.file_names import placed_by_name
         from planner.recording.hits import with_axes
+        from planner.recording.read import placed_by_name
 
         if not isinstance(record, FrfRecord):
             return record

@@ -17,8 +17,7 @@ from planner.effects.effect import Gain, Motions
 from planner.fit.data import FrfData, among
 from planner.fit.inertias import spatial
 from planner.fit.structure import REACH, RobotStructure
-from planner.measurement.missed_ports import actual_ports
-from planner.measurement.nuisances import OpenNumbers, Tolerances, basis
+from planner.measurement.nuisances import OpenNumbers, Tolerances, actual_ports, basis
 from planner.robot.elastic_model import Matrices
 from planner.robot.virtual_joints import inertia_basis
 

@@ -26,7 +26,7 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.structure import effects_free, exported
 from planner.fit.trials import FAR, LOG_STEPS, Trials, explained
 from planner.inference.parallel import side_by_side
-from planner.measurement.truncated_decay import completed
+from planner.measurement.measured_frfs import completed
 
 SEARCHED, SCREENED, LAST = 28, 64, 44  # lines a pose: while searching, for operators, at the end
 LEAST = 12.0  # nats that one more effect must gain

@@ -10,8 +10,7 @@ from planner.dynamics.gradient import response
 from planner.dynamics.simulation import Simulation
 from planner.frf import metrics
 from planner.frf.frf import Frf
-from planner.measurement.measured_frfs import Measured, common_band, stack
-from planner.measurement.truncated_decay import cut_off
+from planner.measurement.measured_frfs import Measured, common_band, cut_off, stack
 
 MODEL_ERROR = 0.003  # relative sd of all that no simulation follows: calibration, angles
 MOST_LINES = 512  # a pose

@@ -9,7 +9,7 @@ from planner.errors import InputError
 from planner.frf.exported import labelled_frfs
 from planner.frf.quantities import convert
 from planner.milling.cut import Cut
-from planner.recording.file_names import read_frfs
+from planner.recording.read import read_frfs
 from planner.recording.records import AXES, FrfRecord
 
 SEEN = 1e-9  # share of a direction in the plane of the cut that does not count

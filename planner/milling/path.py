@@ -8,10 +8,9 @@ import numpy as np
 from scipy.stats import norm
 
 from planner.milling.cut import Cut
-from planner.milling.lobes import Loss, losses
+from planner.milling.lobes import PROBABILITY, Loss, losses, sampled_limits
 from planner.milling.machine import Machine, multipliers
 from planner.milling.structure import Structure, moved
-from planner.milling.uncertainty import PROBABILITY, sampled_limits
 from planner.progress import Tell, quietly, within
 
 TURNS_DEG = np.arange(0.0, 360.0, 15.0)  # of the feed about the tool's axis that are tried

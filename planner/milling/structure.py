@@ -9,12 +9,11 @@ from scipy.stats import norm, qmc
 
 from planner.errors import InputError
 from planner.milling.cut import Cut
-from planner.milling.cutter_fit import CutterFit, hidden_below
 from planner.milling.cutter_frf import CutterFrf
-from planner.milling.cutter_modes import CutterModes, ModeFile
+from planner.milling.cutter_modes import CutterFit, CutterModes, ModeFile, hidden_below
 from planner.milling.directional import mean_matrix
+from planner.milling.lobes import OPEN, REPLICATES
 from planner.milling.machine import LobeCurves, Machine, check_structure, curves
-from planner.milling.uncertainty import OPEN, REPLICATES
 
 STEP = 1e-4  # relative, of derivatives
 MOST_DAMPING = 0.95

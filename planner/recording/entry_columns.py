@@ -1,19 +1,147 @@
-"""Entries of a file to its columns, each with what is stated of it, and to named columns."""
+"""Named entries of files (MAT, HDF5, TDMS, LVM), level by level, and the columns among them."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording import stated
-from planner.recording.column_names import Unit, lookup, time_unit, unit_text
-from planner.recording.entries import EntryTree, text_of
-from planner.recording.frf_columns import holds_frfs
-from planner.recording.named_columns import Named
+from planner.recording.column_names import (
+    Axis,
+    Unit,
+    axis_of,
+    is_abscissa,
+    is_axis,
+    lookup,
+    name_of,
+    names_of,
+    rescaled,
+    time_unit,
+    unit_of,
+    unit_text,
+    units_of,
+)
+from planner.recording.named_columns import Named, holds_frfs
 from planner.recording.records import check_numbers
 from planner.recording.sampling import UNEVEN, sampling_rate
+
+# A small file may unfold to any size: a hit of 5 channels at 100 kHz over 60 s is 240 MB.
+LARGEST_BYTES = 384 * 1024 * 1024
+MOST_ENTRIES = 10_000  # groups, arrays and texts of a file that are looked at
+DEEPEST = 32  # levels
+
+
+@dataclass(frozen=True, eq=False)
+class EntryTree:
+    """A group of a file, a struct, an array with what is stated of it.
+
+    `attributes` are texts, single numbers, dates and lists of texts; `parts` further levels and
+    arrays of numbers: (n,), (n, k) and what is no column. An array named "" is the level's own:
+    a channel and what is stated of it.
+    """
+
+    attributes: Mapping[str, object] = field(default_factory=dict)
+    parts: Mapping[str, "EntryTree | np.ndarray"] = field(default_factory=dict)
+    unread: tuple[str, ...] = ()  # what is there and cannot be read, in words
+
+
+def tree_of(
+    entries: Mapping[str, object], attributes: Mapping[str, object] | None = None
+) -> EntryTree:
+    """A level from nested dicts (structs), lists (cells, arrays of structs), arrays and texts."""
+    stated = dict(attributes_of(attributes or {}))
+    parts: dict[str, EntryTree | np.ndarray] = {}
+    unread = []
+    for name, value in entries.items():
+        while isinstance(value, list):
+            value = _of_list(name, value)
+        if isinstance(value, Mapping):
+            value = tree_of(value)
+        if isinstance(value, EntryTree):
+            parts[name] = value
+        elif value is None:
+            unread.append(name)
+        elif (found := _attribute(value)) is not None:
+            stated[name] = found
+        elif isinstance(value, np.ndarray) and value.size > 1 and value.dtype.kind in "fiubc":
+            parts[name] = np.squeeze(value)
+    return EntryTree(stated, parts, tuple(unread))
+
+
+def attributes_of(entries: Mapping[str, object]) -> Iterator[tuple[str, object]]:
+    """Of any entries those that are attributes."""
+    for name, value in entries.items():
+        found = _attribute(value)
+        if found is not None:
+            yield str(name), found
+
+
+def text_of(value: object) -> str:
+    """An attribute as text; what is no UTF-8 is Latin-1, as older analysers write it."""
+    if not isinstance(value, bytes):
+        return str(value)
+    try:
+        return value.decode()
+    except UnicodeDecodeError:
+        return value.decode("latin-1")
+
+
+def check_size(path: Path, unfolded: int) -> None:
+    """Raise InputError where a file's numbers would take too many bytes, before they are read."""
+    if unfolded > LARGEST_BYTES:
+        raise InputError(
+            f"{path} unfolds to {unfolded >> 20} MiB, no single hit does; export a hit a file."
+        )
+
+
+def _attribute(value: object) -> object | None:
+    """A text, number, date or list of texts (a tuple); None where it is none of them."""
+    if isinstance(value, tuple):
+        return tuple(text_of(v).strip() for v in value)
+    if isinstance(value, str | bytes):
+        return text_of(value).strip()
+    array = np.asarray(value)
+    kind, texts = array.dtype.kind, array.dtype.kind in "SUO"
+    if array.size == 1 and (kind in "fiubSUM" or isinstance(array.item(), str | bytes)):
+        only = array.reshape(())
+        return text_of(array.item()).strip() if texts else only[()] if kind == "M" else only.item()
+    if texts and array.size and all(isinstance(v, str | bytes) for v in array.flat):
+        return tuple(text_of(v).strip() for v in array.flat)
+    return None
+
+
+def _of_list(name: str, values: list[object]) -> object:
+    """A cell array or an array of structs: texts, columns, or elements by their numbers."""
+    if len(values) == 1:
+        return values[0]
+    texts = tuple(v for v in values if isinstance(v, str))
+    if len(texts) == len(values):
+        return texts
+    if all(isinstance(v, Mapping) for v in values) and (table := _of_structs(values)):
+        return table
+    arrays = [np.squeeze(v) for v in values if isinstance(v, np.ndarray) and np.size(v) > 1]
+    alike = len({a.shape for a in arrays}) == 1 and arrays[0].ndim == 1 and len(arrays) > 1
+    if alike and len(arrays) + len(texts) == len(values):
+        return EntryTree({"names": texts} if texts else {}, {"": np.column_stack(arrays)})
+    return {f"{name} {number}": value for number, value in enumerate(values, 1)}
+
+
+def _of_structs(values: list[object]) -> dict[str, object]:
+    """Structs of texts and numbers alone as lists of their texts: a table of channels."""
+    each = [dict(attributes_of(v)) for v in values if isinstance(v, Mapping)]
+    raw = [v for v in values if isinstance(v, Mapping)]
+    if any(len(stated) != len(v) for stated, v in zip(each, raw, strict=True)) or not each[0]:
+        return {}
+    found: dict[str, object] = {}
+    for key in each[0]:
+        column = [stated.get(key) for stated in each]
+        if len(set(map(str, column))) == 1:
+            found[key] = column[0]
+        elif all(isinstance(v, str) for v in column):
+            found[key] = tuple(column)
+    return found
+
 
 Stated = Mapping[str, object]
 
@@ -65,7 +193,7 @@ def found_in(
             own = {k: v for alone, of in here if alone for k, v in of.items()}
             own |= _of_one(name, here[-1][1])
             if path and not (unit_text(name) or time_unit(name, "")):
-                unit = stated.unit_of(here[-1][1])  # of all that is in the group
+                unit = unit_of(here[-1][1])  # of all that is in the group
                 own = {**({"unit": unit} if lookup(unit) else {}), **own}
             shared = {k: v for alone, of in here if not alone for k, v in of.items()}
             yield from _columns(at, part, own, shared)
@@ -86,12 +214,12 @@ def _columns(
     at: tuple[str, ...], values: np.ndarray, own: dict[str, object], shared: dict[str, object]
 ) -> Iterator[EntryColumn]:
     if values.ndim == 1:
-        yield EntryColumn(at, values, own, shared, unit=stated.unit_of(own))
+        yield EntryColumn(at, values, own, shared, unit=unit_of(own))
         return
     for count, turned in ((values.shape[1], values), (values.shape[0], values.T)):
         for beside in (own, shared):
-            if values.ndim == 2 and (titles := stated.names_of(beside, count)):
-                each = (stated.units_of(of, count) for of in (own, shared))
+            if values.ndim == 2 and (titles := names_of(beside, count)):
+                each = (units_of(of, count) for of in (own, shared))
                 units = next((u for u in each if u[0]), ("",) * count)
                 for title, unit, column in zip(titles, units, turned.T, strict=True):
                     yield EntryColumn(at, column, own, shared, title, unit)
@@ -142,10 +270,10 @@ def _only(part: EntryTree | np.ndarray) -> tuple[np.ndarray, Stated] | None:
 
 def _axis_unit(name: str, said: Stated) -> Unit | None:
     """The unit of what samples stand at, where a part is named so."""
-    unit = lookup(stated.unit_of(said))
-    if unit and unit.quantity in ("time", "frequency") and stated.is_abscissa(name):
+    unit = lookup(unit_of(said))
+    if unit and unit.quantity in ("time", "frequency") and is_abscissa(name):
         return unit
-    return time_unit(name, stated.unit_of(said))
+    return time_unit(name, unit_of(said))
 
 
 def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Named:
@@ -155,12 +283,12 @@ def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Na
     """
     names = _names(file, columns, by_place)
     axes = {
-        name: stated.axis_of(file, {**column.shared, **column.own})
+        name: axis_of(file, {**column.shared, **column.own})
         for name, column in zip(names, columns, strict=True)
     }
     attributes = _attributes(columns)
     for column in columns:
-        if said := stated.rescaled({**column.shared, **column.own}):
+        if said := rescaled({**column.shared, **column.own}):
             raise InputError(
                 f"{file}: {column.place} is in {column.unit or 'a unit'} and has a {said} beside "
                 f"it, so nothing says what its numbers are in; export it in N or m/s^2."
@@ -184,7 +312,7 @@ def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Na
     return Named(held, units, attributes, start_s=starts)
 
 
-def _starts(file: Path, axes: Mapping[str, stated.Axis]) -> tuple[dict[str, float], float]:
+def _starts(file: Path, axes: Mapping[str, Axis]) -> tuple[dict[str, float], float]:
     """When columns begin, in s after the first that says so, and the first's own offset.
 
     A channel without a date begins with the others, if those begin together.
@@ -208,7 +336,7 @@ def _starts(file: Path, axes: Mapping[str, stated.Axis]) -> tuple[dict[str, floa
 
 def _names(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> list[str]:
     """A name for each, by which they differ."""
-    names = [c.title or (not by_place and stated.name_of(c.own)) or c.last for c in columns]
+    names = [c.title or (not by_place and name_of(c.own)) or c.last for c in columns]
     same = _grouped(names, columns)
     distinct = [
         _differing(column, same[name], columns) if len(same[name]) > 1 else name
@@ -264,7 +392,7 @@ def _attributes(columns: Sequence[EntryColumn]) -> dict[str, str]:
     for column in columns:
         for key, value in {**column.shared, **column.own}.items():
             name, text = key.rpartition(".")[2], text_of(value)
-            if isinstance(value, tuple) or stated.is_axis(key):
+            if isinstance(value, tuple) or is_axis(key):
                 continue
             if found.setdefault(name, text) != text:
                 contradicted.add(name)

@@ -16,10 +16,8 @@ from planner.recording.column_names import (
     time_unit,
     unit_text,
 )
-from planner.recording.entries import EntryTree
-from planner.recording.entry_columns import EntryColumn, found_in, named_from
-from planner.recording.frf_columns import holds_frfs
-from planner.recording.named_columns import Named, to_records
+from planner.recording.entry_columns import EntryColumn, EntryTree, found_in, named_from
+from planner.recording.named_columns import Named, holds_frfs, to_records
 from planner.recording.records import FrfRecord, Record, TimeRecord
 from planner.recording.sampling import LEAST_SAMPLES
 

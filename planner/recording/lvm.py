@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.entries import MOST_ENTRIES, EntryTree, tree_of
+from planner.recording.entry_columns import MOST_ENTRIES, EntryTree, tree_of
 from planner.recording.entry_records import records_of
 from planner.recording.records import Record, check_numbers
 from planner.recording.sampling import UNEVEN, sampling_rate

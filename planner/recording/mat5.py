@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.entries import DEEPEST, LARGEST_BYTES, MOST_ENTRIES, check_size
+from planner.recording.entry_columns import DEEPEST, LARGEST_BYTES, MOST_ENTRIES, check_size
 
 HEADER = 128
 COMPRESSED, MATRIX = 15, 14  # types of elements

@@ -2,12 +2,15 @@
 
 Time histories: `time_s` (or an attribute such as `sampling_rate_hz`), `force_n`,
 `acceleration_x_m_s2`, `acceleration_y_m_s2`, `acceleration_z_m_s2`, attribute `hit` ("+x"); of a
-sensor at a point of the robot `acceleration_NAME_x_m_s2`, attribute `hit_point` ("NAME"). Names as
-people write them ("Time [s]", "Acc X (g)") say the same. FRFs: see `frf_columns`.
+sensor at a point of the robot `acceleration_NAME_x_m_s2`, attribute `hit_point` ("NAME"). FRFs:
+`frequency_hz` and `accelerance_xx` … (response, hit), complex or as `…_re`, `…_im`; between points
+`accelerance_NAME_x_NAME_x`, response first; `coherence_xx`. Names as people and analysers write
+them say the same: "Time [s]", "Acc X (g)", "Frequency (Hz)", "Real (m/N)", "Magnitude (dB)",
+"Phase (deg)", with attributes `hit`, `response` ("+x") and `hit_point`, `response_point`.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,16 +18,20 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.recording.column_names import (
+    RATES,
+    STEPS,
     bare,
     direction_in,
+    frequency_unit,
     hit_direction,
     lookup,
+    lookup_ratio,
+    number,
     time_unit,
     unit_text,
 )
-from planner.recording.records import Channel, Record, TimeRecord, check_numbers
+from planner.recording.records import AXES, Channel, FrfRecord, Record, TimeRecord, check_numbers
 from planner.recording.sampling import UNEVEN, aligned, sampling_rate
-from planner.recording.stated import RATES, STEPS, number
 
 _AT = re.compile(r"acceleration_(.+)_[xyz]$")
 
@@ -66,8 +73,6 @@ def _letters(text: str) -> str:
 
 def to_records(path: Path, named: Named) -> tuple[Record, ...]:
     """Records of a file's named columns. Raises InputError saying what is wrong or missing."""
-    from planner.recording.frf_columns import frf_record, holds_frfs
-
     if not named.columns:
         raise InputError(f"{path} holds no named columns of numbers; export time histories.")
     if holds_frfs(named):
@@ -142,3 +147,221 @@ def _channel(name: str, values: np.ndarray, named: Named) -> Channel:
         direction = hit_direction(hit) if hit else 0
         node = (named.attribute("hitpoint") or "").strip()
     return Channel(name, quantity, si, direction, np.real(values).astype(float) * factor, node)
+
+
+_OWN = re.compile(r"(accelerance|mobility|receptance|coherence)_([xyz])([xyz])(_re|_im|)$")
+_BETWEEN = re.compile(
+    r"(accelerance|mobility|receptance|coherence)_(.+)_([xyz])_(.+)_([xyz])(_re|_im|)$"
+)
+_SI = {"accelerance": "m/s^2/N", "mobility": "m/s/N", "receptance": "m/N", "unknown": ""}
+_WORDS = {
+    "im": r"im|imag|imaginary|imaginär|imaginärteil|imaginaire",
+    "re": r"re|real|realteil|réel|réelle|reell",
+    "phase": r"phase|phas|phi|angle|arg|winkel",
+    "coherence": r"coherence|coh|cohérence|kohärenz|coherencia",
+    "magnitude": r"magnitude|mag|amplitude|ampl|amp|betrag|abs|modulus|module|\|[^|]*\|",
+}
+_PARTS = {part: re.compile(rf"(?<![^\W_])({words})(?![^\W_])") for part, words in _WORDS.items()}
+_KINDS = {"accelerance": "accelerance|inertance", "mobility": "mobility",
+          "receptance": "receptance|compliance|flexibility"}  # fmt: skip
+_COMPLETE = ({"complex"}, {"re", "im"}, {"magnitude", "phase"})
+Place = tuple[str, int, str, int]  # response's point and axis (±1, ±2, ±3; 0 unknown), the hit's
+
+
+@dataclass
+class _Entry:
+    """One FRF while its columns are gathered; `parts` are names of columns."""
+
+    stem: str
+    kind: str = "unknown"
+    place: Place | None = None
+    parts: dict[str, str] = field(default_factory=dict)
+
+    def takes(self, part: str) -> bool:
+        """Whether a further part may belong to it."""
+        return part not in self.parts and any(
+            {part, *self.parts} - {"coherence"} <= whole for whole in _COMPLETE
+        )
+
+
+def holds_frfs(named: Named) -> bool:
+    """Whether the columns are FRFs (of one, or lacking some): values over frequency."""
+    if any(_own(name) for name in named.columns):
+        return True
+    over_frequency = any(_frequency(name, named) for name in named.columns)
+    return over_frequency and any(_part(name, named) for name in named.columns)
+
+
+def frf_record(path: Path, named: Named) -> FrfRecord:
+    """The FRFs of a file's columns. Raises InputError saying what is wrong or missing."""
+    axis = next((name for name in named.columns if _frequency(name, named)), None)
+    if axis is None:
+        raise InputError(f"{path} holds FRFs but no column frequency_hz; export it too.")
+    unit = frequency_unit(axis, named.units.get(axis, ""))
+    frequency = np.real(named.columns[axis]) * (unit.factor if unit else 1.0)
+    # The line at 0 Hz is used nowhere, and is often none (infinitely many dB below, no phase).
+    keep = slice(int(len(frequency) > 1 and frequency[0] == 0), None)
+    entries = _entries(named)
+    if not entries:
+        raise InputError(f"{path} holds frequencies and no FRFs; export FRFs, not spectra.")
+    for entry in entries:
+        for name in entry.parts.values():
+            if len(named.columns[name]) != len(frequency):
+                raise InputError(
+                    f"{path}: column {name} has {len(named.columns[name])} values for "
+                    f"{len(frequency)} frequencies; export them together."
+                )
+            check_numbers(path, name, named.columns[name][keep])
+    read = [_values(path, entry, named) for entry in entries]
+    kinds = {kind for kind, _, _ in read}
+    if len(kinds) != 1:
+        raise InputError(f"{path} mixes {' and '.join(sorted(kinds))}; export one kind.")
+    kind, known = kinds.pop(), all(stated for _, stated, _ in read)
+    unknown = np.full(len(frequency), np.nan)
+    coherence = [
+        np.real(named.columns[e.parts["coherence"]]) if "coherence" in e.parts else unknown
+        for e in entries
+    ]
+    places = [entry.place or _stated_place(entry, entries, named) for entry in entries]
+    return FrfRecord(
+        path,
+        frequency[keep],
+        np.array([values[keep] for _, _, values in read]),
+        tuple(place[1] for place in places),
+        tuple(place[3] for place in places),
+        kind,
+        _SI[kind] if known else "",
+        np.array(coherence)[:, keep],
+        named.remarks,
+        named.simulated,
+        tuple(place[0] for place in places),
+        tuple(place[2] for place in places),
+    )
+
+
+def _frequency(name: str, named: Named) -> bool:
+    return frequency_unit(name, named.units.get(name, "")) is not None
+
+
+def _own(name: str) -> tuple[str, Place, str] | None:
+    """Quantity, place, and "_re", "_im" or "" of a column that has one of planner's names."""
+    found = _OWN.match(name.lower())
+    if found:
+        return found[1], ("", _axis(found[2]), "", _axis(found[3])), found[4]
+    found = _BETWEEN.match(name)
+    if found:
+        return found[1], (found[2], _axis(found[3]), found[4], _axis(found[5])), found[6]
+    return None
+
+
+def _axis(name: str) -> int:
+    return AXES.index(name) + 1
+
+
+def _part(name: str, named: Named) -> str:
+    """Which part of an FRF a column holds ("re", "phase", …); "" where it is none."""
+    if np.iscomplexobj(named.columns[name]):
+        return "complex"
+    plain = bare(name)
+    return next((part for part, words in _PARTS.items() if words.search(plain)), "")
+
+
+def _entries(named: Named) -> list[_Entry]:
+    """The columns FRF by FRF: parts belong together by their names, else by their order."""
+    entries: list[_Entry] = []
+    for name in named.columns:
+        own = _own(name)
+        if own:
+            part = "coherence" if own[0] == "coherence" else own[2].strip("_") or "complex"
+            stem, kind, place = str(own[1]), own[0], own[1]
+        else:
+            part = "" if _frequency(name, named) else _part(name, named)
+            stem, kind, place = _stem(name, part), _kind(name), None
+        if not part:
+            continue
+        free = [entry for entry in entries if entry.takes(part)]
+        same = [entry for entry in free if entry.stem == stem and entry.place == place]
+        if not same and (own or not free or part in ("re", "magnitude", "complex")):
+            entries.append(_Entry(stem, place=place))
+        entry = (same or ([] if own else free) or entries)[0 if same else -1]
+        entry.parts[part] = name
+        if part != "coherence" and kind != "unknown":
+            entry.kind = kind
+    return [entry for entry in entries if set(entry.parts) - {"coherence"}]
+
+
+def _stem(name: str, part: str) -> str:
+    """What a name says beside its part."""
+    plain = bare(name)
+    return _PARTS[part].sub("", plain).strip(" _") if part in _PARTS else plain
+
+
+def _kind(name: str) -> str:
+    plain = name.lower()
+    return next((kind for kind, words in _KINDS.items() if re.search(words, plain)), "unknown")
+
+
+def _values(path: Path, entry: _Entry, named: Named) -> tuple[str, bool, np.ndarray]:
+    """Kind of one FRF, whether its unit is known, and its values (F,) in SI units."""
+    parts = {part: named.columns[name] for part, name in entry.parts.items() if part != "coherence"}
+    if set(parts) not in _COMPLETE:
+        raise InputError(
+            f"{path} holds {', '.join(entry.parts.values())} without the other part; export real "
+            f"and imaginary part, or magnitude and phase."
+        )
+    first = next(part for part in ("complex", "re", "magnitude", "im") if part in parts)
+    stated = named.unit(entry.parts[first])
+    unit = lookup_ratio(
+        re.sub(r"(?i)\bdb\b|\bref?\b\.?|\brel\b\.?|(?<![\w.])1(?![\w.])", "", stated)
+    )
+    if unit and entry.kind not in ("unknown", unit.quantity):
+        raise InputError(
+            f"{path}: {entry.parts[first]} names {entry.kind} and states {stated}, which is "
+            f"{unit.quantity}; correct the one that is wrong."
+        )
+    known = unit is not None or (entry.place is not None and not stated)
+    factor = unit.factor if unit else 1.0
+    kind = unit.quantity if unit else entry.kind
+    if first == "magnitude":
+        return kind, known, factor * _polar(path, entry, named, "db" in stated.lower())
+    values = parts.get("complex", parts.get("re", 0.0)) + 1j * np.real(parts.get("im", 0.0))
+    return kind, known, factor * values
+
+
+def _polar(path: Path, entry: _Entry, named: Named, in_db: bool) -> np.ndarray:
+    """Complex values (F,) of a magnitude and a phase."""
+    magnitude, phase = (np.real(named.columns[entry.parts[p]]) for p in ("magnitude", "phase"))
+    in_db = in_db or bool(re.search(r"\bdb\b", entry.parts["magnitude"].lower()))
+    unit = lookup(named.unit(entry.parts["phase"]))
+    if unit is None or unit.quantity != "angle":
+        raise InputError(
+            f"{path} does not say whether {entry.parts['phase']} is in degrees or radians; name "
+            f"the column Phase (deg) or Phase (rad)."
+        )
+    size = 10.0 ** (magnitude / 20) if in_db else magnitude
+    return size * np.exp(1j * np.deg2rad(phase * unit.factor))
+
+
+def _stated_place(entry: _Entry, entries: Sequence[_Entry], named: Named) -> Place:
+    """Where an FRF was felt and hit, as its column's name and the file's first lines say."""
+    response, felt = _dof(named, "response", "resp", "output")
+    hit, hit_point = _dof(named, "hit", "reference", "ref", "input", "excitation")
+    own = direction_in(entry.stem)
+    if len(entries) > 1:  # what the file states of its response is of none of them
+        felt, response = "", 0
+    return felt, own or response, hit_point, hit
+
+
+def _dof(named: Named, *words: str) -> tuple[int, str]:
+    """Direction and point of one end, as attributes such as `hit`, `Ref DOF` say ("+x", "3:+x")."""
+    direction, point = 0, named.attribute(*(f"{word}point" for word in words)) or ""
+    for word in words:
+        for end in ("", "dof", "direction", "node", "chan", "channel"):
+            found = re.fullmatch(
+                r"\s*(?:([\w ]+?)[:.\s])?\s*([+-]?[xyzXYZ])\s*", named.attribute(word + end) or ""
+            )
+            if found and not direction:
+                direction = hit_direction(found[2])
+                # A number of a channel is no number of a node.
+                point = point or (found[1] or "" if end in ("dof", "node") else "")
+    return direction, point.strip()

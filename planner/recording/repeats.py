@@ -1,4 +1,4 @@
-"""Hits of a pose beside each other: whether repeats along an axis agree, as they should."""
+"""Hits of a pose beside each other: whether repeats along an axis agree, in shape and in size."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +8,6 @@ import numpy as np
 
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.records import AXES, Fault, Hit
-from planner.recording.repeat_sizes import other_size, other_sizes, outvoted
 from planner.recording.sampling import same_rate
 from planner.recording.screening import SILENCE
 from planner.recording.spectra import band_spectra
@@ -291,3 +290,44 @@ def _likeness(frf: np.ndarray, centre: np.ndarray) -> float:
     """1 where two FRFs are the same in size, sign and phase; 0 or less where unrelated."""
     scale = np.linalg.norm(frf) * np.linalg.norm(centre)
     return float(np.real(np.vdot(centre, frf)) / scale) if scale > 0 else 0.0
+
+
+# ln of sizes by which repeats differ: hands and force levels by some 30 % at most. Chosen.
+OTHER_SIZE = np.log(2.0)
+# ln of what FRFs grow by where a file is in another unit than its repeats, and how near that is.
+UNITS = {-np.log(9.80665): "g instead of m/s²", np.log(4.44822): "lbf instead of N"}
+NEAR_UNIT = 0.1
+
+
+def other_sizes(frfs: np.ndarray, upright: np.ndarray) -> np.ndarray:
+    """ln of how much larger FRFs (n, N) are than half of all or more; 0 where no half differs.
+
+    They differ both as they are and `upright` (n, N), without what tilts of the hits explain.
+    """
+    size, straight = (
+        np.log(np.maximum(np.linalg.norm(f, axis=1), SILENCE)) for f in (frfs, upright)
+    )
+    other = np.minimum(_apart(size), _apart(straight)) > OTHER_SIZE
+    odd = 2 * other.sum(axis=1) >= len(frfs)
+    return np.array([
+        size[i] - np.median(size[other[i]]) if odd[i] else 0.0 for i in range(len(frfs))
+    ])  # fmt: skip
+
+
+def _apart(size: np.ndarray) -> np.ndarray:
+    """By how much each two (n, n) of (n,) differ."""
+    return np.abs(size[:, None] - size)
+
+
+def outvoted(sizes: np.ndarray) -> bool:
+    """Whether most of three hits and more are of the usual size, so that the others are wrong."""
+    return bool(len(sizes) > 2 and 2 * np.count_nonzero(sizes) < len(sizes))
+
+
+def other_size(size: float, others: str) -> str:
+    """What is said of a hit that is larger than `others`, by the ln of how much, and which unit."""
+    own = [unit for grown, unit in UNITS.items() if abs(size - grown) < NEAR_UNIT]
+    theirs = [f"those in {unit}" for grown, unit in UNITS.items() if abs(size + grown) < NEAR_UNIT]
+    unit, way = "".join(own or theirs), "larger" if size > 0 else "smaller"
+    unit = unit or "another unit or sensitivity"
+    return f"is {np.exp(abs(size)):.2g} times {way} than {others}: {unit}?"

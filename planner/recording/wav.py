@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.entries import check_size
+from planner.recording.entry_columns import check_size
 from planner.recording.folder import CHANNELS, read_table, table_of
 from planner.recording.named_columns import Named, to_records
 from planner.recording.records import Record

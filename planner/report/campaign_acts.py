@@ -14,7 +14,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import Entry
 from planner.campaign.from_urdf import Guess, Guessed
 from planner.campaign.taking_back import act
-from planner.check.remark import CheckRemark
+from planner.check.description import CheckRemark
 from planner.report.answer import Answer, Done
 from planner.report.text import command_line, table
 from planner.words import command

@@ -10,9 +10,8 @@ from scipy.stats import rankdata
 from planner.campaign.cut_advice import FeedAdvice, TurnAdvice
 from planner.milling.coupling import AMPLIFICATION_LIMIT, CoupledFrf
 from planner.milling.cut import Cut
-from planner.milling.lobes import Loss
+from planner.milling.lobes import Loss, SampledLimits
 from planner.milling.path import PathLimits
-from planner.milling.uncertainty import SampledLimits
 from planner.report.plot_marks import AXES, MEASURED, MODEL, empty, magnitude, name_axes, panels
 
 STABLE, UNSURE, LIMIT, POINT = "#dcefd9", "#f6e3b4", "black", "tab:red"

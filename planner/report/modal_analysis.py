@@ -21,8 +21,8 @@ from planner.modal.matrix_modes import modes_of_matrix, with_normal_modes
 from planner.modal.modes import ModalModel
 from planner.modal.operating import operating_modes
 from planner.modal.transfer_functions import modes_from_transfer_functions
+from planner.recording.channel_faults import lost_samples
 from planner.recording.dof import Dof
-from planner.recording.filling import lost_samples
 from planner.recording.folder import CHANNELS, TABLE, files_in, joint_columns, read_recordings
 from planner.recording.geometry import read_geometry
 from planner.recording.hits import without_unit

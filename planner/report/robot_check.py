@@ -7,6 +7,7 @@ import msgspec
 from rich.console import Group
 from rich.text import Text
 
+from planner.check.description import SEVERITIES, CheckRemark
 from planner.check.examine import (
     CheckedJoint,
     CheckedLink,
@@ -16,7 +17,6 @@ from planner.check.examine import (
     checked_links,
     checked_poses,
 )
-from planner.check.remark import SEVERITIES, CheckRemark
 from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.text import number, table

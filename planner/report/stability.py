@@ -14,11 +14,10 @@ from planner.campaign.cut_advice import FeedAdvice, TurnAdvice, turn_advice
 from planner.campaign.cut_source import Asked, outside, structure_of, structures_of_file
 from planner.campaign.toolpath_poses import Travelled, Way
 from planner.milling.cut import Cut, load_cut
-from planner.milling.lobes import Loss, losses
+from planner.milling.lobes import PROBABILITY, Loss, SampledLimits, losses, sampled_limits
 from planner.milling.machine import multiplier
 from planner.milling.path import TURNS_DEG, PathLimits, along, by_feed
 from planner.milling.structure import Structure, beyond, doubts
-from planner.milling.uncertainty import PROBABILITY, SampledLimits, sampled_limits
 from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.pictures import Pictures

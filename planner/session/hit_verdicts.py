@@ -9,8 +9,7 @@ from planner.recording.force_levels import far_below, peak_n
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import version
 from planner.recording.records import Hit
-from planner.recording.repeat_sizes import other_size
-from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
+from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, other_size, screen_repeats
 from planner.recording.sampling import sampled_otherwise
 from planner.recording.spectra import driving_point
 from planner.session.inbox import FolderTable

@@ -17,7 +17,7 @@ from planner.cli.app import app
 from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESCRIPTIONS, DESIGNS
 from planner.milling.cut import Cut, load_cut
-from planner.milling.tool_file import ToolTable, load_tool
+from planner.milling.tool import ToolTable, load_tool
 from planner.report.documentation import manual
 from planner.robot.config import RobotConfig
 

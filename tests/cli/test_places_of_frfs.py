@@ -7,7 +7,7 @@ import pytest
 
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
-from planner.recording.file_names import place_in_name
+from planner.recording.read import place_in_name
 from planner.robot.robot import Robot
 from tests.support.outside import call, make_cell, told
 

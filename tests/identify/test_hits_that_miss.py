@@ -9,8 +9,7 @@ from planner.dynamics.gradient import moved
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.fit.identify import identify
-from planner.measurement.missed_ports import actual_ports
-from planner.measurement.nuisances import EXACT_HITS, OpenNumbers, Tolerances
+from planner.measurement.nuisances import EXACT_HITS, OpenNumbers, Tolerances, actual_ports
 from planner.robot.robot import Robot
 from planner.truth.arms import KR10
 from planner.truth.deviation import Deviation

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.milling.contact_fit import fit_contact
-from planner.milling.rotations import two_point_receptance
-from planner.milling.tip_files import smoothed
+from planner.milling.coupling import fit_contact
+from planner.milling.tip_files import smoothed, two_point_receptance
 from planner.milling.tool import NUMBERS
 from tests.milling.assembled import frf, machine
 from tests.milling.test_coupling import (

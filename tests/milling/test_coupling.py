@@ -6,7 +6,7 @@ from scipy.signal import find_peaks
 
 from planner.milling.beam import Segment, ToolMaterial
 from planner.milling.coupling import TipReceptance, couple
-from planner.milling.rotations import TwoPoints, two_point_receptance
+from planner.milling.tip_files import TwoPoints, two_point_receptance
 from planner.milling.tool import Point, Tool, ToolContact, ToolPart
 from tests.milling.assembled import LOSS, NU, RHO, E, frf, machine
 

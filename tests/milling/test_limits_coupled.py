@@ -19,7 +19,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.tip_source import tip_at
 from planner.measurement.nuisances import Tolerances
 from planner.milling.coupling import TipReceptance, couple
-from planner.milling.tool_file import load_tool
+from planner.milling.tool import load_tool
 from planner.truth.arms import KR210
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.handling import Handling

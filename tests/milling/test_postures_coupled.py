@@ -7,7 +7,7 @@ from planner.campaign.posture_tip import posture_tip
 from planner.errors import InputError
 from planner.frf.matrix import FrfMatrix
 from planner.frf.synthesis import pole
-from planner.milling.tool_file import load_tool
+from planner.milling.tool import load_tool
 from planner.recording.dof import Dof
 from tests.milling.test_couple_command import LEI, answered, rod
 from tests.support.matrix_files import write_matrix

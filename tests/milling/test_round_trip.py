@@ -12,8 +12,7 @@ import pytest
 from scipy.signal import find_peaks
 
 from planner.milling.coupling import AMPLIFICATION_LIMIT, TipReceptance, couple
-from planner.milling.rotations import two_point_receptance
-from planner.milling.tip_files import smoothed
+from planner.milling.tip_files import smoothed, two_point_receptance
 from planner.milling.tool import Point
 from tests.milling.assembled import frf, machine
 from tests.milling.test_coupling import (

@@ -13,7 +13,7 @@ from planner.errors import InputError
 from planner.milling.beam import Segment, ToolMaterial
 from planner.milling.coupling import couple
 from planner.milling.cutter_frf import CutterFrf
-from planner.milling.rotations import completed
+from planner.milling.tip_files import completed
 from planner.milling.tool import Tool, ToolPart
 from planner.robot.config import Payload
 from planner.robot.robot import Robot

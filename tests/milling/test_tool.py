@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.milling.tool_file import load_tool
+from planner.milling.tool import load_tool
 
 GOOD = """
 to_spindle = [0.0, 0.0, -2.0]

@@ -8,10 +8,9 @@ import pytest
 
 from planner.errors import InputError
 from planner.frf.quantities import convert
-from planner.milling.cutter_fit import CutterFit
 from planner.milling.cutter_frf import CutterFrf, of_accelerance
-from planner.milling.cutter_modes import CutterModes, real_modes
-from planner.milling.lobes import losses
+from planner.milling.cutter_modes import CutterFit, CutterModes, real_modes
+from planner.milling.lobes import losses, sampled_limits
 from planner.milling.structure import (
     Structure,
     doubts,
@@ -20,7 +19,6 @@ from planner.milling.structure import (
     of_frf,
     sampled,
 )
-from planner.milling.uncertainty import sampled_limits
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way
 from tests.support.semi_discretisation import semi_growth
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.recording.channel_faults import channel_faults
-from planner.recording.filling import lost_samples, without_filling
+from planner.recording.channel_faults import channel_faults, lost_samples, without_filling
 from planner.recording.records import Channel, Hit, TimeRecord
 from planner.recording.stream import cut_into_hits
 from planner.recording.wav import read_wav, self_contained

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from planner.campaign.store import EXAMPLE
-from planner.check.remark import CheckRemark
+from planner.check.description import CheckRemark
 from planner.report.robot_check import _summary
 from tests.support.outside import call, said
 from tests.support.plain_arm import make_plain_arm, plain_campaign

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from planner.check.joints import check_joints
+from planner.check.description import check_joints
 from planner.errors import InputError
 from planner.robot.collision import Collisions
 from planner.robot.elastic_model import ElasticModel

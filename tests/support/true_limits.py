@@ -6,9 +6,8 @@ import numpy as np
 
 from planner.milling.cut import Cut
 from planner.milling.cutter_frf import of_accelerance
-from planner.milling.lobes import losses
+from planner.milling.lobes import losses, sampled_limits
 from planner.milling.structure import of_frf
-from planner.milling.uncertainty import sampled_limits
 
 
 @dataclass(frozen=True, eq=False)
