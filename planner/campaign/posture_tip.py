@@ -17,7 +17,8 @@ from planner.errors import InputError, RefusedError
 from planner.frf.matrix import FrfMatrix
 from planner.frf.synthesis import pole
 from planner.milling.coupling import TipReceptance
-from planner.milling.tip_files import TwoPoints, two_point_receptance, two_points_of
+from planner.milling.cutter_frf import CutterFrf
+from planner.milling.tip_files import two_point_receptance, two_points_of
 from planner.milling.tool import Tool
 from planner.modal.matrix_modes import modes_of_matrix
 from planner.modal.modes import Mode
@@ -62,8 +63,8 @@ def posture_tip(folder: Path, tool: Tool | None, pose: str | None) -> TipRecepta
     hz, every = first.frequency_hz, list(matrices.values())
     values, errors = _predicted(_followed(every, dofs, x), at, hz)
     sd = np.sqrt(np.sum(np.abs(errors) ** 2, axis=0))
-    seen = TwoPoints(hz, directions, values, sd, errors)
-    found = two_point_receptance(seen, tool, back)
+    seen = CutterFrf(str(pose), hz, values, sd)
+    found = two_point_receptance(seen, directions, tool, back, errors)
     said = (
         f"From FRFs between two points at {len(x)} other postures; ± is that of the modes that "
         f"were followed, and too narrow: what other modes add is in neither value nor ±."

@@ -1,5 +1,6 @@
 """Checks of what a URDF and robot.toml state of links, joints and frames; what a check finds."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -44,135 +45,93 @@ OUTSIDE = 0.5  # of its size may a centre of mass lie outside the box around a l
 LONGEST_REACH_M, SHORTEST_REACH_M, NEVER_M = 12.0, 0.1, 100.0
 
 
-def check_links(robot: Robot, links: tuple[LinkBody, ...]) -> list[CheckRemark]:
+def check_links(robot: Robot, links: tuple[LinkBody, ...]) -> Iterator[CheckRemark]:
     """What looks wrong in the links of a robot."""
-    found, guessed = _lengths(robot), guessed_masses(links)
+    reach, guessed = robot.arm_m, guessed_masses(links)
+    if not SHORTEST_REACH_M <= reach <= LONGEST_REACH_M:
+        unit = "millimetres" if reach > LONGEST_REACH_M else "another unit"
+        text = f"The tool reaches {reach:.4g} m from the first joint, as if lengths were in {unit}."
+        where = f"{robot.urdf_path.name}, joint origins"
+        severity = "error" if reach > NEVER_M else "warning"
+        yield CheckRemark(severity, text, where, "A URDF's lengths are in m.")
     if guessed:
         remedy = "Put in what is known, or let recordings narrow it."
-        found.append(CheckRemark("note", guessed, f"{robot.path.name}, [[link]]", remedy))
+        yield CheckRemark("note", guessed, f"{robot.path.name}, [[link]]", remedy)
     for link in links:
         if link.joint:
-            turned = sum(other.mass for other in links if other.joint == link.joint)
-            found += _body(robot, link, turned) if link.mass else _stated(robot, link, links)
-    return found
+            turned = [other for other in links if other.joint == link.joint]
+            where = f"{robot.urdf_path.name}, link {link.name}"
+            yield from (_body if link.mass else _without_mass)(robot, link, turned, where)
 
 
-def _where(robot: Robot, link: LinkBody) -> str:
-    return f"{robot.urdf_path.name}, link {link.name}"
-
-
-def _lengths(robot: Robot) -> list[CheckRemark]:
-    reach, where = robot.arm_m, f"{robot.urdf_path.name}, joint origins"
-    if SHORTEST_REACH_M <= reach <= LONGEST_REACH_M:
-        return []
-    unit = "millimetres" if reach > LONGEST_REACH_M else "another unit"
-    return [
-        CheckRemark(
-            "error" if reach > NEVER_M else "warning",
-            f"The tool reaches {reach:.4g} m from the first joint, as if lengths were in {unit}.",
-            where,
-            "A URDF's lengths are in m.",
-        )
-    ]
-
-
-def _stated(robot: Robot, link: LinkBody, links: tuple[LinkBody, ...]) -> list[CheckRemark]:
-    """A link without a mass: a frame may be one, a part of the arm may not."""
-    turned = [other for other in links if other.joint == link.joint]
-    whole = any(other.mass > 0 for other in turned)
-    if link.first and not whole:
-        what = "an <inertial> of mass 0" if link.stated else "no <inertial>"
+def _without_mass(
+    robot: Robot, link: LinkBody, turned: list[LinkBody], where: str
+) -> Iterator[CheckRemark]:
+    """A frame may be without a mass, a part of the arm may not."""
+    weighed, severity = [other.size_m for other in turned if other.mass > 0], "warning"
+    what = "an <inertial> of mass 0" if link.stated else "no <inertial>"
+    if link.first and not weighed:
         text = f"What {link.joint} turns has no mass: {what}, here or on what is fixed to it"
         if any(block.joint == link.joint for block in robot.config.compliance):
             text = f"{text}, though [[compliance]] lets {link.joint} swing"
-            return [_weightless(robot, link, text, "error")]
-    elif (link.shapes or link.visuals) and link.size_m > SMALL * _largest_weighed(turned):
-        what = "an <inertial> of mass 0" if link.stated else "no <inertial>"
+            severity = "error"
+    elif (link.shapes or link.visuals) and link.size_m > SMALL * max(weighed, default=0.0):
         text = f"It has shapes but {what}, so that the simulation takes it for weightless"
     else:
-        return []
-    return [_weightless(robot, link, text, "warning")]
-
-
-def _largest_weighed(turned: list[LinkBody]) -> float:
-    """Size in m of the largest link that has a mass."""
-    return max((other.size_m for other in turned if other.mass > 0), default=0.0)
-
-
-def _weightless(robot: Robot, link: LinkBody, text: str, severity: Severity) -> CheckRemark:
-    return CheckRemark(
-        severity,
-        f"{text}: simulated frequencies come out too high.",
-        _where(robot, link),
+        return
+    remedy = (
         "Add its mass (kg), centre of mass (m) and moments of inertia (kg·m²), there or in "
-        "robot.toml's [[link]]; planner new --urdf guesses them.",
+        "robot.toml's [[link]]; planner new --urdf guesses them."
     )
+    yield CheckRemark(severity, f"{text}: simulated frequencies come out too high.", where, remedy)
 
 
-def _body(robot: Robot, link: LinkBody, turned: float) -> list[CheckRemark]:
-    """A link with a mass; all that turns with it weighs `turned`."""
-    found, where = [], _where(robot, link)
-    if link.mass > HEAVIEST_KG or turned < LIGHTEST_KG:
+def _body(
+    robot: Robot, link: LinkBody, turned: list[LinkBody], where: str
+) -> Iterator[CheckRemark]:
+    """A link with a mass, and all that turns with it."""
+    if link.mass > HEAVIEST_KG or sum(other.mass for other in turned) < LIGHTEST_KG:
         text = f"It has a mass of {link.mass:,.4g} kg."
         if link.mass > HEAVIEST_KG:
             text = f"It has a mass of {link.mass:,.0f} kg, {link.mass / 1000:.3g} t."
-        remedy = "Masses are in kg, neither in g nor in t."
-        found.append(CheckRemark("warning", text, where, remedy))
+        yield CheckRemark("warning", text, where, "Masses are in kg, neither in g nor in t.")
     low, mid, high = link.moments
     if low + mid < high * (1 - 1e-6) - 1e-12:
         text = (
             f"No body has principal moments of {low:.3g}, {mid:.3g} and {high:.3g} kg·m²: "
             f"each is at most the sum of the two others."
         )
-        found.append(CheckRemark("warning", text, where, "Correct <inertia>."))
+        yield CheckRemark("warning", text, where, "Correct <inertia>.")
+    # How large a link may be: half as large as the arm where no shape tells its size.
+    told = link.whole and link.size_m > SMALLEST_SIZE_M
+    largest = link.size_m if told else max(link.size_m, 0.5 * robot.reach_m)
     if high == 0:
         text = f"Its {link.mass:.4g} kg have no moments of inertia, as if they were in one point."
-        found.append(CheckRemark("warning", text, where, "State ixx, iyy, izz in kg·m²."))
+        yield CheckRemark("warning", text, where, "State ixx, iyy, izz in kg·m².")
     else:
-        found += _gyration(robot, link, where)
-    return found + _centre(robot, link, where)
+        yield from _gyration(link, largest, where)
+    over = np.maximum(link.low_m - link.com_m, link.com_m - link.high_m).max()
+    if over > OUTSIDE * largest:
+        place = ", ".join(f"{v:.4g}" for v in link.com_m)
+        text = f"Its centre of mass, ({place}) m, lies {over:.3g} m outside the link."
+        yield CheckRemark("warning", text, where, "It is given in m, in the link's own frame.")
 
 
-def _largest_m(robot: Robot, link: LinkBody) -> float:
-    """How large a link may be: half as large as the arm where no shape tells its size."""
-    told = link.whole and link.size_m > SMALLEST_SIZE_M
-    return link.size_m if told else max(link.size_m, 0.5 * robot.reach_m)
-
-
-def _gyration(robot: Robot, link: LinkBody, where: str) -> list[CheckRemark]:
+def _gyration(link: LinkBody, largest: float, where: str) -> Iterator[CheckRemark]:
     """How far from its centre of mass the mass would have to be."""
     gyration = float(np.sqrt(link.moments[2] / link.mass))
-    largest = _largest_m(robot, link)
     least, most = GYRATION[0] * link.size_m, GYRATION[1] * largest
-    if least <= gyration <= most:
-        return []
-    word = "far outside" if gyration > most else "at the middle of"
-    return [
-        CheckRemark(
-            "warning",
+    if not least <= gyration <= most:
+        word = "far outside" if gyration > most else "at the middle of"
+        text = (
             f"Its largest moment of inertia, {link.moments[2]:.3g} kg·m², puts its "
             f"{link.mass:.4g} kg at {gyration:.3g} m from their centre, {word} a link of "
-            f"{link.size_m if least > gyration else largest:.2g} m.",
-            where,
-            "Moments are in kg·m² about the centre of mass, neither in kg·mm² nor about the joint.",
+            f"{link.size_m if least > gyration else largest:.2g} m."
         )
-    ]
-
-
-def _centre(robot: Robot, link: LinkBody, where: str) -> list[CheckRemark]:
-    size = _largest_m(robot, link)
-    over = np.maximum(link.low_m - link.com_m, link.com_m - link.high_m).max()
-    if over <= OUTSIDE * size:
-        return []
-    place = ", ".join(f"{v:.4g}" for v in link.com_m)
-    return [
-        CheckRemark(
-            "warning",
-            f"Its centre of mass, ({place}) m, lies {over:.3g} m outside the link.",
-            where,
-            "It is given in m, in the link's own frame.",
+        remedy = (
+            "Moments are in kg·m² about the centre of mass, neither in kg·mm² nor about the joint."
         )
-    ]
+        yield CheckRemark("warning", text, where, remedy)
 
 
 WIDEST_RAD = 20.0  # of a limit: three turns; 360 rad are 57
@@ -184,69 +143,59 @@ APART_M = 0.6  # between where the hammer hits and where the sensor sits
 EARTH_M_S2 = 9.81
 
 
-def check_joints(robot: Robot, planned: bool = False) -> list[CheckRemark]:
+def check_joints(robot: Robot, planned: bool = False) -> Iterator[CheckRemark]:
     """What looks wrong in limits (rad, m of those that slide) and speeds (rad/s, m/s).
 
     With a workspace `planned` it is an error where no such joint can be: the limits keep nobody
     from driving there.
     """
-    found = []
     rows = zip(
         robot.joint_names, robot.lower_rad, robot.upper_rad, robot.velocity_rad_s, strict=True
     )
     for name, low, high, speed in rows:
-        where = f"{robot.urdf_path.name}, joint {name}"
-        wrong = (_shifts if robot.slides(name) else _turns)(float(low), float(high), float(speed))
+        where, slides = f"{robot.urdf_path.name}, joint {name}", robot.slides(name)
+        wrong = (_shifts if slides else _turns)(float(low), float(high), float(speed))
         away = max(abs(low), abs(high))
-        never = planned and not robot.slides(name) and NEVER_RAD < away < np.inf
-        severity = "error" if never else "warning"
-        found += [CheckRemark(severity, text, where, remedy) for text, remedy in wrong]
+        never = planned and not slides and NEVER_RAD < away < np.inf
+        for text, remedy in wrong:
+            yield CheckRemark("error" if never else "warning", text, where, remedy)
         if not 0 < speed < np.inf:
             text = "It has no speed limit: what it takes to get to a pose cannot be told."
-            unit = "m/s" if robot.slides(name) else "rad/s"
-            found.append(CheckRemark("note", text, where, f"Add velocity in {unit} to <limit>."))
-    return found + _followers(robot)
-
-
-def _followers(robot: Robot) -> list[CheckRemark]:
+            unit = "m/s" if slides else "rad/s"
+            yield CheckRemark("note", text, where, f"Add velocity in {unit} to <limit>.")
     linkage = robot.linkage
     following = sorted(set(range(len(linkage.names))) - set(linkage.leads))
     leader = {k: robot.joint_names[int(np.flatnonzero(linkage.spread[k])[0])] for k in following}
-    if not following:
-        return []
-    said = "; ".join(f"{linkage.names[k]} follows {leader[k]}" for k in following)
-    text = f"{said}: never listed among the joints, and within their limits wherever these are."
-    return [CheckRemark("note", text, f"{robot.urdf_path.name}, <mimic>")]
+    if following:
+        said = "; ".join(f"{linkage.names[k]} follows {leader[k]}" for k in following)
+        text = f"{said}: never listed among the joints, and within their limits wherever these are."
+        yield CheckRemark("note", text, f"{robot.urdf_path.name}, <mimic>")
 
 
-def _turns(low: float, high: float, speed: float) -> list[tuple[str, str]]:
+def _turns(low: float, high: float, speed: float) -> Iterator[tuple[str, str]]:
     """What looks wrong, and its remedy, in limits (rad) and speed (rad/s)."""
-    found = []
     if max(abs(low), abs(high)) > WIDEST_RAD:
         turns = (high - low) / 2 / np.pi
         text = f"Its limits are {low:.4g} and {high:.4g} rad, {turns:.0f} turns apart."
-        found.append((text, "A URDF's limits are in rad: 360 degrees are 6.283."))
+        yield text, "A URDF's limits are in rad: 360 degrees are 6.283."
     if FASTEST_RAD_S < speed < np.inf:
         text = f"Its speed limit is {speed:.4g} rad/s, {speed / 2 / np.pi:.0f} turns a second."
-        found.append((text, "A URDF's speeds are in rad/s, not in degrees a second."))
-    return found
+        yield text, "A URDF's speeds are in rad/s, not in degrees a second."
 
 
-def _shifts(low: float, high: float, speed: float) -> list[tuple[str, str]]:
+def _shifts(low: float, high: float, speed: float) -> Iterator[tuple[str, str]]:
     """The same of a joint that slides: limits (m) and speed (m/s)."""
-    found = []
     if max(abs(low), abs(high)) > LONGEST_M:
         text = f"It slides from {low:.4g} to {high:.4g} m, as if its limits were in millimetres."
-        found.append((text, "Limits of a prismatic joint are in m."))
+        yield text, "Limits of a prismatic joint are in m."
     if FASTEST_M_S < speed < np.inf:
         remedy = "Speeds of prismatic joints are in m/s, not in millimetres a second."
-        found.append((f"Its speed limit is {speed:.4g} m/s.", remedy))
-    return found
+        yield f"Its speed limit is {speed:.4g} m/s.", remedy
 
 
-def check_frames(robot: Robot) -> list[CheckRemark]:
+def check_frames(robot: Robot) -> Iterator[CheckRemark]:
     """What looks wrong in the frames of tool and sensor, and in gravity."""
-    config, found, where = robot.config, [], f"{robot.path.name}, sensor_frame"
+    config, where = robot.config, f"{robot.path.name}, sensor_frame"
     tcp, sensor = robot.model.frames[robot.tcp_id], robot.model.frames[robot.sensor_id]
     if tcp.parentJoint != sensor.parentJoint:
         text = (
@@ -254,7 +203,7 @@ def check_frames(robot: Robot) -> list[CheckRemark]:
             f"turn with different joints."
         )
         remedy = "Put the sensor beside the hit point unless it really sits there."
-        found.append(CheckRemark("warning", text, where, remedy))
+        yield CheckRemark("warning", text, where, remedy)
     else:
         between = tcp.placement.actInv(sensor.placement)
         angle = np.rad2deg(np.arccos(np.clip((np.trace(between.rotation) - 1) / 2, -1, 1)))
@@ -264,27 +213,24 @@ def check_frames(robot: Robot) -> list[CheckRemark]:
                 f"are read as if the two were parallel."
             )
             remedy = "Give both the same rpy, and turn the sensor's channels when recording."
-            found.append(CheckRemark("warning", text, where, remedy))
+            yield CheckRemark("warning", text, where, remedy)
         apart = float(np.linalg.norm(between.translation))
         if apart > APART_M:
             text = f"The sensor sits {apart:.3g} m from where the hammer hits."
-            found.append(CheckRemark("warning", text, where, "Lengths are in m."))
-    return found + _gravity(robot)
+            yield CheckRemark("warning", text, where, "Lengths are in m.")
+    yield from _gravity(np.array(config.gravity), f"{robot.path.name}, gravity")
 
 
-def _gravity(robot: Robot) -> list[CheckRemark]:
-    gravity, where = np.array(robot.config.gravity), f"{robot.path.name}, gravity"
+def _gravity(gravity: np.ndarray, where: str) -> Iterator[CheckRemark]:
     size = float(np.linalg.norm(gravity))
+    remedy = "If it stands on the floor, give [0, 0, -9.81]."
     if abs(size / EARTH_M_S2 - 1) > 0.01:
         text = f"Gravity is {size:.4g} m/s²."
-        return [CheckRemark("warning", text, where, "On Earth it is 9.81 m/s².")]
-    down = gravity / size
-    if down[2] > 0.999:
+        yield CheckRemark("warning", text, where, "On Earth it is 9.81 m/s².")
+    elif gravity[2] > 0.999 * size:
         text = "Gravity points up along the base's z axis: the robot hangs from a ceiling."
-        remedy = "If it stands on the floor, give [0, 0, -9.81]."
-        return [CheckRemark("warning", text, where, remedy)]
-    if down[2] > -0.999:
-        direction = ", ".join(f"{v:.2f}" for v in down)
+        yield CheckRemark("warning", text, where, remedy)
+    elif gravity[2] > -0.999 * size:
+        direction = ", ".join(f"{v:.2f}" for v in gravity / size)
         text = f"Gravity points along ({direction}) of the base: robot on a wall or a slope."
-        return [CheckRemark("note", text, where, "If it stands on the floor, give [0, 0, -9.81].")]
-    return []
+        yield CheckRemark("note", text, where, remedy)

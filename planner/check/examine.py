@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -69,11 +68,13 @@ def home_of(robot: Robot) -> np.ndarray:
 def examine(robot: Robot, plan: Plan | None = None) -> Examination:
     """Check a robot that was loaded, and what a campaign asks of it."""
     links, home = link_bodies(robot), home_of(robot)
-    found = check_links(robot, links) + check_joints(robot, plan is not None) + check_frames(robot)
-    found += check_collision(robot, links, home)
+    found = [*check_links(robot, links), *check_joints(robot, plan is not None)]
+    found += [*check_frames(robot), *check_collision(robot, links, home)]
     poses, q = (HOME,), home[None]
     if plan is None:
-        others = _spread(robot)
+        collisions = Collisions(robot)
+        free = (q for q in spread_poses(robot)[1:] if not collisions.contacts(q))
+        others = np.array([*islice(free, POSES)]).reshape(-1, len(home))
     else:
         candidates, remarks = look_around(robot, plan.workspace, plan.file)
         found += remarks
@@ -95,7 +96,7 @@ def _simulated(
         simulation = Simulation(robot)
     except InputError as error:
         severity = "error" if plan is not None or robot.config.compliance else "warning"
-        text = _without(str(error), robot.path)
+        text = str(error).removeprefix(str(robot.path)).lstrip(": ")
         return [*found, CheckRemark(severity, text, robot.path.name)], none, none
     found = found + check_springs(simulation, q)
     if any(r.severity == "error" for r in found):
@@ -109,24 +110,12 @@ def _simulated(
     return found, modes.frequency_hz, modes.damping_ratio
 
 
-def _without(sentence: str, path: Path) -> str:
-    """A sentence that begins with the file's name, without it."""
-    return sentence.removeprefix(str(path)).lstrip(": ")
-
-
 def spread_poses(robot: Robot) -> np.ndarray:
     """Home, then poses (n, dof) in rad between the limits, or within half a turn of home."""
     rng, home = np.random.default_rng(0), home_of(robot)
     low = np.maximum(robot.lower_rad, home - np.pi)
     high = np.minimum(robot.upper_rad, home + np.pi)
     return np.array([home, *(rng.uniform(low, high) for _ in range(TRIES))])
-
-
-def _spread(robot: Robot) -> np.ndarray:
-    """A few poses (n, dof) in rad of these at which the robot touches nothing."""
-    collisions = Collisions(robot)
-    free = (q for q in spread_poses(robot)[1:] if not collisions.contacts(q))
-    return np.array([*islice(free, POSES)]).reshape(-1, len(robot.joint_names))
 
 
 @dataclass(frozen=True)
@@ -173,20 +162,16 @@ def checked_poses(found: Examination) -> tuple[CheckedPose, ...]:
     """What the simulation says at the poses that were looked at."""
     if not found.frequency_hz.size:
         return ()
-    places = found.robot.forward_batch(found.q)[1]
-    made = []
-    for i, name in enumerate(found.poses):
-        known = np.isfinite(found.frequency_hz[i])
-        made.append(
-            CheckedPose(
-                name,
-                tuple(found.robot.joints.shown(found.q[i]).round(4).tolist()),
-                tuple(places[i].tolist()),
-                tuple(found.frequency_hz[i][known].tolist()),
-                tuple(found.damping_ratio[i][known].tolist()),
-            )
-        )
-    return tuple(made)
+    robot, known = found.robot, np.isfinite(found.frequency_hz)
+    rows = zip(
+        found.poses,
+        robot.joints.shown(found.q).round(4).tolist(),
+        robot.forward_batch(found.q)[1].tolist(),
+        (f[own].tolist() for f, own in zip(found.frequency_hz, known, strict=True)),
+        (d[own].tolist() for d, own in zip(found.damping_ratio, known, strict=True)),
+        strict=True,
+    )
+    return tuple(CheckedPose(name, *map(tuple, values)) for name, *values in rows)
 
 
 def checked_links(found: Examination) -> tuple[CheckedLink, ...]:

@@ -42,8 +42,13 @@ def fit_similarity(
 
     On at most so many `lines` a pose.
     """
-    measured = _stacked(simulation, frfs, band_hz, lines)
-    return similarity_of(measured, _simulated(simulation, measured, q))
+    band = common_band(frfs, band_hz or simulation.robot.config.band_hz)
+    measured = stack(frfs, band, lines, MODEL_ERROR)
+    matrices = measured.loaded(simulation.elastic.matrices(q, layout=measured.layout), simulation)
+    h = response(matrices, simulation.elasticity, measured.s)
+    if np.isfinite(measured.tail_s).any():  # cut off at the records' ends as the measured ones are
+        h -= cut_off(simulation.solved(matrices), measured.s, measured.tail_s)
+    return similarity_of(measured, h)
 
 
 def similarity_of(measured: Measured, h: np.ndarray) -> Similarity:
@@ -55,22 +60,3 @@ def similarity_of(measured: Measured, h: np.ndarray) -> Similarity:
         parts.append(metrics.agreement(given[i : i + 1, ..., lines], h[i : i + 1, ..., lines]))
     whole = metrics.stack(parts)
     return Similarity(metrics.direct_mean(whole.global_frac), metrics.direct_mean(whole.frobenius))
-
-
-def _stacked(
-    simulation: Simulation,
-    frfs: Sequence[Frf],
-    band_hz: tuple[float, float] | None,
-    lines: int,
-) -> Measured:
-    band = common_band(frfs, band_hz or simulation.robot.config.band_hz)
-    return stack(frfs, band, lines, MODEL_ERROR)
-
-
-def _simulated(simulation: Simulation, measured: Measured, q: np.ndarray) -> np.ndarray:
-    """(n, r, c, F), cut off at the records' ends as the measured ones are."""
-    matrices = measured.loaded(simulation.elastic.matrices(q, layout=measured.layout), simulation)
-    h = response(matrices, simulation.elasticity, measured.s)
-    if np.isfinite(measured.tail_s).any():
-        h -= cut_off(simulation.solved(matrices), measured.s, measured.tail_s)
-    return h

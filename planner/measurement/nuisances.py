@@ -93,6 +93,35 @@ class OpenNumbers:
 HIT_NUMBERS = 3 * OF_HIT
 
 
+def basis(h: np.ndarray, motion: Motion, s: np.ndarray, t: Tolerances) -> np.ndarray:
+    """Changes (n, l, r, c, F) of FRFs h (n, r, c, F) per sd, as `OpenNumbers` counts them.
+
+    Those of the joints are there where the matrices behind `motion` have their slopes. Where it
+    knows of actual ports, h and the changes are around those.
+    """
+    n, rows, columns, lines = h.shape
+    numbers, actual, by_angle = OpenNumbers.of(h), motion.actual, motion.by_angle
+    joints = 0 if by_angle is None else by_angle.shape[1]
+    # All is written once, in place: such arrays are large.
+    out = np.zeros((n, numbers.known + joints, rows, columns, lines), dtype=complex)
+    by_axis = out[:, : numbers.hits].reshape(n, columns, OF_HIT, rows, columns, lines)
+    # A miss along an axis changes the column of that axis only: a view of these.
+    of_hits = np.einsum("namiaf->namif", by_axis)
+    hit_basis(h if actual is None else motion.forces, motion.moment, t, of_hits)
+    of_chain = out[:, numbers.hits : numbers.known]
+    _of_chain(h if actual is None else motion.felt, motion.turning, t, of_chain)
+    if actual is not None:
+        for sensor in range(rows // 3):
+            places = of_chain[:, OF_SENSOR * sensor + 9 : OF_SENSOR * (sensor + 1)]
+            places[:] = np.einsum("nij,nkjcf->nkicf", actual.matrix, places)
+    np.multiply(h, t.force_gain, out=of_chain[:, -2])
+    np.multiply(h, -t.delay_s * s[:, None, None], out=of_chain[:, -1])
+    if by_angle is not None:
+        sd = np.broadcast_to(t.joint_rad, joints).reshape(-1, 1, 1, 1)
+        np.multiply(by_angle, sd, out=out[:, numbers.known :])
+    return out
+
+
 def hit_basis(
     h: np.ndarray, moment: np.ndarray, t: Tolerances, out: np.ndarray | None = None
 ) -> np.ndarray:
@@ -113,15 +142,8 @@ def hit_basis(
     return out
 
 
-def chain_basis(
-    h: np.ndarray, turning: np.ndarray, s: np.ndarray, t: Tolerances, out: np.ndarray | None = None
-) -> np.ndarray:
-    """Changes (n, k, r, c, F) of FRFs per sd: of each sensor's E (9) and place (3); scale, delay.
-
-    `out`, where it is given, holds zeros.
-    """
-    if out is None:
-        out = np.zeros((h.shape[0], OpenNumbers.of(h).chain, *h.shape[1:]), dtype=complex)
+def _of_chain(h: np.ndarray, turning: np.ndarray, t: Tolerances, out: np.ndarray) -> None:
+    """Into zeros `out` (n, k, r, c, F): of each sensor's E (9) and place (3), before the hammer."""
     for sensor in range(h.shape[1] // 3):
         place, row = OF_SENSOR * sensor, 3 * sensor
         for i in range(3):
@@ -133,38 +155,6 @@ def chain_basis(
             moved, a, b = out[:, place + 9 + axis], row + first, row + second
             np.multiply(turning[:, b], t.position_m, out=moved[:, a])
             np.multiply(turning[:, a], -t.position_m, out=moved[:, b])
-    np.multiply(h, t.force_gain, out=out[:, -2])
-    np.multiply(h, -t.delay_s * s[:, None, None], out=out[:, -1])
-    return out
-
-
-def basis(h: np.ndarray, motion: Motion, s: np.ndarray, t: Tolerances) -> np.ndarray:
-    """All of them of the poses, (n, l, r, c, F), of FRFs h: as `OpenNumbers` counts them.
-
-    Those of the joints are there where the matrices behind `motion` have their slopes. Where it
-    knows of actual ports, h and the changes are around those.
-    """
-    n, rows, columns, lines = h.shape
-    numbers, by_angle, actual = OpenNumbers.of(h), motion.by_angle, motion.actual
-    joints = 0 if by_angle is None else by_angle.shape[1]
-    # All is written once, in place: such arrays are large.
-    out = np.zeros((n, numbers.known + joints, rows, columns, lines), dtype=complex)
-    by_axis = out[:, : numbers.hits].reshape(n, columns, OF_HIT, rows, columns, lines)
-    forces, felt = (h, h) if actual is None else (motion.forces, motion.felt)
-    # A miss along an axis changes the column of that axis only: a view of these.
-    hit_basis(forces, motion.moment, t, np.einsum("namiaf->namif", by_axis))
-    of_chain = out[:, numbers.hits : numbers.known]
-    chain_basis(felt, motion.turning, s, t, of_chain)
-    if actual is not None:  # of what the sensors feel, they show so much
-        for sensor in range(rows // 3):
-            places = of_chain[:, OF_SENSOR * sensor + 9 : OF_SENSOR * (sensor + 1)]
-            places[:] = np.einsum("nij,nkjcf->nkicf", actual.matrix, places)
-        np.multiply(h, t.force_gain, out=of_chain[:, -2])
-        np.multiply(h, -t.delay_s * s[:, None, None], out=of_chain[:, -1])
-    if by_angle is not None:
-        sd = np.broadcast_to(t.joint_rad, joints).reshape(-1, 1, 1, 1)
-        np.multiply(by_angle, sd, out=out[:, numbers.known :])
-    return out
 
 
 def real_rows(values: np.ndarray) -> np.ndarray:

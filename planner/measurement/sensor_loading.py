@@ -54,16 +54,13 @@ def unloaded(
     found, by = list(modes), np.full(len(modes), np.nan)
     for j, k in pairs:
         if cost[j, k] < worst:
-            found[j], by[j] = _without(modes[j], float(lowered[k])), lowered[k]
+            hz_alone = float(modes[j].frequency_hz / (1 - lowered[k]))
+            sd = float(np.hypot(modes[j].frequency_sd_hz, DOUBT * lowered[k] * hz_alone))
+            found[j] = replace(modes[j], frequency_hz=hz_alone, frequency_sd_hz=sd)
+            by[j] = lowered[k]
     missing = worst * (len(modes) - len(pairs))
     unlike = (missing + sum(float(cost[j, k]) for j, k in pairs)) / worst
     return Unloaded(tuple(found), by, unlike)
-
-
-def _without(mode: Mode, lowered: float) -> Mode:
-    frequency = mode.frequency_hz / (1 - lowered)
-    sd = float(np.hypot(mode.frequency_sd_hz, DOUBT * lowered * frequency))
-    return replace(mode, frequency_hz=float(frequency), frequency_sd_hz=sd)
 
 
 def _lowered(

@@ -110,19 +110,15 @@ def couple(tip: TipReceptance, target: Tool | None, reference: Tool | None = Non
     taken off. Uncertainty is linearised: measured values, and each number of each contact that
     states `sd_percent`.
     """
-    omega = 2 * np.pi * tip.frequency_hz
-    blocks = _Blocks.between(tip, target, reference, omega)
-    c = tip.receptance
-    coupled, left, right = blocks.applied(c)
+    coupled, left, right = _coupled(tip, target, reference)
     variance = _measured(left @ tip.left, tip, tip.right @ right)
     variance += _carried(left, tip.offset_sd**2, right)
     for other in _uncertain(target, reference):
-        moved = _Blocks.between(tip, *other, omega).applied(c)[0]
-        variance += np.abs(moved - coupled) ** 2
+        variance += np.abs(_coupled(tip, *other)[0] - coupled) ** 2
     own = tuple(k for k, motion in enumerate(tip.kept) if motion < 3)
     noise = _carried(left @ tip.left, np.abs(tip.measured) ** 2, tip.right @ right)
-    size = np.sum(np.abs(coupled[np.ix_(range(len(omega)), own, own)]) ** 2, axis=(1, 2))
-    grown = np.sum(noise[np.ix_(range(len(omega)), own, own)], axis=(1, 2))
+    size = np.sum(np.abs(coupled[np.ix_(range(len(coupled)), own, own)]) ** 2, axis=(1, 2))
+    grown = np.sum(noise[np.ix_(range(len(coupled)), own, own)], axis=(1, 2))
     return CoupledFrf(
         tip.frequency_hz,
         tip.kept,
@@ -134,35 +130,23 @@ def couple(tip: TipReceptance, target: Tool | None, reference: Tool | None = Non
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Blocks:
-    """M of the kept motions, each (F, k, k)."""
-
-    uu: np.ndarray
-    uf: np.ndarray
-    fu: np.ndarray
-    ff: np.ndarray
-
-    @classmethod
-    def between(
-        cls, tip: TipReceptance, target: Tool | None, reference: Tool | None, omega: np.ndarray
-    ) -> "_Blocks":
-        m = np.broadcast_to(np.eye(12, dtype=complex), (len(omega), 12, 12))
-        if reference is not None:
-            m = turned(reference.transfer(omega), tip.frame.T @ reference.frame)
-        if target is not None:
-            own = turned(target.transfer(omega), tip.frame.T @ target.frame)
-            m = inverse(own) @ m
-        u = np.array(tip.kept)
-        f = u + 6
-        rows = np.arange(len(omega))
-        return cls(*(m[np.ix_(rows, a, b)] for a, b in ((u, u), (u, f), (f, u), (f, f))))
-
-    def applied(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """C₂, and what stands to the left and right of an error of C in an error of C₂."""
-        right = np.linalg.inv(self.fu @ c + self.ff)
-        coupled = (self.uu @ c + self.uf) @ right
-        return coupled, self.uu - coupled @ self.fu, right
+def _coupled(
+    tip: TipReceptance, target: Tool | None, reference: Tool | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """C₂ (F, k, k), and what stands to the left and right of an error of C in an error of C₂."""
+    omega = 2 * np.pi * tip.frequency_hz
+    m = np.broadcast_to(np.eye(12, dtype=complex), (len(omega), 12, 12))
+    if reference is not None:
+        m = turned(reference.transfer(omega), tip.frame.T @ reference.frame)
+    if target is not None:
+        m = inverse(turned(target.transfer(omega), tip.frame.T @ target.frame)) @ m
+    u = np.array(tip.kept)
+    pairs = ((u, u), (u, u + 6), (u + 6, u), (u + 6, u + 6))
+    uu, uf, fu, ff = (m[np.ix_(range(len(omega)), a, b)] for a, b in pairs)
+    c = tip.receptance
+    right = np.linalg.inv(fu @ c + ff)
+    coupled = (uu @ c + uf) @ right
+    return coupled, uu - coupled @ fu, right
 
 
 def turned(transfer: np.ndarray, frame: np.ndarray) -> np.ndarray:
@@ -175,10 +159,8 @@ def inverse(transfer: np.ndarray) -> np.ndarray:
     """Of (F, 12, 12): reciprocity makes it symplectic, so that nothing has to be solved."""
     uu, uf = transfer[:, :6, :6], transfer[:, :6, 6:]
     fu, ff = transfer[:, 6:, :6], transfer[:, 6:, 6:]
-    swapped = [np.swapaxes(block, 1, 2) for block in (ff, -uf, -fu, uu)]
-    return np.concatenate(
-        [np.concatenate(swapped[:2], axis=2), np.concatenate(swapped[2:], axis=2)], axis=1
-    )
+    uu, uf, fu, ff = (np.swapaxes(block, 1, 2) for block in (uu, uf, fu, ff))
+    return np.block([[ff, -uf], [-fu, uu]])
 
 
 def _carried(left: np.ndarray, variance: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -251,15 +233,13 @@ class VerifyingHit:
     @property
     def sentence(self) -> str:
         """What to do."""
-        if not self.sd_m_n > 0:
-            return (
-                f"To verify: hit the target's tip along {self.hit} and read {self.hit[1]} there; "
-                f"expect {1e6 * self.expected_m_n:.3g} µm/N at {self.frequency_hz:.4g} Hz."
-            )
+        told = f"{1e6 * self.expected_m_n:.3g}"
+        at = f"µm/N at {self.frequency_hz:.4g} Hz"
+        if self.sd_m_n > 0:
+            told, at = f"{told} ± {1e6 * self.sd_m_n:.2g}", f"{at}, where it is least sure"
         return (
             f"To verify: hit the target's tip along {self.hit} and read {self.hit[1]} there; "
-            f"expect {1e6 * self.expected_m_n:.3g} ± {1e6 * self.sd_m_n:.2g} µm/N at "
-            f"{self.frequency_hz:.4g} Hz, where it is least sure."
+            f"expect {told} {at}."
         )
 
 
@@ -352,7 +332,8 @@ def fit_contact(
             f"{target.name} has no [segment.contact] to be identified; state one to begin with."
         )
     number, stated = contacts[0]
-    known = np.isfinite(seen) & np.isfinite(couple(tip, target, reference).receptance[:3, :3])
+    first = couple(tip, target, reference)
+    known = np.isfinite(seen) & np.isfinite(first.receptance[:3, :3])
     if not np.any(known):
         raise InputError(f"No measured FRF of {target.name} is along a direction of the source.")
     begin = np.log([max(getattr(stated, name), 1e-9) for name in NUMBERS])
@@ -361,7 +342,6 @@ def fit_contact(
         values = np.exp(begin + z)
         return target.held(number, ToolContact(*(float(v) for v in values)))
 
-    first = couple(tip, target, reference)
     size = np.abs(np.where(known, seen, 1.0))
     # Relative error that the model is allowed where measured FRFs and coupled ones state less:
     # tools are no rods.
@@ -371,13 +351,11 @@ def fit_contact(
         away = (couple(tip, held(z), reference).receptance[:3, :3] - seen)[known] / sd
         return np.concatenate([away.real, away.imag, z / PRIOR_SD])
 
-    found = None
-    for start in STARTS:
-        z = np.array([start, start, 0.0, 0.0])
-        one = least_squares(off, z, bounds=(-FARTHEST, FARTHEST), x_scale=1.0, max_nfev=60)
-        if found is None or one.cost < found.cost:
-            found = one
-    assert found is not None
+    tries = (
+        least_squares(off, [start, start, 0.0, 0.0], bounds=(-FARTHEST, FARTHEST), max_nfev=60)
+        for start in STARTS
+    )
+    found = min(tries, key=lambda one: one.cost)
     spread = max(2 * found.cost / max(2 * np.count_nonzero(known) - 4, 1), 1.0)
     covariance = np.linalg.inv(found.jac.T @ found.jac) * spread
 

@@ -10,7 +10,7 @@ from planner.frf.exported import labelled_frfs
 from planner.frf.quantities import convert
 from planner.milling.cut import Cut
 from planner.recording.read import read_frfs
-from planner.recording.records import AXES, FrfRecord
+from planner.recording.records import AXES
 
 SEEN = 1e-9  # share of a direction in the plane of the cut that does not count
 LEAST_LINES = 16
@@ -99,10 +99,17 @@ def read_frf(path: Path, pose: str | None, from_names: bool = False) -> CutterFr
     if not path.exists():
         raise InputError(f"{path} does not exist; name FRFs, modes or a campaign.")
     if path.suffix.lower() == ".npz":
-        return _npz(path, pose)
+        names, held = read_npz(path)
+        row, sd = row_of(path, names, pose), held.get("frf_sd")
+        name, spread = f"{path}, pose {names[row]}", None if sd is None else sd[row]
+        return of_accelerance(name, held["frequency_hz"], held["frf_mean"][row], spread)
     if pose is not None:
         raise InputError(f"{path} holds FRFs of one pose only; leave --pose out.")
-    return _exported(path, read_frfs(path, from_names))
+    frequency, frfs = labelled_frfs(read_frfs(path, from_names), "accelerance", InputError)
+    h = np.full((3, 3, len(frequency)), np.nan + 0j)
+    for one in frfs:
+        h[one.felt[1], one.hit[1]] = one.values
+    return of_accelerance(str(path), frequency, h, None)
 
 
 def of_accelerance(
@@ -124,14 +131,6 @@ def of_accelerance(
 def names_in(path: Path) -> list[str | None]:
     """Every pose of an npz of `predict`, in its order; of other files None, the one they hold."""
     return list(read_npz(path)[0]) if path.suffix.lower() == ".npz" else [None]
-
-
-def _npz(path: Path, pose: str | None) -> CutterFrf:
-    names, held = read_npz(path)
-    row, sd = row_of(path, names, pose), held.get("frf_sd")
-    spread = None if sd is None else sd[row]
-    name = f"{path}, pose {names[row]}"
-    return of_accelerance(name, held["frequency_hz"], held["frf_mean"][row], spread)
 
 
 def read_npz(path: Path) -> tuple[list[str], dict[str, np.ndarray]]:
@@ -170,11 +169,3 @@ def row_of(path: Path, names: list[str], pose: str | None) -> int:
     if pose is not None and pose not in names:
         raise InputError(f"{path} has no pose {pose}; choose one of {few}.")
     return 0 if pose is None else names.index(pose)
-
-
-def _exported(path: Path, records: tuple[FrfRecord, ...]) -> CutterFrf:
-    frequency, frfs = labelled_frfs(records, "accelerance", InputError)
-    h = np.full((3, 3, len(frequency)), np.nan + 0j)
-    for one in frfs:
-        h[one.felt[1], one.hit[1]] = one.values
-    return of_accelerance(str(path), frequency, h, None)

@@ -25,12 +25,7 @@ GROWTH = 1.045
 CHUNK = 12  # depths that are scanned at once
 
 
-@dataclass(frozen=True)
-class GrowthAtDepth:
-    """A depth in m and log |µ| there."""
-
-    depth: float
-    size: float
+Level = tuple[float, float]  # a depth in m, and log |µ| there
 
 
 def scanned_depths(floor_m: float, most_m: float) -> np.ndarray:
@@ -44,46 +39,46 @@ def scanned_depths(floor_m: float, most_m: float) -> np.ndarray:
     return np.append(depths[depths < most_m * (1 - 1e-9)], most_m)
 
 
-def levels(at: Monodromies, depths: np.ndarray) -> list[GrowthAtDepth]:
+def levels(at: Monodromies, depths: np.ndarray) -> list[Level]:
     """Of depths (B,)."""
     sizes = np.log(np.maximum(np.abs(multipliers(at(depths))), 1e-300))
-    return [GrowthAtDepth(float(b), float(s)) for b, s in zip(depths, sizes, strict=True)]
+    return [(float(b), float(s)) for b, s in zip(depths, sizes, strict=True)]
 
 
-def first_unstable(at: Monodromies, scan: np.ndarray) -> tuple[GrowthAtDepth, GrowthAtDepth] | None:
+def first_unstable(at: Monodromies, scan: np.ndarray) -> tuple[Level, Level] | None:
     """The last stable depth before the first that is not."""
     seen = levels(at, np.array([0.0]))
     for first in range(0, len(scan), CHUNK):
         seen += levels(at, scan[first : first + CHUNK])
         seen = _with_peaks(at, seen)
         for low, high in pairwise(seen):
-            if high.size > 0:
+            if high[1] > 0:
                 return low, high
         seen = seen[-2:]
     return None
 
 
-def _with_peaks(at: Monodromies, seen: list[GrowthAtDepth]) -> list[GrowthAtDepth]:
+def _with_peaks(at: Monodromies, seen: list[Level]) -> list[Level]:
     """With more depths where |µ| has a maximum below one that may reach it between."""
-    more: list[GrowthAtDepth] = []
+    more: list[Level] = []
     for a, b, c in zip(seen, seen[1:], seen[2:], strict=False):
-        if b.size > 0:
+        if b[1] > 0:
             break
         # A maximum of |µ| above this, between steps, is looked at more closely.
-        if b.size > np.log(0.9) and b.size >= max(a.size, c.size):
+        if b[1] > np.log(0.9) and b[1] >= max(a[1], c[1]):
             # So many depths then are looked at.
-            more += levels(at, np.linspace(a.depth, c.depth, 9 + 2)[1:-1])
-    return sorted([*seen, *more], key=lambda level: level.depth)
+            more += levels(at, np.linspace(a[0], c[0], 9 + 2)[1:-1])
+    return sorted([*seen, *more])
 
 
-def refined(at: Monodromies, low: GrowthAtDepth, high: GrowthAtDepth, width: float = 1e-6) -> float:
+def refined(at: Monodromies, low: Level, high: Level, width: float = 1e-6) -> float:
     """Depth at which |µ| is one between two, to a relative `width`."""
-    known = {low.depth: low.size, high.depth: high.size}
+    known = dict((low, high))
 
     def size(depth: float) -> float:
-        return known[depth] if depth in known else levels(at, np.array([depth]))[0].size
+        return known[depth] if depth in known else levels(at, np.array([depth]))[0][1]
 
-    return float(root_scalar(size, bracket=(low.depth, high.depth), xtol=width * high.depth).root)
+    return float(root_scalar(size, bracket=(low[0], high[0]), xtol=width * high[0]).root)
 
 
 MANY, BLOCK = 60, 10  # speeds from which two processes share them, in blocks of so many
@@ -158,7 +153,7 @@ def full_loss(machine: Machine, rpm: float, scan: np.ndarray) -> Loss:
 def _again(at: Monodromies, depth: float, scan: np.ndarray) -> float | None:
     """With other points: near where it was, else by another scan."""
     low, high = levels(at, depth * np.array([0.998, 1.002]))
-    if low.size < 0 < high.size:
+    if low[1] < 0 < high[1]:
         return refined(at, low, high)
     bracket = first_unstable(at, scan)
     return None if bracket is None else refined(at, *bracket)
@@ -288,11 +283,11 @@ def _limits(machine: Machine, rpm: np.ndarray, around: np.ndarray) -> np.ndarray
     return found
 
 
-def _bracket(seen: list[GrowthAtDepth]) -> tuple[GrowthAtDepth, GrowthAtDepth] | None:
+def _bracket(seen: list[Level]) -> tuple[Level, Level] | None:
     """The first loss among levels that are coarse; before the first of them it is stable."""
-    before = GrowthAtDepth(0.0, -1.0)
+    before = (0.0, -1.0)
     for level in seen:
-        if level.size > 0:
+        if level[1] > 0:
             return before, level
         before = level
     return None

@@ -93,11 +93,10 @@ def by_feed(poses: Sequence[tuple[str, Structure]], cut: Cut, rpm: float) -> np.
     About the tool's axis, from the feed towards axis × feed; inf where nothing is lost.
     """
     one = _at_one_speed(cut, rpm)
-    limit = []
-    for turn in np.deg2rad(TURNS_DEG):
-        each = [_limit(_turned(structure.machine(one), turn)) for _, structure in poses]
-        limit.append(min(each))
-    return np.array(limit)
+    return np.array([
+        min(_limit(_turned(structure.machine(one), turn)) for _, structure in poses)
+        for turn in np.deg2rad(TURNS_DEG)
+    ])  # fmt: skip
 
 
 def limit_at(structure: Structure, cut: Cut, rpm: float) -> float:

@@ -16,7 +16,7 @@ tip turns as it moves: exact where the simulation is, and H itself for the motio
 antiresonances of G the inverse would blow up what H and G differ by: it is regularised.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -124,8 +124,8 @@ def _frfs(
     if lacking or len(directions) < 2:
         raise InputError(f"{path}: {_lacks(lacking)}; {MEASURE}.")
     values = np.array([[found[(*a, *b)] for b in wanted] for a in wanted])
-    seen = TwoPoints(frequency, directions, values, noise * np.abs(values))
-    found = two_point_receptance(seen, tool, back)
+    seen = CutterFrf(str(path), frequency, values, noise * np.abs(values))
+    found = two_point_receptance(seen, directions, tool, back)
     found = replace(found, simulated=any(record.simulated for record in records))
     if noise > 0:
         return smoothed(found)
@@ -220,48 +220,32 @@ def smoothed(tip: TipReceptance) -> TipReceptance:
     return replace(tip, measured=measured, sd=sd, errors=errors, remarks=(*tip.remarks, text))
 
 
-@dataclass(frozen=True, eq=False)
-class TwoPoints:
-    """Receptances (m/N) between all directions of two points, the tip's first.
-
-    `directions` are those measured at each (numbers of x, y, z in the FRFs' axes, d of them);
-    `values` and `sd` (2d, 2d, F), response by hit, the tip's d directions first. Where they err
-    together `errors` (D, 2d, 2d, F) says how, as in `TipReceptance`.
-    """
-
-    frequency_hz: np.ndarray
-    directions: tuple[int, ...]
-    values: np.ndarray
-    sd: np.ndarray
-    errors: np.ndarray | None = None
-
-
-def two_point_receptance(seen: TwoPoints, tool: Tool, back: Point) -> TipReceptance:
+def two_point_receptance(
+    seen: CutterFrf,
+    directions: tuple[int, ...],
+    tool: Tool,
+    back: Point,
+    errors: np.ndarray | None = None,
+) -> TipReceptance:
     """All receptances of the tip but those of twisting, from two points of a tool.
 
-    `back` is the second point. Raises InputError where the directions measured are too few.
+    `seen` are those (2d, 2d, F) between all `directions` of both points, the tip's d first (numbers
+    of x, y, z in the FRFs' axes). Where they err together `errors` (D, 2d, 2d, F) says how, as in
+    `TipReceptance`. `back` is the second point. InputError where the directions are too few.
     """
-    _check(seen, tool)
+    _check(directions, tool)
     omega = 2 * np.pi * seen.frequency_hz
     both = np.kron(np.eye(2), tool.frame)  # columns are the tool's axes at both points
-    full = [3 * point + k for point in (0, 1) for k in seen.directions]
-    values, variance = (np.zeros((len(omega), 6, 6), kind) for kind in (complex, float))
-    grid = np.ix_(range(len(omega)), full, full)
-    values[grid] = np.moveaxis(seen.values, -1, 0)
-    variance[grid] = np.moveaxis(seen.sd, -1, 0) ** 2
-    axial = len(seen.directions) == 3
-    use = [0, 1, 2, 3, 4] if axial else [0, 1, 3, 4]
-    kept = (0, 1, 2, 3, 4) if axial else (0, 1, 3, 4)
-    here = np.ix_(range(len(omega)), use, use)
-    measured = (both.T @ values @ both)[here]
-    sd = np.sqrt((both.T**2 @ variance @ both**2)[here])
-    together = None
-    if seen.errors is not None:
-        each = np.zeros((len(seen.errors), len(omega), 6, 6), complex)
-        each[np.ix_(range(len(each)), range(len(omega)), full, full)] = np.moveaxis(
-            seen.errors, -1, 1
-        )
-        together = (both.T @ each @ both)[(slice(None), *here)]
+    full = [3 * point + k for point in (0, 1) for k in directions]
+    kept = (0, 1, 2, 3, 4) if len(directions) == 3 else (0, 1, 3, 4)
+    rows = np.ix_(full, kept)
+
+    def along(values: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        """(…, F, k, k) in the tool's axes of values (…, 2d, 2d, F)."""
+        return turn[rows].T @ np.moveaxis(values, -1, -3) @ turn[rows]
+
+    assert seen.sd is not None
+    measured, sd = along(seen.receptance, both), np.sqrt(along(seen.sd**2, both**2))
     v, w = _mapping(tool, back.from_tip_m, kept, omega)
     left = np.linalg.inv(v)
     right = np.swapaxes(left, 1, 2)
@@ -271,15 +255,14 @@ def two_point_receptance(seen: TwoPoints, tool: Tool, back: Point) -> TipRecepta
         moved, shift = _mapping(tool, back.from_tip_m + back.place_sd_m, kept, omega)
         other = np.linalg.inv(moved)
         spread = np.abs(other @ (measured - shift) @ np.swapaxes(other, 1, 2) - c)
-    offset = -left @ w @ right
     return TipReceptance(
-        seen.frequency_hz, kept, measured, sd, left, right, offset, spread, tool.frame,
-        errors=together,
+        seen.frequency_hz, kept, measured, sd, left, right, -left @ w @ right, spread, tool.frame,
+        errors=None if errors is None else along(errors, both),
     )  # fmt: skip
 
 
-def _check(seen: TwoPoints, tool: Tool) -> None:
-    if len(seen.directions) == 3:
+def _check(directions: tuple[int, ...], tool: Tool) -> None:
+    if len(directions) == 3:
         return
     along = int(np.argmax(np.abs(tool.axis)))
     across = tuple(k for k in range(3) if k != along)
@@ -288,7 +271,7 @@ def _check(seen: TwoPoints, tool: Tool) -> None:
         raise InputError(
             f"The axis of {tool.name} is none of the FRFs' own; measure x, y and z at both points."
         )
-    if not set(across) <= set(seen.directions):
+    if not set(across) <= set(directions):
         raise InputError(
             f"Of {tool.name} both directions across its axis are needed at both points, "
             f"{AXES[across[0]]} and {AXES[across[1]]}; measure them."

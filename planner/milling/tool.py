@@ -60,18 +60,19 @@ class ToolContact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     damping_nms_rad: float = 0.0
     sd_percent: float = 0.0
 
-    def flexibility(self, omega: np.ndarray) -> np.ndarray:
-        """(F, 6): how far its sides move apart, for each unit of force or moment."""
-        out = np.zeros((len(omega), 6), complex)
-        out[:, ACROSS] = 1 / (self.stiffness_n_m + 1j * omega * self.damping_ns_m)[:, None]
-        out[:, TURNING] = 1 / (self.stiffness_nm_rad + 1j * omega * self.damping_nms_rad)[:, None]
-        return out
-
     def transfer(self, omega: np.ndarray) -> np.ndarray:
-        """(F, 12, 12) of the state from the tip's side to the holder's; omega (F,) in rad/s."""
+        """(F, 12, 12) of the state from the tip's side to the holder's; omega (F,) in rad/s.
+
+        Its sides move apart by its flexibility for each unit of force or moment.
+        """
         out = np.zeros((len(omega), 12, 12), complex)
         out[:, range(12), range(12)] = 1
-        out[:, range(6), range(6, 12)] = -self.flexibility(omega)
+        for places, stiffness, damping in (
+            (ACROSS, self.stiffness_n_m, self.damping_ns_m),
+            (TURNING, self.stiffness_nm_rad, self.damping_nms_rad),
+        ):
+            for k in places:
+                out[:, k, 6 + k] = -1 / (stiffness + 1j * omega * damping)
         return out
 
     def scaled(self, name: str, factor: float) -> "ToolContact":
@@ -147,11 +148,8 @@ class Tool:
     def above(self, from_tip: float) -> "Tool":
         """The part of it between the tip and a section so many m away."""
         parts = _split(self.parts, from_tip)
-        length, kept = 0.0, 0
-        while kept < len(parts) and length < from_tip - SAME_PLACE:
-            kept += 1
-            length += parts[-kept].segment.length
-        own = [replace(p) for p in parts[len(parts) - kept :]]
+        ends = np.cumsum([part.segment.length for part in parts[::-1]])
+        own = list(parts[len(parts) - int(np.sum(ends < from_tip + SAME_PLACE)) :])
         if own:  # what holds the lowest is below the section
             own[0] = replace(own[0], contact=None)
         return replace(self, parts=tuple(own))
@@ -242,9 +240,10 @@ def load_tool(path: Path) -> Tool:
     _check(path, table)
     parts = tuple(_part(s, table.material[s.material]) for s in table.segment)
     points = tuple(msgspec.structs.replace(p, node=str(p.node)) for p in table.point)
-    tool = Tool(
-        table.name or path.stem, _to_tip(table), parts, points, table.to_spindle is not None
-    )
+    stated = table.to_spindle is not None
+    to_tip = -np.array(table.to_spindle) if stated else np.array(table.axis or TO_TIP)
+    x, y, z = (float(a) for a in to_tip / np.linalg.norm(to_tip))
+    tool = Tool(table.name or path.stem, (x, y, z), parts, points, stated)
     for point in points:
         if point.from_tip_m > tool.length:
             raise InputError(
@@ -255,15 +254,6 @@ def load_tool(path: Path) -> Tool:
             parts = loaded(tool.parts, point.from_tip_m, point.sensor_mass_kg)
             tool = replace(tool, parts=parts)
     return tool
-
-
-def _to_tip(table: ToolTable) -> tuple[float, float, float]:
-    """Unit vector from the holder to the tip."""
-    given = table.axis or TO_TIP
-    if table.to_spindle is not None:
-        given = -np.array(table.to_spindle)
-    x, y, z = (float(a) for a in np.array(given) / np.linalg.norm(given))
-    return x, y, z
 
 
 def _part(s: SegmentTable, material: ToolMaterial) -> ToolPart:
@@ -351,12 +341,14 @@ def _check_segment(where: str, s: SegmentTable, materials: dict[str, ToolMateria
 
 
 def _positive(where: str, **values: float) -> None:
-    for name, value in values.items():
-        if not (np.isfinite(value) and value > 0):
-            raise InputError(f"{where}: {name} is {value:g}; it has to be above zero, correct it.")
+    _signed(where, values, np.nextafter(0, 1), "has to be above zero")
 
 
 def _not_negative(where: str, **values: float) -> None:
+    _signed(where, values, 0.0, "cannot be negative")
+
+
+def _signed(where: str, values: dict[str, float], least: float, said: str) -> None:
     for name, value in values.items():
-        if not (np.isfinite(value) and value >= 0):
-            raise InputError(f"{where}: {name} is {value:g}; it cannot be negative, correct it.")
+        if not least <= value < np.inf:
+            raise InputError(f"{where}: {name} is {value:g}; it {said}, correct it.")

@@ -5,7 +5,7 @@ record; where that is no whole hit, group by group, then what has one length; wh
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from planner.errors import InputError
@@ -32,10 +32,7 @@ UNREAD = "a table, string array or object of MATLAB's own: save table2struct or 
 Columns = tuple[EntryColumn, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class _Whole:
-    record: Record
-    columns: Columns
+_Whole = tuple[Record, Columns]  # and the columns that it is of
 
 
 def records_of(path: Path, root: EntryTree) -> tuple[Record, ...]:
@@ -45,11 +42,11 @@ def records_of(path: Path, root: EntryTree) -> tuple[Record, ...]:
     others = tuple(f for f in found if f.lacks and max(f.values.shape) >= LEAST_SAMPLES)
     wholes = _wholes(path, columns)
     if wholes:
-        used = {id(column) for whole in wholes for column in whole.columns}
+        used = {id(column) for _, own in wholes for column in own}
         left = [c for c in columns if id(c) not in used and len(c.values) >= LEAST_SAMPLES]
         remark = f"Left out, as no part of a hit: {_listed([*left, *others], False)}."
         remarks = (remark,) if left or others else ()
-        return tuple(replace(w.record, remarks=w.record.remarks + remarks) for w in wholes)
+        return tuple(replace(record, remarks=record.remarks + remarks) for record, _ in wholes)
     if others or not any(_known(column) for column in columns):
         raise InputError(f"{path} holds {_held(found, root)}: {LOOKED_FOR}; name columns so.")
     return _as_it_is(path, columns)
@@ -90,7 +87,7 @@ def _whole(path: Path, columns: Columns) -> _Whole | None:
         except InputError:
             continue
         if isinstance(record, FrfRecord) or _is_hit(record):
-            return _Whole(record, columns)
+            return record, columns
     return None
 
 

@@ -9,7 +9,7 @@ import math
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from planner.errors import InputError
 from planner.recording.entry_columns import DEEPEST, LARGEST_BYTES, MOST_ENTRIES, check_size
 
 HEADER = 128
-COMPRESSED, MATRIX = 15, 14  # types of elements
+COMPRESSED, MATRIX, FLAGS, DIMENSIONS = 15, 14, 6, 5  # types of elements
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8",
            13: "u8"}  # types of numbers  # fmt: skip
 TEXTS = {16: "utf-8", 17: "utf-16", 18: "utf-32", 4: "utf-16", 2: "latin-1"}  # types of characters
@@ -26,6 +26,8 @@ TEXTS = {16: "utf-8", 17: "utf-16", 18: "utf-32", 4: "utf-16", 2: "latin-1"}  # 
 CELL, STRUCT, CHARACTERS, NUMERIC, OPAQUE = 1, 2, 4, range(6, 16), 17
 COMPLEX = 0x0800  # flag of an array
 MOST_DIMENSIONS, LONGEST_NAME = 32, 256
+
+Part = tuple[int, memoryview]  # type and bytes
 
 
 def is_version_5(path: Path) -> bool:
@@ -43,29 +45,11 @@ def read_mat5(path: Path) -> dict[str, object]:
     structs lists in column order, matrices of characters tuples of their rows, others None.
     """
     data = memoryview(path.read_bytes())
-    order, left = "<" if data[126:128] == b"IM" else ">", [MOST_ENTRIES]
+    reader = _ArrayReader("<" if data[126:128] == b"IM" else ">")
     try:
-        return dict(_array(body, order, left) for body in _bodies(path, data, order))
+        return dict(reader.array(body) for body in reader.bodies(path, data))
     except (struct.error, zlib.error, ValueError, MemoryError):
         raise InputError(f"{path} is not a whole MAT file; export it again.") from None
-
-
-def _bodies(path: Path, data: memoryview, order: str) -> Iterator[memoryview]:
-    """What stands in each of the file's arrays, unfolded."""
-    at, unfolded = HEADER, 0
-    while at < len(data):
-        kind, size = struct.unpack_from(order + "II", data, at)
-        body = _exactly(data, at + 8, size)
-        at += 8 + size
-        if kind == COMPRESSED:
-            inner = zlib.decompressobj().decompress(body, LARGEST_BYTES - unfolded + 1)
-            unfolded += len(inner)
-            check_size(path, unfolded)
-            kind, size = struct.unpack_from(order + "II", inner)
-            body = _exactly(memoryview(inner), 8, size)
-        if kind != MATRIX:
-            raise ValueError
-        yield body
 
 
 def _exactly(data: memoryview, at: int, size: int) -> memoryview:
@@ -75,117 +59,111 @@ def _exactly(data: memoryview, at: int, size: int) -> memoryview:
     return found
 
 
-def _array(body: memoryview, order: str, left: list[int], depth: int = 0) -> tuple[str, object]:
-    """Name and value of one array; None for objects and the like."""
-    left[0] -= 1
-    if depth > DEEPEST or left[0] < 0:
+def _require(*conditions: bool) -> None:
+    if not all(conditions):
         raise ValueError
-    kind, flags, at = _part(body, 0, order)
-    if kind != 6 or len(flags) != 8:
-        raise ValueError
-    (word,) = struct.unpack_from(order + "I", flags)
-    if word & 0xFF == OPAQUE:  # tables, strings and other objects have no dimensions
-        _, name, _ = _part(body, at, order)
-        return bytes(name).decode("latin-1"), None
-    kind, dimensions, at = _part(body, at, order)
-    shape = struct.unpack(f"{order}{len(dimensions) // 4}i", dimensions)
-    if kind != 5 or not 2 <= len(shape) <= MOST_DIMENSIONS or min(shape) < 0:
-        raise ValueError
-    _, name, at = _part(body, at, order)
-    inner = _Inner(body, at, order, left, depth)
-    reader = {CELL: _cells, STRUCT: _structs, CHARACTERS: _text}.get(word & 0xFF)
-    if reader is not None:
-        value = reader(inner, shape)
-    elif word & 0xFF in NUMERIC:
-        value = _values(inner, shape, bool(word & COMPLEX))
-    else:
-        value = None
-    return bytes(name).decode("latin-1"), value
 
 
 @dataclass
-class _Inner:
-    """What stands in an array after its name, read on part by part."""
+class _ArrayReader:
+    """Reads a file of one byte order; ValueError and the like where a length contradicts another.
 
-    body: memoryview
-    at: int
+    `left` is how many arrays may still follow.
+    """
+
     order: str
-    left: list[int]  # how many arrays may still follow in the file
-    depth: int
+    left: int = field(default=MOST_ENTRIES)
 
-    def part(self) -> tuple[int, memoryview]:
-        kind, part, self.at = _part(self.body, self.at, self.order)
-        return kind, part
+    def bodies(self, path: Path, data: memoryview) -> Iterator[memoryview]:
+        """What stands in each of the file's arrays, unfolded."""
+        at, unfolded = HEADER, 0
+        while at < len(data):
+            kind, size = struct.unpack_from(self.order + "II", data, at)
+            body = _exactly(data, at + 8, size)
+            at += 8 + size
+            if kind == COMPRESSED:
+                inner = zlib.decompressobj().decompress(body, LARGEST_BYTES - unfolded + 1)
+                unfolded += len(inner)
+                check_size(path, unfolded)
+                kind, size = struct.unpack_from(self.order + "II", inner)
+                body = _exactly(memoryview(inner), 8, size)
+            _require(kind == MATRIX)
+            yield body
 
-    def array(self) -> object:
-        """The next array in the array; empty ones may be a tag alone."""
-        kind, body = self.part()
-        if kind != MATRIX:
-            raise ValueError
-        if not len(body):
-            return np.zeros((0, 0))
-        return _array(body, self.order, self.left, self.depth + 1)[1]
+    def parts(self, body: memoryview) -> Iterator[Part]:
+        """The parts of an array."""
+        at = 0
+        while True:
+            (kind,) = struct.unpack_from(self.order + "I", body, at)
+            if kind >> 16:  # up to four bytes stand in the tag itself
+                yield kind & 0xFFFF, _exactly(body, at + 4, min(kind >> 16, 5))
+                at += 8
+            else:
+                (size,) = struct.unpack_from(self.order + "I", body, at + 4)
+                yield kind, _exactly(body, at + 8, size)
+                at += 8 + -(-size // 8) * 8
 
-    def numbers(self) -> np.ndarray:
-        kind, numbers = self.part()
-        if kind not in NUMBERS:
-            raise ValueError
+    def array(self, body: memoryview, depth: int = 0) -> tuple[str, object]:
+        """Name and value of one array; None for objects and the like."""
+        self.left -= 1
+        parts = self.parts(body)
+        kind, flags = next(parts)
+        _require(depth <= DEEPEST, self.left >= 0, kind == FLAGS, len(flags) == 8)
+        (word,) = struct.unpack_from(self.order + "I", flags)
+        of = word & 0xFF
+        if of == OPAQUE:  # tables, strings and other objects have no dimensions
+            return bytes(next(parts)[1]).decode("latin-1"), None
+        kind, dimensions = next(parts)
+        shape = struct.unpack(f"{self.order}{len(dimensions) // 4}i", dimensions)
+        _require(kind == DIMENSIONS, 2 <= len(shape) <= MOST_DIMENSIONS, min(shape) >= 0)
+        name, value = bytes(next(parts)[1]).decode("latin-1"), None
+        if of in (CELL, STRUCT):
+            _require(math.prod(shape) <= len(body) // 8)  # each takes a tag at least
+            read = self._cells if of == CELL else self._structs
+            value = read(parts, math.prod(shape), depth + 1)
+        elif of == CHARACTERS:
+            value = self._text(next(parts), shape)
+        elif of in NUMERIC:
+            value = self._numbers(next(parts))
+            if word & COMPLEX:
+                value = value + 1j * self._numbers(next(parts))
+            value = value.reshape(shape, order="F")
+        return name, value
+
+    def _cells(self, parts: Iterator[Part], count: int, depth: int) -> list[object]:
+        """The next arrays in an array; empty ones may be a tag alone."""
+        found: list[object] = []
+        for _ in range(count):
+            kind, body = next(parts)
+            _require(kind == MATRIX)
+            found.append(self.array(body, depth)[1] if len(body) else np.zeros((0, 0)))
+        return found
+
+    def _structs(self, parts: Iterator[Part], count: int, depth: int) -> object:
+        kind, stated = next(parts)
+        _require(kind == DIMENSIONS, len(stated) == 4)
+        (length,) = struct.unpack(self.order + "i", stated)
+        names = bytes(next(parts)[1])
+        _require(0 < length <= LONGEST_NAME, len(names) <= length * MOST_ENTRIES)
+        texts = [names[i : i + length] for i in range(0, len(names), length)]
+        fields = [text.split(b"\0", 1)[0].decode("latin-1") for text in texts]
+        each = [
+            dict(zip(fields, self._cells(parts, len(fields), depth), strict=True))
+            for _ in range(count if fields else 0)
+        ]
+        return each[0] if len(each) == 1 else each
+
+    def _numbers(self, part: Part) -> np.ndarray:
+        kind, numbers = part
+        _require(kind in NUMBERS)
         return np.frombuffer(numbers, np.dtype(self.order + NUMBERS[kind]))
 
-
-def _values(inner: _Inner, shape: tuple[int, ...], of_complex: bool) -> np.ndarray:
-    values = inner.numbers()
-    if of_complex:
-        values = values + 1j * inner.numbers()
-    return values.reshape(shape, order="F")
-
-
-def _text(inner: _Inner, shape: tuple[int, ...]) -> object:
-    """A text, or the rows of a matrix of characters."""
-    kind, characters = inner.part()
-    codec = TEXTS.get(kind, "")
-    if codec in ("utf-16", "utf-32"):
-        codec += "-le" if inner.order == "<" else "-be"
-    text = bytes(characters).decode(codec or "latin-1")
-    rows = shape[0]
-    if rows < 2 or math.prod(shape) != len(text):
-        return text
-    return tuple(text[row::rows].strip() for row in range(rows))
-
-
-def _cells(inner: _Inner, shape: tuple[int, ...]) -> list[object]:
-    return [inner.array() for _ in range(_count(inner, shape))]
-
-
-def _structs(inner: _Inner, shape: tuple[int, ...]) -> object:
-    kind, stated = inner.part()
-    if kind != 5 or len(stated) != 4:
-        raise ValueError
-    (length,) = struct.unpack(inner.order + "i", stated)
-    _, names = inner.part()
-    if not 0 < length <= LONGEST_NAME or len(names) > length * MOST_ENTRIES:
-        raise ValueError
-    texts = [bytes(names[i : i + length]) for i in range(0, len(names), length)]
-    fields = [text.split(b"\0", 1)[0].decode("latin-1") for text in texts]
-    each = [
-        {name: inner.array() for name in fields}
-        for _ in range(_count(inner, shape) if fields else 0)
-    ]
-    return each[0] if len(each) == 1 else each
-
-
-def _count(inner: _Inner, shape: tuple[int, ...]) -> int:
-    """How many elements an array of arrays has; each takes a tag at least."""
-    count = math.prod(shape)
-    if count > len(inner.body) // 8:
-        raise ValueError
-    return count
-
-
-def _part(body: memoryview, at: int, order: str) -> tuple[int, memoryview, int]:
-    """Type and bytes of a part of an array, and where the next begins."""
-    (kind,) = struct.unpack_from(order + "I", body, at)
-    if kind >> 16:  # up to four bytes stand in the tag itself
-        return kind & 0xFFFF, _exactly(body, at + 4, min(kind >> 16, 5)), at + 8
-    (size,) = struct.unpack_from(order + "I", body, at + 4)
-    return kind, _exactly(body, at + 8, size), at + 8 + -(-size // 8) * 8
+    def _text(self, part: Part, shape: tuple[int, ...]) -> object:
+        """A text, or the rows of a matrix of characters."""
+        codec = TEXTS.get(part[0], "latin-1")
+        if codec in ("utf-16", "utf-32"):
+            codec += "-le" if self.order == "<" else "-be"
+        text, rows = bytes(part[1]).decode(codec), shape[0]
+        if rows < 2 or math.prod(shape) != len(text):
+            return text
+        return tuple(text[row::rows].strip() for row in range(rows))

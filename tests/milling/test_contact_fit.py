@@ -9,6 +9,7 @@ from planner.milling.tip_files import smoothed, two_point_receptance
 from planner.milling.tool import NUMBERS
 from tests.milling.assembled import frf, machine
 from tests.milling.test_coupling import (
+    ACROSS,
     FREQUENCY,
     LOOSER,
     REFERENCE,
@@ -24,7 +25,7 @@ from tests.milling.test_round_trip import BACK, SOFT
 @pytest.fixture(scope="module")
 def tip():
     seen = measured(frf(machine(), REFERENCE, FREQUENCY, RIGID_ENOUGH, points=(-1, 12)), 0.01, 5)
-    return smoothed(two_point_receptance(seen, tool(REFERENCE, RIGID_ENOUGH), BACK))
+    return smoothed(two_point_receptance(seen, ACROSS, tool(REFERENCE, RIGID_ENOUGH), BACK))
 
 
 def hit(held):

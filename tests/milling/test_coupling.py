@@ -6,7 +6,8 @@ from scipy.signal import find_peaks
 
 from planner.milling.beam import Segment, ToolMaterial
 from planner.milling.coupling import TipReceptance, couple
-from planner.milling.tip_files import TwoPoints, two_point_receptance
+from planner.milling.cutter_frf import CutterFrf
+from planner.milling.tip_files import two_point_receptance
 from planner.milling.tool import Point, Tool, ToolContact, ToolPart
 from tests.milling.assembled import LOSS, NU, RHO, E, frf, machine
 
@@ -17,6 +18,7 @@ LOOSER = (4.5e7, 4.19e6, 210.0, 1.5)
 REFERENCE = [(0.030, 0.02, 12), (0.020, 0.02, 8)]
 TARGET = [(0.045, 0.018, 18)]
 PLACES = [0, 2, 3, 1]  # (x, θy, y, θx) as (x, y, θx, θy)
+ACROSS = (0, 1)  # directions in which both points are measured
 KEPT = np.ix_([0, 1, 3, 4], [0, 1, 3, 4])
 
 
@@ -37,7 +39,7 @@ def measured(values, noise=0.0, seed=0):
     moved = np.moveaxis(values[:, ::2][:, :, ::2], 0, -1)
     a, b = np.random.default_rng(seed).standard_normal((2, *moved.shape))
     sd = noise * np.abs(moved)
-    return TwoPoints(FREQUENCY, (0, 1), moved + sd * (a + 1j * b) / np.sqrt(2), sd)
+    return CutterFrf("two points", FREQUENCY, moved + sd * (a + 1j * b) / np.sqrt(2), sd)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +52,7 @@ def assembled():
 def test_two_points_tell_the_rotations_of_a_bending_tool(assembled):
     reference, target = assembled
     ref = tool(REFERENCE, RIGID_ENOUGH)
-    tip = two_point_receptance(measured(reference), ref, Point("1a", 0.02))
+    tip = two_point_receptance(measured(reference), ACROSS, ref, Point("1a", 0.02))
     found = couple(tip, tool(TARGET, LOOSER), ref)
     size = np.sqrt(np.einsum("iif,jjf->ijf", np.abs(target), np.abs(target)))
     assert np.max(np.abs(found.receptance[KEPT] - target) / size) < 1e-5
@@ -59,7 +61,7 @@ def test_two_points_tell_the_rotations_of_a_bending_tool(assembled):
 def test_one_percent_noise_and_what_the_sd_says_of_it(assembled):
     reference, target = assembled
     ref = tool(REFERENCE, RIGID_ENOUGH)
-    tip = two_point_receptance(measured(reference, 0.01, 3), ref, Point("1a", 0.02))
+    tip = two_point_receptance(measured(reference, 0.01, 3), ACROSS, ref, Point("1a", 0.02))
     found = couple(tip, tool(TARGET, LOOSER), ref)
     error = np.abs(found.receptance[KEPT] - target)
     assert np.sqrt(np.mean((error / found.sd[KEPT]) ** 2)) == pytest.approx(1.0, abs=0.08)
@@ -71,10 +73,12 @@ def test_one_percent_noise_and_what_the_sd_says_of_it(assembled):
 def test_amplification_is_the_growth_of_errors(assembled):
     reference, _ = assembled
     ref, put = tool(REFERENCE, RIGID_ENOUGH), tool(TARGET, LOOSER)
-    exact = couple(two_point_receptance(measured(reference), ref, Point("1a", 0.02)), put, ref)
+    exact = couple(
+        two_point_receptance(measured(reference), ACROSS, ref, Point("1a", 0.02)), put, ref
+    )
     grown = np.zeros(len(FREQUENCY))
     for seed in range(25):
-        tip = two_point_receptance(measured(reference, 1e-5, seed), ref, Point("1a", 0.02))
+        tip = two_point_receptance(measured(reference, 1e-5, seed), ACROSS, ref, Point("1a", 0.02))
         off = (couple(tip, put, ref).receptance - exact.receptance)[:2, :2]
         grown += np.sum(np.abs(off) ** 2, axis=(0, 1)) / 25
     size = np.sum(np.abs(exact.receptance[:2, :2]) ** 2, axis=(0, 1))
@@ -109,7 +113,7 @@ def test_a_tool_along_any_axis(axis):
 def test_an_uncertain_contact_widens_the_answer(assembled):
     reference, _ = assembled
     ref, put = tool(REFERENCE, RIGID_ENOUGH), tool(TARGET, LOOSER)
-    tip = two_point_receptance(measured(reference), ref, Point("1a", 0.02))
+    tip = two_point_receptance(measured(reference), ACROSS, ref, Point("1a", 0.02))
     contact = ToolContact(*LOOSER, sd_percent=20.0)
     sd = couple(tip, put.held(0, contact), ref).sd[0, 0]
     moved = couple(tip, put.held(0, contact.scaled("stiffness_n_m", 1.2)), ref).receptance[0, 0]

@@ -2,16 +2,169 @@
 
 `pytest -m slow -s tests/milling/test_decision_proof.py` prints the tables. PROOF=FOLDER keeps each
 run there and goes on after a kill; SEEDS=3 makes fewer; SIMULATION=updated: the simulation learns.
+
+Decisions about a cut along a path, on concealed small arms, measured one pose after another.
+
+Hits are simulated, turned into FRFs and modes as a campaign does it, and the model is refitted
+after each pose; only the files in between are left out.
 """
 
 import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.support.cut_decisions import INITIAL, make_case, play, wrong
+from planner.campaign.build import build
+from planner.campaign.cell import Cell
+from planner.campaign.config import config_from_builtins
+from planner.campaign.log_conversion import from_modal
+from planner.campaign.model import Model
+from planner.campaign.proposals import propose
+from planner.campaign.state import CampaignState, Measurement
+from planner.design.space_filling import NESTED
+from planner.frf.estimator import estimate
+from planner.frf.frf import Frf
+from planner.milling.cut import Cut, load_cut
+from planner.milling.cutter_frf import of_accelerance
+from planner.milling.lobes import losses
+from planner.milling.structure import of_frf
+from planner.modal.estimate_modes import estimate_modes
+from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, Spring
+from planner.truth.hits import Hammer
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
+from tests.support.plain_arm import JOINTS_DEG, STIFFNESS, make_plain_arm
+from tests.support.true_modes import hits_at
+
+BAND_HZ = (3.0, 60.0)
+HAMMER = Hammer(peak_n=300, duration_s=0.004, sampling_rate_hz=640, record_s=2.4)
+LINES = np.arange(2.0, 60.01, 0.25)
+PATH, CANDIDATES, INITIAL = 12, 100, 2
+SPEEDS = np.linspace(500.0, 2500.0, 9)  # rpm that a case chooses from
+GAP = 0.12  # of ln of the path's true limits at least, in whose middle the wanted depth lies
+CUT = """teeth = 2
+diameter_m = 0.016
+milling = "down"
+radial_immersion = 0.5
+kt_n_m2 = 8.0e8
+kr_n_m2 = 2.5e8
+feed = [1.0, 0.0, 0.0]
+axis = [0.0, 0.0, -1.0]
+spindle_rpm = [500, 2500, 9]
+depth_m = [0.0, 0.05, 500]
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class DecisionCase:
+    """A concealed arm, a path (p, dof) in rad and a cut whose true answer is (p,) stable or not."""
+
+    cell: Cell
+    truth: Truth
+    path: np.ndarray
+    limit_m: np.ndarray  # (p,) true limits at the speed
+    depth_m: float
+    seed: int
+
+    @property
+    def stable(self) -> np.ndarray:
+        """(p,) the true answer."""
+        return self.limit_m > self.depth_m
+
+    def measured(self, index: int) -> tuple[Measurement, Frf]:
+        """Twelve hits at a candidate, through FRFs to modes; the same whoever asks."""
+        q = self.cell.candidates.q[index]
+        rng = np.random.default_rng([self.seed, index])
+        frf = estimate(hits_at(self.truth, q, HAMMER, rng), BAND_HZ)
+        modes = from_modal(estimate_modes(frf, BAND_HZ))
+        return Measurement(f"P{index}", tuple(np.rad2deg(q)), (), modes), frf
+
+
+def make_case(folder: Path, seed: int, simulation: str, foreign: bool) -> DecisionCase:
+    """`simulation` as in campaign.toml; `foreign`: the truth bends, and carries a lump and a hose.
+
+    The wanted depth lies in the widest gap between the path's true limits: one can be sure of it.
+    """
+    toml = make_plain_arm(folder)
+    (folder / "cut.toml").write_text(CUT)
+    truth = load_truth(toml, _foreign(seed) if foreign else Deviation(seed, 0.25, 0.25, 0.08, 0.01))
+    rng = np.random.default_rng([seed, 7])
+    low, high = np.deg2rad(np.array(JOINTS_DEG, float)).T
+    given = load_cut(folder / "cut.toml")
+    while True:
+        ends = rng.uniform(low, high, (2, len(low)))
+        path = ends[0] + (ends[1] - ends[0]) * np.linspace(0, 1, PATH)[:, None]
+        limits = np.array([true_limits(truth, q, given) for q in path])
+        at = int(rng.integers(len(SPEEDS)))
+        of_speed = limits[:, at]
+        if np.all(np.isfinite(of_speed)) and np.max(np.diff(np.log(np.sort(of_speed)))) > GAP:
+            break
+    ordered = np.sort(of_speed)
+    gap = int(np.argmax(ordered[1:] / ordered[:-1]))
+    depth = float(np.sqrt(ordered[gap] * ordered[gap + 1]))
+    own = np.rad2deg(path).tolist()
+    config = config_from_builtins({
+        "robot": str(toml),
+        "workspace": {"joints_deg": [list(r) for r in JOINTS_DEG]},
+        "modes": {"count": 3, "band_hz": list(BAND_HZ)},
+        "fidelity": {"simulation": simulation},
+        "acquisition": {"name": "stability", "candidates": CANDIDATES},
+        "cut": {"speed_rpm": float(SPEEDS[at]), "depth_m": depth, "joints_deg": own},
+    })  # fmt: skip
+    return DecisionCase(Cell.load(toml, config), truth, path, of_speed, depth, seed)
+
+
+def _foreign(seed: int) -> Deviation:
+    stiffness = 2.0 * STIFFNESS[1]
+    bend = tuple(
+        Spring("link_2", a, stiffness, 4e-4 * stiffness) for a in ((0, 1.0, 0), (0, 0, 1.0))
+    )
+    lump = AttachedMass("link_3", (0.1, 0.1, -0.1), 1.2)
+    hose = AttachedResonator("link_2", (0.2, 0.05, 0.1), (0.6, 0.8, 0.0), 0.6, 22.0, 0.02)
+    return Deviation(
+        seed, 0.15, 0.15, 0.05, 0.005, extra=bend, added=(lump,), resonators=(hose,)
+    )  # fmt: skip
+
+
+def true_limits(truth: Truth, q: np.ndarray, given: Cut) -> np.ndarray:
+    """(n,) in m at the cut's speeds."""
+    known = of_frf(of_accelerance("true", LINES, truth.accelerance(q, LINES), None), given)
+    return np.array([loss.depth_m for loss in losses(known.machine(given))])
+
+
+def play(case: DecisionCase, strategy: str, budget: int):
+    """Measure by a strategy; yields the model after each number of poses from INITIAL on."""
+    cell = case.cell
+    start = NESTED["maximin_lhs"](cell.candidates.features[:CANDIDATES], INITIAL, case.seed)
+    used, seen, frfs = [int(i) for i in start], {}, {}
+    while True:
+        for i in used:
+            if i not in seen:
+                seen[i], frfs[f"P{i}"] = case.measured(i)
+        state = CampaignState(measurements={seen[i].pose: seen[i] for i in used}, events=case.seed)
+        model = build(cell, state, lambda m, _: frfs[m.pose])
+        yield model, list(used)
+        if len(used) == budget:
+            return
+        if strategy in NESTED:
+            order = NESTED[strategy](cell.candidates.features[:CANDIDATES], budget, case.seed)
+            used.append(int(next(i for i in order if i not in used)))
+            continue
+        (pick,) = propose(model, state, 1, strategy)
+        away = np.abs(np.rad2deg(cell.candidates.q) - np.array(pick.joints_deg)).max(axis=1)
+        used.append(int(np.argmin(away)))
+
+
+def wrong(case: DecisionCase, model: Model) -> tuple[int, bool]:
+    """How many poses' answers are wrong, and whether the model is sure of all."""
+    decision = model.decision
+    assert decision is not None
+    margin = np.array([pose.margin for pose in decision.poses])
+    return int(np.sum((margin > 0) != case.stable)), decision.sure(0.95)
+
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(7200)]
 FIRST = 201  # of the seeds; those below 100 were looked at while the acquisition was made

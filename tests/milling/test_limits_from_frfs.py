@@ -2,19 +2,151 @@
 
 `pytest -m slow -s` prints the table; SEED and STRUCTURES say of which structures and how many. None
 is drawn again. The limits of the modes are the planner's, and are checked by a method of the tests.
+
+Drawn structures, tap tests of them as files, and limits by a method of the tests' own.
 """
 
 import json
 import os
 import re
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
+import pyuff
+from scipy.linalg import expm
 
 from planner.cli.run import run
-from tests.support.tap_tests import MOST_M, NOISES, Tap
+
+# Cuts that follow each other from structure to structure.
+CUT = """
+teeth = 3
+diameter_m = 0.02
+milling = "{}"
+radial_immersion = {}
+kt_n_m2 = 8.0e8
+kr_n_m2 = 2.5e8
+spindle_rpm = [4000.0, 12000.0, 4]
+depth_m = [0.0, {}, 400]
+method = "{}"
+"""
+KT, KR, TEETH, MOST_M = 8.0e8, 2.5e8, 3, 0.05
+IMMERSIONS = (("down", 0.3), ("up", 0.6), ("slot", 1.0))
+METHODS = ("zeroth_order", "full_discretisation")
+NOISES = (0.0, 0.001, 0.003, 0.01)  # of the largest accelerance, on every line alike
+
+
+@dataclass(frozen=True, eq=False)
+class Tap:
+    """A structure of 1 to 4 modes (m,), directions (m, 3), and how it is tapped and cut."""
+
+    hertz: np.ndarray
+    damping: np.ndarray
+    mass_kg: np.ndarray
+    direction: np.ndarray
+    step_hz: float
+    noise: float
+    immersion: tuple[str, float]
+    method: str
+    seed: int
+
+    @classmethod
+    def draw(cls, seed: int, number: int) -> "Tap":
+        """8 to 1500 Hz, 1 to 5 % damping, lines 0.1 to 2 Hz apart; each third has close modes."""
+        rng = np.random.default_rng([seed, number])
+        count = int(rng.integers(1, 5))
+        hertz = np.exp(rng.uniform(np.log(8), np.log(1500), count))
+        if count > 1 and rng.random() < 1 / 3:
+            hertz[1] = hertz[0] * (1 + rng.uniform(0.005, 0.05))
+        stiffness = np.exp(rng.uniform(np.log(2e6), np.log(4e7), count))
+        direction = rng.standard_normal((count, 3))
+        return cls(
+            hertz, rng.uniform(0.01, 0.05, count), stiffness / (2 * np.pi * hertz) ** 2,
+            direction / np.linalg.norm(direction, axis=1)[:, None],
+            float(np.exp(rng.uniform(np.log(0.1), np.log(2.0)))), float(rng.choice(NOISES)),
+            IMMERSIONS[number % 3], METHODS[number % 2], seed + number,
+        )  # fmt: skip
+
+    @property
+    def lines(self) -> np.ndarray:
+        """(F,) to beyond the highest mode."""
+        top = max(1.3 * self.hertz.max() + 20 * self.step_hz, 40 * self.step_hz)
+        return self.step_hz * np.arange(1, int(top / self.step_hz) + 1)
+
+    def accelerance(self, lines: np.ndarray) -> np.ndarray:
+        """(2, 2, F) in m/s²/N along x and y."""
+        omega, own = 2 * np.pi * lines, 2 * np.pi * self.hertz[:, None]
+        d = self.direction[:, :2]
+        stiff = own**2 - omega**2 + 2j * self.damping[:, None] * own * omega
+        return np.einsum("ki,kj,kf->ijf", d, d, -(omega**2) / self.mass_kg[:, None] / stiff)
+
+    def write(self, folder: Path) -> tuple[Path, Path, Path]:
+        """FRFs as UFF 58 with noise, the modes as TOML, cut.toml."""
+        lines, rng = self.lines, np.random.default_rng(self.seed)
+        h = self.accelerance(lines)
+        parts = rng.standard_normal((2, *h.shape)) / np.sqrt(2)
+        h = h + self.noise * np.abs(h).max() * (parts[0] + 1j * parts[1])
+        frfs, modes, cut = folder / "tap.uff", folder / "modes.toml", folder / "cut.toml"
+        sets = [
+            {
+                "type": 58, "binary": 1, "func_type": 4, "id1": "SIMULATED", "rsp_node": 1,
+                "rsp_dir": i + 1, "ref_node": 1, "ref_dir": j + 1, "data": h[i, j], "x": lines,
+                "abscissa_spacing": 1, "abscissa_min": lines[0], "abscissa_inc": self.step_hz,
+                "ord_data_type": 6, "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12,
+                "ordinate_axis_units_lab": "m/s^2", "orddenom_spec_data_type": 13,
+                "orddenom_axis_units_lab": "N",
+            }
+            for i in range(2) for j in range(2)
+        ]  # fmt: skip
+        for one in sets:
+            pyuff.UFF(str(frfs)).write_sets(one, "add")
+        modes.write_text("".join(
+            f"[[mode]]\nfrequency_hz = {f!r}\ndamping_ratio = {z!r}\nmass_kg = {m!r}\n"
+            f"direction = {d.tolist()}\n"
+            for f, z, m, d in zip(self.hertz.tolist(), self.damping.tolist(),
+                                  self.mass_kg.tolist(), self.direction, strict=True)
+        ))  # fmt: skip
+        cut.write_text(CUT.format(*self.immersion, MOST_M, self.method))
+        return frfs, modes, cut
+
+    def multiplier(self, rpm: float, depth_m: float, per_radian: float = 4.0) -> float:
+        """Largest |µ| by first-order semi-discretisation (Insperger and Stépán 2004)."""
+        own, d = 2 * np.pi * self.hertz, self.direction[:, :2]
+        m, period = len(own), 60 / (rpm * TEETH)
+        p = int(np.ceil(per_radian * own.max() * period)) + 40
+        a = np.block([[np.zeros((m, m)), np.eye(m)],
+                      [-np.diag(own**2), -np.diag(2 * self.damping * own)]])  # fmt: skip
+        push, see = (
+            np.vstack([np.zeros((m, 2)), d / self.mass_kg[:, None]]),
+            np.hstack([d.T, np.zeros((2, m))]),
+        )
+        # States, then the last p + 1 places of the cutter, newest first.
+        now = np.eye(2 * m + 2 * (p + 1))
+        z, past = now[: 2 * m], [now[2 * m + 2 * k : 2 * m + 2 * k + 2] for k in range(p + 1)]
+        for step in range(p):
+            force = depth_m * self._forces(step, p)
+            # (z, u)' with the cutter's place one period ago held as u over the step.
+            whole = np.block([[a + push @ force @ see, -push @ force], [np.zeros((2, 2 * m + 2))]])
+            over = expm(whole * period / p)
+            z = over[: 2 * m, : 2 * m] @ z + over[: 2 * m, 2 * m :] @ ((past[-1] + past[-2]) / 2)
+            past = [see @ z, *past[:-1]]
+        # What came before the start is a state of its own: the newest place is the state's.
+        return float(np.max(np.abs(np.linalg.eigvals(np.vstack([z, *past])))))
+
+    def _forces(self, step: int, steps: int) -> np.ndarray:
+        """(2, 2) in N/m²: mean over one of the equal steps of a tooth's period, all teeth."""
+        name, immersion = self.immersion
+        swept = np.pi if name == "slot" else np.arccos(1 - 2 * immersion)
+        start, end = (np.pi - swept, np.pi) if name == "down" else (0.0, swept)
+        turn = 2 * np.pi / TEETH
+        phi = (step + (np.arange(20) + 0.5) / 20) * turn / steps + turn * np.arange(TEETH)[:, None]
+        inside = ((phi >= start) & (phi <= end)) / 20
+        s, c = np.sin(phi), np.cos(phi)
+        force = np.array([-KT * c - KR * s, KT * s - KR * c]) * inside
+        return np.einsum("itk,jtk->ij", force, np.array([s, c]))
+
 
 SEED, STRUCTURES = int(os.environ.get("SEED", "5200")), int(os.environ.get("STRUCTURES", "100"))
 NEAR = 0.05

@@ -16,6 +16,7 @@ from planner.milling.tip_files import smoothed, two_point_receptance
 from planner.milling.tool import Point
 from tests.milling.assembled import frf, machine
 from tests.milling.test_coupling import (
+    ACROSS,
     FREQUENCY,
     KEPT,
     LOOSER,
@@ -36,7 +37,7 @@ def changed(base, put=TARGET, held=LOOSER, noise=0.01, seed=5, back=BACK, place=
     """What is predicted for a target on a machine, and the truth (4, 4, F)."""
     seen = measured(frf(base, REFERENCE, FREQUENCY, RIGID_ENOUGH, points=(-1, place)), noise, seed)
     reference = tool(REFERENCE, RIGID_ENOUGH)
-    tip = smoothed(two_point_receptance(seen, reference, back))
+    tip = smoothed(two_point_receptance(seen, ACROSS, reference, back))
     truth = ordered(frf(base, put, FREQUENCY, held))
     return couple(tip, tool(put, held), reference), truth
 
@@ -120,7 +121,7 @@ def test_a_second_point_two_millimetres_off():
     seen = measured(frf(base, shifted, FREQUENCY, RIGID_ENOUGH, points=(-1, 12)), 0.01, 5)
     truth = ordered(frf(base, TARGET, FREQUENCY, LOOSER))
     back = Point(BACK.node, BACK.from_tip_m, place_sd_m=0.002)
-    tip = smoothed(two_point_receptance(seen, reference, back))
+    tip = smoothed(two_point_receptance(seen, ACROSS, reference, back))
     found = couple(tip, tool(TARGET, LOOSER), reference)
     off = np.abs(found.receptance[KEPT] - truth)
     assert at_peaks(found, truth)[:2, :2].max() < 0.05
@@ -130,7 +131,7 @@ def test_a_second_point_two_millimetres_off():
 def test_as_many_modes_as_the_noise_shows():
     """Eight of the machine, and the rod's own above the lines; the fit is as sure as it says."""
     clean = frf(machine(), REFERENCE, FREQUENCY, RIGID_ENOUGH, points=(-1, 12))
-    exact, seen = (measured(clean, n, 1).values for n in (0.0, 0.01))
+    exact, seen = (measured(clean, n, 1).receptance for n in (0.0, 0.01))
     tip = TipReceptance.known(FREQUENCY, seen, 0.01 * np.abs(exact), (0, 1, 3, 4))
     found = smoothed(tip)
     count = re.search(r"those of (\d+) common modes", found.remarks[-1])
@@ -147,8 +148,8 @@ def test_what_few_modes_do_not_follow_is_left_as_measured():
     clean = frf(machine(), REFERENCE, FREQUENCY, RIGID_ENOUGH, points=(-1, 12))
     seen = measured(clean, 0.01)
     noise = np.moveaxis(values[:, 0] + 1j * values[:, 1], 0, -1)
-    wild = replace(seen, values=seen.values + 0.3 * np.abs(seen.values) * noise)
-    tip = two_point_receptance(wild, tool(REFERENCE, RIGID_ENOUGH), BACK)
+    wild = replace(seen, receptance=seen.receptance + 0.3 * np.abs(seen.receptance) * noise)
+    tip = two_point_receptance(wild, ACROSS, tool(REFERENCE, RIGID_ENOUGH), BACK)
     left = smoothed(tip)
     assert left.measured is tip.measured
     assert "line by line" in left.remarks[-1]
