@@ -117,7 +117,9 @@ def _check(cut: Cut, path: Path) -> None:
             f"{path}: milling is a slot and radial_immersion {cut.radial_immersion:g}; leave it "
             f'out, or say "up" or "down".'
         )
-    _check_directions(cut, path)
+    check_unit(str(path), feed=cut.feed, axis=cut.axis)
+    if cut.feed_in == "frf" and abs(float(np.dot(cut.feed, cut.axis))) > UNIT:
+        raise InputError(f"{path}: feed is not at right angles to the axis; correct one of them.")
     if cut.pitch_deg is not None and (
         len(cut.pitch_deg) != cut.teeth
         or min(cut.pitch_deg) <= 0
@@ -154,12 +156,6 @@ def _check_range(given: tuple[float, float, int], least: float, most: float, nam
         raise InputError(
             f"{name} asks for {count} values; give 2 to {MOST_POINTS}, or 1 if both ends agree."
         )
-
-
-def _check_directions(cut: Cut, path: Path) -> None:
-    check_unit(str(path), feed=cut.feed, axis=cut.axis)
-    if cut.feed_in == "frf" and abs(float(np.dot(cut.feed, cut.axis))) > UNIT:
-        raise InputError(f"{path}: feed is not at right angles to the axis; correct one of them.")
 
 
 def cuts_at(

@@ -172,9 +172,10 @@ def _build(
     to_end = np.exp(modes.poles[:, None] * (duration - end[points.element])) * whole
     over = seen * np.exp(modes.poles[:, None] * points.time)
     first, together = _joined(points.shared)
+    e = np.exp(modes.poles * duration)  # of states as real and imaginary parts
     return Period(
         duration_s=float(duration),
-        free=_rotations(np.exp(modes.poles * duration)),
+        free=np.block([[np.diag(e.real), -np.diag(e.imag)], [np.diag(e.imag), np.diag(e.real)]]),
         seen=np.concatenate([over.real, -over.imag]).T[first],
         reply=reply[first] @ together,
         push=np.concatenate([to_end.real, to_end.imag]) @ together,
@@ -202,11 +203,6 @@ def _joined(shared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first, together
 
 
-def _rotations(e: np.ndarray) -> np.ndarray:
-    """(2k, 2k): of states as real and imaginary parts."""
-    return np.block([[np.diag(e.real), -np.diag(e.imag)], [np.diag(e.imag), np.diag(e.real)]])
-
-
 def _uneven(
     built: Period, found: Engagement, points: _Points, cut: Cut, speed: float,
     degree: int, depth_m: float,
@@ -228,7 +224,8 @@ def _uneven(
             at = angle[p] - delay[tooth]
             target, turn = (now, -1.0) if at >= -1e-9 else (before, 1.0)
             at = at if at >= -1e-9 else at + found.period
-            e = _element_at(found, at)
+            inside = (found.start <= at + 1e-9) & (at <= found.end + 1e-9)
+            e = int(np.argmax(inside))
             share = (at - found.start[e]) / (found.end[e] - found.start[e])
             values = lagrange(nodes, np.array(share))
             own = np.unique(points.shared[points.element == e])
@@ -236,8 +233,3 @@ def _uneven(
                 to = own[2 * n : 2 * n + 2]
                 target[p : p + 2, to] += turn * value * matrix
     return replace(built, now=now, before=before)
-
-
-def _element_at(found: Engagement, angle: float) -> int:
-    inside = np.flatnonzero((found.start <= angle + 1e-9) & (angle <= found.end + 1e-9))
-    return int(inside[0])

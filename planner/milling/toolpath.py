@@ -134,7 +134,10 @@ def _gcode(path: Path, text: str) -> list[Move]:
 
 
 def _number(path: Path, line: int, text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        raise InputError(f"{path}, line {line}: {text[:20]} is no number.") from None
     if not abs(value) < 1e7:
         raise InputError(f"{path}, line {line}: {text} is no coordinate; correct it.")
     return value
@@ -187,7 +190,7 @@ def _apt(path: Path, text: str) -> tuple[list[Move], np.ndarray]:
             rapid = word == "RAPID"
         if word not in ("GOTO", "FROM", "GODLTA"):
             continue
-        values = np.array([_plain(path, number, part) for part in rest.split(",")])
+        values = np.array([_number(path, number, part.strip()) for part in rest.split(",")])
         if len(values) not in (3, 6):
             raise InputError(f"{path}, line {number}: {word} needs 3 or 6 numbers; correct it.")
         if not unit:
@@ -206,10 +209,3 @@ def _apt(path: Path, text: str) -> tuple[list[Move], np.ndarray]:
             moves.append((at, there, number))
         at, rapid = there, False
     return moves, np.array([0.0, 0.0, 1.0]) if spindle is None else spindle
-
-
-def _plain(path: Path, line: int, text: str) -> float:
-    try:
-        return _number(path, line, text.strip())
-    except ValueError:
-        raise InputError(f"{path}, line {line}: {text.strip()[:20]} is no number.") from None

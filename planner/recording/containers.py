@@ -110,7 +110,11 @@ class _Reader:
         import h5py
 
         items = list(group.values()) if _stated(group, "MATLAB_class") == "struct" else []
-        lists = [i for i in items if isinstance(i, h5py.Dataset) and _is_list(i)]
+        lists = [
+            i for i in items
+            if isinstance(i, h5py.Dataset) and i.dtype == h5py.ref_dtype
+            and _stated(i, "MATLAB_class") is None
+        ]  # fmt: skip
         if not items or len(lists) < len(items) or len({i.size for i in lists}) > 1:
             return self.group(group, depth)
         each = {name: self._elements(item, depth) for name, item in group.items()}
@@ -155,12 +159,6 @@ class _Reader:
             return np.asarray(values).T if kind in NUMBERS else None
         stated = _attributes(dataset)
         return tree_of({"": values}, stated) if stated and np.size(values) > 1 else values
-
-
-def _is_list(dataset: "h5py.Dataset") -> bool:
-    import h5py
-
-    return dataset.dtype == h5py.ref_dtype and _stated(dataset, "MATLAB_class") is None
 
 
 def _text(codes: np.ndarray) -> object:

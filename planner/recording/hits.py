@@ -108,7 +108,8 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
             raise InputError(
                 f"{source}: the unit of {channel.name} is not known; label it N or m/s^2."
             )
-    order = sorted(responses, key=lambda dof: _rank(dof, responses))
+    places = list(dict.fromkeys(dof.node for dof in responses))  # as in the file, x, y, z at each
+    order = sorted(responses, key=lambda dof: (places.index(dof.node), dof.number))
     signs = [-1.0 if responses[d].direction < 0 else 1.0 for d in order]
     samples = np.array([responses[d].samples * s for d, s in zip(order, signs, strict=True)])
     told, hit_point = _hit_direction(force, axis), stated.hit_at(source, force.node)
@@ -209,12 +210,6 @@ def _anywhere(
     return found
 
 
-def _rank(dof: Dof, responses: dict[Dof, Channel]) -> tuple[int, int]:
-    """Places in order of the file, x, y, z at each."""
-    places = list(dict.fromkeys(own.node for own in responses))
-    return places.index(dof.node), dof.number
-
-
 def _hit_direction(force: Channel, axis: str | None) -> tuple[int, int]:
     """As the file and as the table of recordings says it; 0 where it does not."""
     own = force.direction if 1 <= abs(force.direction) <= 3 else 0
@@ -243,15 +238,12 @@ def _axis(record: TimeRecord, force: Channel, axis: str | None, remarks: list[st
 def _in_the_file(source: Path) -> str:
     """How a file of its kind states the hit's axis."""
     kind = source.name.lower().removesuffix(".gz").rpartition(".")[2]
-    if kind in ("csv", "tsv", "txt"):
-        return 'write it as its first line, such as "# hit: +x"'
-    if kind in ("uff", "unv", "uf58"):
-        return "state it in the file (ref_dir)"
-    if kind == "lvm":
-        return "write it into its header, as a line of hit, a tab and +x"
-    if kind == "wav":
-        return 'state it in channels.csv (column hit, such as "+x")'
-    return 'state it in the file (attribute hit, such as "+x")'
+    return {
+        **dict.fromkeys(("csv", "tsv", "txt"), 'write it as its first line, such as "# hit: +x"'),
+        **dict.fromkeys(("uff", "unv", "uf58"), "state it in the file (ref_dir)"),
+        "lvm": "write it into its header, as a line of hit, a tab and +x",
+        "wav": 'state it in channels.csv (column hit, such as "+x")',
+    }.get(kind, 'state it in the file (attribute hit, such as "+x")')
 
 
 def _name(direction: int) -> str:

@@ -36,7 +36,8 @@ class Layout:
 
     def columns(self, inner: "Layout") -> list[int]:
         """Columns of this layout that are those of an `inner` one."""
-        places = [_nth(self.hits, *_which(inner.hits, i)) for i in range(len(inner.hits))]
+        place_of = {_which(self.hits, i): i for i in range(len(self.hits))}
+        places = [place_of[_which(inner.hits, i)] for i in range(len(inner.hits))]
         return [3 * place + axis for place in places for axis in range(3)]
 
 
@@ -59,10 +60,6 @@ def together(layouts: Sequence[Layout]) -> Layout:
 def _which(names: Sequence[str], place: int) -> tuple[str, int]:
     """The name at a place, and how often it stood before."""
     return names[place], names[:place].count(names[place])
-
-
-def _nth(names: Sequence[str], name: str, number: int) -> int:
-    return [i for i, own in enumerate(names) if own == name][number]
 
 
 @dataclass(frozen=True)

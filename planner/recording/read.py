@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -226,24 +225,18 @@ _NODES = re.compile(r"(?:^|[^a-z0-9])h?(\d+)([+-]?[xyz]?)[_,-](\d+)([+-]?[xyz]?)
 _DIGITS = re.compile(r"(?:^|[^a-z0-9])h(\d)(\d)$", re.IGNORECASE)
 
 
-class Place(NamedTuple):
-    """Nodes ("" unknown) and signed axes ("" unknown) of the response and of the hit."""
+def place_in_name(path: Path) -> tuple[str, str, str, str]:
+    """Nodes and signed axes of the response, then of the hit, as a file's name says; "" unknown.
 
-    response_node: str
-    response: str
-    hit_node: str
-    hit: str
-
-
-def place_in_name(path: Path) -> Place:
-    """What a file's name says. Raises InputError where it says nothing."""
+    Raises InputError where it says nothing.
+    """
     stem = path.name.removesuffix(".gz").rpartition(".")[0]
     if found := _NODES.search(stem):
-        return Place(found[1], found[2], found[3], found[4])
+        return found[1], found[2], found[3], found[4]
     if found := _DIGITS.search(stem):
-        return Place(found[1], "", found[2], "")
+        return found[1], "", found[2], ""
     if found := _AXES.search(stem):
-        return Place("", found[1], "", found[2])
+        return "", found[1], "", found[2]
     raise InputError(
         f"{path}: its name says neither axes nor nodes; call it such as tap_yx (response y, hit "
         f"x), H3_1 or 3y_1x (nodes), or leave out --from-names."
@@ -252,20 +245,22 @@ def place_in_name(path: Path) -> Place:
 
 def placed_by_name(record: FrfRecord, name: str) -> FrfRecord:
     """FRFs with what they do not state themselves from their file's name; of several the hit."""
-    place, count = place_in_name(Path(name)), len(record.values)
-    response, reference = hit_direction(place.response), hit_direction(place.hit)
-    alone = count == 1
+    count = len(record.values)
+    response_node, response, hit_node, hit = place_in_name(Path(name))
+    if count > 1:
+        response_node, response = "", ""
+
+    def nodes(own: tuple[str, ...], named: str) -> tuple[str, ...]:
+        return tuple(named if node in ("", "0") else node for node in own or ("",) * count)
+
+    felt, struck = hit_direction(response), hit_direction(hit)
     return replace(
         record,
-        response_direction=tuple(d or alone * response for d in record.response_direction),
-        reference_direction=tuple(d or reference for d in record.reference_direction),
-        response_node=_nodes(record.response_node, place.response_node if alone else "", count),
-        reference_node=_nodes(record.reference_node, place.hit_node, count),
+        response_direction=tuple(d or felt for d in record.response_direction),
+        reference_direction=tuple(d or struck for d in record.reference_direction),
+        response_node=nodes(record.response_node, response_node),
+        reference_node=nodes(record.reference_node, hit_node),
     )
-
-
-def _nodes(own: tuple[str, ...], named: str, count: int) -> tuple[str, ...]:
-    return tuple(named if node in ("", "0") else node for node in own or ("",) * count)
 
 
 def read_frfs(path: Path, from_names: bool = False) -> tuple[FrfRecord, ...]:

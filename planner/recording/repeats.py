@@ -81,7 +81,10 @@ class _Alike:
 
     @classmethod
     def of(cls, hits: Sequence[Hit], band_hz: tuple[float, float]) -> "_Alike":
-        return cls(_frfs(hits, band_hz), np.array([hit.axis_index for hit in hits]), _levels(hits))
+        peaks = [peak_n(hit) for hit in hits]
+        weakest = [group[0] for group in levels(np.sort(peaks))[1:]]
+        level = np.searchsorted(weakest, peaks, side="right")
+        return cls(_frfs(hits, band_hz), np.array([hit.axis_index for hit in hits]), level)
 
     @cached_property
     def centres(self) -> dict[int, np.ndarray]:
@@ -243,13 +246,6 @@ def _struck(frf: np.ndarray, own: np.ndarray, across: dict[int, np.ndarray]) -> 
     )
 
 
-def _levels(hits: Sequence[Hit]) -> np.ndarray:
-    """Which force level each hit belongs to."""
-    groups = levels(np.sort([peak_n(hit) for hit in hits]))
-    weakest = [group[0] for group in groups[1:]]
-    return np.searchsorted(weakest, [peak_n(hit) for hit in hits], side="right")
-
-
 def _centre(frfs: np.ndarray) -> np.ndarray:
     return np.median(frfs.real, axis=0) + 1j * np.median(frfs.imag, axis=0)
 
@@ -274,16 +270,14 @@ def _groups(hits: tuple[Hit, ...]) -> list[list[int]]:
 
 def _frfs(hits: Sequence[Hit], band_hz: tuple[float, float]) -> np.ndarray:
     """FRFs (n, 3·F) of hits that can be compared, of as many samples, over the same lines."""
-    shortest = min(len(hit.force_n) for hit in hits)
-    return np.array([_frf(hit, shortest, band_hz, hits[0].sampling_rate_hz) for hit in hits])
-
-
-def _frf(hit: Hit, samples: int, band_hz: tuple[float, float], rate_hz: float) -> np.ndarray:
-    """FRF (3·F,) of a hit's first samples over the band's lines."""
-    rest_n = float(np.median(hit.force_n))
-    force, response = band_spectra(hit, band_hz, rest_n, samples, rate_hz)
-    floor = 1e-3 * np.max(np.abs(force))
-    return (response * force.conj() / np.maximum(np.abs(force) ** 2, floor**2)).ravel()
+    shortest, rate_hz = min(len(hit.force_n) for hit in hits), hits[0].sampling_rate_hz
+    found = []
+    for hit in hits:
+        rest_n = float(np.median(hit.force_n))
+        force, response = band_spectra(hit, band_hz, rest_n, shortest, rate_hz)
+        power = np.maximum(np.abs(force) ** 2, (1e-3 * np.max(np.abs(force))) ** 2)
+        found.append((response * force.conj() / power).ravel())
+    return np.array(found)
 
 
 def _likeness(frf: np.ndarray, centre: np.ndarray) -> float:
@@ -307,16 +301,12 @@ def other_sizes(frfs: np.ndarray, upright: np.ndarray) -> np.ndarray:
     size, straight = (
         np.log(np.maximum(np.linalg.norm(f, axis=1), SILENCE)) for f in (frfs, upright)
     )
-    other = np.minimum(_apart(size), _apart(straight)) > OTHER_SIZE
+    apart = (np.abs(own[:, None] - own) for own in (size, straight))
+    other = np.minimum(*apart) > OTHER_SIZE
     odd = 2 * other.sum(axis=1) >= len(frfs)
     return np.array([
         size[i] - np.median(size[other[i]]) if odd[i] else 0.0 for i in range(len(frfs))
     ])  # fmt: skip
-
-
-def _apart(size: np.ndarray) -> np.ndarray:
-    """By how much each two (n, n) of (n,) differ."""
-    return np.abs(size[:, None] - size)
 
 
 def outvoted(sizes: np.ndarray) -> bool:

@@ -167,7 +167,7 @@ def _header(
     attributes: dict[str, str] = {}
     for line, row in zip(lines, rows, strict=True):
         for key, value in _pairs(line[:MOST_HEADER_TEXT], row):
-            attributes.setdefault(_key(key), value)
+            attributes.setdefault(re.sub(r"[^a-z]+", "_", key.lower()).strip("_"), value)
     if not likely:
         return [f"column_{i + 1}" for i in range(width)], [""] * width, attributes
     # The row that says most of columns; of several that say as much the first.
@@ -230,10 +230,6 @@ def _pairs(line: str, row: Sequence[str]) -> list[tuple[str, str]]:
     value = re.split(r'[,;\t"]', value, maxsplit=1)[0].strip()
     usable = value and re.fullmatch(r"[\w .()/-]+", key)
     return [(key, value)] if usable else []
-
-
-def _key(text: str) -> str:
-    return re.sub(r"[^a-z]+", "_", text.lower()).strip("_")
 
 
 def _distinct(names: Sequence[str]) -> list[str]:
