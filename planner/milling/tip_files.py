@@ -83,18 +83,13 @@ def _npz(path: Path, pose: str | None) -> TipReceptance | CutterFrf:
         if np.all(np.isfinite(h)) and np.all(np.isfinite(spread)):
             if kind == "frf6":
                 return TipReceptance.known(frequency, h, spread, kept)
-            joints = _joints(stored, row)
+            joints = None  # rad and m; None where the file does not say
+            if "joints_deg" in stored:
+                stated = stored["joints_deg"][row]
+                units = stored.get("joint_units", msgspec.UNSET)
+                joints = JointUnits.declared_as([""] * len(stated), units).internal(stated)
             return CutterFrf(names[row], frequency, h, spread, joints_rad=joints)
     raise InputError(f"{path}: FRFs of {names[row]} are not finite; measure what lacks.")
-
-
-def _joints(stored: dict[str, np.ndarray], row: int) -> np.ndarray | None:
-    """How the robot stood, in rad and m; None where the file does not say."""
-    if "joints_deg" not in stored:
-        return None
-    stated = stored["joints_deg"][row]
-    units = stored.get("joint_units", msgspec.UNSET)
-    return JointUnits.declared_as([""] * len(stated), units).internal(stated)
 
 
 def two_points_of(path: Path, tool: Tool | None) -> tuple[Point, Point]:

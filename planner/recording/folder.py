@@ -59,7 +59,7 @@ def read_recordings(
     """
     points = points or PointNames()
     path = folder / TABLE
-    header, lines = read_table(path)
+    header, lines = _rows(path)
     units = JointUnits.of(joints)
     told = not bare or any(name.endswith((ANGLE, SLIDE)) for name in header)
     columns = _joint_columns(path, header, units) if told else ()
@@ -69,8 +69,7 @@ def read_recordings(
     inside = folder.resolve()
     rows: list[PoseRow] = []
     seen: dict[tuple[object, ...], int] = {}
-    for number, values in lines:
-        line = _Row(path, number, dict(zip(header, values, strict=True)))
+    for line in lines:
         row = _recording_row(line, inside, columns, points)
         points_hit = row.stated.hit_point, row.stated.response_points
         key = row.pose, row.hit, row.response, *points_hit, row.repeat or 0
@@ -79,34 +78,32 @@ def read_recordings(
                 f"pose {row.pose}, hit {row.hit}, repeat {row.repeat} is listed in row {seen[key]} "
                 f"already; number the repeats."
             )
-        seen[key] = number
+        seen[key] = line.number
         rows.append(row)
     if columns:
         _same_angles(path, rows, units)
-    rows = _one_row_a_file(path, rows)
-    return tuple(rows)
+    return _one_row_a_file(path, rows)
 
 
 def read_poses(path: Path, joints: JointUnits | Sequence[str]) -> tuple[PoseRow, ...]:
     """Poses at which a prediction is wanted. Raises InputError naming file, row and remedy."""
-    header, lines = read_table(path)
+    header, lines = _rows(path)
     columns = _joint_columns(path, header, JointUnits.of(joints))
     if "pose" not in header:
         raise InputError(f"{path} has no column pose; add one that names each row.")
     rows: list[PoseRow] = []
     seen: dict[str, int] = {}
-    for number, values in lines:
-        line = _Row(path, number, dict(zip(header, values, strict=True)))
+    for line in lines:
         pose = line.pose
         if pose in seen:
             raise line.wrong(f"pose {pose} stands in row {seen[pose]} already; rename one of them.")
-        seen[pose] = number
+        seen[pose] = line.number
         force = line.value("peak_force_n") if line.cell("peak_force_n") else None
         if force is not None and not force > 0:
             raise line.wrong(
                 f"peak_force_n is {force:g}; give a force above 0 N, or leave the cell empty."
             )
-        rows.append(PoseRow(pose, line.angles(columns), number, peak_force_n=force))
+        rows.append(PoseRow(pose, line.angles(columns), line.number, peak_force_n=force))
     return tuple(rows)
 
 
@@ -256,10 +253,8 @@ class _Row:
     def points(self, names: PointNames) -> StatedPoints:
         """The points that it names."""
         hit_point, responses = self.cell("hit_point"), tuple(self.cell("response_points").split())
-        for column, name in (
-            ("hit_point", hit_point),
-            *(("response_points", n) for n in responses),
-        ):
+        named = [("hit_point", hit_point), *(("response_points", name) for name in responses)]
+        for column, name in named:
             if name and not names.anywhere and name not in names.known:
                 raise self.wrong(
                     f'{column} names "{name}", which is none of robot.toml\'s points '
@@ -271,6 +266,11 @@ class _Row:
         if not hit_point and not responses and names == PointNames():
             return StatedPoints()
         return StatedPoints(hit_point, responses, self.number, names)
+
+
+def _rows(path: Path) -> tuple[list[str], list[_Row]]:
+    header, lines = read_table(path)
+    return header, [_Row(path, n, dict(zip(header, v, strict=True))) for n, v in lines]
 
 
 def _recording_row(
@@ -304,7 +304,7 @@ def _same_angles(path: Path, rows: list[PoseRow], joints: JointUnits) -> None:
             )
 
 
-def _one_row_a_file(path: Path, rows: list[PoseRow]) -> list[PoseRow]:
+def _one_row_a_file(path: Path, rows: list[PoseRow]) -> tuple[PoseRow, ...]:
     """Rows of which those that name the same file, for each hit in it, are one.
 
     The file itself then says along which axes it was hit. Raises InputError where rows that name
@@ -324,4 +324,4 @@ def _one_row_a_file(path: Path, rows: list[PoseRow]) -> list[PoseRow]:
             )
         hits = *(known.hits or (known.hit or "",)), row.hit
         first[row.file] = replace(known, hit=None, hits=hits)
-    return list(first.values())
+    return tuple(first.values())

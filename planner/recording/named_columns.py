@@ -276,7 +276,9 @@ def _entries(named: Named) -> list[_Entry]:
             stem, kind, place = str(own[1]), own[0], own[1]
         else:
             part = "" if _frequency(name, named) else _part(name, named)
-            stem, kind, place = _stem(name, part), _kind(name), None
+            stem, place, plain = _stem(name, part), None, name.lower()
+            kinds = (kind for kind, words in _KINDS.items() if re.search(words, plain))
+            kind = next(kinds, "unknown")
         if not part:
             continue
         free = [entry for entry in entries if entry.takes(part)]
@@ -294,11 +296,6 @@ def _stem(name: str, part: str) -> str:
     """What a name says beside its part."""
     plain = bare(name)
     return _PARTS[part].sub("", plain).strip(" _") if part in _PARTS else plain
-
-
-def _kind(name: str) -> str:
-    plain = name.lower()
-    return next((kind for kind, words in _KINDS.items() if re.search(words, plain)), "unknown")
 
 
 def _values(path: Path, entry: _Entry, named: Named) -> tuple[str, bool, np.ndarray]:

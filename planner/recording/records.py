@@ -182,10 +182,16 @@ class PoseRow:
 def check_records(path: Path, records: Sequence[Record]) -> None:
     """Raise InputError saying what of the records of a file no instrument can have given."""
     for record in records:
-        if isinstance(record, TimeRecord):
-            _check_times(path, record)
-        else:
+        if isinstance(record, FrfRecord):
             _check_frfs(path, record)
+            continue
+        rate = record.sampling_rate_hz
+        if not SLOWEST_HZ <= rate <= FASTEST_HZ:
+            raise InputError(
+                f"{path} was sampled at {rate:.4g} Hz as it says; correct the time's unit or step."
+            )
+        for channel in record.channels:
+            check_numbers(path, channel.name, channel.samples)
 
 
 def check_numbers(path: Path, name: str, values: np.ndarray) -> None:
@@ -197,16 +203,6 @@ def check_numbers(path: Path, name: str, values: np.ndarray) -> None:
         if np.isfinite(values[at]):
             fault = f"is {abs(values[at]):.3g}, which no instrument gives"
         raise InputError(f"{path}: {name}, sample {at + 1} {fault}; export it again.")
-
-
-def _check_times(path: Path, record: TimeRecord) -> None:
-    rate = record.sampling_rate_hz
-    if not SLOWEST_HZ <= rate <= FASTEST_HZ:
-        raise InputError(
-            f"{path} was sampled at {rate:.4g} Hz as it says; correct the time's unit or step."
-        )
-    for channel in record.channels:
-        check_numbers(path, channel.name, channel.samples)
 
 
 def _check_frfs(path: Path, record: FrfRecord) -> None:

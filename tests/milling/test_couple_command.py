@@ -1,4 +1,4 @@
-"""`planner couple` from the shipped example, from files, at a posture not hit; and what is refused."""
+"""`planner couple`: the shipped example, files, a posture that was not hit; and what is refused."""
 
 import io
 import json
