@@ -37,27 +37,22 @@ def read_geometry(paths: tuple[Path, ...]) -> Geometry | None:
     lines: list[tuple[str, str]] = []
     for path in paths:
         if path.suffix.lower() in SUFFIXES:
-            _add(_sets(path), position, lines)
+            found = _sets(path)
+            factors = [float(s.get("length", 1.0)) for s in found if s["type"] == UNITS]
+            # A dataset 164 states how many of the file's lengths make a metre.
+            scale = 1 / factors[-1] if factors and factors[-1] > 0 else 1.0
+            for s in found:
+                if s["type"] in NODES:
+                    places = scale * np.stack([np.asarray(s[axis], float) for axis in "xyz"], 1)
+                    names = (str(int(number)) for number in s["node_nums"])
+                    position |= dict(zip(names, places, strict=True))
+                elif s["type"] == TRACES:
+                    pairs = pairwise(int(n) for n in s["nodes"])  # 0 lifts the pen
+                    lines += [(str(a), str(b)) for a, b in pairs if a and b and a != b]
     if not position:
         return None
     known = tuple(dict.fromkeys(line for line in lines if set(line) <= set(position)))
     return Geometry(tuple(position), np.array(list(position.values())), known)
-
-
-def _add(
-    sets: list[dict[str, Any]], position: dict[str, np.ndarray], lines: list[tuple[str, str]]
-) -> None:
-    factors = [float(s.get("length", 1.0)) for s in sets if s["type"] == UNITS]
-    # A dataset 164 states how many of the file's lengths make a metre.
-    scale = 1 / factors[-1] if factors and factors[-1] > 0 else 1.0
-    for s in sets:
-        if s["type"] in NODES:
-            places = np.stack([np.asarray(s[axis], float) for axis in "xyz"], axis=1)
-            for number, place in zip(s["node_nums"], places, strict=True):
-                position[str(int(number))] = scale * place
-        elif s["type"] == TRACES:
-            pairs = pairwise(int(n) for n in s["nodes"])  # 0 lifts the pen
-            lines += [(str(a), str(b)) for a, b in pairs if a and b and a != b]
 
 
 def _sets(path: Path) -> list[dict[str, Any]]:

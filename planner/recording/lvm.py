@@ -50,15 +50,21 @@ class _Segment:
 
 @dataclass(frozen=True, eq=False)
 class _Channel:
-    """One column of numbers (n,); `start_s` from `date`, `step` in s (of spectra in Hz)."""
+    """One column of numbers (n,), and what is stated of it as in entries of other files."""
 
     name: str
-    unit: str
     values: np.ndarray
-    start: float
-    step: float
-    date: np.datetime64 | None
-    of_spectrum: bool
+    unit: str
+    x_unit: str  # "s", of spectra "Hz"
+    t0: float  # from the date, if one is stated
+    dt: float
+    start_time: np.datetime64 | None
+
+    @property
+    def stated(self) -> dict[str, object]:
+        names = ("unit", "x_unit", "t0", "dt", "start_time")
+        each = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in each.items() if value is not None}
 
 
 def read_lvm(path: Path) -> tuple[Record, ...]:
@@ -163,8 +169,9 @@ def _channel(
     of_spectrum = stated("X_Dimension") == "Frequency" or stated("X_Unit_Label") in ("Hz", "hertz")
     # Seconds since 1904 are a date themselves.
     date = _date(stated("Date"), stated("Time")) if abs(start) < 1e9 else None
+    x_unit = "Hz" if of_spectrum else "s"
     name, unit = segment.names[column], stated("Y_Unit_Label")
-    return _Channel(name, unit, values, start, step, date, of_spectrum)
+    return _Channel(name, values, unit, x_unit, start, step, date)
 
 
 def _cell(segment: _Segment, tag: str, column: int) -> str:
@@ -213,33 +220,25 @@ def _date(date: str, time: str) -> np.datetime64 | None:
 def _goes_on(before: list[_Channel], after: list[_Channel]) -> bool:
     """Whether each channel begins where it ended in the last segment."""
     return len(before) == len(after) and all(
-        (a.name, a.unit, a.of_spectrum) == (b.name, b.unit, False)
-        and abs(_after(a, b) / a.step - len(a.values)) < max(0.5, UNEVEN * len(a.values))
+        (a.name, a.unit, a.x_unit) == (b.name, b.unit, "s")
+        and abs(_after(a, b) / a.dt - len(a.values)) < max(0.5, UNEVEN * len(a.values))
         for a, b in zip(before, after, strict=True)
-        if a.step > 0
+        if a.dt > 0
     )
 
 
 def _after(a: _Channel, b: _Channel) -> float:
     """How long after `a` `b` begins, in s."""
     apart = 0.0
-    if a.date is not None and b.date is not None:
-        apart = float((b.date - a.date) / np.timedelta64(1, "ns") * 1e-9)
-    return b.start - a.start + apart
+    if a.start_time is not None and b.start_time is not None:
+        apart = float((b.start_time - a.start_time) / np.timedelta64(1, "ns") * 1e-9)
+    return b.t0 - a.t0 + apart
 
 
 def _tree(channels: list[_Channel]) -> EntryTree:
-    parts = {}
+    parts, names = {}, [channel.name for channel in channels]
     for number, channel in enumerate(channels, 1):
-        stated = {
-            "unit": channel.unit,
-            "t0": channel.start,
-            "dt": channel.step,
-            "start_time": channel.date,
-            "x_unit": "Hz" if channel.of_spectrum else "s",
-        }
-        same = [c.name for c in channels].count(channel.name) > 1
-        name = f"{channel.name} ({number})" if same or not channel.name else channel.name
-        known = {key: value for key, value in stated.items() if value is not None}
-        parts[name] = tree_of({"": channel.values}, known)
+        same = names.count(channel.name) > 1 or not channel.name
+        name = f"{channel.name} ({number})" if same else channel.name
+        parts[name] = tree_of({"": channel.values}, channel.stated)
     return EntryTree({}, parts)

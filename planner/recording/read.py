@@ -45,14 +45,14 @@ class ReadFile:
     @cached_property
     def nbytes(self) -> int:
         """What its numbers take up."""
-        arrays = {id(a): a.nbytes for r in (*self.whole, *self.hits) for a in _arrays(r)}
-        return sum(arrays.values())
-
-
-def _arrays(record: Record) -> list[np.ndarray]:
-    if isinstance(record, FrfRecord):
-        return [record.frequency_hz, record.values, record.coherence]
-    return [channel.samples for channel in record.channels]
+        arrays: dict[int, np.ndarray] = {}
+        for record in (*self.whole, *self.hits):
+            if isinstance(record, FrfRecord):
+                own = [record.frequency_hz, record.values, record.coherence]
+            else:
+                own = [channel.samples for channel in record.channels]
+            arrays |= {id(array): array for array in own}
+        return sum(array.nbytes for array in arrays.values())
 
 
 MOST_REMEMBERED = 256 * 1024 * 1024  # bytes of what was read last, the last file in any case
