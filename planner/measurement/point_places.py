@@ -48,71 +48,55 @@ def misplaced(
     sensors = tuple(dict.fromkeys((SENSOR, *measured.layout.sensors, *map(names.sensor, points))))
     if len(points) < 2:
         return []
-    tried = [_Differences.of(s, q, measured, Layout(hits, sensors)) for s in simulations]
-    best = min(tried, key=lambda one: one.total)
-    return best.misplaced()
+    wide, own = Layout(hits, sensors), measured.layout
+    tried = [_differences(simulation, q, measured, wide) for simulation in simulations]
+    # How far all sensors are off, each at the point which fits it best.
+    by_sensor, by_hit = min(tried, key=lambda sides: np.nansum(np.min(sides[0], axis=-1)))
+    found = []
+    for differences, named, points_there, tool, hit in (
+        (by_sensor, own.sensors, sensors, SENSOR, False),
+        (by_hit, own.hits, hits, TCP, True),
+    ):
+        for i, k in np.argwhere(np.isfinite(differences[..., 0])):
+            each = differences[i, k]
+            stated, best = float(each[points_there.index(named[k])]), int(np.argmin(each))
+            # The tool's own are as they are.
+            if named[k] != tool and each[best] < min(FAR_BETTER * stated, CLOSE):
+                there = float(each[best])
+                found.append(Misplaced(int(i), named[k], points_there[best], hit, stated, there))
+    return found
 
 
-@dataclass(frozen=True, eq=False)
-class _Differences:
-    """Relative differences (n, named points, all points) of FRFs to a simulation, NaN: no FRF."""
+def _differences(
+    simulation: Simulation, q: np.ndarray, measured: Measured, wide: Layout
+) -> tuple[np.ndarray, np.ndarray]:
+    """Relative differences (n, named points, all points) of FRFs to a simulation, NaN: no FRF.
 
-    named: Layout
-    wide: Layout
-    by_sensor: np.ndarray
-    by_hit: np.ndarray
+    Of all sensors as if at each point of `wide`, and of all hits.
+    """
+    own = measured.layout
+    loaded = measured.loaded(simulation.elastic.matrices(q, layout=own), simulation)
+    matrices = replace(simulation.elastic.matrices(q, layout=wide), mass=loaded.mass)
+    h = response(matrices, simulation.elasticity, measured.s)
+    h = h.reshape(len(q), len(wide.sensors), 3, len(wide.hits), 3, -1)
+    shape = len(q), len(own.sensors), 3, len(own.hits), 3, h.shape[-1]
+    used = measured.used.reshape(shape)
+    given = np.where(used, measured.accelerance.reshape(shape), 0.0)
+    to_sensor = [wide.sensors.index(name) for name in own.sensors]
+    to_hit = [wide.hits.index(name) for name in own.hits]
 
-    @classmethod
-    def of(
-        cls, simulation: Simulation, q: np.ndarray, measured: Measured, wide: Layout
-    ) -> "_Differences":
-        """Of all sensors as if at each point of `wide`, and of all hits."""
-        own = measured.layout
-        loaded = measured.loaded(simulation.elastic.matrices(q, layout=own), simulation)
-        matrices = replace(simulation.elastic.matrices(q, layout=wide), mass=loaded.mass)
-        h = response(matrices, simulation.elasticity, measured.s)
-        h = h.reshape(len(q), len(wide.sensors), 3, len(wide.hits), 3, -1)
-        shape = len(q), len(own.sensors), 3, len(own.hits), 3, h.shape[-1]
-        used = measured.used.reshape(shape)
-        given = np.where(used, measured.accelerance.reshape(shape), 0.0)
-        to_sensor = [wide.sensors.index(name) for name in own.sensors]
-        to_hit = [wide.hits.index(name) for name in own.hits]
+    def along(side: int, simulated: np.ndarray) -> np.ndarray:
+        """(n, named, all) from FRFs of all points on axis `side`, one after another."""
+        axes, found = tuple(axis for axis in range(1, 6) if axis != side), []
+        power = np.sum(np.abs(given) ** 2, axis=axes)
+        for point in range(simulated.shape[side]):
+            off = given - np.take(simulated, [point], axis=side)
+            left = np.sum(np.abs(np.where(used, off, 0.0)) ** 2, axis=axes)
+            share = np.divide(left, power, out=np.full(left.shape, np.nan), where=power > 0)
+            found.append(np.sqrt(share))
+        return np.stack(found, axis=-1)
 
-        def differences(side: int, simulated: np.ndarray) -> np.ndarray:
-            """(n, named) from FRFs (as given), with their points on axis `side`."""
-            axes = tuple(axis for axis in range(1, 6) if axis != side)
-            left = np.sum(np.abs(np.where(used, given - simulated, 0.0)) ** 2, axis=axes)
-            power = np.sum(np.abs(given) ** 2, axis=axes)
-            return np.sqrt(np.divide(left, power, out=np.full(left.shape, np.nan), where=power > 0))
-
-        by_sensor = [
-            differences(1, h[:, [p] * len(to_sensor)][:, :, :, to_hit]) for p in range(h.shape[1])
-        ]
-        by_hit = [
-            differences(3, h[:, to_sensor][:, :, :, [p] * len(to_hit)]) for p in range(h.shape[3])
-        ]
-        return cls(own, wide, np.stack(by_sensor, axis=-1), np.stack(by_hit, axis=-1))
-
-    @property
-    def total(self) -> float:
-        """How far all sensors are off, each at the point which fits it best."""
-        return float(np.nansum(np.min(self.by_sensor, axis=-1)))
-
-    def misplaced(self) -> list[Misplaced]:
-        """Sensors, then hits, that fit elsewhere far better; the tool's own are as they are."""
-        found = []
-        sides = (
-            (self.by_sensor, self.named.sensors, self.wide.sensors, SENSOR, False),
-            (self.by_hit, self.named.hits, self.wide.hits, TCP, True),
-        )
-        for differences, named, wide, tool, hit in sides:
-            for i, k in np.argwhere(np.isfinite(differences[..., 0])):
-                each = differences[i, k]
-                stated, best = float(each[wide.index(named[k])]), int(np.argmin(each))
-                if named[k] != tool and each[best] < min(FAR_BETTER * stated, CLOSE):
-                    there = float(each[best])
-                    found.append(Misplaced(int(i), named[k], wide[best], hit, stated, there))
-        return found
+    return along(1, h[:, :, :, to_hit]), along(3, h[:, to_sensor])
 
 
 def questions(found: Sequence[Misplaced], poses: Sequence[str]) -> tuple[str, ...]:

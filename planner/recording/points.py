@@ -156,16 +156,15 @@ class StatedPoints:
                 f"{source}{self.where} does not say which of {', '.join(stated)} a response is "
                 f"of; name its node, or its column acceleration_{stated[0]}_x_m_s2."
             )
-        same = [name for name in stated if own and self.names.sensor(name) == self._sensor(own)]
+        same = [
+            name for name in stated if own and self.names.sensor(name) == self.names.sensor(own)
+        ]
         if own and stated and not same:
             raise InputError(
                 f"{source}{self.where} has a response at {_told(node, own)}, the table says "
                 f"{', '.join(stated)}; correct the one that is wrong."
             )
-        return self._sensor(own or (stated[0] if stated else SENSOR))
-
-    def _sensor(self, name: str) -> str:
-        return self.names.sensor(name)
+        return self.names.sensor(own or (stated[0] if stated else SENSOR))
 
     def _named(self, source: object, node: str, what: str, stated: tuple[str, ...]) -> str | None:
         """The point at a node; one that robot.toml does not list is that of a stated point.
