@@ -18,12 +18,15 @@ from planner.campaign.build import build
 from planner.campaign.cell import Cell, refuse_errors
 from planner.campaign.config import CampaignConfig, check_config, load_campaign_config
 from planner.campaign.events import MeasuredMode, Proposal
-from planner.campaign.log_conversion import from_modal, from_mode
 from planner.campaign.low_fidelity import in_memory
+from planner.campaign.measured_modes import (
+    from_modal,
+    from_mode,
+    measured_records,
+    predicted_records,
+)
 from planner.campaign.model import Model
-from planner.campaign.planned import inside
 from planner.campaign.proposals import propose
-from planner.campaign.records import measured_records, predicted_records
 from planner.campaign.state import CampaignState, Measurement
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
@@ -178,7 +181,7 @@ class AskTell:
     def predict_records(self, joints_deg: ArrayLike) -> list[dict[str, Any]]:
         """`predict` as rows, one for each mode of each pose."""
         q = self._cell.poses(joints_deg)
-        there = inside(self._cell, q)
+        there = self._cell.inside(q)
         return predicted_records(self._cell.robot.joints, q, self.model.predict(q), there)
 
 

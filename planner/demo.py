@@ -13,7 +13,7 @@ from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
 from planner.campaign.importing import ImportReport
 from planner.campaign.labels import frequencies, label
-from planner.campaign.log_conversion import from_modal
+from planner.campaign.measured_modes import from_modal
 from planner.campaign.state import Measurement
 from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source

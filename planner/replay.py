@@ -23,8 +23,8 @@ from planner.campaign.events import (
     Proposal,
     Proposed,
 )
-from planner.campaign.log_conversion import from_modal
 from planner.campaign.low_fidelity import Recall, in_memory
+from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement, fold, without

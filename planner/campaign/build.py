@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
-from planner.campaign.frequencies_by_simulation import TunedFrequencies, tuned_frequencies
+from planner.campaign.frequencies_by_simulation import tuned_frequencies
 from planner.campaign.hit_error_estimates import Visited, estimate
 from planner.campaign.labels import LabelledPose, label, observations
 from planner.campaign.low_fidelity import LowFidelity, Recall, in_memory, learn
@@ -131,12 +131,17 @@ class _Guided:
         cell: Cell,
         used: tuple[Measurement, ...],
         low: LowFidelity,
-        tuned: TunedFrequencies | None = None,
+        tuned: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> "_Guided":
-        """`tuned` frequencies take the place of those that modal analyses found."""
+        """`tuned` frequencies, their sds known, take the place of those of modal analyses."""
         labelled = label(cell, used, low)
         seen = observations(cell, labelled)
-        seen = seen if tuned is None else tuned.into(seen)
+        if tuned is not None:
+            hz, sd = (
+                np.where(np.isfinite(tuned[1]), own, found)
+                for own, found in zip(tuned, (seen.frequency_hz, seen.frequency_sd_hz), strict=True)
+            )
+            seen = replace(seen, frequency_hz=hz, frequency_sd_hz=sd)
         known = low.discrepancy if labelled else None
         primary = fit_primary(
             seen, known, low.belief, model=cell.config.surrogate.model,

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +18,6 @@ from planner.progress import Tell, quietly
 from planner.version import __version__
 
 if TYPE_CHECKING:
-    from planner.campaign.deliveries import Delivery
     from planner.campaign.importing import ImportReport
     from planner.dataset.screened_files import Source
 
@@ -55,7 +53,7 @@ class Campaign(CampaignReads):
             if same and len(state.open) >= count:
                 return tuple(state.proposals[pose] for pose in state.open[:count])
             proposals = propose(self.model, state, count, name)
-            self._append(events.Proposed(name, count, proposals))
+            self.append(events.Proposed(name, count, proposals))
             return proposals
 
     def import_paths(
@@ -74,30 +72,10 @@ class Campaign(CampaignReads):
         """
         from threadpoolctl import threadpool_limits
 
-        from planner.campaign.arrivals import at_their_poses
-        from planner.campaign.deliveries import sort_paths
-        from planner.campaign.importing import place
+        from planner.campaign.importing import import_paths
 
-        given = tuple(map(Path, paths))
         with self._acting(), threadpool_limits(1):
-            open_poses = self.state.open
-            default = open_poses[0] if len(open_poses) == 1 else None
-            deliveries = sort_paths(
-                given, self.cell.robot.joints, self.cell.robot.points, pose, default
-            )
-            deliveries = at_their_poses(deliveries, self.state)
-            if from_names:
-                deliveries = tuple(
-                    replace(d, sources=tuple(replace(s, from_name=True) for s in d.sources))
-                    for d in deliveries
-                )
-            placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
-            named = frozenset(path for path in given if path.is_file())
-            reports = []
-            for number, (delivery, joints_deg) in enumerate(placed):
-                progress(delivery.pose, number / len(placed))
-                reports.append(self._import_pose(delivery, joints_deg, named))
-            return tuple(reports)
+            return import_paths(self, tuple(map(Path, paths)), pose, progress, from_names)
 
     def refuse(
         self,
@@ -116,7 +94,7 @@ class Campaign(CampaignReads):
         with self._acting():
             if paths:
                 hits = refusals(self.directory, paths, reasons or {}, stated or {})
-                self._append(events.Refused(pose, hits))
+                self.append(events.Refused(pose, hits))
 
     def confirm(self, pose: str) -> "ImportReport":
         """Held hits are from their pose indeed, or those of a withdrawn one good: they are used."""
@@ -126,8 +104,8 @@ class Campaign(CampaignReads):
         with self._acting():
             known, before = self.state.measurements.get(pose), self.model
             if known is None or not known.withdrawn:
-                self._held(pose)
-            self._append(events.Confirmed(pose))
+                self.held_import(pose)
+            self.append(events.Confirmed(pose))
             found = self.state.measurements[pose]
             return ImportReport(
                 pose, found.accepted, (), (), found, None, before, self.model,
@@ -137,29 +115,29 @@ class Campaign(CampaignReads):
     def move(self, pose: str, other: str) -> "ImportReport":
         """The held hits of a pose are from another one: import them there."""
         from planner.campaign.deliveries import Delivery
-        from planner.campaign.importing import place
+        from planner.campaign.importing import import_pose, place
 
         with self._acting():
-            entry, event = self._held(pose)
+            entry, event = self.held_import(pose)
             sources = tuple(self.recordings.source(hit) for hit in event.hits)
             delivery = Delivery(other, None, sources)
             joints_deg = place(self.cell, self.state, delivery)
             if other in self.state.held:
                 raise InputError(f"Hits of {other} wait for an answer too; answer that first.")
-            self._append(events.Undone(entry.seq, gives_way=True))
-            return self._import_pose(delivery, joints_deg, frozenset(s.path for s in sources))
+            self.append(events.Undone(entry.seq, gives_way=True))
+            return import_pose(self, delivery, joints_deg, frozenset(s.path for s in sources))
 
     def refuse_held(self, pose: str, reason: str = events.REFUSED) -> None:
         """The held hits of a pose are set aside, as if they had been refused when they came."""
         with self._acting():
-            entry, event = self._held(pose)
+            entry, event = self.held_import(pose)
             # In this order: stopped in between, the hits are asked for again.
-            self._append(events.Undone(entry.seq, gives_way=True))
+            self.append(events.Undone(entry.seq, gives_way=True))
             refused = (msgspec.structs.replace(h, accepted=False) for h in event.hits)
             asked = event.question
             why = f"{reason}; held before: {asked.text}" if asked else reason
             hits = (msgspec.structs.replace(h, reason=h.reason or why) for h in refused)
-            self._append(events.Refused(pose, tuple(hits)))
+            self.append(events.Refused(pose, tuple(hits)))
 
     def withdraw(self, pose: str, reason: str = "") -> None:
         """Set a measured pose aside, or held hits; the recordings stay."""
@@ -169,21 +147,21 @@ class Campaign(CampaignReads):
             measurement = self.state.hit_at(pose)
             if measurement is None or measurement.withdrawn:
                 raise InputError(f"Pose {pose} is not among the measured ones; see planner status.")
-            self._append(events.Withdrawn(pose, reason))
+            self.append(events.Withdrawn(pose, reason))
 
     def skip(self, pose: str, reason: str = "", neighbours: bool = False) -> None:
         """A proposed pose shall not be measured: never offered again, nor its `neighbours`."""
         with self._acting():
             if pose not in self.state.open:
                 raise InputError(f"Pose {pose} is not an open proposal; see planner status.")
-            self._append(events.Skipped(pose, reason, neighbours))
+            self.append(events.Skipped(pose, reason, neighbours))
 
     def star(self, pose: str) -> None:
         """Mark a pose as worth a second look."""
         with self._acting():
             if pose not in self.state.measurements and pose not in self.state.proposals:
                 raise InputError(f"Pose {pose} is not known; see planner status.")
-            self._append(events.Starred(pose))
+            self.append(events.Starred(pose))
 
     def undo(self, decisions_only: bool = False) -> tuple[events.Entry, ...]:
         """Take back the last act (proposal, import, answer, refusal, withdrawal, skip, star).
@@ -196,9 +174,9 @@ class Campaign(CampaignReads):
             if not acts:
                 raise InputError(f"{self.directory} holds no act that could be taken back.")
             for entry in acts:
-                self._append(events.Undone(entry.seq))
+                self.append(events.Undone(entry.seq))
                 for gave_way in gave_way_to(self.entries, entry):
-                    self._append(events.Undone(gave_way.seq))
+                    self.append(events.Undone(gave_way.seq))
             return acts
 
     def redo(self) -> tuple[events.Entry, ...]:
@@ -214,7 +192,7 @@ class Campaign(CampaignReads):
                     f"act followed can be done again."
                 )
             for entry in (*since, *undone):
-                self._append(events.Undone(entry.seq))
+                self.append(events.Undone(entry.seq))
             acts = (e.event.act for e in undone if isinstance(e.event, events.Undone))
             return tuple(self.entries[act - 1] for act in acts)
 
@@ -225,16 +203,31 @@ class Campaign(CampaignReads):
         """
         with self._acting():
             if new := tuple(file for file in files if file not in self.state.shown):
-                self._append(events.FilesShown(pose, new, at))
+                self.append(events.FilesShown(pose, new, at))
 
     def place(self, pose: str, files: Sequence[str]) -> None:
         """The engineer says that files (sha256) shown elsewhere were hit at this pose."""
         with self._acting():
-            self._append(events.FilesPlaced(pose, tuple(files)))
+            self.append(events.FilesPlaced(pose, tuple(files)))
 
     def holding(self):
         """A context in which nobody else can act in this campaign; InputError names who does."""
         return self._journal.holding(wait_s=1.0, session=True)
+
+    def held_import(self, pose: str) -> tuple[events.Entry, events.Imported]:
+        """The import that is held at a pose; InputError if none is."""
+        if pose not in self.state.held:
+            raise InputError(f"No hits of pose {pose} wait for an answer; see planner status.")
+        found = [
+            (e, e.event)
+            for e in self.entries
+            if isinstance(e.event, events.Imported) and e.event.pose == pose and e.event.question
+        ]
+        return found[-1]
+
+    def append(self, event: events.AnyEvent) -> events.Entry:
+        """Write one event, within an act."""
+        return self._journal.append(event)
 
     # -- inside --------------------------------------------------------------------------------
 
@@ -246,9 +239,6 @@ class Campaign(CampaignReads):
             self._log_configuration()
             yield
 
-    def _append(self, event: events.AnyEvent) -> events.Entry:
-        return self._journal.append(event)
-
     def _log_configuration(self) -> None:
         """Follow changes made by hand to campaign.toml or the robot folder."""
         from planner.campaign.cell import refuse_errors
@@ -258,119 +248,7 @@ class Campaign(CampaignReads):
         if (configured.config, configured.robot) != (logged.config, logged.robot):
             refuse_errors(self.cell.examined)  # before it is believed
             store.keep_robot_files(self.directory, configured.robot)
-            self._append(configured)
-
-    def _held(self, pose: str) -> tuple[events.Entry, events.Imported]:
-        """The import that is held at a pose; InputError if none is."""
-        if pose not in self.state.held:
-            raise InputError(f"No hits of pose {pose} wait for an answer; see planner status.")
-        found = [
-            (e, e.event)
-            for e in self.entries
-            if isinstance(e.event, events.Imported) and e.event.pose == pose and e.event.question
-        ]
-        return found[-1]
-
-    def _let_go(self, delivery: "Delivery") -> "Delivery":
-        """Take back a held import of which a delivery says something else now; all is judged anew.
-
-        The delivery with the held files of its pose that it lacks.
-        """
-        from planner.campaign.arrivals import let_go
-
-        for held_at in tuple(self.state.held):
-            entry, event = self._held(held_at)
-            lacking = let_go(delivery, event, self.cell.robot.joints)
-            if lacking is not None:
-                self._append(events.Undone(entry.seq, gives_way=True))
-                more = tuple(self.recordings.source(hit) for hit in lacking)
-                delivery = replace(delivery, sources=(*delivery.sources, *more))
-        return delivery
-
-    def _import_pose(
-        self, delivery: "Delivery", joints_deg: tuple[float, ...], named: frozenset[Path]
-    ) -> "ImportReport":
-        from planner.campaign.arrivals import keep_files
-        from planner.campaign.contradictions import asked_of, contradiction
-        from planner.campaign.importing import (
-            ImportReport,
-            JudgedFiles,
-            displacement,
-            lacking,
-            measure_files,
-            not_used,
-            taken_after_all,
-        )
-        from planner.campaign.log_conversion import from_homogeneity, from_modal
-        from planner.campaign.revisits import alerts, suspected
-        from planner.dataset.screened_files import hits_of_files
-
-        started, delivery = time.perf_counter(), self._let_go(delivery)
-        before, state, pose = self.model, self.state, delivery.pose
-        known = state.hit_at(pose)
-        kept = keep_files(self.directory, delivery, state, named)
-        table, keeps = self.cell.config.modes, self.recordings
-        judged = JudgedFiles.of(pose, state, keeps, kept.fresh, table) if kept.fresh else None
-        left_out = (*kept.left_out, *(judged.still if judged else ()))
-        if judged is None or not judged.fresh:
-            held, known = state.held.get(pose), state.measurements.get(pose)
-            return ImportReport(
-                pose, (), (), kept.already, held or known, None, before, before, 0.0,
-                left_out=left_out, question=held.question if held else None,
-            )  # fmt: skip
-        fresh, hits, measured, old = judged.fresh, judged.hits, judged.measured, judged.old
-        joints_deg, stood = known.joints_deg if known else joints_deg, joints_deg
-        alone = measured
-        # Among earlier hits, wrong ones would not stand out; one that was replaced is no new visit.
-        if old and not judged.superseded:
-            alone = measure_files((), fresh, table)[1]
-        modes, new_modes = from_modal(measured.modal), from_modal(alone.modal)
-        asked = contradiction(pose, measured, len(old))
-        asked = asked or asked_of(before, state, pose, joints_deg, alone)
-        drift = None if asked else suspected(before, state, pose, joints_deg, new_modes)
-        event = events.Imported(
-            pose=pose,
-            joints_deg=joints_deg,
-            hits=hits,
-            modes=modes,
-            remarks=measured.remarks,
-            amplitude=from_homogeneity(measured.homogeneity),
-            question=asked,
-            again=drift.again if drift else "",
-            replaced=tuple((hit.sha256, why) for hit, why in judged.superseded.items()),
-        )
-        told = alerts(before, state, event, measured, new_modes, drift)
-        self._append(event)
-        measurement = (self.state.held if event.question else self.state.measurements)[pose]
-        # Beside new hits earlier ones may look wrong; they stay accepted all the same.
-        agreed = all(verdict.accepted for verdict in measured.verdicts[: len(old)])
-        if measured.frf is not None and agreed:
-            keeps.keep_frf(measured.frf, measurement, table)
-        model = self.model
-        return ImportReport(
-            pose=pose,
-            accepted=tuple(hit for hit in hits if hit.accepted and not event.question),
-            refused=not_used(hits, event.question),
-            already=kept.already,
-            measurement=measurement,
-            measured=measured,
-            model_before=before,
-            model=model,
-            refit_seconds=time.perf_counter() - started,
-            remarks=(
-                *hits_of_files(measured.verdicts[len(old) :]),
-                *measured.remarks,
-                *told,
-                *(f"{hit.file} is set aside, {why}." for hit, why in judged.superseded.items()),
-                *taken_after_all(state, fresh),
-                *displacement(self.cell.robot.joints, state, delivery, stood),
-                *lacking(state, measurement),
-                *(() if event.question else model.remarks),
-            ),
-            left_out=left_out,
-            question=event.question,
-            alerts=told,
-        )
+            self.append(configured)
 
 
 def _first_entry(directory: Path) -> bytes:

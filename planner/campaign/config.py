@@ -173,10 +173,9 @@ def check_config(config: CampaignConfig, path: Path) -> None:
 def _wrong(config: CampaignConfig) -> Iterator[str]:
     """What makes no sense, a sentence each; later ones rely on what earlier ones ask for."""
     yield from _of_workspace(config.workspace)
-    for name, number, (low, high) in _ranges(config):
+    for name, (low, high) in _ranges(config):
         if not (abs(low) < 1e6 and abs(high) < 1e6 and low <= high):
-            which = f", range {number}" if number else ""
-            yield f"{name}{which} is [{low:g}, {high:g}]; give finite numbers, the lower one first."
+            yield f"{name} is [{low:g}, {high:g}]; give finite numbers, the lower one first."
     band = config.modes.band_hz
     if not 0 < band[0] < band[1]:
         yield f"[modes] band_hz {list(band)} must rise from above 0 Hz."
@@ -220,19 +219,19 @@ def _limits(config: CampaignConfig) -> list[tuple[str, float, float, float]]:
     ]
 
 
-def _ranges(config: CampaignConfig) -> list[tuple[str, int, tuple[float, float]]]:
-    """Every range: its entry, its number there (0: it is the only one), lower and upper bound."""
-    w, found = config.workspace, [("[modes] band_hz", 0, config.modes.band_hz)]
-    several = [
+def _ranges(config: CampaignConfig) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Every range: its entry, with its number where there are several, lower and upper bound."""
+    w = config.workspace
+    yield "[modes] band_hz", config.modes.band_hz
+    for name, ranges in (
         ("[workspace] joints_deg", w.joints_deg), ("[workspace] position_m", w.position_m),
         *(("[[forbidden]] position_m", zone.position_m) for zone in config.forbidden),
         *(("[[forbidden]] joints_deg", zone.joints_deg) for zone in config.forbidden),
-    ]  # fmt: skip
-    for name, ranges in several:
-        found += [(name, number, one) for number, one in enumerate(ranges or (), 1)]
-    for name, one in (("[workspace] rotation_deg", w.rotation_deg), *_rising(config)):
-        found += [(name, 0, one)] if one else []
-    return found
+    ):  # fmt: skip
+        yield from ((f"{name}, range {k}", one) for k, one in enumerate(ranges or (), 1))
+    for name, range_ in (("[workspace] rotation_deg", w.rotation_deg), *_rising(config)):
+        if range_:
+            yield name, range_
 
 
 def _rising(config: CampaignConfig) -> tuple[tuple[str, tuple[float, float] | None], ...]:

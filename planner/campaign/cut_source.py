@@ -1,23 +1,24 @@
-"""What `stability` is asked of: files or a campaign, one pose or many, this tool or another."""
+"""What `stability` and `couple` start from: files or a campaign, this tool or another."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.campaign.planned import inside, outside_remark
+from planner.campaign.campaign import Campaign
+from planner.campaign.model_status import outside_remark
 from planner.campaign.store import is_campaign
 from planner.errors import InputError
 from planner.milling.cut import Cut, cuts_at, no_pose, turned_to
 from planner.milling.cutter_frf import CutterFrf, names_in, of_accelerance, read_frf
 from planner.milling.cutter_modes import load_mode_file
 from planner.milling.structure import SAMPLES, OutOfBandError, Structure, of_frf, of_modes
+from planner.recording.folder import several_poses
 
 if TYPE_CHECKING:
-    from planner.campaign.campaign import Campaign
-    from planner.milling.coupling import TipReceptance
+    from planner.milling.coupling import ContactFit, TipReceptance
     from planner.milling.tool import Tool
 
 
@@ -60,10 +61,9 @@ class Asked:
         return rpm, depth
 
     @property
-    def campaign(self) -> "Campaign":
+    def campaign(self) -> Campaign:
         """The source, with the stated force; InputError where a force would change nothing."""
-        from planner.campaign.at_force import UNCHANGED
-        from planner.campaign.campaign import Campaign
+        from planner.campaign.frf_model import UNCHANGED
 
         opened = Campaign(self.source)
         if self.peak_force_n is not None and not opened.cell.robot.config.law:
@@ -166,8 +166,6 @@ def structures_of_file(asked: Asked, cut: Cut) -> list[tuple[str, Structure]]:
 
 
 def _coupled(asked: Asked, change: ToolChange, pose: str | None, cut: Cut) -> Structure:
-    from planner.campaign.tip_source import tip_of
-
     tip, name = tip_of(
         asked.source, change.tested, pose, asked.robot, asked.noise, asked.from_names
     )
@@ -176,7 +174,7 @@ def _coupled(asked: Asked, change: ToolChange, pose: str | None, cut: Cut) -> St
 
 
 def at_poses(
-    campaign: "Campaign", names: Sequence[str], q: np.ndarray, cut: Cut,
+    campaign: Campaign, names: Sequence[str], q: np.ndarray, cut: Cut,
     change: ToolChange | None, feeds: np.ndarray | None = None,
 ) -> list[Structure]:  # fmt: skip
     """What a campaign predicts at poses q (p, dof) in rad, in the plane of the cut there.
@@ -184,50 +182,144 @@ def at_poses(
     `feeds` (p, 3) in the base frame, where a program gives them; else as the cut says.
     Raises OutOfBandError where the cut would chatter outside the lines at one of them.
     """
-    found = at_poses_in_band(campaign, names, q, cut, change, feeds)
-    for one in found:
+    found = []
+    for one in at_poses_in_band(campaign, names, q, cut, change, feeds):
         if isinstance(one, OutOfBandError):
             raise one
-    return [one for one in found if isinstance(one, Structure)]
+        found.append(one)
+    return found
 
 
 def at_poses_in_band(
-    campaign: "Campaign", names: Sequence[str], q: np.ndarray, cut: Cut,
+    campaign: Campaign, names: Sequence[str], q: np.ndarray, cut: Cut,
     change: ToolChange | None, feeds: np.ndarray | None = None,
-) -> list[Structure | OutOfBandError]:  # fmt: skip
+) -> Iterator[Structure | OutOfBandError]:  # fmt: skip
     """As `at_poses`, but for poses where the cut would chatter outside the lines: they say so."""
-    lines = campaign.frequency_lines
+    lines, simulated = campaign.frequency_lines, campaign.state.simulated
     rotation, position = campaign.cell.robot.forward_batch(q)
     if feeds is not None and cut.feed_in == "path":
         cuts = [turned_to(cut, *row) for row in zip(rotation, feeds, names, strict=True)]
     else:
         cuts = cuts_at(cut, rotation, position, names)
-    simulated = campaign.state.simulated
     mean, sd = campaign.frf_at(q, lines)
-    found: list[Structure | OutOfBandError] = []
     for i, name in enumerate(names):
-        where = f"{campaign.directory}, pose {name}"
-        remarks: tuple[str, ...] = ()
+        where, remarks = f"{campaign.directory}, pose {name}", ()
         if change is None:
             frf = of_accelerance(where, lines, mean[i], sd[i])
         else:
-            from planner.campaign.tip_source import tip_at
-
             tip = tip_at(campaign, name, q[i], lines, mean[i], sd[i])
             frf, remarks = change.coupled(tip, where)
         try:
-            found.append(_with(of_frf(replace(frf, simulated=simulated), cuts[i]), remarks))
+            yield _with(of_frf(replace(frf, simulated=simulated), cuts[i]), remarks)
         except OutOfBandError as error:
-            found.append(error)
-    return found
+            yield error
 
 
-def outside(campaign: "Campaign", names: Sequence[str], q: np.ndarray) -> tuple[str, ...]:
+def outside(campaign: Campaign, names: Sequence[str], q: np.ndarray) -> tuple[str, ...]:
     """A remark on those of the poses q (p, dof) in rad that lie outside the workspace, if any."""
-    there = inside(campaign.cell, q)
+    there = campaign.cell.inside(q)
     said = outside_remark([name for name, one in zip(names, there, strict=True) if not one])
     return (said,) if said else ()
 
 
 def _with(structure: Structure, remarks: tuple[str, ...]) -> Structure:
     return replace(structure, remarks=(*remarks, *structure.remarks))
+
+
+LINES = 1e-6  # Hz by which lines of two files may differ
+
+
+def tip_of(
+    source: Path, tested: "Tool | None", pose: str | None, robot: Path | None, noise: float,
+    from_names: bool = False,
+) -> "tuple[TipReceptance, str]":  # fmt: skip
+    """Receptances at the tip of the tested tool, and the name of the pose.
+
+    `noise` is the relative sd of FRFs whose file states none, `from_names` as in `read_frfs`.
+    Raises InputError in one sentence.
+    """
+    from planner.milling.coupling import TipReceptance
+    from planner.milling.tip_files import MEASURE, read_tip
+
+    if is_campaign(source):
+        campaign = Campaign(source)
+        q, lines = campaign.stands(pose), campaign.frequency_lines
+        mean, sd = campaign.frf_at(q, lines)
+        tip = tip_at(campaign, str(pose), q, lines, mean[0], sd[0])
+        return replace(tip, simulated=campaign.state.simulated), str(pose)
+    if several_poses([source]):
+        from planner.campaign.posture_tip import posture_tip
+
+        return posture_tip(source, tested, pose), str(pose)
+    found = read_tip(source, tested, pose, noise, from_names)
+    if isinstance(found, TipReceptance):
+        return found, pose or source.stem
+    if robot is None:
+        raise InputError(
+            f"{source} holds motions alone, no rotations; {MEASURE}, or have the rotations "
+            f"simulated: --robot ROBOT_TOML."
+        )
+    from planner.dynamics.simulation import Simulation
+    from planner.milling.tip_files import completed
+    from planner.robot.robot import Robot
+
+    loaded, q = Robot.load(robot), found.joints_rad
+    if q is None or len(q) != len(loaded.joint_names):
+        raise InputError(
+            f"{source} does not say the {len(loaded.joint_names)} joint angles of {robot}; write "
+            f"it with predict --out."
+        )
+    return completed(found, Simulation(loaded), q), found.name
+
+
+def tip_at(
+    campaign: Campaign, pose: str, q: np.ndarray, lines: np.ndarray, mean: np.ndarray,
+    sd: np.ndarray,
+) -> "TipReceptance":  # fmt: skip
+    """Of a campaign's accelerance (3, 3, F) and its sd at q (dof,), with its simulation's turns."""
+    from planner.milling.tip_files import MEASURE, completed
+
+    simulation = campaign.model.low.simulation
+    if simulation is None:
+        raise InputError(f"{campaign.directory} has no simulation for the rotations; {MEASURE}.")
+    s2 = (2j * np.pi * lines) ** 2
+    return completed(CutterFrf(pose, lines, mean / s2, sd / np.abs(s2)), simulation, q)
+
+
+def within(
+    tip: "TipReceptance", band_hz: tuple[float, float] | None, source: Path
+) -> "TipReceptance":
+    """The lines of a band. Raises InputError where they do not cover it."""
+    if band_hz is None:
+        return tip
+    low, high = band_hz
+    f = tip.frequency_hz
+    step = float(np.max(np.diff(f)))
+    if not low < high or low < f[0] - step or high > f[-1] + step:
+        raise InputError(
+            f"{source} covers {f[0]:.4g} to {f[-1]:.4g} Hz, not {low:g} to {high:g} Hz; measure "
+            f"that band, or ask for less."
+        )
+    chosen = (f >= low) & (f <= high)
+    if np.count_nonzero(chosen) < 2:
+        raise InputError(f"{source} has no two lines within {low:g} to {high:g} Hz; ask for more.")
+    names = ("frequency_hz", "measured", "sd", "left", "right", "offset", "offset_sd")
+    errors = None if tip.errors is None else tip.errors[:, chosen]
+    return replace(tip, errors=errors, **{name: getattr(tip, name)[chosen] for name in names})
+
+
+def fitted_contact(
+    tip: "TipReceptance", target: "Tool", tested: "Tool | None", seen: Path, pose: str | None
+) -> "ContactFit":
+    """The target's contact from its FRFs in a file, of the same pose and lines as the source."""
+    from planner.milling.coupling import fit_contact
+
+    frf = read_frf(seen, pose if seen.suffix.lower() == ".npz" else None)
+    place = np.searchsorted(frf.frequency_hz, tip.frequency_hz - LINES)
+    place = np.minimum(place, len(frf.frequency_hz) - 1)
+    if np.any(np.abs(frf.frequency_hz[place] - tip.frequency_hz) > 2 * LINES):
+        raise InputError(
+            f"{seen} does not hold the lines of the source, {tip.frequency_hz[0]:.4g} to "
+            f"{tip.frequency_hz[-1]:.4g} Hz; export the same grid, or name a band by --band-hz."
+        )
+    return fit_contact(tip, target, tested, frf.receptance[..., place])

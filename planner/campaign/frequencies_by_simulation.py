@@ -6,7 +6,7 @@ and readback leave open only frequency, damping and size of each counted mode ar
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from planner.frf import synthesis
 from planner.frf.frf import Frf
 from planner.measurement.measured_frfs import Measured, cut_off, matrices_at, stack
 from planner.measurement.nuisances import Tolerances, basis, real_rows
-from planner.surrogate.modal_surrogate import ModalObservations
 
 LINES, LEAST, MOST = 600, 40, 120  # of all poses together, and of one at least and at most
 MODEL_ERROR = 0.01  # relative sd of what no simulation follows; as for FRFs
@@ -30,23 +29,6 @@ TOO_WRONG, UNKNOWN = 0.15, 0.02
 LARGEST = 0.95  # damping ratio of what oscillates
 
 
-@dataclass(frozen=True, eq=False)
-class TunedFrequencies:
-    """Frequencies and sds (n, count) in Hz, NaN where the simulation can't tell."""
-
-    frequency_hz: np.ndarray
-    sd_hz: np.ndarray
-
-    def into(self, seen: ModalObservations) -> ModalObservations:
-        """In place of those that the modal analysis found."""
-        told = np.isfinite(self.sd_hz)
-        return replace(
-            seen,
-            frequency_hz=np.where(told, self.frequency_hz, seen.frequency_hz),
-            frequency_sd_hz=np.where(told, self.sd_hz, seen.frequency_sd_hz),
-        )
-
-
 def tuned_frequencies(
     simulation: Simulation,
     frfs: Sequence[Frf],
@@ -54,8 +36,11 @@ def tuned_frequencies(
     band_hz: tuple[float, float],
     tolerances: Tolerances,
     count: int,
-) -> TunedFrequencies:
-    """Of the first `count` modes at q (n, dof) in rad, from the tool's FRFs there."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Hz (n, count) of the first modes at q (n, dof) in rad, from the tool's FRFs there, and sds.
+
+    NaN where the simulation can't tell.
+    """
     lines = int(np.clip(LINES // len(frfs), LEAST, MOST))
     measured = stack(frfs, band_hz, lines, MODEL_ERROR)
     matrices = matrices_at(simulation.elastic, q, frfs, True)
@@ -68,7 +53,7 @@ def tuned_frequencies(
     modes = simulation.modes(q, count)
     told = [_told(_at(modes, i), measured, h[i], open_[i], i) for i in range(len(q))]
     hertz, sd = (np.array(values) for values in zip(*told, strict=True))
-    return TunedFrequencies(hertz, hertz * sd)
+    return hertz, hertz * sd
 
 
 def _at(modes: SimulatedModes, i: int) -> SimulatedModes:

@@ -1,8 +1,4 @@
-"""FRFs anywhere: the simulation's own where it explains the recordings, else the fused modes'.
-
-The simulation brings all of its modes, over the whole band. FRFs made of fused modes are as far off
-as those of measured poses, each predicted from the others, say.
-"""
+"""FRFs anywhere: the simulation's own where it explains the recordings, else the fused modes'."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -11,18 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from planner.dynamics.at_force import averaged, change_at_force, modes_at_force
+from planner.dynamics.simulation import Simulation
 from planner.fit.posterior import RobotPosterior
 from planner.measurement.measured_frfs import Measured, common_band, stack
+from planner.recording.force_levels import peak_n
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
 from planner.surrogate.leave_one_out import left_out_modes
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
+    from planner.campaign.reads import CampaignReads
 
 Moments = tuple[np.ndarray, np.ndarray]  # mean and sd (n, 3, 3, F) of FRFs in m/s²/N
-ZONES = (
-    5  # of the band, evenly on a logarithmic scale: what is left out differs from one to another
-)
+ZONES = 5  # of the band, evenly on a logarithmic scale: they differ in what is left out
 LINES, LEAST, MOST = 300, 20, 80  # of all poses together, and of one at least and at most
 MODEL_ERROR = 0.01  # relative sd of what no modes follow
 WIDTH = 0.05  # of the frequency: over which an FRF's size is averaged
@@ -36,25 +34,24 @@ ERROR_BEFORE, CAMPAIGN_SPREAD, ZONE_SPREAD = 0.03, 0.7, 0.7
 VALUES = 4
 SIZES = np.geomspace(1e-3, 3.0, 60)  # of errors that are considered
 SHIFTS = np.linspace(-3, 3, 25)  # of a campaign from others, in sds
+UNCHANGED = (
+    "peak_force_n changes nothing: robot.toml states no [[law]] of a joint that is not linear "
+    "(planner diagnose finds them from hits of different force)."
+)
 
 
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """FRFs (3, 3, F) of a measured pose, and predicted from the others; `used` where measured.
+    """FRFs (3, 3, F) of a pose, `predicted` from the others, and `off` by what is measured.
 
-    `known`: variance of noise and of the prediction as it is.
+    `off` is 0 where not `used`; `known`: variance of noise and of the prediction as it is.
     """
 
     frequency_hz: np.ndarray
-    measured: np.ndarray
+    off: np.ndarray
     predicted: np.ndarray
     known: np.ndarray
     used: np.ndarray
-
-    @property
-    def off(self) -> np.ndarray:
-        """(3, 3, F) measured less predicted, 0 where nothing was measured."""
-        return np.where(self.used, self.measured - self.predicted, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +161,8 @@ def _left_out(model: "Model", measured: Measured) -> Iterator[LeftOut]:
         predicted = mean[0] * (s / (1j * s.imag)) ** 2 + above
         used = measured.used[i]
         known = np.where(used, measured.sd[i], 0.0) ** 2 + sd[0] ** 2
-        yield LeftOut(hertz, measured.accelerance[i], predicted, known, used)
+        off = np.where(used, measured.accelerance[i] - predicted, 0.0)
+        yield LeftOut(hertz, off, predicted, known, used)
 
 
 def _windowed(modes: ModalPrediction, rate_1_s: float) -> ModalPrediction:
@@ -175,3 +173,51 @@ def _windowed(modes: ModalPrediction, rate_1_s: float) -> ModalPrediction:
     real, imaginary = zeta * omega + rate_1_s, omega * np.sqrt(np.maximum(0.0, 1 - zeta**2))
     size = np.hypot(real, imaginary)
     return replace(modes, frequency_hz=size / (2 * np.pi), damping_ratio=real / size)
+
+
+@dataclass(frozen=True, eq=False)
+class ForceModel:
+    """The `simulation` whose laws say what another force changes; None: nothing does."""
+
+    simulation: Simulation | None
+
+    @classmethod
+    def of(cls, campaign: "CampaignReads") -> "ForceModel":
+        """Springs that were identified have what the campaign's own hits have of the laws."""
+        low = campaign.model.low
+        simulation = low.simulation
+        if simulation is None or not simulation.robot.config.law:
+            return cls(None)
+        if low.learned is None:
+            return cls(simulation)
+        visits = campaign.dataset(campaign.cell.config.modes.band_hz).visits
+        hits = [(visit.q, hit.axis_index, peak_n(hit)) for visit in visits for hit in visit.hits]
+        if not hits:
+            return cls(simulation)
+        q, axes, force_n = (np.array(column) for column in zip(*hits, strict=True))
+        return cls(averaged(simulation, q, axes, force_n))
+
+    def frf_change(
+        self, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray, in_time: bool = True
+    ) -> np.ndarray:
+        """(n, 3, 3, F) in m/s²/N, as of `change_at_force`; 0 where no force is stated."""
+        if self.simulation is None:
+            return np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
+        return change_at_force(self.simulation, q, force_n, frequency_hz, in_time)
+
+    def modes(
+        self, predicted: ModalPrediction, q: np.ndarray, force_n: np.ndarray
+    ) -> ModalPrediction:
+        """Frequencies and damping moved as the simulation's are; as they were where NaN."""
+        known = np.flatnonzero(np.isfinite(force_n))
+        if self.simulation is None or not known.size:
+            return predicted
+        count = predicted.frequency_hz.shape[1]
+        there = modes_at_force(self.simulation, q[known], force_n[known], count)
+        stated = self.simulation.frequencies(q[known], count)
+        moved = {}
+        for name in ("frequency_hz", "damping_ratio"):
+            ratio = getattr(there, name) / getattr(stated, name)
+            moved[name] = getattr(predicted, name).copy()
+            moved[name][known] *= np.where(np.isfinite(ratio), ratio, 1.0)
+        return replace(predicted, **moved)

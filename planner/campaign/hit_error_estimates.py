@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.campaign.hit_errors import HitErrorEstimate, Pair, PoseHitErrors
+from planner.campaign.hit_errors import HitErrorEstimate, Pair
 from planner.campaign.labels import LabelledPose
-from planner.campaign.log_conversion import to_mode
+from planner.campaign.measured_modes import to_mode
 from planner.campaign.state import Measurement
 from planner.dataset.hit_columns import HitColumns
 from planner.fit.hit_misses import Misses, SolvedPoses, VisitHits, VisitMisses, tell_misses
@@ -54,12 +54,12 @@ class CampaignHitErrors:
         return bool(np.sqrt(np.mean(away**2)) < NO_HAND)
 
     @property
-    def poses(self) -> tuple[PoseHitErrors, ...]:
-        """Hit by hit; none where the simulation is too wrong to tell."""
+    def poses(self) -> dict[str, tuple[HitErrorEstimate, ...]]:
+        """Hit by hit, by pose; none where the simulation is too wrong to tell."""
         if self.told is None or not self.trusted:
-            return ()
+            return {}
         both = zip(self.visited, self.told.visits, strict=True)
-        return tuple(_pose(visited, told) for visited, told in both)
+        return {visited.pose: _pose(visited, told) for visited, told in both}
 
     def corrected(self, labelled: LabelledPose, measured: Measurement) -> LabelledPose:
         """A measured pose's labelled modes with residues as `without_misses` gives them."""
@@ -115,7 +115,7 @@ def estimate(
     return CampaignHitErrors(those, told, t, band_hz)
 
 
-def _pose(visited: Visited, told: VisitMisses) -> PoseHitErrors:
+def _pose(visited: Visited, told: VisitMisses) -> tuple[HitErrorEstimate, ...]:
     columns = visited.columns
     sd = np.sqrt(np.diagonal(told.covariance)).reshape(-1, OF_HIT)
     hits = []
@@ -131,7 +131,7 @@ def _pose(visited: Visited, told: VisitMisses) -> PoseHitErrors:
                 _pair(1e3 * sd[i, 2:]),
             )
         )
-    return PoseHitErrors(visited.pose, tuple(hits))
+    return tuple(hits)
 
 
 def _pair(values: np.ndarray) -> Pair:

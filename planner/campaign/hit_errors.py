@@ -40,14 +40,6 @@ class HitErrorEstimate:
         return AXES[(axis + 1) % 3], AXES[(axis + 2) % 3]
 
 
-@dataclass(frozen=True)
-class PoseHitErrors:
-    """Of a pose's hits in the order of their files."""
-
-    pose: str
-    hits: tuple[HitErrorEstimate, ...]
-
-
 def systematic_errors(hits: Sequence[HitErrorEstimate]) -> tuple[str, ...]:
     """What errors along a signed axis have in common, where it is sure: a sentence an axis."""
     found = []

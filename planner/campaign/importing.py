@@ -1,33 +1,44 @@
 """Importing the hits of one pose: where they belong and what they give."""
 
+import itertools
+import time
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from dataclasses import replace as replaced
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
-from planner.campaign import store
-from planner.campaign.arrivals import (
-    Kept,
-    record_of,
-    still_refused,
-    superseded,
-    without,
-)
+from planner.campaign import events, store
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
-from planner.campaign.deliveries import Delivery
+from planner.campaign.deliveries import (
+    Delivery,
+    Fresh,
+    at_their_poses,
+    let_go,
+    new_files,
+    record_of,
+    sort_paths,
+    superseded,
+)
 from planner.campaign.events import REFUSED, HitRecord, Question
 from planner.campaign.hit_errors import HitErrorEstimate
-from planner.campaign.kept_recordings import KeptRecordings
+from planner.campaign.import_checks import alerts, asked_of, contradiction, suspected
+from planner.campaign.measured_modes import from_homogeneity, from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.store import KeptRecordings
 from planner.dataset.measure import MeasuredPose, measure
-from planner.dataset.screened_files import Source
+from planner.dataset.screened_files import Source, hits_of_files
 from planner.errors import InputError
+from planner.progress import Tell
 from planner.recording.joints import JointUnits
+
+if TYPE_CHECKING:
+    from planner.campaign.campaign import Campaign
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +65,7 @@ class ImportReport:
     def hit_errors(self, model: Model | None = None) -> tuple[HitErrorEstimate, ...]:
         """Of each accepted hit, as far as they are known, by this import's model or a later one."""
         files = [hit.file for hit in self.accepted]
-        poses = (model or self.model).hit_errors
-        own = next((found.hits for found in poses if found.pose == self.pose), ())
+        own = (model or self.model).hit_errors.get(self.pose, ())
         return tuple(hit for hit in own if hit.file in files)
 
 
@@ -111,90 +121,102 @@ def not_used(hits: tuple[HitRecord, ...], asked: Question | None) -> tuple[HitRe
     return tuple(replace(h, accepted=False, reason=h.reason or asked.text) for h in hits)
 
 
-def taken_after_all(state: CampaignState, fresh: tuple[Kept, ...]) -> tuple[str, ...]:
-    """A remark on each file that the engineer had refused and then named."""
-    return tuple(
-        f"{source.name} was {REFUSED} at {state.refused[digest][0]} before; it is imported now "
-        f"because it was named."
-        for source, digest, _ in fresh
-        if digest in state.refused
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class JudgedFiles:
-    """New files of a pose, judged; `still` are those refused as before, which nothing rests on.
+    """Files of a delivery: new ones, judged, those in use `already`, and those left out.
 
+    Of the new ones nothing rests on those that are refused as they were before: they are left out.
     `old` are the earlier ones beside which they stand, without those `superseded` by good new ones.
     """
 
-    fresh: tuple[Kept, ...]
-    hits: tuple[HitRecord, ...]
-    measured: MeasuredPose
-    still: tuple[HitRecord, ...]
-    old: tuple[Source, ...]
-    superseded: dict[HitRecord, str]
+    already: tuple[str, ...]
+    left_out: tuple[HitRecord, ...]
+    hits: tuple[HitRecord, ...] = ()
+    sources: tuple[Source, ...] = ()
+    measured: MeasuredPose | None = None  # None: there is nothing new
+    old: tuple[Source, ...] = ()
+    superseded: dict[HitRecord, str] = field(default_factory=dict)
 
     @classmethod
     def of(
         cls,
-        pose: str,
-        state: CampaignState,
         kept: KeptRecordings,
-        fresh: tuple[Kept, ...],
+        delivery: Delivery,
+        state: CampaignState,
+        named: frozenset[Path],
         table: ModesTable,
     ) -> "JudgedFiles":
         """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
-        known = state.hit_at(pose)
-        before = known.accepted if known else ()
-        newer, hits = [source for source, _, _ in fresh], ()
-        while True:
-            gone = superseded(before, newer)
-            old = tuple(kept.source(hit) for hit in before if hit not in gone)
-            hits, measured = measure_files(old, fresh, table)
-            good = [s for (s, _, _), hit in zip(fresh, hits, strict=True) if hit.accepted]
-            if superseded(before, good) == gone:
-                break
-            newer = [source for source in newer if source in good]
-        still = still_refused(hits, pose, state)
-        left = without(fresh, still)
-        if still and left:
-            return replaced(cls.of(pose, state, kept, left, table), still=still)
-        return cls(left, hits if left else (), measured, still, old, gone)
+        fresh, already, left_out = new_files(kept.directory, delivery, state, named)
+        known, used = state.measurements.get(delivery.pose), state.hit_at(delivery.pose)
+        accepted = used.accepted if used else ()
+        before = {replace(h, file="") for h in (known.hits if known else ()) if not h.accepted}
+        while fresh:
+            newer = [source for source, _ in fresh]
+            while True:
+                gone = superseded(accepted, newer)
+                old = tuple(kept.source(hit) for hit in accepted if hit not in gone)
+                hits, measured = measure_files(old, fresh, table)
+                good = [s for (s, _), hit in zip(fresh, hits, strict=True) if hit.accepted]
+                if superseded(accepted, good) == gone:
+                    break
+                newer = [source for source in newer if source in good]
+            still = [replace(hit, file="") in before for hit in hits]
+            if not any(still):
+                sources = tuple(source for source, _ in fresh)
+                return cls(already, left_out, hits, sources, measured, old, gone)
+            left_out += tuple(itertools.compress(hits, still))
+            fresh = tuple(one for one, out in zip(fresh, still, strict=True) if not out)
+        return cls(already, left_out)
 
 
 def measure_files(
-    old: tuple[Source, ...], fresh: tuple[Kept, ...], table: ModesTable
+    old: tuple[Source, ...], fresh: Sequence[Fresh], table: ModesTable
 ) -> tuple[tuple[HitRecord, ...], MeasuredPose]:
     """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
-    new = tuple(source for source, _, _ in fresh)
+    new = tuple(source for source, _ in fresh)
     measured = measure((*old, *new), table.band_hz, window_rate_1_s=table.window_rate_1_s)
-    verdicts = zip(measured.verdicts[len(old) :], fresh, strict=True)
-    records = tuple(
-        replace(
-            record_of(source, digest, suffix, verdict.reason),
-            hit=verdict.axis,
-            accepted=verdict.accepted,
-            simulated=verdict.simulated,
-        )
-        for verdict, (source, digest, suffix) in verdicts
+    records = (
+        replace(record, hit=v.axis, accepted=v.accepted, reason=v.reason, simulated=v.simulated)
+        for v, (_, record) in zip(measured.verdicts[len(old) :], fresh, strict=True)
     )
-    return records, measured
+    return tuple(records), measured
+
+
+def remarks_on(
+    joints: JointUnits, state: CampaignState, judged: JudgedFiles, measurement: Measurement,
+    stood: tuple[float, ...], told: tuple[str, ...],
+) -> tuple[str, ...]:  # fmt: skip
+    """What is to be known of an import, where the robot `stood`, with what was `told` of its hits.
+
+    `state` is that before it, `measurement` what came of it.
+    """
+    assert judged.measured is not None
+    return (
+        *hits_of_files(judged.measured.verdicts[len(judged.old) :]),
+        *judged.measured.remarks,
+        *told,
+        *(f"{hit.file} is set aside, {why}." for hit, why in judged.superseded.items()),
+        *(
+            f"{hit.file} was {REFUSED} at {state.refused[hit.sha256][0]} before; it is imported "
+            f"now because it was named."
+            for hit in judged.hits
+            if hit.sha256 in state.refused
+        ),
+        *displacement(joints, state, measurement.pose, stood),
+        *lacking(state, measurement),
+    )
 
 
 def displacement(
-    joints: JointUnits, state: CampaignState, delivery: Delivery, joints_deg: tuple[float, ...]
+    joints: JointUnits, state: CampaignState, pose: str, joints_deg: tuple[float, ...]
 ) -> tuple[str, ...]:
     """A remark if the robot stood elsewhere than proposed."""
-    proposal = state.proposals.get(delivery.pose)
-    if proposal is None:
-        return ()
-    off = joints.apart(proposal.joints_deg, joints_deg)
+    proposal = state.proposals.get(pose)
+    off = proposal and joints.apart(proposal.joints_deg, joints_deg)
     if not off:
         return ()
-    return (
-        f"The readback of {delivery.pose} is up to {off} from its setpoint; the readback is used.",
-    )
+    return (f"The readback of {pose} is up to {off} from its setpoint; the readback is used.",)
 
 
 def lacking(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
@@ -219,3 +241,111 @@ def lacking(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
             f"confirms; hit again."
         )
     return tuple(said)
+
+
+def import_paths(
+    campaign: "Campaign", given: tuple[Path, ...], pose: str | None, progress: Tell,
+    from_names: bool,
+) -> tuple[ImportReport, ...]:  # fmt: skip
+    """Import within an act of the campaign, see `Campaign.import_paths`."""
+    cell, state = campaign.cell, campaign.state
+    default = state.open[0] if len(state.open) == 1 else None
+    deliveries = sort_paths(given, cell.robot.joints, cell.robot.points, pose, default)
+    placed = [(d, place(cell, state, d)) for d in at_their_poses(deliveries, state)]
+    named = frozenset(path for path in given if path.is_file())
+    reports = []
+    for number, (delivery, joints_deg) in enumerate(placed):
+        progress(delivery.pose, number / len(placed))
+        sources = tuple(replaced(s, from_name=from_names) for s in delivery.sources)
+        delivery = replaced(delivery, sources=sources)
+        reports.append(import_pose(campaign, delivery, joints_deg, named))
+    return tuple(reports)
+
+
+def _taken_back(campaign: "Campaign", delivery: Delivery) -> Delivery:
+    """Take back a held import of which a delivery says something else now; all is judged anew.
+
+    The delivery with the held files of its pose that it lacks.
+    """
+    for held_at in tuple(campaign.state.held):
+        entry, event = campaign.held_import(held_at)
+        lacks = let_go(delivery, event, campaign.cell.robot.joints)
+        if lacks is not None:
+            campaign.append(events.Undone(entry.seq, gives_way=True))
+            more = tuple(map(campaign.recordings.source, lacks))
+            delivery = replaced(delivery, sources=(*delivery.sources, *more))
+    return delivery
+
+
+def import_pose(
+    campaign: "Campaign", delivery: Delivery, joints_deg: tuple[float, ...],
+    named: frozenset[Path],
+) -> ImportReport:  # fmt: skip
+    """Judge the files of one pose, ask what is to be asked, write the import and fit again."""
+    started, delivery = time.perf_counter(), _taken_back(campaign, delivery)
+    before, state, pose = campaign.model, campaign.state, delivery.pose
+    known, keeps, table = state.hit_at(pose), campaign.recordings, campaign.cell.config.modes
+    judged = JudgedFiles.of(keeps, delivery, state, named, table)
+    hits, measured = judged.hits, judged.measured
+    if measured is None:
+        held = state.held.get(pose)
+        return ImportReport(
+            pose, (), (), judged.already, held or state.measurements.get(pose), None, before,
+            before, 0.0, left_out=judged.left_out, question=held.question if held else None,
+        )  # fmt: skip
+    event, told = _event(before, state, pose, known.joints_deg if known else joints_deg, judged)
+    campaign.append(event)
+    measurement = (campaign.state.held if event.question else campaign.state.measurements)[pose]
+    # Beside new hits earlier ones may look wrong; they stay accepted all the same.
+    agreed = all(verdict.accepted for verdict in measured.verdicts[: len(judged.old)])
+    if measured.frf is not None and agreed:
+        keeps.keep_frf(measured.frf, measurement, table)
+    model = campaign.model
+    remarks = remarks_on(campaign.cell.robot.joints, state, judged, measurement, joints_deg, told)
+    return ImportReport(
+        pose=pose,
+        accepted=tuple(hit for hit in hits if hit.accepted and not event.question),
+        refused=not_used(hits, event.question),
+        already=judged.already,
+        measurement=measurement,
+        measured=measured,
+        model_before=before,
+        model=model,
+        refit_seconds=time.perf_counter() - started,
+        remarks=(*remarks, *(() if event.question else model.remarks)),
+        left_out=judged.left_out,
+        question=event.question,
+        alerts=told,
+    )
+
+
+def _event(
+    before: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...],
+    judged: JudgedFiles,
+) -> tuple[events.Imported, tuple[str, ...]]:  # fmt: skip
+    """What the log gains by new files, and remarks to be acted upon while the robot stands there.
+
+    `before` and `state` are those before the import.
+    """
+    assert judged.measured is not None
+    measured = alone = judged.measured
+    # Among earlier hits, wrong ones would not stand out; one that was replaced is no new visit.
+    if judged.old and not judged.superseded:
+        fresh = tuple(zip(judged.sources, judged.hits, strict=True))
+        alone = measure_files((), fresh, before.cell.config.modes)[1]
+    new_modes = from_modal(alone.modal)
+    asked = contradiction(pose, measured, len(judged.old))
+    asked = asked or asked_of(before, state, pose, joints_deg, alone)
+    drift = None if asked else suspected(before, state, pose, joints_deg, new_modes)
+    event = events.Imported(
+        pose=pose,
+        joints_deg=joints_deg,
+        hits=judged.hits,
+        modes=from_modal(measured.modal),
+        remarks=measured.remarks,
+        amplitude=from_homogeneity(measured.homogeneity),
+        question=asked,
+        again=drift.again if drift else "",
+        replaced=tuple((hit.sha256, why) for hit, why in judged.superseded.items()),
+    )
+    return event, alerts(before, state, event, measured, new_modes, drift)

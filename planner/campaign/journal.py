@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 import msgspec
 from filelock import FileLock, Timeout
 
+from planner import file_content
 from planner.campaign.events import AnyEvent, Entry
 from planner.errors import InputError, JournalError
 from planner.version import __version__
@@ -133,7 +134,7 @@ class Journal:
 
     def _load(self) -> LogContent:
         try:
-            return parse(self.path.read_bytes(), str(self.path))
+            return parse(file_content.read(self.path), str(self.path))
         except FileNotFoundError:
             folder = self.path.parent
             raise InputError(

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.campaign.cell import Cell
-from planner.campaign.log_conversion import to_mode
 from planner.campaign.low_fidelity import LowFidelity
+from planner.campaign.measured_modes import to_mode
 from planner.campaign.state import Measurement
 from planner.dynamics.vibration import SimulatedModes
 from planner.modal.modes import Mode

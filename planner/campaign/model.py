@@ -7,11 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.campaign.acquisition_inputs import open_parameters, outlook
+from planner.campaign.acquisition_inputs import (
+    Decision,
+    decided,
+    deciding_outputs,
+    open_parameters,
+    outlook,
+)
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.hit_error_estimates import CampaignHitErrors
-from planner.campaign.hit_errors import PoseHitErrors
+from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.labels import LabelledPose, observations
 from planner.campaign.low_fidelity import FEW_POSES, LowFidelity
 from planner.campaign.state import Measurement
@@ -31,7 +37,6 @@ from planner.surrogate.modal_surrogate import (
 from planner.words import counted
 
 if TYPE_CHECKING:
-    from planner.campaign.decision import Decision
     from planner.campaign.frf_model import FrfModel
 
 FrfOf = Callable[[Measurement, ModesTable], Frf]
@@ -96,9 +101,9 @@ class Model:
         return tuple(self.frf_of(m, table).within(table.band_hz) for m in self.used)
 
     @cached_property
-    def hit_errors(self) -> tuple[PoseHitErrors, ...]:
+    def hit_errors(self) -> dict[str, tuple[HitErrorEstimate, ...]]:
         """Of the hits of each pose, where a simulation tells them."""
-        return self.estimated.poses if self.estimated else ()
+        return self.estimated.poses if self.estimated else {}
 
     @cached_property
     def seen_exactly(self) -> ModalObservations:
@@ -139,31 +144,21 @@ class Model:
     @cached_property
     def outlook(self) -> tuple[FrequencyOutputs, Poses]:
         """The posterior as acquisitions see it, and the candidates."""
-        return self._outlook(informed=False)
+        return outlook(self, informed=False)
 
     @cached_property
     def informed(self) -> tuple[FrequencyOutputs, Poses]:
         """The same with what `informed_candidates` would tell of the simulation's parameters."""
-        return self._outlook(informed=True)
-
-    def _outlook(self, informed: bool) -> tuple[FrequencyOutputs, Poses]:
-        said = self.simulated_candidates
-        return outlook(self.cell, self.low, self.surrogate, said, self.frf_noise, informed)
+        return outlook(self, informed=True)
 
     @cached_property
-    def decision(self) -> "Decision | None":
+    def decision(self) -> Decision | None:
         """Whether the cut of campaign.toml is stable, pose by pose; None where none is named."""
-        if self.cell.cut is None:
-            return None
-        from planner.campaign.decision import decided
-
         return decided(self)
 
     @cached_property
     def deciding(self) -> tuple[FrequencyOutputs, Poses]:
         """As `informed`, asked for the margins of the decision about the cut."""
-        from planner.campaign.decision import deciding_outputs
-
         outputs, poses = self.informed
         return deciding_outputs(self, outputs), poses
 
@@ -172,7 +167,7 @@ class Model:
         """Predicted RMSE over the workspace, and what one more measurement would gain."""
         outputs, poses = self.outlook
         index = int(np.argmax(self._gains))
-        best, open_ = poses.one(index), open_parameters(self.cell, self.low, self.frf_noise)
+        best, open_ = poses.one(index), open_parameters(self)
         if open_ is not None:  # what hits there tell of it
             q = self.cell.candidates.q[index : index + 1]
             best = replace(best, information=open_.information(q))

@@ -6,7 +6,6 @@ from itertools import count as counted
 import numpy as np
 
 from planner.campaign.acquisition_inputs import (
-    cost_of,
     informed_candidates,
     open_parameters,
     poses_at,
@@ -77,7 +76,7 @@ def _names(state: CampaignState, angles: list[tuple[float, ...]]) -> list[str]:
 
     A new one is of no other pose, also of none that was measured without a proposal.
     """
-    taken = {*(m.pose for m in state.over), *state.held}
+    taken = {*(m.pose for m in state.measured), *state.held}
     known = {p.joints_deg: name for name, p in state.proposals.items() if name not in taken}
     every = (f"P{number:03d}" for number in counted(state.proposals_made + 1))
     given = {*state.proposals, *state.measurements, *state.held}
@@ -90,12 +89,12 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
     joints, x = cell.robot.joints, cell.candidates.features
     stood = [m.joints_deg for m in state.measurements.values()]
     at = joints.internal(stood[-1]) if stood else None
-    taken = [m.joints_deg for m in state.over]
+    taken = [m.joints_deg for m in state.measured]
     taken += [m.joints_deg for m in state.held.values()]
     shares = None
     if cell.config.acquisition.hit_axes == "best" and acquisition not in DESIGNS:
         shares = axis_shares(model.low.simulate(cell.candidates.q).residue)
-    travel = Travel(cost_of(cell), cell.candidates.q, at, shares)
+    travel = Travel(cell.cost, cell.candidates.q, at, shares)
     taken += [state.proposals[pose].joints_deg for pose in state.skipped]
     allowed = cell.allowed
     for pose in state.avoided:
@@ -129,13 +128,13 @@ def places_for(model: Model, state: CampaignState, proposal: Proposal) -> Better
     """
     cell = model.cell
     # Before the first hits nobody knows what will be open.
-    open_ = open_parameters(cell, model.low, model.frf_noise) if model.labelled else None
+    open_ = open_parameters(model) if model.labelled else None
     if open_ is None or not cell.robot.points.axes:
         return None
     joints = cell.robot.joints
     q = joints.internal([proposal.joints_deg])
-    at, _ = poses_at(cell, model.low, model.surrogate, open_, q)
-    cost, taken = cost_of(cell), [m.joints_deg for m in state.measurements.values()]
+    at, _ = poses_at(model, q)
+    cost, taken = cell.cost, [m.joints_deg for m in state.measurements.values()]
     travel = cost.travel(q, joints.internal(taken[-1]) if taken else None)
     pose = proposal.pose, at, q[0]
     target = cell.config.stop.frequency_sd_percent

@@ -17,10 +17,10 @@ from planner.campaign.config import (
     config_from_builtins,
     load_campaign_config,
 )
-from planner.campaign.events import Configured, Entry, HitRecord, Imported, Refused
+from planner.campaign.events import Configured, Entry, Imported, Refused
 from planner.campaign.journal import Journal
-from planner.campaign.kept_recordings import KeptRecordings
 from planner.campaign.state import CampaignState, Measurement, fold
+from planner.campaign.store import KeptRecordings
 from planner.dataset.store import Store, user_store
 from planner.errors import InputError
 from planner.progress import Tell, quietly
@@ -30,8 +30,8 @@ from planner.version import __version__
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from planner.campaign.at_force import ForceModel
     from planner.campaign.cell import Cell
+    from planner.campaign.frf_model import ForceModel
     from planner.campaign.model import Model
     from planner.dataset.dataset import Dataset
     from planner.dataset.visits import Recording
@@ -51,10 +51,15 @@ class CampaignReads:
         self.directory = Path(directory).resolve()
         self._kept = user_store() if models is None else models
         self._journal = Journal(self.directory / store.LOG)
-        self._cells: dict[str, Cell] = {}
-        self._models: dict[tuple[str, int], Model] = {}
-        self._folded: tuple[tuple[Entry, ...], CampaignState] = (), fold(())
+        self._memory: dict[str, tuple[Any, Any]] = {}  # by what it is: of which, and that itself
         self._force_n: float | None = None
+
+    def _remembered(self, what: str, of: Any, make: Callable[[], T]) -> T:
+        """What follows from `of`, made once for as long as that is the same."""
+        known = self._memory.get(what)
+        if known is None or known[0] != of:
+            known = self._memory[what] = of, make()
+        return known[1]
 
     def __repr__(self) -> str:
         state = self.state
@@ -74,10 +79,7 @@ class CampaignReads:
     @property
     def state(self) -> CampaignState:
         """The fold over the log, with changes made by hand to the configuration."""
-        entries = self.entries
-        if entries is not self._folded[0]:
-            self._folded = entries, fold(entries)
-        state = self._folded[1]
+        state = self._remembered("state", self.entries, lambda: fold(self.entries))
         if state.configured is None:
             raise InputError(
                 f"{self.directory} holds an empty log; start the campaign again with planner new."
@@ -87,11 +89,11 @@ class CampaignReads:
     @property
     def cell(self) -> "Cell":
         """Robot, simulation and workspace as configured now."""
-        from planner.campaign.cell import Cell
-
         configured = self._configured()
-        key = _text(configured)
-        if key not in self._cells:
+
+        def load() -> "Cell":
+            from planner.campaign.cell import Cell
+
             config = config_from_builtins(configured.config)
             loaded = Cell.load(self.directory / config.robot, config)
             if loaded.robot.joints.declared != configured.joint_units:
@@ -99,8 +101,9 @@ class CampaignReads:
                     f"{loaded.robot.urdf_path}: other joints slide than when the campaign began, "
                     f"so that places in its log would be read wrongly; start a new campaign."
                 )
-            self._cells[key] = loaded
-        return self._cells[key]
+            return loaded
+
+        return self._remembered("cell", content_hash.of(configured), load)
 
     @property
     def robot_toml(self) -> Path:
@@ -110,16 +113,18 @@ class CampaignReads:
     @property
     def model(self) -> "Model":
         """The model after all measurements; fitted once per state, then kept on disk."""
-        state, configured = self.state, self._configured()
-        key = _text(configured), state.model_version
-        if key not in self._models:
+        state, configured = self.state, content_hash.of(self._configured())
+
+        def find() -> "Model":
             found = self.kept_model(state)
             if found is None:
                 found = self._fitted(state)
                 self._kept.put(self._key("model", state.used), found)
-            self._cells[key[0]] = found.cell  # with the candidates that were worked out for it
-            self._models = {key: found}
-        return self._models[key]
+            # With the candidates that were worked out for it.
+            self._memory["cell"] = configured, found.cell
+            return found
+
+        return self._remembered("model", (configured, state.model_version), find)
 
     def kept_model(self, state: CampaignState) -> "Model | None":
         """The model of an earlier state of this configuration, where it is kept on disk."""
@@ -162,11 +167,11 @@ class CampaignReads:
 
         def recall(used: tuple[Measurement, ...], find: Callable[[], FitRecord]) -> FitRecord:
             # What was fitted does not know where files are: a copy of the campaign finds it.
-            bare = tuple(replace(m, hits=tuple(unplaced(h) for h in m.hits)) for m in used)
-            return self._kept.result(self._key("fit", bare, ""), FitRecord, find)
-
-        def unplaced(hit: HitRecord) -> HitRecord:
-            return msgspec.structs.replace(hit, file="")
+            bare = (
+                replace(m, hits=tuple(msgspec.structs.replace(h, file="") for h in m.hits))
+                for m in used
+            )
+            return self._kept.result(self._key("fit", tuple(bare), ""), FitRecord, find)
 
         with threadpool_limits(1):
             model = build(self.cell, state, kept.frf, kept.hits, recall)
@@ -280,7 +285,7 @@ class CampaignReads:
     @property
     def at_force(self) -> "ForceModel":
         """What a stated force changes; worked out at each call."""
-        from planner.campaign.at_force import ForceModel
+        from planner.campaign.frf_model import ForceModel
 
         return ForceModel.of(self)
 
@@ -300,17 +305,16 @@ class CampaignReads:
 
     def records(self) -> list[dict[str, Any]]:
         """All measured modes, one row each: what pandas.DataFrame takes."""
-        from planner.campaign.records import measured_records
+        from planner.campaign.measured_modes import measured_records
 
         return measured_records(self.cell.robot.joints, self.state.measurements.values())
 
     def predict_records(self, *, joints_deg: "ArrayLike") -> list[dict[str, Any]]:
         """`predict` as rows, one for each mode of each pose."""
-        from planner.campaign.planned import inside
-        from planner.campaign.records import predicted_records
+        from planner.campaign.measured_modes import predicted_records
 
         q, there = self.cell.poses(joints_deg), self.model.predict
-        return predicted_records(self.cell.robot.joints, q, there(q), inside(self.cell, q))
+        return predicted_records(self.cell.robot.joints, q, there(q), self.cell.inside(q))
 
     @property
     def frequency_lines(self) -> np.ndarray:
@@ -318,10 +322,6 @@ class CampaignReads:
         from planner.frf.synthesis import frequency_lines
 
         return frequency_lines(self.cell.config.modes.band_hz)
-
-
-def _text(configured: Configured) -> str:
-    return msgspec.json.encode(configured).decode()
 
 
 def as_logged(config: CampaignConfig) -> dict:

@@ -71,9 +71,7 @@ class CampaignState:
     held: dict[str, Measurement] = field(default_factory=dict)  # until their question is answered
     refused: dict[str, tuple[str, HitRecord]] = field(default_factory=dict)  # by sha256: pose, hit
     shown: dict[str, str] = field(default_factory=dict)  # by sha256: the pose that it is of
-    guessed: dict[str, str] = field(
-        default_factory=dict
-    )  # where those came of which that is a guess
+    guessed: dict[str, str] = field(default_factory=dict)  # where those came that are guessed
     skipped: dict[str, str] = field(default_factory=dict)
     avoided: frozenset[str] = frozenset()  # of these, those whose neighbours are not offered either
     starred: frozenset[str] = frozenset()
@@ -96,11 +94,6 @@ class CampaignState:
         """What was measured at a pose; None too where every hit there was refused."""
         known = self.measurements.get(pose)
         return None if known is None or known.unhit else known
-
-    @property
-    def over(self) -> tuple[Measurement, ...]:
-        """Poses that are not to be proposed again, for there were hits."""
-        return self.measured
 
     def came(self, digest: str, pose: str) -> str:
         """The pose that a file (sha256) is of, as seen from `pose`; that where nothing is known.

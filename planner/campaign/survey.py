@@ -14,6 +14,7 @@ from planner.dataset.measure import DEFAULT_BAND_HZ, MeasuredPose, measure
 from planner.dataset.screened_files import Source, in_parts
 from planner.dynamics.simulation import Simulation
 from planner.errors import RefusedError, RefusedFile
+from planner.fit.learned import Learned
 from planner.frf.frf import Frf
 from planner.measurement.measured_frfs import common_band
 from planner.measurement.nuisances import Tolerances
@@ -117,13 +118,16 @@ def _hit_errors(
     if nominal is None or not visited:
         return CampaignHitErrors((), None, Tolerances(), band)
     visits, whole = zip(*visited, strict=True)
-    t, q = _tolerances(nominal), np.array([one.q for one in visits])
-    learned = learn(LowFidelity(1, nominal, t), whole, q, band).learned
+    learned, t = _learned(nominal, whole, np.array([one.q for one in visits]), band)
     return estimate(visits, learned, t, band)
 
 
-def _tolerances(simulation: Simulation) -> Tolerances:
-    return Tolerances.of(simulation.robot.config, simulation.robot.joints.slides)
+def _learned(
+    nominal: Simulation, frfs: Sequence[Frf], q: np.ndarray, band: tuple[float, float]
+) -> tuple[Learned | None, Tolerances]:
+    """What FRFs at q (n, dof) in rad tell of a robot, within the tolerances that it states."""
+    t = Tolerances.of(nominal.robot.config, nominal.robot.joints.slides)
+    return learn(LowFidelity(1, nominal, t), frfs, q, band).learned, t
 
 
 def _doubts(
@@ -144,8 +148,8 @@ def _doubts(
     known = [(i, frf) for i, frf in tool if frf is not None]
     if found and known:
         # What was identified from wrongly named points too is spoiled: from the tool's alone.
-        nominal = LowFidelity(1, simulations[0], _tolerances(simulations[0]))
-        learned = learn(nominal, [frf for _, frf in known], q[[i for i, _ in known]], band).learned
+        at, frfs_of_tool = zip(*known, strict=True)
+        learned, _ = _learned(simulations[0], frfs_of_tool, q[list(at)], band)
         if learned is not None:
             tried = [*simulations, learned.identified.simulation]
             found = misplaced(tried, q[index], frfs, usable)

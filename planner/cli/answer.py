@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,24 +12,32 @@ from planner.words import by_reason
 if TYPE_CHECKING:
     from planner.report.answer import Answer, RefusedFile
 
-AsJson = Annotated[bool, typer.Option("--json", help="Answer with one JSON document.")]
-
 RECORDED = "Folder with recordings.csv, or with folders that have one; or a campaign"
 
-RobotOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--robot", metavar="ROBOT_TOML", help="The robot's robot.toml (a campaign has its own)."
-    ),
-]
 
+def option(text: str, metavar: str | None = None, *names: str) -> Any:
+    """An option with its help text, called by its parameter's name unless `names` are given."""
+    return typer.Option(*names, metavar=metavar, help=text)
+
+
+AsJson = Annotated[bool, option("Answer with one JSON document.", None, "--json")]
+Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Campaign folder.")]
+RobotOption = Annotated[
+    Path | None, option("The robot's robot.toml (a campaign has its own).", "ROBOT_TOML", "--robot")
+]
 FromNames = Annotated[
     bool,
-    typer.Option(
+    option(
+        "FRFs' directions or nodes from file names (tap_yx, H3_1) where files lack them.",
+        None,
         "--from-names",
-        help="FRFs' directions or nodes from file names (tap_yx, H3_1) where files lack them.",
     ),
 ]
+WindowRate = Annotated[
+    float, option("Of the analyser's exponential window.", "1/S", "--window-rate")
+]
+PictureFormat = Annotated[str, option("Of the pictures: png or svg.", None, "--format")]
+Rrd = Annotated[Path | None, option("Write a Rerun recording to this file.")]
 
 
 def respond(answer: "Answer", as_json: bool, code: int = 0) -> int:

@@ -5,18 +5,22 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.acts import Directory, confirm, redo, skip, undo, withdraw
-from planner.cli.answer import AsJson, FromNames, refusals, respond, warn
-from planner.cli.checking import check
-from planner.cli.comparison import compare
-from planner.cli.couple import couple
-from planner.cli.documentation import manual, schema
-from planner.cli.exports import export, report
-from planner.cli.identification import diagnose, identify
+from planner.cli.acts import confirm, export, new, redo, report, skip, undo, withdraw
+from planner.cli.answer import (
+    AsJson,
+    Directory,
+    FromNames,
+    PictureFormat,
+    Rrd,
+    option,
+    refusals,
+    respond,
+    warn,
+)
+from planner.cli.documentation import check, manual, prove, schema, study
+from planner.cli.identification import compare, diagnose, identify
 from planner.cli.modes import modes
-from planner.cli.new import new
-from planner.cli.stability import stability
-from planner.cli.study import prove, study
+from planner.cli.stability import couple, stability
 from planner.errors import InputError
 from planner.words import command
 
@@ -30,7 +34,6 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-Rrd = Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")]
 Viewer = Annotated[bool, typer.Option("--viewer", help="Show progress in a live Rerun viewer.")]
 
 
@@ -48,9 +51,7 @@ def _root(
 def next_(
     directory: Directory,
     count: Annotated[int, typer.Option(min=1, max=100, help="How many poses.")] = 1,
-    acquisition: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Instead of campaign.toml's.")
-    ] = None,
+    acquisition: Annotated[str | None, option("Instead of campaign.toml's.", "NAME")] = None,
     as_json: AsJson = False,
 ) -> int:
     """Propose the next pose or poses to measure.
@@ -96,7 +97,7 @@ def status_(
             metavar="FOLDER", help="Draw each pose predicted without it into this folder."
         ),
     ] = None,
-    format_: Annotated[str, typer.Option("--format", help="Of the picture: png or svg.")] = "png",
+    format_: PictureFormat = "png",
     models: Annotated[
         bool, typer.Option("--models", help="Try every [surrogate] model, poses left out.")
     ] = False,

@@ -1,4 +1,4 @@
-"""What a simulation is told by recordings (`planner identify`, `planner diagnose`)."""
+"""What recordings tell (`planner identify`, `planner diagnose`, `planner compare`)."""
 
 import time
 from dataclasses import replace
@@ -7,15 +7,25 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import RECORDED, AsJson, RobotOption, refusals, respond
+from planner.cli.answer import (
+    RECORDED,
+    AsJson,
+    PictureFormat,
+    RobotOption,
+    Rrd,
+    WindowRate,
+    option,
+    refusals,
+    respond,
+    warn,
+)
+from planner.errors import InputError
 
 
 def identify(
     recordings: Annotated[Path, typer.Argument(metavar="RECORDINGS", help=f"{RECORDED}.")],
     robot: RobotOption = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="ROBOT_TOML", help="Write the identified robot here.")
-    ] = None,
+    out: Annotated[Path | None, option("Write the identified robot here.", "ROBOT_TOML")] = None,
     inertias: Annotated[
         bool, typer.Option(help="Let masses and inertias err by 8 %, centres of mass by 1 cm.")
     ] = True,
@@ -30,15 +40,10 @@ def identify(
         tuple[float, float] | None,
         typer.Option(metavar="LOW HIGH", help="Band in Hz, instead of robot.toml's."),
     ] = None,
-    window_rate_1_s: Annotated[
-        float,
-        typer.Option("--window-rate", metavar="1/S", help="Of the analyser's exponential window."),
-    ] = 0.0,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Draw FRFs before and after into it.")
-    ] = None,
-    format_: Annotated[str, typer.Option("--format", help="Of the pictures: png or svg.")] = "png",
-    rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
+    window_rate_1_s: WindowRate = 0.0,
+    plot: Annotated[Path | None, option("Draw FRFs before and after into it.", "FOLDER")] = None,
+    format_: PictureFormat = "png",
+    rrd: Rrd = None,
     as_json: AsJson = False,
 ) -> int:
     """Fit stiffness and damping of a robot's simulation to recorded hits.
@@ -80,16 +85,9 @@ def identify(
 def diagnose(
     recordings: Annotated[Path, typer.Argument(metavar="RECORDINGS", help=f"{RECORDED}.")],
     robot: RobotOption = None,
-    predict: Annotated[
-        Path | None, typer.Option(metavar="POSES_CSV", help="Poses whose FRFs are wanted.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Write robot, FRFs and pictures here.")
-    ] = None,
-    window_rate_1_s: Annotated[
-        float,
-        typer.Option("--window-rate", metavar="1/S", help="Of the analyser's exponential window."),
-    ] = 0.0,
+    predict: Annotated[Path | None, option("Poses whose FRFs are wanted.", "POSES_CSV")] = None,
+    out: Annotated[Path | None, option("Write robot, FRFs and pictures here.", "FOLDER")] = None,
+    window_rate_1_s: WindowRate = 0.0,
     as_json: AsJson = False,
 ) -> int:
     """Locate where simulation and recordings differ, name the missing physics, show the fit.
@@ -129,3 +127,88 @@ def _target(out: Path | None, predict: Path, recordings: Path) -> Path:
     """Where predictions go: FOLDER, or beside the recordings' folder."""
     folder = out if out is not None else recordings.absolute().parent / "predictions"
     return folder.absolute() / f"{predict.stem}.npz"
+
+
+SIMULATIONS = ("frozen", "updated", "none")
+
+
+def compare(
+    recordings: Annotated[
+        Path, typer.Argument(metavar="RECORDINGS", help=f"{RECORDED}: the pool.")
+    ],
+    strategies: Annotated[
+        str | None,
+        typer.Option(metavar="A,B,…", help="random, sobol, maximin_lhs, default, variance, …"),
+    ] = None,
+    models: Annotated[
+        str | None,
+        typer.Option(metavar="A,B,…", help="default, gp, ar1, nargp, mfdgp, multitask, none."),
+    ] = None,
+    robot: RobotOption = None,
+    repeats: Annotated[int, typer.Option(min=1, max=10_000, help="Seeds.")] = 20,
+    initial: Annotated[
+        int, typer.Option(min=1, help="First poses, the same for all strategies at a seed.")
+    ] = 3,
+    budget: Annotated[
+        int | None, typer.Option(min=1, help="Measurements (default: 15, or what the pool allows).")
+    ] = None,
+    simulation: Annotated[str | None, option("frozen, updated or none.", "USE")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Of a Dask cluster that does the runs.")
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, max=256, help="Processes on this machine.")] = 2,
+    campaign: Annotated[
+        Path | None, typer.Option(metavar="CAMPAIGN_TOML", help="Workspace, modes, acquisition.")
+    ] = None,
+    out: Annotated[Path | None, option("Where results and the picture go.", "FOLDER")] = None,
+    rrd: Rrd = None,
+    as_json: AsJson = False,
+) -> int:
+    """Compare sampling strategies: error by number of measurements, on poses not used.
+
+    `--models` compares models of the frequencies, as `[surrogate] model` names them.
+
+    Example: planner compare exports --robot robot/robot.toml --strategies random,default
+    """
+    from planner.campaign import store
+    from planner.campaign.material import material
+    from planner.cli.progress import telling
+    from planner.compare.bench import assemble, decide
+    from planner.compare.resume import conduct, recorded
+    from planner.compare.tasks import Study
+    from planner.report.comparison import comparison
+
+    started = time.perf_counter()
+    if simulation not in (None, *SIMULATIONS):
+        raise InputError(f"--simulation {simulation} is not known; give {', '.join(SIMULATIONS)}.")
+    given = material(recordings, robot, 0.0)
+    loaded = given.nominal
+    listed = given.listed(loaded)
+    if campaign is None and given.campaign is not None:
+        campaign = given.campaign.directory / store.CONFIG
+    config = decide(loaded, listed, campaign, simulation)
+    folder = out or _cache_folder()
+    with telling("comparing", quiet=as_json) as progress:
+        poses = recorded(listed, loaded.joints, config.modes, workers, progress)
+        bench, remarks = assemble(loaded, config, poses)
+        study = Study.plan(bench, strategies, models, repeats, initial, budget)
+        found, damaged = conduct(bench, study, folder, scheduler, workers, progress)
+    answer = comparison(bench, study, found, poses, (*remarks, *damaged))
+    answer = answer.with_pictures(out, rrd, bench.key)
+    answer = replace(answer, seconds=time.perf_counter() - started)
+    if out is not None:
+        answer.write(out)
+    for run in answer.failed:
+        warn(f"The run of {run.strategy} with seed {run.seed} failed: {run.reason}")
+    return respond(answer, as_json)
+
+
+def _cache_folder() -> Path:
+    from planner import cache_folder
+
+    try:
+        return cache_folder.folder("compare")
+    except RuntimeError:
+        raise InputError(
+            "There is no home folder to keep results in; name one with --out."
+        ) from None

@@ -5,7 +5,16 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, FromNames, refusals, respond
+from planner.cli.answer import (
+    AsJson,
+    FromNames,
+    PictureFormat,
+    Rrd,
+    WindowRate,
+    option,
+    refusals,
+    respond,
+)
 from planner.errors import InputError
 
 
@@ -14,12 +23,8 @@ def modes(
         list[Path],
         typer.Argument(metavar="PATH...", help="Hits or FRFs, of a pose or of any points."),
     ],
-    band_hz: Annotated[
-        tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Band in Hz.")
-    ] = None,
-    force: Annotated[
-        str | None, typer.Option(metavar="CHANNEL", help="Force channel, if not labelled.")
-    ] = None,
+    band_hz: Annotated[tuple[float, float] | None, option("Band in Hz.", "LOW HIGH")] = None,
+    force: Annotated[str | None, option("Force channel, if not labelled.", "CHANNEL")] = None,
     quantity: Annotated[
         str | None,
         typer.Option(
@@ -27,19 +32,14 @@ def modes(
         ),
     ] = None,
     estimator: Annotated[str, typer.Option(help="h1, h2 or hv.")] = "h1",
-    window_rate_1_s: Annotated[
-        float,
-        typer.Option("--window-rate", metavar="1/S", help="Of the analyser's exponential window."),
-    ] = 0.0,
+    window_rate_1_s: WindowRate = 0.0,
     robot: Annotated[
         Path | None,
         typer.Option(metavar="ROBOT_TOML", help="Whose simulation guides labels over poses."),
     ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Draw the analysis into this folder.")
-    ] = None,
-    format_: Annotated[str, typer.Option("--format", help="Of the pictures: png or svg.")] = "png",
-    rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
+    plot: Annotated[Path | None, option("Draw the analysis into this folder.", "FOLDER")] = None,
+    format_: PictureFormat = "png",
+    rrd: Rrd = None,
     real: Annotated[
         bool, typer.Option("--real", help="Of any points: real normal modes as shapes.")
     ] = False,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.campaign.config import ModesTable
-from planner.campaign.log_conversion import from_modal
+from planner.campaign.measured_modes import from_modal
 from planner.campaign.state import Measurement
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source

@@ -9,7 +9,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from planner import content_hash
-from planner.campaign.acquisition_inputs import cost_of
 from planner.campaign.build import build
 from planner.campaign.low_fidelity import Recall, in_memory
 from planner.campaign.model import Model
@@ -79,7 +78,7 @@ def _cell(bench: Bench, task: Task) -> PoolCell:
 
 def _minutes(bench: Bench, cell: PoolCell, used: list[int]) -> tuple[float, ...]:
     """Robot time until each pose is measured, in this order, hit along the axes recorded."""
-    cost, at, total = cost_of(cell), None, []
+    cost, at, total = cell.cost, None, []
     for i in used:
         axes = tuple(axis for axis in range(3) if bench.frfs[i].hits[axis])
         total.append(float(cost.minutes(bench.q[i][None], at, axes)[0]))

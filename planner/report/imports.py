@@ -160,7 +160,7 @@ class ImportedPoses(Answer):
     def of(cls, reports: "tuple[ImportReport, ...]", simulated: bool = False) -> "ImportedPoses":
         """Of what `Campaign.import_paths` gave; hits are told by what all of them taught."""
         model = reports[-1].model
-        every = [hit for pose in model.hit_errors for hit in pose.hits]
+        every = [hit for own in model.hit_errors.values() for hit in own]
         poses = tuple(PoseImport.of(report, model) for report in reports)
         common = systematic_errors(every) if any(pose.accepted for pose in poses) else ()
         return cls(poses, common, simulated or any(pose.simulated for pose in poses))

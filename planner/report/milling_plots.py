@@ -7,7 +7,7 @@ from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 from scipy.stats import rankdata
 
-from planner.campaign.cut_advice import FeedAdvice, TurnAdvice
+from planner.campaign.toolpath_poses import FeedAdvice, TurnAdvice
 from planner.milling.coupling import AMPLIFICATION_LIMIT, CoupledFrf
 from planner.milling.cut import Cut
 from planner.milling.lobes import Loss, SampledLimits

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from msgspec import UNSET
 
-from planner.campaign.log_conversion import from_homogeneity
+from planner.campaign.measured_modes import from_homogeneity
 from planner.dataset.frf_set import FrfSet
 from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import Source, in_parts, told_of_files

@@ -247,7 +247,7 @@ def survey_report(found: "Survey") -> ModesReport:
         )
         others = tuple(answer(mode, None, None) for mode in tracks.unexpected[i])
         poses.append(SurveyedPose(name, modes, others))
-    hits = tuple(hit for pose in found.hit_errors.poses for hit in pose.hits)
+    hits = tuple(hit for own in found.hit_errors.poses.values() for hit in own)
     return ModesReport(
         poses=tuple(poses), modes=poses[0].modes, band_hz=found.band_hz, refused=found.refused,
         remarks=found.remarks, simulated=found.simulated, hit_errors=hits,

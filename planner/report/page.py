@@ -10,7 +10,7 @@ import numpy as np
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.config import CampaignConfig
-from planner.campaign.left_out import found_without
+from planner.campaign.model_status import found_without
 from planner.campaign.state import CampaignState, Measurement, taken_back
 from planner.campaign.taking_back import act
 from planner.design.stopping import percent

@@ -12,7 +12,7 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.planned import inside, outside_remark
+from planner.campaign.model_status import outside_remark
 from planner.export.npz import save_frfs
 from planner.frf.synthesis import frequency_lines
 from planner.report.answer import Answer
@@ -119,7 +119,7 @@ def predictions(
 
     Raises InputError where that cannot be written.
     """
-    from planner.campaign.at_force import UNCHANGED  # status needs none of what that imports
+    from planner.campaign.frf_model import UNCHANGED  # status needs none of what that imports
 
     angles, lines = np.array(q), campaign.frequency_lines
     prediction, (mean, sd) = campaign.model.predict(angles), campaign.frf_at(angles)
@@ -129,7 +129,7 @@ def predictions(
         prediction = there.modes(prediction, angles, force_n)
         mean = mean + there.frf_change(angles, force_n, lines)
         said = () if there.simulation else (UNCHANGED,)
-    outside, joints = ~inside(campaign.cell, angles), campaign.cell.robot.joints
+    outside, joints = ~campaign.cell.inside(angles), campaign.cell.robot.joints
     save_frfs(npz, lines, mean, sd, names, joints, angles, outside, force_n if asked else None)
     modes = (ExpectedMode.all_of(prediction, i) for i in range(len(angles)))
     poses = _poses(names, modes, outside, force_n)
@@ -147,7 +147,7 @@ def robot_predictions(
 
     Raises InputError where its simulation is not possible there, or the file cannot be written.
     """
-    from planner.campaign.at_force import UNCHANGED
+    from planner.campaign.frf_model import UNCHANGED
     from planner.dynamics.at_force import change_at_force, modes_at_force
     from planner.dynamics.simulation import Simulation
 

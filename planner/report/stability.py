@@ -10,9 +10,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.campaign.cut_advice import FeedAdvice, TurnAdvice, turn_advice
 from planner.campaign.cut_source import Asked, outside, structure_of, structures_of_file
-from planner.campaign.toolpath_poses import Travelled, Way
+from planner.campaign.toolpath_poses import FeedAdvice, Travelled, TurnAdvice, Way, turn_advice
 from planner.milling.cut import Cut, load_cut
 from planner.milling.lobes import PROBABILITY, Loss, SampledLimits, losses, sampled_limits
 from planner.milling.machine import multiplier

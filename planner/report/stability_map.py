@@ -85,7 +85,7 @@ def map_report(
     candidates = campaign.cell.candidates
     count = min(count, campaign.cell.spread)
     asked_of = tuple(f"W{i + 1:03d}" for i in range(count))
-    at = at_poses_in_band(campaign, asked_of, candidates.q[:count], cut, change)
+    at = list(at_poses_in_band(campaign, asked_of, candidates.q[:count], cut, change))
     poses = [(n, s) for n, s in zip(asked_of, at, strict=True) if isinstance(s, Structure)]
     names = tuple(name for name, _ in poses)
     left_out = tuple(name for name in asked_of if name not in names)

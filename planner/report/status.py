@@ -11,9 +11,8 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.decision_status import DecisionStatus
 from planner.campaign.events import Proposal, Question
-from planner.campaign.left_out import LeftOutValues, found_without, left_out
+from planner.campaign.model_status import DecisionStatus, LeftOutValues, found_without, left_out
 from planner.campaign.state import Measurement
 from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain

@@ -15,19 +15,17 @@ from planner.dataset.screened_files import Source
 from planner.errors import NoPoseLeftError, PlannerError
 from planner.report.campaign_acts import redone, undone
 from planner.session import session_text
-from planner.session.course import BAD, Course, PoseInProgress
-from planner.session.page import (
-    ask_why,
-    can_take_back,
-    on_reason_key,
-    page_with_hits,
-    page_without_hits,
-)
-from planner.session.station import Station
+from planner.session.pose_screen import page_with_hits, page_without_hits
+from planner.session.station import BAD, Course, PoseInProgress, Station
 from planner.words import by_reason, counted, short_name
 
 ENTER = ("a", "\n", "\r")
 IMPORTING = "importing and refitting"
+ESCAPE, ERASE = "\x1b", ("\x7f", "\b")
+ASKED = (
+    "What stands in the way? Type it, then Enter: poses around it are left out too.\n"
+    "Enter alone skips this pose only, Escape goes back. "
+)
 
 
 def arrive(station: Station, course: Course) -> Course:
@@ -43,9 +41,9 @@ def arrive(station: Station, course: Course) -> Course:
     if course.left:  # what lies there before the robot can have moved
         campaign.show(course.left, station.inbox.present())
     page = page_without_hits(
-        campaign, proposal, station.hits_at(proposal), station.inbox.folder, course
+        campaign, proposal, station.hits_at(proposal), station.inbox.folder, course.progress
     )
-    page = page_with_hits(page, (), (), can_take_back(campaign), station.auto, course)
+    page = page_with_hits(page, (), (), station.can_take_back, station.auto, course.progress)
     station.screen.show(page.page)
     station.rerun_queue.show()
     before = station.pose_before(proposal.pose)
@@ -66,7 +64,7 @@ def say_last_import(station: Station) -> None:
 
 def on_key(station: Station, course: Course, visit: PoseInProgress, key: str | None) -> Course:
     """Act on a key at a pose; without a visit the pose is over."""
-    on = _act if visit.typed is None else on_reason_key
+    on = _act if visit.typed is None else _on_reason_key
     try:
         return on(station, course, visit, key)
     except PlannerError as error:
@@ -105,7 +103,7 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
             campaign.star(pose)
             station.say(f"★ {pose}")
         case "k":
-            return replace(course, visit=ask_why(station, visit))
+            return replace(course, visit=_ask_why(station, visit))
         case "u":
             return undo(station, over)
         case "U":
@@ -117,6 +115,32 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
         case _:
             station.say(session_text.not_now(key), "dim")
     return course
+
+
+def _ask_why(station: Station, visit: PoseInProgress, typed: str = "") -> PoseInProgress:
+    """The visit while a reason is typed, which the page shows in the place of the keys."""
+    station.screen.show(replace(visit.page, keys=f"{ASKED}{typed}_").page)
+    return replace(visit, typed=typed)
+
+
+def _on_reason_key(
+    station: Station, course: Course, visit: PoseInProgress, key: str | None
+) -> Course:
+    """One more key of the reason; the pose is over with Enter."""
+    typed, pose = visit.typed or "", visit.proposal.pose
+    if key is None:
+        return course
+    if key == ESCAPE:
+        station.screen.show(visit.page.page)
+        return replace(course, visit=replace(visit, typed=None))
+    if key in ("\r", "\n"):
+        reason = typed.strip()
+        station.campaign.skip(pose, reason or "skipped in the session", neighbours=bool(reason))
+        which = f"{pose} and poses around it" if reason else pose
+        station.say(f"{which} will not be offered again ([u] takes that back).")
+        return replace(course, visit=None)
+    typed = typed[:-1] if key in ERASE else typed + key * key.isprintable()
+    return replace(course, visit=_ask_why(station, visit, typed))
 
 
 def _refuse(station: Station, visit: PoseInProgress, files: Collection[Path]) -> None:

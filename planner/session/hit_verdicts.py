@@ -17,6 +17,7 @@ from planner.session.inbox import FolderTable
 # As like as hits of one pose are (0.98 and more on the true robots of the tests); at poses that a
 # campaign proposes one after the other it is below 0.9. Chosen between.
 SAME_POSE = SAME
+BAD = ("repeat", "unsure", "unstated")  # kinds of verdicts on which something is to be done
 Part = tuple[Path, int]  # which of a file's hits, from 1
 
 

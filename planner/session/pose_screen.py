@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from re import split
 
@@ -10,13 +10,15 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.dataset.screened_files import when
 from planner.recording.joints import JointUnits
 from planner.report.text import with_sd
-from planner.session.hit_verdicts import HitVerdict
+from planner.robot.place_names import axes_in_the_room
+from planner.session.hit_verdicts import BAD, HitVerdict
 from planner.session.screen import Said, fitted
-from planner.words import command
+from planner.words import command, counted, short_name
 
 WIDTH, HEIGHT = 80, 22  # of the smallest terminal, less a line for work and the cursor's
 LAST = 4  # verdicts that are shown
@@ -188,3 +190,92 @@ def _unfinished(name: str, said: str) -> Said:
         return Said([None, Text(f"not whole yet: {said}", "dim")], 5)
     short = f"cannot be used: {name}: {do}"
     return Said([None, Text(short, "dim"), Text(f"{short} {why}", "dim")], 5)
+
+
+def page_without_hits(
+    campaign: Campaign, proposal: Proposal, hits_per_pose: int, folder: Path, progress: str
+) -> PosePage:
+    """What the screen says of a pose before anything was hit there."""
+    model, robot = campaign.model, campaign.cell.robot
+    q = robot.joints.internal([proposal.joints_deg])
+    expected = model.predict(q)
+    return PosePage(
+        proposal, len(model.labelled) + 1, robot.joints, robot.config.tcp_frame,
+        max(1, hits_per_pose // len(proposal.hits)), (),
+        tuple(expected.frequency_hz[0].tolist()), tuple(expected.frequency_sd_hz[0].tolist()),
+        folder, progress=progress, room=axes_in_the_room(robot, q[0]),
+    )  # fmt: skip
+
+
+def page_with_hits(
+    page: PosePage,
+    verdicts: Sequence[HitVerdict],
+    waiting: Sequence[tuple[Path, str]],
+    can: tuple[bool, bool],
+    auto: bool,
+    progress: str,
+) -> PosePage:
+    """The page with the hits that wait, the files that are not whole yet, and keys that do.
+
+    `can`: whether there is an act to take back, and one that was and can hold again.
+    """
+    names = [one.path.name for one in verdicts]
+    hits = tuple(_judged(one, names) for one in verdicts)
+    unfinished = tuple((short_name(path), _named(path, why)) for path, why in waiting)
+    streams = _streams(verdicts)
+    page = replace(page, hits=hits, unfinished=unfinished, progress=progress, streams=streams)
+    return replace(page, keys="" if auto else _keys(page, can))
+
+
+def _judged(verdict: HitVerdict, names: Sequence[str]) -> HitVerdict:
+    said = f"answers as {verdict.came} did" if verdict.alike else f"came at {verdict.came}"
+    late = f"{said}: [b] it is from there, [h] from here"
+    text = late if verdict.kind == "late" else verdict.text
+    if verdict.kind == "elsewhere":
+        text = f"of {verdict.came} by recordings.csv, goes there with [a]"
+    if verdict.kind == "unsure":
+        text = f"{text}, or [h]: it is right"
+    for name in names:
+        text = text.replace(name, short_name(name))
+    return replace(verdict, text=text)
+
+
+def _streams(verdicts: Sequence[HitVerdict]) -> tuple[str, ...]:
+    """How many hits of records of several are good."""
+    kinds: dict[Path, list[str]] = {}
+    for verdict in verdicts:
+        if verdict.at_s is not None:
+            kinds.setdefault(verdict.path, []).append(verdict.kind)
+    return tuple(
+        f"{counted(len(own), 'hit')} in {short_name(path)}: {own.count('good')} good"
+        for path, own in kinds.items()
+    )
+
+
+def _keys(page: PosePage, can: tuple[bool, bool]) -> str:
+    kinds = {hit.kind for hit in page.hits}
+    late = {hit.came for hit in page.hits if hit.kind == "late"}
+    usable = bool(kinds & {"good", "elsewhere"})
+    return keys_that_do([
+        ("a", "accept" if page.complete else "accept as it is", usable),
+        ("r", "refuse bad hits", bool(kinds & {*BAD})),
+        ("R", "refuse all", bool(page.hits)),
+        ("b", f"late ones to {' and '.join(sorted(late))}", "late" in kinds),
+        ("h", _right_here(kinds), bool(kinds & {"late", "unsure"})),
+        ("s", "mark for a second look", True), ("k", "skip this pose", True),
+        ("u", "undo", can[0]), ("U", "redo", can[1]), ("q", "quit", True), ("?", "help", True),
+    ])  # fmt: skip
+
+
+def _right_here(kinds: set[str]) -> str:
+    if "late" not in kinds:
+        return "those asked about are right"
+    asked = ", those asked about right" if "unsure" in kinds else ""
+    return f"late ones are from here{asked}"
+
+
+def _named(path: Path, why: str) -> str:
+    """What is the matter with a file, by its name alone."""
+    name = short_name(path)
+    text = why.replace(str(path), name).replace(path.name, name)
+    return text if name in text else f"{name} {text}"

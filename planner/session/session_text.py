@@ -1,7 +1,6 @@
 """What the session shows, as rich renderables; units in every column."""
 
-from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -38,37 +37,64 @@ def _table(*columns: str) -> Table:
     return table
 
 
+@dataclass(frozen=True, eq=False)
+class FoundMode:
+    """A label's mode at a pose, None where it was not found, beside what was expected (Hz, sd).
+
+    NaN where that is not known; `probability` that it is this mode.
+    """
+
+    label: int
+    mode: Mode | None
+    probability: float
+    expected_hz: float = float("nan")
+    sd_hz: float = float("nan")
+
+    @property
+    def off(self) -> float:
+        """By how many sds it is off what was expected; NaN where either is not known."""
+        if self.mode is None:
+            return float("nan")
+        sd = np.hypot(self.sd_hz, self.mode.frequency_sd_hz)
+        return float((self.mode.frequency_hz - self.expected_hz) / sd)
+
+
+def found_modes(pose: str, model: Model, before: Model | None) -> list[FoundMode]:
+    """Of a pose, and what a model expected `before` it was hit; none where nothing was found."""
+    labelled = next((p for p in model.labelled if p.pose == pose), None)
+    if labelled is None:
+        return []
+    labels = enumerate(zip(labelled.modes, labelled.probability.tolist(), strict=True), 1)
+    found = [FoundMode(k, mode, certain) for k, (mode, certain) in labels]
+    if before is None:
+        return found
+    expected = before.predict(labelled.q[None])
+    each = expected.frequency_hz[0].tolist(), expected.frequency_sd_hz[0].tolist()
+    return [
+        replace(one, expected_hz=hz, sd_hz=sd) for one, hz, sd in zip(found, *each, strict=True)
+    ]
+
+
 def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
     """What came out against what was expected."""
     table = _table(
         "mode", "measured (Hz)", "expected (Hz)", "off by (sd)", "damping (%)", "is this mode (%)"
     )
-    labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
-    if labelled is not None:
-        before = report.model_before.predict(labelled.q[None])
-        for k, mode in enumerate(labelled.modes):
-            expected, sd = before.frequency_hz[0, k], before.frequency_sd_hz[0, k]
-            certain = labelled.probability[k]
-            sure = Text(f"{100 * certain:.0f}", style="bold yellow" if certain < 0.9 else "")
-            if mode is None:
-                table.add_row(str(k + 1), "not found", with_sd(expected, sd), "–", "–", sure)
-                continue
-            off = (mode.frequency_hz - expected) / np.hypot(sd, mode.frequency_sd_hz)
-            table.add_row(
-                str(k + 1),
-                with_sd(mode.frequency_hz, mode.frequency_sd_hz, ".3f"),
-                with_sd(expected, sd),
-                Text(f"{off:+.1f}", style="bold yellow" if abs(off) > 3 else ""),
-                with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd),
-                sure,
-            )
+    for one in found_modes(report.pose, report.model, report.model_before):
+        expected, mode = with_sd(one.expected_hz, one.sd_hz), one.mode
+        certain = "bold yellow" if one.probability < 0.9 else ""
+        sure = Text(f"{100 * one.probability:.0f}", style=certain)
+        if mode is None:
+            table.add_row(str(one.label), "not found", expected, "–", "–", sure)
+            continue
+        off = Text(f"{one.off:+.1f}", style="bold yellow" if abs(one.off) > 3 else "")
+        measured = with_sd(mode.frequency_hz, mode.frequency_sd_hz, ".3f")
+        damping = with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd)
+        table.add_row(str(one.label), measured, expected, off, damping, sure)
     parts: list[RenderableType] = [table, *_missed(report)]
-    for hit in report.refused:
-        parts.append(Text(_refused(hit), style="red"))
+    parts += [Text(_refused(hit), style="red") for hit in report.refused]
     parts += [Text(remark, style="yellow") for remark in report.remarks]
-    parts.append(uncertainty_line(report.model))
-    if simulated:
-        parts.append(SIMULATED)
+    parts += [uncertainty_line(report.model), *([SIMULATED] if simulated else [])]
     title = f"Pose {report.pose}: {_in(report)}"
     return Panel(Group(*parts), title=title, title_align="left", expand=False)
 
@@ -97,7 +123,7 @@ def _missed(report: ImportReport) -> list[RenderableType]:
         column.no_wrap = True
     for hit in hits:
         rows.add_row(*hit.cells)
-    every = [hit for pose in report.model.hit_errors for hit in pose.hits]
+    every = [hit for own in report.model.hit_errors.values() for hit in own]
     return [Text(""), rows, *(Text(habit, style="bold") for habit in systematic_errors(every))]
 
 
@@ -115,12 +141,6 @@ def question_panel(question: Question, pose: str, other: str) -> RenderableType:
         )
     parts = Group(text, Text(more), Text(f"{keys}[u] undo  [q] quit", style="dim"))
     return Panel(parts, title=f"Pose {pose}: a question", title_align="left", expand=False)
-
-
-def held_of(pose: str, files: Sequence[Path]) -> str:
-    """What is said of files that are of another pose, where nobody can be asked."""
-    names = ", ".join(short_name(path) for path in files)
-    return f"Held, not used: {names} of {pose}; import --pose {pose} takes them there."
 
 
 def _in(report: ImportReport) -> str:
@@ -141,11 +161,6 @@ def not_now(key: str) -> str:
     return f"{shown} is not possible now: the keys that are stand above in [brackets]."
 
 
-def never_again(which: str) -> str:
-    """What is said once a pose is skipped."""
-    return f"{which} will not be offered again ([u] takes that back)."
-
-
 def incomplete(page: PosePage) -> str:
     """What is missing where a pose is accepted too early."""
     counts = ", ".join(f"{a} {page.counts[a]}/{page.per_axis}" for a in page.proposal.hits)
@@ -155,40 +170,30 @@ def incomplete(page: PosePage) -> str:
 def result_line(report: ImportReport) -> str:
     """What came out, and how far at most it is off what was expected; the panel has each mode."""
     said = f"{report.pose}: {_in(report)}"
-    labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
-    if labelled is None:
+    every = found_modes(report.pose, report.model, report.model_before)
+    if not every:
         return f"{said}; no modes"
-    found = [(k, m) for k, m in enumerate(labelled.modes) if m is not None]
-    said = f"{said}; {', '.join(f'{m.frequency_hz:.2f}' for _, m in found)} Hz"
-    if report.model_before is None or not found:
+    found = [one for one in every if one.mode is not None]
+    said += f"; {', '.join(f'{one.mode.frequency_hz:.2f}' for one in found if one.mode)} Hz"
+    if not found:
         return said
-    expected = report.model_before.predict(labelled.q[None])
-    means, sds = expected.frequency_hz[0], expected.frequency_sd_hz[0]
-    off = max((_sds_off(m, means[k], sds[k]) for k, m in found), key=abs)
-    missing = len(labelled.modes) - len(found)
+    off = max(abs(one.off) for one in found)
+    missing = len(every) - len(found)
     lacks = f", {counted(missing, 'mode')} not found" if missing else ""
-    return f"{said}, at most {abs(off):.1f} sd off what was expected{lacks}"
+    return f"{said}, at most {off:.1f} sd off what was expected{lacks}"
 
 
 def against_expected(pose: str, model: Model, before: Model | None) -> str:
     """The modes of a pose, and what a model expected `before` it was hit, where that is known."""
-    labelled = next((p for p in model.labelled if p.pose == pose), None)
-    if labelled is None:
-        return "no modes"
-    expected = None if before is None else before.predict(labelled.q[None])
     each = []
-    for k, mode in enumerate(labelled.modes):
-        said = f"mode {k + 1} not found" if mode is None else f"{mode.frequency_hz:.2f} Hz"
-        if expected is not None:
-            there, sd = expected.frequency_hz[0, k], expected.frequency_sd_hz[0, k]
-            off = "" if mode is None else f", {_sds_off(mode, there, sd):+.1f} sd"
-            said = f"{said} (expected {there:.2f}{off})"
+    for one in found_modes(pose, model, before):
+        mode = one.mode
+        said = f"mode {one.label} not found" if mode is None else f"{mode.frequency_hz:.2f} Hz"
+        if before is not None:
+            off = "" if mode is None else f", {one.off:+.1f} sd"
+            said += f" (expected {one.expected_hz:.2f}{off})"
         each.append(said)
-    return ", ".join(each)
-
-
-def _sds_off(mode: Mode, expected_hz: float, sd_hz: float) -> float:
-    return float((mode.frequency_hz - expected_hz) / np.hypot(sd_hz, mode.frequency_sd_hz))
+    return ", ".join(each) or "no modes"
 
 
 def progress_line(

@@ -23,14 +23,13 @@ from planner.session.acts import (
     on_key,
     say_last_import,
 )
-from planner.session.course import Course, PoseInProgress
 from planner.session.diagnosis_process import LEAST, DiagnosisProcess
 from planner.session.hit_verdicts import HitVerdict, Part, Verdicts
 from planner.session.inbox import FolderTable, Inbox
-from planner.session.keys import Keys, NoKeys, terminal_keys
-from planner.session.page import can_take_back, page_with_hits
-from planner.session.screen import Screen
-from planner.session.station import RerunQueue, Station
+from planner.session.pose_screen import page_with_hits
+from planner.session.screen import Keys, NoKeys, Screen, terminal_keys
+from planner.session.station import Course, PoseInProgress, RerunQueue, Station
+from planner.words import short_name
 
 
 @dataclass(frozen=True)
@@ -179,8 +178,8 @@ def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInPr
     now = (tuple(whole), tuple(waiting), tuple((v.kind, v.text) for v in verdicts))
     if now == visit.shown:
         return visit
-    can = can_take_back(station.campaign)
-    page = page_with_hits(visit.page, verdicts, waiting, can, station.auto, course)
+    can = station.can_take_back
+    page = page_with_hits(visit.page, verdicts, waiting, can, station.auto, course.progress)
     station.screen.ring({(str(v.path), v.number): v.kind for v in verdicts})
     station.screen.show(page.page)
     seen = replace(
@@ -188,7 +187,9 @@ def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInPr
         numbers=numbers, asked="",
     )  # fmt: skip
     for at, files in seen.late_by_pose.items() if station.auto else ():
-        station.say(session_text.held_of(at, files), "yellow")
+        names = ", ".join(short_name(path) for path in files)
+        held = f"Held, not used: {names} of {at}; import --pose {at} takes them there."
+        station.say(held, "yellow")
     return seen
 
 

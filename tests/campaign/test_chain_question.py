@@ -7,7 +7,7 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.chain_faults import SCALED, TURNED, ChainFault
-from planner.campaign.contradictions import asked_of
+from planner.campaign.import_checks import asked_of
 from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
 from planner.demo import NAME, Pool, shipped

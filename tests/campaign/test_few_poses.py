@@ -17,8 +17,8 @@ from threadpoolctl import threadpool_limits
 from planner.campaign.build import build
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
-from planner.campaign.log_conversion import from_modal
 from planner.campaign.low_fidelity import Recall, in_memory
+from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.robot.robot import Robot

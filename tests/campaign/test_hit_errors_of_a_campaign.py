@@ -31,7 +31,7 @@ def imported(cell: MissedCell, folder):
 
 def told_of(cell: MissedCell, model):
     """Told, sds and truth (n, 4) of all hits of a campaign."""
-    parts = [cell.misses(pose.pose, pose.hits) for pose in model.hit_errors]
+    parts = [cell.misses(*own) for own in model.hit_errors.items()]
     return tuple(np.concatenate(part) for part in zip(*parts, strict=True))
 
 
@@ -72,8 +72,9 @@ def test_it_is_replayed_identically(cell):
     _, campaign, _ = cell
     steps = list(replay(campaign))
     assert {step.check for step in steps} <= {"identical", "kept"}
-    for again, first in zip(steps[-1].model.hit_errors, campaign.model.hit_errors, strict=True):
-        for a, b in zip(again.hits, first.hits, strict=True):
+    again = steps[-1].model.hit_errors
+    for pose, first in campaign.model.hit_errors.items():
+        for a, b in zip(again[pose], first, strict=True):
             assert a.tilt_deg == pytest.approx(b.tilt_deg, abs=1e-9)
             assert a.offset_mm == pytest.approx(b.offset_mm, abs=1e-9)
 

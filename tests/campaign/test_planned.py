@@ -8,7 +8,7 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
-from planner.campaign.planned import inside, outside_remark
+from planner.campaign.model_status import outside_remark
 from planner.demo import NAME, shipped
 from planner.report.predictions import predictions
 from planner.robot.collision import Collisions
@@ -41,11 +41,11 @@ def planned(places):
 
 
 def test_poses_as_planned_are_inside(places, planned):
-    assert inside(places, places.candidates.q).all()
-    assert inside(places, planned).all()
+    assert places.inside(places.candidates.q).all()
+    assert places.inside(planned).all()
     turned = planned.copy()
     turned[:, 5] += np.where(turned[:, 5] > 0, -2 * np.pi, 2 * np.pi)  # the same pose
-    assert inside(places, turned).all()
+    assert places.inside(turned).all()
 
 
 def test_a_wrist_turned_over_is_outside(places, planned):
@@ -61,7 +61,7 @@ def test_a_wrist_turned_over_is_outside(places, planned):
     away = np.abs(planned[:, 4]) > np.deg2rad(15)  # where the two ways are far from one another
     assert away.sum() > POSES / 2
     # So few poses are planned here that one far from all may be reached either way.
-    assert inside(places, over[away]).mean() < 0.06
+    assert places.inside(over[away]).mean() < 0.06
 
 
 def test_a_tilted_tool_is_outside(places, planned):
@@ -75,7 +75,7 @@ def test_a_tilted_tool_is_outside(places, planned):
     np.testing.assert_allclose(
         places.robot.forward_batch(tilted)[1], position[[q is not None for q in found]], atol=1e-4
     )
-    assert not inside(places, tilted).any()
+    assert not places.inside(tilted).any()
 
 
 def test_every_answer_marks_them(tmp_path):

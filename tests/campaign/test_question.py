@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.contradictions import asked_of
 from planner.campaign.events import Proposed
+from planner.campaign.import_checks import asked_of
 from planner.campaign.state import fold
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
@@ -237,7 +237,7 @@ def _put(campaign, joints):
         for p in last.event.proposals
     )
     with campaign._acting():
-        campaign._append(msgspec.structs.replace(last.event, proposals=changed))
+        campaign.append(msgspec.structs.replace(last.event, proposals=changed))
 
 
 def test_more_hits_at_a_measured_pose_are_looked_at_alone(campaign, pool, tmp_path):

@@ -16,7 +16,7 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
-from planner.campaign.revisits import hit_again, suspected
+from planner.campaign.import_checks import hit_again, suspected
 from planner.campaign.state import CampaignState, Measurement, fold
 from planner.recording.folder import TABLE
 from planner.recording.joints import JointUnits

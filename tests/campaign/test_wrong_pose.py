@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.contradictions import asked_of
+from planner.campaign.import_checks import asked_of
 from planner.campaign.question import SURE
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source

@@ -11,7 +11,7 @@ from rich.console import Console
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposed
 from planner.design.propose import ACQUISITIONS, DESIGNS
-from planner.session.keys import NoKeys
+from planner.session.screen import NoKeys
 from planner.session.watch import watch
 from tests.support.outside import said, told
 from tests.support.plain_arm import make_plain_arm, plain_campaign

@@ -121,7 +121,7 @@ def rod(path, **changes):
 
 @pytest.fixture(scope="module")
 def few():
-    from planner.campaign.tip_source import within
+    from planner.campaign.cut_source import within
 
     tip = read_tip(LEI / "modes.toml", None, None, 0.0)
     return within(tip, (800.0, 1000.0), LEI)

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.tip_source import tip_at
+from planner.campaign.cut_source import tip_at
 from planner.measurement.nuisances import Tolerances
 from planner.milling.coupling import TipReceptance, couple
 from planner.milling.tool import load_tool

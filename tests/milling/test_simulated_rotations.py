@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from planner.campaign.tip_source import tip_of
+from planner.campaign.cut_source import tip_of
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.errors import InputError
 from planner.milling.beam import Segment, ToolMaterial

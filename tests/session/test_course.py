@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.session.course import Course
+from planner.session.station import Course
 
 
 def model(sd_percent: float, done: bool = False) -> Any:

@@ -11,10 +11,8 @@ from rich.text import Text
 
 from planner.campaign.events import HitRecord, Proposal
 from planner.recording.joints import JointUnits
-from planner.session.course import Course
 from planner.session.hit_verdicts import HitVerdict
-from planner.session.page import page_with_hits
-from planner.session.pose_screen import PosePage, keys_that_do, remedy_first
+from planner.session.pose_screen import PosePage, keys_that_do, page_with_hits, remedy_first
 from planner.session.screen import Said, Screen, fitted
 from planner.session.session_text import refusals
 from planner.words import short_name
@@ -152,7 +150,7 @@ def test_names_of_files_leave_room_for_what_is_said_of_them(page):
     said = f"disagrees with hit 2 ({name}) (likeness 0.42): hit along x once more"
     verdict = HitVerdict(Path("exports") / name, "+x", "unsure", said, number=1)
     why = f"exports/{name} holds no force; export it again."
-    made = page_with_hits(page, [verdict], [(verdict.path, why)], (True, False), False, Course())
+    made = page_with_hits(page, [verdict], [(verdict.path, why)], (True, False), False, "")
     text = whole(lines(made, height=40))
     assert name not in text
     assert "disagrees with hit 2 (measurem…n_hit_x_003.uff) (likeness 0.42)" in text

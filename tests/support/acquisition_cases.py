@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.campaign.acquisition_inputs import cost_of
 from planner.campaign.build import build
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
-from planner.campaign.log_conversion import from_mode
+from planner.campaign.measured_modes import from_mode
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
@@ -152,7 +151,7 @@ def campaign(
 
     A strategy is an acquisition, or the indices of a design made beforehand.
     """
-    cost, candidates = cost_of(case.cell), case.cell.candidates
+    cost, candidates = case.cell.cost, case.cell.candidates
     measurements: dict[str, Measurement] = {}
     frfs: dict[str, Frf] = {}
     frf_of: Callable = lambda m, _: frfs[m.pose]  # noqa: E731
