@@ -204,6 +204,7 @@ def test_what_cannot_be_built_is_said_in_words(pendulum, monkeypatch):
     pendulum.write_text(text[: text.index("[[")])
     with pytest.raises(InputError, match=r"no \[\[compliance\]\]"):
         load_truth(pendulum)
+    pendulum.write_text(text)
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(InputError, match=r"pip install"):
         load_truth(pendulum)
