@@ -12,14 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
+Numbers = Sequence[float] | np.ndarray
+
 
 @dataclass(frozen=True)
 class Joint:
     """Placement in the parent (m, quarter turns), axis, limits (°), speed (rad/s)."""
 
-    xyz: Sequence[float]
-    quarters: Sequence[float]
-    axis: Sequence[float]
+    xyz: Numbers
+    quarters: Numbers
+    axis: Numbers
     limits_deg: tuple[float, float]
     velocity: float
 
@@ -32,9 +34,9 @@ class Body:
     """
 
     mass: float
-    com: Sequence[float]
-    rpy: Sequence[float]
-    moments: Sequence[float]
+    com: Numbers
+    rpy: Numbers
+    moments: Numbers
     box: Sequence[float] = ()
     box_at: Sequence[float] = ()
 
@@ -48,7 +50,7 @@ class Arm:
     bodies: tuple[Body, ...]
     tcp: Sequence[float]  # in the last link
     sensor: Sequence[float]
-    quarters: Sequence[float]  # of tcp and sensor in the last link
+    quarters: Numbers  # of tcp and sensor in the last link
     torsion: tuple[float, ...]  # N·m/rad, about the joints' axes
     bending: tuple[float, ...]  # N·m/rad, across them
     damping_s: float  # C = damping_s · K
@@ -112,15 +114,15 @@ class Arm:
         return np.random.default_rng(seed).uniform(low, high, (n, len(low)))
 
 
-def _text(values: Sequence[float]) -> str:
+def _text(values: Numbers) -> str:
     return " ".join(repr(float(v)) for v in values)
 
 
-def _turn(quarters: Sequence[float]) -> list[float]:
+def _turn(quarters: Numbers) -> list[float]:
     return [float(k) * np.pi / 2 for k in quarters]
 
 
-def _origin(xyz: Sequence[float], rpy: Sequence[float]) -> str:
+def _origin(xyz: Numbers, rpy: Numbers) -> str:
     return f'<origin xyz="{_text(xyz)}" rpy="{_text(rpy)}"/>'
 
 
@@ -147,7 +149,7 @@ def _joint(name: str, parent: str, child: str, joint: Joint) -> str:
     )
 
 
-def _fixed(child: str, parent: str, xyz: Sequence[float], rpy: Sequence[float]) -> str:
+def _fixed(child: str, parent: str, xyz: Numbers, rpy: Numbers) -> str:
     return (
         f'<joint name="{child}_fixed" type="fixed"><parent link="{parent}"/>'
         f'<child link="{child}"/>{_origin(xyz, rpy)}</joint>'

@@ -19,7 +19,7 @@ class Hinge:
     """A coordinate of a part: it turns about an axis (3,) in its frame, or slides along it."""
 
     name: str
-    axis: Sequence[float]
+    axis: Sequence[float] | np.ndarray
     slides: bool = False
 
 
@@ -51,7 +51,7 @@ class Mechanics(ABC):
     Frames are rotation (3, 3), place (3,) in m and Jacobian (6, n), linear first, in the world.
     """
 
-    def __init__(self, parts: Sequence[Part], gravity: Sequence[float]) -> None:
+    def __init__(self, parts: Sequence[Part], gravity: Sequence[float] | np.ndarray) -> None:
         self.parts, self.gravity = tuple(parts), np.array(gravity, dtype=float)
         self.names = [hinge.name for part in parts for hinge in part.hinges]
         self.version = "tree of frames"
@@ -92,7 +92,7 @@ class Mechanics(ABC):
 class Mujoco(Mechanics):
     """By MuJoCo."""
 
-    def __init__(self, parts: Sequence[Part], gravity: Sequence[float]) -> None:
+    def __init__(self, parts: Sequence[Part], gravity: Sequence[float] | np.ndarray) -> None:
         super().__init__(parts, gravity)
         import mujoco
 
@@ -165,7 +165,7 @@ class FrameTree(Mechanics):
     (dc/dxⱼ), i being the inner one.
     """
 
-    def __init__(self, parts: Sequence[Part], gravity: Sequence[float]) -> None:
+    def __init__(self, parts: Sequence[Part], gravity: Sequence[float] | np.ndarray) -> None:
         super().__init__(parts, gravity)
         self._turns = np.array([not h.slides for part in parts for h in part.hinges], bool)[:, None]
         self._moves = np.zeros((len(parts), len(self.names)), bool)  # which coordinates move which
