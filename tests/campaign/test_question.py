@@ -3,6 +3,7 @@
 import csv
 import json
 import shutil
+from contextlib import contextmanager
 from dataclasses import replace
 
 import msgspec
@@ -13,6 +14,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposed
 from planner.campaign.import_checks import asked_of
 from planner.campaign.state import fold
+from planner.campaign.store import CONFIG
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.demo import NAME, Pool, shipped
@@ -22,7 +24,7 @@ from planner.replay import replay
 from planner.report.imports import how_to_answer
 from planner.report.status import status
 from tests.support.chain_cases import scaled
-from tests.support.outside import call
+from tests.support.outside import FROZEN, call
 
 MEASURED = ("A11", "A57")
 WRONG, CLAIMED = "A25", "A42"
@@ -47,6 +49,16 @@ def begun(parent):
     """A campaign without a measured pose."""
     robot, config = (shipped(NAME) / name for name in ("robot/robot.toml", "campaign.toml"))
     return Campaign.new(parent / "campaign", robot, config)
+
+
+@contextmanager
+def unlearned(directory):
+    """The simulation as stated meanwhile: a fit to hits that contradict others takes long."""
+    config = directory / CONFIG
+    decided = config.read_text()
+    config.write_text(f"{decided}\n{FROZEN}")
+    yield
+    config.write_text(decided)
 
 
 @pytest.fixture
@@ -105,9 +117,10 @@ def test_hits_of_another_pose_are_held_until_confirmed(campaign, pool, tmp_path)
     (once_more,) = again.import_paths((tmp_path / "wrong",))
     assert once_more.question == asked
     assert len(once_more.already) == 12
-    again.confirm("X1")
-    assert "X1" in [m.pose for m in again.state.used]
-    assert not again.state.held
+    with unlearned(again.directory):
+        again.confirm("X1")
+        assert "X1" in [m.pose for m in again.state.used]
+        assert not again.state.held
     again.undo()
     assert again.state.held["X1"].question == asked
     again.undo()
@@ -136,21 +149,21 @@ def test_hits_listed_along_wrong_axes_are_asked_about(campaign, pool):
 @pytest.mark.parametrize(
     ("wrong", "about", "said"),
     [
+        ({}, "", ""),
         ({"off_deg": (0, 0, 8.0, 0, 0, 0)}, "readback", "is joint_3"),
         ({"off_deg": (0, 0, 0, 0, 5.0, 0)}, "readback", "is joint_5"),
         ({"other_way": "x"}, "chain", "towards −x?"),
         ({"louder": 1.12}, "chain", "12 % too large"),
     ],
 )
-def test_a_misread_angle_and_hits_from_behind_are_asked_about(
+def test_misread_angles_and_hits_from_behind_are_asked_about_right_ones_are_not(
     campaign, pool, tmp_path, wrong, about, said
 ):
-    (right,) = campaign.import_paths((claim(tmp_path / "right", pool, WRONG, WRONG),))
-    assert right.question is None
-    campaign.undo()
     folder = claim(tmp_path / "wrong", pool, WRONG, WRONG, **wrong)
     (report,) = campaign.import_paths((folder,))
-    assert report.question is not None
+    assert (report.question is not None) == bool(wrong)
+    if report.question is None:
+        return
     assert report.question.about == about
     assert said in report.question.text
     if about == "readback":
@@ -204,7 +217,7 @@ def test_hits_of_a_pose_left_unmoved_are_told_and_moved(campaign, pool, tmp_path
     assert campaign.state.held[stated].question == report.question
 
 
-@pytest.mark.parametrize("typed_deg", [0.0, 3.0, 30.0])
+@pytest.mark.parametrize("typed_deg", [3.0, 30.0])
 def test_a_mistyped_readback_is_asked_about(campaign, pool, tmp_path, typed_deg):
     proposal = campaign.next()[0]
     hits = _nearest(campaign, pool, proposal)
@@ -217,9 +230,6 @@ def test_a_mistyped_readback_is_asked_about(campaign, pool, tmp_path, typed_deg)
     assert said in text
     (folder / TABLE).write_text(text.replace(said, ",".join(map(str, wrong))))
     (report,) = campaign.import_paths((folder,))
-    if not typed_deg:
-        assert report.question is None
-        return
     assert report.question is not None
     assert report.question.about == "readback"
     assert f"is joint_3 {angles[2]:.2f}° or {wrong[2]:.2f}°" in report.question.text
@@ -306,7 +316,8 @@ def test_the_commands_say_it_and_answer_it(campaign, pool, tmp_path):
     assert f"planner confirm {campaign.directory} X1" in err
     assert len(err.splitlines()) == 1
     assert call("confirm", campaign.directory, "A11")[0] == 2
-    said = call("confirm", campaign.directory, "X1")[1]
+    with unlearned(campaign.directory):
+        said = call("confirm", campaign.directory, "X1")[1]
     assert "frequency (Hz)" in said
     assert "hits accepted" in said
     assert "X1" in [m.pose for m in Campaign(campaign.directory).state.used]
