@@ -72,7 +72,7 @@ def test_measured_poses_are_met_and_new_visits_lie_in_the_intervals(name: str) -
 def test_far_from_all_poses_it_is_less_sure(name: str) -> None:
     data = seen()
     near, far = (predicted(fitted(name), x, False)[1] for x in (data.x, np.array([[2.5, 2.5]])))
-    assert np.all(far >= np.median(near, axis=0))
+    assert np.all(far >= (1 - 1e-9) * np.median(near, axis=0))  # equal where nothing is learned
     if name != WITHOUT_GP:
         assert np.all(far > 2 * np.median(near, axis=0))
 
