@@ -142,7 +142,7 @@ def _coupled(
         m = inverse(turned(target.transfer(omega), tip.frame.T @ target.frame)) @ m
     u = np.array(tip.kept)
     pairs = ((u, u), (u, u + 6), (u + 6, u), (u + 6, u + 6))
-    uu, uf, fu, ff = (m[np.ix_(range(len(omega)), a, b)] for a, b in pairs)
+    uu, uf, fu, ff = (m[np.ix_(np.arange(len(omega)), a, b)] for a, b in pairs)
     c = tip.receptance
     right = np.linalg.inv(fu @ c + ff)
     coupled = (uu @ c + uf) @ right

@@ -66,8 +66,10 @@ def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndar
     Linearised where all lines have them: poles that a part does not hold would stray in a fit, to
     where their variance is that of another place.
     """
-    own = (both[..., part].reshape(data.entries, -1) for both in (data.response, fitted.variance))
-    point = reduced_together(WeightedSets.of(data.lines.part(part), *own), fitted.poles)
+    seen = data.response[..., part].reshape(data.entries, -1)
+    variance = fitted.variance[..., part].reshape(data.entries, -1)
+    sets = WeightedSets.of(data.lines.part(part), seen, variance)
+    point = reduced_together(sets, fitted.poles)
     unit = np.sqrt(np.maximum(np.diag(fitted.pole_covariance), 1e-300))
     turned = np.outer(unit, unit)
     # Of the information on the best held pole: below, rounding rules

@@ -213,8 +213,8 @@ class ElasticModel:
         stiffness = np.array([self._angle_slope(row) for row in q])
         # (n, points, dof, 3, e), the points side by side with their axes.
         moved = (np.moveaxis(turned(ends, *places)[..., :3, :], 1, 2) for ends in (hits, sensors))
-        both = (one.reshape(*stiffness.shape[:2], -1, self.size) for one in moved)
-        return AngleSlopes(mass, *both, stiffness)
+        hit, sensor = (one.reshape(*stiffness.shape[:2], -1, self.size) for one in moved)
+        return AngleSlopes(mass, hit, sensor, stiffness)
 
     def body_jacobians(self, q: np.ndarray) -> np.ndarray:
         """(n, bodies, 6, e) at q (n, dof) in rad: how the elastic rotations move the bodies.
