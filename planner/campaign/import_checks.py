@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.campaign.chain_question import chain_question
 from planner.campaign.events import HitRecord, Imported, MeasuredMode, Question
 from planner.campaign.model import FEW_POSES, Model
-from planner.campaign.question import question
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose
 from planner.frf.frf import unreciprocal
@@ -33,7 +31,11 @@ def asked_of(
     if known is not None and known.question is not None:  # answered
         return None
     if not model.labelled:
+        from planner.campaign.chain_question import chain_question  # and SciPy, where it is asked
+
         return chain_question(model, pose, joints_deg, measured.frf)
+    from planner.campaign.question import question
+
     return question(model, state, pose, joints_deg, measured)
 
 
