@@ -7,13 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.campaign.acquisition_inputs import (
-    Decision,
-    decided,
-    deciding_outputs,
-    open_parameters,
-    outlook,
-)
+from planner.campaign.acquisition_inputs import open_parameters, outlook
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.hit_error_estimates import CampaignHitErrors
@@ -37,6 +31,7 @@ from planner.surrogate.modal_surrogate import (
 from planner.words import counted
 
 if TYPE_CHECKING:
+    from planner.campaign.decision import Decision
     from planner.campaign.frf_model import FrfModel
 
 FrfOf = Callable[[Measurement, ModesTable], Frf]
@@ -152,13 +147,17 @@ class Model:
         return outlook(self, informed=True)
 
     @cached_property
-    def decision(self) -> Decision | None:
+    def decision(self) -> "Decision | None":
         """Whether the cut of campaign.toml is stable, pose by pose; None where none is named."""
+        from planner.campaign.decision import decided
+
         return decided(self)
 
     @cached_property
     def deciding(self) -> tuple[FrequencyOutputs, Poses]:
         """As `informed`, asked for the margins of the decision about the cut."""
+        from planner.campaign.decision import deciding_outputs
+
         outputs, poses = self.informed
         return deciding_outputs(self, outputs), poses
 

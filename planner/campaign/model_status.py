@@ -96,7 +96,7 @@ class DecisionStatus:
         table = model.cell.config.cut
         if table is msgspec.UNSET or not model.labelled:
             return None
-        from planner.campaign.acquisition_inputs import measurements_left
+        from planner.campaign.decision import measurements_left
 
         decision = model.decision
         if decision is None:

@@ -25,7 +25,8 @@ GROWTH = 1.045
 CHUNK = 12  # depths that are scanned at once
 
 
-Level = tuple[float, float]  # a depth in m, and log |µ| there
+ROUNDING = 1e-12  # of log |µ|: an undamped mode has |µ| = 1 at any depth
+Level = tuple[float, float]  # a depth in m, and log |µ| there, beyond rounding
 
 
 def scanned_depths(floor_m: float, most_m: float) -> np.ndarray:
@@ -41,7 +42,7 @@ def scanned_depths(floor_m: float, most_m: float) -> np.ndarray:
 
 def levels(at: Monodromies, depths: np.ndarray) -> list[Level]:
     """Of depths (B,)."""
-    sizes = np.log(np.maximum(np.abs(multipliers(at(depths))), 1e-300))
+    sizes = np.log(np.maximum(np.abs(multipliers(at(depths))), 1e-300)) - ROUNDING
     return [(float(b), float(s)) for b, s in zip(depths, sizes, strict=True)]
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from planner.campaign.acquisition_inputs import Decision
 from planner.campaign.config import load_campaign_config
+from planner.campaign.decision import Decision
 from planner.errors import InputError
 from planner.milling.lobes import losses
 from planner.milling.path import along, by_feed, decide
