@@ -142,6 +142,8 @@ class StatedHits:
         value, size = self.density
 
         def shown(one: Mistake) -> tuple[Frf, float]:
+            if one.fault is NONE:  # of whichever sensors
+                return self.frf, 0.0
             frf, volume = one.fault.undone(self.frf)
             return frf, volume * columns * LINES
 
