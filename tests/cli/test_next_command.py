@@ -41,7 +41,7 @@ def begun(
     folder: Path, robot: Path, acquisition: str = "integrated_variance", more: str = ""
 ) -> Path:
     toml = plain_campaign(folder / "plan" / "campaign.toml", acquisition)
-    toml.write_text(toml.read_text() + more)
+    toml.write_text(toml.read_text().replace("candidates = 30", "candidates = 10") + more)
     said("new", folder / "cell", "--robot", robot, "--campaign", toml)
     return folder / "cell"
 
