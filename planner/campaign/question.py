@@ -87,17 +87,18 @@ def question(
     joints = model.cell.robot.joints
     q, frf = joints.internal([joints_deg])[0], frf.within(expected.band_hz)
     stated, sure = StatedHits(expected, q, frf), learned.poses >= SURE
+    answered = _called_right(state)
+    said = "".join(answered)  # not asked again
     likely = _setpoint(model, state, pose, joints_deg)
-    likely += [missed(expected, q)] if sure else []
+    if sure and frf.layout == TOOL and MISSED not in said:
+        likely.append(missed(expected, q))
     if not stated.doubted and not stated.instead(likely):
         return None
     mistakes = [*likely, *_poses(model, state, pose, joints_deg)]
     if sure:
         mistakes += opposite(joints, joints_deg)
         mistakes += elsewhere(joints, expected, frf, joints_deg)
-    answered = _called_right(state)
-    chains = (m for m in chain(expected, q, frf, sure) if m.fault.asked not in "".join(answered))
-    mistakes += chains
+    mistakes += (m for m in chain(expected, q, frf, sure) if m.what not in said)
     fits = stated.instead(mistakes)
     if fits is None or (fits.about != "chain" and StatedHits(expected, fits.q, frf).doubted):
         fits = _earlier(model, state, pose, joints_deg, frf) or fits
