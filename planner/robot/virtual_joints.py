@@ -42,7 +42,7 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
     """The virtual model; inertia_change (bodies, 10) is added to the inertias of its bodies."""
     source, model = robot.model, pin.Model()
     model.gravity = pin.Motion(np.array([*robot.config.gravity, 0.0, 0.0, 0.0]))
-    last, ends, own, springs = _add_joints(robot, model)
+    last, ends, own, springs, small = _add_joints(robot, model)
     names: list[str] = []
     carriers: list[int] = []
     bodies: list[np.ndarray] = []
@@ -58,12 +58,12 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
             names.append(name)
             carriers.append(carrier)
             bodies.append(values)
-    small = _resonators(robot, model, last)
     for number, block in enumerate(robot.config.resonator):
         names.append(f"{SMALL} {number + 1}")
         carriers.append(small[number])
         bodies.append(np.array([block.mass, *np.zeros(9)]))
-    springs = np.append(springs, [model.joints[k].idx_q for k in small]).astype(int)
+    order = range(len(robot.config.resonator))
+    springs = np.append(springs, [model.joints[small[k]].idx_q for k in order]).astype(int)
     inertia = np.array(bodies)
     if inertia_change is not None:
         inertia = inertia + inertia_change
@@ -106,14 +106,15 @@ def _carried(frame: pin.Frame, last: list[int], ends: list[tuple[int, pin.SE3]])
     return pin.Frame(frame.name, joint, 0, place, frame.type)
 
 
-def _resonators(robot: Robot, model: pin.Model, last: list[int]) -> list[int]:
-    """Numbers of the sliding joints that carry the resonators' masses."""
-    found = []
+def _resonators(robot: Robot, model: pin.Model, joint: str, parent: int) -> dict[int, int]:
+    """Numbers of the sliding joints that carry the masses that hang on a joint's body."""
+    found = {}
     for number, block in enumerate(robot.config.resonator):
-        parent = last[robot.joint_names.index(block.joint) + 1]
-        place = pin.SE3(np.eye(3), np.array(block.position_m, dtype=float))
-        axis = np.array(block.direction, dtype=float)
-        found.append(_add_joint(model, parent, axis, place, f"{SMALL} {number + 1}", True))
+        if block.joint == joint:
+            place = pin.SE3(np.eye(3), np.array(block.position_m, dtype=float))
+            axis = np.array(block.direction, dtype=float)
+            name = f"{SMALL} {number + 1}"
+            found[number] = _add_joint(model, parent, axis, place, name, True)
     return found
 
 
@@ -173,12 +174,18 @@ def _halves(
 
 def _add_joints(
     robot: Robot, model: pin.Model
-) -> tuple[list[int], list[tuple[int, pin.SE3]], np.ndarray, np.ndarray]:
-    """What carries each body, what hangs on it; places of the robot's joints and of the springs."""
+) -> tuple[list[int], list[tuple[int, pin.SE3]], np.ndarray, np.ndarray, dict[int, int]]:
+    """What carries each body, what hangs on it; places of the robot's joints and of the springs;
+    what carries the resonators.
+
+    Depth first, resonators before what else hangs on their body: Pinocchio's mass matrix takes the
+    coordinates of a subtree for contiguous, and couples none that are not.
+    """
     source, blocks = robot.model, robot.config.compliance
     last: list[int] = []  # carries the body of the same number
     ends: list[tuple[int, pin.SE3]] = []  # carries what hangs on it, and where the body is then
     rigid: list[int] = []
+    small: dict[int, int] = {}
     elastic = np.zeros(len(blocks), dtype=int)
 
     def give(outer: int, place: pin.SE3, where: str) -> int:
@@ -200,8 +207,9 @@ def _add_joints(
         if joint or BASE not in robot.joint_names:
             outer = give(outer, pin.SE3.Identity(), name)
         last.append(outer)
+        small |= _resonators(robot, model, name, outer)
         ends.append(_end(robot, joint, outer, give))
-    return last, ends, np.array(rigid), elastic
+    return last, ends, np.array(rigid), elastic, small
 
 
 def _end(

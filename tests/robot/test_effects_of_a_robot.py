@@ -6,6 +6,7 @@ import pytest
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.robot import Robot
+from planner.robot.virtual_joints import inertia_basis
 from planner.truth.arms import ARMS
 from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, Spring
 from planner.truth.load import load_truth
@@ -40,6 +41,30 @@ SAME = {
     # The halves of a link that bends are cut a little otherwise there.
     "link_flexibility": (BEND, {"extra": (Spring("link_2", (0, 0, 1.0), 4e6, 2e3),)}, 0.02),
 }
+
+
+def test_resonators_on_several_links_couple_with_the_robot_in_any_order(tmp_path):
+    links, arm = (2, 5, 3), ARMS["kr210"]
+    way = (0, 0.6, 0.8)
+    several = Deviation(
+        resonators=tuple(
+            AttachedResonator(f"link_{k}", (0.1, 0, 0.2), way, 14.0, 11.0 + k, 0.03) for k in links
+        )
+    )
+    path, q = arm.write(tmp_path), arm.poses(1, 3)[0]
+    expected = load_truth(path, several).accelerance(q, LINES)
+    blocks = [SMALL.replace("joint_3", f"joint_{k}").replace("17.0", str(11.0 + k)) for k in links]
+    text = path.read_text()
+    for order in (blocks, blocks[::-1]):
+        path.write_text(text + "\n" + "\n".join(order).replace("effects.resonator", "resonator"))
+        simulation = Simulation(Robot.load(path))
+        made = simulation.accelerance(q, LINES)[0]
+        assert np.linalg.norm(made - expected) <= 1e-3 * np.linalg.norm(expected)
+        model = simulation.elastic
+        spatial = np.einsum("bk,kij->bij", model.inertia, inertia_basis())
+        moved = model.body_jacobians(q)
+        whole = np.einsum("nbie,bij,nbjf->nef", moved, spatial, moved)
+        np.testing.assert_allclose(model.matrices(q).mass, whole, atol=1e-9)
 
 
 @pytest.mark.parametrize("effect", SAME)
