@@ -40,7 +40,9 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     feed: tuple[float, float, float] = (1.0, 0.0, 0.0)
     feed_in: Literal["frf", "base", "path"] = "frf"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    method: Literal["full_discretisation", "zeroth_order"] = "full_discretisation"
+    method: Literal["full_discretisation", "semi_discretisation", "zeroth_order"] = (
+        "full_discretisation"
+    )
     pitch_deg: list[float] | None = None
     helix_deg: float = 0.0
     kt_sd_percent: float = 0.0

@@ -18,6 +18,7 @@ from scipy.optimize import root_scalar
 from planner.inference.parallel import side_by_side
 from planner.milling.machine import Machine, Monodromies, check_structure, limits, multipliers
 from planner.milling.period import Period
+from planner.milling.semi_discretisation import semi_monodromies
 from planner.progress import Tell, quietly
 
 LEAST_STEPS = 16  # of the scan in all
@@ -108,10 +109,10 @@ def losses(machine: Machine, tell: Tell = quietly) -> tuple[Loss, ...]:
     scan = scanned_depths(machine.floor().floor_m, cut.depth_m[1])
     speeds = [float(rpm) for rpm in cut.speeds_rpm]
     if len(speeds) < MANY:
-        return tuple(full_loss(machine, rpm, scan) for rpm in speeds)
+        return tuple(discretised_loss(machine, rpm, scan) for rpm in speeds)
     blocks = [speeds[i : i + BLOCK] for i in range(0, len(speeds), BLOCK)]
     found = side_by_side(
-        lambda block: [full_loss(machine, rpm, scan) for rpm in block],
+        lambda block: [discretised_loss(machine, rpm, scan) for rpm in block],
         blocks,
         lambda number, count: tell("lobes", count / len(blocks)),
     )
@@ -128,9 +129,16 @@ def zeroth_losses(machine: Machine) -> tuple[Loss, ...]:
     )
 
 
-def full_loss(machine: Machine, rpm: float, scan: np.ndarray) -> Loss:
-    """By full discretisation, with as many points per period as it needs."""
-    at = machine.monodromies(rpm)
+def monodromies(machine: Machine, rpm: float, factor: float = 1.0) -> Monodromies:
+    """By the cut's method of discretisation; `factor` multiplies the points per period."""
+    if machine.cut.method == "semi_discretisation":
+        return semi_monodromies(machine, rpm, factor)
+    return machine.monodromies(rpm, factor)
+
+
+def discretised_loss(machine: Machine, rpm: float, scan: np.ndarray) -> Loss:
+    """With as many points per period as it needs."""
+    at = monodromies(machine, rpm)
     bracket = first_unstable(at, scan)
     if bracket is None:
         return NO_LOSS
@@ -140,7 +148,7 @@ def full_loss(machine: Machine, rpm: float, scan: np.ndarray) -> Loss:
     for _ in range(5):
         # Finer: factor on the points, for the check
         factor *= 1.5
-        at = machine.monodromies(rpm, factor)
+        at = monodromies(machine, rpm, factor)
         found = _again(at, depth, scan)
         if found is None:
             return NO_LOSS
@@ -267,12 +275,12 @@ def _between(around: np.ndarray, chosen: np.ndarray, values: np.ndarray) -> np.n
 
 
 def _limits(machine: Machine, rpm: np.ndarray, around: np.ndarray) -> np.ndarray:
-    """(n,): where |µ| passes one, by full discretisation without further points per period."""
+    """(n,): where |µ| passes one, without further points per period."""
     most = machine.cut.depth_m[1]
     scan = scanned_depths(machine.floor().floor_m, most)
     found = np.full(len(around), np.inf)
     for i, speed in enumerate(rpm):
-        at = machine.monodromies(float(speed))
+        at = monodromies(machine, float(speed))
         bracket = None
         if np.isfinite(around[i]):
             bracket = _bracket(levels(at, FIRST * around[i]))

@@ -10,8 +10,8 @@ from planner.milling.cutter_modes import real_modes
 from planner.milling.lobes import losses
 from planner.milling.machine import Machine, multipliers
 from planner.milling.period import Discretisation
+from planner.milling.semi_discretisation import semi_growth
 from tests.support.milling_cases import MULTIPLIERS, cut, machine, one_mode
-from tests.support.semi_discretisation import semi_growth
 
 RPM, DEPTH_MM = 5000.0, 0.5
 

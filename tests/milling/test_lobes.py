@@ -14,10 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.lobes import losses
 from planner.milling.machine import Machine, limits, multiplier
+from planner.milling.semi_discretisation import semi_growth
 from tests.support.milling_cases import (
     MULTIPLIERS,
     ONE_MODE,
@@ -29,7 +31,6 @@ from tests.support.milling_cases import (
     two_each_way,
     two_equal,
 )
-from tests.support.semi_discretisation import semi_growth
 
 CONVERGED, ZEROTH = 1e-3, 5e-3
 
@@ -219,6 +220,16 @@ def test_semi_discretisation_agrees(helix_deg: float):
     (loss,) = losses(structure)
     for share, unstable in ((0.997, False), (1.003, True)):
         assert (semi_growth(structure, 20000.0, share * loss.depth_m) > 1) == unstable
+    (other,) = losses(machine(two_each_way(), cut(**given, method="semi_discretisation")))
+    assert other.depth_m == pytest.approx(loss.depth_m, rel=2e-3)
+    assert other.kind == loss.kind
+    assert other.chatter_hz == pytest.approx(loss.chatter_hz, rel=1e-3)
+
+
+def test_semi_discretisation_takes_teeth_at_equal_angles_only():
+    given = cut(method="semi_discretisation", pitch_deg=[170.0, 190.0], teeth=2)
+    with pytest.raises(InputError, match="equal angles only; choose the method full_discr"):
+        losses(machine(two_each_way(), given))
 
 
 def test_pitches_that_hardly_differ_change_nothing_and_others_do():

@@ -11,6 +11,7 @@ from planner.frf.quantities import convert
 from planner.milling.cutter_frf import CutterFrf, of_accelerance
 from planner.milling.cutter_modes import CutterFit, CutterModes, real_modes
 from planner.milling.lobes import losses, sampled_limits
+from planner.milling.semi_discretisation import semi_growth
 from planner.milling.structure import (
     Structure,
     doubts,
@@ -20,7 +21,6 @@ from planner.milling.structure import (
     sampled,
 )
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way
-from tests.support.semi_discretisation import semi_growth
 
 LINES = np.arange(200.0, 2400.0, 2.0)
 

@@ -9,19 +9,35 @@ angles.
 import numpy as np
 from scipy.linalg import expm
 
+from planner.errors import InputError
 from planner.milling.directional import tooth_matrix
-from planner.milling.machine import Machine
+from planner.milling.machine import Machine, Monodromies
 
 STEPS, PER_RADIAN = 24, 3.0  # of a period, and more per radian of the fastest mode: for 1 %
 AVERAGED = 16  # points of a step, over which the directional matrix is averaged
 
 
+def semi_monodromies(machine: Machine, rpm: float, factor: float = 1.0) -> Monodromies:
+    """A function of depths in m that gives their monodromy matrices; `factor` multiplies steps.
+
+    Raises InputError where teeth do not follow at equal angles.
+    """
+    if not machine.cut.even:
+        raise InputError(
+            "The semi-discretisation knows teeth at equal angles only; choose the method "
+            "full_discretisation for pitch_deg."
+        )
+    angle = machine.fastest * 60 / (rpm * machine.cut.teeth)
+    count = int(np.ceil(factor * np.ceil(STEPS + PER_RADIAN * angle)))
+    return lambda depths: [semi_monodromy(machine, rpm, count, float(b)) for b in depths]
+
+
 def semi_growth(machine: Machine, rpm: float, depth: float, count: int | None = None) -> float:
     """Largest |µ| at a speed and a depth in m, with `count` steps of a tooth's period."""
     if count is None:
-        angle = machine.fastest * 60 / (rpm * machine.cut.teeth)
-        count = int(np.ceil(2 * np.ceil(STEPS + PER_RADIAN * angle)))
-    built = semi_monodromy(machine, rpm, count, depth)
+        (built,) = semi_monodromies(machine, rpm, 2.0)(np.array([depth]))
+    else:
+        built = semi_monodromy(machine, rpm, count, depth)
     return float(np.max(np.abs(np.linalg.eigvals(built))))
 
 
