@@ -23,7 +23,8 @@ from scipy.stats import qmc
 from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS, Priors, parametrise
-from planner.fit.identify import identify
+from planner.fit.identify import identify, robot_prior
+from planner.fit.posterior import RobotBelief
 from planner.fit.result import TOLD
 from planner.frf import metrics
 from planner.frf.frf import Frf
@@ -224,11 +225,11 @@ class Informative:
         misfit: float, band_hz: tuple[float, float],
     ) -> "Informative":  # fmt: skip
         """At poses q (n, dof) in rad, with the noise of these FRFs and a misfit as found."""
-        p = parametrise(simulation, priors)
-        covariance = np.diag([parameter.log_sd**2 for parameter in p.parameters])
-        noise = FrfNoise.of(tuple(frfs), band_hz, misfit)
-        open_ = OpenParameters(simulation, p, covariance, noise, band_hz)
-        return cls(covariance, open_.information(q))
+        robot = RobotBelief.stated(robot_prior(simulation, priors), EXACT_HITS)
+        open_ = OpenParameters(robot, FrfNoise.of(tuple(frfs), band_hz, misfit), band_hz)
+        springs = slice(0, len(robot.structure.parameters))
+        told = open_.information(q)[:, :, springs, springs]
+        return cls(open_.covariance[springs, springs], told)
 
     def best(self, count: int) -> np.ndarray:
         """Rows (count,), the most informative first, each hit along all axes."""

@@ -8,8 +8,6 @@ from planner.campaign.cell import Cell
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
 from planner.design.propose import WORKSPACE_POSES
-from planner.effects.parameters import parametrise
-from planner.inference.block_diagonal import block_diagonal
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -24,14 +22,8 @@ def open_parameters(model: "Model") -> OpenParameters | None:
     # One that was identified and then set aside has nothing to learn that would be believed.
     if config.fidelity.simulation != "updated" or low.nominal is None or low.suspect is not None:
         return None
-    band, learned = config.modes.band_hz, low.learned
-    noise = model.frf_noise or FrfNoise.of((), band, 1.0)
-    if learned is None:
-        p = parametrise(low.nominal, low.priors)
-        known = block_diagonal(p.covariance, np.eye(len(p.nuisances)))
-        return OpenParameters(low.nominal, p, known, noise, band)
-    p, found = parametrise(learned.structure.simulation, learned.priors), learned.identified
-    return OpenParameters(found.simulation, p, found.covariance, noise, band)
+    noise = model.frf_noise or FrfNoise.of((), config.modes.band_hz, 1.0)
+    return OpenParameters(low.known_robot, noise, config.modes.band_hz)
 
 
 def informed_candidates(cell: Cell) -> np.ndarray:

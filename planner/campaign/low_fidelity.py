@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -13,6 +14,7 @@ from planner.effects.parameters import CAD_INERTIAS, Priors
 from planner.effects.table import Repertoire
 from planner.fit.fitted import FitRecord
 from planner.fit.learned import Learned
+from planner.fit.posterior import RobotBelief
 from planner.fit.result import Identification
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
@@ -57,6 +59,19 @@ class LowFidelity:
     def priors(self) -> Priors:
         """What is known before anything is measured."""
         return CAD_INERTIAS
+
+    @cached_property
+    def prior(self) -> RobotPrior:
+        """The same of everything that a robot may have; only with a simulation."""
+        assert self.nominal is not None
+        return RobotPrior(Repertoire.of(self.nominal, self.priors))
+
+    @property
+    def known_robot(self) -> RobotBelief:
+        """What is known of the robot's numbers, before it is measured as stated."""
+        if self.learned is not None:
+            return self.learned.posterior
+        return RobotBelief.stated(self.prior, self.tolerances)
 
     @property
     def taught(self) -> bool:
@@ -166,10 +181,9 @@ def learn(
     begins where that of the first 1, 2, 3, 4, 6, 8, 12, … led: it is a function of the measurements
     in their order alone, whatever was computed before, and each step costs little.
     """
-    nominal = before.nominal
-    if nominal is None or not frfs:
+    if before.nominal is None or not frfs:
         return before
-    prior = RobotPrior(Repertoire.of(nominal, before.priors))
+    prior = before.prior
 
     def search(count: int) -> Search:
         first, few = tuple(frfs[:count]), count < FEW_POSES

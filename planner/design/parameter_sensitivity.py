@@ -12,11 +12,11 @@ import numpy as np
 from planner.design.acquisitions import parameter_reduction
 from planner.design.cost import Cost
 from planner.design.frequency_posterior import ALL_AXES, AXES, FrequencyOutputs, Poses
-from planner.dynamics.gradient import laplace, motion_slopes, moved
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
-from planner.effects.parameters import Parametrisation
 from planner.fit.frequency_uncertainty import log_frequency_slope
+from planner.fit.misfit import FrfMisfit
+from planner.fit.posterior import RobotBelief
 from planner.frf.frf import Frf
 from planner.measurement.agreement import MODEL_ERROR
 from planner.measurement.measured_frfs import ASSUMED_FLOOR, ASSUMED_RELATIVE, noise_sd
@@ -64,13 +64,21 @@ class FrfNoise:
 
 @dataclass(frozen=True, eq=False)
 class OpenParameters:
-    """A simulation's parameters with covariance (p, p), and how FRFs to come would be measured."""
+    """What is believed of a robot, and how FRFs to come would be measured."""
 
-    simulation: Simulation
-    parametrisation: Parametrisation
-    covariance: np.ndarray
+    belief: RobotBelief
     noise: FrfNoise
     band_hz: tuple[float, float]
+
+    @property
+    def simulation(self) -> Simulation:
+        """Of the robot as it is believed to be."""
+        return self.belief.simulation
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(p, p) of the physical numbers."""
+        return self.belief.covariance[self.belief.physical, self.belief.physical]
 
     def poses(
         self,
@@ -86,7 +94,7 @@ class OpenParameters:
         """
         slope = np.zeros((0, low.shape[1], len(self.covariance)))
         if len(q):
-            slope = log_frequency_slope(self.simulation, self.parametrisation, q, simulated)
+            slope = log_frequency_slope(self.belief, q, simulated)
         information = self.information(q) if informed else np.zeros((len(q), AXES, 0, 0))
         return Poses(x, low, np.nan_to_num(slope), information)
 
@@ -106,28 +114,21 @@ class OpenParameters:
 
     def _information(self, q: np.ndarray, layout: Layout) -> np.ndarray:
         frequency, count = self._lines(q)
-        matrices = self.simulation.elastic.matrices(q, layout=layout)
-        inertias = None
-        if self.parametrisation.nuisances:
-            inertias = self.parametrisation.inertias(self.simulation.elastic.body_jacobians(q))
-        springs = self.simulation.elasticity
-        motion = moved(matrices, springs, laplace(frequency))
-        h, slope = motion.accelerance, motion_slopes(motion, springs, inertias)
+        belief = self.belief
+        misfit = FrfMisfit(belief.structure, belief.at(q, frequency, layout), belief.tolerances)
+        motion = misfit.motion(belief.x, None)
+        h, (slope, _) = motion.accelerance, misfit.slopes(motion, belief.x)
         # What no hit along an axis moves is never measured along it: it tells nothing.
         sd = self._sd(h)
         weight = np.sqrt(2 * count[:, None, None] / self.noise.misfit) / np.where(
             sd > 0, sd, np.inf
         )
         slope = (slope * weight[:, None])[:, :, self._channels(layout)]
-        spread = self.parametrisation.spread
-        n, p = len(q), len(self.covariance)
+        n, p = slope.shape[:2]
         out = np.empty((n, AXES, p, p))
         for i in range(n):
-            both = np.concatenate(
-                [np.tensordot(spread.T, slope[i, : len(spread)], 1), slope[i, len(spread) :]]
-            )
             for axis in range(AXES):
-                j = np.ascontiguousarray(both[:, :, axis]).reshape(p, -1).view(float)
+                j = np.ascontiguousarray(slope[i][:, :, axis]).reshape(p, -1).view(float)
                 out[i, axis] = j @ j.T
         return out
 

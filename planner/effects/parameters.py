@@ -6,12 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.errors import InputError
 from planner.robot.config import Compliance, RobotConfig
 from planner.robot.urdf_inertias import stated_shares
-from planner.robot.virtual_joints import inertia_basis
 
 KINDS = ("stiffness", "damping", "loss_factor")
 UNITS = {"stiffness": "N·m/rad", "damping": "N·m·s/rad", "loss_factor": "1"}
@@ -80,7 +78,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Parametrisation:
-    """From θ (P,), logarithms of the parameters, to springs; from φ (R,) in sds to inertias.
+    """From θ (P,), logarithms of the parameters, to springs; and what inertias err by.
 
     All logarithms of springs together (3e or 2e: stiffness, damping, loss factor if there is any)
     are `held` + `spread` θ.
@@ -92,7 +90,6 @@ class Parametrisation:
     size: int
     nuisances: tuple[str, ...]
     inertia: np.ndarray  # (bodies, 10, 10): change of the inertia by one sd
-    basis: np.ndarray  # (bodies, 10, 6, 6): the same as spatial inertias
 
     @property
     def mean(self) -> np.ndarray:
@@ -120,15 +117,6 @@ class Parametrisation:
         values = np.exp(self.held + self.spread @ theta).reshape(-1, self.size)
         none = np.zeros(self.size)
         return Elasticity(values[0], values[1], values[2] if len(values) > 2 else none)
-
-    def inertia_change(self, phi: np.ndarray) -> np.ndarray:
-        """Change (bodies, 10) of the inertias at φ (R,)."""
-        weights = phi.reshape(self.inertia.shape[:2])
-        return np.einsum("bp,bpk->bk", weights, self.inertia)
-
-    def inertias(self, jacobians: np.ndarray) -> Inertias:
-        """How φ moves the mass matrix at poses whose bodies move by jacobians (n, B, 6, e)."""
-        return Inertias(jacobians, self.basis)
 
 
 def parametrise(simulation: Simulation, priors: Priors) -> Parametrisation:
@@ -168,8 +156,7 @@ def parametrise(simulation: Simulation, priors: Priors) -> Parametrisation:
     with np.errstate(divide="ignore"):
         held = np.where(free, 0.0, np.log(np.where(free, 1.0, values)))
     names, inertia = _nuisances(simulation, priors)
-    basis = np.einsum("bpk,kij->bpij", inertia, inertia_basis())
-    return Parametrisation(tuple(parameters), held, spread, e, names, inertia, basis)
+    return Parametrisation(tuple(parameters), held, spread, e, names, inertia)
 
 
 def _place(simulation: Simulation, tie: str, blocks: list[int]) -> str:

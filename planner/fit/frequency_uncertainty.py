@@ -7,48 +7,11 @@ import numpy as np
 from planner.dynamics.motion import Motion
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
-from planner.effects.parameters import Parametrisation
 from planner.fit.misfit import FrfMisfit
-from planner.fit.posterior import RobotPosterior
+from planner.fit.posterior import RobotBelief
 
 # A pole is told by inverse iteration from so far beside it, relative to itself, in so many rounds.
 BESIDE, ROUNDS = 1e-7, 2
-
-
-def log_frequency_slope(
-    simulation: Simulation, parametrisation: Parametrisation, q: np.ndarray, modes: SimulatedModes
-) -> np.ndarray:
-    """∂ ln f of a simulation's `modes` (n, count) at q (n, dof) in rad, (n, count, P + R).
-
-    By any parameters; 0 where there is no mode.
-
-    With Z(λ) = λ²M + λC + K symmetric and Z(λ) x = 0, dλ = −xᵀ dZ x / xᵀ(2λM + C)x: modes are the
-    damped ones, whatever the dampers. The sag under gravity is held where the springs carry the
-    weight, as it is while they are identified.
-    """
-    poles = PoleMotion.of(simulation, q, modes)
-    pole, x, scale = poles.pole, poles.shape, poles.scale
-    springs, own = simulation.elasticity, len(parametrisation.parameters)
-    by_kind = {
-        "stiffness": np.diagonal(simulation.stiffness)[None, None],
-        "damping": pole[..., None] * springs.damping,
-        "loss_factor": 1j * (springs.stiffness * springs.loss_factor)[None, None],
-    }
-    slope = {kind: scale[..., None] * values * x**2 for kind, values in by_kind.items()}
-    out = np.zeros((*pole.shape, own + len(parametrisation.nuisances)))
-    for number, parameter in enumerate(parametrisation.parameters):
-        some = slope[parameter.kind][..., list(parameter.blocks)]
-        out[..., number] = some.sum(axis=-1).real
-    if parametrisation.nuisances:
-        jacobians = simulation.elastic.body_jacobians(q)
-        bodies, numbers = parametrisation.basis.shape[:2]
-        moved = np.moveaxis(jacobians @ np.swapaxes(x, 1, 2)[:, None], 3, 2)  # (n, b, k, 6)
-        squares = (moved[..., :, None] * moved[..., None, :]).reshape(*moved.shape[:3], -1)
-        basis = parametrisation.basis.reshape(bodies, numbers, -1)
-        change = np.moveaxis(squares @ np.swapaxes(basis, 1, 2), 1, 2)  # (n, k, b, p)
-        inertial = (scale * pole**2)[..., None, None] * change
-        out[..., own:] = inertial.real.reshape(*pole.shape, -1)
-    return np.where(poles.known[..., None], out, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,23 +57,28 @@ def _shapes(
     return x[..., 0]
 
 
-def frequency_sd(posterior: RobotPosterior, q: np.ndarray, modes: SimulatedModes) -> np.ndarray:
+def frequency_sd(belief: RobotBelief, q: np.ndarray, modes: SimulatedModes) -> np.ndarray:
     """Standard deviation of ln f (n, count) that all numbers of a structure leave, linearised.
 
     `modes` are its simulation's at q (n, dof) in rad.
     """
-    slope = structure_slope(posterior, q, modes)
-    return np.sqrt(np.sum((slope @ posterior.root) ** 2, axis=-1))
+    slope = log_frequency_slope(belief, q, modes)
+    return np.sqrt(np.sum((slope @ belief.root) ** 2, axis=-1))
 
 
-def structure_slope(posterior: RobotPosterior, q: np.ndarray, modes: SimulatedModes) -> np.ndarray:
-    """∂ ln f (n, count, D) of the same by the numbers of the structure, but for the chain's."""
-    poles, structure = PoleMotion.of(posterior.simulation, q, modes), posterior.structure
-    data = posterior.at(q, np.abs(poles.pole) / (2 * np.pi))
+def log_frequency_slope(belief: RobotBelief, q: np.ndarray, modes: SimulatedModes) -> np.ndarray:
+    """∂ ln f (n, count, D) of the same by the physical numbers of the structure.
+
+    With Z(λ) = λ²M + λC + K symmetric and Z(λ) x = 0, dλ = −xᵀ dZ x / xᵀ(2λM + C)x: modes are the
+    damped ones, whatever the dampers. The sag under gravity is held where the springs carry the
+    weight, as it is while they are identified. 0 where there is no mode.
+    """
+    poles, structure = PoleMotion.of(belief.simulation, q, modes), belief.structure
+    data = belief.at(q, np.abs(poles.pole) / (2 * np.pi))
     data = replace(data, measured=replace(data.measured, s=poles.pole))
     x = np.swapaxes(poles.shape[..., : len(structure.springs)], 1, 2)[:, :, None]
-    misfit = FrfMisfit(structure, data, posterior.tolerances)
+    misfit = FrfMisfit(structure, data, belief.tolerances)
     # Accelerances' slopes are −s² xᵀ dZ x of how hits and sensors move the springs.
-    moved, _ = misfit.slopes(Motion(misfit.matrices, x, x, poles.pole), posterior.x)
+    moved, _ = misfit.slopes(Motion(misfit.matrices, x, x, poles.pole), belief.x)
     slope = (moved[:, :, 0, 0] * (-poles.scale / poles.pole**2)[:, None]).real
     return np.where(poles.known[..., None], np.swapaxes(slope, 1, 2), 0.0)

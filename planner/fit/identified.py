@@ -42,13 +42,12 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
         len(structure.springs) - repertoire.stated,
     )
     p = parametrise(nominal, model.priors)
-    mean, turned = _translated(posterior, p, simulation, nominal)
-    covariance = turned @ posterior.covariance @ turned.T
-    covariance += np.diag(np.full(len(covariance), 1e-9))  # of bodies that nothing moves
+    turned = _logarithms(posterior, p)
+    mean, covariance = turned @ posterior.x, turned @ posterior.covariance @ turned.T
     misfit, by_pose = posterior.misfits(MODEL_ERROR)
     before = np.sqrt(np.diagonal(turned @ np.linalg.inv(structure.precision) @ turned.T))
     doubted = {structure.names[i] for i in departed(structure, posterior.x)}
-    told = estimates(p, mean[: len(p.parameters)], covariance)
+    told = estimates(p, mean, covariance)
     result = Identification(
         simulation,
         tuple(
@@ -57,10 +56,8 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
                 explained=posterior.explains and one.name not in doubted,
                 prior_log_sd=float(sd),
             )
-            for one, sd in zip(told, before, strict=False)
+            for one, sd in zip(told, before, strict=True)
         ),
-        p.nuisances,
-        mean,
         covariance,
         misfit,
         by_pose,
@@ -70,44 +67,19 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
     return model, result
 
 
-def _translated(
-    posterior: RobotPosterior, p: Parametrisation, simulation: Simulation, nominal: Simulation
-) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (P + R,) in its numbers, and the matrix (P + R, D) by which x moves them."""
-    structure, x = posterior.structure, posterior.x
-    springs, bodies = structure.parameters, structure.bodies
-    count = len(p.parameters)
-    turned = np.zeros((count + len(p.nuisances), structure.size))
-    mean = np.zeros(len(turned))
+def _logarithms(posterior: RobotPosterior, p: Parametrisation) -> np.ndarray:
+    """(P, D): by which x is turned into the logarithms of the springs' parameters."""
+    structure = posterior.structure
+    turned = np.zeros((len(p.parameters), structure.size))
     by_name = {name: k for k, name in enumerate(structure.names)}
-    springs_named = {q.name: q for q in springs}
-    stiffness = [q.name for q in springs if q.kind == "stiffness"]
+    springs = {q.name: q for q in structure.parameters}
+    stiffness = [q for q in structure.parameters if q.kind == "stiffness"]
     for i, parameter in enumerate(p.parameters):
-        if parameter.name in by_name:
-            turned[i, by_name[parameter.name]] = 1.0
-            mean[i] = x[by_name[parameter.name]]
-        else:  # a loss factor that an effect brought
-            own = next(k for n, k in by_name.items() if n.startswith(f"{parameter.name} of "))
-            turned[i, own], mean[i] = 1.0, np.log(parameter.median)
-        if parameter.kind == "damping":
-            blocks = set(springs_named[parameter.name].blocks)
-            there = (n for n in stiffness if blocks & set(springs_named[n].blocks))
-            at = by_name[next(there)]
-            turned[i, at] += 1.0
-            mean[i] += x[at]
-    difference = simulation.elastic.inertia - nominal.elastic.inertia
-    slopes = bodies.slopes(x[structure.inertial])
-    per = p.inertia.shape[1]
-    pairs = zip(structure.effects, structure.own, strict=True)
-    added = [(own, *more) for effect, own in pairs if (more := effect.inertia(x[own]))]
-    for b, name in enumerate(nominal.elastic.bodies):
-        rows = slice(count + b * per, count + (b + 1) * per)
-        onto = np.linalg.pinv(p.inertia[b].T)
-        mean[rows] = onto @ difference[b]
-        if name in bodies.bodies:
-            k = bodies.bodies.index(name)
-            turned[rows, structure.inertial.start + bodies.mine[k]] = onto @ slopes[k].T
-        for own, body, _, moved in added:
-            if body == name:
-                turned[rows, own] = onto @ moved.T
-    return mean, turned
+        name = parameter.name
+        if name not in by_name:  # a loss factor that an effect brought
+            name = next(n for n in by_name if n.startswith(f"{name} of "))
+        turned[i, by_name[name]] = 1.0
+        if parameter.kind == "damping":  # known by its ratio to the stiffness
+            blocks = set(springs[name].blocks)
+            turned[i, by_name[next(q.name for q in stiffness if blocks & set(q.blocks))]] = 1.0
+    return turned

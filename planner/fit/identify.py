@@ -50,12 +50,17 @@ def identify(
             f"{len(frfs)} FRF matrices and joint angles of shape {q.shape} do not fit together; "
             f"give {dof} finite angles for each of at least one."
         )
-    if not priors.inertial:
-        priors = replace(priors, mass=EXACT, inertia=EXACT, com_m=EXACT)
     tolerances = tolerances or Tolerances.of(robot.config, robot.joints.slides)
-    prior, band = RobotPrior(Repertoire.of(simulation, priors)), band_hz or robot.config.band_hz
+    prior, band = robot_prior(simulation, priors), band_hz or robot.config.band_hz
     search = Search(prior, tuple(frfs), q, band, tolerances, tell, extend=extend)
     stated = prior.stated()
     if not FrfMisfit(stated, search.data(1), tolerances).possible(stated.mean):
         raise InputError(TOO_SOFT)
     return Learned.of(search.found(warm))
+
+
+def robot_prior(simulation: Simulation, priors: Priors) -> RobotPrior:
+    """What is known of a robot before, its inertias exactly where priors leave them alone."""
+    if not priors.inertial:
+        priors = replace(priors, mass=EXACT, inertia=EXACT, com_m=EXACT)
+    return RobotPrior(Repertoire.of(simulation, priors))

@@ -10,9 +10,10 @@ from planner.effects.effect import Operator
 from planner.fit.data import FrfData
 from planner.fit.fitted import StructureFit
 from planner.fit.misfit import SHARE, FrfMisfit
-from planner.fit.structure import RobotStructure, exported
+from planner.fit.structure import RobotPrior, RobotStructure, exported
 from planner.inference.covariance import inverse
 from planner.measurement.measured_frfs import Measured
+from planner.measurement.nuisances import Tolerances
 from planner.recording.points import TOOL, Layout
 from planner.words import significant
 
@@ -24,26 +25,24 @@ MATTERS = 0.01  # share of |H| that a named effect changes: nothing wrong change
 
 
 @dataclass(frozen=True, eq=False)
-class RobotPosterior:
-    """A structure at x with the covariance of x; `size` is that of the discrepancy."""
+class RobotBelief:
+    """A structure at x with the covariance of x; `tolerances` of hits, chain and readback."""
 
     structure: RobotStructure
     x: np.ndarray
     covariance: np.ndarray
-    size: float
-    found: StructureFit
+    tolerances: Tolerances
 
     @classmethod
-    def of(cls, found: StructureFit) -> "RobotPosterior":
-        """After a fit."""
-        covariance = inverse(found.at.normal + found.structure.precision)
-        assert found.misfit.rho is not None
-        return cls(found.structure, found.at.x, covariance, found.misfit.rho, found)
+    def stated(cls, prior: RobotPrior, tolerances: Tolerances) -> "RobotBelief":
+        """Before anything is measured."""
+        structure = prior.stated()
+        return cls(structure, structure.mean, inverse(structure.precision), tolerances)
 
     @property
-    def explains(self) -> bool:
-        """Whether the structure explains the recordings."""
-        return self.size <= FOLLOWED
+    def physical(self) -> slice:
+        """Where the numbers of springs, bodies and effects are: all but the chain's."""
+        return slice(0, self.structure.chain.start)
 
     @cached_property
     def simulation(self) -> Simulation:
@@ -52,9 +51,8 @@ class RobotPosterior:
 
     @cached_property
     def root(self) -> np.ndarray:
-        """R with R Rᵀ the covariance, of all but the chain's numbers."""
-        own = self.structure.chain.start
-        covariance = self.covariance[:own, :own]
+        """R with R Rᵀ the covariance of the physical numbers."""
+        covariance = self.covariance[self.physical, self.physical]
         unit = np.sqrt(np.diagonal(covariance))
         values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
         return unit[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
@@ -72,20 +70,9 @@ class RobotPosterior:
             sds.append(sd.reshape(means[-1].shape))
         return np.array(means), np.array(sds)
 
-    def predicted(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same; in the sds what no structure explains too, in proportion to the FRFs."""
-        mean, sd = self.response(q, frequency_hz)
-        rms = np.sqrt(np.mean(np.abs(mean) ** 2, axis=(1, 2), keepdims=True))
-        return mean, np.hypot(sd, self.size * np.hypot(np.abs(mean), SHARE * rms))
-
-    @property
-    def tolerances(self):
-        """Of hits, chain and readback."""
-        return self.found.misfit.tolerances
-
     def at(self, q: np.ndarray, frequency_hz: np.ndarray, layout: Layout = TOOL) -> FrfData:
         """Nothing measured at q (n, dof) in rad on lines (F,) or (n, F), between some points."""
-        elastic = self._carried
+        elastic = self.structure.prior.carried
         lines = np.broadcast_to(frequency_hz, (len(q), np.shape(frequency_hz)[-1]))
         ones = np.ones((len(q), *layout.shape, lines.shape[1]))
         measured = Measured(
@@ -94,9 +81,32 @@ class RobotPosterior:
         matrices = elastic.matrices(q, layout=layout)
         return FrfData(q, measured, matrices, elastic.body_jacobians(q))
 
-    @cached_property
-    def _carried(self):
-        return self.structure.prior.carried
+
+@dataclass(frozen=True, eq=False)
+class RobotPosterior(RobotBelief):
+    """What a fit has made of it; `size` is that of the discrepancy."""
+
+    size: float
+    found: StructureFit
+
+    @classmethod
+    def of(cls, found: StructureFit) -> "RobotPosterior":
+        """After a fit."""
+        covariance = inverse(found.at.normal + found.structure.precision)
+        misfit = found.misfit
+        assert misfit.rho is not None
+        return cls(found.structure, found.at.x, covariance, misfit.tolerances, misfit.rho, found)
+
+    @property
+    def explains(self) -> bool:
+        """Whether the structure explains the recordings."""
+        return self.size <= FOLLOWED
+
+    def predicted(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same; in the sds what no structure explains too, in proportion to the FRFs."""
+        mean, sd = self.response(q, frequency_hz)
+        rms = np.sqrt(np.mean(np.abs(mean) ** 2, axis=(1, 2), keepdims=True))
+        return mean, np.hypot(sd, self.size * np.hypot(np.abs(mean), SHARE * rms))
 
     @cached_property
     def scale_sd(self) -> float:

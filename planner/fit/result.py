@@ -46,16 +46,12 @@ class Estimate:
 class Identification:
     """Result of `identify`.
 
-    `mean` (P + R,) and `covariance` (P + R, P + R) are those of the parameters' logarithms, then
-    of the inertial deviations in prior sds, named in `nuisances` (none where inertias were taken
-    for exact). `misfit` is χ² per real value, 1 at the noise; the covariance is that of the stated
-    noise, or of the misfit where that is larger.
+    `covariance` (P, P) is that of the parameters' logarithms; `misfit` is χ² per real value, 1 at
+    the noise.
     """
 
     simulation: Simulation
     estimates: tuple[Estimate, ...]
-    nuisances: tuple[str, ...]
-    mean: np.ndarray
     covariance: np.ndarray
     misfit: float
     misfit_by_pose: np.ndarray  # (n,)

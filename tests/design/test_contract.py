@@ -18,8 +18,12 @@ from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
 from planner.design.propose import ACQUISITIONS, Travel, propose
 from planner.design.stopping import forecast, left_out, mean_squares
 from planner.dynamics.simulation import Simulation
-from planner.effects.parameters import Priors, parametrise
+from planner.effects.parameters import Priors
 from planner.fit.frequency_uncertainty import log_frequency_slope
+from planner.fit.identify import robot_prior
+from planner.fit.posterior import RobotBelief
+from planner.fit.structure import exported
+from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
@@ -37,9 +41,9 @@ def open_(tmp_path_factory):
     """An arm's simulation with 12 springs and uncertain inertias."""
     path = make_arm(tmp_path_factory.mktemp("arm"), transverse=True)
     simulation = Simulation(Robot.load(path))
-    p = parametrise(simulation, Priors(mass=0.05, inertia=0.05, com_m=0.01))
-    prior = np.diag(np.concatenate([p.log_sd**2, np.ones(len(p.nuisances))]))
-    return OpenParameters(simulation, p, prior, FrfNoise(0.01, 0.01, 0.5), BAND_HZ)
+    prior = robot_prior(simulation, Priors(mass=0.05, inertia=0.05, com_m=0.01))
+    robot = RobotBelief.stated(prior, Tolerances())
+    return OpenParameters(robot, FrfNoise(0.01, 0.01, 0.5), BAND_HZ)
 
 
 def some_q(n, seed=0):
@@ -162,28 +166,21 @@ def test_repeating_is_a_refit_with_half_the_variance(surrogate):
 
 
 def moved(open_, x):
-    """The simulation at x, springs and inertias."""
-    p = open_.parametrisation
-    count = len(p.parameters)
-    changed = open_.simulation.changed(p.elasticity(x[:count]), p.inertia_change(x[count:]))
-    return held(changed, open_)
-
-
-def held(changed, open_):
-    """The same in the posture in which the robot sags now: that hardly moves with the springs."""
+    """The simulation at x, in the posture in which it sags now: that hardly moves with springs."""
+    changed = exported(open_.belief.structure, x)[0]
     changed.elastic = changed.elastic.carried_by(open_.simulation.elasticity.stiffness)
     return changed
 
 
 def test_slopes_are_the_derivatives_of_ln_f(open_):
-    q, p = some_q(2), open_.parametrisation
-    slope = log_frequency_slope(open_.simulation, p, q, open_.simulation.modes(q, 4))
-    x, count = np.concatenate([p.mean, np.zeros(len(p.nuisances))]), len(p.parameters)
+    q, belief = some_q(2), open_.belief
+    slope = log_frequency_slope(belief, q, open_.simulation.modes(q, 4))
+    x, count = belief.x, len(belief.structure.parameters)
 
     def log_hz(at):
         return np.log(moved(open_, at).modes(q, 4).frequency_hz)
 
-    for i in (0, 3, 11, count, count + 7, len(x) - 1):
+    for i in (0, 3, 11, count, count + 7, belief.physical.stop - 1):
         step = np.zeros(len(x))
         step[i] = 1e-5
         by_difference = (log_hz(x + step) - log_hz(x - step)) / 2e-5
@@ -192,9 +189,9 @@ def test_slopes_are_the_derivatives_of_ln_f(open_):
 
 def test_information_is_that_of_the_frf_line_by_line(open_):
     """Against finite differences of the simulated FRF on every line that would be recorded."""
-    q, p = some_q(1, 3), open_.parametrisation
+    q = some_q(1, 3)
     lines = np.arange(BAND_HZ[0], BAND_HZ[1], open_.noise.step_hz)
-    x, count = np.concatenate([p.mean, np.zeros(len(p.nuisances))]), len(p.parameters)
+    x, count = open_.belief.x, len(open_.belief.structure.parameters)
     h = open_.simulation.accelerance(q, lines)[0]
     sd = np.hypot(open_.noise.relative * np.abs(h), open_.noise.floor)
     rows, chosen = [], (0, 1, 2, 12, count + 3)

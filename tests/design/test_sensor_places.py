@@ -10,7 +10,10 @@ from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.design.parameter_sensitivity import FrfNoise, OpenParameters, better_places
 from planner.design.stopping import forecast
 from planner.dynamics.simulation import Simulation
-from planner.effects.parameters import Priors, parametrise
+from planner.effects.parameters import CAD_INERTIAS
+from planner.fit.identify import robot_prior
+from planner.fit.posterior import RobotBelief
+from planner.measurement.nuisances import Tolerances
 from planner.recording.points import Layout
 from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import fit_surrogate
@@ -32,9 +35,8 @@ def open_(tmp_path_factory) -> OpenParameters:
     one_axis = toml.read_text().replace('name = "sensor"\n', 'name = "sensor"\naxes = ["x"]\n')
     toml.write_text(one_axis)
     simulation = Simulation(Robot.load(toml))
-    p = parametrise(simulation, Priors(mass=0.08, inertia=0.08, com_m=0.01))
-    prior = np.diag(np.concatenate([p.log_sd**2, np.ones(len(p.nuisances))]))
-    return OpenParameters(simulation, p, prior, FrfNoise(0.01, 0.02, 0.5), (4.0, 90.0))
+    robot = RobotBelief.stated(robot_prior(simulation, CAD_INERTIAS), Tolerances())
+    return OpenParameters(robot, FrfNoise(0.01, 0.02, 0.5), (4.0, 90.0))
 
 
 @pytest.fixture(scope="module")
