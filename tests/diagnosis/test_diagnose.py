@@ -109,7 +109,7 @@ def test_the_robot_that_is_written_is_read_back_and_predicts(tmp_path):
         lines, mean = file["frequency_hz"], file["frf_mean"]
         assert mean.shape == file["frf_sd"].shape == (1, 3, 3, lines.size)
         q = np.deg2rad(file["joints_deg"])[0]
-    deviation: Deviation = replace(SCATTER, **of.change)  # pyright: ignore[reportArgumentType]
+    deviation: Deviation = replace(SCATTER, **of.change)
     true = load_truth(case.robot_toml, deviation).accelerance(q, lines)
     assert np.linalg.norm(mean[0] - true) < 0.05 * np.linalg.norm(true)
     assert all(Path(plot).is_file() for plot in answer["plots"])
