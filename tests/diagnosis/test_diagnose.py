@@ -1,4 +1,7 @@
-"""Diagnoses of small cells from the other engine: what they say, and in which form."""
+"""Diagnoses of small cells from the other engine: what they say, and in which form.
+
+`pytest -m slow tests/diagnosis/test_diagnose.py` lets all rounds look for what nothing describes.
+"""
 
 import json
 import pickle
@@ -10,6 +13,7 @@ import numpy as np
 import pytest
 
 from planner import Dataset, Robot, diagnose
+from planner.diagnosis.search import ROUNDS
 from planner.truth.deviation import Deviation
 from planner.truth.handling import EVERYDAY, LABORATORY
 from planner.truth.load import load_truth
@@ -99,7 +103,10 @@ def test_what_is_concealed_is_named_and_sized(tmp_path, name):
     assert_named_and_sized(diagnosed(small_case(tmp_path, CONCEALED[name])), name)
 
 
-def test_what_no_effect_describes_is_unexplained(tmp_path):
+@pytest.mark.parametrize("rounds", [1, pytest.param(ROUNDS, marks=pytest.mark.slow)])
+def test_what_no_effect_describes_is_unexplained(tmp_path, monkeypatch, rounds):
+    """Nor does one more effect explain it, after those of the first round."""
+    monkeypatch.setattr("planner.diagnosis.search.ROUNDS", rounds)
     answer = diagnosed(small_case(tmp_path, CONCEALED["outsider"]))
     assert answer["verdict"] == "unexplained"
     assert answer["candidates"][0]["effect"] == "unknown"
