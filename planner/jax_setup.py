@@ -137,7 +137,8 @@ def _backend_understands_options() -> bool:
 @contextmanager
 def _kept_on_disk() -> Iterator[None]:
     """What is compiled meanwhile is kept in the user's cache folder, unless JAX has one already."""
-    folder = None if jax.config.jax_compilation_cache_dir else _folder()
+    own = jax.config.jax_compilation_cache_dir  # pyrefly: ignore[missing-attribute]
+    folder = None if own else _folder()
     if folder is None:
         yield
         return

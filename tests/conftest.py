@@ -9,6 +9,8 @@ from pathlib import Path  # noqa: E402
 
 import pytest  # noqa: E402
 
+from planner.inference import parallel  # noqa: E402
+
 pytest_plugins = ["tests.support.proof_table"]
 SHARED_DATA = Path(__file__).parents[2] / "shared" / "data"
 
@@ -17,6 +19,15 @@ SHARED_DATA = Path(__file__).parents[2] / "shared" / "data"
 def no_lines_of_progress(monkeypatch):
     """What a command says hangs on no clock: lines of progress come after seconds."""
     monkeypatch.setattr("planner.cli.progress.FIRST_S", 3600.0)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def no_more_processes_than_cores():
+    """Where workers of pytest-xdist fill the cores, a helper process takes another's."""
+    with pytest.MonkeyPatch.context() as patch:
+        if int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")) >= parallel.cores():
+            patch.setattr(parallel, "_has_cores", lambda: False)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,8 @@ import pytest
 from planner.inference import parallel as module
 from planner.inference.parallel import cores, side_by_side
 
+HAS_CORES = module._has_cores  # before conftest.py, where there are many workers, says otherwise
+
 
 def who(seconds: float) -> tuple[float, int]:
     time.sleep(seconds)
@@ -42,6 +44,11 @@ def there(process: int) -> bool:
     except ProcessLookupError:
         return False
     return True
+
+
+@pytest.fixture(autouse=True)
+def as_without_other_workers(monkeypatch):
+    monkeypatch.setattr(module, "_has_cores", HAS_CORES)
 
 
 @pytest.fixture

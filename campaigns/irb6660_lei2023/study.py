@@ -50,7 +50,7 @@ PAPER = Paper(
 )  # fmt: skip
 ROBOTS = (11, 12, 13)
 FOLDS = 5
-FEW_FOLDS, EVERY = 2, 4  # of the small version: folds that are run, and every such posture
+FEW_FOLDS, EVERY = 2, 6  # of the small version: folds that are run, and every such posture
 NEAREST = 4  # postures from which a missing value is filled in, to train with only
 RULES = (
     ClaimRule.of(

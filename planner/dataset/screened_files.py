@@ -74,7 +74,7 @@ class Source:
         if not isinstance(record, FrfRecord):
             return record
         named = placed_by_name(record, self.name) if self.from_name else record
-        return with_axes(named, self.hit, self.response)
+        return with_axes(named, self.hit, self.response)  # pyrefly: ignore[bad-return]
 
     def _meant(self, records: tuple[Record, ...]) -> tuple[Record, ...]:
         """Of a file's records those that are meant."""

@@ -28,8 +28,8 @@ STRANGE = 0.6  # where it is something else: little is left of what is expected
 class _Informed(RobotStructure):
     """A structure of which `x` is expected, with the inverse covariance `known`."""
 
-    x: np.ndarray = None  # pyright: ignore[reportAssignmentType]
-    known: np.ndarray = None  # pyright: ignore[reportAssignmentType]
+    x: np.ndarray = None  # pyrefly: ignore[bad-assignment]
+    known: np.ndarray = None  # pyrefly: ignore[bad-assignment]
 
     @cached_property
     def mean(self) -> np.ndarray:

@@ -41,7 +41,7 @@ class StructureFit:
     def remembered(self) -> "FitRecord":
         """What is worth keeping of it."""
         record = self._record(self.shares)
-        return replace(record, wider=self.wider and self.wider._record(()))
+        return replace(record, wider=self.wider._record(()) if self.wider else None)
 
     @property
     def tried(self) -> "Tried":

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -95,13 +96,16 @@ def joined(records: Sequence[FrfRecord]) -> FrfRecord:
             f"{other.source} holds FRFs of kind {other.quantity}, {first.source} of kind "
             f"{first.quantity}; name files of one kind."
         )
+    of_each: dict[str, Any] = {
+        name: tuple(chain(*(getattr(r, name) for r in records))) for name in OF_EACH
+    }
     return replace(
         first,
         values=np.concatenate([record.values for record in records]),
         coherence=np.concatenate([record.coherence for record in records]),
         remarks=tuple(dict.fromkeys(told for record in records for told in record.remarks)),
         simulated=any(record.simulated for record in records),
-        **{name: tuple(chain(*(getattr(r, name) for r in records))) for name in OF_EACH},
+        **of_each,
     )
 
 

@@ -90,7 +90,7 @@ def score(name: str, answer: Mapping[str, Any], told: Mapping[str, Any]) -> Scor
     """Score one case; one that failed is wrong, with certainty."""
     true = tuple(_place(e) for e in answer["effects"])
     verdict, failed = told.get("verdict", "failed"), "failed" in told
-    first = {"effects": (), "probability": 1.0} if failed else told["candidates"][0]
+    first: dict[str, Any] = {"effects": (), "probability": 1.0} if failed else told["candidates"][0]
     said = tuple(_place(e) for e in first["effects"])
     named = _named(told, verdict, said)
     sets = [frozenset(map(_place, members)) for members in told.get("sets") or ()]

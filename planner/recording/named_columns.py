@@ -20,6 +20,7 @@ from planner.errors import InputError
 from planner.recording.column_names import (
     RATES,
     STEPS,
+    Unit,
     bare,
     direction_in,
     frequency_unit,
@@ -137,8 +138,7 @@ def _stated_rates(path: Path, named: Named) -> dict[str, float]:
 
 
 def _channel(name: str, values: np.ndarray, named: Named) -> Channel:
-    unit = lookup(named.unit(name))
-    quantity, si, factor = unit or ("unknown", "", 1.0)
+    quantity, si, factor = lookup(named.unit(name)) or Unit("unknown", "", 1.0)
     plain = re.sub(r"(_m_s2|_n|_g)$", "", name)
     at = _AT.match(plain)
     direction, node = direction_in(plain[at.end(1) :] if at else plain), at[1] if at else ""
@@ -322,7 +322,7 @@ def _values(path: Path, entry: _Entry, named: Named) -> tuple[str, bool, np.ndar
     if first == "magnitude":
         return kind, known, factor * _polar(path, entry, named, "db" in stated.lower())
     values = parts.get("complex", parts.get("re", 0.0)) + 1j * np.real(parts.get("im", 0.0))
-    return kind, known, factor * values
+    return kind, known, np.asarray(factor * values)
 
 
 def _polar(path: Path, entry: _Entry, named: Named, in_db: bool) -> np.ndarray:

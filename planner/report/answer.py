@@ -30,7 +30,7 @@ class Answer:
 
     def to_json(self) -> dict[str, Any]:
         """Builtin values only. NumPy arrays become lists, numbers that are not finite None."""
-        fields = dataclasses.fields(self)  # pyright: ignore[reportArgumentType]
+        fields = dataclasses.fields(self)  # pyrefly: ignore[bad-argument-type]
         values = {f.name: getattr(self, f.name) for f in fields if f.metadata.get("json", True)}
         return {name: plain(v) for name, v in values.items() if v is not msgspec.UNSET}
 
@@ -64,7 +64,7 @@ class Answer:
             return self
         simulated = getattr(self, "simulated", False)
         written = pictures.write(draw(), name, note, more, simulated)
-        return dataclasses.replace(self, **written)  # pyright: ignore[reportArgumentType]
+        return dataclasses.replace(self, **written)  # pyrefly: ignore[bad-specialization]
 
     def drawings(self) -> "dict[str, Figure]":
         """Its pictures by name."""

@@ -71,7 +71,7 @@ class ComparisonReport(Answer):
     seconds: float = 0.0
     curves: Mapping[str, Curves] | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
-    def with_pictures(self, out: Path | None, rrd: Path | None, key: str) -> "ComparisonReport":  # pyright: ignore[reportIncompatibleMethodOverride]
+    def with_pictures(self, out: Path | None, rrd: Path | None, key: str) -> "ComparisonReport":  # pyrefly: ignore[bad-override-param-name]
         """The same with the picture in `out` and the Rerun file, where they are wanted.
 
         `key` is the pool's content hash.

@@ -257,7 +257,7 @@ def status(campaign: Campaign) -> StatusReport:
     believed = campaign.of_model("status", ModelStatus, ModelStatus.of)
     remarks = (*believed.remarks, *_beside_diagnosis(campaign, believed.springs))
     return StatusReport(
-        **(vars(believed) | {"remarks": remarks}),  # pyright: ignore[reportArgumentType]
+        **(vars(believed) | {"remarks": remarks}),
         campaign=str(campaign.directory),
         simulated=state.simulated,
         measurements=tuple(

@@ -12,6 +12,7 @@ import numpy as np
 
 UNKNOWN = "unknown"
 NEARLY = 1 - 1e-12
+Kind = Literal["hardening", "softening", "friction", "backlash"]
 Step = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -102,7 +103,7 @@ class LawTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_def
     """
 
     joint: str
-    kind: Literal["hardening", "softening", "friction", "backlash"]
+    kind: Kind
     stiffness_n_m_rad: float | None = None
     angle_rad: float | None = None
     coulomb_torque_n_m: float | None = None
@@ -118,14 +119,14 @@ class LawTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_def
         cls, joint: str, slides: bool, step: Step, k: float, a: float, linear: tuple[float, float]
     ) -> "LawTable":
         """With k and a in the units of a joint that slides or turns; what is `linear` of k = 1."""
-        kinds: dict[Step, str] = {dead_zone: "backlash", dahl: "friction", bouc_wen: "friction"}
-        kind = kinds.get(step, "hardening" if k > 0 else "softening")
+        kinds: dict[Step, Kind] = {dead_zone: "backlash", dahl: "friction", bouc_wen: "friction"}
+        kind = kinds.get(step) or ("hardening" if k > 0 else "softening")
         hysteresis = "bouc_wen" if step is bouc_wen else "dahl"
         stiffness, bend = cls.entries(kind, slides)
         size = abs(k) * a if kind == "friction" else a
         numbers = {stiffness: abs(k), bend: size, "in_spring": linear[0], "in_damper_s": linear[1]}
         rounded = {name: float(f"{value:.6g}") for name, value in numbers.items()}
-        return cls(joint, kind, hysteresis=hysteresis, **rounded)  # pyright: ignore[reportArgumentType]
+        return cls(joint, kind, hysteresis=hysteresis, **rounded)
 
     @staticmethod
     def entries(kind: str, slides: bool) -> tuple[str, str]:

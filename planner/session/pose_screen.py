@@ -124,7 +124,7 @@ class PosePage:
     def _hits(self) -> Table:
         made = Table(box=None, header_style="bold", pad_edge=False)
         made.add_column(f"hit along, axes of {self.frame}")
-        ways = dict(zip("xyz", self.room, strict=False))
+        ways: dict[str, str] = dict(zip("xyz", self.room, strict=False))
         for axis in self.proposal.hits:
             count = self.counts[axis]
             done = count >= self.per_axis

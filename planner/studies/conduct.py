@@ -2,7 +2,6 @@
 
 import csv
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -140,7 +139,7 @@ def _index(answers: list[StudyAnswer]) -> str:
 
 
 def _study_html(title: str, **values: Any) -> str:
-    empty: Mapping[str, Any] = {
+    empty: dict[str, Any] = {
         "paper": "", "said": (), "links": {}, "pictures": (), "seconds": 0.0, "classes": CLASSES,
         "shown": shown_cell,
     }  # fmt: skip

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -132,5 +133,5 @@ def some_joint(scene: Scene, rng: np.random.Generator, last: int = 5) -> str:
 def deviate(secret: Secret, **changes: Iterable) -> Secret:
     """A secret with more items in its deviation, by the name of the field."""
     old = secret.deviation
-    more = {name: (*getattr(old, name), *items) for name, items in changes.items()}
+    more: dict[str, Any] = {name: (*getattr(old, name), *items) for name, items in changes.items()}
     return replace(secret, deviation=replace(old, **more))

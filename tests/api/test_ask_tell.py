@@ -73,7 +73,7 @@ def test_a_pose_told_again_replaces_what_was_told(stiffer):
 
 
 def test_frfs_teach_the_simulation_itself(stiffer):
-    lines, loop = np.arange(2.0, 90.0, 0.25), AskTell(TOML, tables("updated"))
+    lines, loop = np.arange(2.0, 90.0, 0.5), AskTell(TOML, tables("updated"))
     rng = np.random.default_rng(3)
     for _ in range(2):
         proposal = loop.ask()[0]

@@ -38,7 +38,7 @@ def told_of(cell: MissedCell, model):
 @pytest.fixture(scope="module")
 def cell(tmp_path_factory):
     folder = tmp_path_factory.mktemp("missed")
-    made = missed_cell(folder, "irb6640", poses=3, repeats=2, seed=31)
+    made = missed_cell(folder, "irb6640", poses=2, repeats=2, seed=31)
     return made, *imported(made, folder / "campaign")
 
 

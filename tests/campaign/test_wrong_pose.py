@@ -1,4 +1,4 @@
-"""Hits of another pose of the workspace, under a pose's name, after one to three measurements."""
+"""Hits of another pose, or with a wrong angle, under a pose's name, after few measurements."""
 
 import csv
 
@@ -11,7 +11,10 @@ from planner.campaign.question import SURE
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
+from planner.report.imports import how_to_answer
 from tests.support.generated_arms import BAND_HZ, Arm, make_generated_arm
+
+OTHERS = 3  # poses of the workspace that are hit beside
 
 
 def measured(arm: Arm, folder, poses: int = 3) -> Campaign:
@@ -41,7 +44,7 @@ def measured_at(arm: Arm, folder, q: np.ndarray) -> list[MeasuredPose]:
 def test_another_pose_is_asked_about_before_three_are_measured(tmp_path, poses):
     arm = make_generated_arm(tmp_path, 922, 4, 3)
     campaign = measured(arm, tmp_path, poses)
-    q = np.random.default_rng(924).uniform(*arm.box_rad.T, (6, 4))
+    q = np.random.default_rng(924).uniform(*arm.box_rad.T, (OTHERS, 4))
     first = np.deg2rad(campaign.state.used[0].joints_deg)
     *found, again = measured_at(arm, tmp_path, np.vstack([q, first]))
 
@@ -49,11 +52,41 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path, poses):
         angles = tuple(np.rad2deg(q[at]).tolist())
         return asked_of(campaign.model, campaign.state, "X", angles, one)
 
-    assert not any(asked(i, found[i]) for i in range(6))
-    repeated = [asked(i, again) for i in range(6)]
-    assert [one and one.fits for one in repeated] == ["P001"] * 6
+    assert not any(asked(i, found[i]) for i in range(OTHERS))
+    repeated = [asked(i, again) for i in range(OTHERS)]
+    assert [one and one.fits for one in repeated] == ["P001"] * OTHERS
     assert all("repeat those of P001" in one.text for one in repeated if one)
-    wrong = [asked(i, found[i - k]) is not None for i in range(6) for k in (1, 2)]
     # From one pose, another structure may explain what fits nothing that is known.
     if poses >= SURE:
-        assert np.mean(wrong) >= 0.9
+        assert all(asked(i, found[i - k]) for i in range(OTHERS) for k in (1, 2))
+
+
+def test_a_wrong_angle_at_the_first_pose_is_asked_about_at_the_next(tmp_path):
+    """Nothing tells then: the simulation alone lacks too much. It bends what is expected after."""
+    arm = make_generated_arm(tmp_path, 923, 4, 3)
+    campaign, reports = Campaign.new(tmp_path / "campaign", arm.robot_toml, arm.campaign_toml), []
+    for number in range(2):
+        (pose,) = campaign.next()
+        named = [(pose.pose, np.deg2rad(pose.joints_deg))]
+        folder = arm.record(tmp_path / pose.pose, named, number)
+        if number == 0:
+            read = other_sign(folder, "joint_4_deg")
+        reports += campaign.import_paths((folder,))
+    first, asked = (report.question for report in reports)
+    assert first is None
+    assert asked is not None
+    assert (asked.about, asked.fits) == ("earlier", "P001")
+    assert f"is joint_4 {-read:.2f}° or {read:.2f}°?" in asked.text
+    assert "--pose P001b" in how_to_answer(campaign.directory, "P002", asked)
+
+
+def other_sign(folder, column: str) -> float:
+    """A table that says the other sign of a joint's angle, in degrees: what it says then."""
+    with open(folder / TABLE, newline="") as file:
+        rows = list(csv.DictReader(file))
+    read = -float(rows[0][column])
+    with open(folder / TABLE, "w", newline="") as file:
+        table = csv.DictWriter(file, list(rows[0]))
+        table.writeheader()
+        table.writerows({**row, column: read} for row in rows)
+    return read

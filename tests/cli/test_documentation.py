@@ -21,7 +21,7 @@ from planner.milling.tool import ToolTable, load_tool
 from planner.report.documentation import manual
 from planner.robot.config import RobotConfig
 
-COMMANDS = typer.main.get_command(app).commands  # pyright: ignore[reportAttributeAccessIssue]
+COMMANDS = typer.main.get_command(app).commands
 
 
 def parsed(line: str) -> None:

@@ -31,8 +31,8 @@ kt_n_m2 = 6.0e8
 kr_n_m2 = 2.0e8
 feed = [1.0, 0.0, 0.0]
 axis = [0.0, 0.0, 1.0]
-spindle_rpm = [600, 3000, 5]
-depth_m = [0.0, 0.001, 10]
+spindle_rpm = [600, 3000, 3]
+depth_m = [0.0, 0.001, 4]
 method = "zeroth_order"
 """
 

@@ -64,7 +64,7 @@ class Cell:
 @pytest.fixture(scope="module")
 def cell(tmp_path_factory: pytest.TempPathFactory) -> Cell:
     toml = write_arm(tmp_path_factory.mktemp("arm"))
-    made = Cell(load_truth(toml, Deviation(extra=SOFT)), None)  # pyright: ignore
+    made = Cell(load_truth(toml, Deviation(extra=SOFT)), None)
     q = poses(2, 3)
     frfs = [made.frf(row, k) for k, row in enumerate(q)]
     return replace(made, search=searching(frfs, q, Simulation(Robot.load(toml))))

@@ -45,7 +45,12 @@ LAWS: dict[str, Callable[[float, float], JointLaw]] = {
 
 
 def made(
-    folder: Path, seed: int, law: str = "", joint: str = "", levels: tuple[float, ...] = LEVELS
+    folder: Path,
+    seed: int,
+    law: str = "",
+    joint: str = "",
+    levels: tuple[float, ...] = LEVELS,
+    count: int = POSES,
 ) -> Made:
     """A robot whose springs and bodies are not quite as stated, hit by hand; its law, if any."""
     rng, peak_n = np.random.default_rng(seed), PEAK_N["kr10"]
@@ -53,17 +58,17 @@ def made(
     toml = arm.write(folder / "robot", 1)
     deviation = Deviation(seed, stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)
     truth, (low, high) = load_truth(toml, deviation), np.deg2rad(np.array(arm.joints_deg)).T
-    poses, hammer = rng.uniform(low, high, (POSES, 6)), Hammer(peak_n, 0.008, noise=0.01)
+    poses, hammer = rng.uniform(low, high, (count, 6)), Hammer(peak_n, 0.008, noise=0.01)
     scene = Scene(arm, truth, 1, poses, peak_n)
     bends = LAWS[law](scene.stiffness(joint), scene.angle(joint)) if law else None
     ports = (Port(bends, joint=joint),) if bends else ()
     secret = Secret(deviation, ports, chain=EVERYDAY.chain(rng))
     shots = [(f"+{axis}", peak_n * level) for axis in "xyz" for level in levels]
     axes = [AXES.index(axis[1]) for axis, _ in shots]
-    planned = [HitVisit(q, shots, i / POSES, EVERYDAY.aims(axes, rng)) for i, q in enumerate(poses)]
+    planned = [HitVisit(q, shots, i / count, EVERYDAY.aims(axes, rng)) for i, q in enumerate(poses)]
     visits = [
         Visit(
-            f"P{i}", q, i / POSES,
+            f"P{i}", q, i / count,
             tuple(Hit(Path("hit"), h.axis, hammer.sampling_rate_hz, h.force_n, h.acceleration_m_s2)
                   for h in hits),
         )

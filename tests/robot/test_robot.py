@@ -105,4 +105,4 @@ class _Placed:
 def test_axes_are_told_as_seen_from_the_base(tmp_path, place, axes, said):
     robot = Robot.load(make_plain_arm(tmp_path))
     placed = _Placed(robot, axes, place)
-    assert axes_in_the_room(placed, np.zeros(len(robot.joint_names))) == said  # pyright: ignore
+    assert axes_in_the_room(placed, np.zeros(len(robot.joint_names))) == said

@@ -363,7 +363,7 @@ def test_a_tool_far_out_is_inside_every_shape():
     dofs = tuple(Dof(name, axis) for name in names for axis in "xyz")
     shapes = np.random.default_rng(2).normal(size=(3, 18)) + 0j
     modes = [SimpleNamespace(shape=shape, frequency_hz=10.0) for shape in shapes]
-    figure = shapes_figure(SimpleNamespace(modes=modes, dofs=dofs), geometry)  # pyright: ignore
+    figure = shapes_figure(SimpleNamespace(modes=modes, dofs=dofs), geometry)
     figure.canvas.draw()
     for panel in figure.axes:
         (dots,) = [c for c in panel.collections if hasattr(c, "_offsets3d")]

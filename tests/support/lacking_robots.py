@@ -135,4 +135,4 @@ def mass_that_moves(root: ElementTree.Element) -> float:
 def links_moved(root: ElementTree.Element, joints: tuple[str, ...]) -> dict[str, str]:
     """The link that each joint moves."""
     found = {j.get("name", ""): j.find("child") for j in root.findall("joint")}
-    return {name: str(found[name].get("link")) for name in joints}  # pyright: ignore
+    return {name: str(found[name].get("link")) for name in joints}

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planner.truth import cases
 from planner.truth.arms import ARMS
 from planner.truth.cases import DAMPING_S, RANDOM, SCATTER, TABLE, make_case
 from planner.truth.deviation import Deviation, Spring
@@ -79,7 +80,9 @@ def test_robots_drawn_at_random_stand_and_have_modes_in_the_band(tmp_path, seed)
         assert np.all((damping > 0.002) & (damping < 0.2))
 
 
-def test_a_case_of_a_robot_drawn_at_random_is_whole_and_the_same_again(tmp_path):
+def test_a_case_of_a_robot_drawn_at_random_is_whole_and_the_same_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(cases, "POSES", 2)
+    monkeypatch.setattr(cases, "PREDICTED", 1)
     one, two = (make_case("sensor_gain", RANDOM, 7, tmp_path / name) for name in "ab")
     assert [c.effect for c in one.concealed] == ["sensor_gain"]
     assert one.held_out == two.held_out

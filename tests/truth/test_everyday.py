@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planner.truth import cases
 from planner.truth.arms import ARMS
 from planner.truth.cases import DAMPING_S, OUTSIDERS, PEAK_N, SCATTER, TABLE, make_case
 from planner.truth.imperfections import imperfect
@@ -93,7 +94,9 @@ def test_what_changes_with_time_is_what_gives_or_what_is_carried(tmp_path):
     assert without is None
 
 
-def test_a_case_says_what_it_should_and_hides_the_rest(tmp_path):
+def test_a_case_says_what_it_should_and_hides_the_rest(tmp_path, monkeypatch):
+    monkeypatch.setattr(cases, "POSES", 2)
+    monkeypatch.setattr(cases, "PREDICTED", 1)
     made = make_case("friction", "kr210", 2, tmp_path)
     [effect] = made.concealed
     assert effect.effect == "friction"

@@ -35,7 +35,7 @@ def open_stream(
 
 
 def _sinks(rrd: Path | None, viewer: bool) -> list:
-    sinks = []
+    sinks: list = []
     if rrd is not None:
         with writing(rrd):
             rrd.parent.mkdir(parents=True, exist_ok=True)
