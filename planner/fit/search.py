@@ -201,8 +201,7 @@ class Search(Trials):
             e for e in effects_free(base.structure)
             if type(e) is type(effect) and e.at != effect.at.split("#")[0]
         ]  # fmt: skip
-        starts = [e.elsewhere(effect, psi, motions, gain) for e in others]
-        ends = self.compete(base, starts, rival=best)
+        ends = self.compete(base, [e.elsewhere(effect, psi, motions, gain) for e in others])
         return [*map(converged, ends[:1]), *ends[1:]]
 
     def _last(self, best: StructureFit) -> StructureFit:

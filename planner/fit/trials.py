@@ -112,21 +112,19 @@ class Trials:
         count: int = SETTLED,
         unmoved: bool = True,
         afar: bool = False,
-        rival: StructureFit | None = None,
         behind: float = FAR,
     ) -> list[StructureFit]:
         """Starts (`placed`) beside it: a few steps each, where much is left and `afar` from what is
         stated too, the best farther, `count` settled.
 
-        None is followed that by then is so many nats `behind` a `rival`, which is `base` itself
-        where none is named.
+        None is followed that by then is so many nats `behind` the base.
         """
         rough, data = self._on(base, self.data(ROUGH)), base.misfit.data
         pool = side_by_side(lambda s: self._few(rough, s, unmoved), starts)
         if afar and not explained(base):
             near = self.nearest(base, starts)
             pool += side_by_side(lambda at: self.begun_with(rough, *at).tried, near)
-        least = (self._on(rival, self.data(ROUGH)) if rival else rough).evidence - behind
+        least = rough.evidence - behind
         near = _best_of_each(p for p in pool if p and p.evidence > least)
         followed = side_by_side(lambda p: self._stepped(p, data), near[:FOLLOWED])
         near = _best_of_each(followed)[:count]
