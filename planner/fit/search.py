@@ -70,12 +70,15 @@ class Search(Trials):
         return replace(self, frfs=tuple(out))
 
     def _found(self, warm: FitRecord | None) -> StructureFit:
+        known = None if warm is None or not self.extend else self._recovered(warm)
+        if known is not None and explained(known):
+            return self._ended(self._evolved(known))
         data = self.data(SEARCHED)
         self.tell("as stated")
         plain = converged(self.begun(data, self.prior.stated(data.sensors)))
         if not self.extend:
             return self._ended(plain)
-        first, *others = self._beginnings(plain, warm)
+        first, *others = self._beginnings(plain, known)
         best = self._evolved(first)
         for other in others:
             if other.evidence > best.evidence or not explained(best):
@@ -95,14 +98,12 @@ class Search(Trials):
         misfit, x = self.again(known, self.data(SEARCHED), max(known.size, AGAIN))
         return converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
 
-    def _beginnings(self, plain: StructureFit, warm: FitRecord | None) -> list[StructureFit]:
+    def _beginnings(self, plain: StructureFit, known: StructureFit | None) -> list[StructureFit]:
         """Where effects are added and removed from: what is most likely to lack some first."""
         if explained(plain):  # nothing need be missing
             return [plain]
-        known = plain if warm is None else self._recovered(warm)
-        afar = [] if explained(known) else self.from_afar(plain)
-        likeliest = max(plain, known, *afar, key=evidence_of)
-        if warm is not None or explained(likeliest):
+        likeliest = max(plain, known or plain, *self.from_afar(plain), key=evidence_of)
+        if known is not None or explained(likeliest):
             return [likeliest]
         return [self.freed(), likeliest]
 
@@ -141,7 +142,9 @@ class Search(Trials):
         """With the one effect that gains most, if that is enough."""
         if crowded(best):
             return best
-        ends = self.compete(best, self.starts(best, SCREENED))
+        # Of what explains the FRFs first order and few steps tell what more would gain.
+        least, behind = (LEAST, 0.0) if explained(best) else (0.0, FAR)
+        ends = self.compete(best, self.starts(best, SCREENED, least), behind=behind)
         if not ends or ends[0].evidence < best.evidence + LEAST:
             return best
         self.tell(f"+ {ends[0].structure.effects[-1].label}")

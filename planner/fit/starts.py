@@ -74,8 +74,11 @@ def pulled(base: StructureFit, effect: Operator) -> bool:
     return not there or bool(np.any(away > PULLED))
 
 
-def leaders(starts: Sequence[Start]) -> list[Start]:
-    """Springs, which the first order says little of, the first operators, the best of each kind."""
+def leaders(starts: Sequence[Start], least: float = 0.0) -> list[Start]:
+    """Springs, which the first order says little of, the first operators, the best of each kind.
+
+    Operators gain more than `least` nats.
+    """
     kept: list[Start] = []
     kinds: set[str] = set()
     operators = 0
@@ -83,7 +86,7 @@ def leaders(starts: Sequence[Start]) -> list[Start]:
         effect: Operator = start.effect
         new = effect.kind not in kinds
         told = np.isinf(start.nats) or effect.artefact
-        if told or (start.nats > 0 and (operators < KEPT or new)):
+        if told or (start.nats > least and (operators < KEPT or new)):
             kept.append(start)
             kinds.add(effect.kind)
             operators += not np.isinf(start.nats)

@@ -93,15 +93,16 @@ class Trials:
             own = at.own if size < 0.1 else None
         return settled(misfit, at)
 
-    def starts(self, base: StructureFit, lines: int) -> list[Start]:
-        """All effects that it has not; of operators those that the first order ranks first."""
+    def starts(self, base: StructureFit, lines: int, least: float = 0.0) -> list[Start]:
+        """All effects that it has not; of operators those that the first order ranks first, and
+        that gain more than `least` nats by it."""
         misfit = replace(base.misfit, data=self.data(lines))
         motions, gain = misfit.first_order(base.at.x, base.at.own)
         free, every = effects_free(base.structure), self.prior.repertoire.effects
         again = (e for e in every if e.several and e not in free)  # more may hang on a link
         far = not explained(base)
         tried = (e for e in (*free, *again) if far or pulled(base, e))
-        return leaders([s for e in tried for s in e.starts(motions, gain)])
+        return leaders([s for e in tried for s in e.starts(motions, gain)], least)
 
     def compete(
         self,
@@ -111,15 +112,20 @@ class Trials:
         count: int = SETTLED,
         unmoved: bool = True,
         afar: bool = False,
+        behind: float = FAR,
     ) -> list[StructureFit]:
         """Starts (`placed`) beside it: a few steps each, where much is left and `afar` from what is
-        stated too, the best farther, `count` settled."""
+        stated too, the best farther, `count` settled.
+
+        None is followed that by then is so many nats `behind` the base.
+        """
         rough, data = self._on(base, self.data(ROUGH)), base.misfit.data
         pool = side_by_side(lambda s: self._few(rough, s, unmoved), starts)
         if afar and not explained(base):
             near = self.nearest(base, starts)
             pool += side_by_side(lambda at: self.begun_with(rough, *at).tried, near)
-        near = _best_of_each(p for p in pool if p and p.evidence > rough.evidence - FAR)
+        least = rough.evidence - behind
+        near = _best_of_each(p for p in pool if p and p.evidence > least)
         followed = side_by_side(lambda p: self._stepped(p, data), near[:FOLLOWED])
         near = _best_of_each(followed)[:count]
         ends = side_by_side(lambda p: self._settled(p, data), near)
