@@ -24,6 +24,7 @@ from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.effects.table import Repertoire
 from planner.fit.expected import LINES, SIZES, ExpectedFrfs
+from planner.fit.learned import PLACED
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
@@ -43,7 +44,7 @@ STEPS = 2.0 ** np.arange(1, 7)
 FINE = 0.02  # of where it is likeliest: so finely that is told
 # Measured poses among which one may be wrong unnoticed; of more it stands out
 MOST_BEFORE = 3
-MUCH = 10.0  # times farther than `[hits]` says hits may have struck, and more slanted
+MUCH = 10.0  # times farther than is stated hits may have struck, or joints may stand
 MISSED = (
     "hits look struck far beside the tool's tip, or slanted: was it that point, and along its axes?"
 )
@@ -86,13 +87,15 @@ def question(
     expected = ExpectedFrfs(learned.posterior, model.cell.config.modes.band_hz)
     joints = model.cell.robot.joints
     q, frf = joints.internal([joints_deg])[0], frf.within(expected.band_hz)
-    stated, sure = StatedHits(expected, q, frf), learned.poses >= SURE
+    sure, placed = learned.poses >= SURE, learned.poses >= PLACED
+    stated = StatedHits(expected, q, frf, placed)
     answered = _called_right(state)
     said = "".join(answered)  # not asked again
     likely = _setpoint(model, state, pose, joints_deg)
     if sure and frf.layout == TOOL and MISSED not in said:
         likely.append(missed(expected, q))
-    if not stated.doubted and not stated.instead(likely):
+    doubts = [*likely, misread(expected, q)] if placed else likely
+    if not stated.doubted and not stated.instead(doubts):
         return None
     mistakes = [*likely, *_poses(model, state, pose, joints_deg)]
     if sure:
@@ -111,11 +114,15 @@ def question(
 
 @dataclass(frozen=True, eq=False)
 class StatedHits:
-    """Hits as they are said to be: of q (dof,) in rad, by a chain as it should be."""
+    """Hits as they are said to be: of q (dof,) in rad, by a chain as it should be.
+
+    `placed`: so many poses were measured that what was found is where it was found.
+    """
 
     expected: ExpectedFrfs
     q: np.ndarray
     frf: Frf
+    placed: bool = False
 
     @cached_property
     def strange(self) -> float:
@@ -157,7 +164,10 @@ class StatedHits:
             frf, volume = shown(one)
             its, left = (one.expected or self.expected).density(one.q, frf)
             gain = its + volume - one.rarer - value
-            better = (1 if one.rival else BETTER) * left <= size
+            # Where as little is left as may be, evidence alone tells of a joint.
+            told = self.placed and size == SIZES[-1] and one.about == "readback"
+            alone = one.rival or told
+            better = (1 if alone else BETTER) * left <= size
             if gain > LOG_ODDS and (better or its + volume > self.strange > value):
                 found.append((gain, one))
         return max(found, key=lambda pair: pair[0], default=(0.0, None))[1]
@@ -234,6 +244,11 @@ def chain(expected: ExpectedFrfs, q: np.ndarray, frf: Frf, sure: bool) -> Iterat
 def missed(expected: ExpectedFrfs, q: np.ndarray) -> Mistake:
     """Hits of another point, or slanted: they take it up as they are, so nothing else is wrong."""
     return Mistake(q, MISSED, about="chain", rival=True, expected=replace(expected, times=MUCH))
+
+
+def misread(expected: ExpectedFrfs, q: np.ndarray) -> Mistake:
+    """The joints stand far beside their readback: which one does is worth a search."""
+    return Mistake(q, "", rival=True, expected=replace(expected, joint_times=MUCH))
 
 
 def _best(less: Callable[[float], float]) -> float:

@@ -128,9 +128,9 @@ class MismatchShares:
         stated, refitted, explained, left = (significant(100 * 10 ** (db / 20)) for db in sides)
         text = (
             f"The simulation is off from the measured FRFs by {stated} % (root mean square) as "
-            f"robot.toml states it, by {refitted} % once its own springs and dampers are refitted, "
-            f"and by {explained} % with what was found. Once the likeliest errors of hits "
-            f"and sensor are taken out too, {left} % remains."
+            f"robot.toml states it, by {refitted} % once its own springs, dampers and masses are "
+            f"refitted, and by {explained} % with what was found. Once the likeliest errors of "
+            f"hits and sensor are taken out too, {left} % remains."
         )
         if self.refitted <= self.stated:
             return text

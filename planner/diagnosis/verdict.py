@@ -68,8 +68,7 @@ class Verdict:
     def findings(self) -> tuple[NamedEffect, ...]:
         """What is there and matters; nothing where it does not explain the recordings."""
         told = self.verdict == "explained"
-        counted = (e for e in self.effects if e.counts and (told or e.operator.artefact))
-        return tuple({e.place: e for e in reversed(tuple(counted))}.values())[::-1]
+        return tuple(e for e in self.effects if e.counts and (told or e.operator.artefact))
 
 
 def judged(

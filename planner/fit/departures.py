@@ -1,6 +1,7 @@
 """Springs and bodies that a fit moved far from what robot.toml states: something is missing."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -46,22 +47,68 @@ def _springs(s: RobotStructure, x: np.ndarray, far: tuple[int, ...]) -> Iterator
             yield f"{place} would be {significant(times)} times {way} than robot.toml has it"
 
 
-def _bodies(s: RobotStructure, x: np.ndarray, far: tuple[int, ...]) -> Iterator[str]:
-    robot, bodies = s.prior.repertoire.simulation.robot, s.bodies
-    links = [
-        robot.link_of(b) if b in robot.joint_names else b.removesuffix(OUTER) for b in bodies.bodies
-    ]
-    own = [i - s.inertial.start for i in far if s.inertial.start <= i < s.inertial.stop]
-    moved = np.any(bodies.change[:, own] != 0, axis=(1, 2))
-    change = bodies.difference(x[s.inertial])[:, 0]
-    for link in dict.fromkeys(link for link, far_off in zip(links, moved, strict=True) if far_off):
+@dataclass(frozen=True)
+class RefittedMass:
+    """A link with what is mounted on it: kg as stated, how many more by a fit, and their sd."""
+
+    link: str
+    stated_kg: float
+    more_kg: float
+    sd_kg: float
+
+    @property
+    def text(self) -> str:
+        """Such as "link_6 60 kg where 52 ± 4.1 kg is stated"."""
+        whole, stated = significant(self.stated_kg + self.more_kg), significant(self.stated_kg)
+        return f"{self.link} {whole} kg where {stated} ± {significant(self.sd_kg)} kg is stated"
+
+
+def refitted_masses(s: RobotStructure, x: np.ndarray) -> list[RefittedMass]:
+    """Of all links, in their order."""
+    bodies, links = s.bodies, _links(s)
+    change, found = bodies.difference(x[s.inertial])[:, 0], []
+    for link in dict.fromkeys(links):
         parts = [k for k, name in enumerate(links) if name == link]
         mass, more = float(bodies.nominal[parts, 0].sum()), float(change[parts].sum())
         sd = float(np.linalg.norm(bodies.sigma[parts] * bodies.nominal[parts, 0]))
-        if abs(more) > 2 * sd:
+        found.append(RefittedMass(link, mass, more, sd))
+    return found
+
+
+def _links(s: RobotStructure) -> list[str]:
+    """Of each body."""
+    robot = s.prior.repertoire.simulation.robot
+    return [
+        robot.link_of(b) if b in robot.joint_names else b.removesuffix(OUTER)
+        for b in s.bodies.bodies
+    ]
+
+
+def masses_text(structure: RobotStructure, x: np.ndarray) -> str:
+    """Which masses a fit moved by more than their sd; empty where there are none."""
+    moved = [m for m in refitted_masses(structure, x) if abs(m.more_kg) > m.sd_kg > 0]
+    told = sorted(moved, key=lambda m: -abs(m.more_kg) / m.sd_kg)[:TOLD]
+    if not told:
+        return ""
+    return (
+        f"The refit changed masses (each link with what is mounted on it): "
+        f"{'; '.join(m.text for m in told)}. State what you know better ([[link]], [[payload]]); "
+        f"is something mounted there that robot.toml lacks?"
+    )
+
+
+def _bodies(s: RobotStructure, x: np.ndarray, far: tuple[int, ...]) -> Iterator[str]:
+    bodies = s.bodies
+    own = [i - s.inertial.start for i in far if s.inertial.start <= i < s.inertial.stop]
+    moved = np.any(bodies.change[:, own] != 0, axis=(1, 2))
+    far_off = {link for link, is_far in zip(_links(s), moved, strict=True) if is_far}
+    for m in refitted_masses(s, x):
+        if m.link not in far_off:
+            continue
+        if abs(m.more_kg) > 2 * m.sd_kg:
             yield (
-                f"{link} would have to weigh {significant(mass + more)} kg, where "
-                f"{significant(mass)} ± {significant(sd)} kg is stated"
+                f"{m.link} would have to weigh {significant(m.stated_kg + m.more_kg)} kg, where "
+                f"{significant(m.stated_kg)} ± {significant(m.sd_kg)} kg is stated"
             )
         else:
-            yield f"{link} would need a centre or moments of inertia that are not those stated"
+            yield f"{m.link} would need a centre or moments of inertia that are not those stated"

@@ -44,18 +44,22 @@ class _Informed(RobotStructure):
 class ExpectedFrfs:
     """Of one more pose, after what `posterior` knows; FRFs in `band_hz` count.
 
-    Its hits may be so many `times` farther off and more slanted than is stated.
+    Its hits may be so many `times` farther off and more slanted than is stated, its joints so many
+    `joint_times` farther beside their readback.
     """
 
     posterior: RobotPosterior
     band_hz: tuple[float, float]
     times: float = 1.0
+    joint_times: float = 1.0
 
     @cached_property
     def tolerances(self) -> Tolerances:
         """Of the pose."""
         t, by = self.posterior.tolerances, self.times
-        return replace(t, angle_rad=by * t.angle_rad, offset_m=by * t.offset_m)
+        joints = self.joint_times * np.array(t.joint_rad)
+        joint_rad = tuple(joints.tolist()) if joints.ndim else float(joints)
+        return replace(t, angle_rad=by * t.angle_rad, offset_m=by * t.offset_m, joint_rad=joint_rad)
 
     @cached_property
     def _structures(self) -> dict[tuple[str, ...], _Informed]:

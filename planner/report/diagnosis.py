@@ -15,6 +15,7 @@ from planner.diagnosis.mismatch import MismatchPlaces, MismatchShares, Residuals
 from planner.dynamics.at_force import change_at_force
 from planner.effects.effect import Operator
 from planner.errors import InputError, writing
+from planner.fit.departures import departures_text, masses_text
 from planner.fit.posterior import RobotPosterior
 from planner.measurement.agreement import Similarity, fit_similarity
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
@@ -327,6 +328,8 @@ def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> Diagno
     sides = (RobotPosterior.of(f).misfits(matters)[0] for f in (found.refitted, found.best))
     aside = tuple(recorded.poses[i] for i in found.aside)
     undecided = [c for c in verdict.candidates if c.probability > LIKELY]
+    there = found.best.structure, found.best.at.x
+    masses = departures_text(*there) or masses_text(*there)
     return DiagnosisReport(
         verdict=verdict.verdict,
         findings=established_effects(found, undecided, names),
@@ -340,7 +343,7 @@ def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> Diagno
         misfit=TwoMisfits(*sides),
         shares=MismatchShares.of(found),
         refused=tuple(RefusedFile(*entry) for entry in recorded.refused),
-        remarks=(*recorded.remarks, *found.remarks),
+        remarks=tuple(filter(None, (*recorded.remarks, *found.remarks, masses))),
         simulated=recorded.simulated,
         odd_pose=odd,
         closest=tuple(EffectAtPlace(*e.place) for e in verdict.effects if e.counts),

@@ -13,12 +13,22 @@ from scipy.signal import butter, lfilter
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.chain_question import Draws
-from planner.campaign.question import SURE, Mistake, StatedHits, chain, elsewhere, missed, opposite
+from planner.campaign.question import (
+    SURE,
+    Mistake,
+    StatedHits,
+    chain,
+    elsewhere,
+    misread,
+    missed,
+    opposite,
+)
 from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
 from planner.fit.expected import ExpectedFrfs
+from planner.fit.learned import PLACED
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
@@ -94,10 +104,11 @@ class Asker:
         if self.expected is None:
             return self.of_chain(q, frf)
         frf = frf.within(self.band_hz)
-        stated = StatedHits(self.expected, q, frf)
-        sure = self.poses >= SURE
+        sure, placed = self.poses >= SURE, self.poses >= PLACED
+        stated = StatedHits(self.expected, q, frf, placed)
         likely = [missed(self.expected, q)] if sure else []
-        if not stated.doubted and not stated.instead(likely):
+        doubts = [*likely, misread(self.expected, q)] if placed else likely
+        if not stated.doubted and not stated.instead(doubts):
             return ""
         mistakes = likely + [Mistake(there, "", name) for name, there in others.items()]
         if sure:

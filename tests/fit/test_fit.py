@@ -9,7 +9,7 @@ from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire
 from planner.fit.data import FrfData
-from planner.fit.departures import departures_text
+from planner.fit.departures import departures_text, masses_text, refitted_masses
 from planner.fit.fitted import SIZES, StructureFit
 from planner.fit.frequency_uncertainty import log_frequency_slope
 from planner.fit.gauss_newton import minimised
@@ -251,3 +251,12 @@ def test_what_the_fit_moved_far_is_told(prior):
     times = np.exp(5 * structure.sd[spring])
     assert f"{significant(times)} times stiffer than robot.toml has it" in told
     assert "link_5 would have to weigh" in told
+    x = structure.mean.copy()
+    assert not masses_text(structure, x)
+    x[mass] += 2 * structure.sd[mass]
+    assert not departures_text(structure, x)
+    (heavier,) = (m for m in refitted_masses(structure, x) if m.link == "link_5")
+    assert heavier.more_kg > heavier.sd_kg
+    assert f"link_5 {significant(heavier.stated_kg + heavier.more_kg)} kg where " in masses_text(
+        structure, x
+    )
