@@ -13,6 +13,7 @@ from typing import Any, Self
 
 import msgspec
 import numpy as np
+from scipy.linalg import block_diag
 
 from planner.diagnosis.diagnose import Diagnosis
 from planner.diagnosis.search import key_of
@@ -20,7 +21,6 @@ from planner.diagnosis.verdict import Place, probabilities
 from planner.fit.fitted import StructureFit
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
-from planner.inference.block_diagonal import block_diagonal
 from planner.measurement.nuisances import OF_HAMMER
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout
@@ -113,7 +113,7 @@ class _Predicted:
         size = replace(misfit, data=replace(data, measured=there)).size
         there = replace(there, sd=noise * size)
         misfit = replace(misfit, data=replace(data, measured=there))
-        both = block_diagonal(precision, np.eye(own.shape[1]))
+        both = block_diag(precision, np.eye(own.shape[1]))
         return cls(frf, columns[:, :-1], both, misfit)
 
     def left_of(self, true: "_Predicted") -> np.ndarray:

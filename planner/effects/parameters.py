@@ -107,11 +107,6 @@ class Parametrisation:
         shared = np.array([p.shared for p in self.parameters])
         return np.diag(self.log_sd**2 - shared**2) + np.outer(shared, shared)
 
-    @cached_property
-    def precision(self) -> np.ndarray:
-        """Its inverse (P, P)."""
-        return np.linalg.inv(self.covariance)
-
     def elasticity(self, theta: np.ndarray) -> Elasticity:
         """Springs at θ (P,)."""
         values = np.exp(self.held + self.spread @ theta).reshape(-1, self.size)

@@ -5,10 +5,8 @@ import sys
 
 import numpy as np
 import pytest
-import scipy.linalg
 from scipy.special import logsumexp, softmax
 
-from planner.inference.block_diagonal import block_diagonal
 from planner.inference.log_space import log_sum, shares
 
 
@@ -20,9 +18,6 @@ def test_they_give_what_scipy_gives():
         assert log_sum(values, axis) == pytest.approx(logsumexp(values, axis=axis), rel=1e-14)
     finite = rng.normal(0, 300, (4, 5))
     assert shares(finite, 1) == pytest.approx(softmax(finite, axis=1), rel=1e-12)
-    blocks = rng.normal(size=(2, 2)), rng.normal(size=(3, 3)), np.zeros((0, 0))
-    beside = np.asarray(scipy.linalg.block_diag(*blocks[:2]))
-    assert np.array_equal(block_diagonal(*blocks), beside)
 
 
 def test_commands_between_hits_do_not_import_it():
