@@ -115,7 +115,7 @@ def likeliest(explored: Explored) -> StructureFit:
 
 def probabilities(fits: Sequence[StructureFit]) -> dict[frozenset[Place], float]:
     """Probability of each set of effects, among all that were settled."""
-    logs = {key_of(f): f.evidence - RARE * len(key_of(f)) for f in fits}
+    logs = {key_of(f): f.evidence - RARE * len(added(f)) for f in fits}
     total = float(np.asarray(logsumexp(list(logs.values()))))
     return {key: float(np.exp(log - total)) for key, log in logs.items()}
 

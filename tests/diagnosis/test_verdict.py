@@ -1,8 +1,13 @@
 """What a verdict's findings are."""
 
-from typing import cast
+from types import SimpleNamespace
+from typing import Any, cast
 
-from planner.diagnosis.verdict import NamedEffect, Verdict
+import numpy as np
+import pytest
+
+from planner.diagnosis.search import RARE
+from planner.diagnosis.verdict import NamedEffect, Verdict, probabilities
 from planner.effects.resonator import LinkResonator
 from planner.fit.fitted import StructureFit
 
@@ -21,3 +26,21 @@ def test_two_hoses_on_one_link_are_two_findings():
     assert [e.change for e in found.findings] == [0.12, 0.05]
     assert {e.place for e in found.findings} == {("local_resonator", "link_4")}
     assert Verdict("unexplained", tuple(hoses), (), (), nothing).findings == ()
+
+
+def test_a_second_hose_is_as_rare_on_the_same_link_as_on_another():
+    def fit(evidence: float, *places: str) -> Any:
+        prior = SimpleNamespace(repertoire=SimpleNamespace(as_built=tuple))
+        effects = tuple(LinkResonator(at, ()) for at in places)
+        return SimpleNamespace(
+            structure=SimpleNamespace(effects=effects, prior=prior), evidence=evidence
+        )
+
+    same, apart, alone = (
+        fit(100.0, "link_4", "link_4#2"),
+        fit(100.0, "link_4", "link_2"),
+        fit(100.0),
+    )
+    weights = list(probabilities([same, apart, alone]).values())
+    assert weights[0] == pytest.approx(weights[1])
+    assert weights[2] / weights[0] == pytest.approx(np.exp(2 * RARE))
