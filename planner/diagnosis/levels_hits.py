@@ -180,4 +180,5 @@ def _motion(
     ports = np.eye(m.hit.shape[2])[own][None]
     wider = replace(m, hit=np.concatenate([m.hit, ports], axis=1))
     springs = found.structure.elasticity(x)
-    return moved(wider, springs, s[None], misfit.mass(x), misfit.impedances(x))
+    added = [z for z in misfit.impedances(x) if z is not None]
+    return moved(wider, springs, s[None], misfit.mass(x), added)

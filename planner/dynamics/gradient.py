@@ -56,10 +56,11 @@ class Impedance:
         hit, sensor = times_real(self.ports, x_hit), times_real(self.ports, x_sensor)
         each = np.empty((len(hit), len(self.shapes), *out.shape[2:]), dtype=complex)
         _between(self.shapes, sensor, hit, each)
-        out[:] = 0.0
-        for parameter, terms in enumerate(self.slope):
-            for number, coefficient in terms:
-                out[:, parameter] += coefficient[:, None, None] * each[:, number]
+        for parameter, ((number, coefficient), *more) in enumerate(self.slope):
+            one = out[:, parameter]
+            np.multiply(coefficient[:, None, None], each[:, number], out=one)
+            for number, coefficient in more:
+                one += coefficient[:, None, None] * each[:, number]
 
 
 def laplace(frequency_hz: np.ndarray, rate_1_s: np.ndarray | float = 0.0) -> np.ndarray:

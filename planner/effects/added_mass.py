@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.dynamics.gradient import Impedance, Terms
+from planner.dynamics.gradient import Impedance
 from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start, nats_of
 from planner.effects.parameters import MOMENTS
 from planner.robot.virtual_joints import inertia_basis
@@ -13,7 +13,7 @@ from planner.words import significant
 
 LEAST = 0.05  # of the mass's sd: a start needs some mass for its place to matter
 FARTHEST = 2.0  # prior sds, of a start's mass; its place begins within one of where it is tried
-BELOW = np.tril_indices(3, -1)
+BELOW, AXES = np.tril_indices(3, -1), np.arange(3)
 CENTRE = ((0.0, 0.0, 0.0),)
 AROUND = (*CENTRE, *map(tuple, np.vstack([np.eye(3), -np.eye(3)]).tolist()))
 
@@ -37,15 +37,10 @@ class AddedMass(Operator):
 
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """s² times its inertia, on what turns with the joint."""
-        unit = poses.s**2
-
-        def terms(inertia: np.ndarray) -> Terms:
-            return tuple((k, value * unit) for k, value in enumerate(inertia))
-
         there, slopes = self._body(psi)
-        return Impedance(
-            poses.body(self.joint), inertia_basis(), terms(there), tuple(map(terms, slopes))
-        )
+        every = np.tensordot(np.vstack([there, slopes]), inertia_basis(), 1)
+        terms = [((number, poses.s**2),) for number in range(len(every))]
+        return Impedance(poses.body(self.joint), every, terms[0], tuple(terms[1:]))
 
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """By the columns of the mass and of its first moments, at the likeliest of some places."""
@@ -101,16 +96,23 @@ class AddedMass(Operator):
 
     def _body(self, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Inertia (10,) about the joint's frame: kg, kg·m, kg·m²; and its slopes (10, 10) by ψ."""
-        place, step = np.array(self.centre_m) + self.size_m * psi[1:4], self.size_m * np.eye(3)
+        place = np.array(self.centre_m) + self.size_m * psi[1:4]
         d, u = np.exp(psi[4:7]), np.eye(3)
         u[BELOW] = psi[7:]
-        root = d[:, None] * u
-        roots = [root * np.eye(3)[k][:, None] for k in range(3)]
-        roots += [d[i] * np.outer(np.eye(3)[i], np.eye(3)[j]) for i, j in zip(*BELOW, strict=True)]
-        whole = _inertia(1.0, place, np.outer(place, place) + root @ root.T)
-        moved = [_inertia(0.0, e, np.outer(e, place) + np.outer(place, e)) for e in step]
-        spread = [_inertia(0.0, np.zeros(3), r @ root.T + root @ r.T) for r in roots]
-        slopes = np.array([whole, *(psi[0] * np.array([*moved, *spread]))])
+        root, roots = d[:, None] * u, np.zeros((6, 3, 3))
+        roots[AXES, AXES] = root
+        roots[AXES + 3, BELOW[0], BELOW[1]] = d[BELOW[0]]
+        whole = _inertia(np.ones(1), place[None], (np.outer(place, place) + root @ root.T)[None])[0]
+        step, none = self.size_m * np.eye(3), np.zeros(3)
+        moved = step[:, :, None] * place + place[:, None] * step[:, None]
+        spread = roots @ root.T
+        slopes = np.vstack(
+            [
+                whole[None],
+                psi[0] * _inertia(none, step, moved),
+                psi[0] * _inertia(np.zeros(6), np.zeros((6, 3)), spread + spread.swapaxes(1, 2)),
+            ]
+        )
         return self.mass_kg * psi[0] * whole, self.mass_kg * slopes
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
@@ -140,7 +142,8 @@ class AddedMass(Operator):
         )
 
 
-def _inertia(mass: float, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """(10,) as Pinocchio has it, of mass, ∫ρ x (3,) and ∫ρ x xᵀ (3, 3)."""
-    moments = np.trace(second) * np.eye(3) - second
-    return np.array([mass, *first, *(moments[i, j] for i, j in MOMENTS)])
+def _inertia(mass: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """(k, 10) as Pinocchio has it, of mass (k,), ∫ρ x (k, 3) and ∫ρ x xᵀ (k, 3, 3)."""
+    moments = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+    rows, columns = np.transpose(MOMENTS)
+    return np.column_stack([mass, first, moments[:, rows, columns]])

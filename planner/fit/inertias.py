@@ -129,6 +129,16 @@ class BodyNumbers:
         out[np.arange(len(out)), self.scaled] = 0.0
         return out
 
+    @cached_property
+    def _own(self) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers (L, m) of each body, and `_possible` by them; filled up by nothing's."""
+        most = max(map(len, self.mine))
+        mine = np.array([np.pad(one, (0, most - len(one))) for one in self.mine])
+        own = self._possible[np.arange(len(mine))[:, None], mine]
+        for b, one in enumerate(self.mine):
+            own[b, len(one) :] = 0.0
+        return mine, own
+
     def barrier(self, phi: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         """Value, gradient (R,), Hessian (R, R) of the divergence; ∞ where no body can be so."""
         slope = self._possible
@@ -138,13 +148,13 @@ class BodyNumbers:
         if values.min() <= 0:
             return np.inf, gradient, hessian
         inverse = (vectors / values[:, None]) @ np.swapaxes(vectors, 1, 2)
-        for b, mine in enumerate(self.mine):
-            own = slope[b, mine]
-            moved = inverse[b] @ own
-            gradient[mine] += np.trace(own, axis1=1, axis2=2) - np.trace(moved, axis1=1, axis2=2)
-            flat = moved.reshape(len(mine), -1)
-            turned = np.swapaxes(moved, 1, 2).reshape(len(mine), -1)
-            hessian[np.ix_(mine, mine)] += flat @ turned.T
+        mine, own = self._own
+        moved = inverse[:, None] @ own
+        pull = np.trace(own, axis1=2, axis2=3) - np.trace(moved, axis1=2, axis2=3)
+        turned = np.swapaxes(moved, 2, 3).reshape(*mine.shape, -1)
+        both = moved.reshape(*mine.shape, -1) @ np.swapaxes(turned, 1, 2)
+        np.add.at(gradient, mine, pull)
+        np.add.at(hessian, (mine[:, :, None], mine[:, None]), both)
         return float(np.sum(values - 1 - np.log(values))), gradient, hessian
 
 

@@ -6,6 +6,7 @@ share (`ρ`). Hits, readback and the scatter of springs from visit to visit are 
 pose (Woodbury), linearised about where they were last; the chain is common to all poses.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -172,11 +173,10 @@ class FrfMisfit:
         change = np.swapaxes(self.jacobians, 2, 3) @ self.inertias(x) @ self.jacobians
         return self.matrices.mass + change.sum(axis=1)
 
-    def impedances(self, x: np.ndarray) -> list[Impedance]:
-        """Of the effects that have any."""
+    def impedances(self, x: np.ndarray) -> list[Impedance | None]:
+        """Of each effect; None of those that have none."""
         pairs = zip(self.structure.effects, self.structure.own, strict=True)
-        found = (e.impedance(self.poses, x[own]) for e, own in pairs)
-        return [one for one in found if one is not None]
+        return [e.impedance(self.poses, x[own]) for e, own in pairs]
 
     def possible(self, x: np.ndarray) -> bool:
         """Whether such a robot can be, and stands."""
@@ -193,8 +193,16 @@ class FrfMisfit:
             return False
         return True
 
-    def motion(self, x: np.ndarray, eta: np.ndarray | None) -> Motion:
-        """At x, between the ports that hits and sensors had by eta (n, l); None: as stated."""
+    def motion(
+        self,
+        x: np.ndarray,
+        eta: np.ndarray | None,
+        added: Sequence[Impedance | None] | None = None,
+    ) -> Motion:
+        """At x, between the ports that hits and sensors had by eta (n, l); None: as stated.
+
+        `added` are the impedances there, if they are known.
+        """
         m, mass = self.matrices, self.mass(x)
         if m.by_angle is not None:  # slopes by the joints' angles go with the masses as they are
             nominal, now = (np.trace(a, axis1=1, axis2=2) for a in (m.mass, mass))
@@ -203,21 +211,27 @@ class FrfMisfit:
         s, shape = self.data.measured.s, self.data.measured.accelerance.shape[1:3]
         ports = None if eta is None else actual_ports(eta, s, self.tolerances, shape)
         elasticity = self.structure.elasticity(x)
-        return moved(m, elasticity, s, mass, self.impedances(x), ports)
+        there = self.impedances(x) if added is None else added
+        return moved(m, elasticity, s, mass, [z for z in there if z is not None], ports)
 
     def slopes(
-        self, motion: Motion, x: np.ndarray, out: np.ndarray | None = None
+        self,
+        motion: Motion,
+        x: np.ndarray,
+        out: np.ndarray | None = None,
+        added: Sequence[Impedance | None] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives (n, D − chain, r, c, F) by x, and (n, e, r, c, F) by ln k of each spring.
 
-        The former into `out`, where it is given.
+        The former into `out`, where it is given; `added` are the impedances at x, if they are
+        known.
         """
         structure, elasticity = self.structure, self.structure.elasticity(x)
         kinds, e = structure.spread.shape[:2]
         numbers = structure.bodies.slopes(x[structure.inertial])
-        added, bodies = self.impedances(x), len(numbers)
+        there, bodies = self.impedances(x) if added is None else added, len(numbers)
         every = Inertias(self.jacobians, np.broadcast_to(inertia_basis(), (bodies, 10, 6, 6)))
-        raw = motion_slopes(motion, elasticity, every, added)
+        raw = motion_slopes(motion, elasticity, every, [z for z in there if z is not None])
         springs = (3 if elasticity.loss_factor.any() else 2) * e
         by_block, n, shape = raw[:, : kinds * e], len(raw), raw.shape[2:]
         if out is None:
@@ -230,8 +244,8 @@ class FrfMisfit:
             at = structure.inertial.start + mine
             out[:, at] += moved.reshape(n, len(mine), *shape)
         at = springs + 10 * bodies
-        for effect, own in zip(structure.effects, structure.own, strict=True):
-            count = own.stop - own.start if effect.impedance(self.poses, x[own]) else 0
+        for impedance, own in zip(there, structure.own, strict=True):
+            count = own.stop - own.start if impedance else 0
             out[:, own] = raw[:, at : at + count] if count else 0.0
             at += count
         visits = by_block[:, :e] + by_block[:, e : 2 * e]  # dampers scatter with their springs
@@ -243,13 +257,14 @@ class FrfMisfit:
         `eta` (n, all numbers that a pose leaves open) is what they are linearised about; the last
         column is for the residual.
         """
-        motion, s = self.motion(x, eta), self.structure
+        added, s = self.impedances(x), self.structure
+        motion = self.motion(x, eta, added)
         h = motion.accelerance
         open_ = basis(h, motion, self.data.measured.s, self.tolerances)
         numbers, joints = self.open_numbers
         own = s.size + numbers.hits + joints
         out = np.empty((len(h), own + len(s.springs) + 1, *h.shape[1:]), dtype=complex)
-        _, visits = self.slopes(motion, x, out[:, : s.chain.start])
+        _, visits = self.slopes(motion, x, out[:, : s.chain.start], added)
         out[:, s.chain] = open_[:, numbers.hits : numbers.known]
         out[:, s.size : s.size + numbers.hits] = open_[:, : numbers.hits]
         out[:, s.size + numbers.hits : own] = open_[:, numbers.known :]

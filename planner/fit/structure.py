@@ -246,9 +246,10 @@ class RobotStructure:
         """Into (n, P, …) from derivatives (n, kinds · e, …) by ln k, ln c, ln η of each spring."""
         turned = self.spread.copy()
         turned[1] += self.spread[0]  # c = k · (c/k)
-        for number, column in enumerate(turned.reshape(-1, turned.shape[2]).T):
-            rows = np.flatnonzero(column)
-            np.sum(by_block[:, rows], axis=1, out=out[:, number])
+        n, blocks, *shape = by_block.shape
+        flat = np.ascontiguousarray(by_block).reshape(n, blocks, -1).view(float)
+        told = turned.reshape(blocks, -1).T @ flat
+        out[:] = told.view(complex).reshape(n, -1, *shape)
 
     def added_inertia(self, x: np.ndarray) -> np.ndarray:
         """(L, 10): what effects add to the bodies."""

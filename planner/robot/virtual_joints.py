@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pinocchio as pin
@@ -254,6 +255,7 @@ def body_inertia(robot: Robot, joint: int) -> np.ndarray:
     return np.array(total.toDynamicParameters())
 
 
+@cache
 def inertia_basis() -> np.ndarray:
     """(10, 6, 6): the spatial inertia of a body is their sum weighted by its parameters.
 
@@ -267,6 +269,7 @@ def inertia_basis() -> np.ndarray:
         basis[1 + axis, 3:, :3] = cross
     for number, (i, j) in enumerate(PINOCCHIO, 4):
         basis[number, 3 + i, 3 + j] = basis[number, 3 + j, 3 + i] = 1.0
+    basis.flags.writeable = False
     return basis
 
 
