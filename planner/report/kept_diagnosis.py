@@ -59,8 +59,8 @@ def _listed(places: set[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def chapter(file: Path, springs: Sequence[RefittedSpring]) -> dict[str, Any]:
-    """Verdict, findings, what else was considered, agreement; beside the model's `springs`."""
+def chapter(file: Path) -> dict[str, Any]:
+    """Verdict, findings, what else was considered, agreement."""
     found = read_diagnosis(file)
     parts = (("fit", "poses used"), ("held_out", "poses held out"))
     sides = [
@@ -75,7 +75,6 @@ def chapter(file: Path, springs: Sequence[RefittedSpring]) -> dict[str, Any]:
                            for name, v in one["parameters"].items()])
             for one in found["findings"]
         ],
-        "two_answers": two_answers(springs, found),
         "candidates": [
             (c["effect"].replace("_", " "), c["at"] or "–", f"{100 * c['probability']:.1f}")
             for c in found["candidates"] if c["probability"] >= LEAST_SHOWN

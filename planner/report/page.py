@@ -65,8 +65,8 @@ def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -
 
 def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
     """The report; `kept_diagnosis` is the answer of a diagnosis in JSON."""
-    state, now, cell = campaign.state, status(campaign), campaign.cell
-    found = chapter(kept_diagnosis, now.springs) if kept_diagnosis else None
+    state, now, cell = campaign.state, status(campaign, kept_diagnosis), campaign.cell
+    found = chapter(kept_diagnosis) if kept_diagnosis else None
     without = {"diagnosis"} if found is None else set()
     without |= set() if now.springs else {"learned"}
     folder = campaign.directory
