@@ -115,7 +115,8 @@ def stability_of(
 
         return {"stability": lobes_figure(cut, found, drawn, point)}
 
-    return answer.with_figures(pictures or Pictures(), figures, asked.source.name, LOBES)
+    name = ", ".join(filter(None, (asked.source.name, asked.pose)))
+    return answer.with_figures(pictures or Pictures(), figures, name, LOBES)
 
 
 def _at_one(
