@@ -100,7 +100,7 @@ def path_figure(limits: PathLimits, best_rpm: float, feed: FeedAdvice, cut: Cut)
     for row in robust:
         upper.plot(rpm, row, color="grey", lw=0.7, alpha=0.7)
     least = np.min(robust, axis=0)
-    upper.fill_between(rpm, 0, least, color="#dcefd9", lw=0)
+    upper.fill_between(rpm, 0, least, color=STABLE, lw=0)
     upper.plot(rpm, least, color="tab:green", lw=2, label="whole path, 95 % probability")
     upper.axvline(best_rpm, color="tab:red", lw=1, ls="--", label="best speed")
     upper.set_ylim(0, min(top, 1.25 * float(np.max(np.where(robust > top, 0, robust))) or top))
