@@ -243,5 +243,6 @@ def _figure(table: Table, title: str, floor: float) -> Figure:
     drawing.bars(grid[0, 0], groups, names, mean, "R², mean over folds", floor)
     spread = values[:, 1 : 2 * len(WAYS) : 2]
     drawing.bars(grid[1, 0], groups, WAYS, spread, "R², spread over folds")
+    grid[1, 0].set_yscale("log")  # one mode that no way predicts must not hide the others
     name_axes(figure, grid)
     return figure

@@ -43,7 +43,7 @@ def figure_9(x: np.ndarray, y: np.ndarray, sd: np.ndarray, fits: Mapping[str, Fi
     train, test = split(x, 0)
     test = test[np.isfinite(y[test])]
     samples = Samples.of(x[train[:FEWEST]], y[train[:FEWEST]], sd[train[:FEWEST]])
-    title = "Figure 9: ω₂ predicted from three poses, 95 % interval"
+    title = "Figure 9: frequency of mode 2, predicted from three poses, 95 % interval"
     figure, grid = panels((10.0, 4.6), title, 1, len(fits), sharey=True)
     ends = float(np.min(y[test])) - 0.3, float(np.max(y[test])) + 0.3
     for panel, (name, fit) in zip(grid[0], fits.items(), strict=True):
@@ -264,6 +264,6 @@ def _draw(
         drawing.frf(panel, hz, middle[k], (band[0][k], band[1][k]), title)
         panel.plot(hz, np.abs(mean[i, j]), color="tab:green", lw=1.1, label="fused, ours")
         panel.plot(hz, size[k], "k", lw=0.9, label="measured (simulated)")
-        panel.set_ylim(0, 2.0 * float(np.max(size[k])))
+        panel.set_ylim(0, 1.6 * float(np.max(size[k])))
     name_axes(figure, grid, "frequency (Hz)", "|H| (m/s²/N)")
     return figure

@@ -12,7 +12,16 @@ from scipy.stats import binom
 from planner.campaign.campaign import Campaign
 from planner.frf.frf import Frf
 from planner.recording.joints import SCALES
-from planner.report.plot_marks import AXES, MEASURED, MODEL, empty, magnitude, phase, plain_text
+from planner.report.plot_marks import (
+    AXES,
+    FAINTEST,
+    MEASURED,
+    MODEL,
+    empty,
+    magnitude,
+    phase,
+    plain_text,
+)
 from planner.surrogate.leave_one_out import LeaveOneOut
 
 SHARES = np.linspace(0.02, 0.98, 49)
@@ -49,7 +58,7 @@ def _coverage(panel: Axes, found: LeaveOneOut) -> None:
 def _errors(panel: Axes, found: LeaveOneOut, poses: tuple[str, ...]) -> None:
     score = found.error / found.sd
     place = np.arange(len(poses))
-    panel.axhspan(-1.96, 1.96, color="tab:green", alpha=0.1, lw=0)
+    panel.axhspan(-1.96, 1.96, color="tab:green", alpha=0.1, lw=0, label="95 %")
     panel.axhline(0, color="black", lw=0.8, ls=":")
     for k in range(score.shape[1]):
         panel.plot(place, score[:, k], ls="", marker="o", ms=4, color=f"C{k % 10}",
@@ -69,7 +78,7 @@ def _errors(panel: Axes, found: LeaveOneOut, poses: tuple[str, ...]) -> None:
     )
     panel.set_ylabel("measured − predicted frequency, in expected sds")
     panel.margins(x=0.02, y=0.12)
-    panel.legend(fontsize=8, ncols=min(score.shape[1], 4))
+    panel.legend(fontsize=8, ncols=min(score.shape[1] + 1, 5))
     panel.grid(True, alpha=0.25)
 
 
@@ -99,12 +108,16 @@ def workspace_map(
     for panel in (left, right):
         for i in range(len(measured)):
             panel.plot(*measured[i], "o", ms=5, mfc="white", mec="black", mew=1.2)
+        panel.use_sticky_edges = False  # of contours: poses at their edge are seen whole
         panel.set_xlabel(names[0])
     left.set_ylabel(names[1])
+    middle = np.mean(left.get_xlim())
     for place, pose in zip(measured, poses, strict=True):
+        side = 1 if place[0] < middle else -1  # a name runs towards the middle
         left.annotate(
-            plain_text(pose), (place[0], place[1]), xytext=(4, 4), textcoords="offset points",
-            fontsize=7, bbox={"facecolor": "white", "alpha": 0.7, "pad": 0.6, "lw": 0},
+            plain_text(pose), (place[0], place[1]), xytext=(4 * side, 4), fontsize=7,
+            textcoords="offset points", ha="left" if side > 0 else "right",
+            bbox={"facecolor": "white", "alpha": 0.7, "pad": 0.6, "lw": 0},
         )  # fmt: skip
     return figure
 
@@ -123,9 +136,6 @@ def _fill(
         image = panel.hexbin(x[:, 0], x[:, 1], values, gridsize=BINS, cmap=colours, mincnt=1)
     figure.colorbar(image, ax=panel, label=label, pad=0.02)
     panel.margins(0.04)
-
-
-FAINTEST = 1e-3  # of the largest magnitude: what is smaller is not shown
 
 
 def frf_sheet(

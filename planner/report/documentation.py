@@ -54,7 +54,7 @@ def manual(commands: Sequence[tuple[str, str]]) -> str:
     }
     told = []
     for name, text in commands:
-        said, _, example = text.partition("Example: ")
+        said, _, example = text.replace("`", "").partition("Example: ")  # help is Markdown
         paragraphs = [one for one in said.split("\n\n") if one.strip()]
         told.append((name, paragraphs, " ".join(example.split())))
     return rendered("manual.html", title="planner: manual", files=files, commands=told)

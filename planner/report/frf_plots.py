@@ -47,8 +47,11 @@ class ComparedFrfs:
     place: str = ""  # before titles, where it is not the tool
 
     def figures(self, first: Sequence[int]) -> dict[str, Figure]:
-        """Maps of every direct FRF, then the direct FRFs of so many of the `first` poses."""
+        """The direct FRFs of so many of the `first` poses, then maps of each over all poses."""
         number, figures = np.arange(1.0, len(self.names) + 1), {}
+        for k in first[:MOST]:
+            name = re.sub(r"[^\w.-]", "_", str(self.names[k]))
+            figures[f"frf_{name}"] = self.overlay(k)
         for i, axis in enumerate(AXES):
             measured = self._aligned(self.measured[:, i, i])
             for side in self.sides:
@@ -57,9 +60,6 @@ class ComparedFrfs:
                     "pose, in recorded order",
                     f"{self.place}Map of H {axis}{axis}, simulation {side.label}", names=self.names,
                 )  # fmt: skip
-        for k in first[:MOST]:
-            name = re.sub(r"[^\w.-]", "_", str(self.names[k]))
-            figures[f"frf_{name}"] = self.overlay(k)
         return figures
 
     def _aligned(self, h: np.ndarray) -> np.ndarray:

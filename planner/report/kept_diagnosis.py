@@ -7,10 +7,12 @@ from typing import Any
 
 from planner.errors import InputError
 from planner.report.springs import RefittedSpring
+from planner.words import with_sd
 
 KEPT = "diagnosis.json"  # as `diagnose --out` writes it
 LEAST_SHOWN = 5e-4  # of a probability in the table: 0.05 %
 MOST_PICTURES = 4
+SIDES = {"nominal": "as given", "refitted": "refitted", "explained": "explained"}
 
 
 def diagnosis_of(directory: Path, given: Path | None = None) -> Path | None:
@@ -59,23 +61,22 @@ def _listed(places: set[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def chapter(file: Path, springs: Sequence[RefittedSpring]) -> dict[str, Any]:
-    """Verdict, findings, what else was considered, agreement; beside the model's `springs`."""
+def chapter(file: Path) -> dict[str, Any]:
+    """Verdict, findings, what else was considered, agreement."""
     found = read_diagnosis(file)
     parts = (("fit", "poses used"), ("held_out", "poses held out"))
     sides = [
-        (f"{name}, {side}", found.get(where, {}).get(side) or {})
-        for where, name in parts for side in ("nominal", "refitted", "explained")
+        (f"{name}, {SIDES[side]}", found.get(where, {}).get(side) or {})
+        for where, name in parts for side in SIDES
     ]  # fmt: skip
     pictures = [Path(p) for p in found.get("plots", ())[:MOST_PICTURES]]
     return {
         "verdict": found.get("verdict_text", found["verdict"]),
         "findings": [
-            (one["text"], [(name, f"{v['value']:.4g} ± {v['sd']:.2g}", v["unit"])
+            (one["text"], [(name, with_sd(v["value"], v["sd"]), v["unit"])
                            for name, v in one["parameters"].items()])
             for one in found["findings"]
         ],
-        "two_answers": two_answers(springs, found),
         "candidates": [
             (c["effect"].replace("_", " "), c["at"] or "–", f"{100 * c['probability']:.1f}")
             for c in found["candidates"] if c["probability"] >= LEAST_SHOWN

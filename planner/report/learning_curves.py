@@ -50,7 +50,7 @@ def _finish(panels: Mapping[str, Axes], strategies: Mapping[str, Curves]) -> Non
     r2.set_ylim(max(worst - 0.05, -0.5), 1.02)
     r2.set_ylabel("R²")
     coverage.axhline(0.95, color="black", lw=0.8, ls="--")
-    coverage.set_ylim(0.0, 1.05)
+    coverage.set_ylim(min(0.8, coverage.get_ylim()[0]), 1.02)
     coverage.set_ylabel("share in 95 % interval")
     for panel in panels.values():
         panel.xaxis.set_major_locator(MaxNLocator(integer=True))

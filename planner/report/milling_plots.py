@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.colors import LinearSegmentedColormap, LogNorm
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 from scipy.stats import rankdata
 
@@ -15,7 +17,7 @@ from planner.milling.path import PathLimits
 from planner.report.plot_marks import AXES, MEASURED, MODEL, empty, magnitude, name_axes, panels
 
 STABLE, UNSURE, LIMIT, POINT = "#dcefd9", "#f6e3b4", "black", "tab:red"
-ROWS = 240  # of depths at which probabilities are drawn
+BANDS = 10  # of probability, in a colour each
 WIDE = 8.0  # ratio of chatter frequencies from which their axis is logarithmic
 ROOM = 1.25  # of the picture above the highest limit
 RING = {"ls": "", "marker": "o", "mfc": "none", "mec": "tab:red", "ms": 13, "mew": 1.8}
@@ -57,14 +59,12 @@ def lobes_figure(
 
 
 def _bands(panel, figure: Figure, rpm: np.ndarray, top: float, drawn: SampledLimits) -> None:
-    depths = np.linspace(0, top, ROWS)
-    probability = drawn.probability(depths * 1e-3)
     colours = LinearSegmentedColormap.from_list("stable", ["white", UNSURE, STABLE])
-    filled = panel.contourf(
-        rpm, depths, probability.T, levels=np.linspace(0, 1, 11), cmap=colours, extend="neither"
-    )
-    bar = figure.colorbar(filled, ax=panel, pad=0.01, aspect=30)
-    bar.set_label("probability of being stable")
+    scale = ScalarMappable(BoundaryNorm(np.linspace(0, 1, BANDS + 1), colours.N), colours)
+    for low in np.arange(BANDS) / BANDS:  # what is deeper is covered by what is surer
+        depth = np.minimum(1e3 * drawn.robust(low), 2 * top)
+        panel.fill_between(rpm, 0, depth, color=scale.to_rgba(low + 0.5 / BANDS), lw=0)
+    figure.colorbar(scale, ax=panel, pad=0.01, aspect=30, label="probability of being stable")
 
 
 def _frequencies(panel, rpm: np.ndarray, found: Sequence[Loss]) -> None:
@@ -100,14 +100,16 @@ def path_figure(limits: PathLimits, best_rpm: float, feed: FeedAdvice, cut: Cut)
     for row in robust:
         upper.plot(rpm, row, color="grey", lw=0.7, alpha=0.7)
     least = np.min(robust, axis=0)
-    upper.fill_between(rpm, 0, least, color="#dcefd9", lw=0)
+    upper.fill_between(rpm, 0, least, color=STABLE, lw=0)
     upper.plot(rpm, least, color="tab:green", lw=2, label="whole path, 95 % probability")
     upper.axvline(best_rpm, color="tab:red", lw=1, ls="--", label="best speed")
     upper.set_ylim(0, min(top, 1.25 * float(np.max(np.where(robust > top, 0, robust))) or top))
     upper.set_xlabel("spindle speed (rpm)")
     upper.set_ylabel("axial depth (mm)")
-    upper.legend(fontsize=9, loc="upper left")
-    lower.plot(feed.turn_deg, 1e3 * np.array(feed.depth_m), ".-")
+    upper.margins(x=0)
+    figure.legend(fontsize=9, loc="outside lower center", ncols=2)
+    # What is stable up to the largest depth asked for is drawn as that.
+    lower.plot(feed.turn_deg, 1e3 * np.minimum(feed.depth_m, cut.depth_m[1]), ".-")
     lower.set_ylim(bottom=0)
     lower.set_xlabel("feed turned about the tool's axis (°)")
     lower.set_ylabel("depth (mm)")
@@ -135,7 +137,7 @@ def turns_figure(
     panel.set_yticks(range(len(advice.turn_deg)), [f"{a:g}" for a in advice.turn_deg])
     panel.set_ylabel("turned about the tool's axis (°)")
     panel.set_facecolor("lightgrey")
-    figure.colorbar(image, ax=panel, label="depth limit (mm)")
+    _decimals(figure.colorbar(image, ax=panel, label="depth limit (mm)").ax)
     return figure
 
 
@@ -161,14 +163,24 @@ def map_figure(
     most = int(np.argmax(np.abs(np.corrcoef(ranks.T)[0, 1:])))
     over.plot(features[:, most], shown, "o", ms=5)
     over.plot(features[tight, most], shown[tight], **RING)
-    over.set(xlabel=f"{names[most]}, share of its range", ylabel="depth stable with 95 % (mm)")
+    name = names[most].rpartition("_")[0]
+    over.set(xlabel=f"{name}, share of its range", ylabel="depth stable with 95 % (mm)")
     over.set_yscale("log")
+    _decimals(over)
     if wanted_m is not None:
         over.axhline(1e3 * wanted_m, color="tab:red", ls="--", lw=1)
     for panel in (above, side, over):
         panel.grid(True, alpha=0.3)
-    figure.colorbar(dots, ax=[above, side], label="depth stable with 95 % probability (mm)")
+    bar = figure.colorbar(dots, ax=[above, side], label="depth stable with 95 % probability (mm)")
+    _decimals(bar.ax)
     return figure
+
+
+def _decimals(panel: Axes) -> None:
+    """A logarithmic axis of depths that may span little: no powers of ten."""
+    panel.yaxis.set_major_formatter("{x:.3g}")
+    panel.yaxis.set_minor_formatter("{x:.3g}")
+    panel.tick_params(which="minor", labelsize=7)
 
 
 def coupling_figure(
@@ -197,12 +209,11 @@ def coupling_figure(
             panel.grid(True, which="both", alpha=0.2)
             if column == 0:
                 panel.set_ylabel("|H| (µm/N)", fontsize=9)
-    grown = grid[n, 0]
-    for other in grid[n, 1:]:
+    for other in grid[n]:
         other.remove()
-    for panel in grid[n - 1, 1:]:
+    for panel in grid[n - 1]:
         panel.tick_params(labelbottom=True)
-        panel.set_xlabel("frequency (Hz)", fontsize=9)
+    grown = figure.add_subplot(grid[0, 0].get_gridspec()[n, :], sharex=grid[0, 0])
     grown.semilogy(f, coupled.amplification, color="black", lw=1.0)
     grown.axhline(AMPLIFICATION_LIMIT, color="tab:red", ls="--", lw=0.9)
     grown.set_ylabel("errors grow (times)", fontsize=9)

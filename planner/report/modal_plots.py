@@ -240,12 +240,13 @@ def mac_figure(mac: np.ndarray, rows: Sequence[str], columns: Sequence[str], tit
 
 def frequency_figure(
     poses: Sequence[str],
+    modes: Sequence[str],
     frequency_hz: np.ndarray,
     sd_hz: np.ndarray,
     simulated_hz: np.ndarray | None = None,
     title: str = "",
 ) -> Figure:
-    """Natural frequencies of labelled modes over the poses, ± 2 sd, the simulated ones dashed.
+    """Natural frequencies of k named modes over the poses, ± 2 sd, the simulated ones dashed.
 
     frequency_hz, sd_hz and simulated_hz (n, k), NaN where there is none (a gap).
     """
@@ -263,7 +264,7 @@ def frequency_figure(
     panel.set_xlabel("pose")
     panel.set_ylabel("natural frequency (Hz)")
     panel.grid(True, alpha=0.25)
-    label_ends(panel, frequency_hz, [f"mode {k + 1}" for k in range(frequency_hz.shape[1])])
+    label_ends(panel, frequency_hz, modes)
     handles = [Line2D([], [], color="0.3", marker="o", label="measured, ± 2 sd")]
     if simulated_hz is not None:
         style: dict[str, Any] = {"color": "0.3", "ls": "--", "marker": "D", "mfc": "none"}

@@ -182,8 +182,9 @@ class ModesReport(Answer):
         sd = np.array(rows, dtype=float).reshape(tracks.probability.shape)
         seen = np.any(np.isfinite(tracks.frequency_hz), axis=0)
         simulated = None if expected is None else expected[:, seen]
-        hz, title = tracks.frequency_hz[:, seen], "Campbell diagram"
-        return {"campbell": frequency_figure(survey.poses, hz, sd[:, seen], simulated, title)}
+        names = [f"mode {k + 1}" for k in np.flatnonzero(seen)]  # numbers as in the table
+        known = tracks.frequency_hz[:, seen], sd[:, seen], simulated
+        return {"campbell": frequency_figure(survey.poses, names, *known, "Campbell diagram")}
 
     def text(self) -> Group:
         """The modes as a table."""

@@ -65,8 +65,8 @@ def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -
 
 def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
     """The report; `kept_diagnosis` is the answer of a diagnosis in JSON."""
-    state, now, cell = campaign.state, status(campaign), campaign.cell
-    found = chapter(kept_diagnosis, now.springs) if kept_diagnosis else None
+    state, now, cell = campaign.state, status(campaign, kept_diagnosis), campaign.cell
+    found = chapter(kept_diagnosis) if kept_diagnosis else None
     without = {"diagnosis"} if found is None else set()
     without |= set() if now.springs else {"learned"}
     folder = campaign.directory
@@ -148,7 +148,7 @@ def _asked(cell: "Cell", state: CampaignState) -> Rows:
 
 
 def _range(values: Iterable[float]) -> str:
-    return " to ".join(f"{v:g}" for v in values)
+    return " to ".join(dict.fromkeys(f"{v:g}" for v in values))
 
 
 def _simulation(config: CampaignConfig, springs: int) -> str:
@@ -223,7 +223,7 @@ def _mode_rows(campaign: Campaign) -> Rows:
 def _errors(now: StatusReport) -> Rows:
     return [
         (f.pose, f.mode, f"{f.measured_hz:.3f}", f"{f.predicted_hz:.3f} ± {f.sd_hz:.3f}",
-         f"{100 * (f.measured_hz / f.predicted_hz - 1):+.2f}")
+         f"{100 * (f.measured_hz / f.predicted_hz - 1):+z.2f}")
         for f in now.leave_one_out.frequencies
     ]  # fmt: skip
 

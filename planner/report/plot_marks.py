@@ -1,5 +1,6 @@
 """What pictures share: panels, curves with bands, marked modes, text that can be read."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +28,7 @@ MEASURED, MODEL = "black", "tab:red"
 WEIGHTS, ALIKE = (0.2126, 0.7152, 0.0722), 0.179
 MODE, USABLE = "tab:blue", "tab:green"
 COHERENT, WINDOW = 0.8, 7  # from this coherence (median of so many lines around) an FRF is shaded
+FAINTEST = 1e-3  # of an FRF's largest magnitude: bands that reach below are cut off there
 MOST_LABELS = 7  # of a legend that fit side by side
 COLUMNS = 9  # labels of several lines that fit side by side; more are turned upright
 
@@ -190,7 +192,7 @@ def _trusted(frf: "Frf", response: int, hit: int) -> list[tuple[float, float]]:
     return [(max(hz[part.start] - half, low), min(hz[part.stop - 1] + half, high)) for part in good]
 
 
-def label_ends(panel: Axes, values: np.ndarray, names: list[str]) -> None:
+def label_ends(panel: Axes, values: np.ndarray, names: Sequence[str]) -> None:
     """Name of each curve of values (n, k) beside its last point, kept apart."""
     drawn = [k for k in range(values.shape[1]) if np.any(np.isfinite(values[:, k]))]
     last = np.array([values[np.isfinite(values[:, k]), k][-1] for k in drawn])

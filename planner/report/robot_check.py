@@ -90,7 +90,7 @@ class RobotCheckReport(Answer):
         )
         for link in self.links:
             if link.inertial or link.collision_shapes:
-                place = ", ".join(f"{v:.3g}" for v in link.com_m) if link.mass_kg else "–"
+                place = ", ".join(f"{v:z.3f}" for v in link.com_m) if link.mass_kg else "–"
                 mass = f"{link.mass_kg:.4g}" if link.inertial else "–"
                 mass += f" ± {link.mass_sd_kg:.2g}" if link.mass_sd_kg else ""
                 cells = link.joint or "–", mass, place, str(link.collision_shapes)

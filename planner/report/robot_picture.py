@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull
 
-from planner.report.plot_marks import empty, plain_text
+from planner.report.plot_marks import empty, plain_text, spread
 from planner.robot.link_bodies import LinkBody, RobotLines, robot_lines
 from planner.robot.robot import Robot
 
@@ -15,40 +15,51 @@ LINK, SHAPE, OBSTACLE, MASS = "0.25", "tab:blue", "tab:brown", "tab:orange"
 AXIS_COLOURS = "tab:red", "tab:green", "tab:blue"  # x, y, z, as CAD programs have them
 VIEWS = (("seen from the side", (0, 2)), ("seen from above", (0, 1)))
 FRAME = 0.14  # length of a drawn frame, in units of the arm's length
-NEAR = 0.07  # in the same units: joints so close to each other share a label
+ROOM = 0.25  # around the robot, in the same units: more of obstacles is not drawn
+LABEL = 0.045  # height of a joint's label, in units of a view's
 AREA_PER_SHARE = 1200.0  # of a mass's dot in points², times its share of the whole
 
 
 def robot_figure(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Figure:
     """The robot at q (dof,) in rad: from the side, from above, and in space."""
-    lines = _close(robot_lines(robot, q, links), robot.shoulder_m, robot.reach_m)
+    lines = robot_lines(robot, q, links)
+    corners = _extent(lines) + ROOM * robot.arm_m * np.array([[-1.0], [1.0]])
+    middle, half = corners.mean(axis=0), np.ptp(corners, axis=0).max() / 2
+    cube = middle + half * np.array([[-1.0], [1.0]])  # all views have its scale
+    cut = (np.clip(box, *cube) for box in lines.obstacles)
+    lines = replace(lines, obstacles=[box for box in cut if np.ptp(box, axis=0).all()])
     stands = robot.joints.listed(robot.joints.shown(q), 0)
     figure = empty((15.0, 6.0), f"At joint angles ({stands})")
     grid = figure.add_gridspec(1, 3)
     for column, (name, pair) in enumerate(VIEWS):
         panel = figure.add_subplot(grid[0, column])
         guessed = any(link.guessed for link in links)
-        _flat(panel, lines, pair, FRAME * robot.arm_m, " (guessed)" if guessed else "")
         panel.set(title=name, xlabel=f"{'xyz'[pair[0]]} (m)", ylabel=f"{'xyz'[pair[1]]} (m)")
-    _space(figure.add_subplot(grid[0, 2], projection="3d"), lines, FRAME * robot.arm_m)
+        panel.set(xlim=cube[:, pair[0]], ylim=cube[:, pair[1]], aspect="equal")
+        _flat(panel, lines, pair, FRAME * robot.arm_m, " (guessed)" if guessed else "")
+    space = figure.add_subplot(grid[0, 2], projection="3d")
+    _space(space, lines, FRAME * robot.arm_m)
+    space.set(xlim=cube[:, 0], ylim=cube[:, 1], zlim=cube[:, 2])
     return figure
 
 
-def _close(lines: RobotLines, shoulder_m: np.ndarray, reach_m: float) -> RobotLines:
-    """Without what of the obstacles lies where the tool never comes."""
-    low, high = shoulder_m - reach_m, shoulder_m + reach_m
-    cut = (np.clip(corners, low, high) for corners in lines.obstacles)
-    return replace(lines, obstacles=[c for c in cut if np.ptp(c, axis=0).all()])
+def _extent(lines: RobotLines) -> np.ndarray:
+    """Least and largest coordinates (2, 3) of links, frames and shapes."""
+    ends = [np.array(end)[None] for link in lines.links for end in link]
+    points = np.vstack([*ends, *(place[None] for _, place, _ in lines.frames), *lines.shapes])
+    return np.array([points.min(axis=0), points.max(axis=0)])
 
 
 def _flat(
     panel: Axes, lines: RobotLines, pair: tuple[int, int], length: float, remark: str
 ) -> None:
     a, b = pair
-    for box, colour in ((lines.obstacles, OBSTACLE), (lines.shapes, SHAPE)):
-        for corners in box:
+    both = (lines.obstacles, OBSTACLE, "obstacle"), (lines.shapes, SHAPE, "collision shape")
+    for boxes, colour, label in both:
+        for k, corners in enumerate(boxes):
             hull = _outline(corners[:, pair])
-            panel.fill(hull[:, 0], hull[:, 1], color=colour, alpha=0.12, lw=0)
+            panel.fill(hull[:, 0], hull[:, 1], color=colour, alpha=0.12, lw=0,
+                       label="" if k else label)  # fmt: skip
             panel.plot(*np.vstack([hull, hull[:1]]).T, color=colour, lw=0.6, alpha=0.6)
     for start, end in lines.links:
         panel.plot([start[a], end[a]], [start[b], end[b]], color=LINK, lw=3, solid_capstyle="round")
@@ -57,7 +68,7 @@ def _flat(
         arrow = {"arrowstyle": "->", "color": "black", "lw": 1.4}
         panel.annotate("", (tip[a], tip[b]), (place[a], place[b]), arrowprops=arrow)
         panel.plot(place[a], place[b], "o", color="white", mec="black", ms=6)
-    _names(panel, lines, pair, NEAR * length / FRAME)
+    _names(panel, lines, pair)
     whole = sum(mass for mass, _ in lines.masses) or 1.0
     for k, (mass, place) in enumerate(lines.masses):
         label = f"centre of mass, area ~ mass{remark}" if k == 0 else None
@@ -67,29 +78,21 @@ def _flat(
         _frame(panel, pair, place, rotation, 0.7 * length)
         panel.annotate(plain_text(name), (place[a], place[b]), xytext=(8, 22 if k else -26),
                        textcoords="offset points", fontsize=9, weight="bold")  # fmt: skip
-    panel.margins(x=0.25)  # for the names on the left
-    panel.set_aspect("equal", adjustable="datalim")
     panel.grid(True, alpha=0.25)
-    if lines.masses:
-        panel.legend(fontsize=8, loc="lower right")
+    panel.legend(fontsize=8, loc="lower right", markerscale=0.6)
 
 
-def _names(panel: Axes, lines: RobotLines, pair: tuple[int, int], near: float) -> None:
-    """Names of the joints, one label for those that this view shows `near` each other."""
-    groups: list[tuple[np.ndarray, list[str]]] = []
-    for name, place, _ in lines.joints:
-        at = place[list(pair)]
-        same = next((names for other, names in groups if np.hypot(*(at - other)) < near), None)
-        if same is None:
-            groups.append((at, [plain_text(name)]))
-        else:
-            same.append(plain_text(name))
-    # Frames are named on the right; on the left labels in turn sit above and below.
-    for k, (at, names) in enumerate(groups):
+def _names(panel: Axes, lines: RobotLines, pair: tuple[int, int]) -> None:
+    """Names of the joints on the left, kept apart; frames are named on the right."""
+    named = sorted((tuple(place[list(pair)])[::-1], name) for name, place, _ in lines.joints)
+    low, high = panel.get_ylim()
+    gap = LABEL * (high - low)
+    heights = spread(np.array([at[0] for at, _ in named]), gap, low + gap, high - gap)
+    for (at, name), height in zip(named, heights, strict=True):
         panel.annotate(
-            "\n".join(names), tuple(at), xytext=(-26, 12 if k % 2 else -12), va="center",
-            textcoords="offset points", fontsize=8, ha="right",
-            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": "0.5"},
+            plain_text(name), at[::-1], xytext=(0.02, height), va="center", fontsize=8,
+            textcoords=panel.get_yaxis_transform(),
+            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": "0.5", "relpos": (1.0, 0.5)},
         )  # fmt: skip
 
 

@@ -21,15 +21,22 @@ from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.pictures import Pictures
 from planner.report.text import number, remarks, table
+from planner.words import significant
 
 MOST_ROWS = 24  # of speeds that the text shows
 LOBES_SHARE = 0.2  # of the time, where samples follow
+EVERY = "every depth that was asked for"
 KINDS = {
     "hopf": "hopf: chatter at a frequency of its own, beside multiples of the tooth passing.",
     "flip": "flip: chatter at odd multiples of half the tooth-passing frequency.",
 }
 LOBES = "Where a line has a gap every depth that was asked for is stable."
 PATH = "Depths that are stable with 95 % probability at all poses, and at each."
+
+
+def depth_mm(depth_m: float, every: str, unit: str = "") -> str:
+    """A depth in mm, of three digits, or what stands for `every` that was asked for."""
+    return f"{significant(1e3 * depth_m, 3)}{unit}" if np.isfinite(depth_m) else every
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -56,9 +63,9 @@ class LimitsBySpeed(Answer):
         columns = "spindle (rpm)", "depth limit (mm)", "at 95 % (mm)", "chatter (Hz)"
         made = table(f"{title}, {self.method.replace('_', ' ')}", *columns, last)
         for i in range(0, len(cells), max(1, -(-len(cells) // MOST_ROWS))):
-            depths = 1e3 * self.depth_limit_m[i], 1e3 * self.depth_limit_m_at_95[i]
+            depths = self.depth_limit_m[i], self.depth_limit_m_at_95[i]
             made.add_row(
-                f"{self.spindle_rpm[i]:.0f}", *(number(depth, ".4f") for depth in depths),
+                f"{self.spindle_rpm[i]:.0f}", *(depth_mm(depth, "–") for depth in depths),
                 number(self.chatter_hz[i], ".1f"), cells[i],
             )  # fmt: skip
         return made
@@ -108,7 +115,8 @@ def stability_of(
 
         return {"stability": lobes_figure(cut, found, drawn, point)}
 
-    return answer.with_figures(pictures or Pictures(), figures, asked.source.name, LOBES)
+    name = ", ".join(filter(None, (asked.source.name, asked.pose)))
+    return answer.with_figures(pictures or Pictures(), figures, name, LOBES)
 
 
 def _at_one(
@@ -156,15 +164,16 @@ class PathReport(LimitsBySpeed):
 
     def text(self) -> Group:
         """A table of speeds, then the best of them."""
-        made = self._table(f"{len(self.poses)} poses", "tightest pose", self.tightest_pose)
-        deep = 1e3 * self.best_depth_m_at_95
-        best = f"{deep:.3f} mm" if np.isfinite(deep) else "every depth that was asked for"
+        known = zip(self.tightest_pose, self.depth_limit_m, strict=True)
+        tightest = [pose if np.isfinite(depth) else "–" for pose, depth in known]
+        made = self._table(f"{len(self.poses)} poses", "tightest pose", tightest)
+        best = depth_mm(self.best_depth_m_at_95, EVERY, " mm")
         said = (
             f"Best speed for the whole path: {self.best_spindle_rpm:.0f} rpm allows {best} with "
-            f"95 % probability. {self.feed.text}"
+            f"95 % probability."
         )
-        if self.turn is not None:
-            said += " " + self.turn.text(self.poses)
+        turned = self.turn.text(self.poses) if self.turn is not None else ""
+        said = " ".join(filter(None, (said, self.feed.text, turned)))
         return Group(made, Text(said), *remarks(self.remarks), *self.end)
 
 

@@ -16,7 +16,8 @@ from planner.milling.structure import OutOfBandError, Structure
 from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.pictures import Pictures
-from planner.report.text import number, remarks, table
+from planner.report.stability import EVERY, depth_mm
+from planner.report.text import remarks, table
 
 MOST_SPEEDS = 24  # among which the best for the whole workspace is looked for
 MOST_ROWS = 10
@@ -56,12 +57,12 @@ class MapReport(Answer):
         order = np.argsort(self.depth_limit_m_at_95)
         for i in order[:MOST_ROWS]:
             place = ", ".join(f"{v:.3f}" for v in self.position_m[i])
-            shown = 1e3 * self.depth_limit_m[i], 1e3 * self.depth_limit_m_at_95[i]
-            made.add_row(self.poses[i], place, *(number(float(v), ".4f") for v in shown))
-        low, high = (float(1e3 * self.depth_limit_m_at_95[order[k]]) for k in (0, -1))
+            shown = self.depth_limit_m[i], self.depth_limit_m_at_95[i]
+            made.add_row(self.poses[i], place, *(depth_mm(v, "–") for v in shown))
+        low, high = (depth_mm(self.depth_limit_m_at_95[order[k]], EVERY, " mm") for k in (0, -1))
         said = (
-            f"With 95 % probability the workspace allows {number(low, '.3f')} mm at "
-            f"{self.tightest_pose} and {number(high, '.3f')} mm at {self.poses[order[-1]]}."
+            f"With 95 % probability the workspace allows {low} at {self.tightest_pose} and "
+            f"{high} at {self.poses[order[-1]]}."
         )
         if self.wanted_depth_m is not None and self.wanted_share is not None:
             said += (

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -251,11 +252,13 @@ def _still_refused(state: "CampaignState") -> tuple[RefusedHit, ...]:
     )
 
 
-def status(campaign: Campaign) -> StatusReport:
-    """Of a campaign as it is now."""
+def status(campaign: Campaign, diagnosis: Path | None = None) -> StatusReport:
+    """Of a campaign as it is now, beside a kept `diagnosis` (by default its own)."""
     state = campaign.state
     believed = campaign.of_model("status", ModelStatus, ModelStatus.of)
-    remarks = (*believed.remarks, *_beside_diagnosis(campaign, believed.springs))
+    kept = diagnosis or diagnosis_of(campaign.directory)
+    beside = two_answers(believed.springs, read_diagnosis(kept)) if kept else ""
+    remarks = (*believed.remarks, *filter(None, (beside,)))
     return StatusReport(
         **(vars(believed) | {"remarks": remarks}),
         campaign=str(campaign.directory),
@@ -302,9 +305,3 @@ def models_text(rows: "Sequence[LeftOutModel]") -> list[RenderableType]:
 def model_beside(campaign: Campaign, found: Mapping[str, Any]) -> str:
     """What to say where the campaign's model and a diagnosis of it, as JSON, give two answers."""
     return two_answers(campaign.of_model("status", ModelStatus, ModelStatus.of).springs, found)
-
-
-def _beside_diagnosis(campaign: Campaign, springs: Sequence[RefittedSpring]) -> tuple[str, ...]:
-    kept = diagnosis_of(campaign.directory)
-    said = two_answers(springs, read_diagnosis(kept)) if kept else ""
-    return (said,) if said else ()

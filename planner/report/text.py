@@ -43,10 +43,12 @@ def number(value: float | None, form: str = ".2f") -> str:
 def with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:
     """A number and its standard deviation, or a dash; an sd that rounds to 0 is below that digit.
 
-    `form` has fixed decimals (".2f").
+    `form` has fixed decimals (".2f"); of a larger sd two digits are enough.
     """
     if number(value, form) == "–":
         return "–"
+    if sd and math.isfinite(sd):
+        form = f".{max(0, min(int(form[1:-1]), 1 - math.floor(math.log10(sd))))}f"
     known = small(sd, form) if sd is not None and math.isfinite(sd) else "–"
     return f"{number(value, form)} ± {known}"
 

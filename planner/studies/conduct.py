@@ -43,7 +43,7 @@ def conduct(name: str, folder: Path | None, small: bool, progress: Tell) -> Stud
     )  # fmt: skip
     if folder is not None:
         files += [_write_table(each, folder) for each in (*told.tables, answer.claims)]
-        files += Pictures(folder).write(told.pictures, name)["plots"]
+        files += Pictures(folder).write(told.pictures, name, simulated=True)["plots"]
         files.append(str(write_page(_page(answer), folder / f"{name}.html")))
     return answer
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.report.springs import with_exponent
 from planner.surrogate.frequency_models import MODELS
 from planner.truth.model import Truth
 from tests.support.outside import call, make_cell, record, told
@@ -78,7 +79,7 @@ def test_what_the_simulation_learned_of_each_joint_stands_beside_what_was_stated
     assert any(abs(s["stiffness"] / s["stated"] - 1) > 0.03 for s in springs)  # it learned
     _, said, _ = call("status", three.cell)
     first = springs[0]
-    shown = f"{first['stiffness'] / 10 ** int(np.log10(first['stiffness'])):.3f} ±"
+    shown = with_exponent(first["stiffness"], first["stiffness_sd"])
     assert all(word in said for word in ("stated", "refitted ± sd", "N·m/rad", shown))
     page = tmp_path / "report.html"
     told("report", three.cell, "--out", page)

@@ -10,7 +10,7 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.cli.run import run
 from planner.report.page import write_report
-from planner.report.text import SIMULATED
+from planner.report.text import SIMULATED, with_sd
 from tests.support.named_campaign import DOLLAR, SCRIPT
 
 LARGEST_BYTES = 5_000_000
@@ -79,7 +79,8 @@ def test_it_says_what_was_asked_measured_refused_and_how_good_it_is(report):
     state = campaign.state
     for measurement in state.used:
         for mode in measurement.modes:
-            assert not mode.likely or f"{mode.frequency_hz:.3f} ± " in text
+            known = with_sd(mode.frequency_hz, mode.frequency_sd_hz, ".3f")
+            assert not mode.likely or known in text
     refused = [hit for m in state.recorded for hit in m.hits if not hit.accepted]
     assert len(refused) == 1
     assert refused[0].reason in text

@@ -40,7 +40,7 @@ COLOURS = {
     "hit": (70, 140, 255),
     "obstacle": (140, 150, 155),
 }
-SCALE = "0.1 % dark to 10 % yellow"
+SCALE = "0.01 % dark to 10 % yellow"
 NEAR = 0.75  # modes are seen from nearer than the cell
 ARROW = 0.18  # length of a hit's arrow, in units of the arm's length
 NOTE = """\
@@ -191,8 +191,8 @@ class RerunView:
         prediction = model.workspace_prediction
         relative = prediction.frequency_sd_hz / prediction.frequency_hz
         sd = 100 * np.sqrt(np.mean(relative**2, axis=1))
-        # A fixed logarithmic scale, 0.1 % to 10 %, so that colours can be compared over time.
-        shade = np.clip((np.log10(sd) + 1) / 2, 0, 1)
+        # A fixed logarithmic scale, 0.01 % to 10 %, so that colours can be compared over time.
+        shade = np.clip((np.log10(sd) + 2) / 3, 0, 1)
         # Without viridis' lowest quarter, which cannot be seen on a dark ground.
         colours = (255 * colormaps["viridis"](0.25 + 0.75 * shade)).astype(np.uint8)
         points = rr.Points3D(self._cell.candidates.position_m, radii=0.008, colors=colours)

@@ -6,16 +6,14 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from matplotlib import colormaps
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
-from planner.report.plot_marks import AXES, magnitude, panels
+from planner.report.plot_marks import AXES, FAINTEST, magnitude, name_axes, panels
 
 LINES = 300  # frequency lines of a plot: as many as its width shows
-FAINTEST = 1e-4  # of an FRF's largest magnitude: what is smaller is not shown
 PULSE_MS = (-5.0, 35.0)  # of a hit, shown from its peak
 SIZE = (7.0, 3.6)  # inches
 EXPECTED, SPREAD, TARGET = (255, 150, 40), (150, 95, 40), (120, 200, 120)
@@ -32,9 +30,9 @@ def frf_figures(
     then = None if before is None or not before.labelled else before.frf(pose.q[None], lines)
     frf, figures = None if measured is None else measured.frf, []
     for i, axis in enumerate(AXES):
-        figure, panel = _figure(
-            f"{pose.pose}: response along {axis} to hits along {axis}", "|H| (m/s²/N)"
-        )
+        title = f"{pose.pose}: response along {axis} to hits along {axis}"
+        figure, grid = panels(SIZE, title)
+        panel = grid[0, 0]
         floor = FAINTEST * float(np.abs(now[i, i]).max())
         if then is not None:
             mean, sd = then[0][0, i, i], then[1][0, i, i]
@@ -42,11 +40,12 @@ def frf_figures(
             magnitude(panel, lines, mean, sd, floor, **style)
         magnitude(panel, lines, now[i, i], color="tab:blue", lw=1.8, label="believed now")
         if frf is not None:
-            style = {"color": "black", "lw": 1.0, "label": "measured"}
-            magnitude(panel, frf.frequency_hz, frf.accelerance[i, i], **style)
-        panel.set(xlabel="frequency (Hz)", xlim=(low, high))
-        panel.set_ylim(bottom=floor)
-        panel.legend(fontsize=7, loc="upper right", ncols=4)
+            inside = (frf.frequency_hz >= low) & (frf.frequency_hz <= high)
+            seen = frf.frequency_hz[inside], frf.accelerance[i, i, inside]
+            magnitude(panel, *seen, color="black", lw=1.0, label="measured")
+        panel.set_xlim(low, high)
+        panel.grid(True, which="both", alpha=0.25)
+        name_axes(figure, grid, "frequency (Hz)", "|H| (m/s²/N)")
         figures.append(figure)
     return figures
 
@@ -54,23 +53,17 @@ def frf_figures(
 def force_figure(measured: MeasuredPose) -> Figure:
     """The force of one hit along each axis around its peak."""
     title = "Force, one hit an axis" if measured.hits else "FRFs were imported: no hits to show"
-    figure, panel = _figure(title, "force (N)")
+    figure, grid = panels(SIZE, title)
+    panel = grid[0, 0]
     shown = {hit.axis[-1]: hit for hit in reversed(measured.hits)}
     for axis, hit in sorted(shown.items()):
         ms = 1000 * np.arange(hit.force_n.size) / hit.sampling_rate_hz
         ms = ms - ms[int(np.argmax(np.abs(hit.force_n)))]
         panel.plot(ms, np.abs(hit.force_n), label=f"along {axis}")
-    panel.set(xlabel="time after the peak (ms)", xlim=PULSE_MS)
-    if shown:
-        panel.legend(fontsize=7)
+    panel.set_xlim(PULSE_MS)
+    panel.grid(True, alpha=0.25)
+    name_axes(figure, grid, "time after the peak (ms)", "force (N)")
     return figure
-
-
-def _figure(title: str, y: str) -> tuple[Figure, Axes]:
-    figure, grid = panels(SIZE, title)
-    grid[0, 0].set_ylabel(y)
-    grid[0, 0].grid(True, which="both", alpha=0.25)
-    return figure, grid[0, 0]
 
 
 def measured_modes(pose: LabelledPose, before: Model | None) -> dict[str, float]:
