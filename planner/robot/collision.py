@@ -76,7 +76,7 @@ class Collisions:
         names = [block.name for block in self.robot.config.obstacle]
         if len(names) > NAMED:
             return f"all {len(names)} obstacles of {self.robot.path.name}"
-        return f"what {self.robot.path.name} has as [[obstacle]] ({', '.join(names)})"
+        return f"the obstacles of {self.robot.path.name} ({', '.join(names)})"
 
     @property
     def overlapping(self) -> tuple[str, ...]:

@@ -150,7 +150,7 @@ def test_lines_stand_for_links_without_shapes_against_obstacles(arm):
     found = collisions(without_shapes(arm))
     robot = found.robot
     assert found.free(FREE)
-    assert "[[obstacle]] (floor)" in (found.unchecked or "")
+    assert "the obstacles of robot.toml (floor)" in (found.unchecked or "")
     poses = np.random.default_rng(0).uniform(robot.lower_rad, robot.upper_rad, (200, 6))
     under = [q for q in poses if robot.forward(q)[1][2] < -0.02]
     assert len(under) > 10
