@@ -242,7 +242,7 @@ def test_forecast_speaks_of_its_own_samples(surrogate):
     found = forecast(outputs, best, 1.0, 0.95)
     assert 0 < found.rmse_percent < found.bound_percent
     assert found.gain_percent > 0
-    assert "One more measurement would gain about" in found.text
+    assert "One more pose should bring the RMSE to about" in found.text
     assert forecast(outputs, None, 1e3, 0.95).reached == 1
     assert forecast(outputs, None, 1e-9, 0.95).reached == 0
 
