@@ -81,7 +81,8 @@ class ProposalsReport(Answer):
         """Each pose, then what one more measurement is worth."""
         parts = [part for one in self.proposals for part in one.parts(self.joints)]
         again = self.repeat.text if self.repeat else ""
-        said = standing(self.forecast, self.waits_for, again), self.places and self.places.sentence
+        places = self.places.sentence if self.places else ""
+        said = standing(self.forecast, self.waits_for, again), places
         remarks = [Text(remark, style="yellow") for remark in self.remarks]
         return Group(*parts, Text(" ".join(filter(None, said))), *remarks, *self._then())
 
