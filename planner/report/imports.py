@@ -122,7 +122,8 @@ class PoseImport(Answer):
         if not self.copies:
             return ""
         one, more = self.copies[0], len(self.copies) - 1
-        others = f" (so has each of {counted(more, 'more file')} of an earlier one)" if more else ""
+        are = "is a copy" if more == 1 else "are copies"
+        others = f" ({counted(more, 'more file')} {are}, too)" if more else ""
         return f"{one.file} has the same data as {one.first}, imported as {self.pose}{others}"
 
     def _counts(self) -> str:
