@@ -233,13 +233,13 @@ def lacking(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
     said = []
     if missing := [axis for axis in wanted if not counts[axis]]:
         said.append(
-            f"{measurement.pose} was not hit along {' and '.join(missing)}: what moves that way "
-            f"only is missing; hit along it too, at the same pose."
+            f"{measurement.pose} has no accepted hit along {' and '.join(missing)}, so that what "
+            f"moves that way alone is missing: hit along it too, at the same pose."
         )
     if once := [axis for axis in wanted if counts[axis] == 1]:
         said.append(
-            f"{measurement.pose} has one hit only along {' and '.join(once)}, which no repeat "
-            f"confirms; hit again."
+            f"{measurement.pose} has only one accepted hit along {' and '.join(once)}, and no "
+            f"repeat confirms it: hit along it again."
         )
     return tuple(said)
 
