@@ -6,6 +6,7 @@ from pathlib import Path
 
 from planner.campaign import store
 from planner.campaign.events import REFUSED, HitRecord, Imported
+from planner.campaign.known_files import KnownFile, first_files, owners
 from planner.campaign.state import CampaignState
 from planner.dataset.screened_files import Source
 from planner.dataset.visits import table_folders
@@ -119,7 +120,7 @@ def at_their_poses(deliveries: tuple[Delivery, ...], state: CampaignState) -> tu
 
     Raises InputError where it is not clear at which pose the others were recorded.
     """
-    owner = _owners(state)
+    owner = owners(state)
     found: list[Delivery] = []
     for delivery in deliveries:
         if delivery.said:
@@ -139,14 +140,14 @@ def at_their_poses(deliveries: tuple[Delivery, ...], state: CampaignState) -> tu
 
 def new_files(
     directory: Path, delivery: Delivery, state: CampaignState, named: frozenset[Path]
-) -> tuple[tuple[Fresh, ...], tuple[str, ...], tuple[HitRecord, ...]]:
-    """Keep the raw files; those new, names of those in use at this pose, and those left out.
+) -> tuple[tuple[Fresh, ...], tuple[KnownFile, ...], tuple[HitRecord, ...]]:
+    """Keep the raw files; those new, those in use at this pose, and those left out.
 
     A file that the engineer refused, or that was shown at another pose, is new only where it is
     itself among the `named` paths or its table says so; one that cannot be read is left out, as is
     a recording that is in use at another pose. Raises InputError where all are.
     """
-    owner, pose, known = _owners(state), delivery.pose, state.measurements.get(delivery.pose)
+    owner, pose, known = owners(state), delivery.pose, state.measurements.get(delivery.pose)
     withdrawn = ""
     if known is not None and known.withdrawn:
         again = command("planner", "confirm", directory, pose)
@@ -154,6 +155,7 @@ def new_files(
         withdrawn += "new measurement another pose name, in recordings.csv or by --pose"
     fresh: list[Fresh] = []
     already, left_out, elsewhere = [], [], []
+    first = first_files(state)
     seen: set[str] = set()
     for source in delivery.sources:
         try:
@@ -163,8 +165,9 @@ def new_files(
             continue
         if owner.get(digest, pose) != pose:
             reason = (
-                f"it was imported before as a recording of pose {owner[digest]} and cannot belong "
-                f"to {pose} too; delete it, or put the right file there"
+                f"it has the same data as {first[digest]}, imported as a recording of pose "
+                f"{owner[digest]}, and cannot belong to {pose} too; delete it, or put the right "
+                f"file there"
             )
             if len(delivery.sources) == 1 + len(elsewhere):
                 raise InputError(f"{source.path}: {reason}.")
@@ -172,9 +175,10 @@ def new_files(
         elif reason := withdrawn or _reason_against(delivery, source, digest, named, state):
             left_out.append(record_of(source, digest, "", reason))
         elif digest in owner or (digest in seen and not source.part):
-            already.append(source.name)
+            already.append(KnownFile(source.name, first[digest]))
         else:
             seen.add(digest)
+            first.setdefault(digest, source.name)
             _, suffix = store.store_recording(directory, source.path)
             kept = replace(source, path=store.recording_path(directory, digest, suffix))
             fresh += [(part, record_of(part, digest, suffix, "")) for part in kept.parts()]
@@ -225,13 +229,6 @@ def let_go(delivery: Delivery, held: Imported, joints: JointUnits) -> tuple[HitR
     moved = stood is not None and joints.apart(held.joints_deg, stood)
     anew = gone or moved or any(stated_otherwise(*one) for one in both)
     return tuple(hit for hit in lacking if hit not in gone) if anew else None
-
-
-def _owners(state: CampaignState) -> dict[str, str]:
-    """Poses of all that is in use, or is held, by sha256."""
-    held = {h.sha256: pose for pose, m in state.held.items() for h in m.hits}
-    used = (m for m in state.measurements.values() if not m.withdrawn)
-    return held | {h.sha256: m.pose for m in used for h in m.accepted}
 
 
 def _digest(source: Source) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import tomlkit
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.stated_masses import links_kg, whose_masses
 from planner.campaign.store import CONFIG, ROBOT
 from planner.check.examine import spread_poses
 from planner.dynamics.simulation import Simulation
@@ -108,6 +109,7 @@ def guess(urdf: Path, weights: StatedMasses, robot_toml: Path, planned: bool = T
         raise InputError(
             f"{urdf} states no masses; give the robot's, from its data sheet, with --mass-kg."
         )
+    stated_kg = links_kg(robot, weights.robot)
     links = guess_inertias(robot, weights.robot)
     payload = weights.payload or PAYLOAD_SHARE * (weights.robot or total_stated(robot))
     carried = (_tool(chain.tcp, weights.tool, robot),) if weights.tool else ()
@@ -119,7 +121,8 @@ def guess(urdf: Path, weights: StatedMasses, robot_toml: Path, planned: bool = T
     robot = Robot.of(msgspec.structs.replace(robot.config, band_hz=band), robot_toml)
     ranges = ranges_inside(robot, low, high, 1.0)
     guesses = tuple(_guesses(robot, chain, weights, payload, ranges if planned else None))
-    return Guessed(robot, ranges, band, modes, guesses, tuple(_remarks(robot, chain, weights)))
+    remarks = (*whose_masses(robot, weights.robot, stated_kg), *_remarks(robot, chain, weights))
+    return Guessed(robot, ranges, band, modes, guesses, remarks)
 
 
 def _tool(tcp: str, mass: float, robot: Robot) -> Payload:

@@ -74,14 +74,15 @@ def contradiction(pose: str, measured: MeasuredPose, known: int) -> Question | N
     if not told:
         return None
     text = (
-        f"At {pose} {'; '.join(told)}: hit along it once more, take this import back, and import "
-        f"all of them together. Is each of them right as it is?"
+        f"At {pose} {'; '.join(told)}. To settle it, hit along that axis once more, take this "
+        f"import back, and import all hits together. Is each of them right as it is?"
     )
     return Question(text, disagree=tuple(disagree))
 
 
 def _listed(names: Iterable[str]) -> str:
-    return " and ".join(Path(name).name for name in names)
+    *before, last = (Path(name).name for name in names)
+    return f"{', '.join(before)} and {last}" if before else last
 
 
 def _told(hit: Hit, doubt: Doubt, first: str, others: str, both_doubted: bool) -> str:

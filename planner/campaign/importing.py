@@ -27,6 +27,7 @@ from planner.campaign.deliveries import (
 from planner.campaign.events import REFUSED, HitRecord, Question
 from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.import_checks import alerts, asked_of, contradiction, suspected
+from planner.campaign.known_files import KnownFile
 from planner.campaign.measured_modes import from_homogeneity, from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
@@ -51,7 +52,7 @@ class ImportReport:
     pose: str
     accepted: tuple[HitRecord, ...]
     refused: tuple[HitRecord, ...]
-    already: tuple[str, ...]  # files that were imported before
+    already: tuple[KnownFile, ...]  # files that were imported before
     measurement: Measurement | None
     measured: MeasuredPose | None
     model_before: Model
@@ -129,7 +130,7 @@ class JudgedFiles:
     `old` are the earlier ones beside which they stand, without those `superseded` by good new ones.
     """
 
-    already: tuple[str, ...]
+    already: tuple[KnownFile, ...]
     left_out: tuple[HitRecord, ...]
     hits: tuple[HitRecord, ...] = ()
     sources: tuple[Source, ...] = ()
@@ -232,13 +233,13 @@ def lacking(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
     said = []
     if missing := [axis for axis in wanted if not counts[axis]]:
         said.append(
-            f"{measurement.pose} was not hit along {' and '.join(missing)}: what moves that way "
-            f"only is missing; hit along it too, at the same pose."
+            f"{measurement.pose} has no accepted hit along {' and '.join(missing)}, so that what "
+            f"moves that way alone is missing: hit along it too, at the same pose."
         )
     if once := [axis for axis in wanted if counts[axis] == 1]:
         said.append(
-            f"{measurement.pose} has one hit only along {' and '.join(once)}, which no repeat "
-            f"confirms; hit again."
+            f"{measurement.pose} has only one accepted hit along {' and '.join(once)}, and no "
+            f"repeat confirms it: hit along it again."
         )
     return tuple(said)
 

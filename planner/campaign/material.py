@@ -1,5 +1,6 @@
 """What recordings of several poses come from: folders and a robot, or a campaign."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from planner.campaign import store
 from planner.campaign.acquisition_inputs import MOST_INFORMED
 from planner.campaign.campaign import Campaign
 from planner.dataset.dataset import Dataset
-from planner.dataset.visits import Recording, recordings_in
+from planner.dataset.visits import Recording, recordings_in, unlisted_folders
 from planner.errors import InputError
 from planner.progress import Tell
 from planner.recording.folder import TABLE
@@ -46,6 +47,10 @@ class Material:
         if self.campaign is None:
             return recordings_in(self.recordings, robot.joints, robot.points)
         return self.campaign.used_recordings
+
+    def unlisted(self, listed: Sequence[Recording]) -> tuple[str, ...]:
+        """Which folders are left out because no table lists their recordings, in a sentence."""
+        return () if self.campaign else unlisted_folders(self.recordings, listed)
 
     def read(self, robot: Robot, band_hz: tuple[float, float], progress: Tell) -> Dataset:
         """What is `listed`, read and screened; nothing is written. Raises as `Dataset.of` does."""

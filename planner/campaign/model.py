@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.campaign.acquisition_inputs import open_parameters, outlook
+from planner.campaign.acquisition_inputs import open_parameters, outlook, poses_at
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.hit_error_estimates import CampaignHitErrors
@@ -15,7 +15,7 @@ from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.labels import LabelledPose, observations
 from planner.campaign.low_fidelity import FEW_POSES, LowFidelity
 from planner.campaign.state import Measurement
-from planner.design.acquisitions import mixed, repeat_gain
+from planner.design.acquisitions import mixed, parameter_variance, repeat_gain
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.design.parameter_sensitivity import FrfNoise
 from planner.design.stopping import Forecast, forecast
@@ -164,19 +164,25 @@ class Model:
     @cached_property
     def forecast(self) -> Forecast:
         """Predicted RMSE over the workspace, and what one more measurement would gain."""
-        outputs, poses = self.outlook
-        index = int(np.argmax(self._gains))
-        best, open_ = poses.one(index), open_parameters(self)
-        if open_ is not None:  # what hits there tell of it
-            q = self.cell.candidates.q[index : index + 1]
-            best = replace(best, information=open_.information(q))
-        stop = self.cell.config.stop
+        outputs, best, stop = self.outlook[0], self._best, self.cell.config.stop
         learned, least = self.low.learned, 0.0
         if learned is not None and learned.wider is not None:
             least = float(np.mean((self.frequency_sd_percent / 100) ** 2))
         found = forecast(outputs, best, stop.frequency_sd_percent, stop.probability, least)
         misses = self.low.misses
         return found.doubted(misses) if misses and found.measurements < FEW_POSES else found
+
+    @cached_property
+    def _best(self) -> Poses:
+        """The candidate (n = 1) that gains most, with what hits there tell of the simulation."""
+        outputs, poses = self.outlook
+        index = int(np.argmax(mixed(outputs, poses[:CONSIDERED])))
+        return self._told_by(poses.one(index), self.cell.candidates.q[index : index + 1])
+
+    def _told_by(self, poses: Poses, q: np.ndarray) -> Poses:
+        """The poses with what hits there, q (n, dof) in rad, tell of the simulation."""
+        open_ = open_parameters(self)
+        return poses if open_ is None else replace(poses, information=open_.information(q))
 
     @property
     def done(self) -> bool:
@@ -210,25 +216,17 @@ class Model:
         """The measured pose that gains most from more hits; None where a new pose gains more."""
         if not self.labelled:
             return None
-        outputs = self.outlook[0]
+        outputs, q = self.outlook[0], np.array([pose.q for pose in self.labelled])
         sd = [[m.frequency_sd_hz / m.frequency_hz if m else np.nan for m in p.modes]
               for p in self.labelled]  # fmt: skip
-        gain = repeat_gain(outputs, np.array(sd) ** 2)
-        best, new = int(np.argmax(gain)), float(np.max(self._gains))
+        there = self._told_by(poses_at(self, q)[0], q)
+        gain = repeat_gain(outputs, np.array(sd) ** 2) + parameter_variance(outputs, there)
+        best, new = int(np.argmax(gain)), float(mixed(outputs, self._best)[0])
         if gain[best] <= new:
             return None
         pose = self.labelled[best].pose
-        text = (
-            f"Hit {pose} again, with as many hits as before: that lowers the uncertainty more than "
-            f"any new pose."
-        )
+        text = f"Hit {pose} again, with as many hits as before: that tells more than a new pose."
         return RepeatedPose(pose, float(gain[best]), new, text)
-
-    @cached_property
-    def _gains(self) -> np.ndarray:
-        """(n,) what measuring each of the first candidates would gain."""
-        outputs, poses = self.outlook
-        return mixed(outputs, poses[:CONSIDERED])
 
     def _predict(
         self,

@@ -193,7 +193,8 @@ def compare(
         bench, remarks = assemble(loaded, config, poses)
         study = Study.plan(bench, strategies, models, repeats, initial, budget)
         found, damaged = conduct(bench, study, folder, scheduler, workers, progress)
-    answer = comparison(bench, study, found, poses, (*remarks, *damaged))
+    told = (*given.unlisted(listed), *remarks, *damaged)
+    answer = comparison(bench, study, found, poses, told)
     answer = answer.with_pictures(out, rrd, bench.key)
     answer = replace(answer, seconds=time.perf_counter() - started)
     if out is not None:

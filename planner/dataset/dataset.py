@@ -12,7 +12,15 @@ import numpy as np
 from planner.dataset.level_columns import Column, column
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.store import Store, user_store
-from planner.dataset.visits import PoseEntry, Recording, Stay, Visit, recordings_in, stays_of
+from planner.dataset.visits import (
+    PoseEntry,
+    Recording,
+    Stay,
+    Visit,
+    recordings_in,
+    stays_of,
+    unlisted_folders,
+)
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
@@ -92,14 +100,16 @@ class Dataset:
             InputError: The table is wrong.
             RefusedError: No pose has a hit that can be used.
         """
-        return cls.of(
-            recordings_in(Path(folder), robot.joints, robot.points),
+        listed = recordings_in(Path(folder), robot.joints, robot.points)
+        found = cls.of(
+            listed,
             band_hz or robot.config.band_hz,
             window_rate_1_s=window_rate_1_s,
             progress=progress,
             store=store,
             name=str(folder),
         )
+        return replace(found, remarks=(*unlisted_folders(Path(folder), listed), *found.remarks))
 
     @classmethod
     def of(

@@ -12,10 +12,13 @@ import numpy as np
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
-from planner.recording.folder import TABLE, read_recordings
+from planner.recording.folder import TABLE, TABLES, read_recordings
 from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames
+from planner.recording.read import READERS, read
 from planner.recording.records import Hit
+
+NAMED = 3  # folders in a sentence, and files of each that are looked into
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +109,8 @@ def recordings_in(
     if not folders:
         raise InputError(
             f"{path} has no {TABLE}, nor has a folder in it; add one that says of each file at "
-            f"which pose it was recorded and how the joints stood."
+            f"which pose it was recorded and how the joints stood, or name the campaign that "
+            f"imported them."
         )
     found: list[Recording] = []
     first: dict[str, tuple[Path, tuple[float, ...]]] = {}
@@ -122,3 +126,44 @@ def recordings_in(
                 q = joints.internal(row.joints_deg)
                 found.append(Recording(row.pose, q, Source.of(row)))
     return tuple(found)
+
+
+def unlisted_folders(path: Path, listed: Sequence[Recording]) -> tuple[str, ...]:
+    """A sentence that names folders at a path with recordings of which no table names any.
+
+    `listed` are all recordings that tables name. Files were imported with `--pose`, say: where the
+    joints stood only the campaign knows then. None where every folder is used.
+    """
+    top = path.resolve()
+    top = top.parent if top.name == TABLE else top
+    used = {one.source.path.resolve().parent for one in listed}
+    used |= {folder.resolve() for folder in table_folders(path)}
+    found = sorted({file.parent for file in top.rglob("*") if _may_be_read(file, top)} - used)
+    left = [folder for folder in found if _has_recordings(folder)]
+    if not left:
+        return ()
+    names = ", ".join(folder.relative_to(top).as_posix() for folder in left[:NAMED])
+    more = f" and {len(left) - NAMED} more" if len(left) > NAMED else ""
+    return (
+        f"Of {path}, {names}{more} {'is' if len(left) == 1 else 'are'} left out: no {TABLE} says "
+        f"at which pose these files were recorded and how the joints stood. Add one, or, where "
+        f"they were imported with --pose, name the campaign instead of {path.name}.",
+    )
+
+
+def _may_be_read(file: Path, top: Path) -> bool:
+    """Whether a file below a folder is shown and has a format of recordings."""
+    shown = not any(part[0] == "." for part in file.relative_to(top).parts)
+    return shown and file.suffix.lower() in READERS and file.name not in TABLES and file.is_file()
+
+
+def _has_recordings(folder: Path) -> bool:
+    """Whether one of its first files can be read: pictures' tables and notes cannot."""
+    files = sorted(file for file in folder.iterdir() if _may_be_read(file, folder))
+    for file in files[:NAMED]:
+        try:
+            read(file)
+        except InputError:
+            continue
+        return True
+    return False

@@ -12,6 +12,7 @@ import numpy as np
 from planner.design.acquisitions import parameter_reduction
 from planner.design.cost import Cost
 from planner.design.frequency_posterior import ALL_AXES, AXES, FrequencyOutputs, Poses
+from planner.dynamics.motion import Motion
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.fit.frequency_uncertainty import log_frequency_slope
@@ -20,6 +21,7 @@ from planner.fit.posterior import RobotBelief
 from planner.frf.frf import Frf
 from planner.measurement.agreement import MODEL_ERROR
 from planner.measurement.measured_frfs import ASSUMED_FLOOR, ASSUMED_RELATIVE, noise_sd
+from planner.measurement.nuisances import OpenNumbers, basis, real_rows
 from planner.recording.points import SENSOR, TCP, TOOL, Layout
 
 # Lines around each mode at which the information is summed up, in half-widths of its resonance.
@@ -117,20 +119,33 @@ class OpenParameters:
         belief = self.belief
         misfit = FrfMisfit(belief.structure, belief.at(q, frequency, layout), belief.tolerances)
         motion = misfit.motion(belief.x, None)
-        h, (slope, _) = motion.accelerance, misfit.slopes(motion, belief.x)
+        h, (told, visits) = motion.accelerance, misfit.slopes(motion, belief.x)
         # What no hit along an axis moves is never measured along it: it tells nothing.
         sd = self._sd(h)
         weight = np.sqrt(2 * count[:, None, None] / self.noise.misfit) / np.where(
             sd > 0, sd, np.inf
         )
-        slope = (slope * weight[:, None])[:, :, self._channels(layout)]
-        n, p = slope.shape[:2]
-        out = np.empty((n, AXES, p, p))
-        for i in range(n):
-            for axis in range(AXES):
-                j = np.ascontiguousarray(slope[i][:, :, axis]).reshape(p, -1).view(float)
-                out[i, axis] = j @ j.T
-        return out
+        beside = self._of_the_visit(motion, misfit, visits)
+        told, beside = (
+            (one * weight[:, None])[:, :, self._channels(layout)] for one in (told, beside)
+        )
+        return np.array([
+            [_told(a[:, :, axis], b[:, :, axis]) for axis in range(AXES)]
+            for a, b in zip(told, beside, strict=True)
+        ])  # fmt: skip
+
+    def _of_the_visit(self, motion: Motion, misfit: FrfMisfit, visits: np.ndarray) -> np.ndarray:
+        """Columns (n, l, r, c, F), in sds, of what a visit has of its own, as the fit takes it.
+
+        Hits beside their axis and point, joints beside their readback, springs as they are that
+        day. Joints and springs are common to hits along all axes, each of which is told apart here:
+        each has a third of what they tell.
+        """
+        t, s = self.belief.tolerances, misfit.data.measured.s
+        numbers = OpenNumbers.of(motion.accelerance)
+        every = basis(motion.accelerance, motion, s, t)
+        common = np.concatenate([every[:, numbers.known :], visits * t.visit_stiffness], axis=1)
+        return np.concatenate([every[:, : numbers.hits], np.sqrt(AXES) * common], axis=1)
 
     def _channels(self, layout: Layout) -> list[int]:
         """Rows of FRFs that the sensors have axes for."""
@@ -161,6 +176,13 @@ class OpenParameters:
             [lines[:, :1], (lines[:, 1:] + lines[:, :-1]) / 2, lines[:, -1:]], axis=1
         )
         return lines, np.diff(edges, axis=1) / self.noise.step_hz
+
+
+def _told(told: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """(p, p) of columns (p, …) in sds of the noise, others (l, …) integrated out, N(0, 1) each."""
+    a, b = real_rows(told), real_rows(beside)
+    across = b @ a.T
+    return a @ a.T - across.T @ np.linalg.solve(np.eye(len(b)) + b @ b.T, across)
 
 
 TINY = 1e-12  # share of the variance that is always left

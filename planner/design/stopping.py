@@ -51,6 +51,11 @@ class Forecast:
     @property
     def text(self) -> str:
         """One or two sentences for the engineer."""
+        return " ".join(filter(None, (self.known, self.outlook)))
+
+    @property
+    def known(self) -> str:
+        """How far frequencies are off, in a sentence."""
         if self.misses:
             few = counted(self.measurements, "pose") if self.measurements else "one pose"
             return (
@@ -67,14 +72,16 @@ class Forecast:
         known = f"The frequencies' RMSE over the workspace is about {percent(self.rmse_percent)}"
         share = f"{100 * self.probability:.0f} % probability"
         if self.bound_percent > MOST_PERCENT:
-            known += f"; too little is known for a bound with {share}."
-        else:
-            known += f", below {percent(self.bound_percent)} with {share}."
-        gain, left = self.gain_percent, percent(self.rmse_percent - self.gain_percent)
-        return (
-            f"{known} One more measurement would gain about {percent(gain, 1)}: the RMSE would be "
-            f"{left}."
-        )
+            return f"{known}; too little is known for a bound with {share}."
+        return f"{known}, below {percent(self.bound_percent)} with {share}."
+
+    @property
+    def outlook(self) -> str:
+        """What one more measurement is expected to make of it, in a sentence; "": nobody knows."""
+        if self.misses or not self.measurements:
+            return ""
+        left = percent(self.rmse_percent - self.gain_percent)
+        return f"One more pose should bring the RMSE to about {left}."
 
 
 def percent(value: float, digits: int = 2) -> str:

@@ -20,6 +20,7 @@ ANSWERS = "confirm", "withdraw"  # to a question of held hits
 
 if TYPE_CHECKING:
     from planner.campaign.importing import ImportReport
+    from planner.campaign.known_files import KnownFile
     from planner.campaign.model import Model
 
 
@@ -61,6 +62,7 @@ class PoseImport(Answer):
     hit_errors: tuple[HitErrorEstimate, ...] = ()
     question: Question | None = None
     expected: tuple[ExpectedMode, ...] = ()  # of held hits at the pose that is stated
+    copies: "tuple[KnownFile, ...]" = ()  # of those already imported, other files of the same data
 
     @classmethod
     def of(cls, report: "ImportReport", model: "Model | None" = None) -> "PoseImport":
@@ -72,7 +74,8 @@ class PoseImport(Answer):
             refused=tuple(
                 RefusedFile(hit.file, hit.reason) for hit in (*report.refused, *report.left_out)
             ),
-            already_imported=report.already,
+            already_imported=tuple(one.file for one in report.already),
+            copies=tuple(one for one in report.already if one.copied),
             modes=_labelled_modes(report),
             refit_seconds=report.refit_seconds,
             frequency_sd_percent_before=report.model_before.frequency_sd_percent,
@@ -93,9 +96,11 @@ class PoseImport(Answer):
         """Modes beside what was expected, remarks, and the change of the model, if there is any."""
         if self.known:
             files = counted(len(self.already_imported), "file")
-            return [Text(f"{files} imported before as {self.pose}; nothing changed.")]
+            before = self._copied() or f"{files} imported before as {self.pose}"
+            return [Text(f"{before}; nothing changed.")]
+        told = (*self.remarks, f"{self._copied()}.") if self.copies else self.remarks
         if self.unhit:
-            return [Text(self._without_hits()), *remarks(self.remarks)]
+            return [Text(self._without_hits()), *remarks(told)]
         made = table(
             f"Pose {self.pose}: {self._counts()}, {len(self.already_imported)} known before",
             *("mode", "frequency (Hz)", "expected (Hz)", "damping (%)"),
@@ -104,13 +109,22 @@ class PoseImport(Answer):
         if self.question:
             there = ", ".join(with_sd(mode.frequency_hz, mode.sd_hz) for mode in self.expected)
             said = Text(f"  Expected at {self.pose}: {there} Hz.")
-            return [made, said, *remarks(self.remarks), Text(NOT_USED)]
+            return [made, said, *remarks(told), Text(NOT_USED)]
         both = zip(self.frequency_sd_percent_before, self.frequency_sd_percent, strict=True)
         change = ", ".join(
             f"{significant(before)} → {significant(after)} %" for before, after in both
         )
         said = Text(f"  sd of frequencies: {change} (refit {self.refit_seconds:.2f} s)")
-        return [made, *self._others(), *remarks(self.remarks), said]
+        return [made, *self._others(), *remarks(told), said]
+
+    def _copied(self) -> str:
+        """Which files have the data of others; "": none."""
+        if not self.copies:
+            return ""
+        one, more = self.copies[0], len(self.copies) - 1
+        are = "is a copy" if more == 1 else "are copies"
+        others = f" ({counted(more, 'more file')} {are}, too)" if more else ""
+        return f"{one.file} has the same data as {one.first}, imported as {self.pose}{others}"
 
     def _counts(self) -> str:
         """How many hits are used, held by the question, and refused."""

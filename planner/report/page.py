@@ -21,7 +21,7 @@ from planner.report.answer import Done
 from planner.report.campaign_plots import frf_pictures, left_out_figure, map_pictures
 from planner.report.html import rendered, write_page
 from planner.report.kept_diagnosis import chapter, diagnosis_of
-from planner.report.proposals import target_sentence
+from planner.report.proposals import standing
 from planner.report.springs import COLUMNS, NOT_KNOWN
 from planner.report.status import StatusReport, status
 from planner.report.text import SIMULATED, number, with_sd
@@ -70,7 +70,6 @@ def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
     without = {"diagnosis"} if found is None else set()
     without |= set() if now.springs else {"learned"}
     folder = campaign.directory
-    reached = target_sentence(now.waits_for)
     nothing = "Nothing is measured yet: all that is said is the simulation's."
     return rendered(
         "report.html",
@@ -85,7 +84,7 @@ def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
         findings=[(CLASSES[r.severity], r.sentence) for r in cell.examined.remarks
                   if r.severity in CLASSES],
         **_measured(campaign, state, now),
-        forecast=f"{now.forecast.text} {reached}" if state.used else nothing,
+        forecast=standing(now.forecast, now.waits_for) if state.used else nothing,
         modes=_mode_rows(campaign),
         left_out=left_out_figure(*found_without(campaign.model))
         if now.leave_one_out.values

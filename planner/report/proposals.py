@@ -80,12 +80,9 @@ class ProposalsReport(Answer):
     def text(self) -> Group:
         """Each pose, then what one more measurement is worth."""
         parts = [part for one in self.proposals for part in one.parts(self.joints)]
-        said = [
-            self.forecast.text,
-            target_sentence(self.waits_for),
-            self.repeat.text if self.repeat else "",
-        ]
-        said += [self.places.sentence if self.places else ""]
+        again = self.repeat.text if self.repeat else ""
+        places = self.places.sentence if self.places else ""
+        said = standing(self.forecast, self.waits_for, again), places
         remarks = [Text(remark, style="yellow") for remark in self.remarks]
         return Group(*parts, Text(" ".join(filter(None, said))), *remarks, *self._then())
 
@@ -103,11 +100,18 @@ class ProposalsReport(Answer):
         return [where, command_line("  ", *act)]
 
 
-def target_sentence(waits_for: str) -> str:
-    """Whether the target is reached, and if not what it waits for."""
-    if not waits_for:
-        return "The target is reached: no more poses are needed."
-    return f"The target is not reached yet; what lacks: {waits_for}."
+def standing(forecast: Forecast, waits_for: str, again: str = "") -> str:
+    """Whether the target is reached, how far frequencies are off, and what going on would bring.
+
+    `waits_for` is what lacks until the target is reached; `again` asks to hit a pose again.
+    """
+    if waits_for:
+        lacks = f"The target is not reached yet; what lacks: {waits_for}."
+        return " ".join(filter(None, (forecast.text, lacks, again)))
+    more = again or forecast.outlook
+    more = more and f"If you go on, {more[0].lower()}{more[1:]}"
+    reached = "The target is reached: no more poses are needed."
+    return " ".join(filter(None, (reached, forecast.known, more)))
 
 
 def unanswered(question: Question) -> str:

@@ -19,7 +19,7 @@ from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain
 from planner.report.imports import asked_of
 from planner.report.kept_diagnosis import diagnosis_of, read_diagnosis, two_answers
-from planner.report.proposals import forecast_json, target_sentence, unanswered
+from planner.report.proposals import forecast_json, standing, unanswered
 from planner.report.springs import (
     NOT_KNOWN,
     RefittedSpring,
@@ -219,7 +219,7 @@ class StatusReport(ModelStatus, Answer):
             "sd of frequencies over the workspace: "
             + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)
             + f" (all together: target {self.target_frequency_sd_percent:g} %)",
-            f"{self.forecast.text} {target_sentence(self.waits_for)}",
+            standing(self.forecast, self.waits_for),
             f"log: {counted(self.log.entries, 'entry', 'entries')}",
         ]
         if self.frf_sd_percent:

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
+from planner.robot.link_lines import link_lines
 from planner.robot.robot import Robot
 from planner.robot.shapes import (
     UnusableShape,
@@ -17,6 +18,7 @@ from planner.robot.shapes import (
 )
 
 LIMIT_TOLERANCE = 1e-9  # rad or m
+NAMED = 3  # obstacles in a sentence
 KEPT = 4  # robots whose collision shapes are at hand
 
 
@@ -27,8 +29,9 @@ class Collisions:
     that touch in the middle of all joints' ranges (there, far from all limits, a robot stands free:
     it is coarse shapes that overlap), and those that robot.toml's [collision] ignores; and every
     moving link against every [[obstacle]]. An obstacle that is touched there stays in: it is the
-    obstacle that is wrong, and only the engineer can tell. Raises InputError where [collision]
-    names what does not exist.
+    obstacle that is wrong, and only the engineer can tell. Where the URDF has no shapes, lines from
+    joint to joint stand for the links against obstacles. Raises InputError where [collision] names
+    what does not exist.
     """
 
     def __init__(self, robot: Robot):
@@ -54,18 +57,26 @@ class Collisions:
     @property
     def unchecked(self) -> str | None:
         """A sentence where collision geometry is missing, so that little or nothing is checked."""
-        geometry, left = self._links
-        if geometry.ngeoms:
-            return unchecked_sentence(left) or None
-        if unchecked_sentence(left):
+        left = unchecked_sentence(self.left_out)
+        if not self.none_checked:
+            return left or None
+        bare = f"{self.robot.urdf_path.name} has no collision geometry"
+        look = "Look at each pose before the robot moves there."
+        if not self.nothing_checked:
             return (
-                f"Nothing is checked for collision: {unchecked_sentence(left)} Look at each pose "
-                f"before the robot moves there."
+                f"{left or f'{bare}.'} Instead, thin lines from joint to joint, up to the tool's "
+                f"tip, are checked against {self._named_obstacles()}: links are thicker, and may "
+                f"touch each other. {look}"
             )
-        return (
-            f"Nothing is checked for collision, because {self.robot.urdf_path.name} has no "
-            f"collision geometry: look at each pose before the robot moves there."
-        )
+        if left:
+            return f"Nothing is checked for collision: {left} {look}"
+        return f"Nothing is checked for collision, because {bare}. {look}"
+
+    def _named_obstacles(self) -> str:
+        names = [block.name for block in self.robot.config.obstacle]
+        if len(names) > NAMED:
+            return f"all {len(names)} obstacles of {self.robot.path.name}"
+        return f"the obstacles of {self.robot.path.name} ({', '.join(names)})"
 
     @property
     def overlapping(self) -> tuple[str, ...]:
@@ -86,6 +97,11 @@ class Collisions:
         """Whether no link has a shape that can be checked."""
         return not self._links[0].ngeoms
 
+    @property
+    def nothing_checked(self) -> bool:
+        """Whether nothing keeps a robot from a pose but its limits."""
+        return self.none_checked and not self.robot.config.obstacle
+
     @cached_property
     def _geometry(self) -> tuple[pin.GeometryModel, pin.GeometryData, pin.Data, tuple[str, ...]]:
         geometry, overlapping = _with_pairs(self.robot)
@@ -101,6 +117,8 @@ class Collisions:
             if not self._ignored(geometry, i, j) and not _neighbours(robot.model, a, b):
                 geometry.addCollisionPair(pin.CollisionPair(i, j))
         overlapping = self._drop_overlapping(geometry)
+        if not links:
+            links = [geometry.addGeometryObject(obj) for obj in link_lines(robot)]
         for box in [geometry.addGeometryObject(obj) for obj in _obstacles(robot)]:
             for i in links:
                 moves = geometry.geometryObjects[i].parentJoint > 0

@@ -15,6 +15,7 @@ ARM_AXES, EXTERNAL_AXES = 6, 6  # that KRL and RAPID have words for
 UNUSED = "9E9"  # an external axis that is not there, in RAPID
 CHECKED = "Only the poses themselves were checked for collision, not the ways between them."
 UNCHECKED = "Nothing was checked for collision, neither the poses nor the ways between them:"
+PARTLY = "Not all was checked for collision, and not the ways between poses:"
 SLOWLY = "Run it slowly first, with a hand at the stop."
 SIMULATED = "SIMULATED RECORDINGS: what chose these poses was not measured on a real robot."
 
@@ -51,10 +52,10 @@ def heading(robot: Robot, simulated: bool) -> tuple[str, ...]:
     """What is to be known before the program is run, in lines of plain ASCII."""
     found = (CHECKED,)
     collisions = Collisions(robot)
-    if collisions.none_checked:
+    if collisions.nothing_checked:
         found = (UNCHECKED, f"{plain(robot.urdf_path.name)} has no collision geometry.")
     elif collisions.unchecked is not None:
-        found = (UNCHECKED, plain(collisions.unchecked))
+        found = (PARTLY, plain(collisions.unchecked))
     return (*((SIMULATED,) if simulated else ()), *found, SLOWLY)
 
 
@@ -186,7 +187,7 @@ def _poses(_: str, poses: Sequence[DrivenPose], table: ControllerTable, said: Se
     It has no room for sentences: each note begins with what is to be known first.
     """
     first = "".join(
-        f"{line.partition(':')[0]}; " for line in said if line in (SIMULATED, UNCHECKED)
+        f"{line.partition(':')[0]}; " for line in said if line in (SIMULATED, UNCHECKED, PARTLY)
     )
     axes: list[str] = []
     if poses:

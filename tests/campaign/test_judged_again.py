@@ -63,6 +63,12 @@ def test_the_same_files_without_a_table_are_of_the_pose_they_were_imported_at(ce
     call("next", folder)
     code, out, _ = call("import", folder, made / "data")
     assert (code, f"imported before as {pose.pose}" in out) == (0, True)
+    copied = shutil.copytree(made / "data", made.parent / "copied")
+    code, out, _ = call("import", folder, copied)
+    first, *others = sorted((made / "data").iterdir())
+    told = f"{copied / first.name} has the same data as {first}, imported as {pose.pose} "
+    told += f"({len(others)} more files are copies, too); nothing changed."
+    assert (code, "".join(told.split()) in "".join(out.split())) == (0, True)
     code, _, said = call("import", folder, made / "data", "--pose", "P002")
     assert (code, f"a recording of pose {pose.pose}" in said) == (2, True)
 
@@ -138,7 +144,7 @@ def test_a_file_of_another_pose_does_not_keep_the_others_out(cell, tmp_path):
     shutil.copy(next((made / "data").glob("*z_1.uff")), left)
     code, _, said = call("import", folder, there)
     assert (code, said.count("Refused"), left.name in said) == (3, 1, True)
-    assert f"recording of pose {pose.pose} and cannot belong to {second.pose}" in said
+    assert f"recording of pose {pose.pose}, and cannot belong to {second.pose}" in said
     assert [len(m.accepted) for m in Campaign(folder).state.used] == [9, 8]
 
 

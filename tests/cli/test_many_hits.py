@@ -62,5 +62,5 @@ def test_hits_along_one_axis_or_a_single_hit_are_remarked_upon(tmp_path):
     code, out, err = call("import", cell, folder / "data" / "P001_px_1.uff", "--json")
     assert code == 0, err
     said = " ".join(json.loads(out)["remarks"])
-    assert "not hit along y and z" in said
-    assert "one hit only along x" in said
+    assert "no accepted hit along y and z" in said
+    assert "only one accepted hit along x" in said

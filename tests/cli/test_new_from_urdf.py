@@ -10,7 +10,16 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.robot.robot import Robot
 from tests.support.outside import call, said, told
-from tests.support.published import HAND, LIMITS, PACKAGE, RAIL, published, robot_toml
+from tests.support.published import (
+    BOXES,
+    DENSITY,
+    HAND,
+    LIMITS,
+    PACKAGE,
+    RAIL,
+    published,
+    robot_toml,
+)
 
 GIVEN = "--mass-kg", "420", "--payload-kg", "20"
 
@@ -139,9 +148,23 @@ def test_the_screen_says_what_to_put_right_first(tmp_path):
     assert "Masses are guessed" in next(cell.glob("*.html")).read_text()
 
 
+@pytest.mark.parametrize(
+    ("mass", "words"),
+    [(1.0, ""), (1.2, "the URDF's masses are used"), (100.0, "--mass-kg is used and shared out")],
+)
+def test_it_says_whose_masses_are_used_where_urdf_and_data_sheet_differ(mass, words, tmp_path):
+    urdf = published(tmp_path, inertias=True)
+    stated = sum(DENSITY * float(np.prod(np.subtract(high, low))) for low, high in BOXES)
+    new = told("new", tmp_path / "cell", "--urdf", urdf, "--mass-kg", mass * stated)
+    found = [text for text in new["told"] if "--mass-kg says" in text]
+    assert [words in text for text in found] == [True] * bool(words)
+
+
 REFUSED = {
     "no mass": (lambda p: ["--urdf", str(published(p))], "--mass-kg"),
     "mass 0": (lambda p: ["--urdf", str(published(p)), "--mass-kg", "0"], "above 0"),
+    "tonnes": (lambda p: ["--urdf", str(published(p, inertias=True)), "--mass-kg", "0.2"],
+               "kg together; give"),
     "no file": (lambda p: ["--urdf", str(p / "none.urdf"), *GIVEN], "none.urdf cannot be read"),
     "two robots": (lambda p: ["--urdf", "a.urdf", "--robot", "b.toml"], "give one"),
     "mass of a robot.toml": (lambda p: ["--robot", "b.toml", *GIVEN], "go with --urdf"),

@@ -13,7 +13,7 @@ from planner.dataset.dataset import LAID, Dataset, Recording, Visit
 from planner.dataset.measure import OVER
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
-from planner.dataset.visits import recordings_in
+from planner.dataset.visits import recordings_in, unlisted_folders
 from planner.errors import InputError, RefusedError
 from planner.frf.estimator import estimate
 from planner.recording.joints import JointUnits
@@ -199,6 +199,20 @@ def test_tables_that_differ_on_a_pose_and_folders_without_one_are_told(tmp_path)
     listed(tmp_path / "two", "P1", 30.0)
     with pytest.raises(InputError, match=r"two/recordings\.csv, row 2: pose P1 .*20\.00° away"):
         recordings_in(tmp_path, joints)
+
+
+def test_folders_whose_recordings_no_table_names_are_told_of(tmp_path):
+    joints = JointUnits.of(["J1"])
+    listed(tmp_path / "P1", "P1", 10.0)
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes" / "weather.csv").write_text("sunny\n")
+    found = recordings_in(tmp_path, joints)
+    assert unlisted_folders(tmp_path, found) == ()
+    (tmp_path / "P2").mkdir()
+    write_hit(tmp_path / "P2" / "hit.csv", make_hit(np.random.default_rng(1), "+x"))
+    (said,) = unlisted_folders(tmp_path, found)
+    assert "P2 is left out: no recordings.csv says" in said
+    assert "name the campaign" in said
 
 
 def test_a_stream_is_a_file_of_several_hits_and_its_bad_ones_are_named(tmp_path):

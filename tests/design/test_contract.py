@@ -1,5 +1,8 @@
 """Closed forms against what they claim: refits, determinants, finite differences, brute force."""
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,7 +26,7 @@ from planner.fit.frequency_uncertainty import log_frequency_slope
 from planner.fit.identify import robot_prior
 from planner.fit.posterior import RobotBelief
 from planner.fit.structure import exported
-from planner.measurement.nuisances import Tolerances
+from planner.measurement.nuisances import EXACT_HITS, Tolerances
 from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
@@ -191,6 +194,7 @@ def test_information_is_that_of_the_frf_line_by_line(open_):
     """Against finite differences of the simulated FRF on every line that would be recorded."""
     q = some_q(1, 3)
     lines = np.arange(BAND_HZ[0], BAND_HZ[1], open_.noise.step_hz)
+    open_ = replace(open_, belief=replace(open_.belief, tolerances=EXACT_HITS))
     x, count = open_.belief.x, len(open_.belief.structure.parameters)
     h = open_.simulation.accelerance(q, lines)[0]
     sd = np.hypot(open_.noise.relative * np.abs(h), open_.noise.floor)
@@ -215,6 +219,20 @@ def test_information_is_that_of_the_frf_line_by_line(open_):
         assert np.median(off) < 0.025
 
 
+def test_hits_that_err_and_springs_that_scatter_from_visit_to_visit_tell_less(open_):
+    """No more than one visit's springs tell of them, however small the noise."""
+    q, belief = some_q(1, 3), open_.belief
+    kinds = EXACT_HITS, replace(EXACT_HITS, visit_stiffness=0.004), belief.tolerances
+    told = [
+        replace(open_, belief=replace(belief, tolerances=one)).information(q)[0].sum(axis=0)
+        for one in kinds
+    ]
+    for more, less in itertools.pairwise(told):
+        assert np.linalg.eigvalsh(more - less).min() > -1e-8 * np.abs(more).max()
+    spring = 2
+    assert told[0][spring, spring] > 1 / 0.004**2 > told[1][spring, spring]
+
+
 def test_forecast_speaks_of_its_own_samples(surrogate):
     outputs, poses = over(surrogate, X, 64)
     squares = mean_squares(outputs)
@@ -224,7 +242,7 @@ def test_forecast_speaks_of_its_own_samples(surrogate):
     found = forecast(outputs, best, 1.0, 0.95)
     assert 0 < found.rmse_percent < found.bound_percent
     assert found.gain_percent > 0
-    assert "One more measurement would gain about" in found.text
+    assert "One more pose should bring the RMSE to about" in found.text
     assert forecast(outputs, None, 1e3, 0.95).reached == 1
     assert forecast(outputs, None, 1e-9, 0.95).reached == 0
 

@@ -130,10 +130,30 @@ def test_shapes_that_overlap_in_the_middle_of_all_ranges_are_said_and_not_checke
     assert {"base_link touches link_3", "link_3 touches floor"} <= touching
 
 
-def test_a_robot_without_collision_shapes_has_its_limits_only(arm):
+def without_shapes(arm: Path) -> Path:
     text = re.sub(r"<(visual|collision)>.*?</\1>", "", (arm.parent / "arm.urdf").read_text())
     (arm.parent / "arm.urdf").write_text(text)
+    return arm
+
+
+def test_a_robot_without_collision_shapes_or_obstacles_has_its_limits_only(arm):
+    without_shapes(arm).write_text(arm.read_text().partition("[[obstacle]]")[0])
     found = collisions(arm)
     assert found.free(LOW)
     assert found.contacts(LOW) == ()
     assert not found.free(LOW + np.deg2rad(5))
+    assert "Nothing is checked for collision" in (found.unchecked or "")
+
+
+def test_lines_stand_for_links_without_shapes_against_obstacles(arm):
+    """The floor is thin: a tool below it touches nothing, but what leads there goes through it."""
+    found = collisions(without_shapes(arm))
+    robot = found.robot
+    assert found.free(FREE)
+    assert "the obstacles of robot.toml (floor)" in (found.unchecked or "")
+    poses = np.random.default_rng(0).uniform(robot.lower_rad, robot.upper_rad, (200, 6))
+    under = [q for q in poses if robot.forward(q)[1][2] < -0.02]
+    assert len(under) > 10
+    assert not any(map(found.free, under))
+    _, tip = robot.forward(FREE)
+    assert collisions(arm, box("vice", tip)).contacts(FREE) == ("link_6 touches vice",)

@@ -86,7 +86,7 @@ def test_it_says_what_was_asked_measured_refused_and_how_good_it_is(report):
     assert refused[0].reason in text
     for hit in (h for m in state.recorded for h in m.hits):
         assert hit.sha256 in text
-    for line in campaign.model.forecast.text.split(". "):
+    for line in campaign.model.forecast.known.split(". "):
         assert " ".join(line.split()) in text
     assert "predicted without it" in text
     assert len(re.findall(r"imported \d+ of \d+ hits", text)) == 2
