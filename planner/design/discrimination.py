@@ -16,8 +16,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from planner.diagnosis.diagnose import Diagnosis
-from planner.diagnosis.search import key_of
-from planner.diagnosis.verdict import Place, probabilities
+from planner.diagnosis.verdict import Place
+from planner.fit.explanations import Key, key_of, probabilities
 from planner.fit.fitted import StructureFit
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
@@ -52,15 +52,16 @@ def tied(found: Diagnosis) -> tuple[Tied, ...]:
     Those that differ only by what is too small to matter are one.
     """
     idle = {e.place for e in found.verdict.effects if not e.counts}
-    weight, groups = probabilities(found.explored.settled), {}
+    weight = probabilities(found.explored.settled)
+    groups: dict[Key, list[StructureFit]] = {}
     for fit in sorted(found.explored.settled, key=lambda f: -weight[key_of(f)]):
-        groups.setdefault(key_of(fit) - idle, []).append(fit)
+        key = tuple(place for place in key_of(fit) if place not in idle)
+        groups.setdefault(key, []).append(fit)
     shares = {key: sum(weight[key_of(f)] for f in fits) for key, fits in groups.items()}
     kept = sorted((k for k in groups if shares[k] > LIKELY), key=lambda k: -shares[k])[:MOST_TIED]
     whole = sum(shares[key] for key in kept)
     return tuple(
-        Tied(tuple(sorted(key)) or (("none", None),), shares[key] / whole, groups[key][0])
-        for key in kept
+        Tied(key or (("none", None),), shares[key] / whole, groups[key][0]) for key in kept
     )
 
 

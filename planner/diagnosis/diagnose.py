@@ -12,19 +12,19 @@ from planner.diagnosis.exponential_window import screen_window
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.found_laws import straightened, with_laws
 from planner.diagnosis.levels import LevelLaw, Levels, level_laws
-from planner.diagnosis.search import FITTED, LEAST, Explored, Explorer
 from planner.diagnosis.tone import screen_tone
-from planner.diagnosis.verdict import NamedEffect, Verdict, judged, likeliest
+from planner.diagnosis.verdict import LEAST, NamedEffect, Verdict, judged
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import Repertoire, diagnosed
 from planner.errors import InputError
+from planner.fit.explanations import Explored, likeliest
 from planner.fit.fitted import StructureFit, settled
 from planner.fit.held_out import set_aside
 from planner.fit.identify import TOO_SOFT
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
-from planner.fit.search import Search
+from planner.fit.search import SEARCHED, Search
 from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
 from planner.measurement.agreement import NO_SIMILARITY, Similarity, similarity_of
@@ -180,7 +180,7 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
     heard = [(f.effect, f.at) for f in screened]
     matters = robot.config.diagnose.matters
     recorded, search, explored, levels = _explored(recorded, search, simulation, tell)
-    fits, aside = (explored.plain, likeliest(explored)), set_aside(recorded.q)
+    fits, aside = (explored.plain, likeliest(explored.settled)), set_aside(recorded.q)
     tell("judging", 0.9)
     held_out = _held_out(search, fits, aside) if aside else None
     worse = held_out is not None and held_out.worse(matters)
@@ -209,16 +209,16 @@ def _explored(
 
     def explored() -> Explored:
         steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
-        return Explorer(steps).explored()
+        return steps.explored()
 
     found, levels, straight = explored(), None, recorded
     for _ in range(ROUNDS if recorded.visits else 0):
         tell("comparing hits of different force", 0.85)
-        told = level_laws(recorded, likeliest(found))
+        told = level_laws(recorded, likeliest(found.settled))
         levels = told if levels is None or told.laws else levels
         if not told.laws or recorded.most_heard is not recorded:
             break
-        there = RobotPosterior.of(likeliest(found)).simulation
+        there = RobotPosterior.of(likeliest(found.settled)).simulation
         straight = straightened(recorded, with_laws(there, told.laws, recorded))
         search = searching(straight.ended_frfs, straight.q, simulation, _order(straight))
         found = explored()
@@ -242,7 +242,7 @@ def searching(
 ) -> Search:
     """A search of the whole library, in which nothing is told that does not matter."""
     robot = simulation.robot
-    prior = RobotPrior(Repertoire.of(simulation, PRIORS, diagnosed(simulation)))
+    prior = RobotPrior(Repertoire.of(simulation, PRIORS, diagnosed(simulation)), bearings=True)
     return Search(
         prior,
         tuple(frfs),
@@ -251,6 +251,7 @@ def searching(
         Tolerances.of(robot.config, robot.joints.slides),
         order=order,
         floor=robot.config.diagnose.matters,
+        thorough=True,
     )
 
 
@@ -294,7 +295,7 @@ def _held_out(
     search: Search, fits: tuple[StructureFit, StructureFit], aside: tuple[int, ...]
 ) -> ThreefoldSimilarity:
     """Of fits that never saw the poses set aside; the structure was chosen with all."""
-    data = search.data(FITTED)
+    data = search.data(SEARCHED)
     kept = np.array([i for i in range(len(data.q)) if i not in aside])
     again = []
     for fit in fits:

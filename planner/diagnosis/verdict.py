@@ -5,19 +5,30 @@ it is dropped and the rest refitted. What refitting takes the place of (a stated
 chain) counts by evidence beyond its stated tolerance.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import expit, logsumexp
+from scipy.special import expit
 from scipy.stats import norm
 
 from planner.diagnosis.levels import Levels
-from planner.diagnosis.search import LEAST, RARE, Explored, added, built, key_of
 from planner.effects.effect import Operator
+from planner.fit.explanations import (
+    RARE,
+    Explored,
+    Key,
+    added,
+    built,
+    key_of,
+    likeliest,
+    probabilities,
+)
 from planner.fit.fitted import StructureFit, evidence_of, settled, size_of, without
 from planner.fit.posterior import RobotPosterior
 
+LEAST = RARE + float(np.log(9.0))  # nats from which an effect is there: 9 times as likely
 SURE = 0.9  # probability from which an effect's size counts as beyond what matters
 EXPLAINS = 2.0  # times what matters: a discrepancy up to which nothing else is wanted
 # Effects without a name of their own imitate what a named one's shape lacks: they count from so
@@ -85,7 +96,7 @@ def judged(
     by a joint's law: beside one only what changes FRFs by more than levels do is told. What
     predicts poses set aside `worse` than the robot as stated explains nothing.
     """
-    weights, best = probabilities(explored.settled), likeliest(explored)
+    weights, best = probabilities(explored.settled), likeliest(explored.settled)
     effects = _weighed(explored, best, weights, matters, q)
     laws = levels.laws if levels else ()
     if levels and laws:
@@ -107,23 +118,10 @@ def judged(
     return Verdict(verdict, tuple(effects), candidates, _sets(named, weights), best)
 
 
-def likeliest(explored: Explored) -> StructureFit:
-    """The likeliest set of effects, as fitted."""
-    weights = probabilities(explored.settled)
-    return max(explored.settled, key=lambda f: weights[key_of(f)])
-
-
-def probabilities(fits: Sequence[StructureFit]) -> dict[frozenset[Place], float]:
-    """Probability of each set of effects, among all that were settled."""
-    logs = {key_of(f): f.evidence - RARE * len(added(f)) for f in fits}
-    total = float(np.asarray(logsumexp(list(logs.values()))))
-    return {key: float(np.exp(log - total)) for key, log in logs.items()}
-
-
 def _weighed(
     explored: Explored,
     best: StructureFit,
-    weights: dict[frozenset[Place], float],
+    weights: dict[Key, float],
     matters: float,
     q: np.ndarray,
 ) -> list[NamedEffect]:
@@ -163,8 +161,8 @@ def _beyond(best: StructureFit) -> list[Operator]:
 
 def _without(explored: Explored, best: StructureFit, effect: Operator) -> StructureFit | None:
     """The best that there is without an effect: refitted from here, or as the search came by."""
-    rest = key_of(best) - {effect.name}
-    met = [f for f in explored.settled if key_of(f) == rest and len(added(f)) < len(added(best))]
+    rest = Counter(key_of(best)) - Counter([effect.name])
+    met = [f for f in explored.settled if Counter(key_of(f)) == rest and effect in added(best)]
     fewer = without(best, [effect])
     if fewer is not None:
         met.append(settled(fewer.misfit, fewer.at, rounds=2))
@@ -183,7 +181,7 @@ def _physics(posterior: RobotPosterior, q: np.ndarray, lines: np.ndarray) -> np.
 
 
 def _candidates(
-    weights: dict[frozenset[Place], float],
+    weights: dict[Key, float],
     effects: Sequence[NamedEffect],
     unknown: bool,
     heard: tuple[Place, ...],
@@ -213,18 +211,16 @@ def _with_laws(candidates: Sequence[Candidate], levels: Levels) -> tuple[Candida
     return *sorted(found, key=lambda c: -c.probability), Candidate((UNKNOWN,), 0.0)
 
 
-def _sets(
-    named: Sequence[NamedEffect], weights: dict[frozenset[Place], float]
-) -> tuple[tuple[Place, ...], ...]:
+def _sets(named: Sequence[NamedEffect], weights: dict[Key, float]) -> tuple[tuple[Place, ...], ...]:
     """For each finding what may stand in its place, where that is not much less likely."""
     out = []
     best = max(weights, key=lambda key: weights[key])
     for effect in named:
-        rest = best - {effect.place}
+        rest = Counter(best) - Counter([effect.operator.name])
         others = [
-            next(iter(key - rest))
+            next(iter(Counter(key) - rest))
             for key, weight in weights.items()
-            if weight > 0.05 and key != best and rest <= key and len(key) == len(best)
+            if weight > 0.05 and key != best and rest <= Counter(key) and len(key) == len(best)
         ]
         if others and effect.place in best:
             out.append((effect.place, *others))

@@ -1,17 +1,20 @@
-"""Which effects a robot has: by evidence, added, removed and exchanged until nothing gains.
+"""Which effects a robot has: what is likeliest is looked at until nothing beside it is likelier.
 
-Starts: as stated, with base and all bearings, and, where much is left or numbers departed far, with
-each effect from what is stated, lest what is missing be hidden by what it bent. From each all
-effects at all places compete: operators are ranked by their first-order columns, springs are always
-tried nonlinearly, a few steps each; the best are settled.
+Beside a set of effects are those with one more, one less, one elsewhere, and one exchanged for any
+other. Operators are ranked by their first-order columns, springs are always tried nonlinearly, a
+few steps each; where much is left all are fitted from what is stated too, by logarithms first, lest
+what is missing be hidden by what it bent. The best are settled, and what is settled is kept.
 """
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.effects.effect import Operator
+from planner.fit.explanations import RARE, Explored, Key, added, key, key_of, likeliest, worth
 from planner.fit.fitted import (
+    SIZES,
     FitRecord,
     StructureFit,
     converged,
@@ -28,25 +31,31 @@ from planner.fit.trials import FAR, LOG_STEPS, Trials, explained
 from planner.inference.parallel import side_by_side
 from planner.measurement.measured_frfs import completed
 
-SEARCHED, SCREENED, LAST = 28, 64, 44  # lines a pose: while searching, for operators, at the end
-LEAST = 12.0  # nats that one more effect must gain
-SAME = 3.0  # nats that one less may cost
+SEARCHED, SCREENED, LAST = 24, 48, 44  # lines a pose: while searching, for operators, at the end
+SETTLED = 4  # of those that compete
+MOST, FROM_AFAR = 6, 2  # effects; and up to so many, more are tried from what is stated too
 COMPLETIONS = 2  # rounds
-MOST_OPERATORS = 3  # beside springs: more would imitate what the fit lacks
-IDLE = 2.0  # nats of what goes at once
 STIFF_AT_FIRST = 3.0  # prior sds of springs that may be there
 AGAIN = 0.03  # least size with which what was found before goes on
+
+Pool = dict[Key, StructureFit]
 
 
 @dataclass(frozen=True, eq=False)
 class Search(Trials):
-    """Of the structure that explains FRFs best."""
+    """Of the effects that explain FRFs best."""
 
     extend: bool = True  # where what is stated does not explain them
     widen: bool = False  # whether `StructureFit.wider` is asked for
+    thorough: bool = False  # whether what explains them is compared with all that is beside it
+
+    def explored(self) -> Explored:
+        """From the robot as it is known to be built on."""
+        plain = self._plain()
+        return Explored(plain, self._explore([plain]))
 
     def found(self, warm: FitRecord | None = None) -> StructureFit:
-        """The structure that explains them best; from what was found before, if that is given.
+        """The effects that explain them best; from what was found before, if that is given.
 
         Decays that the ends of records cut off are filled in as it has them, and it goes on.
         """
@@ -56,9 +65,31 @@ class Search(Trials):
             best = self._completed(known)._gone_on(known)
         return best
 
+    def _found(self, warm: FitRecord | None) -> StructureFit:
+        if not self.extend:
+            return self._ended(self._plain())
+        known = [] if warm is None else [self._recovered(warm)]
+        if not known or not explained(known[0]):
+            known.append(self._plain())
+        best = likeliest(self._explore(known, warm is not None))
+        # All springs may give at once, which none of them shows alone; but what did not explain
+        # fewer poses is only mended.
+        if not explained(best) and (warm is None or warm.size <= SIZES[0]):
+            best = likeliest([best, *self._explore([self._pruned(self.freed())], warm is not None)])
+        return self._ended(best)
+
+    def _pruned(self, found: StructureFit) -> StructureFit:
+        """Without what by the first order is not worth how rare it is."""
+        costs = removal_costs(found)
+        fewer = without(found, [e for e in added(found) if costs[e] < RARE])
+        if fewer is None:
+            return found
+        fewer = settled(fewer.misfit, fewer.at)
+        return self._pruned(fewer) if worth(fewer) > worth(found) else found
+
     def _gone_on(self, known: FitRecord) -> StructureFit:
         best = self._recovered(known)
-        return self._ended(self._evolved(best) if self.extend else best)
+        return self._ended(likeliest(self._explore([best], True)) if self.extend else best)
 
     def _completed(self, known: FitRecord) -> "Search":
         """With the decays that records cut off, as a structure has them."""
@@ -69,43 +100,20 @@ class Search(Trials):
         out = [completed(frf, simulation, row) for frf, row in zip(self.frfs, self.q, strict=True)]
         return replace(self, frfs=tuple(out))
 
-    def _found(self, warm: FitRecord | None) -> StructureFit:
-        known = None if warm is None or not self.extend else self._recovered(warm)
-        if known is not None and explained(known):
-            return self._ended(self._evolved(known))
-        data = self.data(SEARCHED)
-        self.tell("as stated")
-        plain = converged(self.begun(data, self.prior.stated(data.sensors)))
-        if not self.extend:
-            return self._ended(plain)
-        first, *others = self._beginnings(plain, known)
-        best = self._evolved(first)
-        for other in others:
-            if other.evidence > best.evidence or not explained(best):
-                best = max(best, self._evolved(other), key=evidence_of)
-        while ends := self.from_afar(best):
-            if ends[0].evidence < best.evidence + LEAST:
-                break
-            best = self._evolved(ends[0])
-        return self._ended(best)
-
     def _ended(self, best: StructureFit) -> StructureFit:
         found = self._last(best)
         return replace(found, wider=self._widened(found)) if self.widen else found
+
+    def _plain(self) -> StructureFit:
+        """With nothing that robots need not have."""
+        self.tell("as stated")
+        data = self.data(SEARCHED)
+        return converged(self.begun(data, self.prior.as_built(data.sensors)))
 
     def _recovered(self, known: FitRecord) -> StructureFit:
         """What was found of other data, of these."""
         misfit, x = self.again(known, self.data(SEARCHED), max(known.size, AGAIN))
         return converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
-
-    def _beginnings(self, plain: StructureFit, known: StructureFit | None) -> list[StructureFit]:
-        """Where effects are added and removed from: what is most likely to lack some first."""
-        if explained(plain):  # nothing need be missing
-            return [plain]
-        likeliest = max(plain, known or plain, *self.from_afar(plain), key=evidence_of)
-        if known is not None or explained(likeliest):
-            return [likeliest]
-        return [self.freed(), likeliest]
 
     def freed(self) -> StructureFit:
         """With every spring that there may be, and no operator."""
@@ -122,72 +130,85 @@ class Search(Trials):
         vars(found)["shares"] = known.shares
         return found
 
-    def _evolved(self, best: StructureFit) -> StructureFit:
-        """Effects added, removed and exchanged until nothing gains."""
-        held = None  # for which no other place is likelier
-        for _ in range(12):
-            added = self._added(best)
-            newest = added.structure.effects[-1] if added is not best else None
-            fewer = self._removed(added, newest)
-            changed = fewer is not best
-            best = converged(fewer) if changed else best
-            swapped = best if best is held else self._exchanged(best)
-            if swapped is best and not changed:
-                break
-            held = best if swapped is best else None
-            best = swapped
-        return best
+    def _explore(
+        self, begun: Sequence[StructureFit], warm: bool = False
+    ) -> tuple[StructureFit, ...]:
+        """All that was settled until nothing beside the likeliest is likelier.
 
-    def _added(self, best: StructureFit) -> StructureFit:
-        """With the one effect that gains most, if that is enough."""
-        if crowded(best):
-            return best
+        What was found before (`warm`), or explains the FRFs, has less beside it that is looked at,
+        unless all is wanted.
+        """
+        pool: Pool = {}
+        extended, seen = set[Key](), set[Key]()
+        _keep(pool, begun)
+        while key_of(best := likeliest(pool.values())) not in seen:
+            seen.add(key_of(best))
+            near = not self.thorough and (warm or explained(best))
+            for more in self._beside(best, near, pool, extended):
+                _keep(pool, more)
+                likelier = likeliest(pool.values())
+                if key_of(likelier) != key_of(best):
+                    self.tell(" + ".join(e.label for e in added(likelier)) or "as stated")
+                    _keep(pool, [converged(likelier)])
+                    break
+        return tuple(pool.values())
+
+    def _beside(
+        self, best: StructureFit, near: bool, pool: Pool, extended: set[Key]
+    ) -> Iterator[list[StructureFit]]:
+        """Sets beside the likeliest that were not looked at, as they are asked for.
+
+        One effect less, one more, each elsewhere; and of each set with one less those with one
+        more, which are exchanges: not where only what is `near` is wanted.
+        """
+        effects, costs = added(best), removal_costs(best)
+        for effect in sorted(effects, key=lambda e: costs[e]):
+            if _less(best, effect) not in pool and not (near and costs[effect] > FAR):
+                yield [self._fewer(best, effect, near)]
+        if key_of(best) not in extended:
+            extended.add(key_of(best))
+            yield self._further(best, afar=len(effects) < FROM_AFAR)
+        for effect in effects:
+            yield self.displaced(best, effect)
+        for effect in effects if len(effects) > 1 and not near else ():
+            fewer = pool.get(_less(best, effect)) or self._fewer(best, effect, near)
+            if key_of(fewer) not in extended:
+                extended.add(key_of(fewer))
+                yield [fewer, *self._further(fewer)]
+        if len(effects) >= FROM_AFAR and not near and not explained(best):
+            yield self._from_afar(best)
+
+    def _fewer(self, best: StructureFit, effect: Operator, near: bool) -> StructureFit:
+        """Without an effect: from where it is, and, not only `near`, from what is stated."""
+        bent = without(best, [effect])
+        if bent is not None:
+            bent = settled(bent.misfit, bent.at)
+            if near:
+                return bent
+        structure = best.structure.without(effect)
+        x, own = structure.mean.copy(), slice(structure.inertial.stop, structure.chain.start)
+        x[own] = structure.carried(best.structure, best.at.x)[own]  # the other effects' numbers
+        if not replace(best.misfit, structure=structure).possible(x):
+            x = structure.mean
+        afar = converged(self.begun(best.misfit.data, structure, x))
+        return afar if bent is None else max(bent, afar, key=evidence_of)
+
+    def _further(self, base: StructureFit, afar: bool = False) -> list[StructureFit]:
+        """With one effect more, settled, likeliest first."""
+        if len(added(base)) >= MOST:
+            return []
         # Of what explains the FRFs first order and few steps tell what more would gain.
-        least, behind = (LEAST, 0.0) if explained(best) else (0.0, FAR)
-        ends = self.compete(best, self.starts(best, SCREENED, least), behind=behind)
-        if not ends or ends[0].evidence < best.evidence + LEAST:
-            return best
-        self.tell(f"+ {ends[0].structure.effects[-1].label}")
-        return converged(ends[0])
+        near = explained(base) and not self.thorough
+        starts = self.starts(base, SCREENED, RARE if near else 0.0)
+        return self.compete(base, starts, count=SETTLED, afar=afar, behind=0.0 if near else FAR)
 
-    def from_afar(self, base: StructureFit) -> list[StructureFit]:
-        """Each effect from what is stated, where `base` leaves some; likeliest first."""
-        if explained(base) or crowded(base):
+    def _from_afar(self, base: StructureFit) -> list[StructureFit]:
+        """The same, all from what is stated."""
+        if len(added(base)) >= MOST:
             return []
         nearest = self.nearest(base, self.starts(base, SCREENED))
         ends = side_by_side(lambda at: converged(self.begun_with(base, *at)).tried, nearest)
-        found = (self._from(p, base.misfit.data) for p in ends)
-        return sorted(found, key=evidence_of, reverse=True)
-
-    def _removed(self, best: StructureFit, newest: Operator | None) -> StructureFit:
-        """Without what the others make superfluous, what seems to matter least first."""
-        while True:
-            costs = removal_costs(best)
-            mine = (e for e in costs if e is not newest and not e.stated)
-            least = sorted(mine, key=lambda e: costs[e])
-            idle = [e for e in least if costs[e] < IDLE]
-            groups = ([idle] if len(idle) > 1 else []) + [[e] for e in least if costs[e] < FAR]
-            for group in groups:
-                fewer = without(best, group)
-                if fewer is None or fewer.evidence < best.evidence - FAR:
-                    continue
-                if fewer.evidence < best.evidence:
-                    fewer = settled(fewer.misfit, fewer.at)
-                if fewer.evidence > best.evidence - SAME:
-                    self.tell("− " + ", ".join(e.label for e in group))
-                    best = fewer
-                    break
-            else:
-                return best
-
-    def _exchanged(self, best: StructureFit) -> StructureFit:
-        """An operator at another place, where that is likelier."""
-        for effect in best.structure.effects:
-            ends = self.displaced(best, effect)
-            if ends and ends[0].evidence > best.evidence + SAME:
-                self.tell(f"{effect.label} → {ends[0].structure.effects[-1].label}")
-                return ends[0]
-        return best
+        return [self._from(tried, base.misfit.data) for tried in ends]
 
     def displaced(self, best: StructureFit, effect: Operator) -> list[StructureFit]:
         """With an operator at other places than where it is, likeliest first."""
@@ -232,6 +253,12 @@ class Search(Trials):
         return StructureFit(misfit, at, misfit.evidence(at))
 
 
-def crowded(found: StructureFit) -> bool:
-    """Whether it has so many operators that more would imitate what explains the FRFs."""
-    return sum(not e.springs and not e.stated for e in found.structure.effects) >= MOST_OPERATORS
+def _less(found: StructureFit, effect: Operator) -> Key:
+    return key(e for e in added(found) if e is not effect)
+
+
+def _keep(pool: Pool, more: Iterable[StructureFit]) -> None:
+    for one in more:
+        known = pool.get(key_of(one))
+        if known is None or one.evidence > known.evidence:
+            pool[key_of(one)] = one

@@ -12,8 +12,8 @@ KEPT = 6  # operators by first order beside the best of each kind
 PULLED = 1.5  # prior sds, from which another prior may pay
 
 
-def placed(base: StructureFit, start: Start, unmoved: bool = True) -> list[np.ndarray]:
-    """Where fits with one more effect begin: all else as it is, if `unmoved`, and moved with it."""
+def placed(base: StructureFit, start: Start) -> list[np.ndarray]:
+    """Where fits with one more effect begin: all else as it is, and moved with it."""
     structure = base.structure.with_effect(start.effect)
     x = structure.carried(base.structure, base.at.x)
     effect = structure.effects[-1]
@@ -22,8 +22,8 @@ def placed(base: StructureFit, start: Start, unmoved: bool = True) -> list[np.nd
         if start.moved is not None:  # as the first order has it
             moved = structure.carried(base.structure, base.at.x + start.moved)
             moved = np.clip(moved, structure.least, structure.most)
-        begun = [(x if unmoved else moved, p) for p in (start.psi, *effect.beside(start.psi))]
-        if unmoved and moved is not x:
+        begun = [(x, p) for p in (start.psi, *effect.beside(start.psi))]
+        if moved is not x:
             begun.append((moved, start.psi))
         out = []
         for x, psi in begun:

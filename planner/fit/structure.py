@@ -29,9 +29,18 @@ LONGEST = 0.5, 1.0, 1.5  # of a step: in logarithms of springs, in sds of bodies
 
 @dataclass(frozen=True, eq=False)
 class RobotPrior:
-    """What is known of a robot before: of all springs that it may have, and of its bodies."""
+    """What is known of a robot before: of all springs that it may have, and of its bodies.
+
+    `bearings`: whether each is taken to give slightly, and loss factors to be there.
+    """
 
     repertoire: Repertoire
+    bearings: bool = False
+
+    @cached_property
+    def built(self) -> tuple[Operator, ...]:
+        """Effects that every robot has."""
+        return self.repertoire.as_built() if self.bearings else self.repertoire.there
 
     @cached_property
     def wide(self) -> Parametrisation:
@@ -56,6 +65,10 @@ class RobotPrior:
     def stated(self, sensors: int = 1) -> "RobotStructure":
         """The robot as robot.toml states it."""
         return RobotStructure(self, self.repertoire.there, sensors)
+
+    def as_built(self, sensors: int = 1) -> "RobotStructure":
+        """With what every robot has, which robot.toml need not state."""
+        return RobotStructure(self, self.built, sensors)
 
     def bodies(self, springs: frozenset[int]) -> tuple[tuple[int, ...], BodyNumbers]:
         """Bodies that move by some of the springs: numbers among all, and theirs."""

@@ -110,7 +110,6 @@ class Trials:
         starts: Sequence[Start],
         *,
         count: int = SETTLED,
-        unmoved: bool = True,
         afar: bool = False,
         behind: float = FAR,
     ) -> list[StructureFit]:
@@ -120,7 +119,7 @@ class Trials:
         None is followed that by then is so many nats `behind` the base.
         """
         rough, data = self._on(base, self.data(ROUGH)), base.misfit.data
-        pool = side_by_side(lambda s: self._few(rough, s, unmoved), starts)
+        pool = side_by_side(lambda s: self._few(rough, s), starts)
         if afar and not explained(base):
             near = self.nearest(base, starts)
             pool += side_by_side(lambda at: self.begun_with(rough, *at).tried, near)
@@ -151,12 +150,12 @@ class Trials:
         at = misfit(found.at.x, found.at.own)
         return StructureFit(misfit, at, misfit.evidence(at))
 
-    def _few(self, base: StructureFit, start: Start, unmoved: bool) -> Tried | None:
+    def _few(self, base: StructureFit, start: Start) -> Tried | None:
         structure = base.structure.with_effect(start.effect)
         misfit = replace(base.misfit, structure=structure)
         # Where the first order leads to no robot that can be, it begins without the effect.
         none = structure.carried(base.structure, base.at.x)
-        begun = [x for x in placed(base, start, unmoved) if misfit.possible(x)]
+        begun = [x for x in placed(base, start) if misfit.possible(x)]
         ends = []
         for x in begun or [x for x in (none,) if misfit.possible(x)]:
             at = minimised(misfit, x, FEW, HOPELESS, base.at.own)

@@ -9,11 +9,10 @@ import pytest
 
 from planner.design.discrimination import WORTH, Tied, extra_sensor, next_hit, separation
 from planner.diagnosis.diagnose import searching
-from planner.diagnosis.search import FITTED
 from planner.dynamics.simulation import Simulation
 from planner.fit.fitted import converged, settled
 from planner.fit.misfit import FrfMisfit
-from planner.fit.search import Search
+from planner.fit.search import SEARCHED, Search
 from planner.fit.structure import RobotStructure
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot
@@ -44,8 +43,8 @@ class Cell:
 
     def candidates(self) -> tuple[Tied, ...]:
         """Both explanations, settled."""
-        data, prior = self.search.data(FITTED), self.search.prior
-        found, built = [], prior.repertoire.as_built()
+        data, prior = self.search.data(SEARCHED), self.search.prior
+        found, built = [], prior.built
         every = {effect.label: effect for effect in prior.repertoire.effects}
         for label, place in PLACES.items():
             structure = RobotStructure(prior, (*built, every[label]), data.sensors)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from planner import Dataset, Robot, diagnose
-from planner.diagnosis.search import ROUNDS
+from planner.fit.search import MOST
 from planner.truth.deviation import Deviation
 from planner.truth.handling import EVERYDAY, LABORATORY
 from planner.truth.load import load_truth
@@ -103,10 +103,10 @@ def test_what_is_concealed_is_named_and_sized(tmp_path, name):
     assert_named_and_sized(diagnosed(small_case(tmp_path, CONCEALED[name])), name)
 
 
-@pytest.mark.parametrize("rounds", [1, pytest.param(ROUNDS, marks=pytest.mark.slow)])
-def test_what_no_effect_describes_is_unexplained(tmp_path, monkeypatch, rounds):
+@pytest.mark.parametrize("most", [1, pytest.param(MOST, marks=pytest.mark.slow)])
+def test_what_no_effect_describes_is_unexplained(tmp_path, monkeypatch, most):
     """Nor does one more effect explain it, after those of the first round."""
-    monkeypatch.setattr("planner.diagnosis.search.ROUNDS", rounds)
+    monkeypatch.setattr("planner.fit.search.MOST", most)
     answer = diagnosed(small_case(tmp_path, CONCEALED["outsider"]))
     assert answer["verdict"] == "unexplained"
     assert answer["candidates"][0]["effect"] == "unknown"

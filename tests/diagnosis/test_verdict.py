@@ -6,9 +6,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from planner.diagnosis.search import RARE
-from planner.diagnosis.verdict import NamedEffect, Verdict, probabilities
+from planner.diagnosis.verdict import NamedEffect, Verdict
 from planner.effects.resonator import LinkResonator
+from planner.fit.explanations import RARE, probabilities
 from planner.fit.fitted import StructureFit
 
 
@@ -30,7 +30,7 @@ def test_two_hoses_on_one_link_are_two_findings():
 
 def test_a_second_hose_is_as_rare_on_the_same_link_as_on_another():
     def fit(evidence: float, *places: str) -> Any:
-        prior = SimpleNamespace(repertoire=SimpleNamespace(as_built=tuple))
+        prior = SimpleNamespace(built=())
         effects = tuple(LinkResonator(at, ()) for at in places)
         return SimpleNamespace(
             structure=SimpleNamespace(effects=effects, prior=prior), evidence=evidence
