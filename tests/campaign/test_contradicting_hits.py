@@ -101,4 +101,4 @@ def test_where_the_simulation_misses_no_limit_is_told():
     assert "4.2 times their noise" in doubted.text
     assert doubted.rmse_percent == pytest.approx(4.2 * 0.4)
     assert doubted.reached == 0
-    assert "RMSE would be 0.34 %" in replace(known, gain_percent=0.06).text
+    assert "bring the RMSE to about 0.34 %" in replace(known, gain_percent=0.06).text
