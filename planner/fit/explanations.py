@@ -4,10 +4,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
 
 from planner.effects.effect import Operator
 from planner.fit.fitted import StructureFit
+from planner.inference.log_space import shares
 
 RARE = 5.0  # nats: one effect at one place, of some 70, is so much rarer than none
 
@@ -48,8 +48,8 @@ def built(found: StructureFit) -> tuple[Operator, ...]:
 def probabilities(fits: Iterable[StructureFit]) -> dict[Key, float]:
     """Probability of each set of effects, among all that were settled."""
     logs = {key_of(f): worth(f) for f in fits}
-    total = float(np.asarray(logsumexp(list(logs.values()))))
-    return {key: float(np.exp(log - total)) for key, log in logs.items()}
+    found = shares(np.array(list(logs.values())), 0)
+    return dict(zip(logs, map(float, found), strict=True))
 
 
 def likeliest(fits: Iterable[StructureFit]) -> StructureFit:
