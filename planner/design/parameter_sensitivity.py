@@ -179,10 +179,16 @@ class OpenParameters:
 
 
 def _told(told: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """(p, p) of columns (p, …) in sds of the noise, others (l, …) integrated out, N(0, 1) each."""
+    """(p, p) of columns (p, …) in sds of the noise, others (l, …) integrated out, N(0, 1) each.
+
+    a (I + bᵀ b)⁻¹ aᵀ by its root, which stays positive where nothing damps a resonance.
+    """
     a, b = real_rows(told), real_rows(beside)
-    across = b @ a.T
-    return a @ a.T - across.T @ np.linalg.solve(np.eye(len(b)) + b @ b.T, across)
+    size, turned = np.linalg.eigh(b @ b.T)
+    size = np.maximum(size, TINY)
+    b = turned.T @ b
+    rest = a - (a @ b.T) * (-np.expm1(-0.5 * np.log1p(size)) / size) @ b
+    return rest @ rest.T
 
 
 TINY = 1e-12  # share of the variance that is always left
