@@ -26,7 +26,7 @@ from planner.fit.fitted import (
 )
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
-from planner.fit.structure import effects_free, exported
+from planner.fit.structure import RobotStructure, effects_free, exported
 from planner.fit.trials import FAR, LOG_STEPS, Trials, explained
 from planner.inference.parallel import side_by_side
 from planner.measurement.measured_frfs import completed
@@ -236,21 +236,27 @@ class Search(Trials):
         return StructureFit(best.misfit, at, best.misfit.evidence(at))
 
     def _widened(self, found: StructureFit) -> StructureFit:
-        """With every spring that there may be.
+        """With every spring that there may be, and with which such a robot can be.
 
         What poses not measured may show is open as it is here: few poses tell no structure.
         """
-        structure = found.structure
-        for effect in effects_free(structure):
-            structure = structure.with_effect(effect) if effect.springs else structure
-        x = structure.carried(found.structure, found.at.x)
-        known = {p.name for p in found.structure.parameters}
-        new = [i for i, p in enumerate(structure.parameters[: structure.stiffnesses])
-               if p.name not in known]  # fmt: skip
-        x[new] += STIFF_AT_FIRST * structure.sd[new]
-        misfit = replace(found.misfit, structure=structure)
+        misfit, x = found.misfit, found.at.x
+        for effect in [e for e in effects_free(found.structure) if e.springs]:
+            wider = replace(misfit, structure=misfit.structure.with_effect(effect))
+            begun = _stiff_at_first(wider.structure, misfit.structure, x)
+            if wider.possible(begun):
+                misfit, x = wider, begun
         at = minimised(misfit, x, LOG_STEPS, 1.0, own=found.at.own)
         return StructureFit(misfit, at, misfit.evidence(at))
+
+
+def _stiff_at_first(wider: RobotStructure, structure: RobotStructure, x: np.ndarray) -> np.ndarray:
+    """Numbers x of a structure in a wider one, whose new springs hardly give."""
+    out, known = wider.carried(structure, x), {p.name for p in structure.parameters}
+    stiffnesses = enumerate(wider.parameters[: wider.stiffnesses])
+    new = [i for i, p in stiffnesses if p.name not in known]
+    out[new] += STIFF_AT_FIRST * wider.sd[new]
+    return out
 
 
 def _less(found: StructureFit, effect: Operator) -> Key:

@@ -218,6 +218,22 @@ def test_what_was_found_is_recalled_as_it_was(case, prior):
     assert again.evidence == pytest.approx(found.evidence, abs=0.1)
 
 
+def test_what_may_give_beside_is_only_what_such_a_robot_can_have(case, prior):
+    """A link from which mass was taken can weigh what it does, and its cut halves cannot."""
+    tolerances = Tolerances.of(prior.repertoire.simulation.robot.config)
+    search = Search(prior, case.frfs[:1], case.q[:1], case.band_hz, tolerances)
+    structure = structure_of(prior, "added_mass at link_2")
+    misfit = FrfMisfit(structure, search.data(8), tolerances)
+    start, taken = structure.mean, structure.own[0].start
+    lighter = [start - share * np.eye(start.size)[taken] for share in np.arange(0.2, 9.0, 0.2)]
+    x = [x for x in lighter if misfit.possible(x)][-1]
+    wider = search._widened(StructureFit(misfit, misfit(x), 0.0))
+    labels = {effect.label for effect in wider.structure.effects}
+    assert "soft_base at base" in labels
+    assert "link_flexibility at link_2" not in labels
+    exported(wider.structure, wider.at.x)  # and so it is a robot anywhere
+
+
 def test_a_tool_that_the_description_lacks_is_found_at_the_flange(tmp_path):
     case = forgotten("irb6640", 2, tmp_path)
     found = case.posterior()
