@@ -6,7 +6,6 @@ from pathlib import Path
 
 from planner.campaign import store
 from planner.campaign.events import REFUSED, HitRecord, Imported
-from planner.campaign.known_files import KnownFile, first_files, owners
 from planner.campaign.state import CampaignState
 from planner.dataset.screened_files import Source
 from planner.dataset.visits import table_folders
@@ -31,6 +30,19 @@ class Delivery:
     sources: tuple[Source, ...]
     row: str = ""  # "file, row n" for messages
     said: bool = True
+
+
+@dataclass(frozen=True)
+class KnownFile:
+    """A delivered file whose data are in use, or are held, and the file that brought them first."""
+
+    file: str
+    first: str
+
+    @property
+    def copied(self) -> bool:
+        """Whether it is another file."""
+        return Path(self.file).absolute() != Path(self.first).absolute()
 
 
 def sort_paths(
@@ -120,7 +132,7 @@ def at_their_poses(deliveries: tuple[Delivery, ...], state: CampaignState) -> tu
 
     Raises InputError where it is not clear at which pose the others were recorded.
     """
-    owner = owners(state)
+    owner = state.owners
     found: list[Delivery] = []
     for delivery in deliveries:
         if delivery.said:
@@ -147,7 +159,7 @@ def new_files(
     itself among the `named` paths or its table says so; one that cannot be read is left out, as is
     a recording that is in use at another pose. Raises InputError where all are.
     """
-    owner, pose, known = owners(state), delivery.pose, state.measurements.get(delivery.pose)
+    owner, pose, known = state.owners, delivery.pose, state.measurements.get(delivery.pose)
     withdrawn = ""
     if known is not None and known.withdrawn:
         again = command("planner", "confirm", directory, pose)
@@ -155,7 +167,7 @@ def new_files(
         withdrawn += "new measurement another pose name, in recordings.csv or by --pose"
     fresh: list[Fresh] = []
     already, left_out, elsewhere = [], [], []
-    first = first_files(state)
+    first = state.first_files
     seen: set[str] = set()
     for source in delivery.sources:
         try:

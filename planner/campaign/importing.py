@@ -17,6 +17,7 @@ from planner.campaign.config import ModesTable
 from planner.campaign.deliveries import (
     Delivery,
     Fresh,
+    KnownFile,
     at_their_poses,
     let_go,
     new_files,
@@ -27,7 +28,6 @@ from planner.campaign.deliveries import (
 from planner.campaign.events import REFUSED, HitRecord, Question
 from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.import_checks import alerts, asked_of, contradiction, suspected
-from planner.campaign.known_files import KnownFile
 from planner.campaign.measured_modes import from_homogeneity, from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement

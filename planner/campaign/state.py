@@ -103,6 +103,24 @@ class CampaignState:
         known = self.shown.get(digest, pose)
         return self.guessed.get(digest, known) if known == pose else known
 
+    @property
+    def owners(self) -> dict[str, str]:
+        """Poses of all hits that are in use, or held, by sha256."""
+        return {hit.sha256: pose for pose, hit in self._known_hits()}
+
+    @property
+    def first_files(self) -> dict[str, str]:
+        """Names under which these were imported, by sha256."""
+        return {
+            hit.sha256: hit.file.rpartition(" (hit ")[0] if hit.part else hit.file
+            for _, hit in self._known_hits()
+        }
+
+    def _known_hits(self) -> list[tuple[str, HitRecord]]:
+        held = [(pose, hit) for pose, m in self.held.items() for hit in m.hits]
+        used = (m for m in self.measurements.values() if not m.withdrawn)
+        return held + [(m.pose, hit) for m in used for hit in m.accepted]
+
     def unchanged_by(self, event: AnyEvent) -> bool:
         """Whether an act changes neither the model nor what is proposed."""
         if isinstance(event, Imported):

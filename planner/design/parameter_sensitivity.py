@@ -130,7 +130,7 @@ class OpenParameters:
             (one * weight[:, None])[:, :, self._channels(layout)] for one in (told, beside)
         )
         return np.array([
-            [_told(a[:, :, axis], b[:, :, axis]) for axis in range(AXES)]
+            [_marginal_information(a[:, :, axis], b[:, :, axis]) for axis in range(AXES)]
             for a, b in zip(told, beside, strict=True)
         ])  # fmt: skip
 
@@ -178,7 +178,7 @@ class OpenParameters:
         return lines, np.diff(edges, axis=1) / self.noise.step_hz
 
 
-def _told(told: np.ndarray, beside: np.ndarray) -> np.ndarray:
+def _marginal_information(told: np.ndarray, beside: np.ndarray) -> np.ndarray:
     """(p, p) of columns (p, …) in sds of the noise, others (l, …) integrated out, N(0, 1) each.
 
     a (I + bᵀ b)⁻¹ aᵀ by its root, which stays positive where nothing damps a resonance.
