@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
 
 import numpy as np
-from scipy.linalg import polar
-from scipy.spatial.transform import Rotation
 
 from planner.dynamics.gradient import laplace
 from planner.frf.frf import Frf
@@ -116,6 +114,8 @@ class ChainFault:
 
     @property
     def _of_turn(self) -> str:
+        from scipy.spatial.transform import Rotation  # 0.4 s, which good hits do not need
+
         turn = Rotation.from_matrix(self.matrix).as_rotvec(degrees=True)
         axis, degrees = AXES[int(np.argmax(np.abs(turn)))], np.linalg.norm(turn)
         return (
@@ -178,7 +178,8 @@ def possible(shown: np.ndarray, within: Tolerances | None) -> Iterator[ChainFaul
         factor = float(np.median(np.diag(shown)[list(channels)]))
         if factor > 0 and abs(np.log(factor)) > least:
             yield _times(channels, factor)
-    rotation, _ = polar(shown)
+    left, _, right = np.linalg.svd(shown)
+    rotation = left @ right
     if np.linalg.det(rotation) > 0:
         yield ChainFault(rotation)
 

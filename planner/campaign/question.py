@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from planner.campaign.chain_faults import FILTERS, NONE, ChainFault, possible
 from planner.campaign.chain_question import chain_question
@@ -254,6 +253,8 @@ def misread(expected: ExpectedFrfs, q: np.ndarray) -> Mistake:
 
 def _best(less: Callable[[float], float]) -> float:
     """By how many units (`STEPS`) hits are explained best; 0: as stated."""
+    from scipy.optimize import minimize_scalar  # 0.6 s, which good hits do not need
+
     tried = np.concatenate([-STEPS[::-1], [0.0], STEPS])
     best = int(np.argmin([less(float(by)) for by in tried]))
     if tried[best] == 0.0:

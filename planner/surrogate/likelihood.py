@@ -8,7 +8,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.scipy.linalg import cho_solve
-from scipy.optimize import minimize
 
 from planner import jax_setup
 from planner.surrogate.training_data import Padded, Prior, data_covariance
@@ -179,6 +178,8 @@ def maximise(
     Returns:
         The highest end; the first start with −∞ where the log density was nowhere finite.
     """
+
+    from scipy.optimize import minimize  # 0.6 s, which few poses do not need
 
     def negative(x: np.ndarray) -> tuple[float, np.ndarray]:
         value, slope = log_density(x)
