@@ -61,7 +61,7 @@ def places(answer: dict[str, Any]) -> set[tuple[str, str]]:
     return {(f["effect"], f["at"]) for f in answer["findings"]}
 
 
-@pytest.mark.parametrize("handling", [LABORATORY, EVERYDAY], ids=["exact hits", "everyday's"])
+@pytest.mark.parametrize("errors", [LABORATORY, EVERYDAY], ids=["exact hits", "everyday's"])
 def test_where_nothing_is_concealed_nothing_is_found(tmp_path, errors):
     answer = diagnosed(small_case(tmp_path, CONCEALED["nothing"], errors))
     assert answer["verdict"] == "consistent"
