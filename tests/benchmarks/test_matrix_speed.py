@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from planner.modal.mac import mac
+from tests.support.hit_structures import hit_frfs
 from tests.support.matrix_files import write_matrix
-from tests.support.struck_structures import struck
 from tests.support.structures import aeroplane
 
 LINES = np.arange(1, 1602) * 0.1  # 74 points x 3 references x 1,601 lines
@@ -55,7 +55,7 @@ def test_222_frfs(tmp_path: Path, capsys) -> None:
     ]  # fmt: skip
     for drift, noise in SETS:
         rng, gain = np.random.default_rng(5), 0.02 if drift else 0.0
-        matrix = struck(structure, references, LINES, rng, noise, drift, gain)
+        matrix = hit_frfs(structure, references, LINES, rng, noise, drift, gain)
         spent, answer = cpu_of(write_matrix(tmp_path / "set.uff", matrix))
         found = np.array([mode["frequency_hz"] for mode in answer["modes"]])
         with capsys.disabled():

@@ -9,7 +9,7 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.demo import play
-from planner.progress import quietly
+from planner.progress import no_progress
 from planner.truth.load import load_truth
 from tests.support.milling_cases import cut
 from tests.support.true_limits import limit_pair
@@ -28,7 +28,7 @@ def test_limits_at_poses_never_measured(tmp_path: Path):
     made = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(made)
     truth = load_truth(SHIPPED / "robot" / "robot.toml", made.DEVIATION)
-    play(tmp_path / "campaign", 4, False, quietly)
+    play(tmp_path / "campaign", 4, False, no_progress)
     campaign = Campaign(tmp_path / "campaign")
     angles = {}
     with open(SHIPPED / "recordings" / "recordings.csv", encoding="utf-8") as file:

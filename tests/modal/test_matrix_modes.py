@@ -3,8 +3,8 @@
 import numpy as np
 
 from planner.modal.matrix_modes import modes_of_matrix
+from tests.support.hit_structures import hit_frfs, unit_mass_shapes
 from tests.support.rough_hammer_sets import RoughSet, told
-from tests.support.struck_structures import struck, unit_mass_shapes
 from tests.support.structures import aeroplane
 
 LINES = np.arange(1, 801) * 0.2
@@ -13,7 +13,7 @@ LINES = np.arange(1, 801) * 0.2
 def modes_and_truth(top_hz, seed, within_sds, **nuisances):
     """What is found up to a frequency, and every true mode beside it; most within so many sds."""
     structure, references = aeroplane()
-    matrix = struck(structure, references, LINES, np.random.default_rng(seed), **nuisances)
+    matrix = hit_frfs(structure, references, LINES, np.random.default_rng(seed), **nuisances)
     band, (poles, shapes) = (5.0, top_hz), unit_mass_shapes(structure)
     hz = np.abs(poles) / (2 * np.pi)
     inside = (hz > band[0]) & (hz < band[1])

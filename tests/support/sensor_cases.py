@@ -17,11 +17,12 @@ import numpy as np
 
 from planner.api import diagnose
 from planner.dataset.dataset import Dataset
-from planner.proof.refit import left
+from planner.proof.refit import detectability
 from planner.recording.points import SENSOR
 from planner.report.diagnosis import DiagnosisReport
 from planner.robot.robot import Robot
 from planner.truth.cases import SCATTER
+from planner.truth.detectability import ScoredCase, detection_problem
 from planner.truth.deviation import (
     AttachedResonator,
     BentLink,
@@ -29,12 +30,11 @@ from planner.truth.deviation import (
     Spring,
     StiffnessRipple,
 )
-from planner.truth.handling import EVERYDAY
+from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses, quiet_hits
 from planner.truth.hits import Hammer, write_recordings
 from planner.truth.load import load_truth
-from planner.truth.questions import Scored, question
+from planner.truth.measurement_errors import EVERYDAY
 from planner.truth.scene import log_uniform, some_direction, triple
-from planner.truth.secret import HitVisit, Secret, hit_poses, quiet_hits
 from tests.support.arm_with_points import (
     AXES,
     BAND_HZ,
@@ -94,8 +94,8 @@ class Concealed:
     """An effect at its place in a robot with imperfections, and the same robot without it."""
 
     place: Place
-    secret: Secret
-    plain: Secret
+    injected: InjectedFaults
+    plain: InjectedFaults
 
 
 def concealed(kind: str, rng: np.random.Generator) -> Concealed:
@@ -112,9 +112,9 @@ def concealed(kind: str, rng: np.random.Generator) -> Concealed:
     ]
     kept = [s for n, b in enumerate(bearings) if kind != "joint" or n != number for s in b]
     robot = replace(plain, mixed=MIXED, harmonics=wave, extra=tuple(kept))
-    whole = Secret(replace(robot, extra=tuple(s for b in bearings for s in b)))
+    whole = InjectedFaults(replace(robot, extra=tuple(s for b in bearings for s in b)))
     place, changed = _with(kind, robot, number, rng)
-    return Concealed(place, Secret(changed), whole)
+    return Concealed(place, InjectedFaults(changed), whole)
 
 
 def _with(
@@ -145,16 +145,16 @@ def _with(
 def make(kind: str, seed: int, folder: Path) -> tuple[Place, float]:
     """Write folder/robot and folder/hits; what is concealed, and nats that the tool's tells of it.
 
-    In all poses, with robot, hits and measuring chain refitted (`refit.Left.nats`).
+    In all poses, with robot, hits and measuring chain refitted (`refit.Detectability.nats`).
     """
     rng = np.random.default_rng([seed, zlib.crc32(kind.encode())])
     toml = write_arm(folder / "robot")
     drawn = concealed(kind, rng)
     chains = {name: EVERYDAY.chain(rng) for name in SENSORS}
-    secret, plain = (
-        replace(s, chain=chains[SENSOR], chains=chains) for s in (drawn.secret, drawn.plain)
+    injected, plain = (
+        replace(s, chain=chains[SENSOR], chains=chains) for s in (drawn.injected, drawn.plain)
     )
-    truth, common = load_truth(toml, secret.deviation), EVERYDAY.common(rng)
+    truth, common = load_truth(toml, injected.deviation), EVERYDAY.common(rng)
     shots = [(f"+{axis}", 250.0) for axis in "xyz"]
     stated, visits = poses(POSES, int(rng.integers(2**31))), []
     for number, q in enumerate(stated):
@@ -162,20 +162,23 @@ def make(kind: str, seed: int, folder: Path) -> tuple[Place, float]:
         there = q + np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(4)
         visits.append(HitVisit(there, shots, number / POSES, aims, "tcp", SENSORS))
     hammer = Hammer(peak_n=250.0, noise=float(rng.uniform(0.004, 0.02)))
-    quiet = quiet_hits(truth, secret, visits, hammer, np.random.default_rng(seed))
+    quiet = quiet_hits(truth, injected, visits, hammer, np.random.default_rng(seed))
     hammer = EVERYDAY.floor(hammer, [hit for hits in quiet for hit in hits], rng)
-    found = hit_poses(truth, secret, visits, hammer, np.random.default_rng(seed))
+    found = hit_poses(truth, injected, visits, hammer, np.random.default_rng(seed))
     rows = [
         (f"P{i}", np.rad2deg(q), 1, hit)
         for i, (q, hits) in enumerate(zip(stated, found, strict=True), 1)
         for hit in hits
     ]
     write_recordings(folder / "hits", truth.joint_names, rows, hammer, truth.description, NODES)
-    return drawn.place, _told_by_the_tool(toml, (secret, plain), visits, hammer)
+    return drawn.place, _told_by_the_tool(toml, (injected, plain), visits, hammer)
 
 
 def _told_by_the_tool(
-    toml: Path, secrets: tuple[Secret, Secret], visits: Sequence[HitVisit], hammer: Hammer
+    toml: Path,
+    secrets: tuple[InjectedFaults, InjectedFaults],
+    visits: Sequence[HitVisit],
+    hammer: Hammer,
 ) -> float:
     """Nats of the effect, which the first secret has and the second has not."""
     alone = [replace(visit, sensors=(SENSOR,)) for visit in visits]
@@ -184,8 +187,8 @@ def _told_by_the_tool(
     quiet = quiet_hits(truth, secrets[0], alone, hammer, np.random.default_rng(0))
     nowhere = np.empty((0, 4))
     load = partial(load_truth, toml)
-    case = Scored(load, BAND_HZ, REACH_M, secrets[0], alone, nowhere, hammer, quiet, rng)
-    return left(question(case, secrets[1])).nats
+    case = ScoredCase(load, BAND_HZ, REACH_M, secrets[0], alone, nowhere, hammer, quiet, rng)
+    return detectability(detection_problem(case, secrets[1])).nats
 
 
 def told(folder: Path, sensors: int, count: int) -> tuple[DiagnosisReport, Dataset]:
