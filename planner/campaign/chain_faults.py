@@ -120,7 +120,7 @@ class ChainFault:
         axis, degrees = AXES[int(np.argmax(np.abs(turn)))], np.linalg.norm(turn)
         return (
             f"the sensor looks turned by {degrees:.0f}° since, mostly about its {axis} axis: was "
-            f"it taken off, or is it loose?"
+            f"it taken off, is it loose, or does a wrist joint stand so far from the angle stated?"
         )
 
     @property
