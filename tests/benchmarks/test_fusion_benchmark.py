@@ -11,37 +11,11 @@ import time
 import numpy as np
 import pytest
 
-from planner.design.propose import propose
 from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
 from tests.support.outside import with_tests
-from tests.support.surrogates import observed, simulated
+from tests.support.surrogates import simulated
 
 X = np.random.default_rng(9).random((1000, 2))
-
-
-def fastest(action, repeats=3):
-    """Least of a few wall times in s."""
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        action()
-        times.append(time.perf_counter() - start)
-    return min(times)
-
-
-@pytest.mark.slow
-def test_times_of_a_step():
-    low = simulated(X)
-    print("\n  n   refit  predict 1000  propose of 1000   [s]")
-    for n, bound in ((10, 0.5), (20, 1.2), (40, 4.0)):
-        surrogate = fit_surrogate(observed(n, 0))
-        refit = fastest(lambda n=n: fit_surrogate(observed(n, 1)))
-        predict = fastest(lambda s=surrogate: s.predict(X, low))
-        pick = fastest(lambda s=surrogate: propose("integrated_variance", s, X, low, 1, None, 0))
-        print(f"{n:3d}  {refit:6.3f}  {predict:12.3f}  {pick:15.3f}")
-        assert refit < bound
-        assert predict < 2.0
-        assert pick < 2.0
 
 
 def eight_modes(n, seed):

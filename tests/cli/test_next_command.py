@@ -63,11 +63,13 @@ def test_every_acquisition_is_logged_so_that_it_reads_back(name, robot, tmp_path
     if name == "stability":
         (robot.parent / "cut.toml").write_text(CUT)
         more = "[cut]\nspeed_rpm = 1200.0\ndepth_m = 1e-4\n"
-    asked = proposed_again(begun(tmp_path / "asked", robot, more=more), "--acquisition", name)
-    stated = proposed_again(begun(tmp_path / "stated", robot, name, more))
-    assert asked == stated
-    for proposal in asked:
+    for proposal in proposed_again(begun(tmp_path, robot, name, more)):
         assert (proposal["score"] is None) == (name in DESIGNS)
+
+
+def test_an_acquisition_that_is_asked_for_is_that_of_the_file(robot, tmp_path):
+    asked = proposed_again(begun(tmp_path / "asked", robot), "--acquisition", "variance")
+    assert asked == proposed_again(begun(tmp_path / "stated", robot, "variance"))
 
 
 def test_a_log_in_which_a_score_became_null_opens(robot, tmp_path):

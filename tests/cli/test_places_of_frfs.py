@@ -67,7 +67,7 @@ def test_a_tap_test_in_files_of_one_frf_each(tmp_path):
 
 @pytest.mark.parametrize("how", ["table", "names"])
 def test_frfs_as_text_into_a_campaign(tmp_path, how):
-    robot, plan, _ = make_cell(tmp_path)
+    robot, plan, _ = make_cell(tmp_path, learns=False)
     cell, taps = tmp_path / "cell", tmp_path / "taps"
     taps.mkdir()
     told("new", cell, "--robot", robot, "--campaign", plan)

@@ -120,8 +120,8 @@ def test_padding_changes_nothing_and_growth_compiles_nothing():
 def test_intervals_hold_at_few_points():
     inside, error = [], []
     x = np.random.default_rng(99).random((60, 2))
-    for seed in range(12):
-        for n in (3, 5, 9, 14):
+    for seed in range(8):
+        for n in (3, 9):
             scale = 1 + 0.1 * np.random.default_rng(seed + 50).standard_normal()
             seen = observed(n, seed, scale)
             p = fit_surrogate(seen, residues=False).predict(x, simulated(x))
