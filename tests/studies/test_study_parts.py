@@ -1,4 +1,7 @@
-"""What the papers' studies are made of: data, splits, the command's answers to bad input."""
+"""What the papers' studies are made of: data, splits, the command's answers to bad input.
+
+`pytest -m slow tests/studies/test_study_parts.py` looks at the sweep of Busch et al. 2020.
+"""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -29,6 +32,7 @@ def swept():
     return busch2020.sweep(1)
 
 
+@pytest.mark.slow
 def test_the_sweep_has_the_papers_points(swept):
     assert swept.simulated.size == 12_801
     assert swept.amplitude.size == 2_622
@@ -38,6 +42,7 @@ def test_the_sweep_has_the_papers_points(swept):
     assert np.array_equal(seen.every(3).angles_deg, seen.angles_deg[::3])
 
 
+@pytest.mark.slow
 def test_the_swept_robot_has_a_resonance_that_its_simulation_lacks(swept):
     """In the band, across the arm: two simulated, three true ones (and in-plane ones in both)."""
     seen, truth = swept, busch2020.true_robot(1)
