@@ -95,7 +95,7 @@ def test_a_robot_that_softened_is_told_by_the_command(tmp_path):
     cell = tmp_path / "cell"
     Campaign.new(cell, robot, plan)
     for day, common in enumerate((1.0, 1.0, 1.0, 0.98)):
-        truth = load_truth(robot, Deviation(seed=3, stiffness=0.1, common=common))
+        truth = load_truth(robot, Deviation(seed=3, common=common))
         proposal = told("next", cell)["proposals"][0]
         folder = record(truth, tmp_path / f"day{day}", proposal["pose"], proposal["joints_deg"])
         last = told("import", cell, folder)
