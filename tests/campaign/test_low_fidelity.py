@@ -1,4 +1,7 @@
-"""A low fidelity that learns: identified from recordings, uncertain where it should be, doubted."""
+"""A low fidelity that learns: identified from recordings, uncertain where it should be, doubted.
+
+`pytest -m slow tests/campaign/test_low_fidelity.py` leaves bearings out of the description.
+"""
 
 import re
 
@@ -73,6 +76,7 @@ def test_what_the_parameters_leave_open_covers_the_error(right):
     assert np.median(sd) < 0.01
 
 
+@pytest.mark.slow
 def test_springs_that_the_description_lacks_are_found_and_named(tmp_path):
     frfs, q, other, true_hz = measured(make_arm(tmp_path / "true", transverse=True), n=3)
     path = make_arm(tmp_path / "simulated")

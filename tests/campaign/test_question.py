@@ -1,6 +1,7 @@
 """Refused hits, and hits of another pose than stated: in the log, asked about, not used.
 
-`pytest -m slow tests/campaign/test_question.py` imports hits of a wrong sensitivity, too.
+`pytest -m slow tests/campaign/test_question.py` imports hits of a wrong sensitivity, too, and moves
+those of a pose that the robot had not left.
 """
 
 import csv
@@ -199,6 +200,7 @@ def test_misread_angles_and_hits_from_behind_are_asked_about_right_ones_are_not(
         assert abs(read - stated[int(said[-1]) - 1]) < 0.5
 
 
+@pytest.mark.slow
 def test_hits_of_a_pose_left_unmoved_are_told_and_moved(campaign, pool, tmp_path):
     """The robot still stands where an open proposal says: the question names it."""
     proposals = campaign.next(3)

@@ -14,10 +14,10 @@ MEASUREMENTS = 1  # that is replayed
 
 
 def test_demo_reaches_two_percent_and_writes_a_recording(tmp_path):
-    summary = told("demo", "--dir", tmp_path / "demo", "--measurements", 3)
+    summary = told("demo", "--dir", tmp_path / "demo", "--measurements", 2)
     print({k: summary[k] for k in summary if "rmse" in k or "coverage" in k})
     assert summary["simulated"] is True
-    assert summary["measurements"] == 3
+    assert summary["measurements"] == 2
     assert summary["frequency_rmse_percent"] <= 2.0
     assert summary["simulation_rmse_percent"] >= 3 * summary["frequency_rmse_percent"]
     assert len(summary["step_seconds"]) == summary["measurements"]
