@@ -40,7 +40,7 @@ def pool():
 
 @pytest.fixture(scope="module")
 def three(tmp_path_factory, pool):
-    """A campaign of three poses."""
+    """A campaign of two poses, to be copied."""
     campaign = begun(tmp_path_factory.mktemp("three"))
     for pose in MEASURED:
         (report,) = campaign.import_paths((pool.folder,), pose)

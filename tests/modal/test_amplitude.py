@@ -1,14 +1,11 @@
 """Force levels: grouping, proportional structures, and structures that soften."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
 from planner.frf.estimator import estimate
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.homogeneity import homogeneity
-from planner.recording.force_levels import by_level, peak_n
 from planner.recording.records import Hit
 from tests.support.simulated_hits import POLES, RESIDUES, make_hit
 
@@ -32,13 +29,6 @@ def struck(seed: int, softening: float = 0.0, levels: tuple[float, ...] = LEVELS
 
 def judged(hits: tuple[Hit, ...]):
     return homogeneity(hits, estimate_modes(estimate(hits, BAND), BAND), BAND)
-
-
-def test_hits_are_grouped_by_strength():
-    hits = struck(0)
-    groups = by_level(hits)
-    assert [len(group) for group in groups] == [6, 6, 6]
-    assert all(max(map(peak_n, a)) < min(map(peak_n, b)) for a, b in pairwise(groups))
 
 
 def test_one_level_has_nothing_to_compare():

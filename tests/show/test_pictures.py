@@ -6,8 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.figure import Figure
@@ -26,7 +24,7 @@ from planner.report.frf_plots import ComparedFrfs, Side, frf_map
 from planner.report.matrix_plots import geometry_figure, shapes_figure
 from planner.report.modal_plots import auto_mac_figure, frequency_figure, modal_figures
 from planner.report.pictures import Pictures, png, save
-from planner.report.plot_marks import ink, mark_band, spread
+from planner.report.plot_marks import ink, mark_band
 from planner.report.text import with_sd
 from planner.surrogate.leave_one_out import LeaveOneOut
 from tests.support.modal_systems import exact_frf, noisy, random_system
@@ -241,15 +239,6 @@ def test_campbell_diagram_labels_close_modes_apart():
     figure.draw_without_rendering()
     assert [label.get_text() for label in axes.texts] == list(MODES)
     assert_apart(figure, axes.texts)
-
-
-@given(st.lists(st.floats(0, 10), max_size=12), st.floats(0.01, 0.8))
-def test_spread_keeps_order_gap_and_ends_and_moves_what_it_must(positions, gap):
-    x = np.sort(np.array(positions))
-    moved = spread(x, gap, 0.0, 10.0)
-    assert np.all(np.diff(moved) >= gap * (1 - 1e-9))
-    assert moved.size == 0 or (moved[0] >= 0 and moved[-1] <= 10 + 1e-9)
-    assert np.allclose(moved, x) or not np.all(np.diff(x) >= gap)
 
 
 def map_panels(figure):

@@ -77,18 +77,6 @@ def test_few_samples_stand_for_twenty_thousand(n, seed):
     assert np.sqrt(np.mean(np.log(sd / exact_sd) ** 2)) < (0.3 if n == 3 else 0.15)
 
 
-def test_one_best_sample_would_be_too_sure():
-    """What averaging is for: with the likeliest θ alone intervals are narrower at few points."""
-    ratio = []
-    for seed in range(8):
-        post = fit_ar1(problem(4, seed), (PRIOR,), (PRIOR,), np.zeros(1), 256, 32).outputs[0]
-        offset = low(QUERY)
-        _, variance, _ = post.covariance(QUERY, offset[:, 0], QUERY[:1], offset[:1, 0])
-        _, sd = post.predict(QUERY, offset[:, 0])
-        ratio.append(np.mean(np.median(np.sqrt(variance), axis=0) / sd))
-    assert np.mean(ratio) < 0.97
-
-
 def test_without_data_the_prior_is_sampled():
     padded = Padded(
         np.zeros((16, 1)), np.zeros((1, 16)), np.ones((1, 16)), np.zeros((1, 16)), np.zeros((1, 16))

@@ -1,4 +1,4 @@
-"""Kernel expressions: laws, columns, angles, gradients against finite differences."""
+"""Kernel expressions: laws, columns, sums and products; test_limits.py has their slopes."""
 
 import jax
 import jax.numpy as jnp
@@ -75,29 +75,6 @@ def test_what_is_no_kernel_is_said_in_words(wrong):
         parse(wrong, 2)
 
 
-@pytest.mark.parametrize("expression", SUMS)
-def test_gradients_agree_with_finite_differences(expression):
-    """The log marginal likelihood's, in θ, points and values."""
-    rng = np.random.default_rng(2)
-    kernel = parse(expression, 3)
-    x, y, theta = rng.standard_normal((9, 3)), rng.standard_normal(9), random_theta(kernel, rng)
-
-    def value(theta, x, y):
-        k = kernel.covariance(jnp, theta, x, x) + 0.1 * jnp.eye(9)
-        return log_marginal(k, y)
-
-    slopes = jax.grad(value, argnums=(0, 1, 2))(theta, x, y)
-    for place, argument in enumerate((theta, x, y)):
-        direction = rng.standard_normal(argument.shape)
-        ends = []
-        for step in (1e-5, -1e-5):
-            moved = [theta, x, y]
-            moved[place] = argument + step * direction
-            ends.append(float(value(*moved)))
-        numeric = (ends[0] - ends[1]) / 2e-5
-        np.testing.assert_allclose(np.sum(slopes[place] * direction), numeric, rtol=1e-5, atol=1e-6)
-
-
 def test_log_marginal_is_the_normal_density():
     from scipy.stats import multivariate_normal
 
@@ -111,7 +88,7 @@ def test_log_marginal_is_the_normal_density():
 
 
 @pytest.mark.parametrize("shape", ["rbf", "matern52"])
-@pytest.mark.parametrize("d", [1, 2, 3, 6])
+@pytest.mark.parametrize("d", [2, 6])
 def test_a_compiled_kernel_is_one_on_its_diagonal(shape, d):
     """XLA may compute r² twice and differently; the diagonal was 0.52 once."""
     x = np.random.default_rng(4).random((64, d))

@@ -135,13 +135,3 @@ def test_growth_compiles_nothing():
         for n in range(4, 16):
             fit_recursive(samples(n), Exact(low), SPREAD)
     assert not compiled
-
-
-def test_what_is_compiled_is_counted():
-    from planner.jax_setup import compiled as compile_it
-
-    doubled = compile_it()(lambda x: 2 * x)
-    with compilations() as compiled:
-        for size in (3, 3, 4):
-            doubled(np.ones(size))
-    assert len(compiled) == 2
