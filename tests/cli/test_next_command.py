@@ -62,7 +62,7 @@ def test_every_acquisition_is_logged_so_that_it_reads_back(name, robot, tmp_path
     more = ""
     if name == "stability":
         (robot.parent / "cut.toml").write_text(CUT)
-        more = "[cut]\nspeed_rpm = 1200.0\ndepth_m = 1e-4\n"
+        more = "[cut]\nspeed_rpm = 1200.0\ndepth_m = 1e-4\njoints_deg = [[0, -40, 50, 0]]\n"
     for proposal in proposed_again(begun(tmp_path, robot, name, more)):
         assert (proposal["score"] is None) == (name in DESIGNS)
 

@@ -57,7 +57,7 @@ def test_a_cut_is_asked_at_a_force(cell, tmp_path):
     cut.write_text(CUT)
 
     def chatter(*force: object) -> list[float]:
-        said = told("stability", campaign, "--cut", cut, "--path", poses, "--samples", 2, *force)
+        said = told("stability", campaign, "--cut", cut, "--path", poses, "--samples", 20, *force)
         return said["depth_limit_m"]
 
     assert chatter() != chatter("--peak-force-n", 2000)

@@ -38,7 +38,7 @@ diameter_m = 0.02
 """
 
 
-WAY = "--path", "PART", "--origin", "0.6,-0.1,0.4", "--poses", 1
+WAY = "--path", "PART", "--origin", "0.6,-0.1,0.4", "--poses", 2
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +102,7 @@ def test_a_program_with_turns_and_another_tool(cell, tmp_path, capsys):
     assert "/figures/path/0/whole_path__95___probability" in lines_of(tmp_path / "path.rrd")
     turn = said["turn"]
     depth = np.array(turn["depth_m"], float)
-    assert depth.shape == (1, 12)
+    assert depth.shape == (2, 12)
     assert turn["reached"][0][0] is True
     assert depth[:, 0].min() == pytest.approx(_at(said, said["best_spindle_rpm"]), rel=1e-6)
     for row, best in zip(depth, turn["best_deg"], strict=True):
@@ -111,7 +111,7 @@ def test_a_program_with_turns_and_another_tool(cell, tmp_path, capsys):
     assert said["feed"]["direction_base"] is not None
     longer = asked(cell, capsys, *WAY, "--tool", cell / "tool.toml")
     assert longer["depth_limit_m"] != said["depth_limit_m"]
-    assert {len(one["poses"]) for one in (longer, said)} == {1}
+    assert {len(one["poses"]) for one in (longer, said)} == {2}
 
 
 def _at(said, rpm):
