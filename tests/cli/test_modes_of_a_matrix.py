@@ -220,7 +220,7 @@ def test_the_recording_has_charts_shapes_and_mac_in_place_of_pictures(
          "nodes": np.array(ends)},
     ]  # fmt: skip
     path = write_matrix(tmp_path / "set.uff", matrix, before=sets if placed else ())
-    code, answer, err = modes(path, "--band-hz", *BAND, "--rrd", tmp_path / "modes.rrd")
+    code, answer, err = modes(path, "--band-hz", 40, 130, "--rrd", tmp_path / "modes.rrd")
     assert (code, err) == (0, "")
     drawn = entities_of(answer["rrd"])
     count = len(answer["modes"])

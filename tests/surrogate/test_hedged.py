@@ -29,7 +29,6 @@ def nominal(x):
 SIMULATIONS = {
     "right": nominal,
     "wrong": lambda x: nominal(x[:, [1, 0, 2]]),  # the joints mixed up
-    "shifted": lambda x: np.where(x[:, :1] + x[:, 1:2] > 1, nominal(x)[:, [1, 1]], nominal(x)),
     "irrelevant": lambda x: np.log(20 + 8 * np.sin(9 * x[:, :2] + [[2.0, 1.0]])),
 }
 
