@@ -13,6 +13,7 @@ from planner.campaign.events import Proposed
 from planner.design.propose import ACQUISITIONS, DESIGNS
 from planner.session.screen import NoKeys
 from planner.session.watch import watch
+from tests.support.cuts import SLOT
 from tests.support.outside import said, told
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
@@ -24,17 +25,7 @@ def robot(tmp_path) -> Path:
     return make_plain_arm(tmp_path / "robot")
 
 
-CUT = """teeth = 2
-diameter_m = 0.01
-milling = "slot"
-kt_n_m2 = 6.0e8
-kr_n_m2 = 2.0e8
-feed = [1.0, 0.0, 0.0]
-axis = [0.0, 0.0, 1.0]
-spindle_rpm = [600, 3000, 3]
-depth_m = [0.0, 0.001, 4]
-method = "zeroth_order"
-"""
+CUT = SLOT.format("600, 3000, 3", "0.0, 0.001, 4", "zeroth_order")
 
 
 def begun(
