@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from planner.campaign.material import Material
+from planner.campaign.recordings_source import RecordingsSource
 from planner.dataset.dataset import Dataset
 from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import in_parts
@@ -23,7 +23,7 @@ from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import ModalModel
-from planner.progress import Tell, quietly
+from planner.progress import ProgressCallback, no_progress
 from planner.recording.records import Hit
 from planner.report.diagnosis import DiagnosisReport, diagnosis_report
 from planner.report.identification import (
@@ -98,7 +98,7 @@ def identify(
     inertias: bool = True,
     extend: bool = True,
     held_out: int | None = None,
-    progress: Tell = quietly,
+    progress: ProgressCallback = no_progress,
 ) -> IdentificationReport:
     """Fit the elastic parameters of a robot's simulation to recorded FRFs of several poses.
 
@@ -136,7 +136,7 @@ def identify(
             dataset.frfs,
             band_hz=band,
             extend=extend,
-            tell=lambda text: progress(text, 0.0),
+            on_step=lambda text: progress(text, 0.0),
         )
         basis = IdentificationBasis(dataset, judged, nominal)
         made = identification_report(basis, band, inertias)
@@ -148,7 +148,7 @@ def diagnose(
     robot: Robot,
     *,
     offered: Mapping[str, np.ndarray] | None = None,
-    progress: Tell = quietly,
+    progress: ProgressCallback = no_progress,
 ) -> DiagnosisReport:
     """Locate where a robot's simulation and recordings differ, and name the missing physics.
 
@@ -176,8 +176,8 @@ def diagnose(
     return replace(made, next=hit, next_sensor=sensor, seconds=time.perf_counter() - started)
 
 
-def diagnose_material(
-    given: Material, robot: Robot | None = None, progress: Tell = quietly
+def diagnose_source(
+    given: RecordingsSource, robot: Robot | None = None, progress: ProgressCallback = no_progress
 ) -> DiagnosisReport:
     """As `diagnose`, of what a folder of recordings or a campaign holds.
 

@@ -18,12 +18,12 @@ from planner.campaign.state import Measurement
 from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
 from planner.errors import InputError, NoPoseLeftError
-from planner.progress import Tell
+from planner.progress import ProgressCallback
 from planner.recording.folder import read_recordings
 from planner.recording.joints import JointUnits
 from planner.recording.records import PoseRow
 from planner.report.demonstration import DemonstrationReport, DemonstrationStep
-from planner.report.rerun.story import Story
+from planner.report.rerun.event_logger import EventLogger
 
 NAME = "kr240_plane"
 Z_95 = 1.959964  # two-sided 95 % of a normal distribution
@@ -69,7 +69,7 @@ class Pool:
 
 
 def play(
-    directory: Path | None, measurements: int, viewer: bool, progress: Tell
+    directory: Path | None, measurements: int, viewer: bool, progress: ProgressCallback
 ) -> DemonstrationReport:
     """Play a campaign until its target, `measurements`, or the pool's end; returns the summary."""
     source = shipped(NAME)
@@ -80,10 +80,10 @@ def play(
     used: list[str] = []
     steps: list[DemonstrationStep] = []
     started = time.perf_counter()
-    with Story(campaign.cell, rrd, viewer, simulated=True) as story:
-        story.tell(campaign.entries[0], campaign.model)
+    with EventLogger(campaign.cell, rrd, viewer, simulated=True) as story:
+        story.log(campaign.entries[0], campaign.model)
         proposal = campaign.next()[0]
-        story.tell(campaign.entries[-1], campaign.model)
+        story.log(campaign.entries[-1], campaign.model)
         while len(used) < min(measurements, len(pool.rows)) and not campaign.model.done:
             pose = pool.nearest(campaign.cell, proposal, used)
             progress(f"measurement {len(used) + 1}: pose {pose}", len(used) / measurements)
@@ -98,8 +98,8 @@ def play(
                 break
             finally:
                 steps.append(_step(report, proposal, time.perf_counter() - started))
-                story.tell(*imported, report.measured)
-            story.tell(campaign.entries[-1], campaign.model)
+                story.log(*imported, report.measured)
+            story.log(campaign.entries[-1], campaign.model)
     return _summary(campaign, pool, used, steps, rrd, progress)
 
 
@@ -117,7 +117,7 @@ def _summary(
     used: list[str],
     steps: list[DemonstrationStep],
     rrd: Path,
-    progress: Tell,
+    progress: ProgressCallback,
 ) -> DemonstrationReport:
     cell = campaign.cell
     unused = [pose for pose in pool.rows if pose not in used]
@@ -151,7 +151,9 @@ def _summary(
     )
 
 
-def _measured_hz(cell: Cell, pool: Pool, poses: list[str], progress: Tell) -> np.ndarray:
+def _measured_hz(
+    cell: Cell, pool: Pool, poses: list[str], progress: ProgressCallback
+) -> np.ndarray:
     """Frequencies (n, count) in Hz that the recordings of poses give; NaN where none was found."""
     found = []
     for i, pose in enumerate(poses):

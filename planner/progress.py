@@ -2,13 +2,15 @@
 
 from collections.abc import Callable
 
-Tell = Callable[[str, float], None]  # what is being done, and the share (0 to 1) that is done
+ProgressCallback = Callable[
+    [str, float], None
+]  # what is being done, and the share (0 to 1) that is done
 
 
-def quietly(text: str, share: float) -> None:
+def no_progress(text: str, share: float) -> None:
     """Report nothing."""
 
 
-def within(tell: Tell, first: float, last: float) -> Tell:
-    """The `tell` of a part of the work, from the share `first` of the whole to `last`."""
-    return lambda text, share: tell(text, first + (last - first) * share)
+def part_of(progress: ProgressCallback, first: float, last: float) -> ProgressCallback:
+    """The `progress` of a part of the work, from the share `first` of the whole to `last`."""
+    return lambda text, share: progress(text, first + (last - first) * share)

@@ -4,8 +4,9 @@ Tool tip on a grid of 200 mm, seven turns about the tool's axis (the paper's sec
 is the KR240 with spindle in MuJoCo, with stiffnesses, damping and inertias of its own. Each posture
 is hit at two points of the tool along two axes, at three levels, and heard at both points along
 both axes. Hits miss axis and point, channels have gains and feel each other, joints stand beside
-their readback, brakes engage anew at each posture (`planner.truth.handling.EVERYDAY`). FRFs are H1,
-modes come from modal analysis and are tracked over the postures without any simulation.
+their readback, brakes engage anew at each posture (`planner.truth.measurement_errors.EVERYDAY`).
+FRFs are H1, modes come from modal analysis and are tracked over the postures without any
+simulation.
 """
 
 from dataclasses import dataclass, replace
@@ -18,14 +19,14 @@ from planner.modal.fit_data import Data
 from planner.modal.modes import LEAST_PROBABILITY, Mode
 from planner.modal.residues import rank_one
 from planner.modal.tracking import Guide, track
-from planner.progress import Tell
-from planner.studies.hits import upright
+from planner.progress import ProgressCallback
+from planner.studies.hits import upright_poses
 from planner.truth.deviation import Deviation
-from planner.truth.handling import EVERYDAY
+from planner.truth.fault_injection import DampingScatter
 from planner.truth.hits import Hammer, SimulatedHit, noisy, pulse, sampled
 from planner.truth.load import load_truth
+from planner.truth.measurement_errors import EVERYDAY
 from planner.truth.model import Truth, driven
-from planner.truth.secret import DampingScatter
 
 X_M, Y_M, Z_M = np.linspace(1.3, 1.9, 4), np.linspace(-0.3, 0.3, 4), 0.8
 TURN_DEG = np.linspace(-60, 60, 7)
@@ -53,7 +54,7 @@ def postures(truth: Truth) -> tuple[np.ndarray, np.ndarray]:
     upper[4] = -0.01
     x = np.array([(turn, a, b) for turn in np.deg2rad(TURN_DEG) for a in X_M for b in Y_M])
     targets = ((np.array([a, b, Z_M]), turn) for turn, a, b in x)
-    q = upright(truth, targets, np.deg2rad(START_DEG), "the table", upper, follow=False)
+    q = upright_poses(truth, targets, np.deg2rad(START_DEG), "the table", upper, follow=False)
     return q, (x - x.min(axis=0)) / np.ptp(x, axis=0)
 
 
@@ -114,13 +115,15 @@ class HitParameters:
         return np.flatnonzero(np.isfinite(self.values[..., 0]).mean(axis=0) >= OFTEN)
 
 
-def measured(truth: Truth, q: np.ndarray, x: np.ndarray, seed: int, tell: Tell) -> HitParameters:
+def measured(
+    truth: Truth, q: np.ndarray, x: np.ndarray, seed: int, progress: ProgressCallback
+) -> HitParameters:
     """Hits and modal analysis at postures q (n, 6) in rad, x (n, d) scaled to the workspace."""
     rng = np.random.default_rng([seed, 7])
     gains, brakes = _channels(rng), DampingScatter(BRAKES, seed)
     found = []
     for i, posture in enumerate(q):
-        tell(f"hits at posture {i + 1} of {len(q)}", i / len(q))
+        progress(f"hits at posture {i + 1} of {len(q)}", i / len(q))
         there = posture + np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(len(posture))
         found.append(_analysed(brakes.applied(truth, i / len(q)), there, gains, rng))
     carried = [[_mode(one) for one in modes] for modes in found]

@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-from planner.progress import Tell, within
+from planner.progress import ProgressCallback, part_of
 from planner.studies.claims import Bound, ClaimRule, in_order
 from planner.studies.report import Paper, Report, Table, on_each, r_squared
 from planner.surrogate.models.likelihood_gp import Samples, fit_likelihood
@@ -100,11 +100,11 @@ RULES = (
 )  # fmt: skip
 
 
-def study(progress: Tell, small: bool = False) -> Report:
+def study(progress: ProgressCallback, small: bool = False) -> Report:
     """R² by 5-fold cross-validation on several robots, and the time that training takes."""
     robots = ROBOTS[:1] if small else ROBOTS
-    part = within(progress, 0.0, 0.95)
-    scores = on_each(robots, lambda seed, tell: _scores(seed, small, tell), part)
+    part = part_of(progress, 0.0, 0.95)
+    scores = on_each(robots, lambda seed, progress: _scores(seed, small, progress), part)
     progress("cost against m", 0.96)
     table, modes, cost = by_kind(scores), by_mode(scores), cost_table(small)
     return Report(
@@ -164,11 +164,11 @@ def _notes(scores: list[RobotScores], cost: Table) -> dict[str, str]:
     }
 
 
-def _scores(seed: int, small: bool, progress: Tell) -> RobotScores:
+def _scores(seed: int, small: bool, progress: ProgressCallback) -> RobotScores:
     truth = true_robot(seed)
     q, x = postures(truth)
     q, x = (q[::EVERY], x[::EVERY]) if small else (q, x)
-    told = measured(truth, q, x, seed, within(progress, 0.0, 0.3))
+    told = measured(truth, q, x, seed, part_of(progress, 0.0, 0.3))
     labels = told.often
     y = told.values[:, labels].reshape(len(q), -1)
     clean = parameters(truth, q, told.reference)[:, labels].reshape(len(q), -1)

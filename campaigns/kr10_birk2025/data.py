@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.progress import Tell
-from planner.studies.hits import StruckPoses, everyday, strike, upright
+from planner.progress import ProgressCallback
+from planner.studies.hits import HitPoses, everyday_faults, simulate_hits, upright_poses
 from planner.truth.deviation import AttachedResonator, BentLink, Deviation, Spring, StiffnessRipple
 from planner.truth.hits import Hammer
 from planner.truth.laws import HarmonicDrive
@@ -44,7 +44,7 @@ STEP = 0.1  # by how much of its own, each time
 class PathHits:
     """Hits at all points of the three paths; `path` (n,) names each one's."""
 
-    struck: StruckPoses
+    hit_poses: HitPoses
     path: np.ndarray
 
     @property
@@ -103,13 +103,13 @@ def poses(truth: Truth, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles (n, 6) in rad and path (n,) of each; InputError if a point is out of reach."""
     places = np.concatenate([np.linspace(*ends, points) for ends in ENDS_M.values()])
     targets = ((place, 0.0) for place in places)
-    q = upright(truth, targets, np.deg2rad(START_DEG), "the paths")
+    q = upright_poses(truth, targets, np.deg2rad(START_DEG), "the paths")
     return q, np.repeat(list(ENDS_M), points)
 
 
-def load(seed: int, small: bool, progress: Tell) -> PathHits:
+def load(seed: int, small: bool, progress: ProgressCallback) -> PathHits:
     """Hits along x, y and z at three levels at each point, with everyday errors."""
     truth = true_robot(seed)
     q, path = poses(truth, FEW_POINTS if small else POINTS)
-    secret = everyday(truth, seed, ports=gears(truth))
-    return PathHits(strike(truth, secret, q, HAMMER, FULL_HZ, seed, progress), path)
+    injected = everyday_faults(truth, seed, ports=gears(truth))
+    return PathHits(simulate_hits(truth, injected, q, HAMMER, FULL_HZ, seed, progress), path)

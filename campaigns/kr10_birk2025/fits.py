@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import differential_evolution, least_squares, minimize
 from scipy.stats import qmc
 
-from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
+from planner.design.parameter_sensitivity import FrfNoise, UncertainParameters
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS, Priors, parametrise
 from planner.fit.identify import identify, robot_prior
@@ -115,7 +115,7 @@ def fitted(
     `searched` (p,): where a global search ended, from which least squares begin, too.
     """
     nominal, ours = stated(name), name.endswith("ours")
-    frfs, q = [hits.struck.frfs[i] for i in rows], hits.struck.q[rows]
+    frfs, q = [hits.hit_poses.frfs[i] for i in rows], hits.hit_poses.q[rows]
     priors, misfit = CAD_INERTIAS if ours else paper_priors(nominal), np.nan
     starts, steps = [], FEW_GENERATIONS if small else SEARCHED.get(name, 0)
     if name not in SEARCHED:
@@ -194,7 +194,7 @@ def _direct(h: np.ndarray, frequency_hz: np.ndarray, lines: np.ndarray) -> np.nd
 def _agreement(hits: PathHits, simulation: Simulation, band_hz: tuple[float, float]) -> Agreement:
     """Of all poses, each on its own lines in the band."""
     parts = []
-    for q, frf in zip(hits.struck.q, hits.struck.frfs, strict=True):
+    for q, frf in zip(hits.hit_poses.q, hits.hit_poses.frfs, strict=True):
         lines = (frf.frequency_hz >= band_hz[0]) & (frf.frequency_hz <= band_hz[1])
         simulated = simulation.accelerance(q[None], frf.frequency_hz[lines])
         parts.append(metrics.agreement(frf.accelerance[None][..., lines], simulated))
@@ -226,7 +226,7 @@ class Informative:
     ) -> "Informative":  # fmt: skip
         """At poses q (n, dof) in rad, with the noise of these FRFs and a misfit as found."""
         robot = RobotBelief.stated(robot_prior(simulation, priors), EXACT_HITS)
-        open_ = OpenParameters(robot, FrfNoise.of(tuple(frfs), band_hz, misfit), band_hz)
+        open_ = UncertainParameters(robot, FrfNoise.of(tuple(frfs), band_hz, misfit), band_hz)
         springs = slice(0, len(robot.structure.parameters))
         told = open_.information(q)[:, :, springs, springs]
         return cls(open_.covariance[springs, springs], told)

@@ -90,7 +90,7 @@ def design_table(run: Run) -> Table:
 def campbell(run: Run) -> Figure:
     """Figures 8 and 9: S1, hit and response y, over frequency and place along the path."""
     rows = np.flatnonzero(run.hits.path == PATHS[0])
-    lines, struck = np.linspace(*BAND_HZ, 240), run.hits.struck
+    lines, struck = np.linspace(*BAND_HZ, 240), run.hits.hit_poses
     measured = [
         np.interp(lines, struck.frfs[i].frequency_hz, np.abs(struck.frfs[i].accelerance[1, 1]))
         for i in rows

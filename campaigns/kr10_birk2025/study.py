@@ -8,7 +8,7 @@ chain leave open integrated out. The paper's outlook asks where to measure: D-op
 
 import numpy as np
 
-from planner.progress import Tell, within
+from planner.progress import ProgressCallback, part_of
 from planner.studies.claims import Bound, ClaimRule, in_order
 from planner.studies.report import Paper, Report, on_each
 
@@ -109,10 +109,10 @@ RULES = (
 )
 
 
-def study(progress: Tell, small: bool = False) -> Report:
+def study(progress: ProgressCallback, small: bool = False) -> Report:
     """FRAC and Frobenius similarity by path, direction and band, and which poses suffice."""
     seeds = SEEDS[:1] if small else SEEDS
-    runs = on_each(seeds, lambda seed, tell: _run(seed, small, tell), progress)
+    runs = on_each(seeds, lambda seed, part: _run(seed, small, part), progress)
     directions = direction_table(runs[0])
     return Report(
         f"SIMULATED: a KR10 in MuJoCo on three paths, {len(runs[0].hits.path)} points, nine hits "
@@ -129,25 +129,25 @@ def study(progress: Tell, small: bool = False) -> Report:
     )
 
 
-def _run(seed: int, small: bool, progress: Tell) -> Run:
-    hits = load(seed, small, within(progress, 0.0, 0.25))
+def _run(seed: int, small: bool, progress: ProgressCallback) -> Run:
+    hits = load(seed, small, part_of(progress, 0.0, 0.25))
     models: dict[str, IdentifiedModel] = {}
     for i, name in enumerate((*SEARCHED, *MAIN)):
         progress(f"{name}: identification from nine poses", 0.25 + 0.09 * i)
         before = models.get(f"{name}, global search")
         start = before.values if before else None
         models[name] = fitted(hits, hits.ends_and_middles, name, small, start)
-    return Run(hits, models, _designs(hits, models, small, within(progress, 0.7, 1.0)))
+    return Run(hits, models, _designs(hits, models, small, part_of(progress, 0.7, 1.0)))
 
 
 def _designs(
-    hits: PathHits, models: dict[str, IdentifiedModel], small: bool, progress: Tell
+    hits: PathHits, models: dict[str, IdentifiedModel], small: bool, progress: ProgressCallback
 ) -> list[Design]:
     """The paper's nine points, as many of the planner's, fewer of these, and one path's.
 
     Without identification also the nine with hits along one axis.
     """
-    simulation, frfs, q = stated("24P"), hits.struck.frfs, hits.struck.q
+    simulation, frfs, q = stated("24P"), hits.hit_poses.frfs, hits.hit_poses.q
     nine = hits.ends_and_middles
     model, searched = models["24P"], models["24P, global search"].values
     informative = Informative.of(
@@ -214,7 +214,7 @@ def _notes(runs: list[Run]) -> dict[str, str]:
     first = runs[0]
     ratios = ", ".join(f"{v:.1f}" for v in first.models["24P"].ratios)
     total, high = np.zeros((2, 3))
-    for frf in first.hits.struck.frfs:
+    for frf in first.hits.hit_poses.frfs:
         square = np.abs(np.einsum("iif->if", frf.accelerance)) ** 2
         total += square.sum(axis=1)
         high += square[:, frf.frequency_hz > BAND_HZ[1]].sum(axis=1)

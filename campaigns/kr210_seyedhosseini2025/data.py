@@ -15,9 +15,9 @@ from planner.errors import RefusedError
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
-from planner.progress import Tell, within
+from planner.progress import ProgressCallback, part_of
 from planner.robot.robot import Robot
-from planner.studies.hits import everyday, strike, upright
+from planner.studies.hits import everyday_faults, simulate_hits, upright_poses
 from planner.truth.arms import KR210
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer
@@ -53,15 +53,15 @@ class PostureData:
     unchecked_hz: np.ndarray  # (n, modes) before the check
 
 
-def load(folder: Path, seed: int, small: bool, progress: Tell) -> PostureData:
+def load(folder: Path, seed: int, small: bool, progress: ProgressCallback) -> PostureData:
     """Hits, modes, tracking and check at all postures; `folder` holds the robot's files."""
     robot_toml = KR210.write(folder, 3)
     truth = load_truth(robot_toml, Deviation(seed, 0.15, 0.4, 0.05, mixed=1.0))
     q = trajectory(truth)
     q = q[-FEW_POSTURES:] if small else q
     x = (q - q.min(axis=0)) / np.maximum(np.ptp(q, axis=0), 1e-3)  # joint 4 hardly moves
-    secret = everyday(truth, seed)
-    struck = strike(truth, secret, q, HAMMER, BAND_HZ, seed, within(progress, 0.0, 0.7))
+    injected = everyday_faults(truth, seed)
+    struck = simulate_hits(truth, injected, q, HAMMER, BAND_HZ, seed, part_of(progress, 0.0, 0.7))
     found: list[tuple[Mode, ...]] = []
     doubtful: list[tuple[Mode, ...]] = []
     for i, frf in enumerate(struck.frfs):
@@ -98,7 +98,7 @@ def trajectory(truth: Truth) -> np.ndarray:
     ][:POSTURES]
     turns = TURN_RAD * np.sin(2 * np.pi * TURNS * np.linspace(0, 1, POSTURES))
     targets = zip(np.array(places), turns, strict=True)
-    return upright(truth, targets, np.deg2rad(START_DEG), "the trajectory")
+    return upright_poses(truth, targets, np.deg2rad(START_DEG), "the trajectory")
 
 
 def parameters(f: np.ndarray, zeta: np.ndarray, residue: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.frf import synthesis
-from planner.progress import Tell, within
+from planner.progress import ProgressCallback, part_of
 from planner.studies.claims import Bound, ClaimRule, in_order
 from planner.studies.report import Paper, Report, Table, on_each
 
@@ -66,10 +66,10 @@ RULES = (
 )
 
 
-def study(progress: Tell, small: bool = False) -> Report:
+def study(progress: ProgressCallback, small: bool = False) -> Report:
     """Errors and coverage at the last 15 postures, correlations, and FRFs."""
     seeds = SEEDS[:1] if small else SEEDS
-    runs = on_each(seeds, lambda seed, tell: _run(seed, small, tell), progress)
+    runs = on_each(seeds, lambda seed, part: _run(seed, small, part), progress)
     first = runs[0]
     correlation = _correlations(first.data)
     rows = tuple((f"posture {n}", *frf.r2) for n, frf in first.frfs.items())
@@ -91,9 +91,9 @@ def study(progress: Tell, small: bool = False) -> Report:
     )
 
 
-def _run(seed: int, small: bool, progress: Tell) -> Run:
+def _run(seed: int, small: bool, progress: ProgressCallback) -> Run:
     with tempfile.TemporaryDirectory() as folder:
-        data = load(Path(folder), seed, small, within(progress, 0.0, 0.8))
+        data = load(Path(folder), seed, small, part_of(progress, 0.0, 0.8))
     progress("fitting", 0.8)
     mean, sd = fit(data)
     progress("one GP an output, as published", 0.85)

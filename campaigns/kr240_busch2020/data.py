@@ -14,9 +14,9 @@ import numpy as np
 
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
-from planner.progress import Tell, quietly
+from planner.progress import ProgressCallback, no_progress
 from planner.robot.robot import Robot
-from planner.studies.hits import StruckPoses, everyday, strike
+from planner.studies.hits import HitPoses, everyday_faults, simulate_hits
 from planner.truth.deviation import AttachedResonator, Deviation
 from planner.truth.hits import Hammer
 from planner.truth.load import load_truth
@@ -42,7 +42,7 @@ class Sweep:
 
     lines_hz: np.ndarray  # (f,) of what is measured
     angles_deg: np.ndarray  # (n,)
-    struck: StruckPoses  # hits across only, at n angles
+    hit_poses: HitPoses  # hits across only, at n angles
     truth: np.ndarray  # (f, p) amplitude at BEYOND_DEG
     simulated: np.ndarray  # (f', p') amplitude on `simulated_axes`
     simulation: Simulation
@@ -56,7 +56,7 @@ class Sweep:
     def amplitude(self) -> np.ndarray:
         """(f, n) of the driving point, in m/s²/N, between the lines of each record."""
         columns = []
-        for frf in self.struck.frfs:
+        for frf in self.hit_poses.frfs:
             h = frf.accelerance[ACROSS, ACROSS]
             parts = [np.interp(self.lines_hz, frf.frequency_hz, part) for part in (h.real, h.imag)]
             columns.append(np.hypot(*parts))
@@ -65,9 +65,9 @@ class Sweep:
     def every(self, step: int) -> "Sweep":
         """With every so manyth experiment only."""
         kept = slice(None, None, step)
-        struck = self.struck
-        some = StruckPoses(struck.q[kept], struck.frfs[kept], struck.hits[kept])
-        return replace(self, angles_deg=self.angles_deg[kept], struck=some)
+        struck = self.hit_poses
+        some = HitPoses(struck.q[kept], struck.frfs[kept], struck.hits[kept])
+        return replace(self, angles_deg=self.angles_deg[kept], hit_poses=some)
 
     def modes(self, angles_deg: np.ndarray, count: int) -> SimulatedModes:
         """What the simulation says at angles (n,) in °."""
@@ -89,13 +89,20 @@ def true_robot(seed: int) -> Truth:
     )  # fmt: skip
 
 
-def sweep(seed: int, progress: Tell = quietly) -> Sweep:
+def sweep(seed: int, progress: ProgressCallback = no_progress) -> Sweep:
     """Robot, hits and noise of one seed."""
     truth = true_robot(seed)
     angles = np.linspace(SWEEP_DEG[0], TRAINED_DEG, MEASURED_ANGLES)
     # Slower than half the sampling rate all is kept; hits are wanted to well above the band.
-    struck = strike(
-        truth, everyday(truth, seed), poses(angles), HAMMER, HEARD_HZ, seed, progress, axes="z"
+    struck = simulate_hits(
+        truth,
+        everyday_faults(truth, seed),
+        poses(angles),
+        HAMMER,
+        HEARD_HZ,
+        seed,
+        progress,
+        axes="z",
     )
     lines = np.linspace(*BAND_HZ, MEASURED_LINES)
     beyond = [truth.accelerance(q, lines)[ACROSS, ACROSS] for q in poses(BEYOND_DEG)]

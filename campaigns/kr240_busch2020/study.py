@@ -12,7 +12,7 @@ import numpy as np
 from planner.api import diagnose
 from planner.errors import InputError, RefusedError
 from planner.modal.tracking import Guide, Tracks, track
-from planner.progress import Tell, quietly, within
+from planner.progress import ProgressCallback, no_progress, part_of
 from planner.studies.claims import Bound, ClaimRule, gathered
 from planner.studies.report import Paper, Report, Table, on_each
 from planner.surrogate.frf_bands import frf_moments
@@ -97,14 +97,14 @@ RULES = (
 )  # fmt: skip
 
 
-def study(progress: Tell, small: bool = False) -> Report:
+def study(progress: ProgressCallback, small: bool = False) -> Report:
     """R² beyond 105° of every model, with every, every 2nd, 3rd and 4th experiment."""
     steps, robots = ((4,), ROBOTS[:1]) if small else (EVERY, ROBOTS)
 
-    def run(seed: int, tell: Tell) -> tuple[Sweep, dict[int, BeyondPrediction]]:
-        there, i = sweep(seed, within(tell, 0.0, 0.05)), robots.index(seed)
+    def run(seed: int, part: ProgressCallback) -> tuple[Sweep, dict[int, BeyondPrediction]]:
+        there, i = sweep(seed, part_of(part, 0.0, 0.05)), robots.index(seed)
         if i < ALL_MODELS:
-            return there, _all_models(there, steps, i == 0, small, within(tell, 0.05, 1.0))
+            return there, _all_models(there, steps, i == 0, small, part_of(part, 0.05, 1.0))
         return there, {step: _fused(there.every(step)) for step in steps}
 
     done = dict(zip(robots, on_each(robots, run, progress), strict=True))
@@ -133,12 +133,12 @@ def study(progress: Tell, small: bool = False) -> Report:
 
 
 def _all_models(
-    seen: Sweep, steps: tuple[int, ...], ours: bool, small: bool, progress: Tell
+    seen: Sweep, steps: tuple[int, ...], ours: bool, small: bool, progress: ProgressCallback
 ) -> dict[int, BeyondPrediction]:
     """By step; with every experiment also MFDGP and the diagnosis, and `ours` of the logarithm."""
     done = {}
     for i, step in enumerate(steps):
-        part = within(progress, i / len(steps), (i + 1) / len(steps))
+        part = part_of(progress, i / len(steps), (i + 1) / len(steps))
         done[step] = _predict(seen.every(step), step == 1, ours, part, COARSE if small else 1)
     return done
 
@@ -211,7 +211,7 @@ def _fused(seen: Sweep) -> BeyondPrediction:
 
 
 def _predict(
-    seen: Sweep, everything: bool, ours: bool, progress: Tell, coarse: int = 1
+    seen: Sweep, everything: bool, ours: bool, progress: ProgressCallback, coarse: int = 1
 ) -> BeyondPrediction:
     """By the models that every number of experiments is given, or by all; every so manyth low."""
     lines, angles = seen.simulated_axes
@@ -246,7 +246,7 @@ def _predict(
 def _diagnosed(seen: Sweep) -> tuple[np.ndarray, str, Effects]:
     """Amplitudes (f, p) of the simulation with what a diagnosis of the same hits adds to it."""
     try:
-        told = diagnose(seen.struck.dataset(BAND_HZ), seen.simulation.robot)
+        told = diagnose(seen.hit_poses.dataset(BAND_HZ), seen.simulation.robot)
     except (InputError, RefusedError) as error:
         nothing = np.full((len(seen.lines_hz), len(BEYOND_DEG)), np.nan)
         return nothing, f"Not diagnosed: {error}", ()
@@ -259,7 +259,7 @@ def _diagnosed(seen: Sweep) -> tuple[np.ndarray, str, Effects]:
 
 def predict_beyond(seen: Sweep) -> tuple[np.ndarray, np.ndarray]:
     """Amplitude and sd (f, p) at BEYOND_DEG in m/s²/N, from the modes of what was measured."""
-    modes = [list(each) for each in seen.struck.modes(BAND_HZ, quietly)]
+    modes = [list(each) for each in seen.hit_poses.modes(BAND_HZ, no_progress)]
     count = max(len(each) for each in modes)
     guide = seen.modes(seen.angles_deg, count + EXTRA_MODES)
     x = _scaled(seen.angles_deg)

@@ -18,8 +18,8 @@ from planner.campaign.measured_modes import from_mode
 from planner.campaign.state import Measurement
 from planner.demo import NAME, shipped
 from planner.frf.frf import Frf
-from planner.progress import Tell, within
-from planner.studies.hits import everyday, strike
+from planner.progress import ProgressCallback, part_of
+from planner.studies.hits import everyday_faults, simulate_hits
 from planner.surrogate.modal_surrogate import ModalObservations
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.hits import Hammer
@@ -68,14 +68,14 @@ def places() -> dict[str, np.ndarray]:
     return {pose: np.deg2rad([float(row[n]) for n in names]) for pose, row in rows.items()}
 
 
-def load(seed: int, progress: Tell) -> AnalysedPoses:
+def load(seed: int, progress: ProgressCallback) -> AnalysedPoses:
     """Hits at all poses, modal analysis, labels by the simulation as in a campaign."""
     source, truth, wanted = shipped(NAME), true_robot(seed), places()
     config = load_campaign_config(source / "campaign.toml")
     cell = Cell.load(source / "robot" / "robot.toml", config)
     band_hz, q = config.modes.band_hz, np.array(list(wanted.values()))
-    struck = strike(
-        truth, everyday(truth, seed), q, HAMMER, band_hz, seed, within(progress, 0.0, 0.75)
+    struck = simulate_hits(
+        truth, everyday_faults(truth, seed), q, HAMMER, band_hz, seed, part_of(progress, 0.0, 0.75)
     )
     found = tuple(
         Measurement(
@@ -85,7 +85,7 @@ def load(seed: int, progress: Tell) -> AnalysedPoses:
             tuple(from_mode(mode) for mode in modes),
         )
         for pose, there, modes in zip(
-            wanted, struck.q, struck.modes(band_hz, within(progress, 0.75, 1.0)), strict=True
+            wanted, struck.q, struck.modes(band_hz, part_of(progress, 0.75, 1.0)), strict=True
         )
     )
     modes = observations(cell, label(cell, found))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.progress import Tell, within
+from planner.progress import ProgressCallback, part_of
 from planner.studies.claims import Bound, ClaimRule, in_order
 from planner.studies.report import Paper, Report, Table, on_each, r_squared
 from planner.surrogate.models.averaged import fit_ar1_nargp, fit_gp, fit_recursive
@@ -150,10 +150,10 @@ class Run:
     twelve: Rebuilt
 
 
-def study(progress: Tell, small: bool = False) -> Report:
+def study(progress: ProgressCallback, small: bool = False) -> Report:
     """All figures, and whether what the paper found in its own holds here."""
     counts, seeds = (FEW_COUNTS, SEEDS[:1]) if small else (COUNTS, SEEDS)
-    runs = on_each(seeds, lambda seed, tell: _run(seed, counts, small, tell), progress)
+    runs = on_each(seeds, lambda seed, part: _run(seed, counts, small, part), progress)
     first = runs[0]
     parts = ("seven", "eight", "ten", "eleven")
     seven, eight, ten, eleven = (np.median([getattr(r, p) for r in runs], axis=0) for p in parts)
@@ -174,8 +174,8 @@ def study(progress: Tell, small: bool = False) -> Report:
     )
 
 
-def _run(seed: int, counts: tuple[int, ...], small: bool, progress: Tell) -> Run:
-    seen = load(seed, within(progress, 0.0, 0.2))
+def _run(seed: int, counts: tuple[int, ...], small: bool, progress: ProgressCallback) -> Run:
+    seen = load(seed, part_of(progress, 0.0, 0.2))
     modes, parts = seen.modes, split(seen.x, seed)
     progress("frequencies", 0.2)
     frequencies = [_frequency(seen, k) for k in range(modes.frequency_hz.shape[1])]

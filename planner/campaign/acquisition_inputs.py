@@ -6,7 +6,7 @@ import numpy as np
 
 from planner.campaign.cell import Cell
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
-from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
+from planner.design.parameter_sensitivity import FrfNoise, UncertainParameters
 from planner.design.propose import WORKSPACE_POSES
 
 if TYPE_CHECKING:
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 MOST_INFORMED = 200
 
 
-def open_parameters(model: "Model") -> OpenParameters | None:
+def uncertain_parameters(model: "Model") -> UncertainParameters | None:
     """The simulation's parameters as measured so far; None where it does not learn."""
     config, low = model.cell.config, model.low
     # One that was identified and then set aside has nothing to learn that would be believed.
-    if config.fidelity.simulation != "updated" or low.nominal is None or low.suspect is not None:
+    if config.fidelity.simulation != "updated" or low.nominal is None or low.rejected is not None:
         return None
     noise = model.frf_noise or FrfNoise.of((), config.modes.band_hz, 1.0)
-    return OpenParameters(low.known_robot, noise, config.modes.band_hz)
+    return UncertainParameters(low.known_robot, noise, config.modes.band_hz)
 
 
 def informed_candidates(cell: Cell) -> np.ndarray:
@@ -32,12 +32,12 @@ def informed_candidates(cell: Cell) -> np.ndarray:
     return np.concatenate([np.arange(min(cell.spread, MOST_INFORMED)), own])
 
 
-def outlook(model: "Model", informed: bool) -> tuple[FrequencyOutputs, Poses]:
+def acquisition_inputs(model: "Model", informed: bool) -> tuple[FrequencyOutputs, Poses]:
     """Posterior over the workspace (and the goal), and candidates as poses.
 
     `informed`: the poses are those of `informed_candidates`, with what they tell of parameters.
     """
-    cell, surrogate, open_ = model.cell, model.surrogate, open_parameters(model)
+    cell, surrogate, open_ = model.cell, model.surrogate, uncertain_parameters(model)
     candidates, simulated = cell.candidates, model.simulated_candidates
     asked = informed_candidates(cell) if informed else np.arange(len(candidates.q))
     x, inputs = candidates.features[asked], surrogate.frequency_inputs(simulated)[asked]
@@ -68,7 +68,7 @@ def _goal(model: "Model", workspace: Target) -> Target:
 
 def poses_at(model: "Model", q: np.ndarray) -> tuple[Poses, np.ndarray]:
     """Poses q (n, dof) in rad as targets, and their simulated frequencies (n, k) in Hz."""
-    said, x, open_ = model.low.simulate(q), model.cell.features(q), open_parameters(model)
+    said, x, open_ = model.low.simulate(q), model.cell.features(q), uncertain_parameters(model)
     inputs = model.surrogate.frequency_inputs(said)
     poses = open_.poses(x, inputs, q, said, False) if open_ else Poses.plain(x, inputs)
     return poses, said.frequency_hz

@@ -10,7 +10,7 @@ from planner.campaign.config import ModesTable
 from planner.campaign.frequencies_by_simulation import tuned_frequencies
 from planner.campaign.hit_error_estimates import Visited, estimate
 from planner.campaign.labels import LabelledPose, label, observations
-from planner.campaign.low_fidelity import LowFidelity, Recall, in_memory, learn
+from planner.campaign.low_fidelity import LowFidelity, Recall, identify_low_fidelity, in_memory
 from planner.campaign.model import FrfOf, Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.hit_columns import PoseHits
@@ -21,10 +21,10 @@ from planner.surrogate.frequency_models import MODELS
 from planner.surrogate.gp import STAGES
 from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, fit_surrogate
 
-LEARNED_AT = 200  # candidates, where a model learns the simulation
+SIMULATED_AT = 200  # candidates, where a model learns the simulation
 # Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
 # that are none.
-MISSED, STRAY = float(np.log(0.1)), float(np.log(0.01))
+MISSING_MODE, UNLABELLED_MODE = float(np.log(0.1)), float(np.log(0.01))
 
 
 def build(
@@ -48,36 +48,36 @@ def build(
         whole = tuple(h.whole for h in hits) if hits is not None else frfs
         joints = cell.robot.joints
         q = joints.internal([m.joints_deg for m in used])
-        low = learn(low, whole, q, table.band_hz, used, recall or in_memory())
+        low = identify_low_fidelity(low, whole, q, table.band_hz, used, recall or in_memory())
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(whole, table.band_hz, misfit)
-        if low.learned is not None:
-            simulation, count = low.learned.identified.simulation, low.count
+        if low.identified_robot is not None:
+            simulation, count = low.identified_robot.identified.simulation, low.count
             seen = tuple(f.within(table.band_hz) for f in frfs)
             tuned = tuned_frequencies(simulation, seen, q, table.band_hz, cell.tolerances, count)
-        if hits is not None and low.learned is not None:
+        if hits is not None and low.identified_robot is not None:
             visits = [
                 Visited(one, h.columns, m.pose, tuple(hit.file for hit in m.accepted), f)
                 for one, m, h, f in zip(q, used, hits, frfs, strict=True)
             ]
-            errors = estimate(visits, low.learned, cell.tolerances, table.band_hz)
-    fits = low.learned is None or low.learned.fits
+            errors = estimate(visits, low.identified_robot, cell.tolerances, table.band_hz)
+    fits = low.identified_robot is None or low.identified_robot.fits
     candidates = [_Guided.by(cell, used, low, tuned if fits else None)]
     if not fits:
         # What lacks physics is bent by fitting it: as it stands it may be a better
         # guide, or none.
-        stated = replace(cell.frozen, suspect=low.learned)
+        stated = replace(cell.frozen, rejected=low.identified_robot)
         candidates += [
             _Guided.by(cell, used, one) for one in (stated, replace(stated, nominal=None))
         ]
     best = max(candidates, key=lambda guided: guided.log_evidence)
-    if not fits and best.low.learned is not None:
+    if not fits and best.low.identified_robot is not None:
         best = _Guided.by(cell, used, low, tuned)
     surrogate = fit_surrogate(
         best.seen,
         primary=best.primary,
         residues=False,
-        identified=best.low.taught,
+        identified=best.low.is_identified,
         kernel=cell.config.surrogate.kernel,
     )
     if hits_of is not None:
@@ -104,14 +104,14 @@ class _OfOneHit:
         return found or self.frf_of(measurement, table)
 
 
-def elsewhere(
+def simulated_elsewhere(
     cell: Cell, low: LowFidelity, model: str = ""
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Where a model of frequencies learns the simulation: features, frequencies in Hz."""
     if not MODELS[model or cell.config.surrogate.model].elsewhere:
         return None
     candidates = cell.candidates
-    q, x = candidates.q[:LEARNED_AT], candidates.features[:LEARNED_AT]
+    q, x = candidates.q[:SIMULATED_AT], candidates.features[:SIMULATED_AT]
     return x, low.frequencies(q).frequency_hz
 
 
@@ -145,7 +145,7 @@ class _Guided:
         known = low.discrepancy if labelled else None
         primary = fit_primary(
             seen, known, low.belief, model=cell.config.surrogate.model,
-            kernel=cell.config.surrogate.kernel, elsewhere=elsewhere(cell, low),
+            kernel=cell.config.surrogate.kernel, elsewhere=simulated_elsewhere(cell, low),
         )  # fmt: skip
         return cls(low, used, labelled, seen, primary)
 
@@ -158,7 +158,9 @@ class _Guided:
         labels = self.primary.log_evidence[: self.low.count]
         missed = sum(mode is None for pose in self.labelled for mode in pose.modes)
         share = min(1.0, STAGES[-1] / max(len(self.labelled), 1))  # of the poses it is about
-        return float(np.sum(labels)) + share * (missed * MISSED + self.stray * STRAY)
+        return float(np.sum(labels)) + share * (
+            missed * MISSING_MODE + self.stray * UNLABELLED_MODE
+        )
 
     @property
     def stray(self) -> int:

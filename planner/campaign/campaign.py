@@ -11,10 +11,10 @@ import msgspec
 from planner.campaign import events, store
 from planner.campaign.config import load_campaign_config
 from planner.campaign.journal import remove_parts
-from planner.campaign.reads import CampaignReads, as_logged
-from planner.campaign.taking_back import gave_way_to, last_acts, last_undone
+from planner.campaign.read_only import ReadOnlyCampaign, as_logged
+from planner.campaign.undo import last_acts, last_undone, replaced_by
 from planner.errors import InputError
-from planner.progress import Tell, quietly
+from planner.progress import ProgressCallback, no_progress
 from planner.version import __version__
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from planner.dataset.screened_files import Source
 
 
-class Campaign(CampaignReads):
+class Campaign(ReadOnlyCampaign):
     """A campaign folder, opened. Reads never write; every act is on the disk when it returns."""
 
     @classmethod
@@ -60,7 +60,7 @@ class Campaign(CampaignReads):
         self,
         paths: Sequence[Path | str],
         pose: str | None = None,
-        progress: Tell = quietly,
+        progress: ProgressCallback = no_progress,
         from_names: bool = False,
     ) -> "tuple[ImportReport, ...]":
         """Import hits, one report per pose, in recording order.
@@ -114,14 +114,14 @@ class Campaign(CampaignReads):
 
     def move(self, pose: str, other: str) -> "ImportReport":
         """The held hits of a pose are from another one: import them there."""
-        from planner.campaign.deliveries import Delivery
-        from planner.campaign.importing import import_pose, place
+        from planner.campaign.imported_files import ImportedFiles
+        from planner.campaign.importing import import_pose, readback_of
 
         with self._acting():
             entry, event = self.held_import(pose)
             sources = tuple(self.recordings.source(hit) for hit in event.hits)
-            delivery = Delivery(other, None, sources)
-            joints_deg = place(self.cell, self.state, delivery)
+            delivery = ImportedFiles(other, None, sources)
+            joints_deg = readback_of(self.cell, self.state, delivery)
             if other in self.state.held:
                 raise InputError(f"Hits of {other} wait for an answer too; answer that first.")
             self.append(events.Undone(entry.seq, gives_way=True))
@@ -175,7 +175,7 @@ class Campaign(CampaignReads):
                 raise InputError(f"{self.directory} holds no act that could be taken back.")
             for entry in acts:
                 self.append(events.Undone(entry.seq))
-                for gave_way in gave_way_to(self.entries, entry):
+                for gave_way in replaced_by(self.entries, entry):
                     self.append(events.Undone(gave_way.seq))
             return acts
 

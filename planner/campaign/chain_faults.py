@@ -27,16 +27,16 @@ class ChainFault:
     """What a chain shows is `matrix` (3, 3) times what it should, x, y, z being its channels.
 
     `scaled` are the channels that `factor` multiplies; () where axes or signs are exchanged.
-    `struck` are axes along which the hammer hit against the direction that is stated; `order` along
-    which axis those hits were that are listed as along x, y, z. Accelerations come `delay_s` late,
-    are high-passed at `corner_hz` (AC coupling; forces are where it is negative), and all channels
-    fade by an exponential window of `window_rate_1_s` more than is known.
+    `flipped_hits` are axes along which the hammer hit against the direction that is stated;
+    `order` along which axis those hits were that are listed as along x, y, z. Accelerations come
+    `delay_s` late, are high-passed at `corner_hz` (AC coupling; forces are where it is negative),
+    and all channels fade by an exponential window of `window_rate_1_s` more than is known.
     """
 
     matrix: np.ndarray
     scaled: tuple[int, ...] = ()
     factor: float = 1.0
-    struck: tuple[int, ...] = ()
+    flipped_hits: tuple[int, ...] = ()
     order: tuple[int, ...] = (0, 1, 2)
     delay_s: float = 0.0
     corner_hz: float = 0.0
@@ -52,7 +52,7 @@ class ChainFault:
         passed = 1 + 2 * np.pi * abs(self.corner_hz) / s
         filtered = np.exp(s * self.delay_s) * passed ** np.sign(self.corner_hz)
         shown = np.einsum("ij,jcf->icf", inverse, frf.accelerance) * filtered
-        for axis in self.struck:
+        for axis in self.flipped_hits:
             shown[:, axis::3] *= -1
         size = np.abs(filtered)
         variance = np.einsum("ij,jcf->icf", inverse**2, frf.variance) * size**2
@@ -66,9 +66,9 @@ class ChainFault:
     @property
     def asked(self) -> str:
         """What looks wrong, as a question."""
-        if self.struck:
-            axes = " and ".join(AXES[i] for i in self.struck)
-            ways = " and ".join(f"−{AXES[i]}" for i in self.struck)
+        if self.flipped_hits:
+            axes = " and ".join(AXES[i] for i in self.flipped_hits)
+            ways = " and ".join(f"−{AXES[i]}" for i in self.flipped_hits)
             return f"hits along {axes} look struck the other way, towards {ways}?"
         wrong = [f"{AXES[i]} along {AXES[at]}" for i, at in enumerate(self.order) if i != at]
         if wrong:
@@ -190,7 +190,9 @@ FILTERS: tuple[Callable[[float], ChainFault], ...] = (
     lambda by: ChainFault(np.eye(3), window_rate_1_s=0.1 * by),
 )
 TURNED = _turned()  # all 47 ways to exchange axes and signs
-AGAINST = tuple(ChainFault(np.eye(3), struck=s) for n in (1, 2) for s in combinations(range(3), n))
+AGAINST = tuple(
+    ChainFault(np.eye(3), flipped_hits=s) for n in (1, 2) for s in combinations(range(3), n)
+)
 EXCHANGED = tuple(ChainFault(np.eye(3), order=order) for order in permutations(range(3)))[1:]
 SCALED = tuple(_scaled(channels) for channels in ((0, 1, 2), (0,), (1,), (2,)))
 

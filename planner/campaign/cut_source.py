@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Asked:
+class StabilityRequest:
     """What `stability` is asked: a source, its pose, and one point of interest.
 
     With `tool` the FRFs are coupled to it first, as `couple` does: `reference` is the tested one,
@@ -80,7 +80,7 @@ class ToolChange:
     remarks: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, asked: Asked, cut: Cut) -> "ToolChange | None":
+    def of(cls, asked: StabilityRequest, cut: Cut) -> "ToolChange | None":
         """None where no tool is named; InputError where its file and the cut's disagree."""
         from planner.milling.tool import load_tool
 
@@ -129,12 +129,12 @@ def _directions(cut: Cut, tool: "Tool", file: Path | None) -> str:
     return text
 
 
-def structure_of(asked: Asked, cut: Cut) -> Structure:
+def structure_of(asked: StabilityRequest, cut: Cut) -> Structure:
     """From modes, FRFs, or a campaign at a pose."""
     source, change = asked.source, ToolChange.of(asked, cut)
     if is_campaign(source):
         campaign = asked.campaign
-        q = campaign.stands(asked.pose)
+        q = campaign.posture(asked.pose)
         (found,) = at_poses(campaign, (str(asked.pose),), q[None], cut, change)
         return _with(found, outside(campaign, (str(asked.pose),), q[None]))
     if asked.peak_force_n is not None:
@@ -152,7 +152,7 @@ def structure_of(asked: Asked, cut: Cut) -> Structure:
     return of_frf(read_frf(source, asked.pose, asked.from_names), cut)
 
 
-def structures_of_file(asked: Asked, cut: Cut) -> list[tuple[str, Structure]]:
+def structures_of_file(asked: StabilityRequest, cut: Cut) -> list[tuple[str, Structure]]:
     """Every pose of an npz."""
     change = ToolChange.of(asked, cut)
     no_pose(cut, asked.source)
@@ -165,7 +165,7 @@ def structures_of_file(asked: Asked, cut: Cut) -> list[tuple[str, Structure]]:
     return list(zip([name or asked.source.stem for name in names], each, strict=True))
 
 
-def _coupled(asked: Asked, change: ToolChange, pose: str | None, cut: Cut) -> Structure:
+def _coupled(asked: StabilityRequest, change: ToolChange, pose: str | None, cut: Cut) -> Structure:
     tip, name = tip_of(
         asked.source, change.tested, pose, asked.robot, asked.noise, asked.from_names
     )
@@ -243,7 +243,7 @@ def tip_of(
 
     if is_campaign(source):
         campaign = Campaign(source)
-        q, lines = campaign.stands(pose), campaign.frequency_lines
+        q, lines = campaign.posture(pose), campaign.frequency_lines
         mean, sd = campaign.frf_at(q, lines)
         tip = tip_at(campaign, str(pose), q, lines, mean[0], sd[0])
         return replace(tip, simulated=campaign.state.simulated), str(pose)

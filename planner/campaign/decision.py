@@ -53,7 +53,7 @@ class Decision:
         return bool(np.min(norm.cdf(size)) >= probability)
 
 
-def decided(model: "Model") -> Decision | None:
+def cut_decision(model: "Model") -> Decision | None:
     """At the poses of the path, or of the workspace; None where no cut is named."""
     cell = model.cell
     table, cut = cell.config.cut, cell.cut

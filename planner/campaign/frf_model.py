@@ -17,7 +17,7 @@ from planner.surrogate.leave_one_out import left_out_modes
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
-    from planner.campaign.reads import CampaignReads
+    from planner.campaign.read_only import ReadOnlyCampaign
 
 Moments = tuple[np.ndarray, np.ndarray]  # mean and sd (n, 3, 3, F) of FRFs in m/s²/N
 ZONES = 5  # of the band, evenly on a logarithmic scale: they differ in what is left out
@@ -130,8 +130,8 @@ class FrfModel:
     @classmethod
     def of(cls, model: "Model") -> "FrfModel":
         """From the FRFs of a model's poses and, where there is one, from what was identified."""
-        band, learned = model.cell.config.modes.band_hz, model.low.learned
-        simulated = learned.posterior if learned is not None and learned.fits else None
+        band, fit = model.cell.config.modes.band_hz, model.low.identified_robot
+        simulated = fit.posterior if fit is not None and fit.fits else None
         found: tuple[LeftOut, ...] = ()
         if simulated is None and len(model.frfs) > 1:
             lines = int(np.clip(LINES // len(model.frfs), LEAST, MOST))
@@ -182,13 +182,13 @@ class ForceModel:
     simulation: Simulation | None
 
     @classmethod
-    def of(cls, campaign: "CampaignReads") -> "ForceModel":
+    def of(cls, campaign: "ReadOnlyCampaign") -> "ForceModel":
         """Springs that were identified have what the campaign's own hits have of the laws."""
         low = campaign.model.low
         simulation = low.simulation
         if simulation is None or not simulation.robot.config.law:
             return cls(None)
-        if low.learned is None:
+        if low.identified_robot is None:
             return cls(simulation)
         visits = campaign.dataset(campaign.cell.config.modes.band_hz).visits
         hits = [(visit.q, hit.axis_index, peak_n(hit)) for visit in visits for hit in visit.hits]

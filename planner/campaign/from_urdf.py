@@ -10,17 +10,17 @@ import numpy as np
 import tomlkit
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.stated_masses import links_kg, whose_masses
+from planner.campaign.stated_masses import links_kg, mass_conflict
 from planner.campaign.store import CONFIG, ROBOT
 from planner.check.examine import spread_poses
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.arm_chain import ArmChain, arm_chain
 from planner.robot.config import Compliance, LinkTable, Obstacle, Payload, RobotConfig
-from planner.robot.guesses import (
+from planner.robot.default_properties import (
     PAYLOAD_KG_M3,
-    guess_inertias,
-    guessed_springs,
+    default_inertias,
+    default_springs,
     nothing_stated,
     total_stated,
 )
@@ -110,18 +110,18 @@ def guess(urdf: Path, weights: StatedMasses, robot_toml: Path, planned: bool = T
             f"{urdf} states no masses; give the robot's, from its data sheet, with --mass-kg."
         )
     stated_kg = links_kg(robot, weights.robot)
-    links = guess_inertias(robot, weights.robot)
+    links = default_inertias(robot, weights.robot)
     payload = weights.payload or PAYLOAD_SHARE * (weights.robot or total_stated(robot))
     carried = (_tool(chain.tcp, weights.tool, robot),) if weights.tool else ()
     floor = _floor(robot)
     config = msgspec.structs.replace(config, link=links, payload=carried, obstacle=(floor,))
-    robot = guessed_springs(Robot.of(config, robot_toml), payload, chain.joints)
+    robot = default_springs(Robot.of(config, robot_toml), payload, chain.joints)
     low, high = workspace_in_front(robot) if planned else (robot.lower_rad, robot.upper_rad)
     band, modes = _band(robot, low, high)
     robot = Robot.of(msgspec.structs.replace(robot.config, band_hz=band), robot_toml)
     ranges = ranges_inside(robot, low, high, 1.0)
     guesses = tuple(_guesses(robot, chain, weights, payload, ranges if planned else None))
-    remarks = (*whose_masses(robot, weights.robot, stated_kg), *_remarks(robot, chain, weights))
+    remarks = (*mass_conflict(robot, weights.robot, stated_kg), *_remarks(robot, chain, weights))
     return Guessed(robot, ranges, band, modes, guesses, remarks)
 
 

@@ -10,8 +10,14 @@ from planner.campaign.labels import LabelledPose
 from planner.campaign.measured_modes import to_mode
 from planner.campaign.state import Measurement
 from planner.dataset.hit_columns import HitColumns
-from planner.fit.hit_misses import Misses, SolvedPoses, VisitHits, VisitMisses, tell_misses
-from planner.fit.learned import Learned
+from planner.fit.hit_error_fit import (
+    HitErrorFit,
+    SolvedPoses,
+    VisitHitErrors,
+    VisitHits,
+    fit_hit_errors,
+)
+from planner.fit.identified_robot import IdentifiedRobot
 from planner.fit.posterior import FOLLOWED
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import ACROSS, HIT_NUMBERS, OF_HIT, Tolerances
@@ -37,57 +43,57 @@ class Visited(VisitHits):
 
 @dataclass(frozen=True, eq=False)
 class CampaignHitErrors:
-    """What is told of all poses with hits; `told` is None where there are none."""
+    """What is told of all poses with hits; `fitted` is None where there are none."""
 
     visited: tuple[Visited, ...]
-    told: Misses | None
+    fitted: HitErrorFit | None
     tolerances: Tolerances
     band_hz: tuple[float, float]
 
     @property
     def trusted(self) -> bool:
         """Whether the simulation is right enough to tell how hits missed."""
-        if self.told is None or self.told.discrepancy > FOLLOWED:
+        if self.fitted is None or self.fitted.discrepancy > FOLLOWED:
             return False
         sd = np.repeat([self.tolerances.angle_rad, self.tolerances.offset_m], 2)
-        away = np.concatenate([visit.mean / sd for visit in self.told.visits])
+        away = np.concatenate([visit.mean / sd for visit in self.fitted.visits])
         return bool(np.sqrt(np.mean(away**2)) < NO_HAND)
 
     @property
     def poses(self) -> dict[str, tuple[HitErrorEstimate, ...]]:
         """Hit by hit, by pose; none where the simulation is too wrong to tell."""
-        if self.told is None or not self.trusted:
+        if self.fitted is None or not self.trusted:
             return {}
-        both = zip(self.visited, self.told.visits, strict=True)
+        both = zip(self.visited, self.fitted.visits, strict=True)
         return {visited.pose: _pose(visited, told) for visited, told in both}
 
     def corrected(self, labelled: LabelledPose, measured: Measurement) -> LabelledPose:
-        """A measured pose's labelled modes with residues as `without_misses` gives them."""
+        """A measured pose's labelled modes with residues as `without_hit_errors` gives them."""
         modes = [to_mode(mode) for mode in measured.modes]
-        exact = {mode.frequency_hz: mode for mode in self.without_misses(measured.pose, modes)}
+        exact = {mode.frequency_hz: mode for mode in self.without_hit_errors(measured.pose, modes)}
         found = (None if mode is None else exact[mode.frequency_hz] for mode in labelled.modes)
         return replace(labelled, modes=tuple(found))
 
-    def without_misses(self, pose: str, modes: Sequence[Mode]) -> list[Mode]:
+    def without_hit_errors(self, pose: str, modes: Sequence[Mode]) -> list[Mode]:
         """Modes with residues as hits without a miss would give them.
 
         What stays unsure is in their sds. Poles and shapes of response do not depend on where and
         how the robot is hit. Where the simulation is too wrong to tell, residues are as measured.
         """
         names = [visited.pose for visited in self.visited]
-        if self.told is None or pose not in names or not modes:
+        if self.fitted is None or pose not in names or not modes:
             return list(modes)
-        visited, told = self.visited[names.index(pose)], self.told.visits[names.index(pose)]
+        visited, told = self.visited[names.index(pose)], self.fitted.visits[names.index(pose)]
         if not self.trusted:
             return [_unsure(mode, visited.columns, self.tolerances) for mode in modes]
         return self._moved(modes, visited, told)
 
-    def _moved(self, modes: Sequence[Mode], visited: Visited, told: VisitMisses) -> list[Mode]:
-        assert self.told is not None
-        frf, simulation = visited.frf, self.told.simulation
+    def _moved(self, modes: Sequence[Mode], visited: Visited, told: VisitHitErrors) -> list[Mode]:
+        assert self.fitted is not None
+        frf, simulation = visited.frf, self.fitted.simulation
         lines = laplace(frf.frequency_hz, frf.exponential_rate_1_s, frf.tail_s)
         solved = SolvedPoses.of(simulation, visited.q[None])
-        basis = solved.misses(0, lines, UNIT)
+        basis = solved.hit_error_columns(0, lines, UNIT)
         changes = _changes(visited.columns, told, basis, frf.frequency_hz)
         poles = np.array([mode.pole for mode in modes])
         outside = _outside(solved.poles[0], self.band_hz)
@@ -105,17 +111,20 @@ class CampaignHitErrors:
 
 
 def estimate(
-    visited: Sequence[Visited], learned: Learned | None, t: Tolerances, band_hz: tuple[float, float]
+    visited: Sequence[Visited],
+    fit: IdentifiedRobot | None,
+    t: Tolerances,
+    band_hz: tuple[float, float],
 ) -> CampaignHitErrors:
     """Misses of the hits of all poses, by the simulation as it was identified from them."""
     those = tuple(one for one in visited if len(one.columns.axis))
-    if learned is None or not those:
+    if fit is None or not those:
         return CampaignHitErrors((), None, t, band_hz)
-    told = tell_misses(learned.posterior, those)
+    told = fit_hit_errors(fit.posterior, those)
     return CampaignHitErrors(those, told, t, band_hz)
 
 
-def _pose(visited: Visited, told: VisitMisses) -> tuple[HitErrorEstimate, ...]:
+def _pose(visited: Visited, told: VisitHitErrors) -> tuple[HitErrorEstimate, ...]:
     columns = visited.columns
     sd = np.sqrt(np.diagonal(told.covariance)).reshape(-1, OF_HIT)
     hits = []
@@ -139,7 +148,7 @@ def _pair(values: np.ndarray) -> Pair:
 
 
 def _changes(
-    columns: HitColumns, told: VisitMisses, basis: np.ndarray, frequency_hz: np.ndarray
+    columns: HitColumns, told: VisitHitErrors, basis: np.ndarray, frequency_hz: np.ndarray
 ) -> np.ndarray:
     """(1 + 12, 3, 3, F): what the mean misses add to the FRF, and one sd of each unsure part."""
     share = columns.shared_at(frequency_hz)

@@ -15,7 +15,7 @@ from planner.recording.records import Hit
 from planner.recording.repeats import Doubt, doubts, other_size
 
 
-def asked_of(
+def question_about(
     model: Model,
     state: CampaignState,
     pose: str,
@@ -31,12 +31,12 @@ def asked_of(
     if known is not None and known.question is not None:  # answered
         return None
     if not model.labelled:
-        from planner.campaign.chain_question import chain_question  # and SciPy, where it is asked
+        from planner.campaign.chain_mismatch import chain_mismatch  # and SciPy, where it is asked
 
-        return chain_question(model, pose, joints_deg, measured.frf)
-    from planner.campaign.question import question
+        return chain_mismatch(model, pose, joints_deg, measured.frf)
+    from planner.campaign.pose_mismatch import pose_mismatch
 
-    return question(model, state, pose, joints_deg, measured)
+    return pose_mismatch(model, state, pose, joints_deg, measured)
 
 
 def contradiction(pose: str, measured: MeasuredPose, known: int) -> Question | None:
@@ -134,17 +134,17 @@ def hit_again(model: Model, known: Measurement, modes: Sequence[MeasuredMode]) -
 
 
 @dataclass(frozen=True)
-class Suspicion:
+class DriftSuspicion:
     """A hint at drift: the measured pose that is to be hit again, and why, in a sentence."""
 
     again: str
     text: str
 
 
-def suspected(
+def suspected_drift(
     model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...],
     modes: Sequence[MeasuredMode],
-) -> Suspicion | None:  # fmt: skip
+) -> DriftSuspicion | None:  # fmt: skip
     """Whether hits at a new pose hint at drift, and which early pose then tells.
 
     `model` and `state` are those before the import; it is a hint only where they expect enough.
@@ -161,7 +161,7 @@ def suspected(
         return None
     early = _telling(state)
     which = "the first pose" if early is state.used[0] else "an early pose"
-    return Suspicion(
+    return DriftSuspicion(
         early.pose,
         f"All modes at {pose} lie to one side of what is expected, by {100 * np.mean(off):+.2f} % "
         f"on average: the robot may have drifted (warmth, load, clamping). Hit {early.pose}, "
@@ -213,7 +213,7 @@ def alerts(
     event: Imported,
     measured: MeasuredPose,
     modes: Sequence[MeasuredMode],
-    suspicion: Suspicion | None,
+    suspicion: DriftSuspicion | None,
 ) -> tuple[str, ...]:
     """Remarks on new hits, their channels, reciprocity and drift.
 

@@ -14,20 +14,20 @@ from msgspec.structs import replace
 from planner.campaign import events, store
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
-from planner.campaign.deliveries import (
-    Delivery,
+from planner.campaign.events import REFUSED, HitRecord, Question
+from planner.campaign.hit_errors import HitErrorEstimate
+from planner.campaign.import_checks import alerts, contradiction, question_about, suspected_drift
+from planner.campaign.imported_files import (
     Fresh,
+    ImportedFiles,
     KnownFile,
     at_their_poses,
-    let_go,
     new_files,
     record_of,
+    replaced_hits,
     sort_paths,
     superseded,
 )
-from planner.campaign.events import REFUSED, HitRecord, Question
-from planner.campaign.hit_errors import HitErrorEstimate
-from planner.campaign.import_checks import alerts, asked_of, contradiction, suspected
 from planner.campaign.measured_modes import from_homogeneity, from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
@@ -35,7 +35,7 @@ from planner.campaign.store import KeptRecordings
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source, hits_of_files
 from planner.errors import InputError
-from planner.progress import Tell
+from planner.progress import ProgressCallback
 from planner.recording.joints import JointUnits
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class ImportReport:
         return tuple(hit for hit in own if hit.file in files)
 
 
-def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, ...]:
+def readback_of(cell: Cell, state: CampaignState, delivery: ImportedFiles) -> tuple[float, ...]:
     """Readback angles (°) of a delivery, checked against robot, proposal and earlier hits.
 
     Raises InputError where they are not known or contradict each other.
@@ -115,7 +115,7 @@ def refusals(
     return tuple(found)
 
 
-def not_used(hits: tuple[HitRecord, ...], asked: Question | None) -> tuple[HitRecord, ...]:
+def left_out_hits(hits: tuple[HitRecord, ...], asked: Question | None) -> tuple[HitRecord, ...]:
     """Those of new hits that the model does not use: refused ones, or all while it is `asked`."""
     if asked is None:
         return tuple(hit for hit in hits if not hit.accepted)
@@ -142,7 +142,7 @@ class JudgedFiles:
     def of(
         cls,
         kept: KeptRecordings,
-        delivery: Delivery,
+        delivery: ImportedFiles,
         state: CampaignState,
         named: frozenset[Path],
         table: ModesTable,
@@ -205,7 +205,7 @@ def remarks_on(
             if hit.sha256 in state.refused
         ),
         *displacement(joints, state, measurement.pose, stood),
-        *lacking(state, measurement),
+        *axes_not_hit(state, measurement),
     )
 
 
@@ -220,7 +220,7 @@ def displacement(
     return (f"The readback of {pose} is up to {off} from its setpoint; the readback is used.",)
 
 
-def lacking(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
+def axes_not_hit(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
     """Remarks on axes that were not hit, or once only, of those that the pose is to be hit along.
 
     Files of FRFs say nothing of single hits and are not remarked upon.
@@ -245,14 +245,14 @@ def lacking(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
 
 
 def import_paths(
-    campaign: "Campaign", given: tuple[Path, ...], pose: str | None, progress: Tell,
+    campaign: "Campaign", given: tuple[Path, ...], pose: str | None, progress: ProgressCallback,
     from_names: bool,
 ) -> tuple[ImportReport, ...]:  # fmt: skip
     """Import within an act of the campaign, see `Campaign.import_paths`."""
     cell, state = campaign.cell, campaign.state
     default = state.open[0] if len(state.open) == 1 else None
     deliveries = sort_paths(given, cell.robot.joints, cell.robot.points, pose, default)
-    placed = [(d, place(cell, state, d)) for d in at_their_poses(deliveries, state)]
+    placed = [(d, readback_of(cell, state, d)) for d in at_their_poses(deliveries, state)]
     named = frozenset(path for path in given if path.is_file())
     reports = []
     for number, (delivery, joints_deg) in enumerate(placed):
@@ -263,14 +263,14 @@ def import_paths(
     return tuple(reports)
 
 
-def _taken_back(campaign: "Campaign", delivery: Delivery) -> Delivery:
+def _taken_back(campaign: "Campaign", delivery: ImportedFiles) -> ImportedFiles:
     """Take back a held import of which a delivery says something else now; all is judged anew.
 
     The delivery with the held files of its pose that it lacks.
     """
     for held_at in tuple(campaign.state.held):
         entry, event = campaign.held_import(held_at)
-        lacks = let_go(delivery, event, campaign.cell.robot.joints)
+        lacks = replaced_hits(delivery, event, campaign.cell.robot.joints)
         if lacks is not None:
             campaign.append(events.Undone(entry.seq, gives_way=True))
             more = tuple(map(campaign.recordings.source, lacks))
@@ -279,7 +279,7 @@ def _taken_back(campaign: "Campaign", delivery: Delivery) -> Delivery:
 
 
 def import_pose(
-    campaign: "Campaign", delivery: Delivery, joints_deg: tuple[float, ...],
+    campaign: "Campaign", delivery: ImportedFiles, joints_deg: tuple[float, ...],
     named: frozenset[Path],
 ) -> ImportReport:  # fmt: skip
     """Judge the files of one pose, ask what is to be asked, write the import and fit again."""
@@ -306,7 +306,7 @@ def import_pose(
     return ImportReport(
         pose=pose,
         accepted=tuple(hit for hit in hits if hit.accepted and not event.question),
-        refused=not_used(hits, event.question),
+        refused=left_out_hits(hits, event.question),
         already=judged.already,
         measurement=measurement,
         measured=measured,
@@ -336,8 +336,8 @@ def _event(
         alone = measure_files((), fresh, before.cell.config.modes)[1]
     new_modes = from_modal(alone.modal)
     asked = contradiction(pose, measured, len(judged.old))
-    asked = asked or asked_of(before, state, pose, joints_deg, alone)
-    drift = None if asked else suspected(before, state, pose, joints_deg, new_modes)
+    asked = asked or question_about(before, state, pose, joints_deg, alone)
+    drift = None if asked else suspected_drift(before, state, pose, joints_deg, new_modes)
     event = events.Imported(
         pose=pose,
         joints_deg=joints_deg,

@@ -11,9 +11,9 @@ from planner.campaign.state import Measurement
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.effects.parameters import CAD_INERTIAS, Priors
-from planner.effects.table import Repertoire
+from planner.effects.table import EffectLibrary
 from planner.fit.fitted import FitRecord
-from planner.fit.learned import Learned
+from planner.fit.identified_robot import IdentifiedRobot
 from planner.fit.posterior import RobotBelief
 from planner.fit.result import Identification
 from planner.fit.search import Search
@@ -47,13 +47,13 @@ class LowFidelity:
     count: int
     nominal: Simulation | None
     tolerances: Tolerances = field(default_factory=Tolerances)
-    learned: Learned | None = None
-    suspect: Learned | None = None  # what was identified and then found worse than nominal
+    identified_robot: IdentifiedRobot | None = None
+    rejected: IdentifiedRobot | None = None  # what was identified and then found worse than nominal
 
     @property
     def identified(self) -> Identification | None:
         """What was identified and is used."""
-        return self.learned.identified if self.learned else None
+        return self.identified_robot.identified if self.identified_robot else None
 
     @property
     def priors(self) -> Priors:
@@ -64,24 +64,26 @@ class LowFidelity:
     def prior(self) -> RobotPrior:
         """The same of everything that a robot may have; only with a simulation."""
         assert self.nominal is not None
-        return RobotPrior(Repertoire.of(self.nominal, self.priors))
+        return RobotPrior(EffectLibrary.of(self.nominal, self.priors))
 
     @property
     def known_robot(self) -> RobotBelief:
         """What is known of the robot's numbers, before it is measured as stated."""
-        if self.learned is not None:
-            return self.learned.posterior
+        if self.identified_robot is not None:
+            return self.identified_robot.posterior
         return RobotBelief.stated(self.prior, self.tolerances)
 
     @property
-    def taught(self) -> bool:
+    def is_identified(self) -> bool:
         """Whether it was identified from the recordings and fits them to their noise."""
-        return self.learned is not None and self.learned.fits
+        return self.identified_robot is not None and self.identified_robot.fits
 
     @property
     def simulation(self) -> Simulation | None:
         """The identified simulation where there is one."""
-        return self.learned.identified.simulation if self.learned else self.nominal
+        return (
+            self.identified_robot.identified.simulation if self.identified_robot else self.nominal
+        )
 
     def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
         """Simulated modes of poses q (n, dof) in rad; NaN without a simulation.
@@ -106,9 +108,9 @@ class LowFidelity:
 
         0 unless the simulation was identified and fits: it is not known then.
         """
-        if self.learned is None or not self.taught:
+        if self.identified_robot is None or not self.is_identified:
             return np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
-        simulation = self.learned.identified.simulation
+        simulation = self.identified_robot.identified.simulation
         modes = simulation.modes(q, self.count)
         known = np.isfinite(modes.frequency_hz)
         pole = synthesis.pole(
@@ -121,31 +123,31 @@ class LowFidelity:
     @property
     def discrepancy(self) -> np.ndarray | None:
         """Size of ln f's error (count,) where the simulation was not fitted; None: not known."""
-        if self.learned is None or not self.learned.fits:
+        if self.identified_robot is None or not self.identified_robot.fits:
             return None
-        return np.full(self.count, RIGHT + DAMPING * self.learned.posterior.size)
+        return np.full(self.count, RIGHT + DAMPING * self.identified_robot.posterior.size)
 
     @property
-    def misses(self) -> float:
+    def misfit_sds(self) -> float:
         """By how many sds of their noise it misses the recordings; 0 where it explains them."""
-        learned = self.learned or self.suspect
-        if learned is None or learned.fits:
+        fit = self.identified_robot or self.rejected
+        if fit is None or fit.fits:
             return 0.0
-        return float(np.sqrt(learned.identified.misfit))
+        return float(np.sqrt(fit.identified.misfit))
 
     @property
     def remark(self) -> str:
         """What the engineer should know of the simulation; empty where it follows as stated."""
-        learned = self.learned or self.suspect
-        if learned is None:
+        fit = self.identified_robot or self.rejected
+        if fit is None:
             return ""
-        if learned.fits:
-            return " ".join(filter(None, (learned.scale, learned.words, learned.departures)))
+        if fit.fits:
+            return " ".join(filter(None, (fit.scale, fit.words, fit.departures)))
         text = (
             f"Fitted to the recordings, the simulation still differs from them by "
-            f"{self.misses:.2g} times their noise: it lacks physics"
+            f"{self.misfit_sds:.2g} times their noise: it lacks physics"
         )
-        if self.learned is None:
+        if self.identified_robot is None:
             how = "the campaign goes on without it"
             if self.nominal is not None:
                 how = "the campaign uses it unfitted, with the values of robot.toml"
@@ -155,19 +157,19 @@ class LowFidelity:
     @property
     def belief(self) -> float:
         """Probability that it is of use, by the FRFs: a whole matrix of them is hard to fit."""
-        return BELIEVED if self.taught else PRIOR_BELIEF
+        return BELIEVED if self.is_identified else PRIOR_BELIEF
 
     def frequency_sd(self, q: np.ndarray, simulated: SimulatedModes) -> np.ndarray:
         """Sd of ln f (n, count) that the identified parameters leave; 0 for a frozen simulation.
 
         `simulated` are the simulation's modes at q (n, dof) in rad.
         """
-        if self.learned is None:
+        if self.identified_robot is None:
             return np.zeros((len(q), self.count))
-        return self.learned.frequency_sd(q, simulated)
+        return self.identified_robot.frequency_sd(q, simulated)
 
 
-def learn(
+def identify_low_fidelity(
     before: LowFidelity,
     frfs: Sequence[Frf],
     q: np.ndarray,
@@ -198,8 +200,8 @@ def learn(
 
     with threadpool_limits(1):
         whole = search(len(frfs))
-        learned = Learned.of(whole.recalled(found(len(used))) if used else whole.found())
-    return replace(before, learned=learned)
+        fit = IdentifiedRobot.of(whole.recalled(found(len(used))) if used else whole.found())
+    return replace(before, identified_robot=fit)
 
 
 def _fewer(count: int) -> int:

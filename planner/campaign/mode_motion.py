@@ -135,7 +135,7 @@ def matched(measured: PointShapes, simulated: PointShapes) -> PointShapes:
     return measured.scaled(size)
 
 
-def alone(measured: PointShapes) -> PointShapes:
+def measured_alone(measured: PointShapes) -> PointShapes:
     """The measured shapes with the point that moves most moving by 1, at the first instant."""
     size = [
         realign(known) / np.max(np.abs(known)) if known.size else 1.0

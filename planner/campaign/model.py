@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.campaign.acquisition_inputs import open_parameters, outlook, poses_at
+from planner.campaign.acquisition_inputs import acquisition_inputs, poses_at, uncertain_parameters
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.hit_error_estimates import CampaignHitErrors
@@ -112,7 +112,7 @@ class Model:
     @cached_property
     def with_residues(self) -> Surrogate:
         """The surrogate of residues too, which FRFs alone need: fitted when asked for."""
-        return self.surrogate.with_residues(self.seen_exactly, self.low.taught)
+        return self.surrogate.with_residues(self.seen_exactly, self.low.is_identified)
 
     @cached_property
     def workspace_prediction(self) -> ModalPrediction:
@@ -137,21 +137,21 @@ class Model:
         return self.low.frequencies(self.cell.candidates.q)
 
     @cached_property
-    def outlook(self) -> tuple[FrequencyOutputs, Poses]:
+    def acquisition_inputs(self) -> tuple[FrequencyOutputs, Poses]:
         """The posterior as acquisitions see it, and the candidates."""
-        return outlook(self, informed=False)
+        return acquisition_inputs(self, informed=False)
 
     @cached_property
     def informed(self) -> tuple[FrequencyOutputs, Poses]:
         """The same with what `informed_candidates` would tell of the simulation's parameters."""
-        return outlook(self, informed=True)
+        return acquisition_inputs(self, informed=True)
 
     @cached_property
     def decision(self) -> "Decision | None":
         """Whether the cut of campaign.toml is stable, pose by pose; None where none is named."""
-        from planner.campaign.decision import decided
+        from planner.campaign.decision import cut_decision
 
-        return decided(self)
+        return cut_decision(self)
 
     @cached_property
     def deciding(self) -> tuple[FrequencyOutputs, Poses]:
@@ -164,24 +164,24 @@ class Model:
     @cached_property
     def forecast(self) -> Forecast:
         """Predicted RMSE over the workspace, and what one more measurement would gain."""
-        outputs, best, stop = self.outlook[0], self._best, self.cell.config.stop
-        learned, least = self.low.learned, 0.0
-        if learned is not None and learned.wider is not None:
+        outputs, best, stop = self.acquisition_inputs[0], self._best, self.cell.config.stop
+        fit, least = self.low.identified_robot, 0.0
+        if fit is not None and fit.wider is not None:
             least = float(np.mean((self.frequency_sd_percent / 100) ** 2))
         found = forecast(outputs, best, stop.frequency_sd_percent, stop.probability, least)
-        misses = self.low.misses
+        misses = self.low.misfit_sds
         return found.doubted(misses) if misses and found.measurements < FEW_POSES else found
 
     @cached_property
     def _best(self) -> Poses:
         """The candidate (n = 1) that gains most, with what hits there tell of the simulation."""
-        outputs, poses = self.outlook
+        outputs, poses = self.acquisition_inputs
         index = int(np.argmax(mixed(outputs, poses[:CONSIDERED])))
         return self._told_by(poses.one(index), self.cell.candidates.q[index : index + 1])
 
     def _told_by(self, poses: Poses, q: np.ndarray) -> Poses:
         """The poses with what hits there, q (n, dof) in rad, tell of the simulation."""
-        open_ = open_parameters(self)
+        open_ = uncertain_parameters(self)
         return poses if open_ is None else replace(poses, information=open_.information(q))
 
     @property
@@ -216,7 +216,7 @@ class Model:
         """The measured pose that gains most from more hits; None where a new pose gains more."""
         if not self.labelled:
             return None
-        outputs, q = self.outlook[0], np.array([pose.q for pose in self.labelled])
+        outputs, q = self.acquisition_inputs[0], np.array([pose.q for pose in self.labelled])
         sd = [[m.frequency_sd_hz / m.frequency_hz if m else np.nan for m in p.modes]
               for p in self.labelled]  # fmt: skip
         there = self._told_by(poses_at(self, q)[0], q)
@@ -308,10 +308,10 @@ class Model:
     @cached_property
     def frf_sd_percent(self) -> tuple[float, ...]:
         """Sd of predicted FRFs over the workspace in %, and of their common scale; () not known."""
-        learned = self.low.learned
-        if learned is None or not learned.fits:
+        fit = self.low.identified_robot
+        if fit is None or not fit.fits:
             return ()
-        return learned.posterior.frf_sd_percent(self.cell.candidates.q[:FEW_POSES])
+        return fit.posterior.frf_sd_percent(self.cell.candidates.q[:FEW_POSES])
 
     @cached_property
     def frequency_sd_percent(self) -> np.ndarray:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.campaign.build import elsewhere
-from planner.inference.parallel import side_by_side
-from planner.progress import Tell, quietly
+from planner.campaign.build import simulated_elsewhere
+from planner.inference.parallel import parallel_map
+from planner.progress import ProgressCallback, no_progress
 from planner.surrogate.average import Average
 from planner.surrogate.frequency_models import MODELS
 from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, simulated_log
@@ -44,7 +44,7 @@ class LeftOutModel:
 
 
 def compared_models(
-    model: "Model", names: Sequence[str] = (), tell: Tell = quietly
+    model: "Model", names: Sequence[str] = (), progress: ProgressCallback = no_progress
 ) -> tuple[LeftOutModel, ...]:
     """All usable ones, the likeliest for poses left out first; () with fewer than two poses."""
     n, config = len(model.seen.x), model.cell.config
@@ -52,12 +52,12 @@ def compared_models(
     if n < 2:
         return ()
     items = [(name, left) for name in usable for left in range(-1, n)]
-    points = {name: elsewhere(model.cell, model.low, name) for name in usable}
+    points = {name: simulated_elsewhere(model.cell, model.low, name) for name in usable}
     fit = partial(
         _without, model.seen, model.low.discrepancy, model.low.belief, config.surrogate.kernel,
         points,
     )  # fmt: skip
-    done = side_by_side(fit, items, lambda i, k: tell(items[i][0], k / len(items)))
+    done = parallel_map(fit, items, lambda i, k: progress(items[i][0], k / len(items)))
     found = dict(zip(items, done, strict=True))
     rows = [
         _row(name, model.seen, found[name, -1], [found[name, i] for i in range(n)])

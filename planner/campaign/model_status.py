@@ -47,7 +47,7 @@ def found_without(model: "Model") -> "tuple[LeaveOneOut, tuple[str, ...]]":
     """Errors of ln f (n, count), by the likelier of the two models of each mode; pose names."""
     from planner.surrogate.leave_one_out import leave_one_out
 
-    found = leave_one_out(model.surrogate.primary.likeliest.outputs, len(model.labelled))
+    found = leave_one_out(model.surrogate.primary.most_probable.outputs, len(model.labelled))
     return found, tuple(pose.pose for pose in model.labelled)
 
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from planner.campaign.acquisition_inputs import (
     informed_candidates,
-    open_parameters,
     poses_at,
+    uncertain_parameters,
 )
 from planner.campaign.events import Proposal
 from planner.campaign.model import Model
@@ -105,7 +105,7 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
         asked = informed_candidates(cell)
         seen = model.deciding if acquisition == "stability" else model.informed
     elif acquisition not in DESIGNS:
-        seen = model.outlook
+        seen = model.acquisition_inputs
     picks = choose(
         acquisition,
         model.surrogate,
@@ -128,7 +128,7 @@ def places_for(model: Model, state: CampaignState, proposal: Proposal) -> Better
     """
     cell = model.cell
     # Before the first hits nobody knows what will be open.
-    open_ = open_parameters(model) if model.labelled else None
+    open_ = uncertain_parameters(model) if model.labelled else None
     if open_ is None or not cell.robot.points.axes:
         return None
     joints = cell.robot.joints
@@ -138,7 +138,7 @@ def places_for(model: Model, state: CampaignState, proposal: Proposal) -> Better
     travel = cost.travel(q, joints.internal(taken[-1]) if taken else None)
     pose = proposal.pose, at, q[0]
     target = cell.config.stop.frequency_sd_percent
-    return better_places(open_, model.outlook[0], pose, cost, float(travel[0]), target)
+    return better_places(open_, model.acquisition_inputs[0], pose, cost, float(travel[0]), target)
 
 
 def _xyz(position_m: np.ndarray) -> tuple[float, float, float]:

@@ -4,7 +4,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 
 from planner.errors import InputError
-from planner.robot.guesses import SAME, total_stated
+from planner.robot.default_properties import SAME, total_stated
 from planner.robot.robot import Robot
 from planner.robot.urdf_elements import link_inertia
 
@@ -26,7 +26,7 @@ def links_kg(robot: Robot, mass_kg: float | None) -> float:
     return stated
 
 
-def whose_masses(robot: Robot, mass_kg: float | None, stated_kg: float) -> Iterator[str]:
+def mass_conflict(robot: Robot, mass_kg: float | None, stated_kg: float) -> Iterator[str]:
     """Which masses are used where URDF and data sheet both state some, and differ."""
     if mass_kg is None or not stated_kg or abs(mass_kg / stated_kg - 1) < SAME_MASS:
         return

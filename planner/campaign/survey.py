@@ -8,21 +8,21 @@ import numpy as np
 
 from planner.campaign.hit_error_estimates import CampaignHitErrors, Visited, estimate
 from planner.campaign.labels import ABOVE
-from planner.campaign.low_fidelity import LowFidelity, learn
+from planner.campaign.low_fidelity import LowFidelity, identify_low_fidelity
 from planner.dataset.hit_columns import hits_of
 from planner.dataset.measure import DEFAULT_BAND_HZ, MeasuredPose, measure
 from planner.dataset.screened_files import Source, in_parts
 from planner.dynamics.simulation import Simulation
 from planner.errors import RefusedError, RefusedFile
-from planner.fit.learned import Learned
+from planner.fit.identified_robot import IdentifiedRobot
 from planner.frf.frf import Frf
 from planner.measurement.measured_frfs import common_band
 from planner.measurement.nuisances import Tolerances
-from planner.measurement.point_places import misplaced, questions
+from planner.measurement.point_places import misplaced, misplaced_questions
 from planner.measurement.sensor_loading import WithoutSensors, without_sensors
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
-from planner.progress import Tell
+from planner.progress import ProgressCallback
 from planner.recording.folder import joint_columns, read_recordings
 from planner.robot.robot import Robot
 
@@ -52,7 +52,7 @@ def survey(
     robot_toml: Path | None,
     estimator: str,
     window_rate_1_s: float,
-    progress: Tell,
+    progress: ProgressCallback,
 ) -> Survey:
     """Analyse each pose; labels follow the simulation's families if a robot is named.
 
@@ -89,10 +89,10 @@ def survey(
     q = joints.internal([first[name].joints_deg for name in names])
     nominal = None if robot is None else Simulation(robot)
     errors = _hit_errors(visited, nominal, band)
-    found = [tuple(errors.without_misses(*one)) for one in zip(names, found, strict=True)]
+    found = [tuple(errors.without_hit_errors(*one)) for one in zip(names, found, strict=True)]
     simulations = [] if nominal is None else [nominal]  # as stated, then as identified
-    if errors.told is not None and errors.trusted:
-        simulations.append(errors.told.simulation)
+    if errors.fitted is not None and errors.trusted:
+        simulations.append(errors.fitted.simulation)
     doubts = _doubts(names, simulations, q, every, band)
     bare = without_sensors(names, found, simulations, q, every)
     tracks, expected = _labelled(bare.modes, q, nominal)
@@ -118,16 +118,16 @@ def _hit_errors(
     if nominal is None or not visited:
         return CampaignHitErrors((), None, Tolerances(), band)
     visits, whole = zip(*visited, strict=True)
-    learned, t = _learned(nominal, whole, np.array([one.q for one in visits]), band)
-    return estimate(visits, learned, t, band)
+    fit, t = _learned(nominal, whole, np.array([one.q for one in visits]), band)
+    return estimate(visits, fit, t, band)
 
 
 def _learned(
     nominal: Simulation, frfs: Sequence[Frf], q: np.ndarray, band: tuple[float, float]
-) -> tuple[Learned | None, Tolerances]:
+) -> tuple[IdentifiedRobot | None, Tolerances]:
     """What FRFs at q (n, dof) in rad tell of a robot, within the tolerances that it states."""
     t = Tolerances.of(nominal.robot.config, nominal.robot.joints.slides)
-    return learn(LowFidelity(1, nominal, t), frfs, q, band).learned, t
+    return identify_low_fidelity(LowFidelity(1, nominal, t), frfs, q, band).identified_robot, t
 
 
 def _doubts(
@@ -149,11 +149,11 @@ def _doubts(
     if found and known:
         # What was identified from wrongly named points too is spoiled: from the tool's alone.
         at, frfs_of_tool = zip(*known, strict=True)
-        learned, _ = _learned(simulations[0], frfs_of_tool, q[list(at)], band)
-        if learned is not None:
-            tried = [*simulations, learned.identified.simulation]
+        fit, _ = _learned(simulations[0], frfs_of_tool, q[list(at)], band)
+        if fit is not None:
+            tried = [*simulations, fit.identified.simulation]
             found = misplaced(tried, q[index], frfs, usable)
-    return questions(found, [names[i] for i in index])
+    return misplaced_questions(found, [names[i] for i in index])
 
 
 def _labelled(

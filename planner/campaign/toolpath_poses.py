@@ -8,13 +8,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.cut_source import Asked, ToolChange, at_poses
+from planner.campaign.cut_source import StabilityRequest, ToolChange, at_poses
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.path import limit_at
 from planner.milling.structure import Structure
 from planner.milling.toolpath import is_toolpath, read_toolpath
-from planner.progress import Tell, quietly
+from planner.progress import ProgressCallback, no_progress
 from planner.recording.folder import read_poses
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import solve
@@ -27,7 +27,7 @@ STARTS = 4  # from which the first pose of a program is looked for, for each tur
 
 
 @dataclass(frozen=True)
-class Way:
+class PathRequest:
     """--path, with --origin and --poses of a program, and whether turns are looked at."""
 
     path: Path | None
@@ -58,7 +58,7 @@ class Way:
 
 
 @dataclass(frozen=True, eq=False)
-class Travelled:
+class PathPoses:
     """p named poses q (p, dof) of a campaign in rad, with feeds (p, 3) in the base if known."""
 
     campaign: Campaign
@@ -69,7 +69,7 @@ class Travelled:
     feeds: np.ndarray | None = None
 
     @classmethod
-    def of(cls, asked: Asked, way: Way, cut: Cut) -> "Travelled":
+    def of(cls, asked: StabilityRequest, way: PathRequest, cut: Cut) -> "PathPoses":
         """InputError where a pose cannot be reached, or the path is missing."""
         if way.path is None:
             raise InputError(
@@ -115,7 +115,7 @@ class Travelled:
                 near = found[angle] = q
         return list(found.items())
 
-    def standing(self, found: list[tuple[int, float, np.ndarray]]) -> "Travelled":
+    def standing(self, found: list[tuple[int, float, np.ndarray]]) -> "PathPoses":
         """Other angles q at some of the poses, with the feeds there."""
         names = tuple(f"{self.names[i]}, turned {turn:g}°" for i, turn, _ in found)
         feeds = np.array([self._feed(i) for i, _, _ in found])
@@ -162,7 +162,9 @@ def about(axis: np.ndarray, turn_deg: float) -> np.ndarray:
     return Rotation.from_rotvec(turn, degrees=True).as_matrix()
 
 
-def _program(robot: Robot, way: Way, cut: Cut) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
+def _program(
+    robot: Robot, way: PathRequest, cut: Cut
+) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
     """Names, angles (p, dof) and feeds (p, 3): the first turn at which all can be reached."""
     assert way.path is not None
     path = read_toolpath(way.path)
@@ -300,7 +302,9 @@ class TurnAdvice:
         return f"{said}; each pose at its own best angle ({each}{more}) {1e3 * best:.3f} mm."
 
 
-def turn_advice(travelled: Travelled, cut: Cut, rpm: float, tell: Tell = quietly) -> TurnAdvice:
+def turn_advice(
+    travelled: PathPoses, cut: Cut, rpm: float, progress: ProgressCallback = no_progress
+) -> TurnAdvice:
     """At a speed in rpm, of each pose and angle."""
     found = [(i, turn, q) for i in range(len(travelled.q)) for turn, q in travelled.turned(i)]
     depth = np.full((len(travelled.q), len(TURNS_DEG)), np.nan)
@@ -308,5 +312,5 @@ def turn_advice(travelled: Travelled, cut: Cut, rpm: float, tell: Tell = quietly
     poses = travelled.standing(found).structures(msgspec.structs.replace(cut, feed_in="path"))
     for k, ((i, turn, _), (_, structure)) in enumerate(zip(found, poses, strict=True)):
         depth[i, int(np.argmin(np.abs(TURNS_DEG - turn)))] = limit_at(structure, cut, rpm)
-        tell("turns", (k + 1) / len(found))
+        progress("turns", (k + 1) / len(found))
     return TurnAdvice.of(depth)

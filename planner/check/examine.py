@@ -13,8 +13,8 @@ from planner.check.description import (
     check_links,
     worst_first,
 )
-from planner.check.room import check_collision, look_around
 from planner.check.springs import check_band, check_springs
+from planner.check.surroundings import check_collision, check_workspace
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.collision import Collisions
@@ -76,7 +76,7 @@ def examine(robot: Robot, plan: Plan | None = None) -> Examination:
         free = (q for q in spread_poses(robot)[1:] if not collisions.contacts(q))
         others = np.array([*islice(free, POSES)]).reshape(-1, len(home))
     else:
-        candidates, remarks = look_around(robot, plan.workspace, plan.file)
+        candidates, remarks = check_workspace(robot, plan.workspace, plan.file)
         found += remarks
         others = np.empty((0, len(home))) if candidates is None else candidates.q
     poses += tuple(f"pose {k + 1}" for k in range(len(others)))

@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.acts import confirm, export, new, redo, report, skip, undo, withdraw
 from planner.cli.answer import (
     AsJson,
     Directory,
@@ -17,6 +16,7 @@ from planner.cli.answer import (
     respond,
     warn,
 )
+from planner.cli.campaign_commands import confirm, export, new, redo, report, skip, undo, withdraw
 from planner.cli.documentation import check, manual, prove, schema, study
 from planner.cli.identification import compare, diagnose, identify
 from planner.cli.modes import modes
@@ -78,10 +78,10 @@ def import_(
     Example: planner import cell7 exports/P001
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli.progress import telling
+    from planner.cli.progress import progress_bar
     from planner.report.imports import ImportedPoses
 
-    with telling("importing", quiet=as_json) as progress:
+    with progress_bar("importing", quiet=as_json) as progress:
         campaign = Campaign(directory)
         reports = campaign.import_paths(tuple(paths), pose, progress, from_names)
     answer = ImportedPoses.of(reports, campaign.state.simulated)
@@ -108,14 +108,14 @@ def status_(
     Example: planner status cell7 --plot pictures
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli.progress import telling
+    from planner.cli.progress import progress_bar
     from planner.report.pictures import Pictures
     from planner.report.status import status
 
     campaign, pictures = Campaign(directory), Pictures(plot, format_)
     answer = status(campaign).with_pictures(pictures, campaign.directory.name)
     if models:
-        with telling("models", quiet=as_json) as progress:
+        with progress_bar("models", quiet=as_json) as progress:
             answer = answer.with_models(progress)
     return respond(answer, as_json)
 
@@ -199,12 +199,12 @@ def predict(
     """
     from planner.campaign.campaign import Campaign
     from planner.campaign.cell import checked_pose
-    from planner.cli.progress import telling
+    from planner.cli.progress import progress_bar
     from planner.recording.folder import peak_forces, read_poses
     from planner.report.predictions import predictions, robot_predictions
     from planner.robot.robot import Robot
 
-    with telling("predicting", quiet=as_json) as progress:
+    with progress_bar("predicting", quiet=as_json) as progress:
         if source.is_file():
             robot = Robot.load(source)
             rows = read_poses(poses, robot.joints)
@@ -238,10 +238,10 @@ def replay(
     Example: planner replay cell7 --rrd cell7.rrd
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli.progress import telling
+    from planner.cli.progress import progress_bar
     from planner.report.replayed import replayed
 
-    with telling("replaying", quiet=as_json) as progress:
+    with progress_bar("replaying", quiet=as_json) as progress:
         answer = replayed(Campaign(directory), until, rrd, viewer, progress, acquisition)
     if not answer.reproduced:
         warn("The log was not reproduced; see the steps that differ.")
@@ -268,9 +268,9 @@ def demo(
 
     Example: planner demo --measurements 6
     """
-    from planner.cli.progress import telling
+    from planner.cli.progress import progress_bar
     from planner.demo import play
 
-    with telling("playing", quiet=as_json) as progress:
+    with progress_bar("playing", quiet=as_json) as progress:
         answer = play(directory, measurements, viewer, progress)
     return respond(answer, as_json)

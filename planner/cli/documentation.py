@@ -98,15 +98,15 @@ def study(
 
     Example: planner study busch2022 --out figures
     """
-    from planner.cli.progress import telling
+    from planner.cli.progress import progress_bar
     from planner.studies import registry
-    from planner.studies.conduct import conduct, conduct_all
+    from planner.studies.run import run_all, run_study
 
-    with telling("studying", quiet=as_json) as progress:
+    with progress_bar("studying", quiet=as_json) as progress:
         if name == registry.ALL:
-            answer = conduct_all(out, small, progress)
+            answer = run_all(out, small, progress)
         else:
-            answer = conduct(name, out, small, progress)
+            answer = run_study(name, out, small, progress)
     return respond(answer, as_json)
 
 
@@ -127,12 +127,12 @@ def prove(
 
     Example: planner prove --cases 20 --out proof
     """
-    from planner.cli.progress import telling
+    from planner.cli.progress import progress_bar
     from planner.proof.report import write
     from planner.proof.run import Proof, results
     from planner.proof.run import seal as sealed
 
     folder = out or Path(f"proof-{cases}-{seed}")
-    with telling("proving", quiet=as_json) as tell:
-        scored = results(Proof(cases, seed, laboratory), folder, jobs, scheduler, tell)
+    with progress_bar("proving", quiet=as_json) as progress:
+        scored = results(Proof(cases, seed, laboratory), folder, jobs, scheduler, progress)
     return respond(write(folder, sealed(folder), tuple(scored.values())), as_json)

@@ -51,20 +51,23 @@ def identify(
     Example: planner identify exports --robot robot/robot.toml --out found/robot.toml
     """
     from planner.api import identify as fit
-    from planner.campaign.material import material
-    from planner.cli.progress import telling
+    from planner.campaign.recordings_source import recordings_source
+    from planner.cli.progress import progress_bar
     from planner.fit.write_robot import check_target
     from planner.report.modal_analysis import check_options
     from planner.report.pictures import Pictures
 
     started = time.perf_counter()
     check_options(band_hz, window_rate_1_s=window_rate_1_s)
-    pictures, given = Pictures(plot, format_, rrd), material(recordings, robot, window_rate_1_s)
+    pictures, given = (
+        Pictures(plot, format_, rrd),
+        recordings_source(recordings, robot, window_rate_1_s),
+    )
     nominal = given.nominal
     if out is not None:
         check_target(out, nominal)
     band = band_hz or nominal.config.band_hz
-    with telling("identifying", quiet=as_json) as progress:
+    with progress_bar("identifying", quiet=as_json) as progress:
         dataset = given.read(nominal, band, progress)
         answer = fit(
             dataset,
@@ -94,20 +97,20 @@ def diagnose(
 
     Example: planner diagnose cell7 --out found
     """
-    from planner.api import diagnose_material
-    from planner.campaign.material import material
-    from planner.cli.progress import telling
+    from planner.api import diagnose_source
+    from planner.campaign.recordings_source import recordings_source
+    from planner.cli.progress import progress_bar
     from planner.recording.folder import peak_forces, read_poses
     from planner.report.modal_analysis import check_options
     from planner.report.status import model_beside
 
     started = time.perf_counter()
     check_options(window_rate_1_s=window_rate_1_s)
-    given = material(recordings, robot, window_rate_1_s)
+    given = recordings_source(recordings, robot, window_rate_1_s)
     nominal = given.nominal
     wanted = read_poses(predict, nominal.joints) if predict else ()
-    with telling("diagnosing", quiet=as_json) as tell:
-        answer = diagnose_material(given.with_poses(wanted), nominal, tell)
+    with progress_bar("diagnosing", quiet=as_json) as progress:
+        answer = diagnose_source(given.with_poses(wanted), nominal, progress)
         if predict:
             q = nominal.joints.internal([row.joints_deg for row in wanted])
             npz = _target(out, predict, given.recordings)
@@ -171,9 +174,9 @@ def compare(
     Example: planner compare exports --robot robot/robot.toml --strategies random,default
     """
     from planner.campaign import store
-    from planner.campaign.material import material
-    from planner.cli.progress import telling
-    from planner.compare.bench import assemble, decide
+    from planner.campaign.recordings_source import recordings_source
+    from planner.cli.progress import progress_bar
+    from planner.compare.bench import assemble, comparison_config
     from planner.compare.resume import conduct, recorded
     from planner.compare.tasks import Study
     from planner.report.comparison import comparison
@@ -181,14 +184,14 @@ def compare(
     started = time.perf_counter()
     if simulation not in (None, *SIMULATIONS):
         raise InputError(f"--simulation {simulation} is not known; give {', '.join(SIMULATIONS)}.")
-    given = material(recordings, robot, 0.0)
+    given = recordings_source(recordings, robot, 0.0)
     loaded = given.nominal
     listed = given.listed(loaded)
     if campaign is None and given.campaign is not None:
         campaign = given.campaign.directory / store.CONFIG
-    config = decide(loaded, listed, campaign, simulation)
+    config = comparison_config(loaded, listed, campaign, simulation)
     folder = out or _cache_folder()
-    with telling("comparing", quiet=as_json) as progress:
+    with progress_bar("comparing", quiet=as_json) as progress:
         poses = recorded(listed, loaded.joints, config.modes, workers, progress)
         bench, remarks = assemble(loaded, config, poses)
         study = Study.plan(bench, strategies, models, repeats, initial, budget)

@@ -57,7 +57,7 @@ def modes(
 
     Example: planner modes exports/P001/*.uff --plot pictures
     """
-    from planner.cli.progress import telling
+    from planner.cli.progress import progress_bar
     from planner.dataset.frf_set import frf_set
     from planner.recording.folder import several_poses
     from planner.report.modal_analysis import (
@@ -83,7 +83,7 @@ def modes(
         if for_points:
             raise InputError(f"{paths[0]} holds several poses; leave {for_points[0]} out.")
         given = paths[0], band_hz, robot, estimator, window_rate_1_s
-        with telling("identifying", quiet=as_json) as progress:
+        with progress_bar("identifying", quiet=as_json) as progress:
             answer = survey_report(survey(*given, progress))
             answer = answer.with_pictures(pictures, paths[0].name)
         return respond(answer, as_json, refusals(answer.refused))

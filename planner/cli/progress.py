@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from threading import Event, Thread
 from typing import TYPE_CHECKING
 
-from planner.progress import Tell
+from planner.progress import ProgressCallback
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,7 +23,7 @@ def console(quiet: bool, stderr: bool = True):
 
 
 @contextmanager
-def telling(verb: str, quiet: bool) -> Iterator[Tell]:
+def progress_bar(verb: str, quiet: bool) -> Iterator[ProgressCallback]:
     """A function that shows what is being done, and as a bar the share (0 to 1) that is done."""
     from rich.progress import (
         BarColumn,
@@ -38,12 +38,12 @@ def telling(verb: str, quiet: bool) -> Iterator[Tell]:
     with _shown(columns, quiet) as bar:
         task = bar.add_task(verb, total=None)
 
-        def tell(text: str, share: float) -> None:
+        def progress(text: str, share: float) -> None:
             if share > 0:  # until then nobody knows how long it takes
                 bar.update(task, total=1.0)
             bar.update(task, description=f"{verb}: {text}", completed=share)
 
-        yield tell
+        yield progress
 
 
 @contextmanager

@@ -66,12 +66,12 @@ def stability(
 
     Example: planner stability cell7 --pose P001 --cut cut.toml --plot pictures
     """
-    from planner.campaign.cut_source import Asked
-    from planner.cli.progress import telling
+    from planner.campaign.cut_source import StabilityRequest
+    from planner.cli.progress import progress_bar
     from planner.milling.cut import load_cut
     from planner.report.pictures import Pictures
 
-    asked = Asked(
+    asked = StabilityRequest(
         source,
         cut,
         pose,
@@ -86,20 +86,22 @@ def stability(
     )
     pictures = Pictures(plot, format_, rrd)
     check(path, origin, turns, poses, map_, pose)
-    with telling("computing", quiet=as_json) as tell:
+    with progress_bar("computing", quiet=as_json) as progress:
         if map_:
             from planner.report.stability_map import map_report
 
-            return respond(map_report(asked, poses or 40, load_cut(cut), pictures, tell), as_json)
+            return respond(
+                map_report(asked, poses or 40, load_cut(cut), pictures, progress), as_json
+            )
         if path is not None or pose == "all":
-            from planner.campaign.toolpath_poses import Way
+            from planner.campaign.toolpath_poses import PathRequest
             from planner.report.stability import path_report
 
-            way = Way(path, origin, poses or 12, turns)
-            return respond(path_report(asked, way, load_cut(cut), pictures, tell), as_json)
+            way = PathRequest(path, origin, poses or 12, turns)
+            return respond(path_report(asked, way, load_cut(cut), pictures, progress), as_json)
         from planner.report.stability import stability_of
 
-        return respond(stability_of(asked, pictures, tell), as_json)
+        return respond(stability_of(asked, pictures, progress), as_json)
 
 
 def check(

@@ -78,7 +78,7 @@ def cell_of(bench: Bench) -> PoolCell:
     )
 
 
-def decide(
+def comparison_config(
     robot: Robot,
     recordings: Sequence[Recording],
     campaign: Path | None,

@@ -14,7 +14,7 @@ from planner.compare.run import run
 from planner.compare.tasks import Run, Study, Task
 from planner.dataset.visits import Recording
 from planner.errors import InputError
-from planner.progress import Tell
+from planner.progress import ProgressCallback
 from planner.recording.joints import JointUnits
 
 RUNS = "runs"
@@ -25,7 +25,7 @@ def recorded(
     joints: JointUnits,
     table: ModesTable,
     workers: int,
-    progress: Tell,
+    progress: ProgressCallback,
 ) -> tuple[PoolPose, ...]:
     """All poses of recordings; what was found of them before is taken up."""
     files = pool.poses_of(recordings, joints, table)
@@ -46,7 +46,7 @@ def conduct(
     folder: Path,
     scheduler: str | None,
     workers: int,
-    progress: Tell,
+    progress: ProgressCallback,
 ) -> tuple[dict[Task, Run | Failure], tuple[str, ...]]:
     """Every run of a study, and remarks on kept ones that were damaged and are done again.
 
@@ -74,8 +74,8 @@ def _spread(bench: Bench, tasks: list[Task], scheduler: str | None, workers: int
     return processes.each(run, bench, tasks, workers)
 
 
-def _count(tell: Tell, what: str, done: int, total: int) -> None:
-    tell(f"{what}, {done} of {total}", done / max(total, 1))
+def _count(progress: ProgressCallback, what: str, done: int, total: int) -> None:
+    progress(f"{what}, {done} of {total}", done / max(total, 1))
 
 
 def _told(damaged: list[str], folder: Path) -> tuple[str, ...]:

@@ -15,17 +15,17 @@ from planner.dataset.store import Store, user_store
 from planner.dataset.visits import (
     PoseEntry,
     Recording,
-    Stay,
     Visit,
+    VisitFiles,
     recordings_in,
-    stays_of,
     unlisted_folders,
+    visit_files_of,
 )
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.modal.modes import ModalModel
-from planner.progress import Tell, quietly
+from planner.progress import ProgressCallback, no_progress
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, together
@@ -66,7 +66,7 @@ class Dataset:
     """
 
     entries: tuple[PoseEntry, ...]  # also those without an FRF
-    stays: tuple[Stay, ...]
+    stays: tuple[VisitFiles, ...]
     band_hz: tuple[float, float]
     window_rate_1_s: float = 0.0
     refused: tuple[tuple[str, str], ...] = ()
@@ -81,7 +81,7 @@ class Dataset:
         band_hz: tuple[float, float] | None = None,
         *,
         window_rate_1_s: float = 0.0,
-        progress: Tell = quietly,
+        progress: ProgressCallback = no_progress,
         store: Store | None = None,
     ) -> "Dataset":
         """Read and screen all hits of a folder as the analyser wrote it.
@@ -118,7 +118,7 @@ class Dataset:
         band_hz: tuple[float, float],
         *,
         window_rate_1_s: float = 0.0,
-        progress: Tell = quietly,
+        progress: ProgressCallback = no_progress,
         store: Store | None = None,
         name: str = "The recordings",
     ) -> "Dataset":
@@ -150,7 +150,7 @@ class Dataset:
             raise RefusedError(f"{name}: no pose has a hit that can be used: {reason}")
         return cls(
             tuple(entries),
-            stays_of(recordings),
+            visit_files_of(recordings),
             band_hz,
             window_rate_1_s,
             refused,
@@ -181,7 +181,7 @@ class Dataset:
                 PoseEntry(v.pose, v.q, MeasuredPose((), self.band_hz, "h1", rate, v.hits))
                 for v in given
             ),
-            stays=tuple(Stay(i, (0,), v.q, v.order) for i, v in enumerate(given)),
+            stays=tuple(VisitFiles(i, (0,), v.q, v.order) for i, v in enumerate(given)),
             window_rate_1_s=rate,
         )
 

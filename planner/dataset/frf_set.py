@@ -22,8 +22,8 @@ class FrfSet:
     """FRFs, and what became of the files that they are from.
 
     `band_hz` is where modes are looked for, None: wherever there are lines. Not `placed` are those
-    that state neither where nor along which directions they were measured. `struck` is the matrix
-    of hits, `records` are FRFs that were exported, with their rate as in `Frf`.
+    that state neither where nor along which directions they were measured. `from_hits` is the
+    matrix of hits, `records` are FRFs that were exported, with their rate as in `Frf`.
     """
 
     records: tuple[FrfRecord, ...]
@@ -33,13 +33,13 @@ class FrfSet:
     band_hz: tuple[float, float] | None
     placed: bool
     exponential_rate_1_s: float = 0.0
-    struck: FrfMatrix | None = None
+    from_hits: FrfMatrix | None = None
     remarks: tuple[str, ...] = ()
 
     def matrix(self, quantity: str | None) -> FrfMatrix:
         """The FRFs by places. Raises RefusedError or InputError as `matrix_of`."""
-        if self.struck is not None:
-            return self.struck
+        if self.from_hits is not None:
+            return self.from_hits
         found = matrix_of(self.records, quantity)
         return replace(found, exponential_rate_1_s=self.exponential_rate_1_s)
 
@@ -152,7 +152,7 @@ def _struck(
         refused,
         band,
         True,
-        struck=replace(plain, ended=windowed),
+        from_hits=replace(plain, ended=windowed),
         remarks=told_of_files(verdicts),
     )
 

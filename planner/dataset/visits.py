@@ -43,7 +43,7 @@ class Recording(NamedTuple):
     source: Source
 
 
-class Stay(NamedTuple):
+class VisitFiles(NamedTuple):
     """A visit before its files are read: which entry, which of its files, and as in `Visit`."""
 
     entry: int
@@ -61,7 +61,7 @@ class PoseEntry:
     measured: MeasuredPose
 
 
-def stays_of(recordings: Sequence[Recording]) -> tuple[Stay, ...]:
+def visit_files_of(recordings: Sequence[Recording]) -> tuple[VisitFiles, ...]:
     """Neighbouring recordings of one pose are a visit."""
     numbers: dict[str, int] = {}
     files: dict[str, int] = {}
@@ -74,7 +74,7 @@ def stays_of(recordings: Sequence[Recording]) -> tuple[Stay, ...]:
         entry = numbers.setdefault(pose, len(numbers))
         q = np.mean([recording.q for recording in run], axis=0)
         order = place / max(len(runs) - 1, 1)
-        found.append(Stay(entry, tuple(range(first, files[pose])), q, order))
+        found.append(VisitFiles(entry, tuple(range(first, files[pose])), q, order))
     return tuple(found)
 
 

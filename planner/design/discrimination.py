@@ -38,7 +38,7 @@ MOST_ODDS = 1e4  # what is said of a robot is never surer
 
 
 @dataclass(frozen=True, eq=False)
-class Tied:
+class TiedExplanations:
     """A fit, and effects of it that matter; probabilities of those that are tied sum to 1."""
 
     places: tuple[Place, ...]
@@ -46,7 +46,7 @@ class Tied:
     fit: StructureFit
 
 
-def tied(found: Diagnosis) -> tuple[Tied, ...]:
+def tied(found: Diagnosis) -> tuple[TiedExplanations, ...]:
     """Explanations that recordings leave tied, likeliest first; one where nothing is tied.
 
     Those that differ only by what is too small to matter are one.
@@ -61,11 +61,14 @@ def tied(found: Diagnosis) -> tuple[Tied, ...]:
     kept = sorted((k for k in groups if shares[k] > LIKELY), key=lambda k: -shares[k])[:MOST_TIED]
     whole = sum(shares[key] for key in kept)
     return tuple(
-        Tied(key or (("none", None),), shares[key] / whole, groups[key][0]) for key in kept
+        TiedExplanations(key or (("none", None),), shares[key] / whole, groups[key][0])
+        for key in kept
     )
 
 
-def separation(candidates: Sequence[Tied], q: np.ndarray, more: tuple[str, ...] = ()) -> np.ndarray:
+def separation(
+    candidates: Sequence[TiedExplanations], q: np.ndarray, more: tuple[str, ...] = ()
+) -> np.ndarray:
     """Expected logarithm of the odds (n, 3) that a hit along each tcp axis gives at q (n, dof).
 
     q in rad; sensors at the points `more` listen beside those of the recordings. The odds are those
@@ -107,7 +110,7 @@ class _Predicted:
         x, precision = structure.mean.copy(), structure.precision.copy()
         x[same] = found.at.x[same]
         precision[np.ix_(same, same)] = (found.at.normal + found.at.precision)[np.ix_(same, same)]
-        own = misfit.nothing_open()
+        own = misfit.zero_nuisances()
         frf, columns, _ = misfit.columns(x, misfit.about(own, x))
         noise = float(np.median((measured.sd / found.misfit.size)[measured.used]))
         there = replace(data.measured, accelerance=frf)
@@ -133,7 +136,7 @@ class _Predicted:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TellingHit:
+class DiscriminatingHit:
     """A hit at a pose along an axis ("x", "y", "z"); `log_odds` of what it would tell.
 
     `between` are the explanations, in words, that it tells apart; joint angles are in degrees.
@@ -148,9 +151,13 @@ class TellingHit:
 
     @classmethod
     def best(
-        cls, tied: Sequence[Tied], joints: JointUnits, poses: tuple[list[str], np.ndarray],
-        gain: np.ndarray, **more: Any,
-    ) -> Self:  # fmt: skip
+        cls,
+        tied: Sequence[TiedExplanations],
+        joints: JointUnits,
+        poses: tuple[list[str], np.ndarray],
+        gain: np.ndarray,
+        **more: Any,
+    ) -> Self:
         """The hit of the largest `gain` (n, 3) at one of n poses, by name and in rad (n, dof)."""
         names, q = poses
         place, axis = np.unravel_index(np.argmax(gain), gain.shape)
@@ -173,7 +180,7 @@ class TellingHit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class NextHit(TellingHit):
+class NextHit(DiscriminatingHit):
     """The hit that best tells apart what a diagnosis leaves tied, and its peak forces in N."""
 
     force_n: tuple[float, ...]
@@ -190,7 +197,7 @@ class NextHit(TellingHit):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ExtraSensor(TellingHit):
+class ExtraSensor(DiscriminatingHit):
     """A `point` of robot.toml, and the hit at the tcp that a sensor there should listen to.
 
     `log_odds_without` is what the best hit without the sensor would tell.
@@ -210,7 +217,7 @@ class ExtraSensor(TellingHit):
 
 
 def next_hit(
-    found: Diagnosis, tied: Sequence[Tied], offered: Mapping[str, np.ndarray]
+    found: Diagnosis, tied: Sequence[TiedExplanations], offered: Mapping[str, np.ndarray]
 ) -> NextHit | None:
     """The best hit at one of the `offered` poses, by name: joint angles (dof,) in rad.
 
@@ -222,12 +229,12 @@ def next_hit(
     # All explanations answer in proportion: the harder, the less noise.
     hardest = [float(found.recorded.level_n[-1])] if found.recorded.visits else []
     force_n = tuple(_at_most(force) for force in hardest)
-    joints = found.search.prior.repertoire.stiff.robot.joints
+    joints = found.search.prior.library.stiff.robot.joints
     return NextHit.best(tied, joints, poses, separation(tied, poses[1]), force_n=force_n)
 
 
 def extra_sensor(
-    found: Diagnosis, tied: Sequence[Tied], offered: Mapping[str, np.ndarray]
+    found: Diagnosis, tied: Sequence[TiedExplanations], offered: Mapping[str, np.ndarray]
 ) -> ExtraSensor | None:
     """At which point of robot.toml that no sensor was at one would part most.
 
@@ -235,7 +242,7 @@ def extra_sensor(
     None where nothing is tied, no such point is stated, or none tells much more than the sensors
     that there were.
     """
-    recorded, robot = found.recorded, found.search.prior.repertoire.stiff.robot
+    recorded, robot = found.recorded, found.search.prior.library.stiff.robot
     there = found.best.misfit.data.measured.layout.sensors
     places = {robot.points.sensor(name) for name in robot.points.axes} - {*there, SENSOR, TCP}
     if len(tied) < 2 or not places:

@@ -122,7 +122,7 @@ class FrequencyOutputs:
         noise = primary.nugget_variance[:k] + MEASUREMENT_SD**2
         open_ = np.zeros((0, 0)) if covariance is None else covariance
         return cls(
-            primary.likeliest.outputs[:k],
+            primary.most_probable.outputs[:k],
             workspace,
             goal or workspace,
             noise,

@@ -21,7 +21,7 @@ from planner.fit.posterior import RobotBelief
 from planner.frf.frf import Frf
 from planner.measurement.agreement import MODEL_ERROR
 from planner.measurement.measured_frfs import ASSUMED_FLOOR, ASSUMED_RELATIVE, noise_sd
-from planner.measurement.nuisances import OpenNumbers, basis, real_rows
+from planner.measurement.nuisances import NuisanceCounts, basis, real_rows
 from planner.recording.points import SENSOR, TCP, TOOL, Layout
 
 # Lines around each mode at which the information is summed up, in half-widths of its resonance.
@@ -65,7 +65,7 @@ class FrfNoise:
 
 
 @dataclass(frozen=True, eq=False)
-class OpenParameters:
+class UncertainParameters:
     """What is believed of a robot, and how FRFs to come would be measured."""
 
     belief: RobotBelief
@@ -142,7 +142,7 @@ class OpenParameters:
         each has a third of what they tell.
         """
         t, s = self.belief.tolerances, misfit.data.measured.s
-        numbers = OpenNumbers.of(motion.accelerance)
+        numbers = NuisanceCounts.of(motion.accelerance)
         every = basis(motion.accelerance, motion, s, t)
         common = np.concatenate([every[:, numbers.known :], visits * t.visit_stiffness], axis=1)
         return np.concatenate([every[:, : numbers.hits], np.sqrt(AXES) * common], axis=1)
@@ -227,7 +227,7 @@ class BetterPlaces:
 
 
 def better_places(
-    open_: OpenParameters,
+    open_: UncertainParameters,
     outputs: FrequencyOutputs,
     pose: tuple[str, Poses, np.ndarray],
     cost: Cost,

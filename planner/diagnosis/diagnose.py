@@ -16,9 +16,9 @@ from planner.diagnosis.tone import screen_tone
 from planner.diagnosis.verdict import LEAST, NamedEffect, Verdict, judged
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
-from planner.effects.table import Repertoire, diagnosed
+from planner.effects.table import EffectLibrary, diagnosed
 from planner.errors import InputError
-from planner.fit.explanations import Explored, likeliest
+from planner.fit.explanations import ExploredStructures, most_probable
 from planner.fit.fitted import StructureFit, settled
 from planner.fit.held_out import set_aside
 from planner.fit.identify import TOO_SOFT
@@ -29,7 +29,7 @@ from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
 from planner.measurement.agreement import NO_SIMILARITY, Similarity, similarity_of
 from planner.measurement.nuisances import Tolerances
-from planner.progress import Tell, quietly
+from planner.progress import ProgressCallback, no_progress
 from planner.robot.joint_laws import LawTable
 from planner.words import significant
 
@@ -81,7 +81,7 @@ class Diagnosis:
 
     recorded: Dataset
     search: Search
-    explored: Explored
+    explored: ExploredStructures
     verdict: Verdict
     screened: tuple[Finding, ...]
     levels: Levels | None
@@ -107,7 +107,7 @@ class Diagnosis:
     @cached_property
     def findings(self) -> tuple[Established, ...]:
         """Of signals first, then of the fits, what changes most first."""
-        heard = [
+        from_signals = [
             Established(f.effect, f.at, 1.0, None, f.parameters, f.text) for f in self.screened
         ]
         laws = [
@@ -116,7 +116,11 @@ class Diagnosis:
             )
             for law in self._laws
         ]
-        return *heard, *laws, *(self._established(e, e.probability) for e in self.verdict.findings)
+        return (
+            *from_signals,
+            *laws,
+            *(self._established(e, e.probability) for e in self.verdict.findings),
+        )
 
     @property
     def _laws(self) -> tuple[LevelLaw, ...]:
@@ -146,7 +150,7 @@ class Diagnosis:
     @cached_property
     def remarks(self) -> tuple[str, ...]:
         """What is there and too small to matter, in words."""
-        told = [e for e in self.verdict.effects if not e.counts and e.nats > LEAST]
+        told = [e for e in self.verdict.effects if not e.counts and e.gain_nats > LEAST]
         return tuple(
             f"Too small to matter ({significant(100 * e.change)} % of |H|): "
             f"{self._established(e, e.probability).text}"
@@ -161,13 +165,15 @@ class Diagnosis:
         return Established(*effect.name, probability, named.change, parameters, text)
 
 
-def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> Diagnosis:
+def explain(
+    recorded: Dataset, simulation: Simulation, progress: ProgressCallback = no_progress
+) -> Diagnosis:
     """What `simulation` lacks, by recordings.
 
     Raises InputError where nothing of the FRFs lies in robot.toml's band, or where the robot would
     not stand at their poses.
     """
-    tell("looking at the signals", 0.02)
+    progress("looking at the signals", 0.02)
     window = None if recorded.window_rate_1_s else screen_window(recorded)
     if window is not None:
         recorded = recorded.corrected(recorded.visits, window.parameters["rate"][0])
@@ -177,14 +183,14 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
     if not FrfMisfit(stated, search.data(1), search.tolerances).possible(stated.mean):
         raise InputError(TOO_SOFT)
     screened = tuple(f for f in (window, screen_tone(recorded)) if f is not None)
-    heard = [(f.effect, f.at) for f in screened]
+    from_signals = [(f.effect, f.at) for f in screened]
     matters = robot.config.diagnose.matters
-    recorded, search, explored, levels = _explored(recorded, search, simulation, tell)
-    fits, aside = (explored.plain, likeliest(explored.settled)), set_aside(recorded.q)
-    tell("judging", 0.9)
+    recorded, search, explored, levels = _explored(recorded, search, simulation, progress)
+    fits, aside = (explored.plain, most_probable(explored.settled)), set_aside(recorded.q)
+    progress("judging", 0.9)
     held_out = _held_out(search, fits, aside) if aside else None
     worse = held_out is not None and held_out.worse(matters)
-    verdict = judged(explored, matters, between(recorded.q), heard, levels, worse)
+    verdict = judged(explored, matters, between(recorded.q), from_signals, levels, worse)
     return Diagnosis(
         recorded,
         search,
@@ -199,26 +205,26 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell = quietly) -> 
 
 
 def _explored(
-    recorded: Dataset, search: Search, simulation: Simulation, tell: Tell
-) -> tuple[Dataset, Search, Explored, Levels | None]:
+    recorded: Dataset, search: Search, simulation: Simulation, progress: ProgressCallback
+) -> tuple[Dataset, Search, ExploredStructures, Levels | None]:
     """What explains the recordings, and what force levels tell of joints that are not linear.
 
     Then the recordings are returned, and searched, as they are without that: a linear fit follows
     what a law has on average, from pose to pose, by effects that are not there.
     """
 
-    def explored() -> Explored:
-        steps = replace(search, tell=lambda text: tell(f"fitting: {text}", 0.5))
+    def explored() -> ExploredStructures:
+        steps = replace(search, on_step=lambda text: progress(f"fitting: {text}", 0.5))
         return steps.explored()
 
     found, levels, straight = explored(), None, recorded
     for _ in range(ROUNDS if recorded.visits else 0):
-        tell("comparing hits of different force", 0.85)
-        told = level_laws(recorded, likeliest(found.settled))
+        progress("comparing hits of different force", 0.85)
+        told = level_laws(recorded, most_probable(found.settled))
         levels = told if levels is None or told.laws else levels
         if not told.laws or recorded.most_heard is not recorded:
             break
-        there = RobotPosterior.of(likeliest(found.settled)).simulation
+        there = RobotPosterior.of(most_probable(found.settled)).simulation
         straight = straightened(recorded, with_laws(there, told.laws, recorded))
         search = searching(straight.ended_frfs, straight.q, simulation, _order(straight))
         found = explored()
@@ -242,7 +248,7 @@ def searching(
 ) -> Search:
     """A search of the whole library, in which nothing is told that does not matter."""
     robot = simulation.robot
-    prior = RobotPrior(Repertoire.of(simulation, PRIORS, diagnosed(simulation)), bearings=True)
+    prior = RobotPrior(EffectLibrary.of(simulation, PRIORS, diagnosed(simulation)), bearings=True)
     return Search(
         prior,
         tuple(frfs),
@@ -286,7 +292,7 @@ def _agreement(
         misfit = replace(fit.misfit, data=data)
         for name in ("matrices", "jacobians", "poses"):
             vars(misfit).pop(name, None)
-        h = misfit.heard(fit.at.x, misfit.motion(fit.at.x, None).accelerance)
+        h = misfit.through_chain(fit.at.x, misfit.motion(fit.at.x, None).accelerance)
         found.append(similarity_of(data.measured, h))
     return ThreefoldSimilarity(found[0], found[1], found[2])
 

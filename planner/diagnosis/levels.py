@@ -57,7 +57,7 @@ class LevelLaw:
 
     effect: str
     at: str
-    nats: float
+    gain_nats: float
     parameters: dict[str, tuple[float, float, str]]
     share: float
     table: LawTable | None = None
@@ -91,7 +91,7 @@ def level_laws(recorded: Dataset, found: StructureFit) -> Levels:
 
     Of several sensors and hit points, the ones most heard tell.
     """
-    config = found.structure.prior.repertoire.simulation.robot.config
+    config = found.structure.prior.library.simulation.robot.config
     groups, ports = hit_groups(recorded.most_heard, found), own_ports(found)
     return laws_of(groups, ports, config.diagnose.matters)
 
@@ -102,7 +102,7 @@ def laws_of(groups: Sequence[HitGroup], ports: Sequence[JointPort], matters: flo
         return Levels(Differences(0.0, 1.0), Differences(0.0, 1.0))
     groups = coloured(groups)
     search, left = _Search(groups, {}), [g.accelerance for g in groups]
-    null, rho = search.likeliest(lambda w: evidence(w, left))
+    null, rho = search.most_probable(lambda w: evidence(w, left))
     seen = differences(search.at(rho), left)
     found = Levels(seen, seen)
     joints = {p.at: (p, JointMotions.of(groups, j, p.stiffness)) for j, p in enumerate(ports)}
@@ -114,14 +114,14 @@ def laws_of(groups: Sequence[HitGroup], ports: Sequence[JointPort], matters: flo
         if worth - null < LEAST:
             break
         fits = search.fits(lower, *joints.pop(at), left, null)
-        best = max(fits, key=lambda f: f.law.nats)
+        best = max(fits, key=lambda f: f.law.gain_nats)
         if not found.laws:
             found = replace(found, free=gains, candidates=_candidates(fits, gains))
-        least = max([LEAST, *(EXPLAINS * law.nats for law in found.laws)])
-        if best.law.effect == UNKNOWN or best.law.nats < least:
+        least = max([LEAST, *(EXPLAINS * law.gain_nats for law in found.laws)])
+        if best.law.effect == UNKNOWN or best.law.gain_nats < least:
             break
         left = [v - c for v, c in zip(left, best.changes, strict=True)]
-        null, rho = search.likeliest(lambda w, left=left: evidence(w, left), best.rho)
+        null, rho = search.most_probable(lambda w, left=left: evidence(w, left), best.rho)
         after = differences(search.at(rho), left)
         found = replace(found, laws=(*found.laws, best.law), left=after)
     if found.explained >= EXPLAINS:
@@ -155,9 +155,9 @@ def _candidates(
     fits: Sequence[_Fit], gains: dict[str, float]
 ) -> tuple[tuple[str, str, float], ...]:
     """Kinds at the best joint by their nats; at others, less by what these gain less."""
-    kinds = {f.law.effect: f.law for f in sorted(fits, key=lambda f: f.law.nats)}
+    kinds = {f.law.effect: f.law for f in sorted(fits, key=lambda f: f.law.gain_nats)}
     laws = [(law, joint) for joint in gains for law in kinds.values()]
-    nats = np.array([law.nats + gains[joint] - gains[law.at] for law, joint in laws])
+    nats = np.array([law.gain_nats + gains[joint] - gains[law.at] for law, joint in laws])
     each = zip(laws, shares(nats, 0).tolist(), strict=True)
     return tuple(sorted(((law.effect, at, p) for (law, at), p in each), key=lambda c: -c[2]))
 
@@ -195,7 +195,7 @@ class _Search:
             self.known[rho] = [WeighedGroup(g, rho) for g in self.groups]
         return self.known[rho]
 
-    def likeliest(
+    def most_probable(
         self, worth: Callable[[Weighed], float], rho: float = 0.01
     ) -> tuple[float, float]:
         """The largest value, uphill from one of SIZES, and its size."""
@@ -214,7 +214,7 @@ class _Search:
 
     def free(self, columns: Values, left: Values, rho: float) -> tuple[float, float]:
         """Evidence of a free stiffness, and the discrepancy beside it."""
-        return self.likeliest(lambda w: evidence(w, left) + gain(w, columns, left), rho)
+        return self.most_probable(lambda w: evidence(w, left) + gain(w, columns, left), rho)
 
     def fits(
         self, rho: float, port: JointPort, motions: JointMotions, left: Values, null: float
@@ -230,7 +230,7 @@ class _Search:
             while True:
                 best = self._descended(self.at(now), motions, shape, sign, points, left)
                 after = [v - c for v, c in zip(left, best.changes, strict=True)]
-                nats, lower = self.likeliest(lambda w, after=after: evidence(w, after), now)
+                nats, lower = self.most_probable(lambda w, after=after: evidence(w, after), now)
                 if lower >= now:
                     break
                 now, points = lower, best.p[None]

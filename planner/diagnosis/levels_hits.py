@@ -84,8 +84,8 @@ class HitGroup:
     """n hits along one axis without leaving a pose, at L of K lines; J joints may bend.
 
     `accelerance` (n, 3, L) in m/s²/N and the `variance` of its noise, `size` (3, L) to which what
-    nothing explains is proportional, `misses` (4 n, n, 3, L) by sds of each hit's own errors. At
-    all K lines: `swing` (n, J, K) of the joints were they linear, `own` (J, K) rad per N·m and
+    nothing explains is proportional, `hit_errors` (4 n, n, 3, L) by sds of each hit's own errors.
+    At all K lines: `swing` (n, J, K) of the joints were they linear, `own` (J, K) rad per N·m and
     `shown` (J, 3, K) accelerations per N·m there, `force` (n, K) under a window from the record's
     start.
     """
@@ -95,7 +95,7 @@ class HitGroup:
     accelerance: np.ndarray
     variance: np.ndarray
     size: np.ndarray
-    misses: np.ndarray
+    hit_errors: np.ndarray
     swing: np.ndarray
     own: np.ndarray
     shown: np.ndarray
@@ -106,7 +106,7 @@ class HitGroup:
 def own_ports(found: StructureFit) -> tuple[JointPort, ...]:
     """The joints with a spring of their own."""
     s = found.structure
-    robot, stiffness = s.prior.repertoire.simulation.robot, s.elasticity(found.at.x).stiffness
+    robot, stiffness = s.prior.library.simulation.robot, s.elasticity(found.at.x).stiffness
     ports: dict[str, JointPort] = {}
     for own, spring in enumerate(s.springs):
         block = robot.config.compliance[spring]

@@ -37,28 +37,28 @@ class WeighedGroup:
         return out.reshape(len(out), -1).view(float)
 
     @cached_property
-    def misses(self) -> tuple[np.ndarray, np.ndarray]:
+    def hit_errors(self) -> tuple[np.ndarray, np.ndarray]:
         """B (4 n, N), and the inverse of the Cholesky factor of I + B Bᵀ."""
-        b = self.white(self.group.misses)
+        b = self.white(self.group.hit_errors)
         return b, np.linalg.inv(np.linalg.cholesky(np.eye(len(b)) + b @ b.T))
 
     @cached_property
     def volume(self) -> float:
         """−ln of the volume in which FRFs may lie."""
         logs = np.log(self.variance).sum() + np.log(np.sum(1 / self.variance, axis=0)).sum()
-        return float(np.log(np.diag(self.misses[1])).sum() - logs)
+        return float(np.log(np.diag(self.hit_errors[1])).sum() - logs)
 
     def gram(self, values: np.ndarray) -> np.ndarray:
         """(C, C) of values (C, n, 3, L), misses integrated out."""
-        white, (b, inverse) = self.white(values), self.misses
+        white, (b, inverse) = self.white(values), self.hit_errors
         taken = white @ b.T @ inverse.T
         return white @ white.T - taken @ taken.T
 
-    def without_misses(self, values: np.ndarray) -> np.ndarray:
+    def without_hit_errors(self, values: np.ndarray) -> np.ndarray:
         """Values (n, 3, L) without the likeliest misses and what is common."""
-        b, inverse = self.misses
+        b, inverse = self.hit_errors
         eta = inverse.T @ (inverse @ (b @ self.white(values[None])[0]))
-        left = values - np.tensordot(eta, self.group.misses, 1)
+        left = values - np.tensordot(eta, self.group.hit_errors, 1)
         return left - left.mean(axis=0)
 
 
@@ -73,7 +73,7 @@ def coloured(groups: Sequence[HitGroup]) -> tuple[HitGroup, ...]:
     ratios = []
     for g in groups:
         n, soft = len(g.peak_n), int(np.argmin(g.peak_n))
-        off = WeighedGroup(g, SMALL).without_misses(g.accelerance)[soft] * n / (n - 1)
+        off = WeighedGroup(g, SMALL).without_hit_errors(g.accelerance)[soft] * n / (n - 1)
         ratios.append(np.abs(off) ** 2 / g.variance[soft])
     least = np.quantile(np.array(ratios), QUARTER, axis=(0, 1)) / -np.log(1 - QUARTER)
     return tuple(replace(g, variance=g.variance * np.maximum(least, 1.0)) for g in groups)
@@ -120,7 +120,7 @@ def differences(weighed: Weighed, left: Values) -> Differences:
         if n < least:
             continue
         noise = rng.standard_normal((2, *values.shape))
-        off = w.without_misses(values + lacking * (noise[0] + 1j * noise[1]))
+        off = w.without_hit_errors(values + lacking * (noise[0] + 1j * noise[1]))
         course = np.log(g.peak_n) - np.log(g.peak_n).mean()
         course /= np.linalg.norm(course)
         along = float(np.sum(np.abs(np.tensordot(course, off, 1)) ** 2))

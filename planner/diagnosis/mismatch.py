@@ -37,7 +37,9 @@ class Residuals:
         """Of a fit on its lines, the likeliest misses of hits and chain taken out."""
         measured = fit.misfit.data.measured
         noise = np.hypot(measured.sd, matters * fit.misfit.size)
-        square = np.where(measured.used, np.abs(RobotPosterior.of(fit).left / noise) ** 2, np.nan)
+        square = np.where(
+            measured.used, np.abs(RobotPosterior.of(fit).residual / noise) ** 2, np.nan
+        )
         edges = np.linspace(*band_hz, BANDS + 1)
         place = np.clip(np.searchsorted(edges, measured.frequency_hz, "right") - 1, 0, BANDS - 1)
         bands = [np.where((place == k)[:, None, None], square, np.nan) for k in range(BANDS)]
@@ -116,7 +118,7 @@ class MismatchShares:
         measured = found.best.misfit.data.measured
         used = measured.used
         sides = simulated(found, found.best.misfit.data)
-        off = [h - measured.accelerance for h in sides] + [found.robot.left]
+        off = [h - measured.accelerance for h in sides] + [found.robot.residual]
         recorded = max(float(np.sum(np.abs(measured.accelerance[used]) ** 2)), 1e-300)
         shares = (float(np.sum(np.abs(one[used]) ** 2)) / recorded for one in off)
         return cls(*(round(10 * float(np.log10(max(share, 1e-12))), 2) for share in shares))
@@ -147,5 +149,5 @@ def simulated(found: "Diagnosis", data: "FrfData") -> list[np.ndarray]:
     out = []
     for structure, x in sides:
         misfit = FrfMisfit(structure, data, found.search.tolerances)
-        out.append(misfit.heard(x, misfit.motion(x, None).accelerance))
+        out.append(misfit.through_chain(x, misfit.motion(x, None).accelerance))
     return out

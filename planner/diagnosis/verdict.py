@@ -17,12 +17,12 @@ from planner.diagnosis.levels import Levels
 from planner.effects.effect import Operator
 from planner.fit.explanations import (
     RARE,
-    Explored,
+    ExploredStructures,
     Key,
     added,
     built,
     key_of,
-    likeliest,
+    most_probable,
     probabilities,
 )
 from planner.fit.fitted import StructureFit, evidence_of, settled, size_of, without
@@ -42,11 +42,11 @@ UNKNOWN, NONE = ("unknown", None), ("none", None)
 
 @dataclass(frozen=True, eq=False)
 class NamedEffect:
-    """An effect of the explanation: `nats` that it gains, share of |H| that it changes, and the
-    probability that it is there."""
+    """An effect of the explanation: `gain_nats` that it gains, share of |H| that it changes, and
+    the probability that it is there."""
 
     operator: Operator
-    nats: float
+    gain_nats: float
     change: float
     probability: float
     counts: bool
@@ -83,20 +83,21 @@ class Verdict:
 
 
 def judged(
-    explored: Explored,
+    explored: ExploredStructures,
     matters: float,
     q: np.ndarray,
-    heard: Sequence[Place] = (),
+    from_signals: Sequence[Place] = (),
     levels: Levels | None = None,
     worse: bool = False,
 ) -> Verdict:
-    """Of what was explored, of effects `heard` in the signals, and of laws of force `levels`.
+    """Of what was explored, of effects `from_signals` in the signals, and of laws of force
+    `levels`.
 
     Sizes are told at q (n, dof) in rad, poses that were not measured. Averages over levels are bent
     by a joint's law: beside one only what changes FRFs by more than levels do is told. What
     predicts poses set aside `worse` than the robot as stated explains nothing.
     """
-    weights, best = probabilities(explored.settled), likeliest(explored.settled)
+    weights, best = probabilities(explored.settled), most_probable(explored.settled)
     effects = _weighed(explored, best, weights, matters, q)
     laws = levels.laws if levels else ()
     if levels and laws:
@@ -109,17 +110,17 @@ def judged(
     named = [e for e in effects if e.counts]
     nameless = any(e.operator.general for e in named)
     left = (size_of(best) > EXPLAINS * matters or nameless or worse) and not laws
-    unknown = left or bool(levels and levels.unexplained) or UNKNOWN in heard
-    there = named or heard or laws
+    unknown = left or bool(levels and levels.unexplained) or UNKNOWN in from_signals
+    there = named or from_signals or laws
     verdict = "unexplained" if unknown else "explained" if there else "consistent"
-    candidates = _candidates(weights, effects, unknown, tuple(heard))
+    candidates = _candidates(weights, effects, unknown, tuple(from_signals))
     if levels and laws and not unknown:
         candidates = _with_laws(candidates, levels)
     return Verdict(verdict, tuple(effects), candidates, _sets(named, weights), best)
 
 
 def _weighed(
-    explored: Explored,
+    explored: ExploredStructures,
     best: StructureFit,
     weights: dict[Key, float],
     matters: float,
@@ -159,7 +160,9 @@ def _beyond(best: StructureFit) -> list[Operator]:
     return [f for f, at in own if f in built(best) and f.beyond(x[at], viscous)]
 
 
-def _without(explored: Explored, best: StructureFit, effect: Operator) -> StructureFit | None:
+def _without(
+    explored: ExploredStructures, best: StructureFit, effect: Operator
+) -> StructureFit | None:
     """The best that there is without an effect: refitted from here, or as the search came by."""
     rest = Counter(key_of(best)) - Counter([effect.name])
     met = [f for f in explored.settled if Counter(key_of(f)) == rest and effect in added(best)]
@@ -184,15 +187,18 @@ def _candidates(
     weights: dict[Key, float],
     effects: Sequence[NamedEffect],
     unknown: bool,
-    heard: tuple[Place, ...],
+    from_signals: tuple[Place, ...],
 ) -> tuple[Candidate, ...]:
     """Sets by what of them counts; what no name explains is "unknown"."""
     counts = {e.place for e in effects if e.counts}
     idle = {e.place for e in effects} - counts
-    heard = (*heard, *sorted(p for p in counts if not any(p in key for key in weights)))
+    from_signals = (
+        *from_signals,
+        *sorted(p for p in counts if not any(p in key for key in weights)),
+    )
     shares: dict[tuple[Place, ...], float] = {}
     for key, weight in weights.items():
-        rest = (*heard, *sorted(p for p in key if p not in idle))
+        rest = (*from_signals, *sorted(p for p in key if p not in idle))
         places = (UNKNOWN,) if unknown else rest or (NONE,)
         shares[places] = shares.get(places, 0.0) + weight
     shares.setdefault((UNKNOWN,), 0.0)

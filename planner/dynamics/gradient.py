@@ -91,7 +91,7 @@ def moved(
         return Motion(matrices, x[:, :, :points], x[:, :, points:], s)
     matrices = actual.turned(matrices)
     mass = (matrices.mass if mass is None else mass) + actual.heavier(matrices)
-    rows = np.concatenate([actual.struck(matrices), actual.heard(matrices)], axis=1)
+    rows = np.concatenate([actual.hit_jacobian(matrices), actual.sensor_jacobian(matrices)], axis=1)
     x = _solutions(matrices, elasticity, s, mass, rows, added)
     points = actual.hit.shape[2]
     return Motion(matrices, x[:, :, :points], x[:, :, points:], s, actual=actual)

@@ -29,18 +29,18 @@ class ActualPorts:
     scale: np.ndarray
     angle: np.ndarray
 
-    def struck(self, matrices: Matrices) -> np.ndarray:
+    def hit_jacobian(self, matrices: Matrices) -> np.ndarray:
         """(n, 3h, e) of the hits."""
         both = np.concatenate([matrices.hit, matrices.hit_turn], axis=1)
         return np.swapaxes(self.hit, 1, 2) @ both
 
-    def felt(self, matrices: Matrices) -> np.ndarray:
+    def true_sensor_jacobian(self, matrices: Matrices) -> np.ndarray:
         """(n, 3s, e) of faultless sensors where they are."""
         return self.place @ np.concatenate([matrices.sensor, matrices.sensor_turn], axis=1)
 
-    def heard(self, matrices: Matrices) -> np.ndarray:
+    def sensor_jacobian(self, matrices: Matrices) -> np.ndarray:
         """(n, 3s, e) of the sensors."""
-        return self.matrix @ self.felt(matrices)
+        return self.matrix @ self.true_sensor_jacobian(matrices)
 
     def heavier(self, matrices: Matrices) -> np.ndarray:
         """Change (n, e, e) of the mass matrix by where the joints stood."""
@@ -93,14 +93,14 @@ class Motion:
     def accelerance(self) -> np.ndarray:
         """(n, 3s, 3h, F) in m/s²/N."""
         m = self.matrices
-        return self.moving(m.sensor if self.actual is None else self.actual.heard(m))
+        return self.moving(m.sensor if self.actual is None else self.actual.sensor_jacobian(m))
 
     @cached_property
-    def felt(self) -> np.ndarray:
+    def true_accelerance(self) -> np.ndarray:
         """(n, 3s, 3h, F) in m/s² per hit in N, as faultless sensors would show it."""
         if self.actual is None:
             return self.accelerance
-        return self.moving(self.actual.felt(self.matrices))
+        return self.moving(self.actual.true_sensor_jacobian(self.matrices))
 
     def moving(self, rows: np.ndarray) -> np.ndarray:
         """(n, r, 3h, F): how the hits accelerate `rows` (n, r, e)."""

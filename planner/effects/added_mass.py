@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.gradient import Impedance
-from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start, nats_of
+from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start, gain_of
 from planner.effects.parameters import MOMENTS
 from planner.robot.virtual_joints import inertia_basis
 from planner.words import significant
@@ -45,7 +45,7 @@ class AddedMass(Operator):
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """By the columns of the mass and of its first moments, at the likeliest of some places."""
         places = map(np.array, self.places)
-        return (max((self._start(motions, gain, place) for place in places), key=nats_of),)
+        return (max((self._start(motions, gain, place) for place in places), key=gain_of),)
 
     def _start(self, motions: Motions, gain: Gain, place: np.ndarray) -> Start:
         there = self.impedance(motions.poses, np.array([1.0, *place, *self.mean[4:]]))
@@ -57,7 +57,7 @@ class AddedMass(Operator):
         place = place + np.clip(psi[1:4] / mass, -1, 1)
         return Start(self, np.array([mass, *place, *self.mean[4:]]), nats, moved)
 
-    def elsewhere(self, found: Operator, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
+    def moved_to(self, found: Operator, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
         """The same matter on another link: springs that move both feel it as they did."""
         matter = found.inertia(psi)
         assert matter is not None

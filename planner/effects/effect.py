@@ -100,13 +100,13 @@ class Start:
 
     effect: "Operator"
     psi: np.ndarray
-    nats: float
+    gain_nats: float
     moved: np.ndarray | None = None
 
 
-def nats_of(start: Start) -> float:
+def gain_of(start: Start) -> float:
     """What the first order promises."""
-    return start.nats
+    return start.gain_nats
 
 
 @dataclass(frozen=True)
@@ -180,7 +180,7 @@ class Operator(ABC):
         """Where fits with it begin, by its first-order columns; springs are tried as they are."""
         return (Start(self, self.mean, np.inf),)
 
-    def elsewhere(self, found: "Operator", psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
+    def moved_to(self, found: "Operator", psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
         """Where it begins, as `found`, one like it at another place, has ψ."""
         return self.starts(motions, gain)[0]
 

@@ -15,8 +15,8 @@ from planner.effects.effect import (
     Operator,
     PosedBodies,
     Start,
+    gain_of,
     moving,
-    nats_of,
     turning,
 )
 from planner.robot.config import Resonator
@@ -79,7 +79,7 @@ class LinkResonator(Operator):
         tried = [
             self.at_frequency(f, motions, gain) for f in np.geomspace(low * 1.1, high, SCREENED)
         ]
-        return (max(tried, key=nats_of),)
+        return (max(tried, key=gain_of),)
 
     def at_frequency(self, hertz: float, motions: Motions, gain: Gain) -> Start:
         """Where it begins at one frequency: six columns, one for each pair of directions."""
@@ -109,7 +109,7 @@ class LinkResonator(Operator):
         start[1], start[3:6] = np.log(hertz), ways[:, most]
         return Start(self.towards(ways[:, most]), start, nats, moved)
 
-    def elsewhere(self, found: Operator, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
+    def moved_to(self, found: Operator, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
         """It keeps frequency and damping."""
         begun = self.at_frequency(float(np.exp(psi[1])), motions, gain)
         return replace(begun, psi=np.array([*begun.psi[:2], psi[2], *begun.psi[3:]]))

@@ -49,7 +49,7 @@ GAIN, TURNED_RAD, DELAY_S, FAR_OFF, HAT, DRIFT = 0.5, 0.5, 5e-4, 1.2, 0.3, 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Repertoire:
+class EffectLibrary:
     """`simulation` with every spring, the first `stated` of which robot.toml states, and effects.
 
     `stiff` is the stated simulation alone, with its own priors; of both the resonators that
@@ -67,7 +67,7 @@ class Repertoire:
     @classmethod
     def of(
         cls, simulation: Simulation, priors: Priors, further: Sequence[Operator] = ()
-    ) -> "Repertoire":
+    ) -> "EffectLibrary":
         """Of a robot as robot.toml states it; `further` effects beside those of every campaign."""
         there = _stated_resonators(simulation.robot)
         if there:

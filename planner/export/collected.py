@@ -13,7 +13,7 @@ from planner.surrogate.frf_bands import ModalPrediction
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredOf:
+class MeasuredPoseData:
     """A measured pose: joint angles in degrees (mm of slides), FRFs, likely modes."""
 
     pose: str
@@ -23,7 +23,7 @@ class MeasuredOf:
 
 
 @dataclass(frozen=True, eq=False)
-class Collected:
+class ExportData:
     """All of a campaign that other programs can use: measured poses, and the model at n `poses`.
 
     There with joints (n, dof) in degrees or mm, modes, FRFs (n, 3, 3, F) with sd in m/s²/N.
@@ -32,7 +32,7 @@ class Collected:
     name: str
     joints: JointUnits
     simulated: bool
-    measured: tuple[MeasuredOf, ...]
+    measured: tuple[MeasuredPoseData, ...]
     poses: tuple[str, ...]
     joints_deg: np.ndarray
     frequency_hz: np.ndarray
@@ -46,9 +46,9 @@ class Collected:
         return f"{'SIMULATED ' if self.simulated else ''}planner campaign {self.name}"
 
 
-def collect(
+def export_data(
     campaign: Campaign, poses: Sequence[str], joints_deg: Sequence[Sequence[float]]
-) -> Collected:
+) -> ExportData:
     """Measured poses, and the model's predictions at `poses` (none: at the measured ones)."""
     state, cell = campaign.state, campaign.cell
     used, lines = state.used, campaign.frequency_lines
@@ -66,11 +66,11 @@ def collect(
         none = np.empty((0, cell.config.modes.count))
         modes = ModalPrediction(none, none, none, none, np.empty((*none.shape, 3, 3)), none)
     measured = (
-        MeasuredOf(
+        MeasuredPoseData(
             m.pose, m.joints_deg, campaign.frf_of(m, cell.config.modes),
             tuple(mode for mode in m.modes if mode.likely),
         )
         for m in used
     )  # fmt: skip
     found = tuple(measured), names, angles, lines, mean, sd, modes
-    return Collected(campaign.directory.name, cell.robot.joints, state.simulated, *found)
+    return ExportData(campaign.directory.name, cell.robot.joints, state.simulated, *found)

@@ -5,7 +5,7 @@ from scipy.interpolate import RBFInterpolator
 
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError
-from planner.export.collected import Collected
+from planner.export.collected import ExportData
 from planner.recording.joints import SCALES
 
 # Points of a workspace of up to two coordinates, and of more: 3 and 9 s, 0.1 and 0.6 MB.
@@ -30,7 +30,7 @@ def at(coordinates):  # (n, d): {coordinates}
 """
 
 
-def model_arrays(campaign: Campaign, found: Collected) -> dict[str, np.ndarray]:
+def model_arrays(campaign: Campaign, found: ExportData) -> dict[str, np.ndarray]:
     """Arrays of the file: points x (n, d), scaled to [0, 1], and values (n, 3 · modes) there.
 
     Values are ln frequency in Hz, ln of its relative sd, and damping ratio, mode by mode.

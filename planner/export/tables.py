@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from planner.export.collected import Collected
+from planner.export.collected import ExportData
 
 AXES = "xyz"
 
 
-def modes_csv(found: Collected) -> str:
+def modes_csv(found: ExportData) -> str:
     """Measured and predicted modes, one a row: Hz, ratios, and their standard deviations."""
     header = ["source", "pose", *found.joints.columns, "mode", "frequency_hz", "frequency_sd_hz",
               "damping_ratio", "damping_sd"]  # fmt: skip
@@ -20,7 +20,7 @@ def modes_csv(found: Collected) -> str:
     return _text(found, header, _mode_rows(found))
 
 
-def _mode_rows(found: Collected) -> Iterator[list[object]]:
+def _mode_rows(found: ExportData) -> Iterator[list[object]]:
     for one in found.measured:
         for k, m in enumerate(one.modes, 1):
             shape = [v for pair in m.shape for v in pair]
@@ -34,14 +34,14 @@ def _mode_rows(found: Collected) -> Iterator[list[object]]:
             yield ["predicted", pose, *found.joints_deg[i].tolist(), k + 1, *numbers, *[""] * 6]
 
 
-def frfs_csv(found: Collected) -> str:
+def frfs_csv(found: ExportData) -> str:
     """Measured and predicted accelerances in m/s²/N, one line of one FRF a row."""
     numbers = [f"{part}_m_s2_per_n" for part in ("real", "imag", "sd")]
     header = ["source", "pose", "response", "hit", "frequency_hz", *numbers, "coherence"]
     return _text(found, header, _frf_rows(found))
 
 
-def _frf_rows(found: Collected) -> Iterator[list[object]]:
+def _frf_rows(found: ExportData) -> Iterator[list[object]]:
     hz = found.frequency_hz
     low, high = (hz[0], hz[-1]) if len(hz) else (0.0, 0.0)
     for one in found.measured:
@@ -60,7 +60,7 @@ def _frf_rows(found: Collected) -> Iterator[list[object]]:
                 yield ["predicted", pose, AXES[i], AXES[j], f, h.real, h.imag, s, ""]
 
 
-def _text(found: Collected, header: list[str], rows: Iterable[list[object]]) -> str:
+def _text(found: ExportData, header: list[str], rows: Iterable[list[object]]) -> str:
     """A table; where recordings are simulated every row says so."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -72,7 +72,7 @@ def _text(found: Collected, header: list[str], rows: Iterable[list[object]]) -> 
     return out.getvalue()
 
 
-def mat_arrays(found: Collected) -> dict[str, Any]:
+def mat_arrays(found: ExportData) -> dict[str, Any]:
     """Variables of the MAT file; poses come first in every array."""
     modes = found.modes
     made: dict[str, Any] = {

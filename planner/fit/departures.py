@@ -13,7 +13,7 @@ DEPARTED = 4.0  # prior sds
 TOLD = 3  # at most
 
 
-def away(structure: RobotStructure, x: np.ndarray) -> np.ndarray:
+def sds_off(structure: RobotStructure, x: np.ndarray) -> np.ndarray:
     """(D,) by how many prior sds stiffnesses and bodies are off what is stated; 0 of all else."""
     out = np.zeros(len(x))
     for own in (slice(0, structure.stiffnesses), structure.inertial):
@@ -23,7 +23,7 @@ def away(structure: RobotStructure, x: np.ndarray) -> np.ndarray:
 
 def departed(structure: RobotStructure, x: np.ndarray) -> tuple[int, ...]:
     """Numbers of x that are far from what is stated."""
-    return tuple(map(int, np.flatnonzero(np.abs(away(structure, x)) > DEPARTED)))
+    return tuple(map(int, np.flatnonzero(np.abs(sds_off(structure, x)) > DEPARTED)))
 
 
 def departures_text(structure: RobotStructure, x: np.ndarray) -> str:
@@ -77,7 +77,7 @@ def refitted_masses(s: RobotStructure, x: np.ndarray) -> list[RefittedMass]:
 
 def _links(s: RobotStructure) -> list[str]:
     """Of each body."""
-    robot = s.prior.repertoire.simulation.robot
+    robot = s.prior.library.simulation.robot
     return [
         robot.link_of(b) if b in robot.joint_names else b.removesuffix(OUTER)
         for b in s.bodies.bodies

@@ -89,7 +89,7 @@ class ExpectedFrfs:
         data = FrfData.of(structure.prior, (frf,), q[None], self.band_hz, LINES)
         return FrfMisfit(structure, data, self.tolerances, size)
 
-    def strange(self, q: np.ndarray, frf: Frf) -> float:
+    def outlier_log_density(self, q: np.ndarray, frf: Frf) -> float:
         """Log density of an FRF measured at q (dof,) in rad if it is hardly what is expected."""
         misfit = self._misfit(q, frf, STRANGE)
         return misfit.evidence(misfit(misfit.structure.mean))

@@ -16,7 +16,7 @@ Key = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Explored:
+class ExploredStructures:
     """The robot as it is known to be built, and every set of effects that was settled."""
 
     plain: StructureFit
@@ -47,16 +47,16 @@ def built(found: StructureFit) -> tuple[Operator, ...]:
 
 def probabilities(fits: Iterable[StructureFit]) -> dict[Key, float]:
     """Probability of each set of effects, among all that were settled."""
-    logs = {key_of(f): worth(f) for f in fits}
+    logs = {key_of(f): log_probability(f) for f in fits}
     found = shares(np.array(list(logs.values())), 0)
     return dict(zip(logs, map(float, found), strict=True))
 
 
-def likeliest(fits: Iterable[StructureFit]) -> StructureFit:
+def most_probable(fits: Iterable[StructureFit]) -> StructureFit:
     """Of the likeliest set of effects."""
-    return max(fits, key=worth)
+    return max(fits, key=log_probability)
 
 
-def worth(found: StructureFit) -> float:
+def log_probability(found: StructureFit) -> float:
     """Logarithm of how likely it is: its evidence, and how rare so many effects are."""
     return found.evidence - RARE * len(added(found))

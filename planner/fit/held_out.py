@@ -9,8 +9,8 @@ import numpy as np
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import Priors
 from planner.errors import InputError
+from planner.fit.identified_robot import IdentifiedRobot
 from planner.fit.identify import identify
-from planner.fit.learned import Learned
 from planner.frf.frf import Frf
 from planner.measurement.agreement import Similarity, fit_similarity
 
@@ -26,8 +26,8 @@ class JudgedIdentification:
     lacked; where there are none, trial and similarities are None.
     """
 
-    final: Learned
-    trial: Learned | None
+    final: IdentifiedRobot
+    trial: IdentifiedRobot | None
     before: Similarity
     after: Similarity
     held_out: tuple[int, ...]

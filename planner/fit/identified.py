@@ -31,15 +31,15 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
     what else is known is as unsure as they make it. Where nothing explains the FRFs, no parameter
     counts as known.
     """
-    structure, repertoire = posterior.structure, posterior.structure.prior.repertoire
+    structure, library = posterior.structure, posterior.structure.prior.library
     simulation = posterior.simulation
     nominal = Simulation(simulation.robot)
     names = {p.name for p in structure.parameters}
-    bounds = {n: b for n, b in repertoire.priors.bounds.items() if n in names}
+    bounds = {n: b for n, b in library.priors.bounds.items() if n in names}
     model = ExtendedModel(
         nominal,
-        repertoire.priors_with(bounds),
-        len(structure.springs) - repertoire.stated,
+        library.priors_with(bounds),
+        len(structure.springs) - library.stated,
     )
     p = parametrise(nominal, model.priors)
     turned = _logarithms(posterior, p)

@@ -7,10 +7,10 @@ import numpy as np
 
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS, Priors
-from planner.effects.table import Repertoire
+from planner.effects.table import EffectLibrary
 from planner.errors import InputError
 from planner.fit.fitted import FitRecord
-from planner.fit.learned import Learned
+from planner.fit.identified_robot import IdentifiedRobot
 from planner.fit.misfit import FrfMisfit
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
@@ -34,8 +34,8 @@ def identify(
     tolerances: Tolerances | None = None,
     extend: bool = True,
     warm: FitRecord | None = None,
-    tell: Callable[[str], None] = lambda _: None,
-) -> Learned:
+    on_step: Callable[[str], None] = lambda _: None,
+) -> IdentifiedRobot:
     """Springs and inertias that explain FRFs at poses q (n, dof) in rad, one row an FRF matrix.
 
     Where what robot.toml states does not explain them, and `extend`, the effects that do are looked
@@ -52,15 +52,15 @@ def identify(
         )
     tolerances = tolerances or Tolerances.of(robot.config, robot.joints.slides)
     prior, band = robot_prior(simulation, priors), band_hz or robot.config.band_hz
-    search = Search(prior, tuple(frfs), q, band, tolerances, tell, extend=extend)
+    search = Search(prior, tuple(frfs), q, band, tolerances, on_step, extend=extend)
     stated = prior.stated()
     if not FrfMisfit(stated, search.data(1), tolerances).possible(stated.mean):
         raise InputError(TOO_SOFT)
-    return Learned.of(search.found(warm))
+    return IdentifiedRobot.of(search.found(warm))
 
 
 def robot_prior(simulation: Simulation, priors: Priors) -> RobotPrior:
     """What is known of a robot before, its inertias exactly where priors leave them alone."""
     if not priors.inertial:
         priors = replace(priors, mass=EXACT, inertia=EXACT, com_m=EXACT)
-    return RobotPrior(Repertoire.of(simulation, priors))
+    return RobotPrior(EffectLibrary.of(simulation, priors))

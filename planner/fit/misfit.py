@@ -18,7 +18,7 @@ from planner.effects.effect import Gain, Motions
 from planner.fit.data import FrfData, among
 from planner.fit.inertias import spatial
 from planner.fit.structure import REACH, RobotStructure
-from planner.measurement.nuisances import OpenNumbers, Tolerances, actual_ports, basis
+from planner.measurement.nuisances import NuisanceCounts, Tolerances, actual_ports, basis
 from planner.robot.elastic_model import Matrices
 from planner.robot.virtual_joints import inertia_basis
 
@@ -261,7 +261,7 @@ class FrfMisfit:
         motion = self.motion(x, eta, added)
         h = motion.accelerance
         open_ = basis(h, motion, self.data.measured.s, self.tolerances)
-        numbers, joints = self.open_numbers
+        numbers, joints = self.nuisance_counts
         own = s.size + numbers.hits + joints
         out = np.empty((len(h), own + len(s.springs) + 1, *h.shape[1:]), dtype=complex)
         _, visits = self.slopes(motion, x, out[:, : s.chain.start], added)
@@ -269,9 +269,11 @@ class FrfMisfit:
         out[:, s.size : s.size + numbers.hits] = open_[:, : numbers.hits]
         out[:, s.size + numbers.hits : own] = open_[:, numbers.known :]
         np.multiply(visits, self.tolerances.visit_stiffness, out=out[:, own:-1])
-        return self.heard(x, h, out[:, :-1]), out, motion
+        return self.through_chain(x, h, out[:, :-1]), out, motion
 
-    def heard(self, x: np.ndarray, h: np.ndarray, columns: np.ndarray | None = None) -> np.ndarray:
+    def through_chain(
+        self, x: np.ndarray, h: np.ndarray, columns: np.ndarray | None = None
+    ) -> np.ndarray:
         """What the chain makes of accelerances h (n, r, c, F), and in place of their columns."""
         structure = self.structure
         for effect, own in zip(structure.effects, structure.own, strict=True):
@@ -287,20 +289,20 @@ class FrfMisfit:
         return h
 
     @cached_property
-    def open_numbers(self) -> tuple[OpenNumbers, int]:
+    def nuisance_counts(self) -> tuple[NuisanceCounts, int]:
         """Of hits and chain, and of joints."""
         by_angle = self.matrices.by_angle
         joints = 0 if by_angle is None else by_angle.mass.shape[1]
-        return OpenNumbers.of(self.data.measured.accelerance), joints
+        return NuisanceCounts.of(self.data.measured.accelerance), joints
 
-    def nothing_open(self) -> np.ndarray:
+    def zero_nuisances(self) -> np.ndarray:
         """(n, l): own numbers, all 0."""
-        numbers, joints = self.open_numbers
+        numbers, joints = self.nuisance_counts
         return np.zeros((len(self.data.q), numbers.hits + joints + len(self.structure.springs)))
 
     def about(self, own: np.ndarray, x: np.ndarray) -> np.ndarray:
         """(n, hits + chain + joints), from own numbers and the chain as x has it."""
-        numbers, joints = self.open_numbers
+        numbers, joints = self.nuisance_counts
         chain = np.tile(x[self.structure.chain], (len(own), 1))
         kept = own[:, : numbers.hits + joints]
         return np.hstack([kept[:, : numbers.hits], chain, kept[:, numbers.hits :]])
@@ -311,9 +313,9 @@ class FrfMisfit:
 
     def around(self, x: np.ndarray, own: np.ndarray | None = None) -> "Around":
         """What does not depend on the discrepancy's size."""
-        numbers, joints = self.open_numbers
+        numbers, joints = self.nuisance_counts
         size = numbers.hits + joints
-        given = self.nothing_open()
+        given = self.zero_nuisances()
         if own is not None:
             given[:, :size] = np.clip(own[:, :size], -FARTHEST, FARTHEST)
         m, d = self.data.measured, self.structure.size
@@ -423,8 +425,8 @@ class FrfMisfit:
     def motions(self, at: At) -> Motions:
         """How hits and sensors move the springs, as effects' first-order columns need it."""
         motion, x = at.motion, at.x
-        sensor = self.heard(x, motion.scaled(motion.x_sensor).swapaxes(1, 2)).swapaxes(1, 2)
-        m, h = self.data.measured, self.heard(x, motion.accelerance)
+        sensor = self.through_chain(x, motion.scaled(motion.x_sensor).swapaxes(1, 2)).swapaxes(1, 2)
+        m, h = self.data.measured, self.through_chain(x, motion.accelerance)
         return Motions(self.poses, motion.x_hit, sensor, h, np.where(m.used, m.accelerance, h))
 
 

@@ -137,18 +137,18 @@ class RobotPosterior(RobotBelief):
         return float(t.gain * own + t.force_gain * chain[-2]), allowed
 
     def misfits(self, least: float) -> tuple[float, np.ndarray]:
-        """Square of what is `left` over the noise's variance, of all and by pose (n,).
+        """Square of what is `residual` over the noise's variance, of all and by pose (n,).
 
         `least` is a relative sd that counts as noise.
         """
         misfit = self.found.misfit
         m, noise = misfit.data.measured, np.hypot(misfit.data.measured.sd, least * misfit.size)
-        ratio = np.where(m.used, np.abs(self.left / noise) ** 2, 0.0)
+        ratio = np.where(m.used, np.abs(self.residual / noise) ** 2, 0.0)
         count = np.maximum(m.used.sum(axis=(1, 2, 3)), 1)
         return float(ratio.sum() / count.sum()), ratio.sum(axis=(1, 2, 3)) / count
 
     @cached_property
-    def left(self) -> np.ndarray:
+    def residual(self) -> np.ndarray:
         """(n, r, c, F) in m/s²/N: simulated less measured, once the likeliest misses are out."""
         misfit, at = self.found.misfit, self.found.at
         columns = misfit.around(at.x, at.own).columns

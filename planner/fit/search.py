@@ -12,7 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.effects.effect import Operator
-from planner.fit.explanations import RARE, Explored, Key, added, key, key_of, likeliest, worth
+from planner.fit.explanations import (
+    RARE,
+    ExploredStructures,
+    Key,
+    added,
+    key,
+    key_of,
+    log_probability,
+    most_probable,
+)
 from planner.fit.fitted import (
     SIZES,
     FitRecord,
@@ -28,7 +37,7 @@ from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
 from planner.fit.structure import RobotStructure, effects_free, exported
 from planner.fit.trials import FAR, LOG_STEPS, Trials, explained
-from planner.inference.parallel import side_by_side
+from planner.inference.parallel import parallel_map
 from planner.measurement.measured_frfs import completed
 
 SEARCHED, SCREENED, LAST = 24, 48, 44  # lines a pose: while searching, for operators, at the end
@@ -49,10 +58,10 @@ class Search(Trials):
     widen: bool = False  # whether `StructureFit.wider` is asked for
     thorough: bool = False  # whether what explains them is compared with all that is beside it
 
-    def explored(self) -> Explored:
+    def explored(self) -> ExploredStructures:
         """From the robot as it is known to be built on."""
         plain = self._plain()
-        return Explored(plain, self._explore([plain]))
+        return ExploredStructures(plain, self._explore([plain]))
 
     def found(self, warm: FitRecord | None = None) -> StructureFit:
         """The effects that explain them best; from what was found before, if that is given.
@@ -71,11 +80,13 @@ class Search(Trials):
         known = [] if warm is None else [self._recovered(warm)]
         if not known or not explained(known[0]):
             known.append(self._plain())
-        best = likeliest(self._explore(known, warm is not None))
+        best = most_probable(self._explore(known, warm is not None))
         # All springs may give at once, which none of them shows alone; but what did not explain
         # fewer poses is only mended.
         if not explained(best) and (warm is None or warm.size <= SIZES[0]):
-            best = likeliest([best, *self._explore([self._pruned(self.freed())], warm is not None)])
+            best = most_probable(
+                [best, *self._explore([self._pruned(self.freed())], warm is not None)]
+            )
         return self._ended(best)
 
     def _pruned(self, found: StructureFit) -> StructureFit:
@@ -85,11 +96,11 @@ class Search(Trials):
         if fewer is None:
             return found
         fewer = settled(fewer.misfit, fewer.at)
-        return self._pruned(fewer) if worth(fewer) > worth(found) else found
+        return self._pruned(fewer) if log_probability(fewer) > log_probability(found) else found
 
     def _gone_on(self, known: FitRecord) -> StructureFit:
         best = self._recovered(known)
-        return self._ended(likeliest(self._explore([best], True)) if self.extend else best)
+        return self._ended(most_probable(self._explore([best], True)) if self.extend else best)
 
     def _completed(self, known: FitRecord) -> "Search":
         """With the decays that records cut off, as a structure has them."""
@@ -106,7 +117,7 @@ class Search(Trials):
 
     def _plain(self) -> StructureFit:
         """With nothing that robots need not have."""
-        self.tell("as stated")
+        self.on_step("as stated")
         data = self.data(SEARCHED)
         return converged(self.begun(data, self.prior.as_built(data.sensors)))
 
@@ -117,7 +128,7 @@ class Search(Trials):
 
     def freed(self) -> StructureFit:
         """With every spring that there may be, and no operator."""
-        data, springs = self.data(SEARCHED), [e for e in self.prior.repertoire.effects if e.springs]
+        data, springs = self.data(SEARCHED), [e for e in self.prior.library.effects if e.springs]
         stated = self.prior.stated(data.sensors)
         return converged(self.begun(data, replace(stated, effects=(*stated.effects, *springs))))
 
@@ -141,14 +152,14 @@ class Search(Trials):
         pool: Pool = {}
         extended, seen = set[Key](), set[Key]()
         _keep(pool, begun)
-        while key_of(best := likeliest(pool.values())) not in seen:
+        while key_of(best := most_probable(pool.values())) not in seen:
             seen.add(key_of(best))
             near = not self.thorough and (warm or explained(best))
             for more in self._beside(best, near, pool, extended):
                 _keep(pool, more)
-                likelier = likeliest(pool.values())
+                likelier = most_probable(pool.values())
                 if key_of(likelier) != key_of(best):
-                    self.tell(" + ".join(e.label for e in added(likelier)) or "as stated")
+                    self.on_step(" + ".join(e.label for e in added(likelier)) or "as stated")
                     _keep(pool, [converged(likelier)])
                     break
         return tuple(pool.values())
@@ -207,7 +218,7 @@ class Search(Trials):
         if len(added(base)) >= MOST:
             return []
         nearest = self.nearest(base, self.starts(base, SCREENED))
-        ends = side_by_side(lambda at: converged(self.begun_with(base, *at)).tried, nearest)
+        ends = parallel_map(lambda at: converged(self.begun_with(base, *at)).tried, nearest)
         return [self._from(tried, base.misfit.data) for tried in ends]
 
     def displaced(self, best: StructureFit, effect: Operator) -> list[StructureFit]:
@@ -222,7 +233,7 @@ class Search(Trials):
             e for e in effects_free(base.structure)
             if type(e) is type(effect) and e.at != effect.at.split("#")[0]
         ]  # fmt: skip
-        ends = self.compete(base, [e.elsewhere(effect, psi, motions, gain) for e in others])
+        ends = self.compete(base, [e.moved_to(effect, psi, motions, gain) for e in others])
         return [*map(converged, ends[:1]), *ends[1:]]
 
     def _last(self, best: StructureFit) -> StructureFit:

@@ -82,12 +82,12 @@ def leaders(starts: Sequence[Start], least: float = 0.0) -> list[Start]:
     kept: list[Start] = []
     kinds: set[str] = set()
     operators = 0
-    for start in sorted(starts, key=lambda s: -s.nats):
+    for start in sorted(starts, key=lambda s: -s.gain_nats):
         effect: Operator = start.effect
         new = effect.kind not in kinds
-        told = np.isinf(start.nats) or effect.artefact
-        if told or (start.nats > least and (operators < KEPT or new)):
+        told = np.isinf(start.gain_nats) or effect.artefact
+        if told or (start.gain_nats > least and (operators < KEPT or new)):
             kept.append(start)
             kinds.add(effect.kind)
-            operators += not np.isinf(start.nats)
+            operators += not np.isinf(start.gain_nats)
     return kept

@@ -14,7 +14,7 @@ import numpy as np
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.effects.effect import Operator, SpringPrior
 from planner.effects.parameters import Parameter, Parametrisation, parametrise
-from planner.effects.table import Repertoire
+from planner.effects.table import EffectLibrary
 from planner.fit.inertias import BodyNumbers, body_numbers, pseudo_inertia
 from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR
 from planner.robot.config import BASE, LOSS_FACTOR_BELOW, Harmonic, Resonator
@@ -34,24 +34,24 @@ class RobotPrior:
     `bearings`: whether each is taken to give slightly, and loss factors to be there.
     """
 
-    repertoire: Repertoire
+    library: EffectLibrary
     bearings: bool = False
 
     @cached_property
     def built(self) -> tuple[Operator, ...]:
         """Effects that every robot has."""
-        return self.repertoire.as_built() if self.bearings else self.repertoire.there
+        return self.library.as_built() if self.bearings else self.library.there
 
     @cached_property
     def wide(self) -> Parametrisation:
         """Of the robot with every spring."""
-        r = self.repertoire
+        r = self.library
         return parametrise(r.simulation, r.priors)
 
     @cached_property
     def carried(self) -> ElasticModel:
         """The robot with every spring, its weight carried by those that robot.toml states."""
-        r = self.repertoire
+        r = self.library
         stiffness = r.simulation.elastic.stiffness.copy()
         stiffness[r.stated : len(r.simulation.robot.config.compliance)] = STIFF
         return r.simulation.elastic.carried_by(stiffness)
@@ -59,12 +59,12 @@ class RobotPrior:
     @cached_property
     def stiff(self) -> Parametrisation:
         """Of the robot as stated: its bodies are whole."""
-        r = self.repertoire
+        r = self.library
         return parametrise(r.stiff, r.stiff_priors)
 
     def stated(self, sensors: int = 1) -> "RobotStructure":
         """The robot as robot.toml states it."""
-        return RobotStructure(self, self.repertoire.there, sensors)
+        return RobotStructure(self, self.library.there, sensors)
 
     def as_built(self, sensors: int = 1) -> "RobotStructure":
         """With what every robot has, which robot.toml need not state."""
@@ -72,7 +72,7 @@ class RobotPrior:
 
     def bodies(self, springs: frozenset[int]) -> tuple[tuple[int, ...], BodyNumbers]:
         """Bodies that move by some of the springs: numbers among all, and theirs."""
-        r = self.repertoire
+        r = self.library
         wide, stiff = r.simulation.elastic, r.stiff.elastic
         joints = {r.simulation.robot.config.compliance[i].joint for i in springs}
         live, nominal, sds, names = [], [], [], []
@@ -109,7 +109,7 @@ class RobotStructure:
     @cached_property
     def springs(self) -> tuple[int, ...]:
         """Numbers of its springs among all: those that robot.toml states, and the effects'."""
-        own = range(self.prior.repertoire.stated)
+        own = range(self.prior.library.stated)
         return tuple(sorted({*own, *(i for e in self.effects for i in e.springs)}))
 
     @cached_property
@@ -307,13 +307,13 @@ KINDS = ("stiffness", "damping", "loss_factor")
 def effects_free(structure: RobotStructure) -> tuple[Operator, ...]:
     """Those of the repertoire that it has not."""
     there = {e.label for e in structure.effects}
-    return tuple(e for e in structure.prior.repertoire.effects if e.label not in there)
+    return tuple(e for e in structure.prior.library.effects if e.label not in there)
 
 
 def exported(structure: RobotStructure, x: np.ndarray) -> tuple[Simulation, Sequence[str]]:
     """The simulation that a structure is at x, and the names of its springs' parameters."""
-    repertoire = structure.prior.repertoire
-    robot = repertoire.simulation.robot
+    library = structure.prior.library
+    robot = library.simulation.robot
     elasticity = structure.elasticity(x)
     blocks = [robot.config.compliance[i] for i in structure.springs]
     losses: dict[int, float] = {}

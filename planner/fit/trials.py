@@ -27,7 +27,7 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.starts import from_stated, leaders, placed, pulled
 from planner.fit.structure import RobotPrior, RobotStructure, effects_free
 from planner.frf.frf import Frf
-from planner.inference.parallel import side_by_side
+from planner.inference.parallel import parallel_map
 from planner.measurement.nuisances import Tolerances
 
 ROUGH, AFAR = (
@@ -51,13 +51,13 @@ class Trials:
     q: np.ndarray
     band_hz: tuple[float, float]
     tolerances: Tolerances
-    tell: Callable[[str], None] = lambda _: None
+    on_step: Callable[[str], None] = lambda _: None
     order: np.ndarray | None = None  # as in `FrfData.of`
     floor: float = 0.0  # as in `FrfMisfit`
 
     def __getstate__(self) -> Mapping[str, object]:
         """For another process, which tells nothing."""
-        return vars(self) | {"tell": _quietly}
+        return vars(self) | {"on_step": _quietly}
 
     @cached_property
     def _data(self) -> dict[int, FrfData]:
@@ -98,7 +98,7 @@ class Trials:
         that gain more than `least` nats by it."""
         misfit = replace(base.misfit, data=self.data(lines))
         motions, gain = misfit.first_order(base.at.x, base.at.own)
-        free, every = effects_free(base.structure), self.prior.repertoire.effects
+        free, every = effects_free(base.structure), self.prior.library.effects
         again = (e for e in every if e.several and e not in free)  # more may hang on a link
         far = not explained(base)
         tried = (e for e in (*free, *again) if far or pulled(base, e))
@@ -119,15 +119,15 @@ class Trials:
         None is followed that by then is so many nats `behind` the base.
         """
         rough, data = self._on(base, self.data(ROUGH)), base.misfit.data
-        pool = side_by_side(lambda s: self._few(rough, s), starts)
+        pool = parallel_map(lambda s: self._few(rough, s), starts)
         if afar and not explained(base):
             near = self.nearest(base, starts)
-            pool += side_by_side(lambda at: self.begun_with(rough, *at).tried, near)
+            pool += parallel_map(lambda at: self.begun_with(rough, *at).tried, near)
         least = rough.evidence - behind
         near = _best_of_each(p for p in pool if p and p.evidence > least)
-        followed = side_by_side(lambda p: self._stepped(p, data), near[:FOLLOWED])
+        followed = parallel_map(lambda p: self._stepped(p, data), near[:FOLLOWED])
         near = _best_of_each(followed)[:count]
-        ends = side_by_side(lambda p: self._settled(p, data), near)
+        ends = parallel_map(lambda p: self._settled(p, data), near)
         return sorted((self._from(p, data) for p in ends), key=evidence_of, reverse=True)
 
     def _stepped(self, tried: Tried, data: FrfData) -> Tried:
@@ -189,10 +189,10 @@ class Trials:
             at = minimised(misfit(begun[0]), begun[1], LOG_STEPS)
             return at.value, at.x
 
-        pairs = zip(starts, side_by_side(near, starts), strict=True)
+        pairs = zip(starts, parallel_map(near, starts), strict=True)
         ends = sorted(((v, s, x) for s, each in pairs for v, x in each), key=lambda end: end[0])
         followed = [(s, x) for _, s, x in ends[:FOLLOWED]]
-        both = zip(followed, side_by_side(nearer, followed), strict=True)
+        both = zip(followed, parallel_map(nearer, followed), strict=True)
         ends = sorted(((v, s, x) for (s, _), (v, x) in both), key=lambda end: end[0])
         return [(s, x) for _, s, x in ends[:FARTHEST]]
 

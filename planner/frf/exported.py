@@ -11,7 +11,7 @@ import numpy as np
 from planner.errors import PlannerError, RefusedError
 from planner.frf.frf import Frf
 from planner.frf.quantities import convert
-from planner.recording.points import SENSOR, TCP, TOOL, UNTOLD, Layout
+from planner.recording.points import NOT_STATED, SENSOR, TCP, TOOL, Layout
 from planner.recording.records import AXES, FrfRecord
 
 # What a record states of each of its FRFs.
@@ -26,7 +26,7 @@ class LabelledFrf:
     (0, 1, 2 for x, y, z).
     """
 
-    felt: tuple[str, int]
+    response: tuple[str, int]
     hit: tuple[str, int]
     values: np.ndarray
     coherence: np.ndarray
@@ -129,7 +129,7 @@ def from_records(records: tuple[FrfRecord, ...], window_rate_1_s: float = 0.0) -
     h, coherence = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
     for one in frfs:
         row, column = layout.sensors.index(_sensor(one)), layout.hits.index(_hit_point(one))
-        at = 3 * row + one.felt[1], 3 * column + one.hit[1]
+        at = 3 * row + one.response[1], 3 * column + one.hit[1]
         h[at], coherence[at] = one.values, one.coherence
     given = np.array([[bool(np.isfinite(one).all()) for one in row] for row in h])
     measured = np.array([c.all() if layout == TOOL else c.any() for c in given.T])
@@ -146,7 +146,7 @@ def from_records(records: tuple[FrfRecord, ...], window_rate_1_s: float = 0.0) -
 
 
 def _sensor(one: LabelledFrf) -> str:
-    return one.felt[0] or SENSOR
+    return one.response[0] or SENSOR
 
 
 def _hit_point(one: LabelledFrf) -> str:
@@ -186,6 +186,6 @@ def exported(frf: Frf, source: Path, simulated: bool) -> FrfRecord:
 def _place(points: tuple[str, ...], at: int, unnamed: str) -> tuple[str, int]:
     """Node and direction of a row or column."""
     name, direction = points[at // 3], at % 3 + 1
-    if name.endswith(UNTOLD):
-        name, direction = name.removesuffix(UNTOLD), 0
+    if name.endswith(NOT_STATED):
+        name, direction = name.removesuffix(NOT_STATED), 0
     return "" if name == unnamed else name, direction

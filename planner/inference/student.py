@@ -7,6 +7,6 @@ import numpy as np
 QUANTILE = -1.21111e-06, 1.210469181, 0.705417327, 0.170526168, -0.309654629, 0.0881456454
 
 
-def wider(freedom: np.ndarray | float) -> np.ndarray:
+def widening_factor(freedom: np.ndarray | float) -> np.ndarray:
     """Student's t quantile over the normal one (97.5 %), for degrees of freedom ≥ 2."""
     return np.exp(np.polynomial.polynomial.polyval(1 / freedom, QUANTILE))

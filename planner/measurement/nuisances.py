@@ -71,14 +71,14 @@ OF_HIT, OF_SENSOR, OF_HAMMER = 4, 12, 2  # numbers of each hit axis, each sensor
 
 
 @dataclass(frozen=True)
-class OpenNumbers:
+class NuisanceCounts:
     """How many numbers FRFs (…, r, c, F) leave open: of hits, then of the chain, then of joints."""
 
     hits: int
     chain: int
 
     @classmethod
-    def of(cls, h: np.ndarray) -> "OpenNumbers":
+    def of(cls, h: np.ndarray) -> "NuisanceCounts":
         """Of FRFs between some points."""
         rows, columns = h.shape[-3:-1]
         return cls(OF_HIT * columns, OF_SENSOR * (rows // 3) + OF_HAMMER)
@@ -94,13 +94,13 @@ HIT_NUMBERS = 3 * OF_HIT
 
 
 def basis(h: np.ndarray, motion: Motion, s: np.ndarray, t: Tolerances) -> np.ndarray:
-    """Changes (n, l, r, c, F) of FRFs h (n, r, c, F) per sd, as `OpenNumbers` counts them.
+    """Changes (n, l, r, c, F) of FRFs h (n, r, c, F) per sd, as `NuisanceCounts` counts them.
 
     Those of the joints are there where the matrices behind `motion` have their slopes. Where it
     knows of actual ports, h and the changes are around those.
     """
     n, rows, columns, lines = h.shape
-    numbers, actual, by_angle = OpenNumbers.of(h), motion.actual, motion.by_angle
+    numbers, actual, by_angle = NuisanceCounts.of(h), motion.actual, motion.by_angle
     joints = 0 if by_angle is None else by_angle.shape[1]
     # All is written once, in place: such arrays are large.
     out = np.zeros((n, numbers.known + joints, rows, columns, lines), dtype=complex)
@@ -109,7 +109,7 @@ def basis(h: np.ndarray, motion: Motion, s: np.ndarray, t: Tolerances) -> np.nda
     of_hits = np.einsum("namiaf->namif", by_axis)
     hit_basis(h if actual is None else motion.forces, motion.moment, t, of_hits)
     of_chain = out[:, numbers.hits : numbers.known]
-    _of_chain(h if actual is None else motion.felt, motion.turning, t, of_chain)
+    _of_chain(h if actual is None else motion.true_accelerance, motion.turning, t, of_chain)
     if actual is not None:
         for sensor in range(rows // 3):
             places = of_chain[:, OF_SENSOR * sensor + 9 : OF_SENSOR * (sensor + 1)]
@@ -167,10 +167,10 @@ def actual_ports(
 ) -> ActualPorts:
     """Where hits and sensors were, and the joints stood, whose numbers eta (n, l) are known.
 
-    They are in sds, as `OpenNumbers` counts them, of FRFs of `shape` (r, c) at s (n, F).
+    They are in sds, as `NuisanceCounts` counts them, of FRFs of `shape` (r, c) at s (n, F).
     """
     n, (rows, columns) = len(eta), shape
-    numbers = OpenNumbers(OF_HIT * columns, OF_SENSOR * (rows // 3) + OF_HAMMER)
+    numbers = NuisanceCounts(OF_HIT * columns, OF_SENSOR * (rows // 3) + OF_HAMMER)
     hit = np.concatenate([np.eye(columns), np.zeros((columns, columns))])
     hit = np.repeat(hit[None], n, axis=0)
     place = np.repeat(np.eye(rows, 2 * rows)[None], n, axis=0)

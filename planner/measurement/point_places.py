@@ -99,7 +99,7 @@ def _differences(
     return along(1, h[:, :, :, to_hit]), along(3, h[:, to_sensor])
 
 
-def questions(found: Sequence[Misplaced], poses: Sequence[str]) -> tuple[str, ...]:
+def misplaced_questions(found: Sequence[Misplaced], poses: Sequence[str]) -> tuple[str, ...]:
     """A sentence for each point that fits another's place, with the poses where it does."""
     told: dict[tuple[str, str, bool], list[Misplaced]] = {}
     for one in found:

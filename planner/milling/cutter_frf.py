@@ -108,7 +108,7 @@ def read_frf(path: Path, pose: str | None, from_names: bool = False) -> CutterFr
     frequency, frfs = labelled_frfs(read_frfs(path, from_names), "accelerance", InputError)
     h = np.full((3, 3, len(frequency)), np.nan + 0j)
     for one in frfs:
-        h[one.felt[1], one.hit[1]] = one.values
+        h[one.response[1], one.hit[1]] = one.values
     return of_accelerance(str(path), frequency, h, None)
 
 

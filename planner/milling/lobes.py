@@ -15,11 +15,11 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import root_scalar
 
-from planner.inference.parallel import side_by_side
+from planner.inference.parallel import parallel_map
 from planner.milling.machine import Machine, Monodromies, check_structure, limits, multipliers
 from planner.milling.period import Period
 from planner.milling.semi_discretisation import semi_monodromies
-from planner.progress import Tell, quietly
+from planner.progress import ProgressCallback, no_progress
 
 LEAST_STEPS = 16  # of the scan in all
 GROWTH = 1.045
@@ -87,7 +87,7 @@ MANY, BLOCK = 60, 10  # speeds from which two processes share them, in blocks of
 
 
 @dataclass(frozen=True)
-class Loss:
+class StabilityLimit:
     """First loss at one speed: depth in m (NaN: none), kind, chatter frequency, relative error."""
 
     depth_m: float
@@ -97,34 +97,36 @@ class Loss:
     points: int = 0
 
 
-NO_LOSS = Loss(np.nan)
+NO_LIMIT = StabilityLimit(np.nan)
 
 
-def losses(machine: Machine, tell: Tell = quietly) -> tuple[Loss, ...]:
+def stability_limits(
+    machine: Machine, progress: ProgressCallback = no_progress
+) -> tuple[StabilityLimit, ...]:
     """At each speed of the cut, up to its largest depth, by its method."""
     check_structure(machine.modes)
     cut = machine.cut
     if cut.method == "zeroth_order":
-        return zeroth_losses(machine)
+        return zeroth_order_limits(machine)
     scan = scanned_depths(machine.floor().floor_m, cut.depth_m[1])
     speeds = [float(rpm) for rpm in cut.speeds_rpm]
     if len(speeds) < MANY:
-        return tuple(discretised_loss(machine, rpm, scan) for rpm in speeds)
+        return tuple(discretised_limit(machine, rpm, scan) for rpm in speeds)
     blocks = [speeds[i : i + BLOCK] for i in range(0, len(speeds), BLOCK)]
-    found = side_by_side(
-        lambda block: [discretised_loss(machine, rpm, scan) for rpm in block],
+    found = parallel_map(
+        lambda block: [discretised_limit(machine, rpm, scan) for rpm in block],
         blocks,
-        lambda number, count: tell("lobes", count / len(blocks)),
+        lambda number, count: progress("lobes", count / len(blocks)),
     )
     return tuple(loss for block in found for loss in block)
 
 
-def zeroth_losses(machine: Machine) -> tuple[Loss, ...]:
+def zeroth_order_limits(machine: Machine) -> tuple[StabilityLimit, ...]:
     """By the average of the cutting force; kind and error are not known to it, kinds are Hopf."""
     cut = machine.cut
     depths, chatter = limits(machine.floor(), cut.speeds_rpm, cut.teeth)
     return tuple(
-        Loss(depth, "hopf", hertz) if depth <= cut.depth_m[1] else NO_LOSS
+        StabilityLimit(depth, "hopf", hertz) if depth <= cut.depth_m[1] else NO_LIMIT
         for depth, hertz in zip(depths, chatter, strict=True)
     )
 
@@ -136,12 +138,12 @@ def monodromies(machine: Machine, rpm: float, factor: float = 1.0) -> Monodromie
     return machine.monodromies(rpm, factor)
 
 
-def discretised_loss(machine: Machine, rpm: float, scan: np.ndarray) -> Loss:
+def discretised_limit(machine: Machine, rpm: float, scan: np.ndarray) -> StabilityLimit:
     """With as many points per period as it needs."""
     at = monodromies(machine, rpm)
     bracket = first_unstable(at, scan)
     if bracket is None:
-        return NO_LOSS
+        return NO_LIMIT
     depth = refined(at, *bracket)
     factor, error = 1.0, np.inf
     # Rounds of adding points
@@ -151,7 +153,7 @@ def discretised_loss(machine: Machine, rpm: float, scan: np.ndarray) -> Loss:
         at = monodromies(machine, rpm, factor)
         found = _again(at, depth, scan)
         if found is None:
-            return NO_LOSS
+            return NO_LIMIT
         error, depth = abs(found - depth) / depth, found
         # Depth error: relative, up to which points per period are added
         if error < 3e-4:
@@ -168,7 +170,9 @@ def _again(at: Monodromies, depth: float, scan: np.ndarray) -> float | None:
     return None if bracket is None else refined(at, *bracket)
 
 
-def _told(machine: Machine, rpm: float, factor: float, depth: float, error: float) -> Loss:
+def _told(
+    machine: Machine, rpm: float, factor: float, depth: float, error: float
+) -> StabilityLimit:
     """Kind and chatter frequency at a limit."""
     built = machine.period(rpm, machine.grid(rpm, factor), depth)
     values, vectors = np.linalg.eig(built.monodromy(np.array([depth]))[0])
@@ -176,7 +180,7 @@ def _told(machine: Machine, rpm: float, factor: float, depth: float, error: floa
     mu = complex(values[top])
     flip = abs(mu.imag) < 1e-7 * abs(mu) and mu.real < 0
     hertz = chatter_frequency(machine, built, mu, vectors[:, top], depth)
-    return Loss(depth, "flip" if flip else "hopf", hertz, error, len(built.seen))
+    return StabilityLimit(depth, "flip" if flip else "hopf", hertz, error, len(built.seen))
 
 
 def chatter_frequency(
@@ -241,7 +245,9 @@ def _quantile(values: np.ndarray, share: float) -> np.ndarray:
 
 
 def sampled_limits(
-    machines: Sequence[Machine], nominal: Sequence[Loss], tell: Tell = quietly
+    machines: Sequence[Machine],
+    nominal: Sequence[StabilityLimit],
+    progress: ProgressCallback = no_progress,
 ) -> SampledLimits:
     """Of samples of a machine whose own first losses are known, at the same speeds."""
     around = np.array([loss.depth_m for loss in nominal])
@@ -250,15 +256,15 @@ def sampled_limits(
 
     def one(machine: Machine) -> np.ndarray:
         if machine.cut.method == "zeroth_order":
-            found = np.array([loss.depth_m for loss in losses(machine)])
+            found = np.array([loss.depth_m for loss in stability_limits(machine)])
             return np.where(np.isnan(found), np.inf, found)
         found = _limits(machine, machine.cut.speeds_rpm[chosen], around[chosen])
         return _between(around, chosen, found)
 
     def done(number: int, count: int) -> None:
-        tell("samples", count / len(machines))
+        progress("samples", count / len(machines))
 
-    return SampledLimits(np.array(side_by_side(one, list(machines), done)))
+    return SampledLimits(np.array(parallel_map(one, list(machines), done)))
 
 
 def _between(around: np.ndarray, chosen: np.ndarray, values: np.ndarray) -> np.ndarray:

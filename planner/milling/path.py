@@ -8,10 +8,10 @@ import numpy as np
 from scipy.stats import norm
 
 from planner.milling.cut import Cut
-from planner.milling.lobes import PROBABILITY, Loss, losses, sampled_limits
+from planner.milling.lobes import PROBABILITY, StabilityLimit, sampled_limits, stability_limits
 from planner.milling.machine import Machine, multipliers
 from planner.milling.structure import Structure, moved
-from planner.progress import Tell, quietly, within
+from planner.progress import ProgressCallback, no_progress, part_of
 
 TURNS_DEG = np.arange(0.0, 360.0, 15.0)  # of the feed about the tool's axis that are tried
 
@@ -24,7 +24,7 @@ class PathLimits:
     """
 
     names: tuple[str, ...]
-    found: tuple[tuple[Loss, ...], ...]
+    found: tuple[tuple[StabilityLimit, ...], ...]
     robust_m: np.ndarray
     known: np.ndarray
 
@@ -45,14 +45,17 @@ class PathLimits:
         return int(np.argmax(np.min(self.robust_m, axis=0)))
 
 
-def along(
-    poses: Sequence[tuple[str, Structure]], cut: Cut, samples: int, tell: Tell = quietly
+def limits_along(
+    poses: Sequence[tuple[str, Structure]],
+    cut: Cut,
+    samples: int,
+    progress: ProgressCallback = no_progress,
 ) -> PathLimits:
     """Limits at every pose, with so many samples of what is uncertain."""
     found, robust, known = [], [], []
     for i, (_, structure) in enumerate(poses):
-        part = within(tell, i / len(poses), (i + 1) / len(poses))
-        own = losses(structure.machine(cut))
+        part = part_of(progress, i / len(poses), (i + 1) / len(poses))
+        own = stability_limits(structure.machine(cut))
         drawn = structure.samples(cut, samples)
         depth = np.array([loss.depth_m for loss in own])
         depth = np.where(np.isnan(depth), np.inf, depth)
@@ -66,28 +69,35 @@ def along(
 
 
 def best_speed_of(
-    poses: Sequence[tuple[str, Structure]], cut: Cut, most: int, tell: Tell = quietly
+    poses: Sequence[tuple[str, Structure]],
+    cut: Cut,
+    most: int,
+    progress: ProgressCallback = no_progress,
 ) -> float:
     """Of at most so many of the cut's speeds that in rpm at which the tightest pose allows most."""
     low, high, count = cut.spindle_rpm
     fewer = msgspec.structs.replace(cut, spindle_rpm=(low, high, min(count, most)))
     least = np.full(len(fewer.speeds_rpm), np.inf)
     for i, (_, structure) in enumerate(poses):
-        depth = np.array([loss.depth_m for loss in losses(structure.machine(fewer))])
+        depth = np.array([loss.depth_m for loss in stability_limits(structure.machine(fewer))])
         least = np.fmin(least, depth)
-        tell("poses", (i + 1) / len(poses))
+        progress("poses", (i + 1) / len(poses))
     return float(fewer.speeds_rpm[int(np.argmax(least))])
 
 
-def at_speed(
-    poses: Sequence[tuple[str, Structure]], cut: Cut, rpm: float, samples: int, tell: Tell = quietly
+def limits_at_speed(
+    poses: Sequence[tuple[str, Structure]],
+    cut: Cut,
+    rpm: float,
+    samples: int,
+    progress: ProgressCallback = no_progress,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(p,) first losses in m at a speed, and depths that are stable with 95 %; inf: none lost."""
-    limits = along(poses, _at_one_speed(cut, rpm), samples, tell)
+    limits = limits_along(poses, _at_one_speed(cut, rpm), samples, progress)
     return limits.depth_m[:, 0], limits.robust_m[:, 0]
 
 
-def by_feed(poses: Sequence[tuple[str, Structure]], cut: Cut, rpm: float) -> np.ndarray:
+def limits_by_feed(poses: Sequence[tuple[str, Structure]], cut: Cut, rpm: float) -> np.ndarray:
     """(TURNS_DEG,) depth in m that all poses allow at a speed if the feed is turned.
 
     About the tool's axis, from the feed towards axis × feed; inf where nothing is lost.
@@ -110,7 +120,7 @@ def _at_one_speed(cut: Cut, rpm: float) -> Cut:
 
 
 def _limit(machine: Machine) -> float:
-    (loss,) = losses(machine)
+    (loss,) = stability_limits(machine)
     return float(np.inf if np.isnan(loss.depth_m) else loss.depth_m)
 
 

@@ -190,7 +190,7 @@ def check_band(frf: CutterFrf, found: LobeCurves, told: np.ndarray | None = None
     )
 
 
-def beyond(structure: Structure, chatter_hz: np.ndarray) -> str | None:
+def out_of_band_remark(structure: Structure, chatter_hz: np.ndarray) -> str | None:
     """A sentence where chatter (n,) lies outside the lines of the FRFs; None where none does."""
     if structure.frf is None:
         return None
@@ -205,7 +205,9 @@ def beyond(structure: Structure, chatter_hz: np.ndarray) -> str | None:
     )
 
 
-def doubts(structure: Structure, cut: Cut, depth_m: np.ndarray, known: np.ndarray) -> list[str]:
+def limit_remarks(
+    structure: Structure, cut: Cut, depth_m: np.ndarray, known: np.ndarray
+) -> list[str]:
     """On limits (n,) in m, NaN or inf where there is none, and whether samples agree on them."""
     fit, said = structure.fit, []
     if fit is None:

@@ -13,15 +13,15 @@ from itertools import combinations
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
-from planner.modal.exchanged import (
+from planner.modal.matrix_poles import MatrixPoles
+from planner.modal.motion_fields import turned_rows
+from planner.modal.node_exchange import (
     Exchange,
-    Sides,
+    RovingSides,
     exchanged_by_neighbours,
     exchanges,
     turning_helps,
 )
-from planner.modal.matrix_poles import MatrixPoles
-from planner.modal.motion_fields import turned_rows
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 
@@ -76,7 +76,7 @@ def check(
     matrix: FrfMatrix, found: MatrixPoles, modes: np.ndarray, geometry: Geometry | None = None
 ) -> Consistency:
     """Check FRFs and residues of the modes (indices) that were established."""
-    sides, (low, high) = Sides.of(matrix, found, modes), found.data.frequency_hz[[0, -1]]
+    sides, (low, high) = RovingSides.of(matrix, found, modes), found.data.frequency_hz[[0, -1]]
     lines = (matrix.frequency_hz >= low) & (matrix.frequency_hz <= high)
     driving = tuple(_driving(matrix, sides, lines, *pair) for pair in sides.driving)
     reciprocity = tuple(_reciprocity(matrix, found, modes, *pair) for pair in _pairs(matrix))
@@ -107,7 +107,7 @@ def check(
     return Consistency(driving, reciprocity, tuple(faults), told, turned, rows, untied, odd)
 
 
-def _turned_rows(sides: Sides, geometry: Geometry | None) -> tuple[Dof, ...]:
+def _turned_rows(sides: RovingSides, geometry: Geometry | None) -> tuple[Dof, ...]:
     """Points whose rows move against all that is around them."""
     if geometry is None or sides.motions is None:
         return ()
@@ -124,7 +124,7 @@ def _turned_row(dof: Dof, hit: bool) -> str:
 
 
 def _driving(
-    matrix: FrfMatrix, sides: Sides, lines: np.ndarray, row: int, column: int
+    matrix: FrfMatrix, sides: RovingSides, lines: np.ndarray, row: int, column: int
 ) -> DrivingPoint:
     dof = sides.columns[column]
     imag = np.imag(matrix.accelerance[matrix.index(dof), matrix.references.index(dof), lines])
@@ -201,7 +201,7 @@ def _remarks(reciprocity: tuple[Reciprocity, ...]) -> tuple[str, ...]:
 FITS, ODD = 0.3, 1.0
 
 
-def odd_entries(sides: Sides) -> tuple[list[str], list[tuple[int, int]]]:
+def odd_entries(sides: RovingSides) -> tuple[list[str], list[tuple[int, int]]]:
     """FRFs with a turned sign, and two of a column that are exchanged: sentences and entries."""
     expected = _expected(sides)
     if expected is None:
@@ -231,7 +231,7 @@ def odd_entries(sides: Sides) -> tuple[list[str], list[tuple[int, int]]]:
     return (sentences, wrong) if few else ([], [])
 
 
-def _expected(sides: Sides) -> np.ndarray | None:
+def _expected(sides: RovingSides) -> np.ndarray | None:
     """(r, c, m) of each entry what the rest of its row asks for; NaN where that says nothing.
 
     The rest of the row tells how the point moves; the columns tell what that makes here.
@@ -251,7 +251,7 @@ def _expected(sides: Sides) -> np.ndarray | None:
     return expected
 
 
-def _named(sides: Sides, row: int, column: int) -> str:
+def _named(sides: RovingSides, row: int, column: int) -> str:
     one, other = sides.rows[row].at, sides.columns[column].at
     felt, hit = (other, one) if sides.hit else (one, other)
     return f"felt {felt} and hit {hit}"

@@ -51,13 +51,13 @@ class Homogeneity:
 
     `difference` is the largest relative difference ‖ΔH‖/‖H‖ between the FRFs of two levels in the
     band beyond what their scatter explains; `p_value` the chance of so much scatter alone. Where
-    hits were not repeated it can't be told (`told` is False): no two hits miss alike.
+    hits were not repeated it can't be told (`significant` is False): no two hits miss alike.
     """
 
     levels: tuple[Level, ...]
     difference: float
     p_value: float
-    told: bool = True
+    significant: bool = True
 
     @property
     def homogeneous(self) -> bool:
@@ -68,7 +68,7 @@ class Homogeneity:
     def remark(self) -> str:
         """One sentence for the engineer; empty where the structure answers in proportion."""
         low, high = self.levels[0], self.levels[-1]
-        if not self.told and self.difference >= SHARE:
+        if not self.significant and self.difference >= SHARE:
             return (
                 f"FRFs at {low.peak_force_n:.0f} N and {high.peak_force_n:.0f} N differ by "
                 f"{100 * self.difference:.0f} %. Either the response is not proportional to the "

@@ -7,7 +7,7 @@ import numpy as np
 from planner.modal.fit_data import Data
 from planner.modal.least_squares import refine
 from planner.modal.mode_selection import doubt, excess, falls, presences, running_mean
-from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
+from planner.modal.set_poles import ROUNDS, DivergedPolesError, SetPoles, fit_sets
 from planner.modal.set_search import Places, reestimated_sets
 from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
 
@@ -96,7 +96,7 @@ def _fit(
         try:
             lines = thinned(data, poles, every)
             return fit_sets(data, sets, variance, poles, rounds, known, lines)
-        except StrayedError as error:
+        except DivergedPolesError as error:
             poles, known = poles[~error.astray], None
 
 
@@ -182,7 +182,7 @@ def _tried(
     start = np.append(fit.poles[near], quick.poles[-1])
     try:
         after = fit_sets(local, sets, variance[:, lines], start, known=own)
-    except StrayedError:
+    except DivergedPolesError:
         return None
     new = after.poles[-1]
     inside = local.frequency_hz[0] < new.imag / (2 * np.pi) < local.frequency_hz[-1]
@@ -192,6 +192,6 @@ def _tried(
         return None
     try:
         before = fit_sets(local, sets, variance[:, lines], fit.poles[near], SETTLING, known)
-    except StrayedError:
+    except DivergedPolesError:
         return None
     return complex(new) if explains(local, before, after, variance[:, lines]) else None

@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from planner.inference.student import wider
+from planner.inference.student import widening_factor
 
 ROUNDS = 60  # of alternating and of Gauss-Newton steps
 ROUGH, STILL = 1e-3, 1e-6  # a step below, relative to the shape, is the last: while weights change
@@ -274,7 +274,7 @@ def row_gain(shapes: Sequence[FittedShape]) -> float:
     if not count:
         return 0.0
     # Of one degree of freedom Student's t would call every shape unknown: it counts as two.
-    return float(np.sqrt(wider(max(tied - 1, 2)) ** 2 * common / count + own / count))
+    return float(np.sqrt(widening_factor(max(tied - 1, 2)) ** 2 * common / count + own / count))
 
 
 def _difference(shapes: Sequence[FittedShape], i: int, j: int) -> tuple[float, float] | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.inference.student import wider
+from planner.inference.student import widening_factor
 from planner.modal.fit_data import Data
 from planner.modal.least_squares import ReducedFit, WeightedSets, fitted, reduced, slope_turn
 from planner.modal.residues import Lines
@@ -21,7 +21,7 @@ ROUNDS = 4  # each a Gauss-Newton step of every set and of what is common
 FARTHEST, FARTHEST_DAMPING = 0.015, 2.0
 
 
-class StrayedError(ValueError):
+class DivergedPolesError(ValueError):
     """Poles left the band, or their damping the possible: the data do not hold them.
 
     `astray` (m,) bool says which.
@@ -60,7 +60,7 @@ def fit_sets(
 
     `sets` are the entries (indices) of each set; data.response (e, 1, F), variance (e, F). `known`
     (k, m) are the sets' own poles to go on from; only some `lines` (indices) are fitted, where
-    stated. Raises StrayedError where the data do not hold the poles.
+    stated. Raises DivergedPolesError where the data do not hold the poles.
     """
     m = start.size
     common = np.concatenate([start.real, start.imag])
@@ -81,7 +81,7 @@ def fit_sets(
         common = common + step
         astray = [not data.allowed(pole[None]) for pole in _complex(common)]
         if any(astray):
-            raise StrayedError(np.array(astray))
+            raise DivergedPolesError(np.array(astray))
         before = own
         own = _own(point, own, common, spread)
         # Still: half bandwidths: sets' own poles that move less are at rest
@@ -160,7 +160,7 @@ def _student(point: ReducedFit, spread: np.ndarray) -> np.ndarray:
     total = np.maximum(np.sum(weight, axis=0), 1e-300)
     freedom = np.maximum(total**2 / np.maximum(np.sum(weight**2, axis=0), 1e-300) - 1, 2.0)
     noise = total / np.maximum(np.sum(known, axis=0), 1e-300)
-    return np.sqrt(noise + (1 - noise) * wider(freedom) ** 2)
+    return np.sqrt(noise + (1 - noise) * widening_factor(freedom) ** 2)
 
 
 def _own(point: ReducedFit, x: np.ndarray, common: np.ndarray, spread: np.ndarray) -> np.ndarray:

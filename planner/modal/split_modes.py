@@ -6,7 +6,7 @@ import numpy as np
 
 from planner.modal.fit_data import Data
 from planner.modal.residues import unit
-from planner.modal.set_poles import SetPoles, StrayedError, fit_sets
+from planner.modal.set_poles import DivergedPolesError, SetPoles, fit_sets
 from planner.modal.set_search import Places, reestimated_sets
 
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
@@ -166,7 +166,7 @@ def _as_one(
             if own is None:
                 return None
             one = fit_sets(local, sets, variance[:, lines], one.poles, MERGED_ROUNDS, own)
-    except StrayedError:
+    except DivergedPolesError:
         return None
     if explains(local, one, more, variance[:, lines], APART):
         return None

@@ -16,11 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from planner.proof.refit import left
-from planner.truth.cases import OUTSIDERS, SINGLES, Made, NothingShowsError, make
+from planner.proof.refit import detectability
+from planner.truth.cases import (
+    OUT_OF_LIBRARY_KINDS,
+    SINGLES,
+    ConcealedCase,
+    NothingDetectableError,
+    make,
+)
 
 ENGINES = "arms", "tree"  # known arms by MuJoCo, robots drawn at random by a tree of frames
-NULL_SHARE, OUTSIDER_SHARE, PAIR_SHARE = 0.15, 0.15, 0.2  # shares of the cases
+NULL_SHARE, OUT_OF_LIBRARY_SHARE, PAIR_SHARE = 0.15, 0.15, 0.2  # shares of the cases
 SCENES, ANOTHER = 5, 1_000_003  # seeds of which something comes; step to the next one
 
 
@@ -32,17 +38,22 @@ def deck(count: int, singles: Sequence[str], outsiders: Sequence[str], seed: int
         rounds = -(-number // len(kinds))
         return [str(k) for _ in range(rounds) for k in rng.permutation(list(kinds))][:number]
 
-    shares = NULL_SHARE, OUTSIDER_SHARE, PAIR_SHARE
+    shares = NULL_SHARE, OUT_OF_LIBRARY_SHARE, PAIR_SHARE
     nulls, outside, pairs = (round(share * count) for share in shares)
     plain = ["null"] * nulls + ["pair"] * pairs + some(outsiders, outside)
     kinds = plain + some(singles, count - len(plain))
     return [str(kind) for kind in rng.permutation(kinds)]
 
 
-def answer(kind: str, engine: str, made: Made) -> str:
+def answer(kind: str, engine: str, made: ConcealedCase) -> str:
     """What was concealed, and what a refit leaves of it: JSON, with salt against guessing."""
     effects = [
-        {"effect": c.effect, "at": c.at, "parameters": c.parameters, **asdict(left(c.question()))}
+        {
+            "effect": c.effect,
+            "at": c.at,
+            "parameters": c.parameters,
+            **asdict(detectability(c.question())),
+        }
         for c in made.concealed
     ]
     whole: dict[str, Any] = {
@@ -63,7 +74,7 @@ def make_one(kind: str, engine: str, seed: int, folder: Path, laboratory: bool =
         try:
             made = make(kind, seed + attempt * ANOTHER, folder, laboratory, engine == "tree")
             return answer(kind, engine, made)
-        except NothingShowsError:
+        except NothingDetectableError:
             continue
     raise SystemExit(f"No {kind} of seed {seed} shows in the noise; take another seed.")
 
@@ -79,7 +90,7 @@ def main() -> None:
     options = parser.parse_args()
     place, own = (options.number - 1) % len(ENGINES), (options.number - 1) // len(ENGINES)
     count = len(range(place, options.cases, len(ENGINES)))
-    kind = deck(count, SINGLES, OUTSIDERS, options.seed)[own]
+    kind = deck(count, SINGLES, OUT_OF_LIBRARY_KINDS, options.seed)[own]
     seed = 100_000 * options.seed + own
     print(make_one(kind, ENGINES[place], seed, options.folder, options.laboratory), end="")
 

@@ -122,7 +122,7 @@ class Pose:
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class DetectionProblem:
     """What tells of one effect: lines s (F,) in 1/s, of which `share` of a record's are these.
 
     `aside`: poses that were not measured, with the true FRFs (F, 3, 3); none where an effect shows
@@ -138,7 +138,7 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Left:
+class Detectability:
     """`nats`: how much the recordings tell of what is left; `size`: of it at poses set aside.
 
     Relative to |H|, of the stage that foretells these best: a refit can also take up too much.
@@ -150,7 +150,7 @@ class Left:
     change: float
 
 
-def left(question: Question) -> Left:
+def detectability(question: DetectionProblem) -> Detectability:
     """Of an effect by the best robot without it."""
     first = question.poses[0].robot
     inertia = [(n, c) for n, b in question.bodies.items() for c in b.changes(question.reach_m)]
@@ -161,10 +161,10 @@ def left(question: Question) -> Left:
         chi2 = found.chi2 - float(moves @ moves)
         chain = np.clip(found.chain, -WITHIN, WITHIN)
         sizes.append(_size(question, inertia, moves, chain))
-    return Left(max(0.0, chi2) / 2, min(sizes), sizes[0])
+    return Detectability(max(0.0, chi2) / 2, min(sizes), sizes[0])
 
 
-def _size(question: Question, inertia: list, moves: np.ndarray, chain: np.ndarray) -> float:
+def _size(question: DetectionProblem, inertia: list, moves: np.ndarray, chain: np.ndarray) -> float:
     """‖Δ‖/‖H‖ at poses set aside, hits and readback as they should be."""
     pairs = list(question.aside) or [(p.robot, o.frf) for p in question.poses for o in p.sets]
     off = whole = 0.0
@@ -246,7 +246,7 @@ class _Sums:
     chi2: float
 
 
-def _sums(question: Question, inertia: list, moves: np.ndarray, error: float) -> _Sums:
+def _sums(question: DetectionProblem, inertia: list, moves: np.ndarray, error: float) -> _Sums:
     parts = [_at_pose(pose, question, inertia, moves, error) for pose in question.poses]
     square, vector, plain = (np.sum(np.array(of), axis=0) for of in zip(*parts, strict=True))
     n = len(moves)
@@ -262,7 +262,7 @@ def _sums(question: Question, inertia: list, moves: np.ndarray, error: float) ->
 
 
 def _at_pose(
-    pose: Pose, question: Question, inertia: list, moves: np.ndarray, error: float
+    pose: Pose, question: DetectionProblem, inertia: list, moves: np.ndarray, error: float
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Normal equations of a pose over moves and chain; its hits and readback are eliminated."""
     shared, frf = _moved(pose.robot, question.s, inertia, moves, slopes=True)

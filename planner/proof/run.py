@@ -46,7 +46,11 @@ class Task:
 
 
 def results(
-    proof: Proof, folder: Path, jobs: int, scheduler: str | None, tell: Callable[[str, float], None]
+    proof: Proof,
+    folder: Path,
+    jobs: int,
+    scheduler: str | None,
+    progress: Callable[[str, float], None],
 ) -> dict[str, Scored]:
     """Every case of a proof, scored; each is kept in `folder` as it comes, and not done again.
 
@@ -66,7 +70,7 @@ def results(
         part.replace(_path(folder, name))
         found[name] = _unsealed(folder, name)
         right = "right" if found[name].right else "wrong"
-        tell(f"{name} {found[name].verdict}, {right}", len(found) / proof.cases)
+        progress(f"{name} {found[name].verdict}, {right}", len(found) / proof.cases)
     return {name: found[name] for name in sorted(found)}
 
 

@@ -3,7 +3,7 @@
 Of each concealed effect the answer has `size`, what the best robot without it leaves of |H| at
 poses set aside, and `nats`, what the recordings tell of that (see `refit`). With m what matters:
 
-- required: at least ENOUGH_NATS and 1.5 m; it is right if named and placed, or in a set of two;
+- required: at least DETECTABLE_NATS and 1.5 m; it is right if named and placed, or in a set of two;
 - silence is required where nothing has 0.67 m; between, either is right;
 - a false name is of nothing that was concealed, nor of an imperfection;
 - "unexplained" is right where an effect without a name has 1.5 m, "consistent" where nothing does.
@@ -20,7 +20,7 @@ from planner.robot.config import DiagnoseTable
 
 MATTERS = DiagnoseTable().matters  # of |H|: what a diagnosis need not explain
 CLEARLY, HARDLY = 1.5 * MATTERS, 0.67 * MATTERS  # of the issue: apart by more than sizes err
-ENOUGH_NATS = 20.0
+DETECTABLE_NATS = 20.0
 LARGEST_SET = 2  # places that can't be told apart and yet count as told
 BINS = 10
 Z90, Z95 = 1.645, 1.96
@@ -31,7 +31,7 @@ NOTHING = frozenset({("none", None), UNKNOWN})
 
 
 @dataclass(frozen=True)
-class Shown:
+class ScoredEffect:
     """A concealed effect, and whether it is named and placed, alone or in a set of two."""
 
     effect: str
@@ -44,7 +44,7 @@ class Shown:
     @property
     def required(self) -> bool:
         """Whether it must be told: by its name, or as unknown."""
-        return self.nats >= ENOUGH_NATS and self.size >= CLEARLY
+        return self.nats >= DETECTABLE_NATS and self.size >= CLEARLY
 
     @property
     def has_name(self) -> bool:
@@ -64,7 +64,7 @@ class Scored:
     group: str
     engine: str
     robot: str
-    shown: tuple[Shown, ...]
+    shown: tuple[ScoredEffect, ...]
     verdict: str
     said: tuple[Place, ...]
     named: tuple[Place, ...]
@@ -97,7 +97,9 @@ def score(name: str, answer: Mapping[str, Any], told: Mapping[str, Any]) -> Scor
     wide = {p: {q for s in sets if p in s and len(s) <= LARGEST_SET for q in s} | {p}
             for p in {*true, *named}}  # fmt: skip
     shown = tuple(
-        Shown(e["effect"], e["at"], e["nats"], e["size"], p in named, bool(wide[p] & set(named)))
+        ScoredEffect(
+            e["effect"], e["at"], e["nats"], e["size"], p in named, bool(wide[p] & set(named))
+        )
         for e, p in zip(answer["effects"], true, strict=True)
     )
     there = {*true, *map(_place, answer.get("imperfections", ()))} - NOTHING
@@ -124,7 +126,7 @@ def _named(told: Mapping[str, Any], verdict: str, said: Sequence[Place]) -> tupl
     return tuple(dict.fromkeys(p for p in found if p not in NOTHING))
 
 
-def _right(verdict: str, shown: Sequence[Shown]) -> bool:
+def _right(verdict: str, shown: Sequence[ScoredEffect]) -> bool:
     """Whether a verdict without false names is right."""
     unknown = [e for e in shown if not e.has_name]
     if verdict == "unexplained":
@@ -256,6 +258,6 @@ def _by(scored: Sequence[Scored], of: Any) -> dict[str, Share]:
     return {name: share([s.right for s in scored if of(s) == name]) for name in names}
 
 
-def _by_effect(effects: Sequence[tuple[Scored, Shown]], of: Any) -> dict[str, Share]:
+def _by_effect(effects: Sequence[tuple[Scored, ScoredEffect]], of: Any) -> dict[str, Share]:
     names = sorted({of(e) for _, e in effects})
     return {name: share([e.in_set for _, e in effects if of(e) == name]) for name in names}

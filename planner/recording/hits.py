@@ -10,7 +10,7 @@ import numpy as np
 from planner.errors import AxisNotStatedError, InputError
 from planner.recording.column_names import hit_direction
 from planner.recording.dof import Dof
-from planner.recording.points import SENSOR, UNTOLD, StatedPoints
+from planner.recording.points import NOT_STATED, SENSOR, StatedPoints
 from planner.recording.records import (
     AXES,
     NOTICED,
@@ -114,7 +114,7 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
     samples = np.array([responses[d].samples * s for d, s in zip(order, signs, strict=True)])
     told, hit_point = _hit_direction(force, axis), stated.hit_at(source, force.node)
     if stated.names.anywhere and not any(told):
-        axis, hit_point = AXES[0], hit_point + UNTOLD
+        axis, hit_point = AXES[0], hit_point + NOT_STATED
     name = _axis(record, force, axis, remarks)
     if unlabelled := without_unit(record):
         remarks.append(f"Left out, as their unit is not known: {unlabelled}.")
@@ -193,7 +193,7 @@ def _anywhere(
         node = stated.response_at(record.source, channel.node)
         along = abs(channel.direction)
         if not along:
-            node = (channel.name if node == SENSOR else node) + UNTOLD
+            node = (channel.name if node == SENSOR else node) + NOT_STATED
         dof = Dof(node, AXES[along - 1 if along else 0]) if along <= len(AXES) else None
         if dof is None or dof in found:
             fault = "has its place and direction twice" if dof else "is a rotation"

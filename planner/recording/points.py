@@ -11,7 +11,7 @@ from planner.errors import InputError
 
 TCP, SENSOR = "tcp", "sensor"
 AXES = "xyz"
-UNTOLD = " (direction not stated)"  # ends the name of a point that a file gives no direction at
+NOT_STATED = " (direction not stated)"  # ends the name of a point that a file gives no direction at
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.recording.dof import Dof
-from planner.recording.points import SENSOR, TCP, UNTOLD, Layout, StatedPoints
+from planner.recording.points import NOT_STATED, SENSOR, TCP, Layout, StatedPoints
 from planner.recording.pulse import Pulse, find_pulse
 
 AXES = ("x", "y", "z")
@@ -144,7 +144,7 @@ class Hit:
     def label(self, row: int) -> str:
         """A response in words: "x", of another sensor than the tool's "elbow x"."""
         dof = self.responses[row]
-        if dof.node.endswith(UNTOLD):
+        if dof.node.endswith(NOT_STATED):
             return dof.node
         return dof.direction if dof.node == SENSOR else f"{dof.node} {dof.direction}"
 

@@ -12,7 +12,7 @@ from rich.text import Text
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError, writing
 from planner.export import uff
-from planner.export.collected import Collected, collect
+from planner.export.collected import ExportData, export_data
 from planner.export.model_file import LOADER, model_arrays
 from planner.export.tables import frfs_csv, mat_arrays, modes_csv
 from planner.recording.folder import read_poses
@@ -82,7 +82,7 @@ def export(
     if kind in PROGRAMS:
         _refuse_contacts(campaign.cell.robot, poses_csv, rows)
         return _program(campaign, kind, folder, rows)
-    found = collect(campaign, [r.pose for r in rows], [r.joints_deg for r in rows])
+    found = export_data(campaign, [r.pose for r in rows], [r.joints_deg for r in rows])
     if not found.measured and not found.poses and kind != "model":
         raise InputError(f"{campaign.directory} has no measured pose yet; name poses with --poses.")
     loader = errors = None
@@ -135,7 +135,7 @@ def _program(campaign: Campaign, kind: str, folder: Path, rows: Sequence[PoseRow
     return ExportedFiles(kind, _write(folder, files), names, simulated, remarks=told)
 
 
-def _uff(found: Collected) -> dict[str, Any]:
+def _uff(found: ExportData) -> dict[str, Any]:
     """A file for each pose: FRFs and modes as measured, FRFs as predicted."""
     files, used = {}, set[str]()
     for one in found.measured:

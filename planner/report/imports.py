@@ -19,7 +19,7 @@ from planner.words import command, counted, significant
 ANSWERS = "confirm", "withdraw"  # to a question of held hits
 
 if TYPE_CHECKING:
-    from planner.campaign.deliveries import KnownFile
+    from planner.campaign.imported_files import KnownFile
     from planner.campaign.importing import ImportReport
     from planner.campaign.model import Model
 

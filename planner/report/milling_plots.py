@@ -12,7 +12,7 @@ from scipy.stats import rankdata
 from planner.campaign.toolpath_poses import FeedAdvice, TurnAdvice
 from planner.milling.coupling import AMPLIFICATION_LIMIT, CoupledFrf
 from planner.milling.cut import Cut
-from planner.milling.lobes import Loss, SampledLimits
+from planner.milling.lobes import SampledLimits, StabilityLimit
 from planner.milling.path import PathLimits
 from planner.report.plot_marks import AXES, MEASURED, MODEL, empty, magnitude, name_axes, panels
 
@@ -26,7 +26,7 @@ MANY_DECADES = 20.0  # ratio of the band's ends from which the frequency axis is
 
 
 def lobes_figure(
-    cut: Cut, found: Sequence[Loss], drawn: SampledLimits | None,
+    cut: Cut, found: Sequence[StabilityLimit], drawn: SampledLimits | None,
     point: tuple[float, float] | None,
 ) -> Figure:  # fmt: skip
     """Depth limits in mm over speeds in rpm, with probabilities; below it the chatter frequency."""
@@ -67,7 +67,7 @@ def _bands(panel, figure: Figure, rpm: np.ndarray, top: float, drawn: SampledLim
     figure.colorbar(scale, ax=panel, pad=0.01, aspect=30, label="probability of being stable")
 
 
-def _frequencies(panel, rpm: np.ndarray, found: Sequence[Loss]) -> None:
+def _frequencies(panel, rpm: np.ndarray, found: Sequence[StabilityLimit]) -> None:
     hertz = np.array([loss.chatter_hz for loss in found])
     for kind, colour in (("hopf", "tab:blue"), ("flip", "tab:orange")):
         of_kind = np.array([loss.kind == kind for loss in found])

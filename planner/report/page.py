@@ -12,7 +12,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.config import CampaignConfig
 from planner.campaign.model_status import found_without
 from planner.campaign.state import CampaignState, Measurement, taken_back
-from planner.campaign.taking_back import act
+from planner.campaign.undo import in_words
 from planner.design.stopping import percent
 from planner.errors import InputError
 from planner.recording.joints import JointUnits
@@ -20,8 +20,8 @@ from planner.recording.points import SENSOR, TCP
 from planner.report.answer import Done
 from planner.report.campaign_plots import frf_pictures, left_out_figure, map_pictures
 from planner.report.html import rendered, write_page
-from planner.report.kept_diagnosis import chapter, diagnosis_of
 from planner.report.proposals import standing
+from planner.report.saved_diagnosis import chapter, diagnosis_of
 from planner.report.springs import COLUMNS, NOT_KNOWN
 from planner.report.status import StatusReport, status
 from planner.report.text import SIMULATED, number, with_sd
@@ -230,7 +230,7 @@ def _errors(now: StatusReport) -> Rows:
 def _log(campaign: Campaign) -> Rows:
     undone = taken_back(campaign.entries)
     return [
-        (e.seq, local_time(e.time), act(e) + (" (taken back)" if e.seq in undone else ""))
+        (e.seq, local_time(e.time), in_words(e) + (" (taken back)" if e.seq in undone else ""))
         for e in campaign.entries
     ]
 

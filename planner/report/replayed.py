@@ -12,7 +12,7 @@ from rich.text import Text
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.compare.counterfactual import OtherAcquisition
-from planner.progress import Tell
+from planner.progress import ProgressCallback
 from planner.recording.joints import JointUnits
 from planner.replay import Step, replay
 from planner.report.answer import Answer
@@ -90,7 +90,7 @@ def replayed(
     until: int | None,
     rrd: Path | None,
     viewer: bool,
-    progress: Tell,
+    progress: ProgressCallback,
     acquisition: str | None = None,
 ) -> ReplayReport:
     """Compute every step of the log again, up to entry `until`, and show it in Rerun.
@@ -98,15 +98,15 @@ def replayed(
     With an `acquisition` also what that would have proposed, and saved. Raises InputError where
     a recording is missing or changed.
     """
-    from planner.report.rerun.story import Story
+    from planner.report.rerun.event_logger import EventLogger
 
     steps = []
     simulated = campaign.state.simulated
-    with Story(campaign.cell, rrd, viewer, simulated) as story:
+    with EventLogger(campaign.cell, rrd, viewer, simulated) as story:
         for step in replay(campaign, until, acquisition):
             last = until or len(campaign.entries)
             progress(f"entry {step.entry.seq}, {step.detail}", step.entry.seq / last)
-            story.tell(step.entry, step.model, step.measured)
+            story.log(step.entry, step.model, step.measured)
             steps.append(ReplayedStep.of(step))
     if acquisition is not None:
         progress(f"playing {acquisition} on what was measured", 1.0)

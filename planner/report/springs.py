@@ -94,15 +94,15 @@ class RefittedSpring:
 
 def refitted_springs(model: "Model") -> tuple[RefittedSpring, ...]:
     """One entry for each spring that was fitted; none where the simulation does not learn."""
-    learned = model.low.learned
-    if learned is None:
+    fit = model.low.identified_robot
+    if fit is None:
         return ()
-    blocks, stated = learned.structure.simulation.robot.config.compliance, learned.stated
+    blocks, stated = fit.structure.simulation.robot.config.compliance, fit.stated
     told = {
         number: estimate
-        for estimate in learned.identified.estimates if estimate.kind == "stiffness"
+        for estimate in fit.identified.estimates if estimate.kind == "stiffness"
         for number in estimate.blocks
-        if number < stated or estimate in learned.unstated
+        if number < stated or estimate in fit.unstated
     }  # fmt: skip
     return tuple(
         RefittedSpring(

@@ -10,14 +10,26 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.campaign.cut_source import Asked, outside, structure_of, structures_of_file
-from planner.campaign.toolpath_poses import FeedAdvice, Travelled, TurnAdvice, Way, turn_advice
+from planner.campaign.cut_source import StabilityRequest, outside, structure_of, structures_of_file
+from planner.campaign.toolpath_poses import (
+    FeedAdvice,
+    PathPoses,
+    PathRequest,
+    TurnAdvice,
+    turn_advice,
+)
 from planner.milling.cut import Cut, load_cut
-from planner.milling.lobes import PROBABILITY, Loss, SampledLimits, losses, sampled_limits
+from planner.milling.lobes import (
+    PROBABILITY,
+    SampledLimits,
+    StabilityLimit,
+    sampled_limits,
+    stability_limits,
+)
 from planner.milling.machine import multiplier
-from planner.milling.path import TURNS_DEG, PathLimits, along, by_feed
-from planner.milling.structure import Structure, beyond, doubts
-from planner.progress import Tell, quietly, within
+from planner.milling.path import TURNS_DEG, PathLimits, limits_along, limits_by_feed
+from planner.milling.structure import Structure, limit_remarks, out_of_band_remark
+from planner.progress import ProgressCallback, no_progress, part_of
 from planner.report.answer import Answer
 from planner.report.pictures import Pictures
 from planner.report.text import number, remarks, table
@@ -94,17 +106,19 @@ class StabilityReport(LimitsBySpeed):
 
 
 def stability_of(
-    asked: Asked, pictures: Pictures | None = None, tell: Tell = quietly
+    asked: StabilityRequest,
+    pictures: Pictures | None = None,
+    progress: ProgressCallback = no_progress,
 ) -> StabilityReport:
     """Raises InputError where source, cut or point are wrong."""
     cut = load_cut(asked.cut)
     point = asked.wanted
     structure = structure_of(asked, cut)
     machine, samples = structure.machine(cut), structure.samples(cut, asked.samples)
-    found = losses(machine, within(tell, 0.0, LOBES_SHARE if samples else 1.0))
+    found = stability_limits(machine, part_of(progress, 0.0, LOBES_SHARE if samples else 1.0))
     drawn = None
     if samples:
-        drawn = sampled_limits(samples, found, within(tell, LOBES_SHARE, 1.0))
+        drawn = sampled_limits(samples, found, part_of(progress, LOBES_SHARE, 1.0))
     answer = _at_one(cut, structure, found, drawn)
     if point is not None:
         there = multiplier(machine, *point)
@@ -120,11 +134,11 @@ def stability_of(
 
 
 def _at_one(
-    cut: Cut, structure: Structure, found: tuple[Loss, ...], drawn: SampledLimits | None
+    cut: Cut, structure: Structure, found: tuple[StabilityLimit, ...], drawn: SampledLimits | None
 ) -> StabilityReport:
     depth = robust = np.array([loss.depth_m for loss in found])
     chatter_hz = np.array([loss.chatter_hz for loss in found])
-    outside = beyond(structure, chatter_hz)
+    outside = out_of_band_remark(structure, chatter_hz)
     said = [*structure.remarks, *([outside] if outside else [])]
     if drawn is not None:
         robust, off = drawn.robust(), drawn.robust_sd()
@@ -134,7 +148,7 @@ def _at_one(
                 f"Depths at {100 * PROBABILITY:.0f} % are from {len(drawn.depth_m)} samples, known "
                 f"to ± {100 * np.median(off):.1f} % (median over speeds)."
             )
-        said += doubts(structure, cut, depth, ~drawn.open(depth))
+        said += limit_remarks(structure, cut, depth, ~drawn.open(depth))
     return StabilityReport(
         spindle_rpm=cut.speeds_rpm,
         depth_limit_m=depth,
@@ -178,21 +192,29 @@ class PathReport(LimitsBySpeed):
 
 
 def path_report(
-    asked: Asked, way: Way, cut: Cut, pictures: Pictures, tell: Tell = quietly
+    asked: StabilityRequest,
+    way: PathRequest,
+    cut: Cut,
+    pictures: Pictures,
+    progress: ProgressCallback = no_progress,
 ) -> PathReport:
     """Of every pose of an npz, or of a campaign along a way."""
     if not asked.source.is_dir():
         way.check_none(asked.source)
         poses = structures_of_file(asked, cut)
-        limits = along(poses, cut, asked.samples, tell)
+        limits = limits_along(poses, cut, asked.samples, progress)
         answer = _at_all(poses, limits, cut)
     else:
-        travelled = Travelled.of(asked, way, cut)
+        travelled = PathPoses.of(asked, way, cut)
         poses = travelled.structures(cut)
-        limits = along(poses, cut, asked.samples, within(tell, 0.0, 0.5 if way.turns else 1.0))
+        limits = limits_along(
+            poses, cut, asked.samples, part_of(progress, 0.0, 0.5 if way.turns else 1.0)
+        )
         answer = _at_all(poses, limits, cut)
         if way.turns:
-            turned = turn_advice(travelled, cut, answer.best_spindle_rpm, within(tell, 0.5, 1.0))
+            turned = turn_advice(
+                travelled, cut, answer.best_spindle_rpm, part_of(progress, 0.5, 1.0)
+            )
             answer = replace(answer, turn=turned)
         feed = travelled.feed_in_base(answer.feed.turn_deg[answer.feed.best])
         said = *outside(travelled.campaign, travelled.names, travelled.q), *answer.remarks
@@ -217,14 +239,14 @@ def _at_all(poses: list[tuple[str, Structure]], limits: PathLimits, cut: Cut) ->
     rpm = cut.speeds_rpm
     said = [
         f"{name}: {text}" for (name, structure), row in zip(poses, limits.found, strict=True)
-        if (text := beyond(structure, np.array([loss.chatter_hz for loss in row])))
+        if (text := out_of_band_remark(structure, np.array([loss.chatter_hz for loss in row])))
     ]  # fmt: skip
     rows = zip(poses, limits.depth_m, limits.known, strict=True)
     said += [
         f"{name}: {text}" for (name, structure), row, known in rows
-        for text in doubts(structure, cut, row, known)
+        for text in limit_remarks(structure, cut, row, known)
     ]  # fmt: skip
-    turned = by_feed(poses, cut, float(rpm[best]))
+    turned = limits_by_feed(poses, cut, float(rpm[best]))
     return PathReport(
         spindle_rpm=rpm,
         depth_limit_m=np.min(limits.depth_m, axis=0),

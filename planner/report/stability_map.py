@@ -8,12 +8,12 @@ import numpy as np
 from rich.console import Group
 from rich.text import Text
 
-from planner.campaign.cut_source import Asked, ToolChange, at_poses_in_band
+from planner.campaign.cut_source import StabilityRequest, ToolChange, at_poses_in_band
 from planner.errors import InputError
 from planner.milling.cut import Cut
-from planner.milling.path import at_speed, best_speed_of
+from planner.milling.path import best_speed_of, limits_at_speed
 from planner.milling.structure import OutOfBandError, Structure
-from planner.progress import Tell, quietly, within
+from planner.progress import ProgressCallback, no_progress, part_of
 from planner.report.answer import Answer
 from planner.report.pictures import Pictures
 from planner.report.stability import EVERY, depth_mm
@@ -73,7 +73,11 @@ class MapReport(Answer):
 
 
 def map_report(
-    asked: Asked, count: int, cut: Cut, pictures: Pictures, tell: Tell = quietly
+    asked: StabilityRequest,
+    count: int,
+    cut: Cut,
+    pictures: Pictures,
+    progress: ProgressCallback = no_progress,
 ) -> MapReport:
     """At the speed of the wanted point, or the one at which the tightest pose allows the most."""
     if not asked.source.is_dir():
@@ -95,8 +99,10 @@ def map_report(
     kept = np.array([i for i, s in enumerate(at) if isinstance(s, Structure)])
     q = candidates.q[kept]
     wanted = asked.wanted
-    rpm = wanted[0] if wanted else best_speed_of(poses, cut, MOST_SPEEDS, within(tell, 0.0, 0.5))
-    found, robust = at_speed(poses, cut, rpm, asked.samples, within(tell, 0.5, 1.0))
+    rpm = (
+        wanted[0] if wanted else best_speed_of(poses, cut, MOST_SPEEDS, part_of(progress, 0.0, 0.5))
+    )
+    found, robust = limits_at_speed(poses, cut, rpm, asked.samples, part_of(progress, 0.5, 1.0))
     share = None if wanted is None else float(np.mean(robust > wanted[1]))
     joints = campaign.cell.robot.joints
     answer = MapReport(

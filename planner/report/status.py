@@ -18,8 +18,8 @@ from planner.campaign.state import Measurement
 from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain
 from planner.report.imports import asked_of
-from planner.report.kept_diagnosis import diagnosis_of, read_diagnosis, two_answers
 from planner.report.proposals import forecast_json, standing, unanswered
+from planner.report.saved_diagnosis import diagnosis_of, read_diagnosis, two_answers
 from planner.report.springs import (
     NOT_KNOWN,
     RefittedSpring,
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from planner.campaign.model import Model
     from planner.campaign.model_comparison import LeftOutModel
     from planner.campaign.state import CampaignState
-    from planner.progress import Tell
+    from planner.progress import ProgressCallback
 
 
 @dataclass(frozen=True)
@@ -181,12 +181,12 @@ class StatusReport(ModelStatus, Answer):
         title = "Each measured pose, predicted without it"
         return {"leave_one_out": left_out_figure(*found_without(self.model()), title)}
 
-    def with_models(self, progress: "Tell") -> "StatusReport":
+    def with_models(self, progress: "ProgressCallback") -> "StatusReport":
         """The same once every model of `[surrogate]` has predicted poses left out."""
         from planner.campaign.model_comparison import compared_models
 
         assert self.model is not None
-        return replace(self, models=compared_models(self.model(), tell=progress))
+        return replace(self, models=compared_models(self.model(), progress=progress))
 
     def text(self) -> Group:
         """Measured poses as a table, then all else line by line."""

@@ -34,7 +34,7 @@ class DiagnosisProcess:
         self._due = True
         self._start()
 
-    def told(self, wait: bool = False) -> str | None:
+    def answer(self, wait: bool = False) -> str | None:
         """What a diagnosis that has ended says, if it is not what the last one said."""
         if self._running is None or not (wait or self._running.done()):
             return None
@@ -42,7 +42,7 @@ class DiagnosisProcess:
         self._running = None
         self._start()
         if self._running is not None and wait:
-            return self.told(wait)
+            return self.answer(wait)
         new, self._said = text != self._said, text
         return text if new else None
 
@@ -79,10 +79,10 @@ class DiagnosisProcess:
 
 def diagnose_measured(directory: Path) -> DiagnosisReport:
     """The diagnosis of a campaign as it stands, without its fits: those stay in the process."""
-    from planner.api import diagnose_material
-    from planner.campaign.material import material
+    from planner.api import diagnose_source
+    from planner.campaign.recordings_source import recordings_source
 
-    return replace(diagnose_material(material(directory, None, 0.0)), diagnosis=None)
+    return replace(diagnose_source(recordings_source(directory, None, 0.0)), diagnosis=None)
 
 
 def _begin() -> None:

@@ -17,7 +17,7 @@ from planner.recording.joints import JointUnits
 from planner.report.text import with_sd
 from planner.robot.place_names import axes_in_the_room
 from planner.session.hit_verdicts import BAD, HitVerdict
-from planner.session.screen import Said, fitted
+from planner.session.screen import ScreenText, fitted
 from planner.words import command, counted, short_name
 
 WIDTH, HEIGHT = 80, 22  # of the smallest terminal, less a line for work and the cursor's
@@ -79,18 +79,18 @@ class PosePage:
         both.add_row(angles, hits)
         rows = 1 + max(angles.row_count, hits.row_count)
         title = f"Measurement {self.number}: go to pose {self.proposal.pose}"
-        parts = [Said([Text(title, style="bold reverse")]), *self._place(), *self._verdicts()]
-        parts += [Said([None, Text(text)], 5) for text in self.streams[-LAST:]]
+        parts = [ScreenText([Text(title, style="bold reverse")]), *self._place(), *self._verdicts()]
+        parts += [ScreenText([None, Text(text)], 5) for text in self.streams[-LAST:]]
         parts += [_unfinished(*one) for one in self.unfinished[-2:]]
-        parts += [Said([None, Text(self.progress)], 6)] if self.progress else []
+        parts += [ScreenText([None, Text(self.progress)], 6)] if self.progress else []
         paths = _end(command(self.folder)), command(self.folder)
         where = [Text(f"waiting for hits in {path}", "dim") for path in paths]
-        parts.append(Said([None, *where], 4))
-        parts.append(Said([Text(self.keys, style="reverse")]))
+        parts.append(ScreenText([None, *where], 4))
+        parts.append(ScreenText([Text(self.keys, style="reverse")]))
         lines = fitted(parts, width, height - rows)
         return Group(lines[0], both, *lines[1:])
 
-    def _place(self) -> list[Said]:
+    def _place(self) -> list[ScreenText]:
         """Where the tool is, and what is expected there."""
         x, y, z = self.proposal.position_m
         place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m"
@@ -98,18 +98,18 @@ class PosePage:
         expected = ", ".join(with_sd(hz, sd) for hz, sd in each)
         short = ", ".join(f"{hz:.2f}" for hz in self.expected_hz)
         return [
-            Said([None, Text(place), Text(f"{place}; {self.proposal.reason}")], 7),
-            Said([Text(f"expected (Hz): {text}", "bold") for text in (short, expected)], 8),
+            ScreenText([None, Text(place), Text(f"{place}; {self.proposal.reason}")], 7),
+            ScreenText([Text(f"expected (Hz): {text}", "bold") for text in (short, expected)], 8),
         ]
 
-    def _verdicts(self) -> list[Said]:
+    def _verdicts(self) -> list[ScreenText]:
         """The last hits; the very last one in any case."""
         *before, last = self.hits[-LAST:] or (None,)
         parts = [
-            Said([None, *_forms(hit)], len(before) - i)
+            ScreenText([None, *_forms(hit)], len(before) - i)
             for i, hit in enumerate(before) if hit
         ]  # fmt: skip
-        return [*parts, Said(_forms(last))] if last else parts
+        return [*parts, ScreenText(_forms(last))] if last else parts
 
     def _angles(self) -> Table:
         angles = Table(box=None, header_style="bold", pad_edge=False)
@@ -183,13 +183,13 @@ def remedy_first(text: str) -> tuple[str, str]:
     return (do, why) if do else (text, "")
 
 
-def _unfinished(name: str, said: str) -> Said:
+def _unfinished(name: str, said: str) -> ScreenText:
     """What is the matter with a file; what to do about it, if anything, comes first."""
     do, why = remedy_first(said)
     if not why:
-        return Said([None, Text(f"not whole yet: {said}", "dim")], 5)
+        return ScreenText([None, Text(f"not whole yet: {said}", "dim")], 5)
     short = f"cannot be used: {name}: {do}"
-    return Said([None, Text(short, "dim"), Text(f"{short} {why}", "dim")], 5)
+    return ScreenText([None, Text(short, "dim"), Text(f"{short} {why}", "dim")], 5)
 
 
 def page_without_hits(

@@ -131,7 +131,7 @@ _RULER = UnbrokenConsole(width=80)  # only to ask how text wraps
 
 
 @dataclass(frozen=True, eq=False)
-class Said:
+class ScreenText:
     """One thing that is said: from its shortest form to its longest, of None nothing is seen.
 
     All are said at one length before any is at the next, those of the lowest `rank` first.
@@ -141,7 +141,7 @@ class Said:
     rank: int = 0
 
 
-def fitted(parts: Iterable[Said], width: int, height: int) -> list[Text]:
+def fitted(parts: Iterable[ScreenText], width: int, height: int) -> list[Text]:
     """The longest forms, in order, that `height` lines of `width` columns hold together.
 
     The shortest ones are taken in any case.

@@ -13,9 +13,12 @@ from planner.campaign.campaign import Campaign
 from planner.errors import InputError, PlannerError
 from planner.replay import replay
 from planner.report.answer import Answer
-from planner.report.rerun.story import Story
+from planner.report.rerun.event_logger import EventLogger
 from planner.session import session_text
-from planner.session.acts import (
+from planner.session.diagnosis_process import LEAST, DiagnosisProcess
+from planner.session.hit_verdicts import HitVerdict, Part, Verdicts
+from planner.session.inbox import FolderTable, Inbox
+from planner.session.key_commands import (
     answer,
     arrive,
     import_waiting,
@@ -23,12 +26,9 @@ from planner.session.acts import (
     on_key,
     say_last_import,
 )
-from planner.session.diagnosis_process import LEAST, DiagnosisProcess
-from planner.session.hit_verdicts import HitVerdict, Part, Verdicts
-from planner.session.inbox import FolderTable, Inbox
 from planner.session.pose_screen import page_with_hits
 from planner.session.screen import Keys, NoKeys, Screen, terminal_keys
-from planner.session.station import Course, PoseInProgress, RerunQueue, Station
+from planner.session.session_state import PoseInProgress, RerunQueue, Session, SessionState
 from planner.words import short_name
 
 
@@ -70,10 +70,10 @@ def watch(
     with ExitStack() as stack:
         stack.enter_context(campaign.holding())
         source = keys or stack.enter_context(terminal_keys())
-        story = stack.enter_context(Story(campaign.cell, rrd, viewer))
+        story = stack.enter_context(EventLogger(campaign.cell, rrd, viewer))
         if rrd is not None or viewer:  # a resumed session shows what went before, too
             for step in replay(campaign):
-                story.tell(step.entry, step.model, step.measured)
+                story.log(step.entry, step.model, step.measured)
         explaining = DiagnosisProcess(campaign.directory) if explain else None
         if explaining is not None:
             stack.callback(explaining.close)
@@ -83,118 +83,118 @@ def watch(
             FolderTable(folder, cell.robot.joints, cell.robot.points, cell.check_pose),
         )  # fmt: skip
         inbox = Inbox(folder, quiet_s, verdicts.unfit)
-        return _run(Station(
+        return _run(Session(
             campaign, inbox, Screen(console), source, RerunQueue(campaign, story), verdicts,
             auto or isinstance(source, NoKeys), hits_per_pose, explaining, LEAST, started,
             None if limit_s is None else started + limit_s,
         ))  # fmt: skip
 
 
-def _run(station: Station) -> SessionSummary:
-    campaign, console = station.campaign, station.screen.console
-    course = Course()
+def _run(session: Session) -> SessionSummary:
+    campaign, console = session.campaign, session.screen.console
+    state = SessionState()
     try:
         for remark in campaign.cell.remarks:
-            station.say(remark, "yellow")
-        with station.screen.working("fitting the model to what was measured"):
+            session.say(remark, "yellow")
+        with session.screen.working("fitting the model to what was measured"):
             _ = campaign.model
-        say_last_import(station)
-        while not course.stop:
-            course = _step(station, course)
-        station.rerun_queue.show()
-        if course.stop != "quit":
+        say_last_import(session)
+        while not state.stop:
+            state = _step(session, state)
+        session.rerun_queue.show()
+        if state.stop != "quit":
             with console.status("finding what the simulation lacks"):
-                station.say_diagnosis(wait=True)
+                session.say_diagnosis(wait=True)
     except KeyboardInterrupt:
-        course = replace(course, stop="quit", ended=interrupted(station))
+        state = replace(state, stop="quit", ended=interrupted(session))
     finally:
         with suppress(KeyboardInterrupt):
-            station.rerun_queue.show()
-    if course.ended:
-        console.print(Text(course.ended))
-    console.print(Text(f"Session ended: {course.stop}. Go on with the same command."))
+            session.rerun_queue.show()
+    if state.ended:
+        console.print(Text(state.ended))
+    console.print(Text(f"Session ended: {state.stop}. Go on with the same command."))
     return SessionSummary(
-        course.measured,
-        course.stop,
+        state.measured,
+        state.stop,
         tuple(campaign.model.frequency_sd_percent.tolist()),
-        time.monotonic() - station.started,
+        time.monotonic() - session.started,
         {p: m.question.text for p, m in campaign.state.held.items() if m.question},
     )
 
 
-def _step(station: Station, course: Course) -> Course:
+def _step(session: Session, state: SessionState) -> SessionState:
     """One look at folder and keys; an interruption loses no more than this."""
-    if course.visit is not None:
-        return _at_pose(station, course, course.visit)
-    if station.campaign.state.held and not station.auto:
-        return _asked(station, course)
-    return arrive(station, course)
+    if state.visit is not None:
+        return _at_pose(session, state, state.visit)
+    if session.campaign.state.held and not session.auto:
+        return _asked(session, state)
+    return arrive(session, state)
 
 
-def _asked(station: Station, course: Course) -> Course:
+def _asked(session: Session, state: SessionState) -> SessionState:
     """Wait for what the engineer says of held hits: where are they from?"""
-    held = station.campaign.state.held
-    pose = course.asking or next(iter(held))
+    held = session.campaign.state.held
+    pose = state.asking or next(iter(held))
     question = held[pose].question
     assert question is not None
-    other = question.fits if question.fits in station.campaign.state.open else ""
-    if not course.asking:
-        station.screen.show(session_text.question_panel(question, pose, other))
-        station.screen.bell(3)
-        course = replace(course, asking=pose)
+    other = question.fits if question.fits in session.campaign.state.open else ""
+    if not state.asking:
+        session.screen.show(session_text.question_panel(question, pose, other))
+        session.screen.bell(3)
+        state = replace(state, asking=pose)
     try:
-        course = answer(station, course, station.key(), other)
+        state = answer(session, state, session.key(), other)
     except PlannerError as error:
-        station.say(str(error), "red")
-        return replace(course, asking="")
-    return _unless_late(station, course) if course.asking else course
+        session.say(str(error), "red")
+        return replace(state, asking="")
+    return _unless_late(session, state) if state.asking else state
 
 
-def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
+def _at_pose(session: Session, state: SessionState, visit: PoseInProgress) -> SessionState:
     """See what waits at a pose, and act on a key, until it is measured, skipped or superseded."""
-    station.say_diagnosis()
-    visit = _looked(station, course, visit)
-    course = replace(course, visit=visit)
-    waited = time.monotonic() - visit.since > 3 * station.inbox.quiet_s
+    session.say_diagnosis()
+    visit = _looked(session, state, visit)
+    state = replace(state, visit=visit)
+    waited = time.monotonic() - visit.since > 3 * session.inbox.quiet_s
     unready = visit.any_of("unstated", "late")
     ready = [path for path in visit.whole if path not in unready]
     hits = sum(verdict.path in ready for verdict in visit.verdicts)
-    if station.auto and ready and (hits >= station.hits_at(visit.proposal) or waited):
-        return import_waiting(station, course, visit, ready)
-    course = on_key(station, course, visit, station.key())
-    return _unless_late(station, course) if course.visit is not None else course
+    if session.auto and ready and (hits >= session.hits_at(visit.proposal) or waited):
+        return import_waiting(session, state, visit, ready)
+    state = on_key(session, state, visit, session.key())
+    return _unless_late(session, state) if state.visit is not None else state
 
 
-def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInProgress:
+def _looked(session: Session, state: SessionState, visit: PoseInProgress) -> PoseInProgress:
     """The visit with what the folder holds now; what changed is drawn, and rung for."""
-    for table in station.verdicts.table.follow():
-        station.say(f"{table.parent.name}/{table.name} was read again and is right now.", "green")
-    whole, waiting = station.inbox.scan(lambda path, digest: station.known(path, digest, course))
-    waiting += station.verdicts.table.waiting
-    for path in station.inbox.ignored():
-        station.say(f"{path.name} is no recording; ignored.", "dim")
-    numbers = station.verdicts.numbered(whole, visit.numbers)
-    verdicts = _shown(station, visit, whole, course.here, numbers)
+    for table in session.verdicts.table.follow():
+        session.say(f"{table.parent.name}/{table.name} was read again and is right now.", "green")
+    whole, waiting = session.inbox.scan(lambda path, digest: session.known(path, digest, state))
+    waiting += session.verdicts.table.waiting
+    for path in session.inbox.ignored():
+        session.say(f"{path.name} is no recording; ignored.", "dim")
+    numbers = session.verdicts.numbered(whole, visit.numbers)
+    verdicts = _shown(session, visit, whole, state.here, numbers)
     now = (tuple(whole), tuple(waiting), tuple((v.kind, v.text) for v in verdicts))
     if now == visit.shown:
         return visit
-    can = station.can_take_back
-    page = page_with_hits(visit.page, verdicts, waiting, can, station.auto, course.progress)
-    station.screen.ring({(str(v.path), v.number): v.kind for v in verdicts})
-    station.screen.show(page.page)
+    can = session.can_take_back
+    page = page_with_hits(visit.page, verdicts, waiting, can, session.auto, state.progress)
+    session.screen.ring({(str(v.path), v.number): v.kind for v in verdicts})
+    session.screen.show(page.page)
     seen = replace(
         visit, page=page, whole=tuple(whole), verdicts=verdicts, shown=now, since=time.monotonic(),
         numbers=numbers, asked="",
     )  # fmt: skip
-    for at, files in seen.late_by_pose.items() if station.auto else ():
+    for at, files in seen.late_by_pose.items() if session.auto else ():
         names = ", ".join(short_name(path) for path in files)
         held = f"Held, not used: {names} of {at}; import --pose {at} takes them there."
-        station.say(held, "yellow")
+        session.say(held, "yellow")
     return seen
 
 
 def _shown(
-    station: Station,
+    session: Session,
     visit: PoseInProgress,
     whole: Sequence[Path],
     here: frozenset[Path],
@@ -204,23 +204,23 @@ def _shown(
 
     Of files that a table lists it says the pose.
     """
-    pose, state = visit.proposal.pose, station.campaign.state
-    digests = {path: station.inbox.digest(path) for path in whole}
+    pose, state = visit.proposal.pose, session.campaign.state
+    digests = {path: session.inbox.digest(path) for path in whole}
     known = {path: digest for path, digest in digests.items() if digest in state.shown}
     shown = {path: state.came(digest, pose) for path, digest in known.items()}
-    rows = ((path, station.verdicts.table.row(path)) for path in whole)
+    rows = ((path, session.verdicts.table.row(path)) for path in whole)
     shown |= {path: row.pose for path, row in rows if row is not None}
-    verdicts = station.verdicts.of(whole, visit.before, here, numbers, shown, pose)
+    verdicts = session.verdicts.of(whole, visit.before, here, numbers, shown, pose)
     new: dict[str, dict[str, None]] = {}
     for verdict in verdicts:
         if verdict.path not in shown and digests[verdict.path]:
             new.setdefault(verdict.came or pose, {})[digests[verdict.path]] = None
     for of, files in new.items():
-        station.campaign.show(of, tuple(files), pose if of != pose else "")
+        session.campaign.show(of, tuple(files), pose if of != pose else "")
     if new:
-        station.rerun_queue.note()
+        session.rerun_queue.note()
     return verdicts
 
 
-def _unless_late(station: Station, course: Course) -> Course:
-    return replace(course, stop="time limit") if station.late and not course.stop else course
+def _unless_late(session: Session, state: SessionState) -> SessionState:
+    return replace(state, stop="time limit") if session.late and not state.stop else state

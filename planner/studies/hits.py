@@ -1,8 +1,9 @@
 """Hits as a careful hand makes them, at many poses of a true robot: to FRFs and modes, in memory.
 
 Three axes, three force levels each; hits miss axis and point, the chain is within its tolerances,
-joints stand beside their readback, the floor rumbles (`planner.truth.handling.EVERYDAY`). Joints
-rub, so that damping depends on the force, and their damping is another one at every visit.
+joints stand beside their readback, the floor rumbles
+(`planner.truth.measurement_errors.EVERYDAY`). Joints rub, so that damping depends on the force,
+and their damping is another one at every visit.
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,26 +19,26 @@ from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import Mode
-from planner.progress import Tell
+from planner.progress import ProgressCallback
 from planner.recording.records import Hit
 from planner.truth import inverse
-from planner.truth.handling import EVERYDAY, Handling
+from planner.truth.fault_injection import DampingScatter, HitVisit, InjectedFaults, quiet_hits
 from planner.truth.hits import Hammer, SimulatedHit, noisy
 from planner.truth.laws import BoucWen
+from planner.truth.measurement_errors import EVERYDAY, MeasurementErrors
 from planner.truth.model import Truth
 from planner.truth.nonlinear import Port
-from planner.truth.secret import DampingScatter, HitVisit, Secret, quiet_hits
 from planner.truth.visits import Visits
 
 AT_ONCE = 12  # poses that are integrated together: what memory holds
 # Chosen: friction's stiffness over a joint's own, the angle (rad) at which it slides, and the
 # log-sd of damping from visit to visit. Damping ratios of robots scatter by some ten percent
 # between visits and levels.
-RUBBING, SLIDING_RAD, BRAKES = 0.06, 4e-6, 0.35
+FRICTION, SLIDING_RAD, BRAKES = 0.06, 4e-6, 0.35
 
 
 @dataclass(frozen=True, eq=False)
-class StruckPoses:
+class HitPoses:
     """Readback angles q (n, dof) in rad; the FRF matrix and the hits of each pose."""
 
     q: np.ndarray
@@ -53,7 +54,9 @@ class StruckPoses:
         ]
         return Dataset.of_visits(visits, band_hz)
 
-    def modes(self, band_hz: tuple[float, float], progress: Tell) -> list[tuple[Mode, ...]]:
+    def modes(
+        self, band_hz: tuple[float, float], progress: ProgressCallback
+    ) -> list[tuple[Mode, ...]]:
         """Modes of every pose by modal analysis; none where it finds none."""
         found: list[tuple[Mode, ...]] = []
         for i, frf in enumerate(self.frfs):
@@ -65,7 +68,7 @@ class StruckPoses:
         return found
 
 
-def upright(
+def upright_poses(
     truth: Truth, targets: Iterable[tuple[np.ndarray, float]], start_rad: np.ndarray, what: str,
     upper_rad: np.ndarray | None = None, follow: bool = True,
 ) -> np.ndarray:  # fmt: skip
@@ -85,7 +88,7 @@ def upright(
     return np.array(q)
 
 
-def rubbing(truth: Truth, share: float = RUBBING) -> tuple[Port, ...]:
+def joint_friction(truth: Truth, share: float = FRICTION) -> tuple[Port, ...]:
     """Friction in the first three joints: it gives stiffness at rest, and takes energy."""
     ports = []
     for joint in truth.joint_names[:3]:
@@ -94,33 +97,36 @@ def rubbing(truth: Truth, share: float = RUBBING) -> tuple[Port, ...]:
     return tuple(ports)
 
 
-def everyday(
-    truth: Truth, seed: int, handling: Handling = EVERYDAY, ports: tuple[Port, ...] = ()
-) -> Secret:
+def everyday_faults(
+    truth: Truth, seed: int, errors: MeasurementErrors = EVERYDAY, ports: tuple[Port, ...] = ()
+) -> InjectedFaults:
     """What is not as in the books: friction, damping that scatters, a chain within tolerance.
 
     `ports` are further laws of joints.
     """
-    chain = handling.chain(np.random.default_rng([seed, 3]))
-    return Secret(
-        truth.deviation, (*rubbing(truth), *ports), drift=DampingScatter(BRAKES, seed), chain=chain
+    chain = errors.chain(np.random.default_rng([seed, 3]))
+    return InjectedFaults(
+        truth.deviation,
+        (*joint_friction(truth), *ports),
+        drift=DampingScatter(BRAKES, seed),
+        chain=chain,
     )
 
 
-def strike(
+def simulate_hits(
     truth: Truth,
-    secret: Secret,
+    injected: InjectedFaults,
     q: np.ndarray,
     hammer: Hammer,
     band_hz: tuple[float, float],
     seed: int,
-    progress: Tell,
-    handling: Handling = EVERYDAY,
+    progress: ProgressCallback,
+    errors: MeasurementErrors = EVERYDAY,
     axes: str = "xyz",
-) -> StruckPoses:
+) -> HitPoses:
     """Hit a robot at poses q (n, dof) in rad, each once visited, along `axes` at three levels."""
     rng, own = np.random.default_rng([seed, 4]), np.random.default_rng([seed, 5])
-    visits = Visits.planned(q, hammer, handling, rng, own)
+    visits = Visits.planned(q, hammer, errors, rng, own)
     planned = [
         _along(v, axes) for v in visits.visits[: len(q)]
     ]  # without the first pose visited again
@@ -129,12 +135,12 @@ def strike(
     hits: list[tuple[Hit, ...]] = []
     for first in range(0, len(q), AT_ONCE):
         progress(f"hits at pose {first + 1} of {len(q)}", first / len(q))
-        quiet = quiet_hits(truth, secret, planned[first : first + AT_ONCE], hammer, rng)
+        quiet = quiet_hits(truth, injected, planned[first : first + AT_ONCE], hammer, rng)
         if floor is None:
-            floor = handling.floor(hammer, [hit for hits in quiet for hit in hits], own)
+            floor = errors.floor(hammer, [hit for hits in quiet for hit in hits], own)
         hits += [_recorded([noisy(h, floor, rng) for h in each], hammer) for each in quiet]
     frfs = tuple(estimate(each, band_hz) for each in hits)
-    return StruckPoses(readback, frfs, tuple(hits))
+    return HitPoses(readback, frfs, tuple(hits))
 
 
 def _along(visit: HitVisit, axes: str) -> HitVisit:

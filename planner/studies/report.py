@@ -11,7 +11,7 @@ from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from planner.progress import Tell, within
+from planner.progress import ProgressCallback, part_of
 from planner.report.answer import Answer
 from planner.report.text import table
 from planner.studies.claims import COLUMNS, HOLDS, IN_KIND, NOT, UNTESTED, PaperClaim
@@ -146,9 +146,11 @@ def shown_cell(value: Cell) -> str:
     return "–" if value != value else f"{value:.4g}"
 
 
-def on_each(seeds: Sequence[int], run: Callable[[int, Tell], R], progress: Tell) -> list[R]:
+def on_each(
+    seeds: Sequence[int], run: Callable[[int, ProgressCallback], R], progress: ProgressCallback
+) -> list[R]:
     """What `run` gives of the robot of every seed, one after the other."""
-    parts = (within(progress, i / len(seeds), (i + 1) / len(seeds)) for i in range(len(seeds)))
+    parts = (part_of(progress, i / len(seeds), (i + 1) / len(seeds)) for i in range(len(seeds)))
     return [run(seed, part) for seed, part in zip(seeds, parts, strict=True)]
 
 

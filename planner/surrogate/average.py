@@ -50,7 +50,7 @@ class Average:
         return np.flatnonzero(self.weights.max(axis=1) > NEGLIGIBLE_WEIGHT).tolist()
 
     @cached_property
-    def likeliest(self) -> AR1:
+    def most_probable(self) -> AR1:
         """Of every output the likeliest model, the first of equals; all have one kernel."""
         best = [self.models[i] for i in np.argmax(self.weights, axis=0)]
         given = [(m.uses_low[j], m.centre[j], m.unknown_sd[j]) for j, m in enumerate(best)]
@@ -61,7 +61,7 @@ class Average:
     @property
     def nugget_variance(self) -> np.ndarray:
         """Mean nugget variance (m,) of the likeliest models."""
-        return np.array([one.nugget_variance for one in self.likeliest.outputs])
+        return np.array([one.nugget_variance for one in self.most_probable.outputs])
 
     def predict(
         self, x: np.ndarray, low: np.ndarray, nugget: bool = False

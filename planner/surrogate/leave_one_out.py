@@ -75,7 +75,9 @@ def left_out_modes(surrogate: Surrogate, seen: ModalObservations) -> ModalPredic
     n, k = seen.frequency_hz.shape
     plain = surrogate.predict(seen.x, seen.simulated)
     assert surrogate.residue is not None
-    frequency = _without([surrogate.primary.likeliest], np.ones((1, k)), np.log(seen.frequency_hz))
+    frequency = _without(
+        [surrogate.primary.most_probable], np.ones((1, k)), np.log(seen.frequency_hz)
+    )
     fits = surrogate.damping
     weights = fits.weights[fits.counted]
     damping = _without([fits.models[i] for i in fits.counted], weights, np.log(seen.damping_ratio))
@@ -85,7 +87,7 @@ def left_out_modes(surrogate: Surrogate, seen: ModalObservations) -> ModalPredic
     parts = np.stack([seen.residue.real, seen.residue.imag], axis=-1) / scale[..., None]
     parts[np.isnan(seen.residue)] = np.nan
     mean, sd = _without(
-        [surrogate.residue.likeliest], np.ones((1, 18 * k)), parts.reshape(n, 18 * k)
+        [surrogate.residue.most_probable], np.ones((1, 18 * k)), parts.reshape(n, 18 * k)
     )
     mean, sd = (v.reshape(n, k, 3, 3, 2) for v in (mean, sd))
     known = np.isfinite(mean).all(axis=-1)

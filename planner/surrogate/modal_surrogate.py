@@ -80,8 +80,8 @@ class Surrogate:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What went wrong in the fits, each once."""
-        fits = [self.primary.likeliest, *(self.damping.models[i] for i in self.damping.counted)]
-        fits += [self.residue.likeliest] if self.residue is not None else []
+        fits = [self.primary.most_probable, *(self.damping.models[i] for i in self.damping.counted)]
+        fits += [self.residue.most_probable] if self.residue is not None else []
         return tuple(dict.fromkeys(said for fit in fits for said in remarks(fit.outputs)))
 
     @property
@@ -102,7 +102,7 @@ class Surrogate:
 
     def frequency_inputs(self, simulated: SimulatedModes) -> np.ndarray:
         """Centred low fidelity (q, k) of the frequency outputs."""
-        return self.primary.likeliest.split(_log(simulated.frequency_hz))[1]
+        return self.primary.most_probable.split(_log(simulated.frequency_hz))[1]
 
     def predict(
         self, x: np.ndarray, simulated: SimulatedModes, visit: bool = True

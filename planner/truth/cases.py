@@ -14,25 +14,25 @@ from typing import Any
 import numpy as np
 
 from planner.errors import InputError
-from planner.proof.refit import Question
+from planner.proof.refit import DetectionProblem
 from planner.truth.arms import ARMS, Arm
+from planner.truth.detectability import ScoredCase, detection_problem, without_effect
 from planner.truth.deviation import Deviation
 from planner.truth.effects import EFFECTS, LINEAR, NONLINEAR
-from planner.truth.handling import EVERYDAY, LABORATORY, ROUGH, Handling
+from planner.truth.fault_injection import InjectedFaults, frfs, once, quiet_hits
 from planner.truth.hits import Hammer, write_predict
 from planner.truth.imperfections import imperfect
 from planner.truth.load import load_truth
+from planner.truth.measurement_errors import EVERYDAY, LABORATORY, ROUGH, MeasurementErrors
 from planner.truth.model import Truth
-from planner.truth.outsiders import ARTEFACTS
-from planner.truth.outsiders import OUTSIDERS as UNKNOWN
-from planner.truth.questions import Scored, lacking, question
+from planner.truth.out_of_library import ARTEFACTS
+from planner.truth.out_of_library import OUT_OF_LIBRARY as UNKNOWN
 from planner.truth.random_arms import draw_arm, standing
-from planner.truth.scene import PULSE_S, Draw, Drawn, Scene, log_uniform
-from planner.truth.secret import Secret, frfs, once, quiet_hits
+from planner.truth.scene import PULSE_S, Draw, DrawnEffect, Scene, log_uniform
 from planner.truth.visits import Visits, record
 
 TABLE: dict[str, Draw] = {**EFFECTS, **ARTEFACTS, **UNKNOWN}
-SINGLES, OUTSIDERS = (*EFFECTS, *ARTEFACTS), tuple(UNKNOWN)
+SINGLES, OUT_OF_LIBRARY_KINDS = (*EFFECTS, *ARTEFACTS), tuple(UNKNOWN)
 KINDS = ("null", *TABLE, "pair", "drives")  # "drives": one law in several of them
 DRIVES = 2, 4  # how many joints, at least and at most
 # By what robots differ from their folders, without anything being wrong with them. Stiffnesses
@@ -48,25 +48,25 @@ RANDOM = "random"  # a robot that is drawn
 DAMPING_S = 9.5e-4  # C = s K: 3 % at 10 Hz, as robots in milling cells have
 
 
-class NothingShowsError(Exception):
+class NothingDetectableError(Exception):
     """A seed of which nothing comes; take another one."""
 
 
 @dataclass(frozen=True)
-class Concealed:
+class ConcealedEffect:
     """An effect and its place as a diagnosis states them; true parameters in SI.
 
-    `question` answers what tells of it; it is asked once the recordings have been written.
+    `detection_problem` answers what tells of it; it is asked once the recordings have been written.
     """
 
     effect: str
     at: str | None
     parameters: Mapping[str, Any]
-    question: Callable[[], Question]
+    question: Callable[[], DetectionProblem]
 
 
 @dataclass(frozen=True)
-class Made:
+class ConcealedCase:
     """A case; `imperfections` are places that a diagnosis may name, too small to be asked for.
 
     `held_out`: names of poses, frequencies (F,) in Hz and true FRFs (real and imaginary parts;
@@ -74,7 +74,7 @@ class Made:
     """
 
     robot: str
-    concealed: Sequence[Concealed]
+    concealed: Sequence[ConcealedEffect]
     imperfections: Sequence[tuple[str, str]] = ()
     held_out: Mapping[str, Any] = field(default_factory=dict)
 
@@ -84,19 +84,19 @@ Load = Callable[[Deviation], Truth]
 
 def make(
     kind: str, seed: int, folder: Path, laboratory: bool = False, random: bool = False
-) -> Made:
+) -> ConcealedCase:
     """Write folder/robot and folder/recordings of a kind of case; known robots in turn, or drawn.
 
-    Raises NothingShowsError for a seed of which nothing comes.
+    Raises NothingDetectableError for a seed of which nothing comes.
     """
     robot = RANDOM if random else sorted(ARMS)[seed % len(ARMS)]
-    handling = LABORATORY if laboratory else ROUGH if random else EVERYDAY
-    return make_case(kind, robot, seed, folder, handling)
+    errors = LABORATORY if laboratory else ROUGH if random else EVERYDAY
+    return make_case(kind, robot, seed, folder, errors)
 
 
 def make_case(
-    kind: str, robot: str, seed: int, folder: Path, handling: Handling = EVERYDAY
-) -> Made:
+    kind: str, robot: str, seed: int, folder: Path, errors: MeasurementErrors = EVERYDAY
+) -> ConcealedCase:
     """The same of one of KINDS and a robot of ARMS or RANDOM; InputError for an unknown one."""
     if kind not in KINDS or robot not in (*ARMS, RANDOM):
         raise InputError(f"No case {kind} of robot {robot}; kinds are {', '.join(KINDS)}.")
@@ -105,29 +105,35 @@ def make_case(
     per_joint = 1 if kind == "transverse_compliance" else int(rng.choice([1, 3]))
     scene, plain, hammer, load = _robot(robot, per_joint, folder / "robot", rng)
     robot_is = imperfect(scene, plain, own)
-    plain = robot_is.secret
+    plain = robot_is.injected
     scene = replace(scene, truth=load(plain.deviation))
     found = concealed(kind, scene, plain, load, rng)
-    secret = found[-1].secret if found else plain
-    recorded = _recorded(folder / "recordings", scene, secret, load, hammer, handling, rng, own)
+    injected = found[-1].injected if found else plain
+    recorded = _recorded(folder / "recordings", scene, injected, load, hammer, errors, rng, own)
     effects = [
-        Concealed(d.effect, d.at, {**d.parameters, "size": d.size},
-                  partial(question, recorded, lacking(recorded.measured, before, d.secret)))
-        for before, d in zip([plain, *(d.secret for d in found)], found, strict=False)
-    ]  # fmt: skip
+        ConcealedEffect(
+            d.effect,
+            d.at,
+            {**d.parameters, "size": d.size},
+            partial(
+                detection_problem, recorded, without_effect(recorded.measured, before, d.injected)
+            ),
+        )
+        for before, d in zip([plain, *(d.injected for d in found)], found, strict=False)
+    ]
     name = scene.arm.name if robot == RANDOM else robot
-    return Made(name, effects, robot_is.places, _held_out(secret, recorded))
+    return ConcealedCase(name, effects, robot_is.places, _held_out(injected, recorded))
 
 
 def _robot(
     robot: str, per_joint: int, folder: Path, rng: np.random.Generator
-) -> tuple[Scene, Secret, Hammer, Load]:
+) -> tuple[Scene, InjectedFaults, Hammer, Load]:
     """A robot's folder, what it is without imperfections, and who hits it."""
     known = ARMS.get(robot)
     arm = replace(known, damping_s=DAMPING_S) if known else draw_arm(rng, folder, per_joint)
     robot_toml = arm.write(folder, per_joint)
     load: Load = partial(load_truth, robot_toml, engine="mujoco" if known else "tree")
-    plain = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
+    plain = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
     low, high = np.deg2rad(np.array(arm.joints_deg)).T
     if known:
         poses = rng.uniform(low, high, (POSES + PREDICTED, len(low)))
@@ -153,21 +159,27 @@ def _drawn(rng: np.random.Generator, hammer: Hammer, arm: Arm) -> Hammer:
 
 
 def _recorded(
-    folder: Path, scene: Scene, secret: Secret, load: Load, hammer: Hammer, handling: Handling,
-    rng: np.random.Generator, own: np.random.Generator,
-) -> Scored:  # fmt: skip
-    """Write the recordings; `own` draws what `handling` leaves open."""
-    truth = load(secret.deviation)
-    measured = replace(secret, chain=handling.chain(own))
+    folder: Path,
+    scene: Scene,
+    injected: InjectedFaults,
+    load: Load,
+    hammer: Hammer,
+    errors: MeasurementErrors,
+    rng: np.random.Generator,
+    own: np.random.Generator,
+) -> ScoredCase:
+    """Write the recordings; `own` draws what `errors` leaves open."""
+    truth = load(injected.deviation)
+    measured = replace(injected, chain=errors.chain(own))
     wanted = scene.poses[POSES:]
-    visits = Visits.planned(scene.poses[:POSES], hammer, handling, rng, own)
+    visits = Visits.planned(scene.poses[:POSES], hammer, errors, rng, own)
     again = copy.deepcopy(rng)
     quiet = quiet_hits(truth, measured, visits.visits, hammer, rng)
-    hammer = handling.floor(hammer, [hit for hits in quiet for hit in hits], own)
+    hammer = errors.floor(hammer, [hit for hits in quiet for hit in hits], own)
     record(folder, truth, measured, visits, quiet, hammer, rng)
     write_predict(folder, truth.joint_names, _named(wanted), hammer.peak_n)
     reach_m = sum(float(np.linalg.norm(joint.xyz)) for joint in scene.arm.joints)
-    return Scored(
+    return ScoredCase(
         load, scene.arm.band_hz, reach_m, measured, visits.visits, wanted, hammer, quiet, again
     )
 
@@ -177,29 +189,29 @@ def _named(wanted: np.ndarray) -> list[tuple[str, np.ndarray]]:
 
 
 def concealed(
-    kind: str, scene: Scene, secret: Secret, load: Load, rng: np.random.Generator
-) -> list[Drawn]:
+    kind: str, scene: Scene, injected: InjectedFaults, load: Load, rng: np.random.Generator
+) -> list[DrawnEffect]:
     """Effects added one after the other.
 
     Drawn again is what could not be: a robot that shakes by itself, a joint with two laws.
     """
-    found: list[Drawn] = []
+    found: list[DrawnEffect] = []
     largest = log_uniform(rng, *SIZES)
     for name in _names(kind, scene, rng):
         size = largest
         for _ in range(ATTEMPTS):
             if found:
                 size = largest * log_uniform(rng, 1 / SMALLER, 1.0)
-            drawn = TABLE[name](replace(scene, size=size), secret, rng)
+            drawn = TABLE[name](replace(scene, size=size), injected, rng)
             if kind == "drives" and not _joins(drawn, found):
                 continue
-            with_it = load(drawn.secret.deviation)
+            with_it = load(drawn.injected.deviation)
             if all(np.all(with_it.poles(q)[0].real < 0) for q in scene.poses):
                 found.append(replace(drawn, size=size))
-                secret = drawn.secret
+                injected = drawn.injected
                 break
         else:
-            raise NothingShowsError(f"No {name} of this robot can be; take another seed.")
+            raise NothingDetectableError(f"No {name} of this robot can be; take another seed.")
     return found
 
 
@@ -214,19 +226,19 @@ def _names(kind: str, scene: Scene, rng: np.random.Generator) -> list[str]:
     return [] if kind == "null" else [kind]
 
 
-def _joins(drawn: Drawn, before: list[Drawn]) -> bool:
+def _joins(drawn: DrawnEffect, before: list[DrawnEffect]) -> bool:
     """Whether a law is at a joint of its own, and hardens or softens as the others do."""
     numbers = [next(iter(d.parameters.values())) for d in (drawn, *before)]
     signs = {v > 0 for v in numbers if isinstance(v, float)}
     return len(signs) == 1 and all(d.at != drawn.at for d in before)
 
 
-def _held_out(secret: Secret, case: Scored) -> dict[str, Any]:
+def _held_out(injected: InjectedFaults, case: ScoredCase) -> dict[str, Any]:
     """True FRFs (real and imaginary; pose, response, hit, F) without noise and artefacts."""
     hammer = case.hammer
     quiet = replace(hammer, noise=0.0, force_noise=0.0, bits=0, record_s=2 * hammer.record_s)
     visits = [once(q, hammer.peak_n) for q in case.wanted]
-    plain, truth = Secret(secret.deviation, secret.ports), case.load(secret.deviation)
+    plain, truth = InjectedFaults(injected.deviation, injected.ports), case.load(injected.deviation)
     frequency, H = frfs(truth, plain, visits, quiet, case.band_hz)
     return {
         "poses": [name for name, _ in _named(case.wanted)],

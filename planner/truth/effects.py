@@ -15,6 +15,7 @@ from planner.truth.deviation import (
     ScaledJoint,
     StiffnessRipple,
 )
+from planner.truth.fault_injection import InjectedFaults, JointDrift, LoadChange
 from planner.truth.imperfections import gas_spring
 from planner.truth.laws import (
     AmplitudeSoftening,
@@ -32,7 +33,7 @@ from planner.truth.nonlinear import Port
 from planner.truth.scene import (
     REFERENCE_HZ,
     Draw,
-    Drawn,
+    DrawnEffect,
     Parameters,
     Scene,
     deviate,
@@ -41,38 +42,43 @@ from planner.truth.scene import (
     some_joint,
     triple,
 )
-from planner.truth.secret import JointDrift, LoadChange, Secret
 
 CHANGED_TOOL = 0.25  # how often properties change because the tool does
 
 
-def joint_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+def joint_stiffness(
+    scene: Scene, injected: InjectedFaults, rng: np.random.Generator
+) -> DrawnEffect:
     """A joint about its own axis is far softer or stiffer than stated."""
     joint = some_joint(scene, rng)
     factor = log_uniform(rng, 0.3, 0.55) if rng.random() < 0.7 else log_uniform(rng, 2.0, 3.5)
     factor = factor**scene.size
     parameters: Parameters = {"factor": factor, "stiffness": factor * scene.stiffness(joint)}
-    change = deviate(secret, scaled=(ScaledJoint(joint, factor),))
-    return Drawn("joint_stiffness", joint, parameters, change)
+    change = deviate(injected, scaled=(ScaledJoint(joint, factor),))
+    return DrawnEffect("joint_stiffness", joint, parameters, change)
 
 
-def transverse_compliance(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+def transverse_compliance(
+    scene: Scene, injected: InjectedFaults, rng: np.random.Generator
+) -> DrawnEffect:
     """A bearing tilts about both axes across its joint's own, softer than the others."""
     joint = some_joint(scene, rng)
     first = scene.stiffness(joint) * log_uniform(rng, 0.4, 2.5) / scene.size
     stiffness = [first, first * log_uniform(rng, 0.7, 1.4)]
-    before = secret.deviation.extra
+    before = injected.deviation.extra
     own = [s.stiffness for s in before if s.joint == joint]
     if own:  # one body between two springs about the same axis would have no inertia: in series
         stiffness = [1 / (1 / k + 1 / float(np.mean(own))) for k in stiffness]
     axes = np.eye(3)[np.abs(scene.axis(joint)) < 0.5]
     springs = [scene.spring(joint, a, k) for a, k in zip(axes, stiffness, strict=True)]
     others = (s for s in before if s.joint != joint)
-    change = replace(secret, deviation=replace(secret.deviation, extra=(*others, *springs)))
-    return Drawn("transverse_compliance", joint, {"stiffness": stiffness}, change)
+    change = replace(injected, deviation=replace(injected.deviation, extra=(*others, *springs)))
+    return DrawnEffect("transverse_compliance", joint, {"stiffness": stiffness}, change)
 
 
-def base_compliance(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+def base_compliance(
+    scene: Scene, injected: InjectedFaults, rng: np.random.Generator
+) -> DrawnEffect:
     """The floor gives way: two tilts, or sometimes all six."""
     tilt = scene.stiffness("joint_2") * log_uniform(rng, 0.7, 4.0) / scene.size
     tilts = [tilt, tilt * log_uniform(rng, 0.7, 1.4)]
@@ -85,10 +91,12 @@ def base_compliance(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
         springs += [scene.spring("base", a, shift, slide=True) for a in np.eye(3)]
         springs.append(scene.spring("base", np.eye(3)[2], turn))
         parameters |= {"freedoms": 6.0, "shift_stiffness": shift, "turn_stiffness": turn}
-    return Drawn("base_compliance", "base", parameters, deviate(secret, extra=springs))
+    return DrawnEffect("base_compliance", "base", parameters, deviate(injected, extra=springs))
 
 
-def link_flexibility(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+def link_flexibility(
+    scene: Scene, injected: InjectedFaults, rng: np.random.Generator
+) -> DrawnEffect:
     """A link is a beam of five elements or more; the one that bends a little anyway bends more."""
     lengths = {i: float(np.linalg.norm(scene.length(i))) for i in range(1, 5)}
     number = int(rng.choice([i for i, length in lengths.items() if length > 0.15]))
@@ -96,29 +104,31 @@ def link_flexibility(scene: Scene, secret: Secret, rng: np.random.Generator) -> 
     first = own * log_uniform(rng, 0.4, 2.0)
     second, twist = first * log_uniform(rng, 0.7, 1.4), first * log_uniform(rng, 0.5, 3.0)
     link, elements = f"link_{number}", int(rng.integers(5, 8))
-    for beam in (b for b in secret.deviation.beams if b.link == link):  # compliances in series
+    for beam in (b for b in injected.deviation.beams if b.link == link):  # compliances in series
         first, second = (
             1 / (1 / k + 1 / b) for k, b in zip((first, second), beam.bending, strict=True)
         )
         twist = 1 / (1 / twist + 1 / beam.torsion)
     beam = BentLink(link, (first, second), twist, scene.arm.damping_s, elements)
-    others = tuple(b for b in secret.deviation.beams if b.link != link)
-    change = replace(secret, deviation=replace(secret.deviation, beams=(*others, beam)))
+    others = tuple(b for b in injected.deviation.beams if b.link != link)
+    change = replace(injected, deviation=replace(injected.deviation, beams=(*others, beam)))
     parameters: Parameters = {"bending_stiffness": [first, second], "torsion_stiffness": twist}
-    return Drawn("link_flexibility", link, parameters, change)
+    return DrawnEffect("link_flexibility", link, parameters, change)
 
 
-def added_mass(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+def added_mass(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) -> DrawnEffect:
     """A lump on a link, or a payload missing from the robot folder."""
     number = scene.some_link(rng)
     mass = scene.size * scene.moving_kg * log_uniform(rng, 0.03, 0.15)
     place = rng.uniform(0.1, 1.0) * scene.length(number) + 0.1 * some_direction(rng)
     lump = AttachedMass(f"link_{number}", triple(place), mass)
     parameters: Parameters = {"mass": mass, "position_m": place.tolist()}
-    return Drawn("added_mass", lump.link, parameters, deviate(secret, added=(lump,)))
+    return DrawnEffect("added_mass", lump.link, parameters, deviate(injected, added=(lump,)))
 
 
-def local_resonator(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+def local_resonator(
+    scene: Scene, injected: InjectedFaults, rng: np.random.Generator
+) -> DrawnEffect:
     """A loose part, or a hose pack that swings at up to three frequencies in as many directions."""
     number = scene.some_link(rng)
     low, high = scene.band_of_modes
@@ -147,56 +157,66 @@ def local_resonator(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
         "direction": list(main.direction),
         "position_m": list(main.position_m),
     }
-    change = deviate(secret, resonators=(main, *more))
-    return Drawn("local_resonator", main.link, parameters, change)
+    change = deviate(injected, resonators=(main, *more))
+    return DrawnEffect("local_resonator", main.link, parameters, change)
 
 
-def angle_dependent_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+def angle_dependent_stiffness(
+    scene: Scene, injected: InjectedFaults, rng: np.random.Generator
+) -> DrawnEffect:
     """First or second harmonic of the angle, or a gas spring that robot.toml does not have."""
     if rng.random() < 0.7:
         joint, order = some_joint(scene, rng), int(rng.integers(1, 3))
         cosine, sine = scene.ripple(rng)
         parameters: Parameters = {"order": float(order), "cosine": cosine, "sine": sine}
-        change = deviate(secret, harmonics=(StiffnessRipple(joint, order, cosine, sine),))
-        return Drawn("angle_dependent_stiffness", joint, parameters, change)
+        change = deviate(injected, harmonics=(StiffnessRipple(joint, order, cosine, sine),))
+        return DrawnEffect("angle_dependent_stiffness", joint, parameters, change)
     spring = gas_spring(scene, (0.3 * scene.size, 0.6 * scene.size), rng)
     parameters = {k: float(v) for k, v in vars(spring).items() if k != "joint"}
-    change = deviate(secret, compensators=(spring,))
-    return Drawn("angle_dependent_stiffness", spring.joint, parameters, change)
+    change = deviate(injected, compensators=(spring,))
+    return DrawnEffect("angle_dependent_stiffness", spring.joint, parameters, change)
 
 
-def left(scene: Scene, secret: Secret, joint: str) -> float:
+def least_stiffness(scene: Scene, injected: InjectedFaults, joint: str) -> float:
     """Stiffness that a joint has where earlier effects leave it least, in N·m/rad.
 
     A law takes its share of this: no joint pushes away from its rest.
     """
     share = 1.0
-    for change in secret.deviation.scaled:
+    for change in injected.deviation.scaled:
         share *= change.factor if change.joint == joint else 1.0
-    for wave in secret.deviation.harmonics:
+    for wave in injected.deviation.harmonics:
         share *= 1 - float(np.hypot(wave.cosine, wave.sine)) if wave.joint == joint else 1.0
     return share * scene.stiffness(joint)
 
 
-def _joint(scene: Scene, secret: Secret, rng: np.random.Generator) -> tuple[str, float, float]:
+def _joint(
+    scene: Scene, injected: InjectedFaults, rng: np.random.Generator
+) -> tuple[str, float, float]:
     """A joint, what stiffness it has left, and its angle under a middling hit."""
     joint = some_joint(scene, rng)
-    return joint, left(scene, secret, joint), scene.angle(joint)
+    return joint, least_stiffness(scene, injected, joint), scene.angle(joint)
 
 
 def _in_joint(
-    effect: str, secret: Secret, joint: str, laws: list[JointLaw], rng: np.random.Generator
-) -> Drawn:
+    effect: str,
+    injected: InjectedFaults,
+    joint: str,
+    laws: list[JointLaw],
+    rng: np.random.Generator,
+) -> DrawnEffect:
     """One of some laws at a joint, with its own numbers and its class as parameters."""
     law = laws[int(rng.integers(len(laws)))]
     numbers: Parameters = {k: float(v) for k, v in vars(law).items()}
-    change = replace(secret, ports=(*secret.ports, Port(law, joint=joint)))
-    return Drawn(effect, joint, {**numbers, "law": type(law).__name__}, change)
+    change = replace(injected, ports=(*injected.ports, Port(law, joint=joint)))
+    return DrawnEffect(effect, joint, {**numbers, "law": type(law).__name__}, change)
 
 
-def nonlinear_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+def nonlinear_stiffness(
+    scene: Scene, injected: InjectedFaults, rng: np.random.Generator
+) -> DrawnEffect:
     """A gear that hardens or softens: smoothly, in steps of a catalogue, or with amplitude."""
-    joint, stiffness, angle = _joint(scene, secret, rng)
+    joint, stiffness, angle = _joint(scene, injected, rng)
     hardens = rng.random() < 0.6
     share = log_uniform(rng, 0.6, 2.0) if hardens else rng.uniform(0.3, 0.6)
     change = scene.size * stiffness * share
@@ -206,12 +226,12 @@ def nonlinear_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) 
         HarmonicDrive(sign * change / 2, knee, knee * rng.uniform(1.5, 3.0)),
         AmplitudeSoftening(-sign * change, knee),
     ]
-    return _in_joint("nonlinear_stiffness", secret, joint, laws, rng)
+    return _in_joint("nonlinear_stiffness", injected, joint, laws, rng)
 
 
-def friction(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+def friction(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) -> DrawnEffect:
     """Hysteresis of Dahl, Bouc and Wen, Iwan, or bristles with Stribeck's fall."""
-    joint, stiffness, angle = _joint(scene, secret, rng)
+    joint, stiffness, angle = _joint(scene, injected, rng)
     stiffness = scene.size * stiffness * log_uniform(rng, 0.3, 1.5)
     coulomb = stiffness * angle * log_uniform(rng, 0.05, 0.4)
     speed = 2 * np.pi * REFERENCE_HZ * angle
@@ -222,33 +242,33 @@ def friction(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
         Iwan(stiffness, coulomb),
         LuGre(stiffness, coulomb, float(stiction), stribeck, 0.02 * coulomb / speed),
     ]
-    return _in_joint("friction", secret, joint, laws, rng)
+    return _in_joint("friction", injected, joint, laws, rng)
 
 
-def backlash(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+def backlash(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) -> DrawnEffect:
     """Play in a gear, in which some stiffness is left; its teeth may dissipate as they meet."""
-    joint, stiffness, angle = _joint(scene, secret, rng)
+    joint, stiffness, angle = _joint(scene, injected, rng)
     stiffness = float(scene.size * stiffness * rng.uniform(0.4, 0.8))
     gap = angle * log_uniform(rng, 0.1, 0.5)
     damping = stiffness / (2 * np.pi * REFERENCE_HZ * angle) * log_uniform(rng, 0.02, 0.2)
     laws: list[JointLaw] = [Backlash(stiffness, gap), ImpactDamping(stiffness, gap, damping)]
-    return _in_joint("backlash", secret, joint, laws, rng)
+    return _in_joint("backlash", injected, joint, laws, rng)
 
 
-def drift(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+def drift(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) -> DrawnEffect:
     """Joints warm up each by itself, some much, some hardly; or another tool half-way through."""
     if rng.random() < CHANGED_TOOL:
         factor = 1 + scene.size * log_uniform(rng, 0.1, 0.6)
         load = LoadChange("spindle", factor, float(rng.uniform(0.3, 0.7)))
         changed: Parameters = {"load_factor": factor, "start": load.start}
-        return Drawn("drift", "campaign", changed, replace(secret, load=load))
+        return DrawnEffect("drift", "campaign", changed, replace(injected, load=load))
     course = str(rng.choice(["linear", "warming", "step"]))
     size = scene.size * rng.uniform(0.12, 0.35) * rng.choice([-1, 1])
     own = {joint: float(size * rng.uniform(0.1, 1.5)) for joint in scene.joints}
-    before = secret.drift.joints if isinstance(secret.drift, JointDrift) else ()
+    before = injected.drift.joints if isinstance(injected.drift, JointDrift) else ()
     law = JointDrift((*before, *((joint, change, course) for joint, change in own.items())))
     parameters: Parameters = {"course": course, **own}
-    return Drawn("drift", "campaign", parameters, replace(secret, drift=law))
+    return DrawnEffect("drift", "campaign", parameters, replace(injected, drift=law))
 
 
 LINEAR: dict[str, Draw] = {

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.truth.deviation import AttachedResonator, BentLink, Compensator, StiffnessRipple
+from planner.truth.fault_injection import InjectedFaults, JointDrift
 from planner.truth.laws import AmplitudeSoftening, Friction, Iwan, JointLaw
 from planner.truth.nonlinear import Port
 from planner.truth.scene import Scene, deviate, log_uniform, some_direction, triple
-from planner.truth.secret import JointDrift, Secret
 from planner.truth.springs import across
 
 # All chosen, so that FRFs change by some percent together: what an engineer would let pass.
@@ -27,41 +27,41 @@ COMPENSATOR = 0.005, 0.03  # of joint 2's stiffness
 class Imperfect:
     """A robot with imperfections, and the names by which a diagnosis could rightly call them."""
 
-    secret: Secret
+    injected: InjectedFaults
     places: tuple[tuple[str, str], ...]
 
 
-def imperfect(scene: Scene, secret: Secret, rng: np.random.Generator) -> Imperfect:
+def imperfect(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) -> Imperfect:
     """Each joint a little nonlinear, rippled, drifting and soft across; links, hoses, a gas spring.
 
     Damping is partly viscous, partly a loss factor, by a share of each gear's own.
     """
     common = log_uniform(rng, *SOFT) if rng.random() < SOFT_SHARE else 1.0
-    secret = replace(secret, deviation=replace(secret.deviation, common=common, mixed=1.0))
+    injected = replace(injected, deviation=replace(injected.deviation, common=common, mixed=1.0))
     places = [("structural_damping", "joints"), ("drift", "campaign")]
     for joint in scene.joints:
-        secret, effects = _joint(scene, secret, joint, rng)
+        injected, effects = _joint(scene, injected, joint, rng)
         places += [(effect, joint) for effect in effects]
         if abs(np.log(common)) > np.log(1.2):
             places.append(("joint_stiffness", joint))
     drifts = tuple((j, DRIFT_SD * float(rng.standard_normal()), "warming") for j in scene.joints)
-    secret = replace(secret, drift=JointDrift(drifts))
+    injected = replace(injected, drift=JointDrift(drifts))
     for _ in range(HOSES + int(rng.integers(HOSES + 1))):
-        secret, link = _hose(scene, secret, rng)
+        injected, link = _hose(scene, injected, rng)
         places.append(("local_resonator", link))
     number = int(rng.choice([n for n in (2, 3) if np.linalg.norm(scene.length(n)) > 0]))
     stiff = scene.stiffness(f"joint_{number}")
     bending = log_uniform(rng, *BEAM) * stiff, log_uniform(rng, *BEAM) * stiff
     twist = log_uniform(rng, *BEAM) * stiff
     beam = BentLink(f"link_{number}", bending, twist, scene.arm.damping_s)
-    secret = deviate(secret, beams=(beam,), compensators=(gas_spring(scene, COMPENSATOR, rng),))
+    injected = deviate(injected, beams=(beam,), compensators=(gas_spring(scene, COMPENSATOR, rng),))
     places += [("link_flexibility", beam.link), ("angle_dependent_stiffness", "joint_2")]
-    return Imperfect(secret, tuple(dict.fromkeys(places)))
+    return Imperfect(injected, tuple(dict.fromkeys(places)))
 
 
 def _joint(
-    scene: Scene, secret: Secret, joint: str, rng: np.random.Generator
-) -> tuple[Secret, list[str]]:
+    scene: Scene, injected: InjectedFaults, joint: str, rng: np.random.Generator
+) -> tuple[InjectedFaults, list[str]]:
     own, angle = scene.stiffness(joint), scene.angle(joint)
     share = log_uniform(rng, *LAWS) * own
     laws: list[tuple[str, JointLaw]] = [
@@ -70,20 +70,22 @@ def _joint(
         ("friction", Friction(share, 0.3 * share * angle)),
     ]
     effect, law = laws[int(rng.integers(len(laws)))]
-    secret = replace(secret, ports=(*secret.ports, Port(law, joint=joint)))
+    injected = replace(injected, ports=(*injected.ports, Port(law, joint=joint)))
     cosine, sine = RIPPLE * rng.standard_normal(2)
     wave = StiffnessRipple(joint, int(rng.integers(1, 3)), float(cosine), float(sine))
-    secret = deviate(secret, harmonics=(wave,))
+    injected = deviate(injected, harmonics=(wave,))
     effects = [effect, "angle_dependent_stiffness"]
     if scene.per_joint == 1:
         axes = across(scene.axis(joint))
         springs = [scene.spring(joint, a, own * log_uniform(rng, *BEARINGS)) for a in axes]
-        secret = deviate(secret, extra=springs)
+        injected = deviate(injected, extra=springs)
         effects.append("transverse_compliance")
-    return secret, effects
+    return injected, effects
 
 
-def _hose(scene: Scene, secret: Secret, rng: np.random.Generator) -> tuple[Secret, str]:
+def _hose(
+    scene: Scene, injected: InjectedFaults, rng: np.random.Generator
+) -> tuple[InjectedFaults, str]:
     number, (low, high) = scene.some_link(rng), scene.band_of_modes
     hose = AttachedResonator(
         f"link_{number}",
@@ -93,7 +95,7 @@ def _hose(scene: Scene, secret: Secret, rng: np.random.Generator) -> tuple[Secre
         log_uniform(rng, 0.5 * low, 2 * high),
         log_uniform(rng, 0.03, 0.15),
     )
-    return deviate(secret, resonators=(hose,)), hose.link
+    return deviate(injected, resonators=(hose,)), hose.link
 
 
 def gas_spring(scene: Scene, share: tuple[float, float], rng: np.random.Generator) -> Compensator:

@@ -2,7 +2,7 @@
 
 Every law is a scalar one: an elastic angle θ (rad, or m) gives a restoring torque (N·m, or N).
 Arrays of angles have any shape, as many hits and joints are integrated together; a law's numbers
-may then be arrays too, which `side_by_side` makes of several laws of a kind.
+may then be arrays too, which `stacked` makes of several laws of a kind.
 """
 
 from abc import ABC, abstractmethod
@@ -51,7 +51,7 @@ class Elastic(OneState, ABC):
         return self.at(now), state
 
 
-def side_by_side(laws: Sequence[JointLaw]) -> JointLaw:
+def stacked(laws: Sequence[JointLaw]) -> JointLaw:
     """Laws of one class as one law of arrays (laws, hits), one row each."""
     kind: Any = type(laws[0])
     rows = {f.name: [[getattr(law, f.name)] for law in laws] for f in fields(kind)}

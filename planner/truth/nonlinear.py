@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.errors import InputError
-from planner.truth.laws import JointLaw, side_by_side
+from planner.truth.laws import JointLaw, stacked
 from planner.truth.model import Truth, driven, weights
 
 MOST_CONTRACTION = 0.5  # of the fixed-point iteration within a step
@@ -38,7 +38,7 @@ class Port:
 
 
 @dataclass(frozen=True, eq=False)
-class StruckPose:
+class HitPose:
     """A robot at a pose q (rad), and forces (h, n) in N that hit it.
 
     `wrench` (h, 6) is what a unit of each force does at the tcp, in its frame: the force's
@@ -65,7 +65,7 @@ class _Linear:
     forces: np.ndarray  # (h, n)
 
 
-def respond(poses: Sequence[StruckPose], ports: Sequence[Port], step_s: float) -> list[np.ndarray]:
+def respond(poses: Sequence[HitPose], ports: Sequence[Port], step_s: float) -> list[np.ndarray]:
     """Accelerations (h, 3s, n) in m/s² of the sensors at each pose, from rest.
 
     The poses are integrated together, so all forces have the same length. Raises InputError if
@@ -77,7 +77,7 @@ def respond(poses: Sequence[StruckPose], ports: Sequence[Port], step_s: float) -
     return [_without_laws(pose, step_s) for pose in linear]
 
 
-def _linear(pose: StruckPose, ports: Sequence[Port]) -> _Linear:
+def _linear(pose: HitPose, ports: Sequence[Port]) -> _Linear:
     truth = pose.truth
     poles, shapes, entry, hit, sensor = truth.modal(pose.q)
     one = poles.imag >= 0  # the other of a pair adds the conjugate
@@ -111,8 +111,7 @@ class _Laws:
             kinds.setdefault(type(port.law), []).append(place)
         self._step_s = step_s
         self._groups = [
-            (np.array(places), side_by_side([ports[i].law for i in places]))
-            for places in kinds.values()
+            (np.array(places), stacked([ports[i].law for i in places])) for places in kinds.values()
         ]
 
     def at_rest(self, shape: tuple[int, ...]) -> list[np.ndarray]:

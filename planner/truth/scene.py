@@ -8,8 +8,8 @@ import numpy as np
 
 from planner.truth.arms import Arm
 from planner.truth.deviation import Spring
+from planner.truth.fault_injection import InjectedFaults
 from planner.truth.model import Truth
-from planner.truth.secret import Secret
 
 PULSE_S = 0.008  # duration of a middling hit
 REFERENCE_HZ = 15.0  # at which speeds of joints are estimated: the middle of the bands
@@ -84,20 +84,20 @@ class Scene:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnEffect:
     """An effect of a case: name and place as a diagnosis states them, true parameters in SI.
 
-    `secret` holds it and all that was there before; `size` as in `Scene`.
+    `injected` holds it and all that was there before; `size` as in `Scene`.
     """
 
     effect: str
     at: str | None
     parameters: Parameters
-    secret: Secret
+    injected: InjectedFaults
     size: float = 1.0
 
 
-Draw = Callable[[Scene, Secret, np.random.Generator], Drawn]
+Draw = Callable[[Scene, InjectedFaults, np.random.Generator], DrawnEffect]
 
 
 def _swing(scene: Scene, joint: str, q: np.ndarray) -> float:
@@ -130,8 +130,8 @@ def some_joint(scene: Scene, rng: np.random.Generator, last: int = 5) -> str:
     return f"joint_{rng.integers(1, min(last, len(scene.arm.joints)) + 1)}"
 
 
-def deviate(secret: Secret, **changes: Iterable) -> Secret:
+def deviate(injected: InjectedFaults, **changes: Iterable) -> InjectedFaults:
     """A secret with more items in its deviation, by the name of the field."""
-    old = secret.deviation
+    old = injected.deviation
     more: dict[str, Any] = {name: (*getattr(old, name), *items) for name, items in changes.items()}
-    return replace(secret, deviation=replace(old, **more))
+    return replace(injected, deviation=replace(old, **more))

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.truth.handling import Handling
+from planner.truth.fault_injection import HitVisit, InjectedFaults, windowed
 from planner.truth.hits import AXES, Hammer, SimulatedHit, noisy, write_recordings
+from planner.truth.measurement_errors import MeasurementErrors
 from planner.truth.model import Truth
-from planner.truth.secret import HitVisit, Secret, windowed
 
 LEVELS = (0.4, 1.0, 2.5)  # of the middling peak force
 TWICE = 0.5  # how often the first pose is hit again at the end
@@ -28,23 +28,23 @@ class Visits:
         cls,
         poses: np.ndarray,
         hammer: Hammer,
-        handling: Handling,
+        errors: MeasurementErrors,
         rng: np.random.Generator,
         own: np.random.Generator,
     ) -> "Visits":
         """Three axes and three force levels at each pose (n, dof) in rad.
 
-        `own` draws what `handling` leaves open, so that all else is the same in the laboratory.
+        `own` draws what `errors` leaves open, so that all else is the same in the laboratory.
         """
         numbers = list(range(len(poses))) + ([0] if rng.random() < TWICE else [])
         shots = [(f"{rng.choice(['+', '-'])}{a}", hammer.peak_n * k) for a in "xyz" for k in LEVELS]
         planned, readbacks = [], []
-        common, axes = handling.common(own), [AXES.index(axis[1]) for axis, _ in shots]
+        common, axes = errors.common(own), [AXES.index(axis[1]) for axis, _ in shots]
         for number, index in enumerate(numbers):
             scatter = hammer.readback_deg * rng.uniform(-1, 1, len(poses[index]))
             readbacks.append(np.round(np.rad2deg(poses[index]) + scatter, 4))
-            off = np.deg2rad(handling.readback_deg) * own.standard_normal(len(poses[index]))
-            aims = handling.aims(axes, own, common)
+            off = np.deg2rad(errors.readback_deg) * own.standard_normal(len(poses[index]))
+            aims = errors.aims(axes, own, common)
             there = np.deg2rad(readbacks[-1]) + off
             planned.append(HitVisit(there, shots, number / max(len(numbers) - 1, 1), aims))
         return cls(planned, numbers, readbacks)
@@ -53,7 +53,7 @@ class Visits:
 def record(
     folder: Path,
     truth: Truth,
-    secret: Secret,
+    injected: InjectedFaults,
     visits: Visits,
     quiet: Sequence[Sequence[SimulatedHit]],
     hammer: Hammer,
@@ -64,7 +64,7 @@ def record(
     counts: dict[tuple[int, str], int] = {}
     for index, readback, hits in zip(visits.poses, visits.readbacks_deg, quiet, strict=True):
         for hit in hits:
-            heard = windowed(secret.artefact, noisy(hit, hammer, rng), hammer)
+            heard = windowed(injected.artefact, noisy(hit, hammer, rng), hammer)
             repeat = counts[index, hit.axis] = counts.get((index, hit.axis), 0) + 1
             rows.append((f"P{index + 1:02d}", readback, repeat, heard))
     write_recordings(folder, truth.joint_names, rows, hammer, "concealed case")

@@ -16,7 +16,7 @@ import pytest
 
 from tests.support.counted_modes import counted
 from tests.support.everyday_campaigns import POSES, Played, campaigns
-from tests.support.lacking_robots import KINDS, ROBOTS
+from tests.support.faulty_robots import KINDS, ROBOTS
 
 FIRST = 71_001
 PERCENT, WORSE_PERCENT = 1.0, 0.1  # RMSE asked for; by how much a peer is better that is no matter

@@ -101,8 +101,8 @@ def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
 def test_a_link_that_bends_is_found_though_other_springs_nearly_fit(tmp_path):
     case = make("irb6640", "bending link", 7308, tmp_path, poses=5)
     model = case.model(2)
-    assert model.low.learned is not None
-    assert model.low.learned.fits
+    assert model.low.identified_robot is not None
+    assert model.low.identified_robot.fits
     score = FrfScore.of(case, model)
     assert score.frac > 0.998
     assert score.covered > 0.85

@@ -14,11 +14,11 @@ from planner.campaign.config import FidelityTable
 from planner.campaign.hit_error_estimates import CampaignHitErrors
 from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.dataset.store import Store
-from planner.fit.hit_misses import VisitMisses
+from planner.fit.hit_error_fit import VisitHitErrors
 from planner.measurement.nuisances import Tolerances
 from planner.replay import replay
 from planner.report.imports import ImportedPoses
-from tests.support.missed_hits import MissedCell, missed_cell
+from tests.support.hit_error_cases import MissedCell, missed_cell
 
 NORMAL95 = 1.959964
 
@@ -100,7 +100,7 @@ def campaign(times: float, discrepancy: float) -> CampaignHitErrors:
     """Nine hits that miss by so many times what hands do."""
     sd = np.repeat([HAND.angle_rad, HAND.offset_m], 2)
     mean = times * sd * np.random.default_rng(2).choice([-1.0, 1.0], (9, 4))
-    told = SimpleNamespace(discrepancy=discrepancy, visits=(VisitMisses(mean, np.eye(36)),))
+    told = SimpleNamespace(discrepancy=discrepancy, visits=(VisitHitErrors(mean, np.eye(36)),))
     return CampaignHitErrors((), cast(Any, told), HAND, (4.0, 60.0))
 
 

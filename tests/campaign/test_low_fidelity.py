@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from planner.campaign.low_fidelity import LowFidelity, learn
+from planner.campaign.low_fidelity import LowFidelity, identify_low_fidelity
 from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
 from planner.fit.frequency_uncertainty import log_frequency_slope
@@ -54,7 +54,7 @@ def right(tmp_path_factory):
     path = make_arm(tmp_path_factory.mktemp("arm"), transverse=True)
     frfs, q, other, true_hz = measured(path)
     before = LowFidelity(COUNT, Simulation(Robot.load(path)))
-    return before, learn(before, frfs, q, BAND_HZ), other, true_hz
+    return before, identify_low_fidelity(before, frfs, q, BAND_HZ), other, true_hz
 
 
 def rmse(low: LowFidelity, q: np.ndarray, true_hz: np.ndarray) -> float:
@@ -81,7 +81,7 @@ def test_springs_that_the_description_lacks_are_found_and_named(tmp_path):
     frfs, q, other, true_hz = measured(make_arm(tmp_path / "true", transverse=True), n=3)
     path = make_arm(tmp_path / "simulated")
     before = LowFidelity(COUNT, Simulation(Robot.load(path)))
-    after = learn(before, frfs, q, BAND_HZ)
+    after = identify_low_fidelity(before, frfs, q, BAND_HZ)
     assert rmse(before, other, true_hz) > 0.1
     assert rmse(after, other, true_hz) < 0.01
     assert "The bearing of joint_" in after.remark
@@ -97,15 +97,17 @@ def test_a_resonator_that_is_stated_is_refitted_and_not_found_again(tmp_path):
         "direction = [0.1, 1.0, 0.0]\nmass = 5.0\nfrequency_hz = 17.4\ndamping_ratio = 0.03\n"
     )
     path.write_text(path.read_text() + stated)
-    after = learn(LowFidelity(COUNT, Simulation(Robot.load(path))), frfs, q, BAND_HZ)
+    after = identify_low_fidelity(
+        LowFidelity(COUNT, Simulation(Robot.load(path))), frfs, q, BAND_HZ
+    )
     assert "swings" not in after.remark
     assert after.simulation is not None
     (found,) = after.simulation.robot.config.resonator
     assert found.frequency_hz == pytest.approx(18.0, rel=0.003)
     assert found.mass == pytest.approx(6.0, rel=0.1)
     assert rmse(after, other, true_hz) < 0.005
-    assert after.learned is not None
-    written = updated_toml(path.read_text(), after.learned.identified)
+    assert after.identified_robot is not None
+    written = updated_toml(path.read_text(), after.identified_robot.identified)
     assert written.count("[[resonator]]") == 1
     assert f"frequency_hz = {found.frequency_hz}" in written
 
@@ -120,10 +122,12 @@ def test_damping_that_is_partly_a_loss_factor_is_no_lack_of_compliance(tmp_path)
     hammer = Hammer(peak_n=250.0, duration_s=0.005, sampling_rate_hz=512.0, record_s=2.0)
     q, rng = poses(3), np.random.default_rng(3)
     frfs = [ended(hits_at(truth, one, hammer, rng), band) for one in q]
-    after = learn(LowFidelity(COUNT, Simulation(Robot.load(path)), Tolerances()), frfs, q, band)
-    assert after.taught
-    assert after.learned is not None
-    assert after.learned.structure.added == 0
+    after = identify_low_fidelity(
+        LowFidelity(COUNT, Simulation(Robot.load(path)), Tolerances()), frfs, q, band
+    )
+    assert after.is_identified
+    assert after.identified_robot is not None
+    assert after.identified_robot.structure.added == 0
     assert "loss factors" in after.remark
     assert "swings" not in after.remark
 
@@ -137,8 +141,8 @@ def test_a_mass_that_swings_on_a_link_is_found_and_named(tmp_path):
     rng = np.random.default_rng(3)
     frfs = [ended(hits_at(truth, one, hammer, rng), band) for one in q]
     before = LowFidelity(count, Simulation(Robot.load(path)), Tolerances())
-    after = learn(before, frfs, q, band)
-    assert after.taught
+    after = identify_low_fidelity(before, frfs, q, band)
+    assert after.is_identified
     true_hz = np.array([truth.modes(one, count)[0] for one in other])
     assert rmse(after, other, true_hz) < 0.01 < 0.1 < rmse(before, other, true_hz)
     assert "on link_4 swings on its own at 59.8 Hz" in after.remark

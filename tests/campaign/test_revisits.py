@@ -16,7 +16,7 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
-from planner.campaign.import_checks import hit_again, suspected
+from planner.campaign.import_checks import hit_again, suspected_drift
 from planner.campaign.state import CampaignState, Measurement, fold
 from planner.recording.joints import JointUnits
 from planner.truth.deviation import Deviation
@@ -67,7 +67,7 @@ def test_a_second_visit_is_held_against_the_scatter_of_visits(hertz, scatter, po
 )  # fmt: skip
 def test_modes_to_one_side_ask_for_the_first_pose_again(hertz, hinted):
     state = CampaignState(measurements={"P001": KNOWN})
-    found = suspected(model(1e-3), state, "P004", (1.0, 1.0), modes(*hertz))
+    found = suspected_drift(model(1e-3), state, "P004", (1.0, 1.0), modes(*hertz))
     assert (found is not None) == hinted
     if found is not None:
         assert found.again == "P001"

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.import_checks import asked_of
-from planner.campaign.question import SURE
+from planner.campaign.import_checks import question_about
+from planner.campaign.pose_mismatch import SURE
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
@@ -53,7 +53,7 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path, poses):
 
     def asked(at: int, one: MeasuredPose):
         angles = tuple(np.rad2deg(q[at]).tolist())
-        return asked_of(campaign.model, campaign.state, "X", angles, one)
+        return question_about(campaign.model, campaign.state, "X", angles, one)
 
     assert not any(asked(i, found[i]) for i in range(OTHERS))
     repeated = [asked(i, again) for i in range(OTHERS)]

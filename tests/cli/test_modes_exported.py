@@ -10,8 +10,8 @@ from PIL import Image
 
 from planner.cli.run import run
 from planner.recording.geometry import read_geometry
+from tests.support.hit_structures import hit_frfs
 from tests.support.matrix_files import write_matrix
-from tests.support.struck_structures import struck
 from tests.support.structures import plate
 
 BAND = (40.0, 180.0)
@@ -22,7 +22,7 @@ def answered(tmp_path_factory):
     """The files of a small plate with its geometry, analysed, drawn and exported."""
     folder = tmp_path_factory.mktemp("exported")
     structure = plate(6, 4)
-    matrix = struck(structure, [0, 9], np.arange(1, 401) * 0.5, np.random.default_rng(1))
+    matrix = hit_frfs(structure, [0, 9], np.arange(1, 401) * 0.5, np.random.default_rng(1))
     nodes = np.array(structure.nodes)
     place = np.array([structure.position_m[n] for n in structure.nodes])
     trace = np.array([k for line in structure.lines for k in (*line, 0)])

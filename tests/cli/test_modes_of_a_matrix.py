@@ -12,9 +12,9 @@ from planner.frf.synthesis import pole
 from planner.modal.mac import mac
 from planner.recording.dof import Dof
 from tests.cli.test_modes_pictures import entities_of
+from tests.support.hit_structures import hit_frfs, unit_mass_shapes
 from tests.support.matrix_files import transposed, write_matrix
 from tests.support.outside import modes
-from tests.support.struck_structures import struck, unit_mass_shapes
 from tests.support.structures import plate
 
 LINES = np.arange(1, 601) * 0.5
@@ -29,7 +29,7 @@ def structure():
 
 @pytest.fixture(scope="module")
 def matrix(structure):
-    return struck(structure, REFERENCES, LINES, np.random.default_rng(3))
+    return hit_frfs(structure, REFERENCES, LINES, np.random.default_rng(3))
 
 
 def true_modes(structure):

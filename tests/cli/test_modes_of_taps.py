@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from planner.modal.mac import mac
+from tests.support.hit_structures import unit_mass_shapes
 from tests.support.outside import modes
-from tests.support.struck_structures import unit_mass_shapes
 from tests.support.structures import plate
 from tests.support.taps import tap, write_csv, write_uff
 

@@ -10,7 +10,7 @@ from planner.cli import progress
 @pytest.mark.parametrize("quiet", [False, True])
 def test_long_work_is_told_in_lines(quiet, monkeypatch, capsys):
     monkeypatch.setattr(progress, "FIRST_S", 0.02)
-    with progress.telling("comparing", quiet) as tell:
+    with progress.progress_bar("comparing", quiet) as tell:
         tell("runs", 0.25)
         time.sleep(0.3)
     said = capsys.readouterr()

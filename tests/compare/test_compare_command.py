@@ -13,7 +13,7 @@ import pytest
 from planner.campaign.build import build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
-from planner.compare.bench import assemble, cell_of, decide
+from planner.compare.bench import assemble, cell_of, comparison_config
 from planner.compare.resume import recorded
 from planner.compare.run import run
 from planner.compare.tasks import Task
@@ -37,7 +37,7 @@ def bench(pool):
     recordings, robot_toml, campaign = pool
     robot = Robot.load(robot_toml)
     listed = recordings_in(recordings, robot.joints, robot.points)
-    config = decide(robot, listed, campaign, "frozen")
+    config = comparison_config(robot, listed, campaign, "frozen")
     poses = recorded(listed, robot.joints, config.modes, 1, lambda *_: None)
     return assemble(robot, config, poses)[0]
 

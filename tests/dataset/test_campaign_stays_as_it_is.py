@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.material import material
+from planner.campaign.recordings_source import recordings_source
 from planner.cli.run import run
 from planner.demo import NAME, Pool, shipped
 from planner.errors import InputError
-from planner.progress import quietly
+from planner.progress import no_progress
 from tests.support.outside import FROZEN
 
 
@@ -47,9 +47,9 @@ def campaign(tmp_path_factory):
 
 def test_recordings_in_use_and_nothing_else(campaign):
     before = content(campaign.directory)
-    given = material(campaign.directory, None, 0.0)
+    given = recordings_source(campaign.directory, None, 0.0)
     robot = campaign.cell.robot
-    recorded = given.read(robot, campaign.cell.config.modes.band_hz, quietly)
+    recorded = given.read(robot, campaign.cell.config.modes.band_hz, no_progress)
     assert len(recorded.ended_frfs) == len(recorded.modes) == len(recorded.columns) == 2
     used = campaign.state.used
     assert recorded.poses == tuple(m.pose for m in used)

@@ -17,7 +17,7 @@ from planner.design.acquisitions import (
 )
 from planner.design.cost import Cost, axis_shares, best_axes, shortest_tour
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
-from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
+from planner.design.parameter_sensitivity import FrfNoise, UncertainParameters
 from planner.design.propose import ACQUISITIONS, Travel, propose
 from planner.design.stopping import forecast, left_out, mean_squares
 from planner.dynamics.simulation import Simulation
@@ -46,7 +46,7 @@ def open_(tmp_path_factory):
     simulation = Simulation(Robot.load(path))
     prior = robot_prior(simulation, Priors(mass=0.05, inertia=0.05, com_m=0.01))
     robot = RobotBelief.stated(prior, Tolerances())
-    return OpenParameters(robot, FrfNoise(0.01, 0.01, 0.5), BAND_HZ)
+    return UncertainParameters(robot, FrfNoise(0.01, 0.01, 0.5), BAND_HZ)
 
 
 def some_q(n, seed=0):
@@ -249,7 +249,7 @@ def test_forecast_speaks_of_its_own_samples(surrogate):
 
 def test_left_out_residuals_are_those_of_refits(surrogate):
     """Leave one out by solving without it, at the hyperparameters held."""
-    outputs, squares = surrogate.primary.likeliest.outputs, []
+    outputs, squares = surrogate.primary.most_probable.outputs, []
     for post in outputs:
         for i in range(len(post.x)):
             means, variances = [], []

@@ -7,7 +7,7 @@ import pytest
 
 from planner.design.cost import Cost
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
-from planner.design.parameter_sensitivity import FrfNoise, OpenParameters, better_places
+from planner.design.parameter_sensitivity import FrfNoise, UncertainParameters, better_places
 from planner.design.stopping import forecast
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
@@ -24,7 +24,7 @@ COST = Cost(np.full(4, 0.2))
 
 
 @pytest.fixture(scope="module")
-def open_(tmp_path_factory) -> OpenParameters:
+def open_(tmp_path_factory) -> UncertainParameters:
     """An arm whose sensor at the tool has one axis; joint 2 and 3 tilt, springs are guessed."""
     springs = "".join(
         f'[[compliance]]\njoint = "{joint}"\naxis = {axis}\nstiffness = 1e6\ndamping = 300.0\n'
@@ -36,7 +36,7 @@ def open_(tmp_path_factory) -> OpenParameters:
     toml.write_text(one_axis)
     simulation = Simulation(Robot.load(toml))
     robot = RobotBelief.stated(robot_prior(simulation, CAD_INERTIAS), Tolerances())
-    return OpenParameters(robot, FrfNoise(0.01, 0.02, 0.5), (4.0, 90.0))
+    return UncertainParameters(robot, FrfNoise(0.01, 0.02, 0.5), (4.0, 90.0))
 
 
 @pytest.fixture(scope="module")

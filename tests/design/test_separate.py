@@ -7,7 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.design.discrimination import WORTH, Tied, extra_sensor, next_hit, separation
+from planner.design.discrimination import (
+    WORTH,
+    TiedExplanations,
+    extra_sensor,
+    next_hit,
+    separation,
+)
 from planner.diagnosis.diagnose import searching
 from planner.dynamics.simulation import Simulation
 from planner.fit.fitted import converged, settled
@@ -41,19 +47,19 @@ class Cell:
         unknown = np.full(h.shape, np.nan)
         return Frf(LINES, h + noise, sd**2, unknown, (1, 1, 1), (5.0, 80.0))
 
-    def candidates(self) -> tuple[Tied, ...]:
+    def candidates(self) -> tuple[TiedExplanations, ...]:
         """Both explanations, settled."""
         data, prior = self.search.data(SEARCHED), self.search.prior
         found, built = [], prior.built
-        every = {effect.label: effect for effect in prior.repertoire.effects}
+        every = {effect.label: effect for effect in prior.library.effects}
         for label, place in PLACES.items():
             structure = RobotStructure(prior, (*built, every[label]), data.sensors)
             misfit = FrfMisfit(structure, data, self.search.tolerances)
             fit = converged(settled(misfit, misfit(structure.mean), rounds=3))
-            found.append(Tied((place,), 0.5, fit))
+            found.append(TiedExplanations((place,), 0.5, fit))
         return tuple(found)
 
-    def found(self, tied: tuple[Tied, ...]) -> Any:
+    def found(self, tied: tuple[TiedExplanations, ...]) -> Any:
         """What of a diagnosis proposals look at."""
         names = tuple(f"P{i + 1}" for i in range(len(self.search.q)))
         recorded = SimpleNamespace(poses=names, q=self.search.q, visits=(1,), level_n=[60.0, 247.0])
@@ -70,20 +76,20 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Cell:
 
 
 @pytest.fixture(scope="module")
-def tied(cell: Cell) -> tuple[Tied, ...]:
+def tied(cell: Cell) -> tuple[TiedExplanations, ...]:
     found = cell.candidates()
     assert len(found) == 2
     return found
 
 
-def test_what_is_the_same_is_told_apart_by_nothing(tied: tuple[Tied, ...]) -> None:
+def test_what_is_the_same_is_told_apart_by_nothing(tied: tuple[TiedExplanations, ...]) -> None:
     q = poses(2, 9)
     assert not separation(tied[:1], q).any()
     assert separation([tied[0], tied[0]], q) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_the_hit_that_is_proposed_tells_more_than_the_worst(
-    cell: Cell, tied: tuple[Tied, ...]
+    cell: Cell, tied: tuple[TiedExplanations, ...]
 ) -> None:
     """By what measuring there does to the odds, all refitted."""
     q = poses(8, 11)
@@ -110,7 +116,7 @@ def test_the_hit_that_is_proposed_tells_more_than_the_worst(
 
 
 def test_a_sensor_at_the_foot_parts_floor_and_first_joint(
-    cell: Cell, tied: tuple[Tied, ...]
+    cell: Cell, tied: tuple[TiedExplanations, ...]
 ) -> None:
     found = extra_sensor(cell.found(tied), tied, {})
     assert found is not None

@@ -16,8 +16,8 @@ import pytest
 from planner import Dataset, Robot, diagnose
 from planner.fit.search import MOST
 from planner.truth.deviation import Deviation
-from planner.truth.handling import EVERYDAY, LABORATORY
 from planner.truth.load import load_truth
+from planner.truth.measurement_errors import EVERYDAY, LABORATORY
 from tests.support import small_cases as cases
 from tests.support.outside import call, told
 from tests.support.small_cases import CONCEALED, SCATTER, SmallCase, small_case
@@ -64,10 +64,10 @@ def places(answer: dict[str, Any]) -> set[tuple[str, str]]:
 
 
 @pytest.mark.parametrize(
-    "handling", [pytest.param(LABORATORY, marks=pytest.mark.slow), EVERYDAY], ids=["exact", "usual"]
+    "errors", [pytest.param(LABORATORY, marks=pytest.mark.slow), EVERYDAY], ids=["exact", "usual"]
 )
-def test_where_nothing_is_concealed_nothing_is_found(tmp_path, handling):
-    answer = diagnosed(small_case(tmp_path, CONCEALED["nothing"], handling))
+def test_where_nothing_is_concealed_nothing_is_found(tmp_path, errors):
+    answer = diagnosed(small_case(tmp_path, CONCEALED["nothing"], errors))
     assert answer["verdict"] == "consistent"
     assert answer["findings"] == []
     assert answer["candidates"][0]["effect"] == "none"

@@ -16,10 +16,10 @@ from planner.robot.robot import Robot
 from planner.truth.arms import ARMS
 from planner.truth.cases import DAMPING_S, PEAK_N
 from planner.truth.deviation import Deviation
+from planner.truth.fault_injection import InjectedFaults, frfs, once
 from planner.truth.hits import Hammer
 from planner.truth.load import load_truth
 from planner.truth.nonlinear import Port
-from planner.truth.secret import Secret, frfs, once
 from tests.diagnosis.test_levels import made
 
 LEVELS = (0.25, 4.0)  # of the middling force; recorded were 0.4, 1 and 2.5
@@ -37,14 +37,17 @@ def test_a_law_is_written_and_predicts_other_poses_and_forces(tmp_path: Path, se
     assert read.robot.config.law == found.found.laws
     assert [one.joint for one in found.found.laws] == ["joint_2"]
     deviation = Deviation(seed, stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)
-    truth, secret = load_truth(robot.path, deviation), Secret(deviation, (Port(law, "joint_2"),))
+    truth, injected = (
+        load_truth(robot.path, deviation),
+        InjectedFaults(deviation, (Port(law, "joint_2"),)),
+    )
     arm = replace(ARMS["kr10"], damping_s=DAMPING_S)
     low, high = np.deg2rad(np.array(arm.joints_deg)).T
     q = np.random.default_rng([seed, 99]).uniform(low, high, (2, 6))
     for level in LEVELS:
         peak = level * PEAK_N["kr10"]
         hammer = Hammer(peak, 0.008, noise=0, force_noise=0, record_s=5.12)
-        hertz, true = frfs(truth, secret, [once(row, peak) for row in q], hammer, arm.band_hz)
+        hertz, true = frfs(truth, injected, [once(row, peak) for row in q], hammer, arm.band_hz)
         linear = read.accelerance(q, hertz)
         at_force = linear + change_at_force(read, q, np.full(2, peak), hertz)
         off = [float(np.linalg.norm(h - true)) for h in (linear, at_force)]

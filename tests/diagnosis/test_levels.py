@@ -15,7 +15,7 @@ from planner.dataset.visits import Visit
 from planner.diagnosis.levels import Levels, level_laws
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
-from planner.effects.table import Repertoire
+from planner.effects.table import EffectLibrary
 from planner.fit.fitted import converged, settled
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
@@ -27,13 +27,13 @@ from planner.robot.robot import Robot
 from planner.truth.arms import ARMS
 from planner.truth.cases import DAMPING_S, PEAK_N
 from planner.truth.deviation import Deviation
-from planner.truth.handling import EVERYDAY
+from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
 from planner.truth.hits import AXES, Hammer
 from planner.truth.laws import Backlash, Friction, Hardening, JointLaw, QuadraticDamping
 from planner.truth.load import load_truth
+from planner.truth.measurement_errors import EVERYDAY
 from planner.truth.nonlinear import Port
 from planner.truth.scene import Scene
-from planner.truth.secret import HitVisit, Secret, hit_poses
 
 Made = tuple[Robot, Dataset, JointLaw | None]
 POSES, LEVELS = 4, (0.4, 1.0, 2.5)
@@ -65,7 +65,7 @@ def made(
     scene = Scene(arm, truth, 1, poses, peak_n)
     bends = LAWS[law](scene.stiffness(joint), scene.angle(joint)) if law else None
     ports = (Port(bends, joint=joint),) if bends else ()
-    secret = Secret(deviation, ports, chain=EVERYDAY.chain(rng))
+    injected = InjectedFaults(deviation, ports, chain=EVERYDAY.chain(rng))
     shots = [(f"+{axis}", peak_n * level) for axis in "xyz" for level in levels]
     axes = [AXES.index(axis[1]) for axis, _ in shots]
     planned = [HitVisit(q, shots, i / count, EVERYDAY.aims(axes, rng)) for i, q in enumerate(poses)]
@@ -76,7 +76,7 @@ def made(
                   for h in hits),
         )
         for i, (q, hits) in enumerate(
-            zip(poses, hit_poses(truth, secret, planned, hammer, rng), strict=True)
+            zip(poses, hit_poses(truth, injected, planned, hammer, rng), strict=True)
         )
     ]  # fmt: skip
     robot = Robot.load(toml)
@@ -85,7 +85,7 @@ def made(
 
 def seen(robot: Robot, recorded: Dataset) -> Levels:
     """What levels tell beside a linear fit of the averages: logarithms first, then the FRFs."""
-    prior = RobotPrior(Repertoire.of(Simulation(robot), CAD_INERTIAS))
+    prior = RobotPrior(EffectLibrary.of(Simulation(robot), CAD_INERTIAS))
     tolerances = Tolerances.of(robot.config, robot.joints.slides)
     search = Search(prior, recorded.ended_frfs, recorded.q, recorded.band_hz, tolerances)
     structure = RobotStructure(prior)

@@ -21,7 +21,7 @@ from planner.truth.cases import DAMPING_S, PEAK_N
 from planner.truth.deviation import Deviation
 from planner.truth.laws import Backlash, Friction, Hardening, JointLaw
 from planner.truth.load import load_truth
-from planner.truth.nonlinear import Port, StruckPose, respond
+from planner.truth.nonlinear import HitPose, Port, respond
 from planner.truth.scene import Scene
 
 JOINT, PEAK, RATE_HZ, RECORD_S = "joint_2", PEAK_N["kr10"], 6400.0, 5.12
@@ -65,7 +65,7 @@ class Bent:
     def measured(self, peak_n: float) -> tuple[np.ndarray, np.ndarray]:
         """Lines (F,) of the band in Hz, and FRFs (1, 3, 3, F) of hits by time integration."""
         force = np.tile(peak_n * pulse(), (3, 1))
-        struck = StruckPose(self.truth, self.q[0], force, np.eye(6)[:3])
+        struck = HitPose(self.truth, self.q[0], force, np.eye(6)[:3])
         (answer,) = respond([struck], [Port(self.law, joint=JOINT)], 1 / RATE_HZ)
         hertz = np.fft.rfftfreq(force.shape[1], 1 / RATE_HZ)
         low, high = self.simulation.robot.config.band_hz

@@ -7,7 +7,7 @@ import pytest
 
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
-from planner.effects.table import Repertoire
+from planner.effects.table import EffectLibrary
 from planner.fit.data import FrfData
 from planner.fit.departures import departures_text, masses_text, refitted_masses
 from planner.fit.fitted import SIZES, StructureFit
@@ -33,7 +33,7 @@ def case(tmp_path_factory) -> Case:
 
 @pytest.fixture(scope="module")
 def prior(case) -> RobotPrior:
-    return RobotPrior(Repertoire.of(Simulation(Robot.load(case.toml)), CAD_INERTIAS))
+    return RobotPrior(EffectLibrary.of(Simulation(Robot.load(case.toml)), CAD_INERTIAS))
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def few(case, prior) -> FrfData:
 
 def structure_of(prior: RobotPrior, *labels: str) -> RobotStructure:
     found = RobotStructure(prior)
-    for effect in prior.repertoire.effects:
+    for effect in prior.library.effects:
         if effect.label in labels:
             found = found.with_effect(effect)
     assert len(found.effects) == len(labels)
@@ -70,7 +70,7 @@ def test_slopes_are_the_derivatives(prior, few):
     rng = np.random.default_rng(0)
     x = structure.mean + 0.1 * structure.sd * rng.standard_normal(structure.size)
     assert misfit.possible(x)
-    about = misfit.about(misfit.nothing_open(), x)
+    about = misfit.about(misfit.zero_nuisances(), x)
     h, columns, _ = misfit.columns(x, about)
     for i, name in enumerate(structure.names[: structure.chain.start]):
         step = 1e-5 * structure.sd[i] * np.eye(structure.size)[i]
@@ -137,8 +137,8 @@ def test_the_same_matter_on_another_link_gives_the_same_frfs(case, prior):
     set_to(one, x, "added_mass", 7, 0.5, -0.4, 0.3)
     before, after = (FrfMisfit(s, few, Tolerances(), 0.1) for s in (one, other))
     base = FrfMisfit(RobotStructure(prior), few, Tolerances(), 0.1)
-    motions, gain = base.first_order(RobotStructure(prior).mean, base.nothing_open())
-    begun = other.effects[0].elsewhere(one.effects[0], x[one.own[0]], motions, gain)
+    motions, gain = base.first_order(RobotStructure(prior).mean, base.zero_nuisances())
+    begun = other.effects[0].moved_to(one.effects[0], x[one.own[0]], motions, gain)
     y[other.own[0]] = begun.psi
     for z, s in (x, one), (y, other):
         joints = [i for i, p in enumerate(s.parameters) if "joint_6" in p.name]
@@ -179,7 +179,7 @@ def test_a_link_that_is_cut_and_whole_again_weighs_as_before(case, prior):
 def test_what_swings_stays_in_the_band(prior, few):
     structure = structure_of(prior, "local_resonator at link_4")
     misfit, x = FrfMisfit(structure, few, Tolerances(), 0.1), structure.mean.copy()
-    low, high = prior.repertoire.simulation.robot.config.band_hz
+    low, high = prior.library.simulation.robot.config.band_hz
     for hertz in (1.05 * low, high / 1.05):
         set_to(structure, x, "local_resonator", 1, np.log(hertz))
         set_to(structure, x, "local_resonator", 3, 1.0, 0.0, 0.0)
@@ -209,7 +209,7 @@ def test_a_soft_base_a_bending_link_and_a_hose_are_found_together(case):
 
 
 def test_what_was_found_is_recalled_as_it_was(case, prior):
-    tolerances = Tolerances.of(prior.repertoire.simulation.robot.config)
+    tolerances = Tolerances.of(prior.library.simulation.robot.config)
     search = Search(prior, case.frfs[:1], case.q[:1], case.band_hz, tolerances)
     found = search.found()
     again = search.recalled(found.remembered)
@@ -220,7 +220,7 @@ def test_what_was_found_is_recalled_as_it_was(case, prior):
 
 def test_what_may_give_beside_is_only_what_such_a_robot_can_have(case, prior):
     """A link from which mass was taken can weigh what it does, and its cut halves cannot."""
-    tolerances = Tolerances.of(prior.repertoire.simulation.robot.config)
+    tolerances = Tolerances.of(prior.library.simulation.robot.config)
     search = Search(prior, case.frfs[:1], case.q[:1], case.band_hz, tolerances)
     structure = structure_of(prior, "added_mass at link_2")
     misfit = FrfMisfit(structure, search.data(8), tolerances)

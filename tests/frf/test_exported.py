@@ -69,7 +69,7 @@ def test_lines_as_headers_round_them_are_the_same():
         (record("a.uff"), record("b.uff", LINES * (1 + 1e-5))), "receptance", InputError
     )
     assert lines == pytest.approx(LINES[1:])
-    assert [(one.felt, one.hit) for one in frfs[1:3]] == [
+    assert [(one.response, one.hit) for one in frfs[1:3]] == [
         (("1", 0), ("1", 1)), (("1", 1), ("1", 0)),
     ]  # fmt: skip
     assert frfs[2].values == pytest.approx(1 / (2 * np.pi * lines) ** 2)
@@ -78,4 +78,4 @@ def test_lines_as_headers_round_them_are_the_same():
 def test_what_other_nodes_and_rotations_have_is_left_out_where_nodes_are_named():
     others = record("a.uff", response_node=("1", "7", "1", "5"), response_direction=(1, 1, 5, 2))
     _, frfs = labelled_frfs((others,), "receptance", InputError, frozenset(("1", "5")))
-    assert [one.felt for one in frfs] == [("1", 0), ("5", 1)]
+    assert [one.response for one in frfs] == [("1", 0), ("5", 1)]

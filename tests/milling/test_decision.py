@@ -6,8 +6,8 @@ import pytest
 from planner.campaign.config import load_campaign_config
 from planner.campaign.decision import Decision
 from planner.errors import InputError
-from planner.milling.lobes import losses
-from planner.milling.path import along, by_feed, decide
+from planner.milling.lobes import stability_limits
+from planner.milling.path import decide, limits_along, limits_by_feed
 from planner.milling.structure import Structure
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way
 
@@ -20,7 +20,7 @@ def uncertain(sd: float) -> Structure:
 
 
 def limit() -> float:
-    return losses(machine(one_mode(), cut(spindle_rpm=(RPM, RPM, 1))))[0].depth_m
+    return stability_limits(machine(one_mode(), cut(spindle_rpm=(RPM, RPM, 1))))[0].depth_m
 
 
 def test_at_the_limit_it_is_even_and_surer_the_farther():
@@ -57,9 +57,9 @@ def test_path_takes_the_tightest_pose_and_the_speed_that_suits_all():
     given = cut(spindle_rpm=(10000.0, 16000.0, 3), depth_m=(0.0, 0.01, 10))
     stiff = Structure(one_mode(), np.zeros(4))
     soft = Structure(one_mode((0.6, 0.8)), np.zeros(4))
-    both = along([("a", stiff), ("b", soft)], given, 20)
+    both = limits_along([("a", stiff), ("b", soft)], given, 20)
     alone = [
-        [loss.depth_m for loss in losses(machine(structure.modes, given))]
+        [loss.depth_m for loss in stability_limits(machine(structure.modes, given))]
         for structure in (stiff, soft)
     ]
     least = np.nanmin(np.nan_to_num(alone, nan=np.inf), axis=0)
@@ -71,11 +71,11 @@ def test_feed_turned_into_a_mode_is_the_cut_turned():
     """A mode along x under a feed turned by 90° is one along −y under a feed along x."""
     given = cut(milling="down", radial_immersion=0.3, depth_m=(0.0, 0.02, 10))
     structure = Structure(one_mode(), np.zeros(4))
-    turned = by_feed([("a", structure)], given, RPM)
+    turned = limits_by_feed([("a", structure)], given, RPM)
     across = cut(
         milling="down", radial_immersion=0.3, depth_m=(0.0, 0.02, 10), spindle_rpm=(RPM, RPM, 1)
     )
-    wanted = losses(machine(one_mode((0.0, -1.0)), across))[0].depth_m
+    wanted = stability_limits(machine(one_mode((0.0, -1.0)), across))[0].depth_m
     assert turned[6] == pytest.approx(np.inf if np.isnan(wanted) else wanted, rel=1e-6)
     assert turned[12] == pytest.approx(turned[0], rel=1e-6)
 

@@ -22,11 +22,11 @@ from planner.milling.coupling import TipReceptance, couple
 from planner.milling.tool import load_tool
 from planner.truth.arms import KR210
 from planner.truth.deviation import Deviation, Spring
-from planner.truth.handling import Handling
+from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
 from planner.truth.hits import Hammer, write_recordings
 from planner.truth.load import load_truth
+from planner.truth.measurement_errors import MeasurementErrors
 from planner.truth.model import Truth
-from planner.truth.secret import HitVisit, Secret, hit_poses
 from tests.support.milling_cases import cut
 from tests.support.true_limits import LimitPair, limit_pair
 
@@ -60,7 +60,7 @@ TARGET = MATERIAL + SEGMENT.format(0.10, 0.063) + CONTACT + SEGMENT.format(0.08,
 
 
 STATED = Tolerances()
-AS_STATED = Handling(
+AS_STATED = MeasurementErrors(
     angle_deg=float(np.rad2deg(STATED.angle_rad)),
     offset_m=STATED.offset_m,
     readback_deg=float(np.rad2deg(STATED.joint_rad)),
@@ -86,13 +86,13 @@ def concealed(folder: Path, seed: int) -> tuple[Path, Deviation]:
 def hit(truth: Truth, deviation: Deviation, q: np.ndarray, folder: Path, seed: int) -> None:
     """Recordings of REPEATS hits an axis at poses P0, P1, … (n, 6)."""
     rng, axes = np.random.default_rng(seed), [axis for axis in range(3) for _ in range(REPEATS)]
-    secret = Secret(deviation, chain=AS_STATED.chain(rng))
+    injected = InjectedFaults(deviation, chain=AS_STATED.chain(rng))
     shots = [(f"+{'xyz'[axis]}", HAMMER.peak_n) for axis in axes]
     visits = []
     for one in q:
         there = one + np.deg2rad(AS_STATED.readback_deg) * rng.standard_normal(len(one))
         visits.append(HitVisit(there, shots, aims=AS_STATED.aims(axes, rng)))
-    found = hit_poses(truth, secret, visits, HAMMER, rng)
+    found = hit_poses(truth, injected, visits, HAMMER, rng)
     rows = [
         (f"P{i}", np.rad2deg(q[i]), 1 + number % REPEATS, one)
         for i, hits in enumerate(found) for number, one in enumerate(hits)

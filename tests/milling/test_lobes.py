@@ -17,7 +17,7 @@ import pytest
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
-from planner.milling.lobes import losses
+from planner.milling.lobes import stability_limits
 from planner.milling.machine import Machine, limits, multiplier
 from planner.milling.semi_discretisation import semi_growth
 from tests.support.milling_cases import (
@@ -47,7 +47,7 @@ def test_first_loss_and_kind_of_one_mode(milling: tuple[str, float]):
     wanted, flips = ONE_MODE[milling]
     for speed, depth, flip in zip(SPEEDS, wanted, flips, strict=True):
         given = cut(milling=milling[0], radial_immersion=milling[1], spindle_rpm=(speed, speed, 1))
-        (loss,) = losses(machine(one_mode(), given))
+        (loss,) = stability_limits(machine(one_mode(), given))
         assert 1e3 * loss.depth_m == pytest.approx(depth, rel=CONVERGED)
         assert loss.kind == ("flip" if flip else "hopf")
 
@@ -55,7 +55,7 @@ def test_first_loss_and_kind_of_one_mode(milling: tuple[str, float]):
 def test_first_loss_of_two_equal_modes():
     for speed, depth in zip(SPEEDS, TWO_EQUAL, strict=True):
         given = cut(spindle_rpm=(speed, speed, 1))
-        (loss,) = losses(machine(two_equal(), given))
+        (loss,) = stability_limits(machine(two_equal(), given))
         assert 1e3 * loss.depth_m == pytest.approx(depth, rel=CONVERGED)
     assert 1e3 * machine(two_equal(), cut()).floor().floor_m == pytest.approx(0.0479, rel=ZEROTH)
 
@@ -209,10 +209,10 @@ def test_semi_discretisation_agrees(helix_deg: float):
         "depth_m": (0.0, 0.02, 10), "spindle_rpm": (20000.0, 20000.0, 1),
     }  # fmt: skip
     structure = machine(two_each_way(), cut(**given))
-    (loss,) = losses(structure)
+    (loss,) = stability_limits(structure)
     for share, unstable in ((0.997, False), (1.003, True)):
         assert (semi_growth(structure, 20000.0, share * loss.depth_m) > 1) == unstable
-    (other,) = losses(machine(two_each_way(), cut(**given, method="semi_discretisation")))
+    (other,) = stability_limits(machine(two_each_way(), cut(**given, method="semi_discretisation")))
     assert other.depth_m == pytest.approx(loss.depth_m, rel=2e-3)
     assert other.kind == loss.kind
     assert other.chatter_hz == pytest.approx(loss.chatter_hz, rel=1e-3)
@@ -221,7 +221,7 @@ def test_semi_discretisation_agrees(helix_deg: float):
 def test_semi_discretisation_takes_teeth_at_equal_angles_only():
     given = cut(method="semi_discretisation", pitch_deg=[170.0, 190.0], teeth=2)
     with pytest.raises(InputError, match="equal angles only; choose the method full_discr"):
-        losses(machine(two_each_way(), given))
+        stability_limits(machine(two_each_way(), given))
 
 
 def test_pitches_that_hardly_differ_change_nothing_and_others_do():
@@ -230,7 +230,7 @@ def test_pitches_that_hardly_differ_change_nothing_and_others_do():
             teeth=3, milling="up", radial_immersion=0.3, pitch_deg=pitch_deg,
             depth_m=(0.0, 0.02, 10), spindle_rpm=(20000.0, 20000.0, 1),
         )  # fmt: skip
-        return losses(machine(two_each_way(), given))[0].depth_m
+        return stability_limits(machine(two_each_way(), given))[0].depth_m
 
     even = depth(None)
     assert depth([120.00001, 119.99999, 120.0]) == pytest.approx(even, rel=1e-5)
@@ -249,8 +249,8 @@ def test_the_cut_turned_with_its_frame_stays_as_it_is():
     given = {"milling": "down", "radial_immersion": 0.5, "spindle_rpm": (9000.0, 9000.0, 1)}
     turned = cut(**given, feed=tuple(turn[:, 0]), axis=tuple(turn[:, 2]))
     found = Machine(whole.in_plane(turned.plane), turned)
-    straight = losses(machine(modes, cut(**given)))[0]
-    assert losses(found)[0].depth_m == pytest.approx(straight.depth_m, rel=1e-6)
+    straight = stability_limits(machine(modes, cut(**given)))[0]
+    assert stability_limits(found)[0].depth_m == pytest.approx(straight.depth_m, rel=1e-6)
 
 
 def test_no_depth_is_as_stable_as_the_structure():

@@ -10,12 +10,12 @@ from planner.errors import InputError
 from planner.frf.quantities import convert
 from planner.milling.cutter_frf import CutterFrf, of_accelerance
 from planner.milling.cutter_modes import CutterFit, CutterModes, real_modes
-from planner.milling.lobes import losses, sampled_limits
+from planner.milling.lobes import sampled_limits, stability_limits
 from planner.milling.semi_discretisation import semi_growth
 from planner.milling.structure import (
     Structure,
-    doubts,
     explaining,
+    limit_remarks,
     moved,
     of_frf,
     sampled,
@@ -48,8 +48,8 @@ def test_frfs_give_the_limits_of_their_modes(method: str):
         milling="down", radial_immersion=0.5, spindle_rpm=(5000.0, 15000.0, 5), method=method,
         depth_m=(0.0, 0.05, 10),
     )  # fmt: skip
-    found = losses(of_frf(tip(crossed()), given).machine(given))
-    wanted = losses(machine(crossed(), given))
+    found = stability_limits(of_frf(tip(crossed()), given).machine(given))
+    wanted = stability_limits(machine(crossed(), given))
     np.testing.assert_allclose(
         [loss.depth_m for loss in found], [loss.depth_m for loss in wanted], rtol=2e-3
     )
@@ -59,9 +59,10 @@ def test_methods_agree_on_cross_frfs_and_residual_compliance():
     given = {"milling": "down", "radial_immersion": 0.5, "spindle_rpm": (12000.0, 15000.0, 2)}
     soft = crossed()
     soft = CutterModes(soft.poles, soft.shapes, soft.drives, 20 * soft.residual)
-    full = losses(machine(soft, cut(**given)))
-    without = losses(machine(CutterModes(soft.poles, soft.shapes, soft.drives, 0 * soft.residual),
-                             cut(**given)))  # fmt: skip
+    full = stability_limits(machine(soft, cut(**given)))
+    without = stability_limits(
+        machine(CutterModes(soft.poles, soft.shapes, soft.drives, 0 * soft.residual), cut(**given))
+    )
     for rpm, a, c in zip(cut(**given).speeds_rpm, full, without, strict=True):
         for share, unstable in ((0.997, False), (1.003, True)):
             found = semi_growth(machine(soft, cut(**given)), rpm, share * a.depth_m)
@@ -90,7 +91,7 @@ def test_cross_frfs_that_lack_are_taken_as_the_others_or_nothing_and_named(lacki
     found = of_frf(part, given)
     assert [f"lacks the FRF {'xy'[i]}{'xy'[j]}: it is taken as {taken}." in " ".join(found.remarks)
             for i, j in lacking] == [True] * len(lacking)  # fmt: skip
-    depth = [[loss.depth_m for loss in losses(s.machine(given))]
+    depth = [[loss.depth_m for loss in stability_limits(s.machine(given))]
              for s in (found, of_frf(full, given))]  # fmt: skip
     np.testing.assert_allclose(*depth, rtol=1e-6)
 
@@ -106,7 +107,7 @@ def test_limits_are_not_lost_between_lines(method: str, step_hz: float):
     given = cut(milling="down", radial_immersion=0.5, kt_n_m2=7e8, method=method,
                 spindle_rpm=(1200.0, 2400.0, 4), depth_m=(0.0, 0.2, 100))  # fmt: skip
     found = of_frf(tip(modes, step_hz * np.arange(1, 121)), given)
-    depth = [[loss.depth_m for loss in losses(m)] for m in
+    depth = [[loss.depth_m for loss in stability_limits(m)] for m in
              (found.machine(given), machine(modes, given))]  # fmt: skip
     assert np.all(np.isfinite(depth[1]))
     np.testing.assert_allclose(*depth, rtol=1e-4)
@@ -118,7 +119,7 @@ def test_two_modes_that_are_alike_stay_two():
                        np.array([[1.0, 0.0], [np.cos(0.15), np.sin(0.15)]]))  # fmt: skip
     given = cut(spindle_rpm=(2000.0, 8000.0, 4), depth_m=(0.0, 0.5, 100), method="zeroth_order")
     found = of_frf(tip(modes, 1.81 * np.arange(1, 80)), given)
-    depth = [[loss.depth_m for loss in losses(m)] for m in
+    depth = [[loss.depth_m for loss in stability_limits(m)] for m in
              (found.machine(given), machine(modes, given))]  # fmt: skip
     np.testing.assert_allclose(*depth, rtol=1e-3)
 
@@ -137,7 +138,7 @@ def test_lines_in_the_noise_govern_nothing(step_hz: float):
     """0.1 % noise, lines from the first on: divided by ω² these were pure noise."""
     given, modes = cut(spindle_rpm=(5000.0, 20000.0, 8)), two_each_way()
     found = of_frf(noisy(modes, step_hz * np.arange(1, int(2200 / step_hz)), 1e-3, 3), given)
-    depth = [[loss.depth_m for loss in losses(m)] for m in
+    depth = [[loss.depth_m for loss in stability_limits(m)] for m in
              (found.machine(given), machine(modes, given))]  # fmt: skip
     np.testing.assert_allclose(*depth, rtol=0.03)
 
@@ -146,11 +147,13 @@ def test_noise_is_sampled_as_wide_as_it_scatters():
     """Limits by other noises lie within the samples of one as often as these say."""
     given = cut(spindle_rpm=(9000.0, 12000.0, 3), method="zeroth_order")
     lines, modes = np.arange(2.0, 2200.0, 2.0), two_each_way()
-    true = np.array([loss.depth_m for loss in losses(machine(modes, given))])
+    true = np.array([loss.depth_m for loss in stability_limits(machine(modes, given))])
     inside = []
     for seed in range(8):
         found = of_frf(noisy(modes, lines, 0.003, 10 + seed), given)
-        drawn = sampled_limits(found.samples(given, 40), losses(found.machine(given))).depth_m
+        drawn = sampled_limits(
+            found.samples(given, 40), stability_limits(found.machine(given))
+        ).depth_m
         low, high = np.quantile(drawn, (0.05, 0.95), axis=0)
         inside.append((low <= true) & (true <= high))
     assert np.mean(inside) > 0.7
@@ -166,8 +169,8 @@ def test_what_lines_and_noise_leave_open_is_said():
     said = {}
     for share in (0.0, 0.01):
         found = of_frf(noisy(modes, np.arange(2.0, 1300.0, 2.0), share, 5), given)
-        depth = np.array([loss.depth_m for loss in losses(found.machine(given))])
-        said[share] = doubts(found, given, depth, depth > 0)
+        depth = np.array([loss.depth_m for loss in stability_limits(found.machine(given))])
+        said[share] = limit_remarks(found, given, depth, depth > 0)
     assert said[0.0] == []
     (text,) = said[0.01]
     hidden = re.search(r"Below (\S+) Hz .* would hide a mode", text)
@@ -217,7 +220,7 @@ def test_robust_depth_is_that_of_the_coefficients_alone():
     given = cut(spindle_rpm=(9000.0, 12000.0, 3), kt_sd_percent=10.0)
     structure = Structure(one_mode(), np.array([0.0, 0.0, 0.0, 0.1]))
     exact = cut(spindle_rpm=(9000.0, 12000.0, 3))
-    found = losses(structure.machine(exact))
+    found = stability_limits(structure.machine(exact))
     drawn = sampled_limits(structure.samples(exact, 60), found)
     depth = np.array([loss.depth_m for loss in found])
     np.testing.assert_allclose(drawn.robust(), depth * np.exp(-1.645 * 0.1), rtol=0.03)

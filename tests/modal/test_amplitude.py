@@ -76,7 +76,7 @@ def aimed(seed: int, repeats: int):
 def test_hits_that_tilt_are_homogeneous(seed):
     found = judged(aimed(seed, 2))
     assert found is not None
-    assert found.told
+    assert found.significant
     assert found.homogeneous
     assert found.p_value > 1e-3
 
@@ -84,7 +84,7 @@ def test_hits_that_tilt_are_homogeneous(seed):
 def test_without_repeats_it_is_said_what_would_tell():
     found = judged(aimed(3, 1))
     assert found is not None
-    assert not found.told
+    assert not found.significant
     assert found.homogeneous
     assert found.difference > 0.03
     assert "hit twice at each level" in found.remark

@@ -5,7 +5,7 @@ import pytest
 
 from planner.modal.motion_fields import expected
 from planner.recording.geometry import Geometry
-from tests.support.struck_structures import dof_of, unit_mass_shapes
+from tests.support.hit_structures import dof_of, unit_mass_shapes
 from tests.support.structures import plate
 
 

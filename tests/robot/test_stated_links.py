@@ -11,7 +11,7 @@ from planner.effects.parameters import CAD_INERTIAS, INERTIAL, Priors, parametri
 from planner.errors import InputError
 from planner.fit.result import Identification
 from planner.fit.write_robot import write_robot
-from planner.robot.guesses import hull_solid
+from planner.robot.default_properties import hull_solid
 from planner.robot.link_bodies import guessed_masses, link_bodies
 from planner.robot.robot import Robot
 from tests.support.published import BOXES, DENSITY, published, robot_toml

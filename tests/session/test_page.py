@@ -13,7 +13,7 @@ from planner.campaign.events import HitRecord, Proposal
 from planner.recording.joints import JointUnits
 from planner.session.hit_verdicts import HitVerdict
 from planner.session.pose_screen import PosePage, keys_that_do, page_with_hits, remedy_first
-from planner.session.screen import Said, Screen, fitted
+from planner.session.screen import Screen, ScreenText, fitted
 from planner.session.session_text import refusals
 from planner.words import short_name
 
@@ -120,11 +120,11 @@ def test_with_room_all_is_said(page):
 
 def test_the_longest_forms_that_fit_are_taken():
     long, short = Text("word " * 40), Text("word")
-    parts = [Said([short, long], rank) for rank in (2, 1)]
+    parts = [ScreenText([short, long], rank) for rank in (2, 1)]
     assert fitted(parts, 80, 100) == [long, long]
     assert fitted(parts, 80, 4) == [short, long]
     assert fitted(parts, 80, 1) == [short, short]
-    assert fitted([Said([None, short]), Said([short])], 80, 1) == [short]
+    assert fitted([ScreenText([None, short]), ScreenText([short])], 80, 1) == [short]
 
 
 def test_a_result_higher_than_the_screen_stands_once_above_the_next_page():

@@ -15,9 +15,9 @@ from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from planner.replay import replay
-from planner.report.rerun.story import Story
+from planner.report.rerun.event_logger import EventLogger
 from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
-from planner.session.station import RerunQueue
+from planner.session.session_state import RerunQueue
 from planner.truth.hits import simulate_hit, write_uff
 from tests.support.hit_csv import write_csv
 from tests.support.outside import FROZEN, HAMMER, record
@@ -231,7 +231,7 @@ def test_pictures_wait_for_the_next_page_and_are_made_at_the_end_where_interrupt
         if interrupted and len(told) == 1:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(Story, "tell", tell)
+    monkeypatch.setattr(EventLogger, "log", tell)
     session(campaign, inbox, until=lambda text: len(told) == 2)
     assert told[interrupted:] == [("Imported", 1, True, True), ("Proposed", 1, True, False)]
 
@@ -275,15 +275,15 @@ def test_a_diagnosis_that_was_asked_for_meanwhile_follows_and_says_only_what_is_
     process, runs = beside
     found = SimpleNamespace(verdict="unexplained", findings=[SimpleNamespace(text="At 20 Hz.")])
     runs(lambda directory: found)
-    assert process.told() is None
+    assert process.answer() is None
     process.ask()
     process.ask()
-    assert (process.told(wait=True) or "").endswith("At 20 Hz.")
+    assert (process.answer(wait=True) or "").endswith("At 20 Hz.")
     process.ask()
-    assert process.told(wait=True) is None  # nothing new
+    assert process.answer(wait=True) is None  # nothing new
     process.ask()
     process.close()
-    assert process.told() is None
+    assert process.answer() is None
 
 
 def test_a_diagnosis_goes_at_low_priority_and_ends_with_the_session(beside, tmp_path):
@@ -304,7 +304,7 @@ def test_a_diagnosis_goes_at_low_priority_and_ends_with_the_session(beside, tmp_
         time.sleep(0.05)
     number, priority = map(int, note.read_text().split())
     assert priority > os.getpriority(os.PRIO_PROCESS, 0)
-    assert process.told() is None  # nobody waits for it
+    assert process.answer() is None  # nobody waits for it
     process.close()
     with pytest.raises(ProcessLookupError):
         os.kill(number, 0)
@@ -319,5 +319,5 @@ def test_a_diagnosis_that_fails_is_said_and_the_next_one_runs(beside):
     ):
         runs(fault)
         process.ask()
-        told = process.told(wait=True)
+        told = process.answer(wait=True)
         assert told is None if said is None else said in (told or "")

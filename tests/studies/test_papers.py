@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.progress import quietly
+from planner.progress import no_progress
 from planner.studies import registry
-from planner.studies.conduct import conduct, conduct_all
 from planner.studies.report import StudyAnswer
+from planner.studies.run import run_all, run_study
 
 QUICK = "seyedhosseini2025"  # the others take long even if small, and go the same way
 # Claims that must hold, be it in kind: of the small version too; in full.
@@ -45,7 +45,7 @@ def assert_holds(answer: StudyAnswer, parts: tuple[str, ...]) -> None:
     "name", [pytest.param(n, marks=() if n == QUICK else pytest.mark.slow) for n in registry.NAMES]
 )
 def test_a_small_study_runs_from_hits_to_claims(name, tmp_path):
-    answer = conduct(name, tmp_path, True, quietly)
+    answer = run_study(name, tmp_path, True, no_progress)
     assert answer.small
     assert answer.data.startswith("SIMULATED")
     page = (tmp_path / f"{name}.html").read_text()
@@ -65,7 +65,7 @@ def test_a_small_study_runs_from_hits_to_claims(name, tmp_path):
 def answers(tmp_path_factory):
     """All studies' answers by name, printed; STUDY_SMALL: of the versions cut down."""
     folder = Path(os.environ.get("STUDY_FOLDER") or tmp_path_factory.mktemp("studies"))
-    told = conduct_all(folder, bool(os.environ.get("STUDY_SMALL")), quietly)
+    told = run_all(folder, bool(os.environ.get("STUDY_SMALL")), no_progress)
     for answer in told.studies:
         for table in (*answer.tables, answer.claims):
             print(f"\n{table.title}\n" + " | ".join(table.columns))

@@ -11,9 +11,9 @@ import pytest
 
 from planner.effects.parameters import parametrise
 from planner.errors import InputError
-from planner.progress import quietly
+from planner.progress import no_progress
 from planner.studies import registry
-from planner.studies.conduct import conduct
+from planner.studies.run import run_study
 from planner.truth.arms import KR210
 from planner.truth.load import load_truth
 from tests.support.studied import part
@@ -133,9 +133,9 @@ def test_bad_input_is_one_sentence(tmp_path, monkeypatch):
     file = tmp_path / "file"
     file.write_text("")
     with pytest.raises(InputError, match="name another folder"):
-        conduct("birk2025", file, True, quietly)
+        run_study("birk2025", file, True, no_progress)
     with pytest.raises(InputError, match="name another folder"):
-        conduct("birk2025", file / "below", True, quietly)
+        run_study("birk2025", file / "below", True, no_progress)
     monkeypatch.setattr(registry, "NEEDED", "no_such_module")
     with pytest.raises(InputError, match=r"pip install 'planner\[truth\]'"):
         registry.named("birk2025")

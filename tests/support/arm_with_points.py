@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.truth.handling import LABORATORY, Handling
+from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
 from planner.truth.hits import Hammer, write_recordings
 from planner.truth.load import load_truth
+from planner.truth.measurement_errors import LABORATORY, MeasurementErrors
 from planner.truth.model import Truth
-from planner.truth.secret import HitVisit, Secret, hit_poses
 
 NODES = {"foot": 11, "shoulder": 12, "elbow": 13, "sensor": 16}
 POINTS = (
@@ -77,8 +77,8 @@ def record(
     folder: Path,
     robot_toml: Path,
     stays: Sequence[tuple[str, np.ndarray, str, tuple[str, ...]]],
-    secret: Secret,
-    handling: Handling = LABORATORY,
+    injected: InjectedFaults,
+    errors: MeasurementErrors = LABORATORY,
     seed: int = 0,
     dead: dict[str, int] | None = None,
 ) -> Truth:
@@ -86,14 +86,14 @@ def record(
 
     `dead` names channels that recorded nothing, by pose.
     """
-    rng, truth = np.random.default_rng(seed), load_truth(robot_toml, secret.deviation)
+    rng, truth = np.random.default_rng(seed), load_truth(robot_toml, injected.deviation)
     hammer = Hammer(peak_n=250.0, noise=0.004)
     shots = [(f"+{axis}", 250.0) for axis in "xyz"]
     visits = [
-        HitVisit(q, shots, 0.0, handling.aims([0, 1, 2], rng), point, sensors)
+        HitVisit(q, shots, 0.0, errors.aims([0, 1, 2], rng), point, sensors)
         for _, q, point, sensors in stays
     ]
-    found = hit_poses(truth, secret, visits, hammer, rng)
+    found = hit_poses(truth, injected, visits, hammer, rng)
     for (name, *_), hits in zip(stays, found, strict=True):
         for hit in hits if dead and name in dead else ():
             hit.acceleration_m_s2[dead[name]] = 0.0

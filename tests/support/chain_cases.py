@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from planner.campaign.cell import Cell as CampaignCell
 from planner.campaign.chain_faults import ChainFault
-from planner.campaign.chain_question import LOG_ODDS, Draws, Sums, likeliest
+from planner.campaign.chain_mismatch import LOG_ODDS, HitSums, SpringDraws, most_probable
 from planner.campaign.config import load_campaign_config
-from planner.campaign.deliveries import sort_paths
+from planner.campaign.imported_files import sort_paths
 from planner.dataset.measure import MeasuredPose
 from tests.support.everyday_campaigns import Cell
-from tests.support.lacking_robots import KINDS, ROBOTS, lacking
+from tests.support.faulty_robots import KINDS, ROBOTS, lacking
 
 FACTORS = {
     "× 1000": 1e3,
@@ -37,7 +37,7 @@ class Struck:
 
     robot: str
     kind: str
-    sums: tuple[Sums, ...]
+    sums: tuple[HitSums, ...]
 
 
 def struck(folder: Path, seed: int, poses: int) -> Struck:
@@ -45,8 +45,8 @@ def struck(folder: Path, seed: int, poses: int) -> Struck:
     name, kind = [*ROBOTS][seed % len(ROBOTS)], KINDS[(seed + seed // len(ROBOTS)) % len(KINDS)]
     rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
     robot = ROBOTS[name](folder, rng)
-    secret, _ = lacking(kind, robot, rng)
-    true = Cell.of(robot, secret, rng)
+    injected, _ = lacking(kind, robot, rng)
+    true = Cell.of(robot, injected, rng)
     config = folder / "campaign.toml"
     config.write_text(
         f"[workspace]\n{robot.workspace}\n[modes]\ncount = 3\nband_hz = {list(robot.band_hz)}\n"
@@ -54,7 +54,7 @@ def struck(folder: Path, seed: int, poses: int) -> Struck:
     )
     cell = CampaignCell.load(robot.toml, load_campaign_config(config))
     assert cell.simulation is not None
-    draws, joints = Draws(cell.simulation, cell.tolerances), cell.robot.joints
+    draws, joints = SpringDraws(cell.simulation, cell.tolerances), cell.robot.joints
     found = []
     for number, q in enumerate(rng.permutation(cell.candidates.q)[:poses]):
         stated = tuple(np.round(joints.shown(q), 4).tolist())
@@ -68,7 +68,7 @@ def struck(folder: Path, seed: int, poses: int) -> Struck:
     return Struck(name, kind, tuple(found))
 
 
-def shown_by(sums: Sums, matrix: np.ndarray) -> Sums:
+def shown_by(sums: HitSums, matrix: np.ndarray) -> HitSums:
     """What a chain shows that is wrong by A (3, 3)."""
     noise = np.sqrt(matrix**2 @ sums.noise**2)
     return replace(sums, measured=matrix @ sums.measured, noise=noise)
@@ -89,9 +89,9 @@ def fault(name: str, rng: np.random.Generator) -> np.ndarray:
     return -one if name == "force's sign" else one - 2 * np.outer(one[axis], one[axis])
 
 
-def judged(sums: Sums) -> ChainFault | None:
+def judged(sums: HitSums) -> ChainFault | None:
     """What is asked about; None: nothing."""
-    found, gain = likeliest(sums)
+    found, gain = most_probable(sums)
     return found if gain >= LOG_ODDS else None
 
 

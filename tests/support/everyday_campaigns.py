@@ -18,13 +18,13 @@ import numpy as np
 from planner.campaign.campaign import Campaign
 from planner.campaign.model import Model
 from planner.dataset.store import Store
-from planner.truth.handling import EVERYDAY, Aim
+from planner.truth.fault_injection import HitVisit, InjectedFaults, quiet_hits
 from planner.truth.hits import AXES, Hammer, noisy, write_recordings
 from planner.truth.load import load_truth
+from planner.truth.measurement_errors import EVERYDAY, HitError
 from planner.truth.model import Truth
-from planner.truth.secret import HitVisit, Secret, quiet_hits
 from tests.support.counted_modes import NOT_COUNTED, counted, own_of_hose, true_modes
-from tests.support.lacking_robots import KINDS, MOST_MODES, ROBOTS, Robot, lacking
+from tests.support.faulty_robots import KINDS, MOST_MODES, ROBOTS, Robot, lacking
 
 POSES, UNSEEN, REPEATS, CANDIDATES = 5, 24, 2, 60
 MOST = 12  # modes that are looked at when they are counted
@@ -36,27 +36,27 @@ class Cell:
 
     robot: Robot
     truth: Truth
-    secret: Secret
+    injected: InjectedFaults
     hammer: Hammer
-    habits: list[Aim]
+    habits: list[HitError]
     rng: np.random.Generator
 
     @classmethod
     def of(
         cls,
         robot: Robot,
-        secret: Secret,
+        injected: InjectedFaults,
         rng: np.random.Generator,
     ) -> "Cell":
-        truth = load_truth(robot.toml, secret.deviation)
+        truth = load_truth(robot.toml, injected.deviation)
         hammer = replace(robot.hammer, noise=float(rng.uniform(0.005, 0.03)), oversampling=8)
-        secret = replace(secret, chain=EVERYDAY.chain(rng))
+        injected = replace(injected, chain=EVERYDAY.chain(rng))
         middle = np.mean([truth.lower_rad, truth.upper_rad], axis=0)
         [quiet] = quiet_hits(
-            truth, secret, [HitVisit(middle, [("+x", hammer.peak_n)])], hammer, rng
+            truth, injected, [HitVisit(middle, [("+x", hammer.peak_n)])], hammer, rng
         )
         hammer = EVERYDAY.floor(hammer, quiet, rng)
-        return cls(robot, truth, secret, hammer, EVERYDAY.common(rng), rng)
+        return cls(robot, truth, injected, hammer, EVERYDAY.common(rng), rng)
 
     def record(self, folder: Path, pose: str, joints_deg: tuple[float, ...]) -> Path:
         """Hits at a pose where the robot was sent; the robot stands a little beside."""
@@ -67,7 +67,7 @@ class Cell:
         there = np.deg2rad(joints_deg) + off
         shots = [(f"+{AXES[axis]}", self.hammer.peak_n) for axis in axes]
         [quiet] = quiet_hits(
-            self.truth, self.secret, [HitVisit(there, shots, aims=aims)], self.hammer, rng
+            self.truth, self.injected, [HitVisit(there, shots, aims=aims)], self.hammer, rng
         )
         rows = [
             (pose, np.array(joints_deg), 1 + number % REPEATS, noisy(hit, self.hammer, rng))
@@ -103,7 +103,7 @@ class Score:
         known = [true_modes(truth, one, most, hose) for one in q]
         true = np.array([counted(*k, f) for k, f in zip(known, found, strict=True)])
         off = found / true - 1
-        learned = model.low.learned or model.low.suspect
+        learned = model.low.identified_robot or model.low.rejected
         inside, visit = (float(np.mean(np.abs(found - true) <= 1.96 * s)) for s in (sd, visit_sd))
         return cls(
             100 * float(np.sqrt(np.mean(off**2))),
@@ -139,8 +139,8 @@ def play(name: str, kind: str, seed: int, folder: Path) -> Played:
     folder.mkdir(parents=True)
     rng = np.random.default_rng([seed, zlib.crc32(f"{name} {kind}".encode())])
     robot = ROBOTS[name](folder, rng)
-    secret, size = lacking(kind, robot, rng)
-    cell = Cell.of(robot, secret, rng)
+    injected, size = lacking(kind, robot, rng)
+    cell = Cell.of(robot, injected, rng)
     kept = Store(folder / "models")
 
     def begun(use: str, modes: int) -> Campaign:

@@ -11,7 +11,7 @@ import numpy as np
 from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
-from planner.effects.table import Repertoire
+from planner.effects.table import EffectLibrary
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
@@ -21,15 +21,15 @@ from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.cases import SCATTER
 from planner.truth.deviation import AttachedMass, Spring
-from planner.truth.handling import EVERYDAY, Handling
+from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
 from planner.truth.hits import AXES
 from planner.truth.load import load_truth
+from planner.truth.measurement_errors import EVERYDAY, MeasurementErrors
 from planner.truth.model import Truth
 from planner.truth.scene import deviate, log_uniform, some_direction, triple
-from planner.truth.secret import HitVisit, Secret, hit_poses
 from tests.support.counted_modes import true_modes
-from tests.support.lacking_robots import ROBOTS, added, known, links_moved, mass_that_moves
-from tests.support.lacking_robots import Robot as Arm
+from tests.support.faulty_robots import ROBOTS, added, known, links_moved, mass_that_moves
+from tests.support.faulty_robots import Robot as Arm
 
 POSES, UNSEEN, REPEATS, LINES = 6, 8, 3, 300
 ROUGH = replace(EVERYDAY, angle_deg=3.0, offset_m=0.005)
@@ -80,46 +80,46 @@ class Case:
         """What a fit makes of it."""
         simulation = Simulation(Robot.load(self.toml))
         tolerances = Tolerances.of(simulation.robot.config, simulation.robot.joints.slides)
-        prior = RobotPrior(Repertoire.of(simulation, CAD_INERTIAS))
+        prior = RobotPrior(EffectLibrary.of(simulation, CAD_INERTIAS))
         return RobotPosterior.of(Search(prior, self.frfs, self.q, self.band_hz, tolerances).found())
 
 
 def everyday(name: str, seed: int, folder: Path) -> Case:
     """A soft base, a link that bends and a hose at once, each of a size of its own."""
     rng, arm = drawn_arm(name, seed, folder)
-    secret = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
+    injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
     kinds = "soft base", "bending link", "hose"
     for kind in kinds:
-        secret = added(secret, kind, log_uniform(rng, 0.2, 1.0), arm, rng)
-    return _measured(arm, secret, kinds, EVERYDAY, rng)
+        injected = added(injected, kind, log_uniform(rng, 0.2, 1.0), arm, rng)
+    return _measured(arm, injected, kinds, EVERYDAY, rng)
 
 
 def harder(name: str, seed: int, folder: Path) -> Case:
     """A soft floor, two bearings and a hose, a spindle 3 % heavier, springs that scatter by 0.5 %
     from visit to visit, hits 3° and 5 mm off."""
     rng, arm = drawn_arm(name, seed, folder)
-    secret = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
+    injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
     for kind in ("soft base", "hose"):
-        secret = added(secret, kind, log_uniform(rng, 0.5, 1.0), arm, rng)
-    truth = load_truth(arm.toml, secret.deviation)
+        injected = added(injected, kind, log_uniform(rng, 0.5, 1.0), arm, rng)
+    truth = load_truth(arm.toml, injected.deviation)
     concealed = ("soft base", "bearings", "hose")
     free = _bearings(truth)
     if len(free) < 2:  # robot.toml states them all
-        secret, concealed = added(secret, "bending link", 1.0, arm, rng), ("base, link", "hose")
+        injected, concealed = added(injected, "bending link", 1.0, arm, rng), ("base, link", "hose")
     for joint, axis, own in (free[i] for i in rng.permutation(len(free))[:2]):
         k = 6 * own * log_uniform(rng, 0.5, 2.0)
-        secret = deviate(secret, extra=[Spring(joint, triple(axis), k, 4e-4 * k)])
-    secret = replace(secret, drift=VisitScatter(0.005, int(rng.integers(2**31))))
-    return _measured(arm, secret, concealed, ROUGH, rng)
+        injected = deviate(injected, extra=[Spring(joint, triple(axis), k, 4e-4 * k)])
+    injected = replace(injected, drift=VisitScatter(0.005, int(rng.integers(2**31))))
+    return _measured(arm, injected, concealed, ROUGH, rng)
 
 
 def forgotten(name: str, seed: int, folder: Path) -> Case:
     """A tool that robot.toml lacks, 2 to 20 % of what moves, three masses on a rod at the flange;
     every other robot stands on a soft base."""
     rng, arm = drawn_arm(name, seed, folder)
-    secret = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
+    injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
     urdf = ElementTree.parse(arm.toml.parent / tomllib.loads(arm.toml.read_text())["urdf"])
-    truth = load_truth(arm.toml, secret.deviation)
+    truth = load_truth(arm.toml, injected.deviation)
     flange = list(links_moved(urdf.getroot(), truth.joint_names).values())[-1]
     kg = mass_that_moves(urdf.getroot()) * log_uniform(rng, 0.02, 0.2)
     middle = some_direction(rng) * rng.uniform(0.02, 0.25)
@@ -128,12 +128,12 @@ def forgotten(name: str, seed: int, folder: Path) -> Case:
         AttachedMass(flange, triple(middle + at * rod), kg * share)
         for at, share in zip((-1, 0, 1), rng.dirichlet([4.0, 4.0, 4.0]), strict=True)
     ]
-    secret, concealed = deviate(secret, added=tool), ("tool",)
+    injected, concealed = deviate(injected, added=tool), ("tool",)
     if rng.random() < 0.5:
-        secret, concealed = added(secret, "soft base", log_uniform(rng, 0.2, 1.0), arm, rng), (
+        injected, concealed = added(injected, "soft base", log_uniform(rng, 0.2, 1.0), arm, rng), (
             "tool", "soft base",
         )  # fmt: skip
-    return _measured(arm, secret, concealed, EVERYDAY, rng)
+    return _measured(arm, injected, concealed, EVERYDAY, rng)
 
 
 def _bearings(truth: Truth) -> list[tuple[str, np.ndarray, float]]:
@@ -154,25 +154,25 @@ def drawn_arm(name: str, seed: int, folder: Path) -> tuple[np.random.Generator, 
 
 
 def _measured(
-    arm: Arm, secret: Secret, concealed: tuple[str, ...], handling: Handling,
+    arm: Arm, injected: InjectedFaults, concealed: tuple[str, ...], errors: MeasurementErrors,
     rng: np.random.Generator,
 ) -> Case:  # fmt: skip
-    truth = load_truth(arm.toml, secret.deviation)
+    truth = load_truth(arm.toml, injected.deviation)
     simulation = Simulation(Robot.load(arm.toml))
     low, high = limits(arm, simulation)
     q = rng.uniform(low, high, (POSES, len(low)))
     unseen = rng.uniform(low, high, (UNSEEN, len(low)))
     hammer = replace(arm.hammer, noise=float(rng.uniform(0.005, 0.03)))
-    secret, common = replace(secret, chain=handling.chain(rng)), handling.common(rng)
+    injected, common = replace(injected, chain=errors.chain(rng)), errors.common(rng)
     axes = [axis for axis in range(3) for _ in range(REPEATS)]
     shots = [(f"+{AXES[axis]}", hammer.peak_n) for axis in axes]
     visits = []
     for number, one in enumerate(q):
-        there = one + np.deg2rad(handling.readback_deg) * rng.standard_normal(len(one))
-        aims = handling.aims(axes, rng, common)
+        there = one + np.deg2rad(errors.readback_deg) * rng.standard_normal(len(one))
+        aims = errors.aims(axes, rng, common)
         visits.append(HitVisit(there, shots, number / POSES, aims=aims))
     measured = []
-    for recorded in hit_poses(truth, secret, visits, hammer, rng):
+    for recorded in hit_poses(truth, injected, visits, hammer, rng):
         hits = tuple(
             Hit(Path("hit"), h.axis, hammer.sampling_rate_hz, h.force_n, h.acceleration_m_s2,
                 simulated=True)
@@ -186,7 +186,7 @@ def _measured(
     frfs = tuple(pose.one_hit_frf for pose in measured)
     return Case(
         arm.toml, arm.band_hz, q, frfs, unseen, lines, true, seen, concealed, tuple(measured),
-        truth, np.array([low, high]), sum(m.mass_kg for m in secret.deviation.added),
+        truth, np.array([low, high]), sum(m.mass_kg for m in injected.deviation.added),
     )  # fmt: skip
 
 

@@ -24,12 +24,12 @@ from planner.truth.arms import ARMS
 from planner.truth.cases import DAMPING_S, PEAK_N
 from planner.truth.deviation import Deviation
 from planner.truth.effects import EFFECTS
-from planner.truth.handling import EVERYDAY
+from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
 from planner.truth.hits import AXES, Hammer
 from planner.truth.load import load_truth
+from planner.truth.measurement_errors import EVERYDAY
 from planner.truth.model import Truth
 from planner.truth.scene import PULSE_S, Scene
-from planner.truth.secret import HitVisit, Secret, hit_poses
 
 SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do
 
@@ -86,13 +86,13 @@ def make(
     low, high = np.deg2rad(np.array(arm.joints_deg)).T
     q = rng.uniform(low, high, (poses, 6))
     other = rng.uniform(low, high, (unseen, 6))
-    secret = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
+    injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
     if LACKING[lacking]:
-        scene = Scene(arm, load_truth(toml, secret.deviation), per_joint, q, PEAK_N[robot])
-        secret = EFFECTS[LACKING[lacking]](scene, secret, rng).secret
-    truth = load_truth(toml, secret.deviation)
+        scene = Scene(arm, load_truth(toml, injected.deviation), per_joint, q, PEAK_N[robot])
+        injected = EFFECTS[LACKING[lacking]](scene, injected, rng).injected
+    truth = load_truth(toml, injected.deviation)
     hammer = Hammer(PEAK_N[robot], PULSE_S, noise=float(rng.uniform(0.005, 0.03)))
-    measurements, frfs, one_hit = _measured(truth, secret, q, hammer, arm.band_hz, rng)
+    measurements, frfs, one_hit = _measured(truth, injected, q, hammer, arm.band_hz, rng)
     table = {
         "robot": str(toml),
         "workspace": {"joints_deg": [list(r) for r in arm.joints_deg]},
@@ -107,11 +107,15 @@ def make(
 
 
 def _measured(
-    truth: Truth, secret: Secret, q: np.ndarray, hammer: Hammer, band_hz: tuple[float, float],
+    truth: Truth,
+    injected: InjectedFaults,
+    q: np.ndarray,
+    hammer: Hammer,
+    band_hz: tuple[float, float],
     rng: np.random.Generator,
-) -> tuple[tuple[Measurement, ...], dict[str, Frf], dict[str, Frf]]:  # fmt: skip
+) -> tuple[tuple[Measurement, ...], dict[str, Frf], dict[str, Frf]]:
     """REPEATS hits an axis at each pose (n, 6), with errors of hand and chain."""
-    secret, common = replace(secret, chain=EVERYDAY.chain(rng)), EVERYDAY.common(rng)
+    injected, common = replace(injected, chain=EVERYDAY.chain(rng)), EVERYDAY.common(rng)
     axes = [axis for axis in range(3) for _ in range(REPEATS)]
     shots = [(f"+{AXES[axis]}", hammer.peak_n) for axis in axes]
     visits = []
@@ -119,7 +123,7 @@ def _measured(
         there = one + np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(6)
         visits.append(HitVisit(there, shots, aims=EVERYDAY.aims(axes, rng, common)))
     measurements, frfs, one_hit = [], {}, {}
-    for number, recorded in enumerate(hit_poses(truth, secret, visits, hammer, rng)):
+    for number, recorded in enumerate(hit_poses(truth, injected, visits, hammer, rng)):
         rate = hammer.sampling_rate_hz
         hits = tuple(
             Hit(Path("hit"), h.axis, rate, h.force_n, h.acceleration_m_s2, simulated=True)
@@ -158,7 +162,7 @@ class FrfScore:
         mean, sd = model.frf(case.unseen, case.lines_hz)
         inside = np.abs(mean - case.true_frf) <= 2 * sd
         half = LINES // 2
-        learned, alone = model.low.learned or model.low.suspect, np.nan
+        learned, alone = model.low.identified_robot or model.low.rejected, np.nan
         if learned is not None:
             simulation = learned.identified.simulation
             alone = frac_of(case.true_frf, simulation.accelerance(case.unseen, case.lines_hz))

@@ -17,7 +17,7 @@ from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
-from tests.support.struck_structures import dof_of, unit_mass_shapes
+from tests.support.hit_structures import dof_of, unit_mass_shapes
 from tests.support.structures import Structure, plate
 
 KINDS = ("panel", "frame", "pieces")

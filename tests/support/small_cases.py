@@ -16,10 +16,16 @@ from planner.truth.deviation import (
     Spring,
     StiffnessRipple,
 )
-from planner.truth.handling import LABORATORY, Handling
+from planner.truth.fault_injection import (
+    Artefact,
+    HitVisit,
+    InjectedFaults,
+    StiffnessDrift,
+    hit_poses,
+)
 from planner.truth.hits import Hammer, write_predict, write_recordings
 from planner.truth.load import load_truth
-from planner.truth.secret import Artefact, HitVisit, Secret, StiffnessDrift, hit_poses
+from planner.truth.measurement_errors import LABORATORY, MeasurementErrors
 from tests.support.arm_with_points import NODES, poses, write_arm
 
 # Springs, dampers and bodies never are as stated; nobody is to call that a finding.
@@ -96,19 +102,19 @@ class SmallCase:
 
 
 def small_case(
-    folder: Path, of: Concealed, handling: Handling = LABORATORY, count: int = POSES
+    folder: Path, of: Concealed, errors: MeasurementErrors = LABORATORY, count: int = POSES
 ) -> SmallCase:
     """An arm of four joints, hit once along each axis at a few poses."""
     tcp = f'[[point]]\nname = "tcp"\nnode = {TCP_NODE}\n'
     robot_toml, q = write_arm(folder / "robot", tcp), poses(count + 1, SEED)
     own = np.random.default_rng(SEED)
-    secret = Secret(replace(SCATTER, **of.change), chain=handling.chain(own), **of.rest)
-    truth, shots = load_truth(robot_toml, secret.deviation), [(f"+{a}", 250.0) for a in "xyz"]
+    injected = InjectedFaults(replace(SCATTER, **of.change), chain=errors.chain(own), **of.rest)
+    truth, shots = load_truth(robot_toml, injected.deviation), [(f"+{a}", 250.0) for a in "xyz"]
     visits = []
     for i, row in enumerate(q[:count]):
-        off = np.deg2rad(handling.readback_deg) * own.standard_normal(len(row))
-        visits.append(HitVisit(row + off, shots, i / count, handling.aims([0, 1, 2], own)))
-    found = hit_poses(truth, secret, visits, HAMMER, np.random.default_rng(SEED))
+        off = np.deg2rad(errors.readback_deg) * own.standard_normal(len(row))
+        visits.append(HitVisit(row + off, shots, i / count, errors.aims([0, 1, 2], own)))
+    found = hit_poses(truth, injected, visits, HAMMER, np.random.default_rng(SEED))
     rows = [
         (f"P{i + 1}", np.rad2deg(row), 1, hit)
         for i, (row, hits) in enumerate(zip(q, found, strict=False))

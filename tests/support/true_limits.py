@@ -6,7 +6,7 @@ import numpy as np
 
 from planner.milling.cut import Cut
 from planner.milling.cutter_frf import of_accelerance
-from planner.milling.lobes import losses, sampled_limits
+from planner.milling.lobes import sampled_limits, stability_limits
 from planner.milling.structure import of_frf
 
 
@@ -38,10 +38,10 @@ def limit_pair(
     known = of_frf(
         of_accelerance("true", lines if true_lines is None else true_lines, true, None), cut
     )
-    found = losses(told.machine(cut))
+    found = stability_limits(told.machine(cut))
     drawn = sampled_limits(told.samples(cut, samples), found).depth_m
     return LimitPair(
         np.array([loss.depth_m for loss in found]),
-        np.array([loss.depth_m for loss in losses(known.machine(cut))]),
+        np.array([loss.depth_m for loss in stability_limits(known.machine(cut))]),
         np.quantile(drawn, (0.05, 0.95), axis=0),
     )

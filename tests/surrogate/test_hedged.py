@@ -75,7 +75,7 @@ def test_outputs_are_weighed_one_by_one():
     fitted = fit_hedged(
         data, (FREQUENCY_PRIOR,) * 2, (FREQUENCY_PRIOR_ALONE,) * 2, low.mean(axis=0)
     )
-    assert fitted.likeliest.uses_low.tolist() == [True, False]
+    assert fitted.most_probable.uses_low.tolist() == [True, False]
     assert (fitted.weights.max(axis=0) > 0.9).all()
 
 

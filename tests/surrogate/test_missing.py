@@ -50,7 +50,7 @@ def test_one_gap_in_the_simulation_does_not_switch_it_off():
         row = []
         for case in (seen, gap, replace(gap, frequency_hz=unseen)):
             s = fit_surrogate(case)
-            assert s.primary.likeliest.uses_low[:4].all()
+            assert s.primary.most_probable.uses_low[:4].all()
             p = s.predict(X, simulated(X))
             off = (p.frequency_hz / true_hz(X, 1.12) - 1)[:, 2]
             sd = (p.frequency_sd_hz / p.frequency_hz)[:, 2]
@@ -66,7 +66,7 @@ def test_one_gap_in_the_simulation_does_not_switch_it_off():
 def test_a_mode_that_is_mostly_not_simulated_is_learned_from_the_hits_alone():
     seen = observed(8, 0)
     s = fit_surrogate(replace(seen, simulated=without(seen.simulated, slice(0, 6), 2)))
-    assert s.primary.likeliest.uses_low[:4].tolist() == [True, True, False, True]
+    assert s.primary.most_probable.uses_low[:4].tolist() == [True, True, False, True]
     p = s.predict(X, simulated(X))
     assert (
         np.mean(np.abs(p.frequency_hz - true_hz(X, 1.12))[:, 2] < 2 * p.frequency_sd_hz[:, 2]) > 0.8

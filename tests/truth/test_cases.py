@@ -14,13 +14,13 @@ from planner.recording.read import read
 from planner.robot.robot import Robot
 from planner.truth import cases
 from planner.truth.arms import ARMS
-from planner.truth.cases import DRIVES, KINDS, TABLE, Made, make_case
+from planner.truth.cases import DRIVES, KINDS, TABLE, ConcealedCase, make_case
 from planner.truth.deviation import Deviation, ScaledJoint, StiffnessRipple
-from planner.truth.handling import LABORATORY
+from planner.truth.fault_injection import InjectedFaults
 from planner.truth.laws import HarmonicDrive
 from planner.truth.load import load_truth
+from planner.truth.measurement_errors import LABORATORY
 from planner.truth.scene import Scene
-from planner.truth.secret import Secret
 
 PLACES = {
     "joint_stiffness": "joint_", "transverse_compliance": "joint_", "friction": "joint_",
@@ -38,7 +38,7 @@ def folder(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def case(folder) -> Made:
+def case(folder) -> ConcealedCase:
     return make_case("added_mass", "kr210", 3, folder, LABORATORY)
 
 
@@ -54,8 +54,8 @@ def test_every_effect_can_be_concealed(tmp_path):
     scene = Scene(arm, truth, 1, arm.poses(4), 1000.0)
     for name, draw in TABLE.items():
         for seed in range(5):
-            drawn = draw(scene, Secret(Deviation()), np.random.default_rng(seed))
-            load_truth(tmp_path / "robot.toml", drawn.secret.deviation)  # its places exist
+            drawn = draw(scene, InjectedFaults(Deviation()), np.random.default_rng(seed))
+            load_truth(tmp_path / "robot.toml", drawn.injected.deviation)  # its places exist
             if name in PLACES:
                 assert drawn.effect == name
                 assert drawn.at is not None
@@ -76,8 +76,8 @@ def test_a_law_leaves_stiffness_in_a_joint_that_an_earlier_effect_made_soft(law,
         harmonics=tuple(StiffnessRipple(j, 1, 0.3, 0.4) for j in joints),
     )
     for seed in range(20):
-        drawn = TABLE[law](scene, Secret(soft), np.random.default_rng(seed))
-        at_rest: Any = drawn.secret.ports[0].law
+        drawn = TABLE[law](scene, InjectedFaults(soft), np.random.default_rng(seed))
+        at_rest: Any = drawn.injected.ports[0].law
         taken = abs(at_rest.stiffness) * (2 if isinstance(at_rest, HarmonicDrive) else 1)
         if law == "nonlinear_stiffness" and float(at_rest.at(np.array(1.0))) > 0:
             continue  # it hardens

@@ -9,12 +9,12 @@ from planner.truth import cases
 from planner.truth.arms import ARMS
 from planner.truth.cases import DAMPING_S, RANDOM, SCATTER, TABLE, make_case
 from planner.truth.deviation import Deviation, Spring
+from planner.truth.fault_injection import InjectedFaults
 from planner.truth.imperfections import imperfect
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
 from planner.truth.random_arms import BAND_HZ, LAYOUTS, draw_arm, standing
 from planner.truth.scene import Scene
-from planner.truth.secret import Secret
 
 
 def same(one: Truth, other: Truth, q: np.ndarray) -> None:
@@ -46,10 +46,10 @@ LACKING = (
 @pytest.mark.parametrize("name", LACKING)
 def test_both_engines_are_one_robot_whatever_it_lacks(tmp_path, name):
     arm = replace(ARMS["irb6640"], damping_s=DAMPING_S)
-    path, plain = arm.write(tmp_path), Secret(replace(SCATTER, seed=4))
+    path, plain = arm.write(tmp_path), InjectedFaults(replace(SCATTER, seed=4))
     scene, rng = Scene(arm, load_truth(path), 1, arm.poses(2), 1e3), np.random.default_rng(2)
-    secret = TABLE[name](scene, imperfect(scene, plain, rng).secret, rng).secret
-    one, other = (load_truth(path, secret.deviation, engine) for engine in ("mujoco", "tree"))
+    injected = TABLE[name](scene, imperfect(scene, plain, rng).injected, rng).injected
+    one, other = (load_truth(path, injected.deviation, engine) for engine in ("mujoco", "tree"))
     same(one, other, scene.poses[1])
     same(one.loaded("spindle", 1.4), other.loaded("spindle", 1.4), scene.poses[1])
 

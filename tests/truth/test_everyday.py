@@ -11,13 +11,13 @@ import pytest
 
 from planner.truth import cases
 from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, OUTSIDERS, PEAK_N, SCATTER, TABLE, make_case
+from planner.truth.cases import DAMPING_S, OUT_OF_LIBRARY_KINDS, PEAK_N, SCATTER, TABLE, make_case
+from planner.truth.detectability import without_effect
+from planner.truth.fault_injection import InjectedFaults
 from planner.truth.imperfections import imperfect
 from planner.truth.load import load_truth
-from planner.truth.nonlinear import StruckPose, respond
-from planner.truth.questions import lacking
+from planner.truth.nonlinear import HitPose, respond
 from planner.truth.scene import Scene
-from planner.truth.secret import Secret
 from tests.support.wrenches import along
 
 STEP_S, N = 1 / 3200, 240
@@ -26,31 +26,31 @@ STEP_S, N = 1 / 3200, 240
 def scene_of(robot: str, folder, seed: int = 1):
     """A scene with an imperfect robot, its secret, and where its robot.toml is."""
     arm = replace(ARMS[robot], damping_s=DAMPING_S)
-    path, plain = arm.write(folder), Secret(replace(SCATTER, seed=seed))
+    path, plain = arm.write(folder), InjectedFaults(replace(SCATTER, seed=seed))
     scene = Scene(arm, load_truth(path, plain.deviation), 1, arm.poses(3), PEAK_N[robot])
-    secret = imperfect(scene, plain, np.random.default_rng(seed)).secret
-    return replace(scene, truth=load_truth(path, secret.deviation)), secret, path
+    injected = imperfect(scene, plain, np.random.default_rng(seed)).injected
+    return replace(scene, truth=load_truth(path, injected.deviation)), injected, path
 
 
-def heard(scene: Scene, secret: Secret, path, progress: float = 1.0) -> np.ndarray:
+def heard(scene: Scene, injected: InjectedFaults, path, progress: float = 1.0) -> np.ndarray:
     """(3, 3, n): how three hits move the sensor at first, as speeds in m/s."""
-    truth = secret.at(load_truth(path, secret.deviation), progress)
+    truth = injected.at(load_truth(path, injected.deviation), progress)
     t = np.arange(N) * STEP_S
     force = scene.peak_n * np.sin(np.pi * np.clip(t / 0.008, 0, 1)) ** 2
-    pose = StruckPose(truth, scene.poses[0], np.tile(force, (3, 1)), along([0, 1, 2]))
-    return STEP_S * np.cumsum(respond([pose], secret.ports, STEP_S)[0], axis=2)
+    pose = HitPose(truth, scene.poses[0], np.tile(force, (3, 1)), along([0, 1, 2]))
+    return STEP_S * np.cumsum(respond([pose], injected.ports, STEP_S)[0], axis=2)
 
 
 def test_there_are_outsiders_of_many_kinds_and_mixed_damping_is_no_effect():
-    assert len(OUTSIDERS) >= 8
+    assert len(OUT_OF_LIBRARY_KINDS) >= 8
     assert "structural_damping" not in TABLE
 
 
 @pytest.mark.parametrize("robot", sorted(ARMS))
 def test_imperfections_are_everywhere_and_small(robot, tmp_path):
-    scene, secret, path = scene_of(robot, tmp_path)
-    assert {port.joint for port in secret.ports} == {f"joint_{n}" for n in range(1, 7)}
-    plain = replace(secret.deviation, beams=(), compensators=(), harmonics=(), extra=())
+    scene, injected, path = scene_of(robot, tmp_path)
+    assert {port.joint for port in injected.ports} == {f"joint_{n}" for n in range(1, 7)}
+    plain = replace(injected.deviation, beams=(), compensators=(), harmonics=(), extra=())
     ours = scene.truth.modes(scene.poses[0], 2)[0]
     without = load_truth(path, plain).modes(scene.poses[0], 2)[0]
     change = np.abs(ours / without - 1)
@@ -69,22 +69,22 @@ QUICK = *CHANNELS, "added_mass", "base_compliance", "friction", "drift", "rattli
     "name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in TABLE]
 )
 def test_every_effect_does_something_and_goes_with_its_size(name, tmp_path):
-    scene, secret, path = scene_of("kr210", tmp_path)
+    scene, injected, path = scene_of("kr210", tmp_path)
     if name in CHANNELS:
         small, large = (
-            TABLE[name](replace(scene, size=s), secret, np.random.default_rng(3)).secret
+            TABLE[name](replace(scene, size=s), injected, np.random.default_rng(3)).injected
             for s in (0.01, 1.0)
         )
-        assert small != secret
+        assert small != injected
         assert small != large or name == "polarity"
         return
-    plain = heard(scene, secret, path)
+    plain = heard(scene, injected, path)
     changes = []
     for size in (0.01, 1.0):
-        drawn = TABLE[name](replace(scene, size=size), secret, np.random.default_rng(3))
+        drawn = TABLE[name](replace(scene, size=size), injected, np.random.default_rng(3))
         json.dumps(drawn.parameters)
-        changes.append(np.linalg.norm(heard(scene, drawn.secret, path) - plain))
-        left = lacking(drawn.secret, secret, drawn.secret)
+        changes.append(np.linalg.norm(heard(scene, drawn.injected, path) - plain))
+        left = without_effect(drawn.injected, injected, drawn.injected)
         assert np.linalg.norm(heard(scene, left, path) - plain) < 1e-6 * changes[0]
     assert 0 < changes[0] < 0.2 * changes[1]
     assert changes[0] < 0.15 * np.linalg.norm(plain)  # a base's long lever is the most
@@ -92,16 +92,16 @@ def test_every_effect_does_something_and_goes_with_its_size(name, tmp_path):
 
 def test_what_changes_with_time_is_what_gives_or_what_is_carried(tmp_path):
     """A joint that grows softer, or another tool: half-way through both differ from before."""
-    scene, secret, path = scene_of("kr210", tmp_path)
-    drawn = [TABLE["drift"](scene, secret, np.random.default_rng(n)) for n in range(12)]
+    scene, injected, path = scene_of("kr210", tmp_path)
+    drawn = [TABLE["drift"](scene, injected, np.random.default_rng(n)) for n in range(12)]
     assert {(d.effect, d.at) for d in drawn} == {("drift", "campaign")}
-    tools = [d for d in drawn if d.secret.load is not None]
+    tools = [d for d in drawn if d.injected.load is not None]
     assert 0 < len(tools) < len(drawn)
     assert all("load_factor" in d.parameters for d in tools)
-    for one in (tools[0], next(d for d in drawn if d.secret.load is None)):
-        early, late = (heard(scene, one.secret, path, progress) for progress in (0.0, 1.0))
+    for one in (tools[0], next(d for d in drawn if d.injected.load is None)):
+        early, late = (heard(scene, one.injected, path, progress) for progress in (0.0, 1.0))
         assert np.linalg.norm(late - early) > 1e-4 * np.linalg.norm(early)
-    [without] = {lacking(d.secret, secret, d.secret).load for d in tools}
+    [without] = {without_effect(d.injected, injected, d.injected).load for d in tools}
     assert without is None
 
 

@@ -14,12 +14,12 @@ from scipy.integrate import solve_ivp
 from planner.errors import InputError
 from planner.truth.arms import KR10
 from planner.truth.deviation import Deviation
+from planner.truth.fault_injection import InjectedFaults, frfs, once
 from planner.truth.hits import Hammer
 from planner.truth.laws import Backlash, Contact, Friction, Hardening, JointLaw
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
-from planner.truth.nonlinear import Port, StruckPose, respond
-from planner.truth.secret import Secret, frfs, once
+from planner.truth.nonlinear import HitPose, Port, respond
 from tests.support.wrenches import along
 
 STEP, N = 1 / 6400, 3200
@@ -56,7 +56,7 @@ def loop(law: JointLaw, angles: np.ndarray) -> np.ndarray:
 
 def test_without_laws_it_is_the_linear_truth(truth):
     forces, axes = pulses([100.0, 30.0, 60.0]), [0, 1, 2]
-    ours = respond([StruckPose(truth, Q, forces, along(axes))], (), STEP)[0]
+    ours = respond([HitPose(truth, Q, forces, along(axes))], (), STEP)[0]
     theirs = [truth.respond(Q, f, a, STEP) for f, a in zip(forces, axes, strict=True)]
     assert np.max(np.abs(ours - theirs)) < 1e-9 * np.max(np.abs(ours))
 
@@ -69,7 +69,7 @@ EACH = [pytest.param(v, marks=() if k in QUICK else pytest.mark.slow) for k, v i
 def test_response_is_that_of_an_ode_solver(truth, law):
     force = pulses([300.0])
     port = Port(law, joint="joint_2")
-    response = respond([StruckPose(truth, Q, force, along([1]))], [port], STEP)[0][0]
+    response = respond([HitPose(truth, Q, force, along([1]))], [port], STEP)[0][0]
     linear = truth.respond(Q, force[0], 1, STEP)
     mass, damping, stiffness, hit, sensor = truth.matrices(Q)
     own, e, t = truth.own("joint_2"), len(mass), np.arange(N) * STEP
@@ -102,9 +102,9 @@ def test_response_is_that_of_an_ode_solver(truth, law):
 @pytest.mark.parametrize("law", EACH, ids=LAWS)
 def test_hits_die_out(truth, law):
     force = np.pad(pulses([300.0]), ((0, 0), (0, 5 * N)))
-    response = respond(
-        [StruckPose(truth, Q, force, along([0]))], [Port(law, joint="joint_1")], STEP
-    )[0][0]
+    response = respond([HitPose(truth, Q, force, along([0]))], [Port(law, joint="joint_1")], STEP)[
+        0
+    ][0]
     blocks = np.sqrt(np.mean(response[:, N:].reshape(3, 5, -1) ** 2, axis=(0, 2)))
     assert np.all(blocks[1:] < blocks[:-1])
 
@@ -112,8 +112,8 @@ def test_hits_die_out(truth, law):
 def test_poses_integrated_together_do_not_meet(truth):
     port, other = Port(LAWS["friction"], joint="joint_2"), KR10.poses(2, seed=3)[1]
     poses = [
-        StruckPose(truth, Q, pulses([300.0, 40.0]), along([0, 2])),
-        StruckPose(truth, other, pulses([99.0]), along([1])),
+        HitPose(truth, Q, pulses([300.0, 40.0]), along([0, 2])),
+        HitPose(truth, other, pulses([99.0]), along([1])),
     ]
     together = respond(poses, [port], STEP)
     alone = [respond([pose], [port], STEP)[0] for pose in poses]
@@ -125,7 +125,7 @@ def resonance(truth: Truth, law: JointLaw, peak_n: float) -> float:
     """Frequency of the first mode as a hit shows it, between two bins."""
     visit = [once(Q, peak_n)]
     f, H = frfs(
-        truth, Secret(Deviation(), (Port(law, joint="joint_2"),)), visit, QUIET, (5.0, 20.0)
+        truth, InjectedFaults(Deviation(), (Port(law, joint="joint_2"),)), visit, QUIET, (5.0, 20.0)
     )
     power = np.sum(np.abs(H[0]) ** 2, axis=(0, 1))
     near = slice(max(int(np.argmax(power)) - 3, 0), int(np.argmax(power)) + 4)
@@ -193,4 +193,4 @@ def test_slopes_are_bounds():
 def test_a_step_too_long_is_refused(truth):
     port = Port(Hardening(1e9, ANGLE), joint="joint_6")
     with pytest.raises(InputError, match="shorten the step"):
-        respond([StruckPose(truth, Q, pulses([1.0]), along([0]))], [port], STEP)
+        respond([HitPose(truth, Q, pulses([1.0]), along([0]))], [port], STEP)

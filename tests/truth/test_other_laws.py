@@ -20,7 +20,7 @@ from planner.truth.laws import (
     LuGre,
     QuadraticDamping,
     Stops,
-    side_by_side,
+    stacked,
 )
 
 K, COULOMB, A, RATE = 6e4, 9.0, 4e-4, 60.0  # N·m/rad, N·m, rad, rad/s
@@ -138,7 +138,7 @@ def test_slopes_are_bounds_and_laws_side_by_side_are_each_alone(name):
     assert np.all(steps <= law.slope(STEP_S) * np.abs(np.diff(angles)) * 1.001 + 1e-3 * K * A)
     rng = np.random.default_rng(0)
     path = rng.standard_normal((30, 2, 3)) * A
-    both = side_by_side([law, law])
+    both = stacked([law, law])
     state, alone = both.at_rest((2, 3)), law.at_rest((3,))
     for before, now in itertools.pairwise(path):
         torque, state = both.torque(state, before, now, STEP_S)
@@ -149,6 +149,6 @@ def test_slopes_are_bounds_and_laws_side_by_side_are_each_alone(name):
 def test_different_laws_of_a_kind_go_side_by_side():
     laws = [Hardening(1e4, A), Hardening(-2e4, A / 2)]
     now = np.array([[A, 2 * A], [A, 2 * A]])
-    torque, _ = side_by_side(laws).torque(np.zeros((2, 2)), 0 * now, now, STEP_S)
+    torque, _ = stacked(laws).torque(np.zeros((2, 2)), 0 * now, now, STEP_S)
     for row, law in zip(torque, laws, strict=True):
         assert row == pytest.approx(law.at(now[0]))

@@ -14,8 +14,8 @@ from planner.campaign.labels import LabelledPose
 from planner.campaign.mode_motion import (
     PointShapes,
     agreement,
-    alone,
     matched,
+    measured_alone,
     measured_shapes,
     simulated_shapes,
 )
@@ -69,7 +69,7 @@ class ModeDrawing:
         drawn = skeleton(robot, pose.q)
         whole = None
         if simulation is None:
-            seen = alone(seen)
+            seen = measured_alone(seen)
         else:
             layout = Layout(sensors=seen.names)
             count = len(pose.modes)

@@ -189,11 +189,11 @@ def fit_growing(
             # The likeliest of few points may be the seventh of all: only the last step is dear.
             rest = peaks if count < len(order) else peaks[:MOST_PEAKS]
             ends = [hill.climb(peak.x, FEW_STEPS, FTOL) for peak in rest]
-        peaks = _likeliest(ends)
+        peaks = _most_probable(ends)
     return at_hyperparameters(samples, kernel, peaks[0].x, units)
 
 
-def _likeliest(ends: Sequence[Peak]) -> list[Peak]:
+def _most_probable(ends: Sequence[Peak]) -> list[Peak]:
     """Those of different density, the likeliest first."""
     found: list[Peak] = []
     for end in sorted(ends, key=lambda peak: -peak.log_density):

@@ -1,0 +1,120 @@
+"""What recordings taught a simulation: a structure, and its parameters."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from planner.dynamics.vibration import SimulatedModes
+from planner.effects.parameters import Priors
+from planner.fit.departures import departures_text
+from planner.fit.fitted import StructureFit
+from planner.fit.frequency_uncertainty import frequency_sd
+from planner.fit.identified import ExtendedModel, as_identification
+from planner.fit.posterior import RobotPosterior
+from planner.fit.result import Estimate, Identification
+from planner.words import counted, significant
+
+BEYOND = 2.0  # sds of the gains, from which their deviation is told
+KNOWN = 0.3  # sd of ln k to which a spring not stated is known when it is told of
+# PosedBodies from which a place is told as found: from one, neighbours imitate each other.
+PLACED = 3
+ABOVE, NOT_THERE = 2, 1.0  # modes that a wider structure may have beside; ln f of one that is none
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedRobot:
+    """What so many `poses` taught the simulation; `structure` and `identified` say it in numbers
+    of springs and bodies, effects held as they are."""
+
+    posterior: RobotPosterior
+    structure: ExtendedModel
+    identified: Identification
+    poses: int = PLACED
+    wider: "IdentifiedRobot | None" = None
+
+    @classmethod
+    def of(cls, found: StructureFit) -> "IdentifiedRobot":
+        """From the structure that was found."""
+        posterior = RobotPosterior.of(found)
+        wider = None if found.wider is None else cls.of(found.wider)
+        return cls(posterior, *as_identification(posterior), len(found.misfit.data.q), wider)
+
+    def frequency_sd(self, q: np.ndarray, modes: SimulatedModes) -> np.ndarray:
+        """Sd of ln f (n, count) of its `modes` at q (n, dof) in rad.
+
+        By the numbers of the wider structure, and by how far its modes are from these.
+        """
+        if self.wider is None:
+            return frequency_sd(self.posterior, q, modes)
+        count = modes.frequency_hz.shape[1]
+        every = self.wider.identified.simulation.frequencies(q, count + ABOVE)
+        same, away = _same(every.frequency_hz, modes.frequency_hz)
+        hertz, ratio = (
+            np.take_along_axis(v, same, 1) for v in (every.frequency_hz, every.damping_ratio)
+        )
+        wider = SimulatedModes(hertz, ratio, modes.residue)
+        return np.minimum(np.hypot(self.wider.frequency_sd(q, wider), away), NOT_THERE)
+
+    @property
+    def fits(self) -> bool:
+        """Whether it explains the recordings."""
+        return self.posterior.explains
+
+    @property
+    def priors(self) -> Priors:
+        """Those it was identified with."""
+        return self.structure.priors
+
+    @property
+    def stated(self) -> int:
+        """How many springs, the first ones, robot.toml states."""
+        return len(self.structure.simulation.robot.config.compliance) - self.structure.added
+
+    @property
+    def unstated(self) -> tuple[Estimate, ...]:
+        """Springs that robot.toml does not state and that the recordings determine."""
+        return tuple(
+            e for e in self.identified.estimates
+            if e.kind == "stiffness" and min(e.blocks) >= self.stated and e.log_sd < KNOWN
+        )  # fmt: skip
+
+    @property
+    def scale(self) -> str:
+        """What to say where recordings are larger or smaller than gains and masses allow."""
+        off, allowed = self.posterior.chain_scale
+        if abs(off) < BEYOND * allowed:
+            return ""
+        more = "larger" if off > 0 else "smaller"
+        return (
+            f"The recordings are {significant(100 * abs(off))} % {more} than the robot's FRFs, "
+            f"though gains of sensor and hammer are stated to {significant(100 * allowed)} %: "
+            f"check their sensitivities, and the masses in the URDF."
+        )
+
+    @property
+    def departures(self) -> str:
+        """What robot.toml may state wrongly; empty where the fit is near it."""
+        return departures_text(self.posterior.structure, self.posterior.x)
+
+    @property
+    def words(self) -> str:
+        """What the robot has that robot.toml does not state; empty where that is nothing."""
+        found = " ".join(self.posterior.words)
+        if not found or self.poses >= PLACED:
+            return found and f"The recordings show what robot.toml does not state. {found}"
+        return (
+            f"The robot differs from what robot.toml states. It may be this: {found} From "
+            f"{counted(self.poses, 'pose')} it may as well be elsewhere: repair nothing yet, and "
+            f"measure {counted(PLACED - self.poses, 'more pose')}."
+        )
+
+
+def _same(every_hz: np.ndarray, hertz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which of all modes (n, more) those (n, k) are, in the same order, and how far off in ln f."""
+    k = hertz.shape[1]
+    choices = np.array(list(combinations(range(every_hz.shape[1]), k)))
+    away = np.abs(np.log(every_hz[:, choices] / hertz[:, None]))
+    away = np.where(np.isfinite(away), away, NOT_THERE)
+    best = np.argmin(np.sum(away**2, axis=-1), axis=1)
+    return choices[best], away[np.arange(len(best)), best]

@@ -1,0 +1,117 @@
+"""Wrong units, signs and axes are asked about at the first pose, good imports are not."""
+
+import json
+
+import numpy as np
+import pytest
+
+from planner.campaign.campaign import Campaign
+from planner.campaign.chain_faults import SCALED, TURNED, ChainFault
+from planner.campaign.import_checks import question_about
+from planner.dataset.measure import measure
+from planner.dataset.screened_files import Source
+from planner.demo import NAME, Pool, shipped
+from planner.frf.frf import Frf
+from planner.recording.folder import TABLE
+from tests.support.chain_cases import FAULTS, SLIGHTEST, cases, fault, judged, scaled, shown_by
+from tests.support.outside import call
+
+
+def test_faults_of_a_chain_are_asked_about_and_named(tmp_path):
+    seeds = range(700, 702)
+    for seed, case in zip(seeds, cases(tmp_path, seeds, 2), strict=True):
+        rng = np.random.default_rng(seed)
+        for sums in case.sums:
+            assert judged(sums) is None
+            for name in FAULTS:
+                if name in SLIGHTEST:  # told at most poses
+                    continue
+                true = fault(name, rng)
+                found = judged(shown_by(sums, true))
+                assert found is not None, (case.robot, name)
+                np.testing.assert_allclose(found.matrix, true, rtol=0.6)
+
+
+@pytest.mark.parametrize(
+    ("one", "said"),
+    [
+        (
+            ChainFault(1e3 * np.eye(3), (0, 1, 2), 1030.0),
+            "1000 times too large: units or sensitivity",
+        ),
+        (ChainFault(np.eye(3), (1,), 0.104), "channel y is 9.81 times too small"),
+        (ChainFault(np.eye(3), (0, 1, 2), 2.1), "about 2 times too large"),
+        (ChainFault(-np.eye(3)), "answers against every hit"),
+        (ChainFault(np.diag([1.0, -1, 1])), "channel y a wrong sign"),
+        (
+            ChainFault(np.array([[0, -1.0, 0], [1, 0, 0], [0, 0, 1]])),
+            "turned by 90°: x reads what −y",
+        ),
+        (ChainFault(np.eye(3)[[1, 0, 2]]), "axes look exchanged: x reads what y should"),
+        (ChainFault(np.eye(3), order=(1, 0, 2)), "were those along x along y, y along x?"),
+        (ChainFault(np.eye(3), (0, 1, 2), 0.89), "accelerations are 11 % too small"),
+        (ChainFault(np.eye(3), delay_s=2e-3), "accelerations come 2 ms after forces"),
+        (ChainFault(np.eye(3), delay_s=-2e-3), "forces come 2 ms after accelerations"),
+        (
+            ChainFault(np.eye(3), corner_hz=1.5),
+            "accelerations lack what is slow, as by",
+        ),
+        (ChainFault(np.eye(3), corner_hz=-1.5), "forces lack what is slow"),
+        (ChainFault(np.eye(3), window_rate_1_s=3.0), "3 1/s faster: does the analyser lay"),
+        (ChainFault(np.eye(3), window_rate_1_s=-3.0), "3 1/s slower: was the analyser's"),
+    ],
+)
+def test_faults_in_words(one, said):
+    assert said in one.asked
+
+
+def test_filters_are_undone():
+    """Of an oscillator under an exponential window, by what a delay and a high-pass are there."""
+    hz, rate = np.linspace(2.0, 40.0, 80), 3.0
+    s = 2j * np.pi * hz + rate
+    true = np.eye(3)[..., None] * s**2 / (s**2 + 6 * s + (2 * np.pi * 15) ** 2)
+    flat = np.ones((3, 3, 80))
+    fault = ChainFault(np.eye(3), delay_s=1e-3, corner_hz=1.5)
+    shown = true * np.exp(-1e-3 * s) * s / (s + 2 * np.pi * 1.5)
+    frf = Frf(hz, shown, 1e-4 * flat, flat, (1, 1, 1), (2.0, 40.0), rate)
+    found, volume = fault.undone(frf)
+    np.testing.assert_allclose(found.accelerance, true, rtol=1e-12, atol=1e-15)
+    grown = np.abs(found.accelerance[0, 0] / shown[0, 0])
+    np.testing.assert_allclose(found.variance[0, 0], 1e-4 * grown**2)
+    assert volume == pytest.approx(6 * np.mean(np.log(grown)))
+    windowed = ChainFault(np.eye(3), window_rate_1_s=2.0).undone(frf)[0]
+    assert windowed.exponential_rate_1_s == 5.0
+
+
+def test_every_fault_can_be_told_in_words():
+    assert all(one.asked.endswith("?") for one in (*TURNED, *(f for own in SCALED for f in own)))
+
+
+def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
+    robot, config = (shipped(NAME) / name for name in ("robot/robot.toml", "campaign.toml"))
+    campaign = Campaign.new(tmp_path / "campaign", robot, config)
+    pool = Pool.load(shipped(NAME) / "recordings", tuple(f"joint_{i}" for i in range(1, 7)))
+    paths = [scaled(row, tmp_path, 1e3) for row in pool.rows["A11"]]
+    names = [row.file.name for row in pool.rows["A11"]]
+    lines = (shipped(NAME) / "recordings" / TABLE).read_text().splitlines()
+    own = [line for line in lines[1:] if any(line.endswith(name) for name in names)]
+    (tmp_path / TABLE).write_text("\n".join([lines[0], *own]).replace("data/", "") + "\n")
+    code, out, err = call("import", campaign.directory, tmp_path / TABLE, "--json")
+    assert code == 3
+    answer = json.loads(out)
+    assert answer["question"]["about"] == "chain"
+    assert "1000 times too large: units or sensitivity" in err
+    assert f"planner undo {campaign.directory}" in err
+    assert f"planner confirm {campaign.directory} A11" in err
+    held = Campaign(campaign.directory)
+    assert len(held.state.held["A11"].hits) == len(paths)
+    held.confirm("A11")
+    assert [m.pose for m in held.state.used] == ["A11"]
+    # Of a chain that the engineer called right the same is not asked again; another one is.
+    rows, band_hz = pool.rows["A57"], held.cell.config.modes.band_hz
+    for factor, doubted in ((1e3, False), (1.0, True)):
+        (folder := tmp_path / f"{factor:g}").mkdir()
+        sources = tuple(Source(scaled(r, folder, factor), r.file.name, r.hit) for r in rows)
+        other = measure(sources, band_hz)
+        asked = question_about(held.model, held.state, "A57", rows[0].joints_deg, other)
+        assert (asked is not None and asked.about == "chain") == doubted

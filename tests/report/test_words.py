@@ -1,0 +1,237 @@
+"""What screens say: numbers with their digits, lines that break where they may, a diagnosis that
+does not contradict itself, and forecasts that hold."""
+
+import io
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import pytest
+from rich.console import Console, Group
+from rich.panel import Panel
+from rich.text import Text
+
+from planner.cli.answer import respond
+from planner.design.stopping import percent
+from planner.diagnosis.diagnose import ThreefoldSimilarity
+from planner.diagnosis.mismatch import MismatchShares
+from planner.diagnosis.odd_pose import OddPose
+from planner.measurement.agreement import Similarity
+from planner.report.answer import Answer, RefusedFile
+from planner.report.diagnosis import DiagnosisReport, EffectAtPlace, RankedExplanation
+from planner.report.imports import PoseImport
+from planner.report.predictions import ExpectedMode
+from planner.report.saved_diagnosis import two_answers
+from planner.report.springs import RefittedSpring
+from planner.report.text import STAND_IN, UnbrokenConsole, table, with_sd
+from planner.robot.place_names import place_names, with_names
+from planner.robot.robot import Robot
+from planner.session.session_text import MOST_TOLD, poses_to_go, progress_line
+from planner.words import probable, significant
+from tests.support.plain_arm import make_plain_arm
+
+SAID = (
+    "Your x hits land 4 ± 1 mm towards +y and mode 3 at 13.482 ± <0.001 Hz, damping 2.05 %, is "
+    "found again; joint_2 has 1.3e+06 ± 4e+04 N·m/rad and answers 30 times."
+)
+WHOLE = ("4 ± 1 mm", "mode 3", "13.482 ± <0.001 Hz", "2.05 %", "1.3e+06 ± 4e+04 N·m/rad")
+UNKNOWN = (("unknown", None),)
+BASE = (("base_compliance", "base"), ("transverse_compliance", "joint_1"))
+
+
+@pytest.mark.parametrize(
+    ("function", "values", "said"),
+    [
+        (with_sd, (15.985, 0.0003, ".3f"), "15.985 ± <0.001"),
+        (with_sd, (15.985, 0.0006, ".3f"), "15.985 ± 0.001"),
+        (with_sd, (1.5, 0.0), "1.50 ± 0.00"),  # stated to be exact
+        (with_sd, (1.5, None), "1.50 ± –"),
+        (with_sd, (None, None), "–"),
+        (with_sd, (1.5, float("nan")), "1.50 ± –"),
+        (significant, (0.01234,), "0.012"),
+        (significant, (0.00949,), "0.0095"),
+        (significant, (1.0,), "1.0"),
+        (significant, (123.4,), "120"),
+        (significant, (0,), "0"),
+        (significant, (0.0996,), "0.10"),
+        (significant, (float("inf"),), "inf"),
+        (percent, (0.0321,), "0.032 %"),
+        (percent, (99.6,), "100 %"),
+        (percent, (113.0,), "more than 100 %"),
+        (percent, (1.7e6,), "more than 100 %"),
+        (percent, (0.0,), "0 %"),
+        (probable, (0.0,), "below 0.1 %"),
+        (probable, (0.004,), "0.4 %"),
+        (probable, (0.92,), "92 %"),
+        (probable, (0.993,), "99.3 %"),
+        (probable, (1.0,), "above 99.9 %"),
+    ],
+)
+def test_numbers_are_said_with_the_digits_that_tell(function, values, said):
+    assert function(*values) == said
+
+
+def test_a_damping_of_which_nothing_is_known_is_no_number():
+    assert ExpectedMode(10.0, 0.1, 0.133, 2.91).cells[1] == "not known"
+    assert ExpectedMode(10.0, 0.1, 0.03, 0.002).cells[1] == "3.00 ± 0.20"
+
+
+@dataclass(frozen=True)
+class Told(Answer):
+    def text(self):
+        return Group(Text(SAID), Panel(Text(SAID)))
+
+
+@pytest.mark.parametrize("width", [30, 47, 61, 89])
+def test_a_number_and_what_goes_with_it_stay_on_one_line(width, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", str(width))
+    respond(Told(), as_json=False)
+    lines = capsys.readouterr().out.splitlines()
+    assert all(len(line) <= width and STAND_IN not in line for line in lines)
+    assert all(sum(line.count(what) for line in lines) == 2 for what in WHOLE)
+
+
+def printed(*parts, width=300):
+    drawn = io.StringIO()
+    UnbrokenConsole(file=drawn, width=width).print(Group(*parts))
+    return drawn.getvalue()
+
+
+def test_where_the_line_is_too_short_it_breaks_as_it_can():
+    made = table("", "of a mode", "frequency (Hz)")
+    made.add_row("13.482 ± 0.001", "13.482 ± 0.001")
+    said = printed(made, Text("is 1.3e+06 ± 4e+04 N·m/rad"), width=16)
+    assert STAND_IN not in said
+    assert "is 1.3e+06 ± \n4e+04 N·m/rad" in said
+
+
+def test_an_import_says_how_a_small_sd_changed():
+    before, after = np.array([0.0123, 1.26]), np.array([0.0091, 0.84])
+    refused = (RefusedFile("x.uff", "A second pulse."),)
+    done = PoseImport("P001", ("y.uff",), refused, (), (), 0.5, before, after, (), None, False)
+    assert "sd of frequencies: 0.012 → 0.0091 %, 1.3 → 0.84 %" in printed(*done.parts())
+
+
+def report(verdict: str, *ranked) -> DiagnosisReport:
+    """An answer with these explanations; FRAC 0.9999 with the best of them."""
+    empty = {f.name: None for f in fields(DiagnosisReport)}
+    sides = (Similarity(f, f) for f in (0.9, 0.95, 0.9999))
+    given = {
+        "verdict": verdict, "findings": (), "remarks": (), "plots": (), "simulated": False,
+        "candidates": tuple(RankedExplanation.of(p, q) for p, q in ranked),
+        "fit": ThreefoldSimilarity(*sides), "place_names": {}, "seconds": 1.0,
+        "closest": tuple(EffectAtPlace(*one) for p, _ in ranked for one in p if one[1]),
+        "where": Said(), "shares": Said(), "held_out": Said(),
+    }  # fmt: skip
+    return DiagnosisReport(**(empty | given))
+
+
+class Said:
+    sentence, poses = "", ()
+
+
+@pytest.mark.parametrize(
+    ("verdict", "ranked", "words"),
+    [
+        ("unexplained", ((UNKNOWN, 0.92), (BASE, 0.08)),
+         ("None of the effects that planner knows explains", "(probability 92 %)", "0.9999",
+          "base compliance at base and transverse compliance at joint_1:")),
+        ("unexplained", ((UNKNOWN, 1.0), ((("none", None),), 0.0)),
+         ("none of the effects that planner knows describes it",)),
+        ("explained", ((BASE, 1.0),), ("explains",)),
+    ],
+)  # fmt: skip
+def test_a_verdict_names_what_comes_nearest(verdict, ranked, words):
+    answer = report(verdict, *ranked)
+    assert all(said in answer.verdict_text for said in words)
+    assert answer.to_json()["verdict_text"] == answer.verdict_text
+
+
+def test_joints_have_the_names_that_the_robot_has_for_them(tmp_path):
+    robot_toml = make_plain_arm(tmp_path)
+    assert place_names(Robot.load(robot_toml)) == {}
+    for path in (robot_toml, tmp_path / "plain.urdf"):
+        path.write_text(path.read_text().replace("joint_1", "swing").replace("link_2", "arm"))
+    assert place_names(Robot.load(robot_toml)) == {"joint_1": "swing", "link_2": "arm"}
+    named = with_names("joint_1 gives; joint_10 and link_2", {"joint_1": "swing", "link_2": "arm"})
+    assert named == "joint_1 (swing) gives; joint_10 and link_2 (arm)"
+    answer = replace(report("unexplained", (BASE, 0.08)), place_names={"joint_1": "swing"})
+    assert "joint_1 (swing)" in answer.verdict_text
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (["base_compliance base"], "adds springs at A5 and base, the diagnosis names base."),
+        (["base_compliance base", "transverse_compliance joint_5"], ""),
+        (["joint_stiffness joint_2"], ""),
+        ([], ""),
+    ],
+)
+def test_a_model_and_a_diagnosis_that_differ_are_one_answer(found, said):
+    axis = (1.0, 0.0, 0.0)
+    springs = [
+        RefittedSpring(joint, axis, stated, 1e6, 1e4, "N·m/rad", True)
+        for joint, stated in (("A2", 2e6), ("A5", None), ("base", None))
+    ]
+    each = [dict(zip(("effect", "at"), one.split(), strict=True)) for one in found]
+    answer = {"findings": each, "place_names": {"joint_2": "A2", "joint_5": "A5"}}
+    both = two_answers(springs, answer)
+    assert said in both
+    assert bool(said) == bool(both)
+
+
+def test_a_diagnosis_says_small_probabilities_and_the_pose_at_odds():
+    odd = OddPose("P003", 95.1, 0.009)
+    answer = replace(report("explained", (BASE, 0.99), (UNKNOWN, 7e-123)), odd_pose=odd)
+    drawn = io.StringIO()
+    Console(file=drawn, width=300).print(answer.text())
+    for said in ("below 0.1 %", "99 %", "Pose P003 is at odds with all others",
+                 "(misfit 0.0090, with it 95; 1 just matters)"):  # fmt: skip
+        assert said in drawn.getvalue()
+    said = answer.to_json()["odd_pose"]
+    assert said == {"pose": "P003", "misfit": 95.1, "misfit_without": 0.009, "text": odd.sentence}
+
+
+def test_a_refit_that_is_farther_off_is_explained():
+    assert "peaks are farther off" in MismatchShares(-6.3, 2.1, -34.4, -46.6).sentence
+    assert "peaks" not in MismatchShares(-6.3, -9.0, -34.4, -46.6).sentence
+
+
+@pytest.mark.parametrize(
+    ("history", "target", "least", "left", "said"),
+    [
+        ([8.0, 4.0, 2.0, 1.0], 0.25, 3, (2, 2), "2.0 min per pose; 2 more poses, 4 min to go"),
+        ([1.0, 0.1], 0.5, 2, (0, 0), "below the target"),
+        ([0.1], 0.5, 3, (2, 2), ""),
+        ([2.5, 0.7, 34.6, 0.9], 0.1, 3, None, "no trend yet"),
+        ([2.5, 2.49, 2.48, 2.47], 0.1, 3, None, "no trend yet"),
+        ([1.0, 2.0, 4.0, 8.0], 0.1, 3, None, "no trend yet"),
+        ([3.0, 1.0], 0.1, 3, None, "no trend yet"),
+    ],
+)
+def test_poses_and_minutes_to_go_are_said_by_a_trend(history, target, least, left, said):
+    line = progress_line(history, target, 120.0, least).plain
+    assert said in line
+    if left is None:
+        assert "more pose" not in line
+        assert "to go" not in line
+    else:
+        assert poses_to_go(history, target, least) == left
+
+
+def test_ranges_hold_the_truth_about_as_often_as_they_should():
+    """Falls by a third, with scatter: two standard errors' width holds most of the true counts."""
+    rng, held, told = np.random.default_rng(0), 0, 0
+    for _ in range(300):
+        falls = np.log(1.5) + 0.25 * rng.standard_normal(60)
+        path = 10 * np.exp(-np.cumsum(falls))
+        left = poses_to_go(path[:6].tolist(), 0.3, 3)
+        if left is None or path[5] <= 0.3:
+            continue
+        true = int(np.argmax(path[6:] <= 0.3)) + 1
+        low, high = left
+        assert 1 <= low <= (high or MOST_TOLD) <= MOST_TOLD
+        told += 1
+        held += low <= true and (high is None or true <= high)
+    assert told > 200
+    assert held / told > 0.6

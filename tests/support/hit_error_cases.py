@@ -1,0 +1,98 @@
+"""Cells whose hits miss axis and point by known amounts, recorded by the other engine."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.campaign.hit_errors import HitErrorEstimate
+from planner.campaign.model import Model
+from planner.truth.arms import ARMS
+from planner.truth.cases import PEAK_N
+from planner.truth.deviation import Deviation
+from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
+from planner.truth.hits import AXES, Hammer, write_recordings
+from planner.truth.load import load_truth
+from planner.truth.measurement_errors import EVERYDAY, HitError, MeasuringChain
+from planner.truth.model import Truth
+from planner.truth.scene import PULSE_S
+
+SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do
+
+HAND = replace(EVERYDAY, angle_deg=2.0, offset_m=0.005)  # beside the chain and aims of a real cell
+NOISE = 0.01  # of the responses, relative to the largest
+SAME = 0.01  # relative difference of frequencies below which two modes are the same
+
+
+@dataclass(frozen=True, eq=False)
+class MissedCell:
+    """A campaign's inputs and the truth: of each pose, where it stood and how its hits missed."""
+
+    robot_toml: Path
+    campaign_toml: Path
+    recordings: Path
+    truth: Truth
+    chain: MeasuringChain
+    q: dict[str, np.ndarray]
+    aims: dict[str, list[HitError]]
+
+    def misses(self, pose: str, hits: tuple[HitErrorEstimate, ...]) -> tuple[np.ndarray, ...]:
+        """Told, its sds, and true misses (n, 4) of a pose's hits, in the order of the files."""
+        pairs = [(h.tilt_deg, h.offset_mm, h.tilt_sd_deg, h.offset_sd_mm) for h in hits]
+        told = np.array([[*tilt, *offset] for tilt, offset, _, _ in pairs])
+        sd = np.array([[*tilt, *offset] for _, _, tilt, offset in pairs])
+        true = []
+        for hit, aim in zip(hits, self.aims[pose], strict=True):
+            axis, sign = AXES.index(hit.hit[1]), -1.0 if hit.hit[0] == "-" else 1.0
+            across = [(axis + 1) % 3, (axis + 2) % 3]
+            # The force of a hit along −x is minus (x + aim.direction).
+            tilt = sign * np.rad2deg(aim.direction[across])
+            true.append([*tilt, *(1e3 * aim.offset_m[across])])
+        return told, sd, np.array(true)
+
+    def residue_errors(self, model: Model) -> np.ndarray:
+        """(m,): of each labelled mode's residues to those that exact hits would give this chain."""
+        out = []
+        seen = replace(self.truth, sensor_offset_m=self.chain.offset_m)
+        for pose, residues in zip(model.labelled, model.seen_exactly.residue, strict=True):
+            frequency, _, residue = seen.modes(self.q[pose.pose], 8)
+            residue = self.chain.matrix @ residue / self.chain.force_gain
+            for mode, found in zip(pose.modes, residues, strict=True):
+                if mode is None:
+                    continue
+                k = int(np.argmin(np.abs(frequency - mode.frequency_hz)))
+                if abs(frequency[k] / mode.frequency_hz - 1) < SAME:
+                    off = np.linalg.norm(found - residue[k])
+                    out.append(off / np.linalg.norm(residue[k]))
+        return np.array(out)
+
+
+def missed_cell(folder: Path, robot: str, poses: int, repeats: int, seed: int) -> MissedCell:
+    """Hits along each axis, in both senses, at `poses` poses; `repeats` a pose and axis."""
+    rng, noise = np.random.default_rng([seed, 24]), np.random.default_rng([seed, 25])
+    arm = ARMS[robot]
+    robot_toml = arm.write(folder / "robot", 1)
+    deviation = replace(SCATTER, seed=seed)
+    truth, hammer = load_truth(robot_toml, deviation), Hammer(PEAK_N[robot], PULSE_S, noise=NOISE)
+    chain, common = HAND.chain(rng), HAND.common(rng)
+    shots = [(f"{'+-'[k % 2]}{a}", hammer.peak_n) for a in AXES for k in range(repeats)]
+    axes = [AXES.index(hit[1]) for hit, _ in shots]
+    visits, stood, aimed, readback = [], {}, {}, {}
+    for i, q in enumerate(arm.poses(poses, seed)):
+        name = f"P{i + 1:02d}"
+        readback[name] = np.round(np.rad2deg(q), 4)
+        off = np.deg2rad(HAND.readback_deg) * rng.standard_normal(len(q))
+        stood[name] = np.deg2rad(readback[name]) + off
+        aimed[name] = HAND.aims(axes, rng, common)
+        visits.append(HitVisit(stood[name], shots, i / poses, aimed[name]))
+    found = hit_poses(truth, InjectedFaults(deviation, chain=chain), visits, hammer, noise)
+    rows = [
+        (name, readback[name], k % repeats + 1, hit)
+        for name, hits in zip(readback, found, strict=True)
+        for k, hit in enumerate(hits)
+    ]
+    # Files of a pose are named by hit and repeat, all different.
+    write_recordings(folder / "recordings", truth.joint_names, rows, hammer, "missed hits")
+    campaign_toml = folder / "campaign.toml"
+    campaign_toml.write_text(arm.campaign())
+    return MissedCell(robot_toml, campaign_toml, folder / "recordings", truth, chain, stood, aimed)

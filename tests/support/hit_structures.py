@@ -1,0 +1,44 @@
+"""FRFs of simulated structures as a hammer test would give them, nuisances and all."""
+
+import numpy as np
+
+from planner.frf.matrix import FrfMatrix
+from planner.recording.dof import Dof
+from tests.support.structures import Structure
+
+NOISE = 0.01  # of the rms of each FRF
+
+
+def hit_frfs(
+    structure: Structure,
+    references: list[int],
+    frequency_hz: np.ndarray,
+    rng: np.random.Generator,
+) -> FrfMatrix:
+    """A matrix of FRFs of all points hit and felt at `references` (indices), with NOISE."""
+    poles, shapes = structure.poles()
+    s = 2j * np.pi * frequency_hz
+    residues = shapes[:, None] * shapes[references]
+    up, down = 1 / (s - poles[:, None]), 1 / (s - poles.conj()[:, None])
+    h = s**2 * (residues @ up + residues.conj() @ down)
+    level = NOISE * np.sqrt(np.mean(np.abs(h) ** 2, axis=-1, keepdims=True))
+    h = h + level * (rng.normal(size=h.shape) + 1j * rng.normal(size=h.shape)) / np.sqrt(2)
+    return FrfMatrix(
+        frequency_hz,
+        tuple(dof_of(structure, i) for i in range(len(structure.nodes))),
+        tuple(dof_of(structure, i) for i in references),
+        h,
+        np.full(h.shape, np.nan),
+        True,
+    )
+
+
+def dof_of(structure: Structure, index: int) -> Dof:
+    """Name of a degree of freedom."""
+    return Dof(str(structure.nodes[index]), structure.directions[index])
+
+
+def unit_mass_shapes(structure: Structure) -> tuple[np.ndarray, np.ndarray]:
+    """Poles (m,) and shapes (n, m) with residue = φφᵀ/(2iω_d)."""
+    poles, shapes = structure.poles()
+    return poles, shapes * np.sqrt(2j * poles.imag)
