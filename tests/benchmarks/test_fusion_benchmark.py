@@ -6,67 +6,13 @@ several times the times aimed at, so that a busy machine does not fail them.
 
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
 
-from planner.design.propose import propose
-from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
 from tests.support.outside import with_tests
-from tests.support.surrogates import observed, simulated
 
 X = np.random.default_rng(9).random((1000, 2))
-
-
-def fastest(action, repeats=3):
-    """Least of a few wall times in s."""
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        action()
-        times.append(time.perf_counter() - start)
-    return min(times)
-
-
-@pytest.mark.slow
-def test_times_of_a_step():
-    low = simulated(X)
-    print("\n  n   refit  predict 1000  propose of 1000   [s]")
-    for n, bound in ((10, 0.5), (20, 1.2), (40, 4.0)):
-        surrogate = fit_surrogate(observed(n, 0))
-        refit = fastest(lambda n=n: fit_surrogate(observed(n, 1)))
-        predict = fastest(lambda s=surrogate: s.predict(X, low))
-        pick = fastest(lambda s=surrogate: propose("integrated_variance", s, X, low, 1, None, 0))
-        print(f"{n:3d}  {refit:6.3f}  {predict:12.3f}  {pick:15.3f}")
-        assert refit < bound
-        assert predict < 2.0
-        assert pick < 2.0
-
-
-def eight_modes(n, seed):
-    """Eight modes at n poses: 8 × (frequency, damping, 18 residue parts) = 160 outputs."""
-    rng = np.random.default_rng(seed)
-    x = rng.random((n, 3))
-    low = simulated(x, 8)
-    f = 1.1 * low.frequency_hz * (1 + 0.02 * np.sin(4 * x[:, :1]))
-    zeta = 0.03 * np.exp(0.1 * rng.standard_normal(f.shape))
-    residue = 1.3 * low.residue * (1 + 0.1 * rng.standard_normal((n, 8, 3, 3)))
-    sd = np.full(residue.shape, 1e-8)
-    return ModalObservations(x, f, 1e-3 * f, zeta, 0.05 * zeta, residue, sd, low)
-
-
-@pytest.mark.slow
-def test_time_of_160_outputs():
-    print("\n  n  refit of 160 outputs: wall s, processor s")
-    for n in (10, 15, 30):
-        fit_surrogate(eight_modes(n, 0))
-        start, own = time.perf_counter(), time.process_time()
-        for seed in range(3):
-            fit_surrogate(eight_modes(n, seed + 1))
-        wall, own = (time.perf_counter() - start) / 3, (time.process_time() - own) / 3
-        print(f"{n:3d}  {wall:6.2f} {own:6.2f}")
-        assert own < 1.5
 
 
 @pytest.mark.slow

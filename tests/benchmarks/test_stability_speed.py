@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from planner.milling.cutter_modes import real_modes
-from planner.milling.lobes import stability_limits
 from planner.milling.machine import Machine, multipliers
 from planner.milling.period import Discretisation
 from planner.milling.semi_discretisation import semi_growth
@@ -68,22 +66,3 @@ def test_full_discretisation_costs_less_at_the_same_error():
     print(f"|µ| within {wanted:g}: semi {steps} steps {1e3 * semi:.1f} ms, full degree {degree} "
           f"{1e3 * full:.1f} ms, ratio {semi / full:.0f}")  # fmt: skip
     assert full < semi
-
-
-@pytest.mark.slow
-def test_a_diagram_of_six_modes():
-    random = np.random.default_rng(1)
-    hertz = np.array([11.0, 22.0, 31.0, 47.0, 820.0, 1400.0])
-    zeta = np.array([0.03, 0.03, 0.025, 0.02, 0.03, 0.02])
-    mass = np.array([300.0, 250.0, 200.0, 150.0, 0.8, 0.5])
-    along = random.standard_normal((6, 2))
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    modes = real_modes(hertz, zeta, mass, along)
-    given = {"spindle_rpm": (4000.0, 16000.0, 400), "depth_m": (0.0, 0.02, 200)}
-    with threadpool_limits(1):
-        full = cpu(lambda: stability_limits(machine(modes, cut(**given))), 1)
-        zeroth = cpu(
-            lambda: stability_limits(machine(modes, cut(**given, method="zeroth_order"))), 1
-        )
-    print(f"400 speeds up to 20 mm, six modes: full {full:.1f} s, zeroth order {zeroth:.2f} s")
-    assert zeroth < full

@@ -1,4 +1,7 @@
-"""FRFs of a campaign: what is left out says what to trust, and how far off FRFs are elsewhere."""
+"""FRFs of a campaign: what is left out says what to trust, and how far off FRFs are elsewhere.
+
+`pytest -m slow tests/campaign/test_frf_model.py` takes a robot that other springs nearly fit.
+"""
 
 from dataclasses import replace
 
@@ -94,6 +97,7 @@ def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
 
 
+@pytest.mark.slow
 def test_a_link_that_bends_is_found_though_other_springs_nearly_fit(tmp_path):
     case = make("irb6640", "bending link", 7308, tmp_path, poses=5)
     model = case.model(2)

@@ -90,17 +90,6 @@ def test_a_kept_model_is_the_fitted_one(tmp_path, store, fitted):
     assert [p.pose for p in again.labelled] == list(POSES[:1])
 
 
-def test_a_damaged_entry_is_fitted_again(folder, store, fitted):
-    first = Campaign(folder, store).model
-    entry = max(store.folder.iterdir(), key=lambda path: path.stat().st_size)
-    whole = entry.read_bytes()
-    for damaged in (whole[: len(whole) // 2], whole[:-1] + bytes([whole[-1] ^ 1]), b""):
-        entry.write_bytes(damaged)
-        assert same(first, Campaign(folder, store).model)
-        assert entry.read_bytes() != damaged  # kept again
-    assert len(fitted) == 4
-
-
 def test_another_configuration_program_or_folder_has_another_model(
     folder, store, fitted, monkeypatch, tmp_path
 ):
@@ -152,14 +141,6 @@ def test_replay_takes_no_model_that_was_kept(folder, store, monkeypatch):
     steps = list(replay(Campaign(folder, store)))
     assert {step.check for step in steps} <= {"identical", "close", "kept"}
     assert len(steps[-1].model.labelled) == len(POSES)
-
-
-def test_a_folder_that_cannot_be_written_only_costs_time(folder, tmp_path, fitted):
-    blocked = tmp_path / "file"
-    blocked.write_text("no folder")
-    models = [Campaign(folder, Store(blocked / "models")).model for _ in range(2)]
-    assert same(*models)
-    assert len(fitted) == 2
 
 
 def test_status_of_a_kept_model_needs_no_heavy_library(folder):

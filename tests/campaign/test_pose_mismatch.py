@@ -1,4 +1,8 @@
-"""Refused hits, and hits of another pose than stated: in the log, asked about, not used."""
+"""Refused hits, and hits of another pose than stated: in the log, asked about, not used.
+
+`pytest -m slow tests/campaign/test_pose_mismatch.py` imports hits of a wrong sensitivity, too, and
+moves those of a pose that the robot had not left.
+"""
 
 import csv
 import json
@@ -36,7 +40,7 @@ def pool():
 
 @pytest.fixture(scope="module")
 def three(tmp_path_factory, pool):
-    """A campaign of three poses."""
+    """A campaign of two poses, to be copied."""
     campaign = begun(tmp_path_factory.mktemp("three"))
     for pose in MEASURED:
         (report,) = campaign.import_paths((pool.folder,), pose)
@@ -104,10 +108,9 @@ def wrong(tmp_path_factory, pool):
 
 @pytest.fixture(scope="module")
 def held_once(three, wrong, tmp_path_factory):
-    """The campaign in which they are held, to be copied, and what the import said."""
+    """The campaign in which they are held, to be copied, and what the import's command said."""
     folder = shutil.copytree(three, tmp_path_factory.mktemp("held") / "campaign")
-    (report,) = Campaign(folder).import_paths((wrong,))
-    return folder, report
+    return folder, *call("import", folder, wrong, "--json")
 
 
 @pytest.fixture
@@ -116,18 +119,22 @@ def held(held_once, tmp_path):
 
 
 def test_hits_of_another_pose_are_held_until_confirmed(campaign, held, held_once, wrong):
-    before, report = campaign.model.frequency_sd_percent, held_once[1]
-    asked = report.question
+    before, (folder, code, out, err) = campaign.model.frequency_sd_percent, held_once
+    # After a crash all is known from the log, and nothing of it is used.
+    again = held
+    assert list(again.state.measurements) == list(MEASURED)
+    asked = again.state.held["X1"].question
     assert asked is not None
     assert asked.off_percent > 20
     assert "Is the robot at X1?" in asked.text
     assert asked.fits == ""
-    assert report.accepted == ()
-    assert {hit.reason for hit in report.refused} == {asked.text}
-    # After a crash all is known from the log, and nothing of it is used.
-    again = held
-    assert list(again.state.measurements) == list(MEASURED)
-    assert again.state.held["X1"].question == asked
+    answer = json.loads(out)
+    assert (code, answer["accepted"]) == (3, [])
+    assert (answer["question"]["pose"], answer["question"]["text"]) == ("X1", asked.text)
+    assert {entry["reason"] for entry in answer["refused"]} == {asked.text}
+    assert asked.text in err
+    assert f"planner confirm {folder} X1" in err
+    assert len(err.splitlines()) == 1
     assert not again.orphans()
     np.testing.assert_array_equal(again.model.frequency_sd_percent, before)
     (held,) = status(again).to_json()["held"]
@@ -135,10 +142,14 @@ def test_hits_of_another_pose_are_held_until_confirmed(campaign, held, held_once
     (once_more,) = again.import_paths((wrong,))
     assert once_more.question == asked
     assert len(once_more.already) == 12
+    assert call("confirm", again.directory, "A11")[0] == 2
     with unlearned(again.directory):
-        again.confirm("X1")
-        assert "X1" in [m.pose for m in again.state.used]
-        assert not again.state.held
+        said = call("confirm", again.directory, "X1")[1]
+    assert "frequency (Hz)" in said
+    assert "hits accepted" in said
+    again = Campaign(again.directory)
+    assert "X1" in [m.pose for m in again.state.used]
+    assert not again.state.held
     again.undo()
     assert again.state.held["X1"].question == asked
     again.undo()
@@ -167,20 +178,17 @@ def test_hits_listed_along_wrong_axes_are_asked_about(campaign, pool):
 @pytest.mark.parametrize(
     ("wrong", "about", "said"),
     [
-        ({}, "", ""),
         ({"off_deg": (0, 0, 8.0, 0, 0, 0)}, "readback", "is joint_3"),
         ({"other_way": "x"}, "chain", "towards −x?"),
-        ({"louder": 1.12}, "chain", "12 % too large"),
+        pytest.param({"louder": 1.12}, "chain", "12 % too large", marks=pytest.mark.slow),
     ],
 )
-def test_misread_angles_and_hits_from_behind_are_asked_about_right_ones_are_not(
+def test_misread_angles_and_hits_from_behind_are_asked_about(
     campaign, pool, tmp_path, wrong, about, said
 ):
     folder = claim(tmp_path / "wrong", pool, WRONG, WRONG, **wrong)
     (report,) = campaign.import_paths((folder,))
-    assert (report.question is not None) == bool(wrong)
-    if report.question is None:
-        return
+    assert report.question is not None
     assert report.question.about == about
     assert said in report.question.text
     if about == "readback":
@@ -189,6 +197,7 @@ def test_misread_angles_and_hits_from_behind_are_asked_about_right_ones_are_not(
         assert abs(read - stated[int(said[-1]) - 1]) < 0.5
 
 
+@pytest.mark.slow
 def test_hits_of_a_pose_left_unmoved_are_told_and_moved(campaign, pool, tmp_path):
     """The robot still stands where an open proposal says: the question names it."""
     proposals = campaign.next(3)
@@ -217,23 +226,6 @@ def test_hits_of_a_pose_left_unmoved_are_told_and_moved(campaign, pool, tmp_path
     assert not campaign.state.held
     campaign.undo()
     assert campaign.state.held[stated].question == report.question
-
-
-def test_a_mistyped_readback_is_asked_about(campaign, pool, tmp_path):
-    proposal = campaign.next()[0]
-    hits = _nearest(campaign, pool, proposal)
-    angles = pool.rows[hits][0].joints_deg
-    _put(campaign, {proposal.pose: angles})
-    folder = claim(tmp_path / "typed", pool, hits, hits, proposal.pose)
-    wrong = (*angles[:2], angles[2] - 30.0, *angles[3:])
-    text = (folder / TABLE).read_text()
-    said = ",".join(map(str, angles))
-    assert said in text
-    (folder / TABLE).write_text(text.replace(said, ",".join(map(str, wrong))))
-    (report,) = campaign.import_paths((folder,))
-    assert report.question is not None
-    assert report.question.about == "readback"
-    assert f"is joint_3 {angles[2]:.2f}° or {wrong[2]:.2f}°" in report.question.text
 
 
 def _nearest(campaign, pool, proposal):
@@ -301,22 +293,3 @@ def test_refused_files_stay_out_unless_they_are_named(tmp_path, pool):
         again.undo()
     assert not again.state.refused
     assert not again.state.measurements
-
-
-def test_the_commands_say_it_and_answer_it(campaign, pool, tmp_path):
-    folder = claim(tmp_path / "wrong", pool)
-    code, out, err = call("import", campaign.directory, folder, "--json")
-    assert code == 3
-    answer = json.loads(out)
-    assert answer["accepted"] == []
-    assert answer["question"]["pose"] == "X1"
-    assert {entry["reason"] for entry in answer["refused"]} == {answer["question"]["text"]}
-    assert answer["question"]["text"] in err
-    assert f"planner confirm {campaign.directory} X1" in err
-    assert len(err.splitlines()) == 1
-    assert call("confirm", campaign.directory, "A11")[0] == 2
-    with unlearned(campaign.directory):
-        said = call("confirm", campaign.directory, "X1")[1]
-    assert "frequency (Hz)" in said
-    assert "hits accepted" in said
-    assert "X1" in [m.pose for m in Campaign(campaign.directory).state.used]

@@ -10,13 +10,16 @@ from planner.campaign.campaign import Campaign
 from planner.dataset.store import Store
 from planner.demo import NAME, shipped
 from planner.errors import InputError
+from tests.support.outside import FROZEN
 
 
 @pytest.fixture(scope="module")
 def one(tmp_path_factory):
     """A campaign of one pose."""
     source, folder = shipped(NAME), tmp_path_factory.mktemp("one") / "campaign"
-    campaign = Campaign.new(folder, source / "robot" / "robot.toml", source / "campaign.toml")
+    plan = folder.with_name("campaign.toml")
+    plan.write_text(f"{(source / plan.name).read_text()}\n{FROZEN}")
+    campaign = Campaign.new(folder, source / "robot" / "robot.toml", plan)
     campaign.import_paths((source / "recordings",), "A11")
     return folder
 

@@ -1,4 +1,7 @@
-"""Hits of another pose, or with a wrong angle, under a pose's name, after few measurements."""
+"""Hits of another pose, or with a wrong angle, under a pose's name, after few measurements.
+
+`pytest -m slow tests/campaign/test_wrong_pose.py` asks after two as well.
+"""
 
 import csv
 
@@ -40,7 +43,7 @@ def measured_at(arm: Arm, folder, q: np.ndarray) -> list[MeasuredPose]:
     return [measure(own, BAND_HZ) for own in sources.values()]
 
 
-@pytest.mark.parametrize("poses", [1, 2])
+@pytest.mark.parametrize("poses", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_another_pose_is_asked_about_before_three_are_measured(tmp_path, poses):
     arm = make_generated_arm(tmp_path, 922, 4, 3)
     campaign = measured(arm, tmp_path, poses)

@@ -96,8 +96,12 @@ def test_named_columns(bench, tmp_path, suffix):
     assert len(json.loads(out)["modes"]) >= 2
 
 
-@pytest.mark.parametrize("suffix", WRITERS)
-@pytest.mark.parametrize("what", bad_columns(LIKE_COLUMNS))
+# All that may be wrong in one format, and in the others what their readers look for themselves.
+BAD_COLUMNS = [(what, ".csv") for what in bad_columns(LIKE_COLUMNS)]
+BAD_COLUMNS += [(what, s) for what in ("no time_s", "nan") for s in WRITERS if s != ".csv"]
+
+
+@pytest.mark.parametrize(("what", "suffix"), BAD_COLUMNS)
 def test_bad_named_columns(bench, tmp_path, suffix, what):
     *_, hit = bench
     bad = tmp_path / f"bad_hit{suffix}"
@@ -111,14 +115,13 @@ def test_bad_named_columns(bench, tmp_path, suffix, what):
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
-@pytest.mark.parametrize("cut", ["1 byte", "100 bytes", "a third", "half"])
+@pytest.mark.parametrize("cut", ["100 bytes", "half"])
 def test_named_columns_cut_short(bench, tmp_path, suffix, cut):
     *_, hit = bench
     bad = tmp_path / f"bad_hit{suffix}"
     WRITERS[suffix](bad, columns(hit))
     whole = bad.read_bytes()
-    counts = {"1 byte": 1, "100 bytes": 100, "a third": len(whole) // 3, "half": len(whole) // 2}
-    kept = whole[: counts[cut]]
+    kept = whole[: 100 if cut == "100 bytes" else len(whole) // 2]
     if suffix == ".csv":
         # A text table cut between two rows is a whole, shorter record: it is cut in a row.
         kept = kept.rsplit(b",", 1)[0]
@@ -143,18 +146,14 @@ def added(lines: str):
 
 STIFF = "stiffness = 60000.0"
 BAND = "band_hz = [5.0, 110.0]"
-# What is wrong in a file, and a part of the sentence that says so.
+# What is wrong in a file, and a part of the sentence that says so; test_robot_config.py has more.
 CONFIGURATIONS = {
     "robot/robot.toml": {
-        "no urdf file": (replaced('urdf = "arm.urdf"', 'urdf = "none.urdf"'), "none.urdf"),
         "no urdf": (replaced('urdf = "arm.urdf"\n', ""), "urdf is missing; add it."),
         "urdf of no file system": (
             replaced('urdf = "arm.urdf"', 'urdf = "a\\u0000.urdf"'),
             "correct the entry urdf",
         ),
-        "unknown frame": (replaced('tcp_frame = "tool"', 'tcp_frame = "nose"'), "nose"),
-        "unknown joint": (replaced('joint = "joint_a1"', 'joint = "joint_9"'), "joint_9"),
-        "negative stiffness": (replaced(STIFF, "stiffness = -1.0"), "stiffness"),
         "stiffness a word": (
             replaced(STIFF, 'stiffness = "high"'),
             "[[compliance]] stiffness must be a number, not",
@@ -164,19 +163,13 @@ CONFIGURATIONS = {
             replaced("damping = ", "dampening = ", 1),
             '[[compliance]] has no entry "dampening"; "damping" may be meant.',
         ),
-        "axis no unit vector": (replaced("axis = [0, 0, 1]", "axis = [0, 0, 3]"), "axis"),
-        "axis of two": (replaced("axis = [0, 0, 1]", "axis = [0, 0]"), "axis"),
         "half": (lambda text: text[: len(text) // 2].rsplit("=", 1)[0], "robot.toml"),
         "nothing elastic": (lambda text: text.split("[[compliance]]")[0], "compliance"),
         "empty": (lambda text: "", "is missing; add it."),
-        "binary": (lambda text: "\x00\x01\x02", "robot.toml"),
     },
     "robot/arm.urdf": {
-        "half": (lambda text: text[: len(text) // 2], "arm.urdf"),
-        "another format": (lambda text: "<mujoco/>", "arm.urdf"),
         "empty": (lambda text: "", "arm.urdf"),
         "joint that slides": (replaced('type="revolute"', 'type="prismatic"', 1), ""),
-        "axis a word": (replaced('<axis xyz="0 1 0"/>', '<axis xyz="0 one 0"/>', 1), "arm.urdf"),
     },
     "plan/campaign.toml": {
         "key misspelt": (replaced("cou", "cuo"), '[modes] has no entry "cuont"; "count" may be'),
@@ -196,10 +189,7 @@ CONFIGURATIONS = {
             'no model "kriging"; choose one',
         ),
         "unknown kernel": (added('[surrogate]\nkernel = "cosine"'), 'there is no kernel "cosine"'),
-        "no number": (added("[stop]\nfrequency_sd_percent = nan"), "frequency_sd_percent"),
         "no end": (added("[goal]\njoints_deg = [[0, inf, 0, 0, 0, 0]]"), "joints_deg"),
-        "goal of five": (added("[goal]\njoints_deg = [[1, 2, 3, 4, 5]]"), "[goal] joints_deg"),
-        "zone of one": (added("[[forbidden]]\njoints_deg = [[1, 2]]"), "[[forbidden]]"),
         "empty": (lambda text: "", "is missing; add it."),
     },
 }

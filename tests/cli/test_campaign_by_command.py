@@ -9,6 +9,7 @@ import pytest
 
 from planner.report.springs import with_exponent
 from planner.surrogate.frequency_models import MODELS
+from planner.truth.load import load_truth
 from planner.truth.model import Truth
 from tests.support.outside import call, make_cell, record, told
 from tests.support.robots import JOINTS_DEG
@@ -62,6 +63,7 @@ def three(tmp_path_factory) -> Three:
         folder = record(truth, root / f"export{number}", names[-1], proposal["joints_deg"], number)
         report = told("import", cell, folder)
         assert (report["pose"], len(report["accepted"])) == (names[-1], 9)
+        assert report["refused"] == []
         if number:
             after[number + 1] = predicted(cell, table)
     assert measured(cell) == [(name, False) for name in names]
@@ -86,12 +88,39 @@ def test_what_the_simulation_learned_of_each_joint_stands_beside_what_was_stated
     assert all(word in page.read_text() for word in ('id="learned"', 'href="#learned"', shown))
 
 
-def test_status_forecasts_and_compares_models(three):
+def likeness(a: np.ndarray, b: np.ndarray) -> float:
+    """Complex correlation of two sets of FRFs, 1 for the same."""
+    return float(np.abs(np.vdot(a, b)) / (np.linalg.norm(a) * np.linalg.norm(b)))
+
+
+def test_frfs_anywhere_are_nearer_to_the_truth_than_the_simulation(three, tmp_path):
+    answer = told("predict", three.cell, three.table, "--out", tmp_path / "out.npz")
+    with np.load(answer["npz"]) as npz:
+        lines, found = npz["frequency_hz"], npz["frf_mean"]
+        assert found.shape == npz["frf_sd"].shape == (2, 3, 3, lines.size)
+    true, simulated = (
+        np.array([one.accelerance(np.deg2rad(q), lines) for q in ASKED])
+        for one in (three.truth, load_truth(three.stated))
+    )
+    assert likeness(found, true) > likeness(simulated, true)
+
+
+def test_status_forecasts_and_compares_models(three, tmp_path, monkeypatch):
     said = " ".join(call("status", three.cell)[1].split())
     assert "RMSE over the workspace is about" in said
     assert "is told once" not in said
+    status = told("status", three.cell, "--plot", tmp_path)
+    assert status["simulated"] is True
+    left_out = status["leave_one_out"]
+    assert left_out["values"] == len(left_out["frequencies"]) > 6
+    assert 0.5 < left_out["coverage"]["0.95"] <= 1
+    for row in left_out["frequencies"]:
+        assert abs(row["measured_hz"] - row["predicted_hz"]) < 8 * row["sd_hz"]
+    assert Path(status["plots"][0]).read_bytes().startswith(b"\x89PNG")
+    few = {name: model for name, model in MODELS.items() if name != "mfdgp"}  # which takes long
+    monkeypatch.setattr("planner.campaign.model_comparison.MODELS", few)
     models = told("status", three.cell, "--models")["models"]
-    assert {m["model"] for m in models} == set(MODELS)
+    assert {m["model"] for m in models} == set(few)
     assert [m["model"] for m in models if m["campaign"]] == ["default"]
     density = {m["model"]: m["log_density"] for m in models}
     assert [m["model"] for m in models] == sorted(density, key=lambda name: -density[name])

@@ -18,7 +18,6 @@ from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESCRIPTIONS, DESIGNS
 from planner.milling.cut import Cut, load_cut
 from planner.milling.tool import ToolTable, load_tool
-from planner.report.documentation import manual
 from planner.robot.config import RobotConfig
 
 COMMANDS = typer.main.get_command(app).commands
@@ -38,16 +37,6 @@ def test_every_command_has_an_example_that_it_takes(name):
     example = " ".join(text.partition("Example:")[2].split())
     assert example.startswith(f"planner {name} "), text
     parsed(example)
-
-
-def test_the_tutorials_commands_are_taken():
-    told = re.search(r'<section id="tutorial">(.*?)</section>', manual([]), re.DOTALL)
-    assert told
-    blocks = re.findall(r"<pre>(.*?)</pre>", told[1], re.DOTALL)
-    lines = [line for block in blocks for line in html.unescape(block).splitlines()]
-    assert len(lines) > 8
-    for line in lines:
-        parsed(line)
 
 
 def names_of(kind: type[msgspec.Struct]) -> set[str]:
@@ -81,34 +70,49 @@ def test_the_schema_tells_defaults_and_choices(capsys):
     assert run(["schema", "log"]) == 2
 
 
-def test_the_manual_quotes_files_that_are_right(tmp_path, capsys):
-    assert run(["manual", "--out", str(tmp_path / "manual.html")]) == 0
-    html = (tmp_path / "manual.html").read_text()
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """The manual, as its command writes it."""
+    path = tmp_path_factory.mktemp("manual") / "manual.html"
+    assert run(["manual", "--out", str(path)]) == 0
+    return path.read_text()
+
+
+def test_the_tutorials_commands_are_taken(written):
+    told = re.search(r'<section id="tutorial">(.*?)</section>', written, re.DOTALL)
+    assert told
+    blocks = re.findall(r"<pre>(.*?)</pre>", told[1], re.DOTALL)
+    lines = [line for block in blocks for line in html.unescape(block).splitlines()]
+    assert len(lines) > 8
+    for line in lines:
+        parsed(line)
+
+
+def test_the_manual_quotes_files_that_are_right(written):
     found: list[str] = []
     reader = HTMLParser()
     reader.handle_data = found.append
-    reader.feed(html)
+    reader.feed(written)
     text = "".join(found)
     robot = (EXAMPLE / "robot" / "robot.toml").read_text()
     assert robot in text
     assert tomllib.loads(robot)["urdf"] == "robot.urdf"
     assert all(f"planner {name}" in text for name in COMMANDS)
     assert all(name in text for name in names_of(RobotConfig) | names_of(CampaignConfig))
-    assert not re.search(r"https?://|<script", html)
-    links = re.findall(r'href="#(\w+)"', html)
+    assert not re.search(r"https?://|<script", written)
+    links = re.findall(r'href="#(\w+)"', written)
     assert links
-    assert all(f'id="{link}"' in html for link in links)
+    assert all(f'id="{link}"' in written for link in links)
 
 
-def test_every_acquisition_is_told_in_schema_and_manual(tmp_path, capsys):
+def test_every_acquisition_is_told_in_schema_and_manual(written, capsys):
     assert set(DESCRIPTIONS) == {*ACQUISITIONS, *DESIGNS}
     assert run(["schema", "campaign"]) == 0
     schema = capsys.readouterr().out
-    assert run(["manual", "--out", str(tmp_path / "manual.html")]) == 0
-    manual = (tmp_path / "manual.html").read_text()
+
     for name, about in DESCRIPTIONS.items():
         assert f"{name}: {about.split()[0]}" in schema
-        assert about in html.unescape(manual)
+        assert about in html.unescape(written)
 
 
 def test_help_swallows_no_brackets(capsys):

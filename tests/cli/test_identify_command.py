@@ -105,8 +105,8 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
     shutil.copytree(robot.parent, copy)
     toml, out = copy / robot.name, copy / "identified.toml"
     few = part_of(folder, tmp_path / "few", {"P0", "P1"})
-    options = ["--held-out", 0, "--plot", tmp_path / "plots"]
-    options += ["--rrd", tmp_path / "found.rrd"]
+    options = ["--held-out", 0, "--no-extend", "--no-inertias"]  # which is quick
+    options += ["--plot", tmp_path / "plots", "--rrd", tmp_path / "found.rrd"]
     code, said, _ = call("identify", few, "--robot", toml, "--out", out, *options)
     said = " ".join(said.split())
     wanted = "joint_a1", "N·m/rad", "SIMULATED", "No pose was held out"

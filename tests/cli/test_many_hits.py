@@ -7,9 +7,6 @@ from pathlib import Path
 from planner.recording.hits import hits_from
 from planner.recording.read import hits_in, read
 from tests.support.outside import call, make_cell, record
-from tests.support.robots import JOINTS_DEG
-
-MIDDLE = [round((a + b) / 2, 3) for a, b in JOINTS_DEG]
 
 
 def joined(files: list[Path], target: Path) -> Path:

@@ -68,8 +68,7 @@ def test_a_folder_of_one_pose_is_that_pose(folder, tmp_path):
     assert found == pytest.approx([mode["frequency_hz"] for mode in answer["modes"]], rel=1e-3)
 
 
-@pytest.mark.parametrize("robot", [True, False])
-def test_poses_named_twice_in_scripts_that_fonts_lack(folder, tmp_path, robot):
+def test_poses_named_twice_in_scripts_that_fonts_lack(folder, tmp_path):
     """The robot stood still between two poses; their names draw no warning."""
     names = {"1": "\u59ff\u52bf", "2": "\U00012000 2"}  # by the number of the hit
 
@@ -77,9 +76,7 @@ def test_poses_named_twice_in_scripts_that_fonts_lack(folder, tmp_path, robot):
         return [names[row[8]], *row[1:]] if row[0] == "A21" and row[8] in names else None
 
     two = some_of(folder, tmp_path / "two", still)
-    toml = str(shipped("kr240_plane") / "robot" / "robot.toml")
-    options = ["--robot", toml] if robot else []
-    code, out, err = call("modes", two, "--plot", tmp_path / "plots", *options)
+    code, out, err = call("modes", two, "--plot", tmp_path / "plots")
     assert (code, err) == (0, "")
     assert "Modes of 2 poses" in out
     assert "SIMULATED" in out.upper()

@@ -66,7 +66,6 @@ def test_without_a_wish_nothing_is_drawn(hits):
     ("options", "words"),
     [
         (("--plot", "taken"), "taken is a file; name a folder"),
-        (("--plot", "taken/below"), "taken/below"),
         (("--plot", "blocked"), "blocked"),
         (("--plot", ".", "--format", "pdf"), "give png or svg"),
         (("--rrd", "taken/below.rrd"), "taken/below.rrd"),

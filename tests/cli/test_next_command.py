@@ -13,6 +13,7 @@ from planner.campaign.events import Proposed
 from planner.design.propose import ACQUISITIONS, DESIGNS
 from planner.session.screen import NoKeys
 from planner.session.watch import watch
+from tests.support.cuts import SLOT
 from tests.support.outside import said, told
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
@@ -24,17 +25,7 @@ def robot(tmp_path) -> Path:
     return make_plain_arm(tmp_path / "robot")
 
 
-CUT = """teeth = 2
-diameter_m = 0.01
-milling = "slot"
-kt_n_m2 = 6.0e8
-kr_n_m2 = 2.0e8
-feed = [1.0, 0.0, 0.0]
-axis = [0.0, 0.0, 1.0]
-spindle_rpm = [600, 3000, 3]
-depth_m = [0.0, 0.001, 4]
-method = "zeroth_order"
-"""
+CUT = SLOT.format("600, 3000, 3", "0.0, 0.001, 4", "zeroth_order")
 
 
 def begun(
@@ -62,12 +53,14 @@ def test_every_acquisition_is_logged_so_that_it_reads_back(name, robot, tmp_path
     more = ""
     if name == "stability":
         (robot.parent / "cut.toml").write_text(CUT)
-        more = "[cut]\nspeed_rpm = 1200.0\ndepth_m = 1e-4\n"
-    asked = proposed_again(begun(tmp_path / "asked", robot, more=more), "--acquisition", name)
-    stated = proposed_again(begun(tmp_path / "stated", robot, name, more))
-    assert asked == stated
-    for proposal in asked:
+        more = "[cut]\nspeed_rpm = 1200.0\ndepth_m = 1e-4\njoints_deg = [[0, -40, 50, 0]]\n"
+    for proposal in proposed_again(begun(tmp_path, robot, name, more)):
         assert (proposal["score"] is None) == (name in DESIGNS)
+
+
+def test_an_acquisition_that_is_asked_for_is_that_of_the_file(robot, tmp_path):
+    asked = proposed_again(begun(tmp_path / "asked", robot), "--acquisition", "variance")
+    assert asked == proposed_again(begun(tmp_path / "stated", robot, "variance"))
 
 
 def test_a_log_in_which_a_score_became_null_opens(robot, tmp_path):

@@ -9,17 +9,11 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.recording.read import place_in_name
 from planner.robot.robot import Robot
+from tests.support.cuts import SLOT
 from tests.support.outside import call, make_cell, told
 
 MODES = {"xx": (22.0, 0.03, 200.0), "yy": (27.0, 0.025, 250.0)}
-CUT = """teeth = 2
-diameter_m = 0.02
-milling = "slot"
-kt_n_m2 = 6.0e8
-kr_n_m2 = 2.0e8
-spindle_rpm = [600, 1400, 5]
-depth_m = [0.0, 0.02, 200]
-"""
+CUT = SLOT.format("600, 1400, 5", "0.0, 0.02, 200", "full_discretisation")
 
 
 def write_frf(path: Path, hertz: np.ndarray, values: np.ndarray, unit: str) -> None:
@@ -67,7 +61,7 @@ def test_a_tap_test_in_files_of_one_frf_each(tmp_path):
 
 @pytest.mark.parametrize("how", ["table", "names"])
 def test_frfs_as_text_into_a_campaign(tmp_path, how):
-    robot, plan, _ = make_cell(tmp_path)
+    robot, plan, _ = make_cell(tmp_path, learns=False)
     cell, taps = tmp_path / "cell", tmp_path / "taps"
     taps.mkdir()
     told("new", cell, "--robot", robot, "--campaign", plan)

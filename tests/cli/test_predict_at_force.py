@@ -53,11 +53,13 @@ def test_robot_and_campaign_answer_at_the_force(cell, tmp_path):
 
 def test_a_cut_is_asked_at_a_force(cell, tmp_path):
     _, campaign, poses = cell
-    cut = tmp_path / "cut.toml"
+    cut, path = tmp_path / "cut.toml", tmp_path / "path.csv"
     cut.write_text(CUT)
+    head, *_, last = poses.read_text().splitlines()  # of the pose without a force
+    path.write_text(f"{head}\n{last}\n")
 
     def chatter(*force: object) -> list[float]:
-        said = told("stability", campaign, "--cut", cut, "--path", poses, "--samples", 20, *force)
+        said = told("stability", campaign, "--cut", cut, "--path", path, "--samples", 20, *force)
         return said["depth_limit_m"]
 
     assert chatter() != chatter("--peak-force-n", 2000)

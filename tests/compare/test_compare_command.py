@@ -202,6 +202,7 @@ def test_other_versions_of_the_program_are_refused(bench):
         (("--repeats", "0"), "repeats"),
     ],
 )
-def test_bad_input_is_one_sentence(pool, out, first, more, words):
+def test_bad_input_is_one_sentence(pool, out, first, more, words, monkeypatch):
+    monkeypatch.setattr("planner.compare.cluster.CONNECT_TIMEOUT_S", 0.5)
     code, shown, err = call(*command(pool, out), *more, "--json")
     assert (code, shown, err.count("\n"), words in err) == (2, "", 1, True), err

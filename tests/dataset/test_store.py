@@ -234,16 +234,6 @@ def test_the_programs_hash_follows_its_packages():
     assert len({whole, some, content_hash.program("modal")}) == 3
 
 
-def test_damage_to_a_kept_pose_is_made_good(sources, tmp_path):
-    first = MeasuredPose(sources, BAND_HZ, store=Store(tmp_path))
-    agree(first, MeasuredPose(sources, BAND_HZ))
-    for path in tmp_path.iterdir():
-        data = bytearray(path.read_bytes())
-        data[len(data) // 2] ^= 255
-        path.write_bytes(bytes(data))
-    agree(MeasuredPose(sources, BAND_HZ, store=Store(tmp_path)), first)
-
-
 def test_a_file_that_changes_while_it_is_read_is_not_kept(tmp_path, monkeypatch):
     hits = write_hits(tmp_path)
     read = measuring.read_files

@@ -1,6 +1,7 @@
 """Diagnoses of small cells from the other engine: what they say, and in which form.
 
-`pytest -m slow tests/diagnosis/test_diagnose.py` lets all rounds look for what nothing describes.
+`pytest -m slow tests/diagnosis/test_diagnose.py` conceals all effects one after the other, and lets
+all rounds look for what nothing describes.
 """
 
 import json
@@ -23,6 +24,7 @@ from tests.support.small_cases import CONCEALED, SCATTER, SmallCase, small_case
 
 # The others have tests of their own; a gain is concealed beside a soft base, too.
 NAMES = [n for n in CONCEALED if n not in ("nothing", "outsider", "soft base", "gain", "window")]
+QUICK = ("drift",)  # of the campaign; of the robot "soft base", of its sensor "window" are below
 
 
 def diagnosed(case: SmallCase, *options: object) -> dict[str, Any]:
@@ -61,7 +63,9 @@ def places(answer: dict[str, Any]) -> set[tuple[str, str]]:
     return {(f["effect"], f["at"]) for f in answer["findings"]}
 
 
-@pytest.mark.parametrize("errors", [LABORATORY, EVERYDAY], ids=["exact hits", "everyday's"])
+@pytest.mark.parametrize(
+    "errors", [pytest.param(LABORATORY, marks=pytest.mark.slow), EVERYDAY], ids=["exact", "usual"]
+)
 def test_where_nothing_is_concealed_nothing_is_found(tmp_path, errors):
     answer = diagnosed(small_case(tmp_path, CONCEALED["nothing"], errors))
     assert answer["verdict"] == "consistent"
@@ -98,7 +102,9 @@ def assert_named_and_sized(answer: dict[str, Any], name: str) -> None:
         assert value["value"] == pytest.approx(true, abs=4 * value["sd"], rel=0.05)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in NAMES]
+)
 def test_what_is_concealed_is_named_and_sized(tmp_path, name):
     assert_named_and_sized(diagnosed(small_case(tmp_path, CONCEALED[name])), name)
 

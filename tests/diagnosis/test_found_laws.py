@@ -1,4 +1,7 @@
-"""A law that was found is written, read back, and predicts poses and forces that were set aside."""
+"""A law that was found is written, read back, and predicts poses and forces that were set aside.
+
+`pytest -m slow tests/diagnosis/test_found_laws.py` takes two more robots.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +22,7 @@ from planner.truth.load import load_truth
 from planner.truth.nonlinear import Port
 from tests.diagnosis.test_levels import made
 
-LEVELS = (0.25, 0.6, 1.6, 4.0)  # of the middling force; recorded were 0.4, 1 and 2.5
+LEVELS = (0.25, 4.0)  # of the middling force; recorded were 0.4, 1 and 2.5
 
 
 # None of these seeds was used while this was built.
@@ -27,7 +30,7 @@ LEVELS = (0.25, 0.6, 1.6, 4.0)  # of the middling force; recorded were 0.4, 1 an
     "seed", [21, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (22, 23))]
 )
 def test_a_law_is_written_and_predicts_other_poses_and_forces(tmp_path: Path, seed: int):
-    robot, recorded, law = made(tmp_path, seed, "hardening", "joint_2", count=3)
+    robot, recorded, law = made(tmp_path, seed, "hardening", "joint_2", count=2)
     assert law is not None
     found = diagnose(recorded, robot).write(tmp_path / "found")
     read = Simulation(Robot.load(tmp_path / "found" / "robot.toml"))

@@ -1,4 +1,7 @@
-"""Joints that are not linear are named from hits of different force; linear robots are not."""
+"""Joints that are not linear are named from hits of different force; linear robots are not.
+
+`pytest -m slow tests/diagnosis/test_levels.py` adds a robot and a joint that hardens.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -91,7 +94,10 @@ def seen(robot: Robot, recorded: Dataset) -> Levels:
     return level_laws(recorded, converged(settled(misfit, minimised(misfit, at.x, 8))))
 
 
-@pytest.mark.parametrize(("seed", "levels"), [(0, LEVELS), (1, LEVELS), (2, (1.0,))])
+SECOND = pytest.param(1, LEVELS, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("seed", "levels"), [(0, LEVELS), SECOND, (2, (1.0,))])
 def test_a_linear_robot_is_proportional(tmp_path: Path, seed: int, levels: tuple[float, ...]):
     found = seen(*made(tmp_path, seed, levels=levels)[:2])
     assert found.laws == ()
@@ -101,7 +107,13 @@ def test_a_linear_robot_is_proportional(tmp_path: Path, seed: int, levels: tuple
 @pytest.mark.parametrize(
     ("law", "joint", "effect", "numbers"),
     [
-        ("hardening", "joint_2", "nonlinear_stiffness", ("stiffness_change", "angle")),
+        pytest.param(
+            "hardening",
+            "joint_2",
+            "nonlinear_stiffness",
+            ("stiffness_change", "angle"),
+            marks=pytest.mark.slow,
+        ),
         ("softening", "joint_3", "nonlinear_stiffness", ("stiffness_change", "angle")),
         ("friction", "joint_2", "friction", ("presliding_stiffness", "coulomb_torque")),
         ("backlash", "joint_3", "backlash", ("lost_stiffness", "half_gap")),

@@ -101,7 +101,7 @@ def test_frfs_at_a_force_are_those_of_time_integration(tmp_path: Path, kind: str
         )
 
 
-@pytest.mark.parametrize("kind", LAWS)
+@pytest.mark.parametrize("kind", ["hardening", "friction"])
 def test_a_mode_moves_with_the_force_as_the_peak_does(tmp_path: Path, kind: str):
     bent, found, seen = Bent.of(kind, tmp_path), [], []
     for level in (0.2, 2.5):

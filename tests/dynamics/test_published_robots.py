@@ -70,7 +70,7 @@ def test_another_engine_reads_the_same_robot(folder, name):
     assert found.frobenius.min() > 1 - 1e-6
 
 
-@pytest.mark.parametrize(("folder", "name"), ROBOTS[:3])
+@pytest.mark.parametrize(("folder", "name"), [*ROBOTS[:3], ("kr240_plane", "robot")])
 def test_kr240_has_the_stiffnesses_as_printed(folder, name):
     """Reading B exchanges y and z at joints 2 and 3. Damping is β = 9.5e-4 s, not the misprint."""
     expected = STIFFNESS.copy()

@@ -22,7 +22,7 @@ from planner.fit.trials import explained
 from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
 from planner.words import significant
-from tests.support.fitted_cases import Case, Judged, everyday, forgotten
+from tests.support.fitted_cases import Case, Judged, everyday
 
 
 @pytest.fixture(scope="module")
@@ -232,16 +232,6 @@ def test_what_may_give_beside_is_only_what_such_a_robot_can_have(case, prior):
     assert "soft_base at base" in labels
     assert "link_flexibility at link_2" not in labels
     exported(wider.structure, wider.at.x)  # and so it is a robot anywhere
-
-
-def test_a_tool_that_the_description_lacks_is_found_at_the_flange(tmp_path):
-    case = forgotten("irb6640", 2, tmp_path)
-    found = case.posterior()
-    judged = Judged.of(case, found)
-    assert "added_mass at link_6" in judged.named
-    assert judged.error < 0.04
-    assert abs(judged.tool_sds) < 2.5
-    assert not departures_text(found.structure, found.x)
 
 
 @pytest.mark.parametrize(("size", "explained"), [(0.004, True), (0.3, False)])

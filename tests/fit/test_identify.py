@@ -282,16 +282,3 @@ def test_springs_that_could_never_carry_the_robot_are_said(tmp_path, frfs):
     simulation = Simulation(Robot.load(make_plain_arm(tmp_path, softer=1e7)))
     with pytest.raises(InputError, match="far too soft to carry the robot's weight"):
         identify(frfs, POSES[:, :4], simulation)
-
-
-def test_what_robot_toml_lacks_is_looked_for(tmp_path, simulation):
-    """Links that bend: identified with them; as stated alone nothing counts as known."""
-    bending = load_truth(KR10.write(tmp_path, 3))
-    given = measured_frfs(bending, POSES, LINES, 0.02), POSES, simulation
-    alone, extended = identify(*given), identify(*given, extend=True)
-    assert not any(e.identifiable for e in alone.estimates)
-    other = KR10.poses(6, seed=50)
-    silent = measured_frfs(bending, other, LINES, 1e-9)
-    better, worse = (fit_similarity(one.simulation, silent, other) for one in (extended, alone))
-    assert better.frac > worse.frac
-    assert better.frobenius > worse.frobenius

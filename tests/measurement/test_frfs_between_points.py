@@ -175,7 +175,3 @@ def test_points_that_make_no_sense_are_refused(tmp_path: Path, more: str, told: 
     with pytest.raises(InputError) as refused:
         Robot.load(write_arm(tmp_path, more))
     assert told in str(refused.value)
-
-
-def _rng() -> np.random.Generator:
-    return np.random.default_rng(5)

@@ -32,11 +32,11 @@ from planner.milling.cutter_frf import of_accelerance
 from planner.milling.lobes import stability_limits
 from planner.milling.structure import of_frf
 from planner.modal.estimate_modes import estimate_modes
-from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, Spring
+from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
-from tests.support.plain_arm import JOINTS_DEG, STIFFNESS, make_plain_arm
+from tests.support.plain_arm import JOINTS_DEG, make_plain_arm
 from tests.support.true_modes import hits_at
 
 BAND_HZ = (3.0, 60.0)
@@ -83,14 +83,14 @@ class DecisionCase:
         return Measurement(f"P{index}", tuple(np.rad2deg(q)), (), modes), frf
 
 
-def make_case(folder: Path, seed: int, simulation: str, foreign: bool) -> DecisionCase:
-    """`simulation` as in campaign.toml; `foreign`: the truth bends, and carries a lump and a hose.
+def make_case(folder: Path, seed: int, simulation: str) -> DecisionCase:
+    """`simulation` as in campaign.toml.
 
     The wanted depth lies in the widest gap between the path's true limits: one can be sure of it.
     """
     toml = make_plain_arm(folder)
     (folder / "cut.toml").write_text(CUT)
-    truth = load_truth(toml, _foreign(seed) if foreign else Deviation(seed, 0.25, 0.25, 0.08, 0.01))
+    truth = load_truth(toml, Deviation(seed, 0.25, 0.25, 0.08, 0.01))
     rng = np.random.default_rng([seed, 7])
     low, high = np.deg2rad(np.array(JOINTS_DEG, float)).T
     given = load_cut(folder / "cut.toml")
@@ -115,18 +115,6 @@ def make_case(folder: Path, seed: int, simulation: str, foreign: bool) -> Decisi
         "cut": {"speed_rpm": float(SPEEDS[at]), "depth_m": depth, "joints_deg": own},
     })  # fmt: skip
     return DecisionCase(Cell.load(toml, config), truth, path, of_speed, depth, seed)
-
-
-def _foreign(seed: int) -> Deviation:
-    stiffness = 2.0 * STIFFNESS[1]
-    bend = tuple(
-        Spring("link_2", a, stiffness, 4e-4 * stiffness) for a in ((0, 1.0, 0), (0, 0, 1.0))
-    )
-    lump = AttachedMass("link_3", (0.1, 0.1, -0.1), 1.2)
-    hose = AttachedResonator("link_2", (0.2, 0.05, 0.1), (0.6, 0.8, 0.0), 0.6, 22.0, 0.02)
-    return Deviation(
-        seed, 0.15, 0.15, 0.05, 0.005, extra=bend, added=(lump,), resonators=(hose,)
-    )  # fmt: skip
 
 
 def true_limits(truth: Truth, q: np.ndarray, given: Cut) -> np.ndarray:
@@ -182,7 +170,7 @@ def runs(folder: Path) -> dict[str, list[dict]]:
         for name in STRATEGIES:
             kept = folder / f"{SIMULATION}_{BUDGET}_{seed}_{name}.json"
             if not kept.exists():
-                case = case or make_case(folder / "arms" / str(seed), seed, SIMULATION, False)
+                case = case or make_case(folder / "arms" / str(seed), seed, SIMULATION)
                 each = [wrong(case, model) for model, _ in play(case, name, BUDGET)]
                 count, sure = zip(*each, strict=True)
                 kept.write_text(json.dumps({"seed": seed, "wrong": count, "sure": sure}))

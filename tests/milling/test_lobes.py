@@ -202,14 +202,6 @@ def test_one_degree_of_freedom_in_closed_form():
     assert found.floor_m == pytest.approx(-1 / (2 * k_s * real), rel=5e-3)
 
 
-def test_isotropic_modes_give_equal_limits_up_and_down():
-    depths = []
-    for milling in ("up", "down"):
-        given = cut(milling=milling, radial_immersion=0.3, spindle_rpm=(6000.0, 18000.0, 5))
-        depths.append([loss.depth_m for loss in stability_limits(machine(two_equal(), given))])
-    np.testing.assert_allclose(depths[0], depths[1], rtol=1e-5)
-
-
 @pytest.mark.parametrize("helix_deg", [0.0, 30.0])
 def test_semi_discretisation_agrees(helix_deg: float):
     given = {

@@ -1,14 +1,11 @@
 """Force levels: grouping, proportional structures, and structures that soften."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
 from planner.frf.estimator import estimate
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.homogeneity import homogeneity
-from planner.recording.force_levels import by_level, peak_n
 from planner.recording.records import Hit
 from tests.support.simulated_hits import POLES, RESIDUES, make_hit
 
@@ -34,18 +31,11 @@ def judged(hits: tuple[Hit, ...]):
     return homogeneity(hits, estimate_modes(estimate(hits, BAND), BAND), BAND)
 
 
-def test_hits_are_grouped_by_strength():
-    hits = struck(0)
-    groups = by_level(hits)
-    assert [len(group) for group in groups] == [6, 6, 6]
-    assert all(max(map(peak_n, a)) < min(map(peak_n, b)) for a, b in pairwise(groups))
-
-
 def test_one_level_has_nothing_to_compare():
     assert judged(struck(0, levels=(500.0,))) is None
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_a_linear_structure_is_homogeneous(seed):
     found = judged(struck(seed))
     assert found is not None
@@ -53,7 +43,7 @@ def test_a_linear_structure_is_homogeneous(seed):
     assert found.remark == ""
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_mode_that_softens_is_told(seed):
     found = judged(struck(seed, softening=0.02))
     assert found is not None
@@ -82,7 +72,7 @@ def aimed(seed: int, repeats: int):
     return tuple(hits)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_hits_that_tilt_are_homogeneous(seed):
     found = judged(aimed(seed, 2))
     assert found is not None

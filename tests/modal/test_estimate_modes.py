@@ -94,7 +94,7 @@ def test_intervals_cover_the_truth(known):
 def test_close_modes_are_told_apart():
     """Pairs 1 to 2 % apart with differing shapes, 1-3 % damping, 2 % noise."""
     found = total = 0
-    for seed in range(12):
+    for seed in range(6):
         rng = np.random.default_rng(seed)
         system = random_system(rng, 4, damping=(0.01, 0.03), pair=rng.uniform(0.01, 0.02))
         h, variance = noisy(exact_frf(system, LINES), 0.02, rng)
@@ -144,7 +144,7 @@ def test_scatter_between_lines_unlike_the_stated_variance_enlarges_the_sd():
 
 def test_sds_do_not_hang_on_the_band():
     """Lines cut off to check the model may be all that hold a mode near the band's edge."""
-    for seed in range(8):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         system = random_system(rng, 5, (8.0, 60.0), damping=(0.01, 0.04))
         h, variance = noisy(exact_frf(system, LINES), 0.003, rng)
@@ -183,7 +183,7 @@ def test_records_that_end_early_are_exact(tail_s):
 def test_hit_directions_that_disagree_do_not_split_a_mode():
     """Frequencies 0.3 % higher in the z column: as many modes as there are, each in between."""
     lost = extra = 0
-    for seed in range(10):
+    for seed in range(5):
         rng = np.random.default_rng(50 + seed)
         system = random_system(rng, 4, damping=(0.005, 0.03), complexity=0.1)
         moved = System(system.frequency_hz * 1.003, system.damping_ratio, system.residues)
@@ -201,7 +201,7 @@ def test_hit_directions_that_disagree_do_not_split_a_mode():
 def test_ripple_makes_no_likely_modes():
     """A 3 % ripple over the FRFs (cable, double hit) that no modal model explains."""
     likely = 0
-    for seed in range(10):
+    for seed in range(5):
         rng = np.random.default_rng(80 + seed)
         system = random_system(rng, 4, damping=(0.005, 0.03))
         h, variance = noisy(exact_frf(system, LINES), 0.005, rng)

@@ -56,7 +56,7 @@ def identified(hits: tuple[Hit, ...], case: str) -> np.ndarray:
     "case", ["no window", "window laid over the records here", "window of the analyser, told"]
 )
 def test_damping_of_a_third_of_a_percent_from_two_seconds(case):
-    found = np.array([identified(struck(seed), case) for seed in range(8)])
+    found = np.array([identified(struck(seed), case) for seed in range(4)])
     off = 100 * (found / DAMPING - 1)
     print(
         f"\n{case}: damping {100 * found.mean():.4f} % for 0.3 %, "

@@ -16,9 +16,7 @@ from tests.support.rough_hammer_sets import geometry_of, rough_set, spoiled, tel
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(3000)]
 SEED = int(os.environ.get("SEED", "2000"))
-SETS, MISSING, PEER = (
-    range(SEED + first, SEED + first + count) for first, count in ((0, 42), (100, 15), (200, 6))
-)
+SETS, MISSING = (range(SEED + first, SEED + first + count) for first, count in ((0, 42), (100, 15)))
 # Whose sign nobody can tell: rows that move less than this (rms, of the usual row); and nodes whose
 # rows differ by less than this, relatively, may stand under each other's names.
 STILL, ALIKE = 0.3, 0.3

@@ -3,8 +3,6 @@
 import subprocess
 import sys
 
-import pytest
-
 from tests.support.outside import with_tests
 
 TESTS = """
@@ -34,13 +32,12 @@ def test_that_does_not_end(left): pass
 """
 
 
-@pytest.mark.parametrize("processes", [(), ("-n", "2")])
-def test_every_result_has_a_row(tmp_path, processes):
+def test_every_result_has_a_row(tmp_path):
     (tmp_path / "test_some.py").write_text(TESTS)
     (tmp_path / "pytest.ini").write_text("[pytest]\nxfail_strict = true\n")
     plugins = "-p", "tests.support.proof_table", "-p", "no:cacheprovider"
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", *plugins, "--table", "found/table.md", *processes],
+        [sys.executable, "-m", "pytest", *plugins, "--table", "found/table.md", "-n", "2"],
         cwd=tmp_path, capture_output=True, text=True, env=with_tests(), check=False,
     )  # fmt: skip
     assert done.returncode == 1, done.stderr

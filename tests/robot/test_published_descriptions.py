@@ -18,7 +18,6 @@ from planner.robot.robot import Robot
 from tests.support.published import AXES, PACKAGE, published, robot_toml
 
 NAME = f"package://{PACKAGE}/meshes/link_1.stl"
-FREE = np.deg2rad([0, 20, 20, 0, 30, 0])
 PACKAGE_XML = f"<package><name> {PACKAGE} </name></package>"
 
 

@@ -68,11 +68,11 @@ def cell(tmp_path):
 
 @pytest.fixture(scope="session")
 def measured_once(tmp_path_factory):
-    """A campaign of four poses, and the robot's truth: to be copied."""
+    """A campaign of three poses, and the robot's truth: to be copied."""
     root = tmp_path_factory.mktemp("measured")
     robot, campaign_toml, truth = make_cell(root)
     campaign = Campaign.new(root / "cell", robot, campaign_toml)
-    for number in range(4):
+    for number in range(3):
         pose = campaign.next()[0]
         folder = record(truth, root / f"made{number}", pose.pose, pose.joints_deg, number)
         (report,) = campaign.import_paths((folder,))
@@ -82,7 +82,7 @@ def measured_once(tmp_path_factory):
 
 @pytest.fixture
 def measured(measured_once, tmp_path):
-    """A campaign of four poses, the robot's truth, and a folder to watch."""
+    """A campaign of three poses, the robot's truth, and a folder to watch."""
     folder, truth = measured_once
     (tmp_path / "inbox").mkdir()
     return Campaign(shutil.copytree(folder, tmp_path / "cell")), truth, tmp_path / "inbox"

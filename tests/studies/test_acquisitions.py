@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.campaign.config import CostTable
 from planner.design.space_filling import NESTED
 from tests.support.acquisition_cases import CELLS, campaign, make
 
@@ -39,7 +38,6 @@ STRATEGIES = {
 }  # "best": along the axes that tell most per minute, not along all  # fmt: skip
 ONLY = os.environ.get("STUDY_ONLY", "")
 AXES = ("all", "best")
-ABOUT = 1.02  # minutes that are as good as equal: travel differs by seconds
 BUDGET = {
     "updated": int(os.environ.get("STUDY_BUDGET", "5")),
     "frozen": int(os.environ.get("STUDY_FROZEN", "12")),
@@ -57,7 +55,6 @@ class Curve:
     """One campaign: errors, minutes, and what the model foretold after each measurement."""
 
     rmse: np.ndarray
-    worst: np.ndarray
     minutes: np.ndarray
     reached: np.ndarray  # foretold probability that the RMSE is below 1 %
     bound: np.ndarray  # foretold 95 % bound of the RMSE
@@ -70,20 +67,6 @@ class Curve:
     def alike(self, frac: float) -> tuple[float, float]:
         """Measurements and minutes from which on the FRAC stays above; ∞ beyond the budget."""
         return self._stays(self.frac >= frac)
-
-    def worst_within(self, minutes: float) -> float:
-        """Worst error in % of the last measurement that ends within the minutes; ∞ if none does."""
-        count = int(np.sum(self.minutes <= minutes))
-        return float(self.worst[count - 1]) if count else np.inf
-
-    def worst_after(self, hits: int) -> float:
-        """Worst error in % of the last measurement that ends within so many hits, an axis each."""
-        cost = CostTable()
-        axes = (np.diff(self.minutes, prepend=0.0) - cost.minutes_per_pose) / (
-            cost.minutes_per_hit * cost.hits_per_axis
-        )  # travel takes seconds
-        count = int(np.sum(np.cumsum(np.round(axes)) <= hits))
-        return float(self.worst[count - 1]) if count else np.inf
 
     def _stays(self, good: np.ndarray) -> tuple[float, float]:
         bad = np.flatnonzero(~good)
@@ -104,9 +87,7 @@ def curve(case, strategy: str, budget: int, initial: int) -> Curve:
         # The rule does not speak before three measurements.
         told = step.model.forecast if step.n >= 3 else None
         reached, bound = (told.reached, told.bound_percent) if told else (0.0, np.inf)
-        rows.append(
-            (step.rmse_percent, step.worst_percent, step.minutes, reached, bound, step.frac)
-        )
+        rows.append((step.rmse_percent, step.minutes, reached, bound, step.frac))
     return Curve(*np.array(rows).T)
 
 
@@ -174,51 +155,6 @@ def saving(ours: np.ndarray, theirs: np.ndarray) -> str:
 def reached(curves: list[Curve], goal: str) -> np.ndarray:
     """(runs, 2) measurements and minutes to a goal of GOALS."""
     return np.array([GOALS[goal](c) for c in curves])
-
-
-def test_measurements_to_the_target(runs):
-    simulation, found = runs
-    base, count = found[BASELINE], len(found[BASELINE])
-    print(f"\n{simulation} simulation, {count} runs a strategy in {len(NAMES)} cells, RMSE in %")
-    for strategy, curves in found.items():
-        middle = np.median([c.rmse for c in curves], axis=0)
-        alike = np.median([c.frac for c in curves], axis=0)
-        print(
-            f"  {strategy:26s}" + " ".join(f"{v:5.2f}" for v in middle)
-            + "   FRAC " + " ".join(f"{v:.3f}" for v in alike)
-        )  # fmt: skip
-    for goal in GOALS:
-        print(f"  to {goal}: median measurements, minutes; reached; saving against {BASELINE}")
-        at = reached(base, goal)
-        for strategy, curves in found.items():
-            own = reached(curves, goal)
-            n, minutes = np.median(own, axis=0)
-            each = [np.median(own[i :: len(NAMES), 0]) for i in range(len(NAMES))]
-            print(
-                f"    {strategy:26s}{n:5.1f} {minutes:6.1f}  {np.isfinite(own[:, 0]).sum()}/{count}"
-                f"  measurements {saving(own[:, 0], at[:, 0])}, minutes "
-                f"{saving(own[:, 1], at[:, 1])}; by cell " + " ".join(f"{v:g}" for v in each)
-            )
-    print("  worst error in % after 4: median of the runs, 9 of 10, all; saving in the median")
-    at = np.array([c.worst[3] for c in base])
-    for strategy, curves in found.items():
-        own = np.array([c.worst[3] for c in curves])
-        of = " ".join(f"{v:6.2f}" for v in np.quantile(own, [0.5, 0.9, 1.0]))
-        print(f"    {strategy:26s}{of}  {saving(own, at)}")
-    for hits in (4, 6):
-        print(f"  the same after {hits} hits, a hit being one axis of one pose")
-        at = np.array([c.worst_after(hits) for c in base])
-        for strategy, curves in found.items():
-            own = np.array([c.worst_after(hits) for c in curves])
-            print(f"    {strategy:26s}{np.median(own):6.2f}  {saving(own, at)}")
-    print("  the same within the minutes of the other's 3")
-    at = np.array([c.worst[2] for c in base])
-    for strategy, curves in found.items():
-        pairs = zip(curves, base, strict=True)
-        own = np.array([c.worst_within(ABOUT * b.minutes[2]) for c, b in pairs])
-        print(f"    {strategy:26s}{np.median(own):6.2f}  {saving(own, at)}")
-    for curves in found.values():
-        assert all(np.isfinite(c.rmse).all() for c in curves)
 
 
 def test_the_default_beside_a_frozen_simulation_on_a_latin_hypercube(tmp_path):

@@ -1,4 +1,7 @@
-"""What the papers' studies are made of: data, splits, the command's answers to bad input."""
+"""What the papers' studies are made of: data, splits, the command's answers to bad input.
+
+`pytest -m slow tests/studies/test_study_parts.py` looks at the sweep of Busch et al. 2020.
+"""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -6,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planner.effects.parameters import Priors, parametrise
+from planner.effects.parameters import parametrise
 from planner.errors import InputError
 from planner.progress import no_progress
 from planner.studies import registry
@@ -29,6 +32,7 @@ def swept():
     return busch2020.sweep(1)
 
 
+@pytest.mark.slow
 def test_the_sweep_has_the_papers_points(swept):
     assert swept.simulated.size == 12_801
     assert swept.amplitude.size == 2_622
@@ -38,6 +42,7 @@ def test_the_sweep_has_the_papers_points(swept):
     assert np.array_equal(seen.every(3).angles_deg, seen.angles_deg[::3])
 
 
+@pytest.mark.slow
 def test_the_swept_robot_has_a_resonance_that_its_simulation_lacks(swept):
     """In the band, across the arm: two simulated, three true ones (and in-plane ones in both)."""
     seen, truth = swept, busch2020.true_robot(1)
@@ -136,25 +141,6 @@ def test_bad_input_is_one_sentence(tmp_path, monkeypatch):
         registry.named("birk2025")
 
 
-def test_the_most_informative_points_come_first():
-    """Of D-optimal points the first few tell more than as many neighbours on one path."""
-    simulation = FITS.stated("12P")
-    truth = birk.true_robot(11)
-    q, path = birk.poses(truth, 6)
-    assert list(path[:6]) == ["S1"] * 6
-    informative = FITS.Informative.of(simulation, Priors(), (), q, 1.0, (5.0, 200.0))
-    chosen = informative.best(4)
-    assert len(set(chosen.tolist())) == 4
-    assert informative.determined(chosen) >= informative.determined(np.arange(4))
-    covariance, told = informative.covariance, informative.information.sum(axis=1)
-
-    def gain(rows):
-        return np.linalg.slogdet(np.eye(len(covariance)) + covariance @ told[rows].sum(axis=0))[1]
-
-    assert all(gain([chosen[0]]) >= gain([i]) for i in range(len(q)))
-    assert gain(chosen) > gain([0, 1, 2, 3])
-
-
 def test_the_truth_of_birk_is_of_another_class():
     truth = birk.true_robot(11)
     assert len(truth.deviation.beams) == 3
@@ -185,14 +171,6 @@ def test_nine_modes_make_70_models_that_hold_each_parameter_once(reference):
     assert len(found) == 70  # section 5.2 of the paper
     assert max(len(group) for group in found) == 3
     np.testing.assert_array_equal(np.sort(np.concatenate(found)), np.arange(144))
-
-
-def test_the_frequencies_of_low_modes_and_of_high_ones_are_apart():
-    found = [set(group.tolist()) for group in SCORES.groups(np.arange(9), np.full(9, 3))]
-    f = [16 * k for k in range(9)]
-    assert [set(f[:3]), set(f[3:5]), set(f[5:7]), set(f[7:])] == [g for g in found if g & set(f)]
-    assert {2, 4} in found  # real parts of L at 1X and 1aX
-    assert {13, 15} in found  # imaginary parts of R at 1Y and 1aY
 
 
 def test_others_that_are_known_at_a_tested_posture_tell_what_it_is():

@@ -9,7 +9,7 @@ import scipy.io
 from planner.truth.hits import SimulatedHit
 from tests.support.outside import HAMMER
 
-CUTS = tuple(np.random.default_rng(7).uniform(size=30))  # where a file ends, of its length
+CUTS = tuple(np.random.default_rng(7).uniform(size=10))  # where a file ends, of its length
 
 
 def edited(lines: list[str], row: int, column: int, cell: str) -> list[str]:

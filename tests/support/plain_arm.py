@@ -28,13 +28,13 @@ def urdf() -> str:
     return "\n".join(text)
 
 
-def make_plain_arm(folder: Path, said: str = "", softer: float = 1.0) -> Path:
-    """Write the robot folder, its robot.toml beginning with `said`; returns robot.toml."""
+def make_plain_arm(folder: Path, softer: float = 1.0) -> Path:
+    """Write the robot folder, its springs that much softer; returns robot.toml."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "plain.urdf").write_text(urdf())
     lines = [
         'name = "plain arm"', 'urdf = "plain.urdf"', 'tcp_frame = "tcp"', 'sensor_frame = "tcp"',
-        "band_hz = [3.0, 60.0]", said,
+        "band_hz = [3.0, 60.0]",
     ]  # fmt: skip
     for i, (axis, stiffness) in enumerate(zip(AXES, STIFFNESS, strict=True), 1):
         k = stiffness / softer

@@ -69,16 +69,15 @@ def make_sliding(
     folder: Path,
     axes: tuple[Axis, ...] = RAIL_ARM,
     tip: str = "0.4 0.04 0.05",
-    softer: dict[str, float] | None = None,
     said: str = "",
 ) -> Path:
-    """Write the robot folder; `softer` divides springs by joint. Returns robot.toml."""
+    """Write the robot folder; returns robot.toml."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "robot.urdf").write_text(urdf(axes, tip))
     lines = ['name = "sliding"', 'urdf = "robot.urdf"', 'tcp_frame = "tcp"', 'sensor_frame = "tcp"',
              "band_hz = [3.0, 60.0]", said]  # fmt: skip
     for one in axes:
-        k = one.stiffness / (softer or {}).get(one.name, 1.0)
+        k = one.stiffness
         n_m = ("_n_m", "_n_s_m") if one.kind == "prismatic" else ("", "")
         axis = [float(v) for v in one.axis.split()]
         lines += ["[[compliance]]", f'joint = "{one.name}"', f"axis = {axis}"]
@@ -88,14 +87,12 @@ def make_sliding(
     return path
 
 
-def sliding_campaign(
-    path: Path, box: tuple[tuple[float, float], ...] = RAIL_BOX, count: int = 3, more: str = ""
-) -> Path:
+def sliding_campaign(path: Path, box: tuple[tuple[float, float], ...] = RAIL_BOX) -> Path:
     """Write a campaign.toml over the joint box; returns its path."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(
         f"[workspace]\njoints_deg = {[list(r) for r in box]}\n"
-        f"[modes]\ncount = {count}\nband_hz = [3.0, 60.0]\n"
-        f'[acquisition]\nname = "integrated_variance"\ncandidates = 40\n{more}'
+        "[modes]\ncount = 3\nband_hz = [3.0, 60.0]\n"
+        '[acquisition]\nname = "integrated_variance"\ncandidates = 40\n'
     )
     return path

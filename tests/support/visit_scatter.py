@@ -1,4 +1,4 @@
-"""Frequencies of five true robots (MuJoCo) that scatter from visit to visit.
+"""Frequencies of true robots (MuJoCo) that scatter from visit to visit.
 
 A visit's ln f is the pose's plus scatter, half of its variance common to all modes, half each
 mode's own; EMA adds a noise whose sd it states. What is scored are new visits at other poses.
@@ -11,17 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
-from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import ModalObservations
 from planner.truth.arms import ARMS
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.load import load_truth
-from tests.support.plain_arm import JOINTS_DEG, make_plain_arm
 
-KR240 = Path(__file__).parents[2] / "campaigns" / "kr240_plane" / "robot" / "robot.toml"
-KR240_DEG = ((-60, 60), (-110, -40), (40, 120), (-60, 60), (20, 80), (-90, 90))
 MODES, POOL, NEW_VISITS = 4, 150, 100
 EMA_SD = 1e-3  # of ln f
 OFF = 0.003  # rms of ln f that an identified simulation is off by, smoothly over the poses
@@ -30,49 +25,35 @@ FLOOR_STIFFNESS = 25.0  # of the truth's floor over the stiffest stated joint
 
 @dataclass(frozen=True, eq=False)
 class TrueRobot:
-    """Poses x (POOL, d) in [0, 1] and ln f (POOL, MODES): the truth's and three simulations'.
-
-    "stated" has the structure but for the floor, and stiffnesses off by 15 %; "identified" is off
-    by OFF; "foreign" is another robot's.
-    """
+    """Poses x (POOL, d) in [0, 1] and ln f (POOL, MODES): the truth's and two simulations'."""
 
     x: np.ndarray
     truth: np.ndarray
     simulated: dict[str, np.ndarray]
 
 
-ROBOTS = (*ARMS, "plain", "kr240")
+ROBOTS = tuple(ARMS)
 
 
 @cache
 def true_robot(name: str) -> TrueRobot:
     """One of ROBOTS; a second of MuJoCo the first time."""
-    seed = ROBOTS.index(name)
-    folder = Path(tempfile.mkdtemp())
-    if name in ARMS:
-        toml, box = ARMS[name].write(folder, 2), ARMS[name].joints_deg
-    elif name == "plain":
-        toml, box = make_plain_arm(folder), JOINTS_DEG
-    else:
-        toml, box = KR240, KR240_DEG
-    robot = Robot.load(toml)
-    stiffness = FLOOR_STIFFNESS * max(c.stiffness for c in robot.config.compliance)
+    seed, arm = ROBOTS.index(name), ARMS[name]
+    toml = arm.write(Path(tempfile.mkdtemp()), 2)
+    stiffness = FLOOR_STIFFNESS * max(*arm.torsion, *arm.bending)
     floor = tuple(
-        Spring("joint_1" if name == "plain" else "base", axis, stiffness, 3e-4 * stiffness)
+        Spring("base", axis, stiffness, 3e-4 * stiffness)
         for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     )
     true = load_truth(toml, Deviation(seed + 1, 0.15, 0.15, 0.05, 0.005, extra=floor))
     rng = np.random.default_rng(seed)
-    low, high = np.deg2rad(np.transpose(box))
+    low, high = np.deg2rad(np.transpose(arm.joints_deg))
     x = rng.random((POOL, len(low)))
     q = low + x * (high - low)
     truth = np.log([true.modes(pose, MODES)[0] for pose in q])
-    stated = np.log(Simulation(robot).modes(q, MODES).frequency_hz)
     simulated = {
-        "stated": stated,
         "identified": truth + OFF * _smooth(x, rng),
         "offset": truth + 0.05 * rng.standard_normal(MODES) + OFF / 3 * _smooth(x, rng),
-        "foreign": np.log(20 + 8 * np.sin(3 * x[:, :1] + np.arange(MODES))),
     }
     return TrueRobot(x, truth, simulated)
 

@@ -1,4 +1,4 @@
-"""Kernel expressions: laws, columns, angles, gradients against finite differences."""
+"""Kernel expressions: laws, columns, sums and products; test_limits.py has their slopes."""
 
 import jax
 import jax.numpy as jnp
@@ -12,13 +12,12 @@ from planner.errors import InputError
 from planner.surrogate.kernels import KERNELS, parse
 from planner.surrogate.likelihood import log_marginal
 
-EXPRESSIONS = [
-    *KERNELS,
+SUMS = [
     "rbf+bias",
     "rbf[0:2]*quadratic[2:3]+linear",
     "matern52[:1]+cubic[1:]*bias",
     "quadratic*matern52+rbf[2:]",
-]
+]  # in which every kernel occurs
 
 
 @pytest.fixture(autouse=True)
@@ -31,7 +30,7 @@ def random_theta(kernel, rng):
     return 0.3 * rng.standard_normal(kernel.size)
 
 
-@pytest.mark.parametrize("expression", EXPRESSIONS)
+@pytest.mark.parametrize("expression", [*KERNELS, *SUMS])
 @settings(deadline=None, max_examples=15)
 @given(st.integers(0, 1000))
 def test_expressions_are_positive_semidefinite_and_say_their_diagonal(expression, seed):
@@ -44,7 +43,7 @@ def test_expressions_are_positive_semidefinite_and_say_their_diagonal(expression
     assert np.linalg.eigvalsh(k)[0] > -1e-8 * np.max(np.abs(k))
 
 
-@pytest.mark.parametrize("expression", EXPRESSIONS)
+@pytest.mark.parametrize("expression", SUMS)
 def test_many_hyperparameters_at_once_as_one_by_one_and_in_both_libraries(expression):
     rng = np.random.default_rng(0)
     kernel = parse(expression, 3)
@@ -76,29 +75,6 @@ def test_what_is_no_kernel_is_said_in_words(wrong):
         parse(wrong, 2)
 
 
-@pytest.mark.parametrize("expression", EXPRESSIONS)
-def test_gradients_agree_with_finite_differences(expression):
-    """The log marginal likelihood's, in θ, points and values."""
-    rng = np.random.default_rng(2)
-    kernel = parse(expression, 3)
-    x, y, theta = rng.standard_normal((9, 3)), rng.standard_normal(9), random_theta(kernel, rng)
-
-    def value(theta, x, y):
-        k = kernel.covariance(jnp, theta, x, x) + 0.1 * jnp.eye(9)
-        return log_marginal(k, y)
-
-    slopes = jax.grad(value, argnums=(0, 1, 2))(theta, x, y)
-    for place, argument in enumerate((theta, x, y)):
-        direction = rng.standard_normal(argument.shape)
-        ends = []
-        for step in (1e-5, -1e-5):
-            moved = [theta, x, y]
-            moved[place] = argument + step * direction
-            ends.append(float(value(*moved)))
-        numeric = (ends[0] - ends[1]) / 2e-5
-        np.testing.assert_allclose(np.sum(slopes[place] * direction), numeric, rtol=1e-5, atol=1e-6)
-
-
 def test_log_marginal_is_the_normal_density():
     from scipy.stats import multivariate_normal
 
@@ -112,7 +88,7 @@ def test_log_marginal_is_the_normal_density():
 
 
 @pytest.mark.parametrize("shape", ["rbf", "matern52"])
-@pytest.mark.parametrize("d", [1, 2, 3, 6])
+@pytest.mark.parametrize("d", [2, 6])
 def test_a_compiled_kernel_is_one_on_its_diagonal(shape, d):
     """XLA may compute r² twice and differently; the diagonal was 0.52 once."""
     x = np.random.default_rng(4).random((64, d))

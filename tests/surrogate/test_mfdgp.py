@@ -6,7 +6,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
 
 from planner import jax_setup
 from planner.surrogate.kernels import parse
@@ -97,35 +96,6 @@ def test_the_bound_is_what_its_definition_says(trained):
     unsure = np.std(told) / np.sqrt(len(told))
     assert unsure < 0.05
     np.testing.assert_allclose(np.mean(told), total, atol=4 * unsure)
-
-
-def test_the_bound_stays_below_the_evidence_and_comes_near_it():
-    """Where layer 2 hardly looks at layer 1, both are GPs, of which the evidence is known."""
-    x, z = np.linspace(0, 1, 20)[:, None], np.linspace(0, 1, 9)[:, None]
-    rng = np.random.default_rng(1)
-    low, high = wave(x) + 0.1 * rng.standard_normal(20), bent(z) + 0.1 * rng.standard_normal(9)
-    fitted = fit_mfdgp(Samples.of(x, low), Samples.of(z, high), replace(HOW, free_steps=3000))
-    first, second = fitted.layers
-    blind = second.theta.copy()
-    blind[0] = -9.0
-    layers = first, second._replace(theta=blind)
-    data = fitted.data
-    evidence = 0.0
-    for kernel, theta, at, y in (
-        (parse("rbf", 1), first.theta, data.x_low, data.y_low),
-        (TiedKernel.cutajar(1), blind, np.column_stack([data.x_high, data.y_high]), data.y_high),
-    ):
-        k = kernel.covariance(np, theta, at, at) + np.exp(2 * theta[1]) * np.eye(len(at))
-        evidence += multivariate_normal(np.zeros(len(at)), k).logpdf(y)
-    assert float(bound(layers, data, 0, 256)) < evidence
-    own = multivariate_normal(
-        np.zeros(20),
-        parse("rbf", 1).covariance(np, first.theta, data.x_low, data.x_low)
-        + np.exp(2 * first.theta[1]) * np.eye(20),
-    ).logpdf(data.y_low)
-    mean, covariance, u, s, k = moments(parse("rbf", 1), first, data.z_low, data.x_low)
-    reached = expected(first.theta, data.y_low, mean, np.diag(covariance)).sum()
-    assert own - 3 < reached - divergence(u, s, k) < own
 
 
 def test_a_prediction_is_integrated_over_the_first_layer(trained):

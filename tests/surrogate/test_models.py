@@ -1,11 +1,9 @@
 """What every averaged model of one output has to do, and what each becomes in the right limit."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from planner.surrogate.models.averaged import AR1_PRIOR, fit_ar1_nargp, fit_gp, fit_recursive
+from planner.surrogate.models.averaged import fit_ar1_nargp, fit_gp, fit_recursive
 from planner.surrogate.models.likelihood_gp import Exact, Samples
 from tests.support.compilations import compilations
 
@@ -85,17 +83,6 @@ def test_intervals_hold(fit):
     assert np.mean(inside) > 0.85
 
 
-def test_ar1_nargp_without_a_bend_is_ar1():
-    """ℓ of the cheap level → ∞: the product kernel no longer sees it."""
-    s = samples(8)
-    mean = fit_recursive(s, Exact(low), SPREAD, "rbf").predict(GRID)[0]
-    wide = replace(AR1_PRIOR, length_spread=1e-6)
-    one = fit_recursive(s, Exact(low), SPREAD, "rbf+rbf", wide)
-    two = fit_ar1_nargp(s, Exact(low), SPREAD, "rbf[0:2]*bias+rbf[0:2]", wide)
-    np.testing.assert_allclose(one.predict(GRID)[0], two.predict(GRID)[0], atol=1e-8)
-    np.testing.assert_allclose(mean, two.predict(GRID)[0], atol=0.1)
-
-
 def test_ar1_nargp_follows_a_bent_relation_that_ar1_cannot():
     x = np.random.default_rng(3).random((14, 1))
     wave = Exact(lambda x: np.sin(8 * np.pi * x[:, 0]))  # Perdikaris et al. 2017, section 3.1
@@ -135,13 +122,3 @@ def test_growth_compiles_nothing():
         for n in range(4, 16):
             fit_recursive(samples(n), Exact(low), SPREAD)
     assert not compiled
-
-
-def test_what_is_compiled_is_counted():
-    from planner.jax_setup import compiled as compile_it
-
-    doubled = compile_it()(lambda x: 2 * x)
-    with compilations() as compiled:
-        for size in (3, 3, 4):
-            doubled(np.ones(size))
-    assert len(compiled) == 2

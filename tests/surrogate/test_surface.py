@@ -25,8 +25,9 @@ def measured(lines, poses):
     )
 
 
-@pytest.mark.parametrize("logarithm", [False, True])
-@pytest.mark.parametrize("model", SURFACES)
+@pytest.mark.parametrize(
+    ("model", "logarithm"), [*((model, False) for model in SURFACES), ("GP", True)]
+)
 def test_between_measured_poses_the_surface_is_met(model, logarithm):
     seen, wanted = POSES[::2], POSES[1::2]
     fine = np.linspace(0, 1, 9)

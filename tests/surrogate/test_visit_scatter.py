@@ -23,8 +23,7 @@ def scatter_percent(fitted):
     return 100 * np.sqrt(fitted.nugget_variance)
 
 
-@pytest.mark.parametrize("scatter", [0.003, 0.01])
-@pytest.mark.parametrize("n", [3, 12])
+@pytest.mark.parametrize(("n", "scatter"), [(3, 0.003), (12, 0.01)])
 def test_intervals_hold_new_visits_beside_an_identified_simulation(n, scatter):
     inside = []
     for robot in ROBOTS:

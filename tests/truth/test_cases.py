@@ -102,15 +102,6 @@ def test_the_folder_has_what_a_diagnosis_needs(case, folder):
     assert max(peaks) / min(peaks) > 3  # force levels
 
 
-def test_a_seed_gives_the_same_case_again(few_poses, tmp_path):
-    names = "once", "again"
-    one, again = (make_case("added_mass", "kr210", 3, tmp_path / n, LABORATORY) for n in names)
-    assert one.held_out == again.held_out
-    assert [c.parameters for c in one.concealed] == [c.parameters for c in again.concealed]
-    tables = [(tmp_path / n / "recordings" / "recordings.csv").read_bytes() for n in names]
-    assert tables[0] == tables[1]
-
-
 def test_nothing_in_the_folder_tells_the_answer(case, folder):
     text = b"".join(p.read_bytes() for p in folder.rglob("*") if p.is_file())
     for word in (b"added_mass", b"mass_kg", b"seed", b"MuJoCo"):

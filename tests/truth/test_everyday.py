@@ -1,4 +1,7 @@
-"""Cases of real cells: imperfections are small, and every effect can have any size."""
+"""Cases of real cells: imperfections are small, and every effect can have any size.
+
+`pytest -m slow tests/truth/test_everyday.py` draws the other effects.
+"""
 
 import json
 from dataclasses import replace
@@ -55,11 +58,19 @@ def test_imperfections_are_everywhere_and_small(robot, tmp_path):
     assert np.all(scene.truth.poles(scene.poses[0])[0].real < 0)
 
 
-@pytest.mark.parametrize("name", TABLE)
+CHANNELS = (
+    "sensor_rotation", "sensor_gain", "polarity", "channel_delay", "exponential_window",
+    "tonal_disturbance",
+)  # fmt: skip
+QUICK = *CHANNELS, "added_mass", "base_compliance", "friction", "drift", "rattling_part"
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in TABLE]
+)
 def test_every_effect_does_something_and_goes_with_its_size(name, tmp_path):
     scene, injected, path = scene_of("kr210", tmp_path)
-    if name in ("sensor_rotation", "sensor_gain", "polarity", "channel_delay", "exponential_window",
-                "tonal_disturbance"):  # fmt: skip
+    if name in CHANNELS:
         small, large = (
             TABLE[name](replace(scene, size=s), injected, np.random.default_rng(3)).injected
             for s in (0.01, 1.0)

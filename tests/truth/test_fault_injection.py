@@ -70,17 +70,6 @@ def test_a_split_link_that_does_not_give_way_is_the_link(path):
         assert np.any(lower < 0.98 * frequencies(path))
 
 
-def test_halves_of_a_link_have_its_mass_matrix(path):
-    """The other springs do not notice that the link was split, with scattered inertia too.
-
-    It hardly bends under the weight, which would move the rest.
-    """
-    whole = Deviation(7, inertia=0.05, com_m=0.01)
-    split = replace(whole, extra=(Spring("link_4", (0.0, 0.0, 1.0), 1e14, 1.0),))
-    M = load_truth(path, whole).matrices(Q)[0]
-    assert load_truth(path, split).matrices(Q)[0][:6, :6] == pytest.approx(M, rel=1e-9, abs=1e-9)
-
-
 def test_a_base_that_shifts_lowers_frequencies(path):
     def shifting(stiffness: float) -> np.ndarray:
         axes = [tuple(float(v) for v in a) for a in np.eye(3)]
@@ -89,16 +78,6 @@ def test_a_base_that_shifts_lowers_frequencies(path):
 
     assert shifting(1e11) == pytest.approx(frequencies(path), rel=1e-4)
     assert np.all(shifting(1e7) < frequencies(path))
-
-
-def test_a_resonator_splits_a_mode_and_absorbs_at_its_own_frequency(path):
-    plain = load_truth(path)
-    first = float(plain.modes(Q, 1)[0][0])
-    small = AttachedResonator("link_6", tuple(KR210.tcp), (1.0, 0.0, 0.0), 20.0, first, 1e-4)  # type: ignore
-    with_it = load_truth(path, Deviation(resonators=(small,)))
-    pair = with_it.modes(Q, 2)[0]
-    assert pair[0] < first < pair[1]
-    assert with_it.springs[6].stiffness == pytest.approx(20.0 * (2 * np.pi * first) ** 2)
 
 
 def test_scaling_and_harmonics_change_the_stiffness_of_one_joint(path):

@@ -1,4 +1,7 @@
-"""Nonlinear joints: an ODE solver, the linear limit, laws of energy, and what textbooks say."""
+"""Nonlinear joints: an ODE solver, the linear limit, laws of energy, and what textbooks say.
+
+`pytest -m slow tests/truth/test_laws.py` integrates the other laws as well.
+"""
 
 import itertools
 
@@ -58,7 +61,11 @@ def test_without_laws_it_is_the_linear_truth(truth):
     assert np.max(np.abs(ours - theirs)) < 1e-9 * np.max(np.abs(ours))
 
 
-@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+QUICK = "hardening", "friction"  # of an elastic law and of one with a memory
+EACH = [pytest.param(v, marks=() if k in QUICK else pytest.mark.slow) for k, v in LAWS.items()]
+
+
+@pytest.mark.parametrize("law", EACH, ids=LAWS)
 def test_response_is_that_of_an_ode_solver(truth, law):
     force = pulses([300.0])
     port = Port(law, joint="joint_2")
@@ -92,7 +99,7 @@ def test_response_is_that_of_an_ode_solver(truth, law):
     assert np.std(response - linear) > 0.05 * np.std(linear)  # it does something
 
 
-@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+@pytest.mark.parametrize("law", EACH, ids=LAWS)
 def test_hits_die_out(truth, law):
     force = np.pad(pulses([300.0]), ((0, 0), (0, 5 * N)))
     response = respond([HitPose(truth, Q, force, along([0]))], [Port(law, joint="joint_1")], STEP)[
@@ -147,7 +154,7 @@ def test_friction_stiffens_a_joint_at_low_level_only(truth):
     assert high == pytest.approx(truth.modes(Q, 1)[0][0], abs=0.5)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     st.sampled_from(sorted(LAWS)),
     st.floats(0.05, 20.0),
