@@ -1,6 +1,6 @@
 """Artefacts of the measurement, and causes that no effect of the library describes.
 
-The right answer to each of OUTSIDERS is "unknown".
+The right answer to each of OUT_OF_LIBRARY is "unknown".
 """
 
 from dataclasses import replace
