@@ -5,8 +5,11 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from rich.console import Group
+from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
@@ -22,8 +25,9 @@ from planner.progress import ProgressCallback
 from planner.recording.folder import read_recordings
 from planner.recording.joints import JointUnits
 from planner.recording.records import PoseRow
-from planner.report.demonstration import DemonstrationReport, DemonstrationStep
+from planner.report.answer import Answer, plain
 from planner.report.rerun.event_logger import EventLogger
+from planner.report.text import SIMULATED, number, table
 
 NAME = "kr240_plane"
 Z_95 = 1.959964  # two-sided 95 % of a normal distribution
@@ -68,6 +72,94 @@ class Pool:
         return left[int(np.argmin(distance))]
 
 
+@dataclass(frozen=True, eq=False)
+class DemonstrationStep:
+    """A measurement: the pose, the one proposed next, frequencies of its modes, and times."""
+
+    pose: str
+    proposed: str
+    frequency_hz: tuple[float, ...]
+    refused: int
+    frequency_sd_percent: np.ndarray
+    refit_seconds: float
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class DemonstrationReport(Answer):
+    """Answer of `demo`, judged on n poses of the pool that were not used: (n, modes) in Hz."""
+
+    campaign: Campaign
+    pool: Pool
+    steps: tuple[DemonstrationStep, ...]
+    measured_hz: np.ndarray
+    predicted_hz: np.ndarray
+    predicted_sd_hz: np.ndarray
+    simulated_hz: np.ndarray
+    rrd: Path
+
+    @property
+    def errors(self) -> list[tuple[float, float, float]]:
+        """RMSE of the planner and of the simulation alone (%), share in 95 % intervals.
+
+        Of all modes together, then of each.
+        """
+        truth, far = self.measured_hz, Z_95 * self.predicted_sd_hz
+        inside, found = np.abs(truth - self.predicted_hz) <= far, []
+        for k in (slice(None), *range(truth.shape[1])):
+            known = np.isfinite(truth[:, k])
+            share = float(np.mean(inside[:, k][known])) if known.any() else float("nan")
+            both = (rmse_percent(of[:, k], truth[:, k]) for of in
+                    (self.predicted_hz, self.simulated_hz))  # fmt: skip
+            found.append((*both, share))
+        return found
+
+    def to_json(self) -> dict[str, Any]:
+        """Errors of all modes together, and per mode."""
+        (ours, simulation, inside), *modes = self.errors
+        each = list(zip(*modes, strict=True)) or [(), (), ()]
+        return plain({
+            "campaign": str(self.campaign.directory), "robot": self.campaign.cell.robot.name,
+            "simulated": True, "pool": len(self.pool.rows), "measurements": len(self.steps),
+            "used": [step.pose for step in self.steps], "unused": len(self.measured_hz),
+            "modes_compared": int(np.isfinite(self.measured_hz).sum()),
+            "frequency_rmse_percent": ours, "simulation_rmse_percent": simulation,
+            "frequency_rmse_percent_per_mode": each[0],
+            "simulation_rmse_percent_per_mode": each[1],
+            "coverage95": inside, "coverage95_per_mode": each[2],
+            "remarks": self.campaign.model.remarks,
+            "step_seconds": [step.seconds for step in self.steps], "steps": self.steps,
+            "rrd": str(self.rrd),
+        })  # fmt: skip
+
+    def text(self) -> Group:
+        """The course, and the errors mode by mode."""
+        course = table("Course", "measurement", "pose", "measured (Hz)", "sd of frequencies (%)")
+        for k, step in enumerate(self.steps, 1):
+            hz = "  ".join(f"{f:.2f}" for f in step.frequency_hz)
+            sd = "  ".join(f"{v:.2f}" for v in step.frequency_sd_percent)
+            course.add_row(str(k), step.pose, hz, sd)
+        made = table(
+            f"Demonstration on {self.campaign.cell.robot.name}: {len(self.steps)} of "
+            f"{len(self.pool.rows)} poses",
+            *("mode", "planner RMSE (%)", "simulation alone RMSE (%)", "in 95 % interval (%)"),
+        )
+        every, *modes = self.errors
+        for name, errors in (*enumerate(modes, 1), ("all", every)):
+            *both, inside = errors
+            style = "bold" if name == "all" else None
+            made.add_row(str(name), *map(number, both), f"{100 * inside:.0f}", style=style)
+        first, *later = (step.seconds for step in self.steps)
+        lines = [
+            *self.campaign.model.remarks,
+            f"On {len(self.measured_hz)} poses that were never used. Refit and next proposal: "
+            f"first {first:.2f} s, then at most {max(later, default=0.0):.2f} s.",
+            f"Campaign: {self.campaign.directory}",
+            f"Rerun recording: {self.rrd} (open with: rerun FILE)",
+        ]
+        return Group(course, made, Text("\n".join(lines)), SIMULATED)
+
+
 def play(
     directory: Path | None, measurements: int, viewer: bool, progress: ProgressCallback
 ) -> DemonstrationReport:
@@ -100,7 +192,13 @@ def play(
                 steps.append(_step(report, proposal, time.perf_counter() - started))
                 story.log(*imported, report.measured)
             story.log(campaign.entries[-1], campaign.model)
-    return _summary(campaign, pool, used, steps, rrd, progress)
+    cell, unused = campaign.cell, [pose for pose in pool.rows if pose not in used]
+    truth, q = _measured_hz(cell, pool, unused, progress), pool.q(unused)
+    expected, simulated = campaign.model.predict(q), cell.frozen.simulate(q)
+    predicted = expected.frequency_hz, expected.frequency_sd_hz
+    return DemonstrationReport(
+        campaign, pool, tuple(steps), truth, *predicted, simulated.frequency_hz, rrd
+    )
 
 
 def _step(report: ImportReport, proposal: Proposal, seconds: float) -> DemonstrationStep:
@@ -109,46 +207,6 @@ def _step(report: ImportReport, proposal: Proposal, seconds: float) -> Demonstra
         report.pose, proposal.pose, tuple(m.frequency_hz for m in modes if m.likely),
         len(report.refused), report.model.frequency_sd_percent, report.refit_seconds, seconds,
     )  # fmt: skip
-
-
-def _summary(
-    campaign: Campaign,
-    pool: Pool,
-    used: list[str],
-    steps: list[DemonstrationStep],
-    rrd: Path,
-    progress: ProgressCallback,
-) -> DemonstrationReport:
-    cell = campaign.cell
-    unused = [pose for pose in pool.rows if pose not in used]
-    truth = _measured_hz(cell, pool, unused, progress)
-    prediction = campaign.model.predict(pool.q(unused))
-    simulated = cell.frozen.simulate(pool.q(unused)).frequency_hz
-    inside = np.abs(truth - prediction.frequency_hz) <= Z_95 * prediction.frequency_sd_hz
-    known = np.isfinite(truth)
-    return DemonstrationReport(
-        campaign=str(campaign.directory),
-        robot=cell.robot.name,
-        simulated=True,
-        pool=len(pool.rows),
-        measurements=len(used),
-        used=tuple(used),
-        unused=len(unused),
-        modes_compared=int(known.sum()),
-        frequency_rmse_percent=rmse_percent(prediction.frequency_hz, truth),
-        simulation_rmse_percent=rmse_percent(simulated, truth),
-        frequency_rmse_percent_per_mode=_per_mode(prediction.frequency_hz, truth),
-        simulation_rmse_percent_per_mode=_per_mode(simulated, truth),
-        coverage95=float(np.mean(inside[known])) if known.any() else float("nan"),
-        coverage95_per_mode=tuple(
-            float(np.mean(inside[known[:, k], k])) if known[:, k].any() else float("nan")
-            for k in range(truth.shape[1])
-        ),
-        remarks=campaign.model.remarks,
-        step_seconds=tuple(step.seconds for step in steps),
-        steps=tuple(steps),
-        rrd=str(rrd),
-    )
 
 
 def _measured_hz(
@@ -171,7 +229,3 @@ def _measured_hz(
 def rmse_percent(predicted: np.ndarray, truth: np.ndarray) -> float:
     """Root mean square relative error in %, over entries (any shape) known in `truth`."""
     return float(100 * np.sqrt(np.nanmean((predicted / truth - 1) ** 2)))
-
-
-def _per_mode(predicted: np.ndarray, truth: np.ndarray) -> tuple[float, ...]:
-    return tuple(rmse_percent(predicted[:, k], truth[:, k]) for k in range(truth.shape[1]))

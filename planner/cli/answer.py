@@ -15,13 +15,18 @@ if TYPE_CHECKING:
 RECORDED = "Folder with recordings.csv, or with folders that have one; or a campaign"
 
 
-def option(text: str, metavar: str | None = None, *names: str) -> Any:
+def argument(text: str, metavar: str | None = None) -> Any:
+    """An argument with its help text."""
+    return typer.Argument(metavar=metavar, help=text)
+
+
+def option(text: str, metavar: str | None = None, *names: str, **limits: Any) -> Any:
     """An option with its help text, called by its parameter's name unless `names` are given."""
-    return typer.Option(*names, metavar=metavar, help=text)
+    return typer.Option(*names, metavar=metavar, help=text, **limits)
 
 
 AsJson = Annotated[bool, option("Answer with one JSON document.", None, "--json")]
-Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Campaign folder.")]
+Directory = Annotated[Path, argument("Campaign folder.", "DIR")]
 RobotOption = Annotated[
     Path | None, option("The robot's robot.toml (a campaign has its own).", "ROBOT_TOML", "--robot")
 ]

@@ -11,6 +11,7 @@ from planner.cli.answer import (
     FromNames,
     PictureFormat,
     Rrd,
+    argument,
     option,
     refusals,
     respond,
@@ -20,6 +21,7 @@ from planner.cli.campaign_commands import confirm, export, new, redo, report, sk
 from planner.cli.documentation import check, manual, prove, schema, study
 from planner.cli.identification import compare, diagnose, identify
 from planner.cli.modes import modes
+from planner.cli.progress import console, progress_bar
 from planner.cli.stability import couple, stability
 from planner.errors import InputError
 from planner.words import command
@@ -34,12 +36,12 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-Viewer = Annotated[bool, typer.Option("--viewer", help="Show progress in a live Rerun viewer.")]
+Viewer = Annotated[bool, option("Show progress in a live Rerun viewer.", None, "--viewer")]
 
 
 @app.callback(invoke_without_command=True)
 def _root(
-    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    version: Annotated[bool, option("Print the version.", None, "--version")] = False,
 ) -> None:
     if version:
         from planner.version import __version__
@@ -50,7 +52,7 @@ def _root(
 @app.command(name="next")
 def next_(
     directory: Directory,
-    count: Annotated[int, typer.Option(min=1, max=100, help="How many poses.")] = 1,
+    count: Annotated[int, option("How many poses.", min=1, max=100)] = 1,
     acquisition: Annotated[str | None, option("Instead of campaign.toml's.", "NAME")] = None,
     as_json: AsJson = False,
 ) -> int:
@@ -68,8 +70,8 @@ def next_(
 @app.command(name="import")
 def import_(
     directory: Directory,
-    paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Hits, or a folder.")],
-    pose: Annotated[str | None, typer.Option(metavar="ID", help="Pose of these hits.")] = None,
+    paths: Annotated[list[Path], argument("Hits, or a folder.", "PATH...")],
+    pose: Annotated[str | None, option("Pose of these hits.", "ID")] = None,
     from_names: FromNames = False,
     as_json: AsJson = False,
 ) -> int:
@@ -78,7 +80,6 @@ def import_(
     Example: planner import cell7 exports/P001
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli.progress import progress_bar
     from planner.report.imports import ImportedPoses
 
     with progress_bar("importing", quiet=as_json) as progress:
@@ -92,14 +93,11 @@ def import_(
 def status_(
     directory: Directory,
     plot: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER", help="Draw each pose predicted without it into this folder."
-        ),
+        Path | None, option("Draw each pose predicted without it into this folder.", "FOLDER")
     ] = None,
     format_: PictureFormat = "png",
     models: Annotated[
-        bool, typer.Option("--models", help="Try every [surrogate] model, poses left out.")
+        bool, option("Try every [surrogate] model, poses left out.", None, "--models")
     ] = False,
     as_json: AsJson = False,
 ) -> int:
@@ -108,12 +106,12 @@ def status_(
     Example: planner status cell7 --plot pictures
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli.progress import progress_bar
     from planner.report.pictures import Pictures
     from planner.report.status import status
 
     campaign, pictures = Campaign(directory), Pictures(plot, format_)
-    answer = status(campaign).with_pictures(pictures, campaign.directory.name)
+    answer = status(campaign)
+    answer = answer.with_figures(pictures, answer.drawings, campaign.directory.name)
     if models:
         with progress_bar("models", quiet=as_json) as progress:
             answer = answer.with_models(progress)
@@ -123,14 +121,13 @@ def status_(
 @app.command()
 def watch(
     directory: Directory,
-    folder: Annotated[Path, typer.Argument(help="Folder into which the analyser exports.")],
-    auto: Annotated[bool, typer.Option("--auto", help="Import without asking.")] = False,
+    folder: Annotated[Path, argument("Folder into which the analyser exports.")],
+    auto: Annotated[bool, option("Import without asking.", None, "--auto")] = False,
     hits_per_pose: Annotated[
-        int | None,
-        typer.Option(min=1, help="Hits that make a pose; else [cost] hits_per_axis along each."),
+        int | None, option("Hits that make a pose; else [cost] hits_per_axis along each.", min=1)
     ] = None,
     explain: Annotated[
-        bool, typer.Option("--diagnose", help="Diagnose beside the session, after each import.")
+        bool, option("Diagnose beside the session, after each import.", None, "--diagnose")
     ] = False,
     rrd: Rrd = None,
     viewer: Viewer = False,
@@ -140,7 +137,6 @@ def watch(
 
     Example: planner watch cell7 exports/ --diagnose
     """
-    from planner.cli.progress import console
 
     if not folder.is_dir():
         raise InputError(
@@ -172,23 +168,22 @@ def watch(
 
 @app.command()
 def predict(
-    source: Annotated[
-        Path, typer.Argument(metavar="DIR|ROBOT_TOML", help="Campaign folder, or a robot alone.")
-    ],
+    source: Annotated[Path, argument("Campaign folder, or a robot alone.", "DIR|ROBOT_TOML")],
     poses: Annotated[
-        Path,
-        typer.Argument(metavar="POSES_CSV", help="pose, joint_…_deg, slides: …_mm[, peak_force_n]"),
+        Path, argument("pose, joint_…_deg, slides: …_mm[, peak_force_n]", "POSES_CSV")
     ],
-    out: Annotated[Path | None, typer.Option(metavar="FILE.npz", help="Where FRFs go.")] = None,
+    out: Annotated[Path | None, option("Where FRFs go.", "FILE.npz")] = None,
     peak_force_n: Annotated[
         float | None,
-        typer.Option(
-            "--peak-force-n", metavar="N", min=1e-3,
-            help="Of hits, where POSES_CSV states none: joints may not be linear ([[law]]).",
+        option(
+            "Of hits, where POSES_CSV states none: joints may not be linear ([[law]]).",
+            "N",
+            "--peak-force-n",
+            min=0.001,
         ),
     ] = None,
     as_json: AsJson = False,
-) -> int:  # fmt: skip
+) -> int:
     """Modes and FRFs, with uncertainty, at given poses.
 
     The npz holds for n poses: frf_mean and frf_sd (n, 3, 3, F) in m/s²/N (response where the sensor
@@ -199,7 +194,6 @@ def predict(
     """
     from planner.campaign.campaign import Campaign
     from planner.campaign.cell import checked_pose
-    from planner.cli.progress import progress_bar
     from planner.recording.folder import peak_forces, read_poses
     from planner.report.predictions import predictions, robot_predictions
     from planner.robot.robot import Robot
@@ -225,9 +219,9 @@ def predict(
 @app.command()
 def replay(
     directory: Directory,
-    until: Annotated[int | None, typer.Option(metavar="N", help="Stop after entry N.")] = None,
+    until: Annotated[int | None, option("Stop after entry N.", "N")] = None,
     acquisition: Annotated[
-        str | None, typer.Option(metavar="NAME", help="What would this one have proposed, saved?")
+        str | None, option("What would this one have proposed, saved?", "NAME")
     ] = None,
     rrd: Rrd = None,
     viewer: Viewer = False,
@@ -238,7 +232,6 @@ def replay(
     Example: planner replay cell7 --rrd cell7.rrd
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli.progress import progress_bar
     from planner.report.replayed import replayed
 
     with progress_bar("replaying", quiet=as_json) as progress:
@@ -258,9 +251,9 @@ for _command in (
 @app.command()
 def demo(
     directory: Annotated[
-        Path | None, typer.Option("--dir", help="Where the campaign goes (default: temporary).")
+        Path | None, option("Where the campaign goes (default: temporary).", None, "--dir")
     ] = None,
-    measurements: Annotated[int, typer.Option(min=1, max=35, help="At most so many.")] = 10,
+    measurements: Annotated[int, option("At most so many.", min=1, max=35)] = 10,
     viewer: Viewer = False,
     as_json: AsJson = False,
 ) -> int:
@@ -268,7 +261,6 @@ def demo(
 
     Example: planner demo --measurements 6
     """
-    from planner.cli.progress import progress_bar
     from planner.demo import play
 
     with progress_bar("playing", quiet=as_json) as progress:

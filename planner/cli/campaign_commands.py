@@ -3,9 +3,8 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from planner.cli.answer import AsJson, Directory, option, refusals, respond
+from planner.cli.answer import AsJson, Directory, argument, option, refusals, respond
+from planner.cli.progress import progress_bar
 from planner.errors import InputError
 
 
@@ -13,24 +12,22 @@ def new(
     directory: Directory,
     robot: Annotated[Path | None, option("The robot's robot.toml.", "ROBOT_TOML")] = None,
     campaign: Annotated[
-        Path | None, typer.Option(metavar="CAMPAIGN_TOML", help="Workspace, modes, acquisition.")
+        Path | None, option("Workspace, modes, acquisition.", "CAMPAIGN_TOML")
     ] = None,
     example: Annotated[
-        bool,
-        typer.Option("--example", help="Write robot.toml, campaign.toml and a URDF to change."),
+        bool, option("Write robot.toml, campaign.toml and a URDF to change.", None, "--example")
     ] = False,
     urdf: Annotated[
-        Path | None,
-        typer.Option(metavar="ARM.urdf", help="Begin from a maker's URDF; the rest is guessed."),
+        Path | None, option("Begin from a maker's URDF; the rest is guessed.", "ARM.urdf")
     ] = None,
     mass_kg: Annotated[
-        float | None, typer.Option(help="With --urdf: the robot's mass, of its data sheet.")
+        float | None, option("With --urdf: the robot's mass, of its data sheet.")
     ] = None,
     payload_kg: Annotated[
-        float | None, typer.Option(help="With --urdf: its rated payload, which tells its gears.")
+        float | None, option("With --urdf: its rated payload, which tells its gears.")
     ] = None,
     tool_mass_kg: Annotated[
-        float | None, typer.Option(help="With --urdf: mass of the spindle on its flange.")
+        float | None, option("With --urdf: mass of the spindle on its flange.")
     ] = None,
     as_json: AsJson = False,
 ) -> int:
@@ -54,13 +51,13 @@ def new(
         raise InputError("--mass-kg, --payload-kg and --tool-mass-kg go with --urdf; give that.")
     if urdf is not None:
         begun, guessed = new_from_urdf(directory, urdf, weights, campaign)
-        return respond(NewCampaign.of(begun, guessed), as_json)
+        return respond(NewCampaign(begun, guessed), as_json)
     if robot is not None:
-        return respond(NewCampaign.of(Campaign.new(directory, robot, campaign)), as_json)
+        return respond(NewCampaign(Campaign.new(directory, robot, campaign)), as_json)
     return respond(ExampleFolder(*write_example(directory)), as_json)
 
 
-PoseArgument = Annotated[str, typer.Argument(metavar="POSE", help="Name of the pose.")]
+PoseArgument = Annotated[str, argument("Name of the pose.", "POSE")]
 
 
 def confirm(
@@ -109,7 +106,7 @@ def redo(directory: Directory, as_json: AsJson = False) -> int:
 def withdraw(
     directory: Directory,
     pose: PoseArgument,
-    reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
+    reason: Annotated[str, option("Why; kept in the log.")] = "",
     as_json: AsJson = False,
 ) -> int:
     """Set a measured pose aside; its recordings stay.
@@ -126,7 +123,7 @@ def withdraw(
 def skip(
     directory: Directory,
     pose: PoseArgument,
-    reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
+    reason: Annotated[str, option("Why; kept in the log.")] = "",
     as_json: AsJson = False,
 ) -> int:
     """Say that a proposed pose cannot be measured; it is not offered again.
@@ -149,12 +146,10 @@ def skip(
 def report(
     directory: Directory,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.html", help="Where it goes (default: DIR/report.html)."),
+        Path | None, option("Where it goes (default: DIR/report.html).", "FILE.html")
     ] = None,
     diagnosis: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="What planner diagnose --out has written."),
+        Path | None, option("What planner diagnose --out has written.", "FOLDER")
     ] = None,
     as_json: AsJson = False,
 ) -> int:
@@ -163,7 +158,6 @@ def report(
     Example: planner report cell7 --out cell7.html
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli.progress import progress_bar
     from planner.report.page import write_report
 
     with progress_bar("writing", quiet=as_json) as progress:
@@ -176,16 +170,15 @@ def export(
     directory: Directory,
     kind: Annotated[
         str,
-        typer.Argument(
-            metavar="KIND",
-            help="Poses to drive to: krl, rapid, urscript, poses (CSV). Results: uff (58 and 55), "
+        argument(
+            "Poses to drive to: krl, rapid, urscript, poses (CSV). Results: uff (58 and 55), "
             "mat, csv, model (one small file).",
+            "KIND",
         ),
     ],
     out: Annotated[Path | None, option("Where it goes (default: DIR/export).", "FOLDER")] = None,
     poses: Annotated[
-        Path | None,
-        typer.Option(metavar="POSES_CSV", help="These poses instead of open or measured ones."),
+        Path | None, option("These poses instead of open or measured ones.", "POSES_CSV")
     ] = None,
     as_json: AsJson = False,
 ) -> int:

@@ -5,15 +5,15 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, PictureFormat, option, respond, warn
+from planner.cli.answer import AsJson, PictureFormat, argument, option, respond, warn
+from planner.cli.progress import progress_bar
 from planner.report.answer import Done
 
 
 def check(
-    robot: Annotated[Path, typer.Argument(metavar="ROBOT_TOML", help="The robot's robot.toml.")],
+    robot: Annotated[Path, argument("The robot's robot.toml.", "ROBOT_TOML")],
     campaign: Annotated[
-        Path | None,
-        typer.Option(metavar="CAMPAIGN_TOML", help="Check its workspace and modes as well."),
+        Path | None, option("Check its workspace and modes as well.", "CAMPAIGN_TOML")
     ] = None,
     plot: Annotated[Path | None, option("Draw the robot into this folder.", "FOLDER")] = None,
     format_: PictureFormat = "png",
@@ -28,19 +28,17 @@ def check(
     from planner.report.robot_check import RobotCheckReport
 
     pictures = Pictures(plot, format_)
-    answer = RobotCheckReport.of(examine_robot(robot, campaign))
-    answer = answer.with_pictures(pictures, answer.robot)
+    answer = RobotCheckReport(examine_robot(robot, campaign))
+    answer = answer.with_figures(pictures, answer.drawings, answer.found.robot.name)
     if as_json:  # the text says them itself
-        for finding in answer.findings:
+        for finding in answer.found.remarks:
             if finding.severity == "error":
                 warn(finding.sentence)
     return respond(answer, as_json, 0 if answer.ok else 2)
 
 
 def schema(
-    file: Annotated[
-        str, typer.Argument(metavar="FILE", help="robot, campaign, cut or tool.")
-    ] = "robot",
+    file: Annotated[str, argument("robot, campaign, cut or tool.", "FILE")] = "robot",
     as_json: AsJson = False,
 ) -> int:
     """Every entry of robot.toml, campaign.toml, cut.toml or tool.toml, as they are read.
@@ -56,7 +54,7 @@ def schema(
 
 def manual(
     context: typer.Context,
-    out: Annotated[Path, typer.Option(metavar="FILE.html", help="Where the manual goes.")] = Path(
+    out: Annotated[Path, option("Where the manual goes.", "FILE.html")] = Path(
         "planner_manual.html"
     ),
     as_json: AsJson = False,
@@ -77,18 +75,13 @@ def manual(
 def study(
     name: Annotated[
         str,
-        typer.Argument(
-            metavar="NAME|all",
-            help="busch2022, busch2020, seyedhosseini2025, lei2023, birk2025, or all.",
-        ),
+        argument("busch2022, busch2020, seyedhosseini2025, lei2023, birk2025, or all.", "NAME|all"),
     ],
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Write tables (CSV), pictures and pages (HTML) here."),
+        Path | None, option("Write tables (CSV), pictures and pages (HTML) here.", "FOLDER")
     ] = None,
     small: Annotated[
-        bool,
-        typer.Option("--small", help="A version of seconds, to see that it works: says little."),
+        bool, option("A version of seconds, to see that it works: says little.", None, "--small")
     ] = False,
     as_json: AsJson = False,
 ) -> int:
@@ -98,7 +91,6 @@ def study(
 
     Example: planner study busch2022 --out figures
     """
-    from planner.cli.progress import progress_bar
     from planner.studies import registry
     from planner.studies.run import run_all, run_study
 
@@ -111,15 +103,15 @@ def study(
 
 
 def prove(
-    cases: Annotated[int, typer.Option(min=1, max=5000, help="How many cases.")] = 25,
-    seed: Annotated[int, typer.Option(min=0, help="Of the cases.")] = 0,
+    cases: Annotated[int, option("How many cases.", min=1, max=5000)] = 25,
+    seed: Annotated[int, option("Of the cases.", min=0)] = 0,
     out: Annotated[Path | None, option("Where all goes; resumed if it is there.", "FOLDER")] = None,
-    jobs: Annotated[int, typer.Option(min=1, max=64, help="Diagnoses at a time.")] = 1,
+    jobs: Annotated[int, option("Diagnoses at a time.", min=1, max=64)] = 1,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Of a Dask cluster that does the cases.")
+        str | None, option("Of a Dask cluster that does the cases.", "ADDRESS")
     ] = None,
     laboratory: Annotated[
-        bool, typer.Option("--laboratory", help="No hit misses, and no sensor errs.")
+        bool, option("No hit misses, and no sensor errs.", None, "--laboratory")
     ] = False,
     as_json: AsJson = False,
 ) -> int:
@@ -127,7 +119,6 @@ def prove(
 
     Example: planner prove --cases 20 --out proof
     """
-    from planner.cli.progress import progress_bar
     from planner.proof.report import write
     from planner.proof.run import Proof, results
     from planner.proof.run import seal as sealed

@@ -5,8 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from planner.cli.answer import (
     RECORDED,
     AsJson,
@@ -14,31 +12,31 @@ from planner.cli.answer import (
     RobotOption,
     Rrd,
     WindowRate,
+    argument,
     option,
     refusals,
     respond,
     warn,
 )
+from planner.cli.progress import progress_bar
 from planner.errors import InputError
 
 
 def identify(
-    recordings: Annotated[Path, typer.Argument(metavar="RECORDINGS", help=f"{RECORDED}.")],
+    recordings: Annotated[Path, argument(f"{RECORDED}.", "RECORDINGS")],
     robot: RobotOption = None,
     out: Annotated[Path | None, option("Write the identified robot here.", "ROBOT_TOML")] = None,
     inertias: Annotated[
-        bool, typer.Option(help="Let masses and inertias err by 8 %, centres of mass by 1 cm.")
+        bool, option("Let masses and inertias err by 8 %, centres of mass by 1 cm.")
     ] = True,
     extend: Annotated[
-        bool,
-        typer.Option(help="Look for what robot.toml leaves out where its springs are not enough."),
+        bool, option("Look for what robot.toml leaves out where its springs are not enough.")
     ] = True,
     held_out: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="Poses to judge by (default: 1 of 4).")
+        int | None, option("Poses to judge by (default: 1 of 4).", "N", min=0)
     ] = None,
     band_hz: Annotated[
-        tuple[float, float] | None,
-        typer.Option(metavar="LOW HIGH", help="Band in Hz, instead of robot.toml's."),
+        tuple[float, float] | None, option("Band in Hz, instead of robot.toml's.", "LOW HIGH")
     ] = None,
     window_rate_1_s: WindowRate = 0.0,
     plot: Annotated[Path | None, option("Draw FRFs before and after into it.", "FOLDER")] = None,
@@ -52,7 +50,6 @@ def identify(
     """
     from planner.api import identify as fit
     from planner.campaign.recordings_source import recordings_source
-    from planner.cli.progress import progress_bar
     from planner.fit.write_robot import check_target
     from planner.report.modal_analysis import check_options
     from planner.report.pictures import Pictures
@@ -86,7 +83,7 @@ def identify(
 
 
 def diagnose(
-    recordings: Annotated[Path, typer.Argument(metavar="RECORDINGS", help=f"{RECORDED}.")],
+    recordings: Annotated[Path, argument(f"{RECORDED}.", "RECORDINGS")],
     robot: RobotOption = None,
     predict: Annotated[Path | None, option("Poses whose FRFs are wanted.", "POSES_CSV")] = None,
     out: Annotated[Path | None, option("Write robot, FRFs and pictures here.", "FOLDER")] = None,
@@ -99,7 +96,6 @@ def diagnose(
     """
     from planner.api import diagnose_source
     from planner.campaign.recordings_source import recordings_source
-    from planner.cli.progress import progress_bar
     from planner.recording.folder import peak_forces, read_poses
     from planner.report.modal_analysis import check_options
     from planner.report.status import model_beside
@@ -113,7 +109,8 @@ def diagnose(
         answer = diagnose_source(given.with_poses(wanted), nominal, progress)
         if predict:
             q = nominal.joints.internal([row.joints_deg for row in wanted])
-            npz = _target(out, predict, given.recordings)
+            beside = given.recordings.absolute().parent / "predictions"
+            npz = (out or beside).absolute() / f"{predict.stem}.npz"
             force_n = peak_forces(wanted)
             answer = answer.with_predictions([row.pose for row in wanted], q, npz, force_n)
         if out is not None:
@@ -126,42 +123,32 @@ def diagnose(
     return respond(answer, as_json, refusals(answer.refused))
 
 
-def _target(out: Path | None, predict: Path, recordings: Path) -> Path:
-    """Where predictions go: FOLDER, or beside the recordings' folder."""
-    folder = out if out is not None else recordings.absolute().parent / "predictions"
-    return folder.absolute() / f"{predict.stem}.npz"
-
-
 SIMULATIONS = ("frozen", "updated", "none")
 
 
 def compare(
-    recordings: Annotated[
-        Path, typer.Argument(metavar="RECORDINGS", help=f"{RECORDED}: the pool.")
-    ],
+    recordings: Annotated[Path, argument(f"{RECORDED}: the pool.", "RECORDINGS")],
     strategies: Annotated[
-        str | None,
-        typer.Option(metavar="A,B,…", help="random, sobol, maximin_lhs, default, variance, …"),
+        str | None, option("random, sobol, maximin_lhs, default, variance, …", "A,B,…")
     ] = None,
     models: Annotated[
-        str | None,
-        typer.Option(metavar="A,B,…", help="default, gp, ar1, nargp, mfdgp, multitask, none."),
+        str | None, option("default, gp, ar1, nargp, mfdgp, multitask, none.", "A,B,…")
     ] = None,
     robot: RobotOption = None,
-    repeats: Annotated[int, typer.Option(min=1, max=10_000, help="Seeds.")] = 20,
+    repeats: Annotated[int, option("Seeds.", min=1, max=10000)] = 20,
     initial: Annotated[
-        int, typer.Option(min=1, help="First poses, the same for all strategies at a seed.")
+        int, option("First poses, the same for all strategies at a seed.", min=1)
     ] = 3,
     budget: Annotated[
-        int | None, typer.Option(min=1, help="Measurements (default: 15, or what the pool allows).")
+        int | None, option("Measurements (default: 15, or what the pool allows).", min=1)
     ] = None,
     simulation: Annotated[str | None, option("frozen, updated or none.", "USE")] = None,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Of a Dask cluster that does the runs.")
+        str | None, option("Of a Dask cluster that does the runs.", "ADDRESS")
     ] = None,
-    workers: Annotated[int, typer.Option(min=1, max=256, help="Processes on this machine.")] = 2,
+    workers: Annotated[int, option("Processes on this machine.", min=1, max=256)] = 2,
     campaign: Annotated[
-        Path | None, typer.Option(metavar="CAMPAIGN_TOML", help="Workspace, modes, acquisition.")
+        Path | None, option("Workspace, modes, acquisition.", "CAMPAIGN_TOML")
     ] = None,
     out: Annotated[Path | None, option("Where results and the picture go.", "FOLDER")] = None,
     rrd: Rrd = None,
@@ -173,9 +160,9 @@ def compare(
 
     Example: planner compare exports --robot robot/robot.toml --strategies random,default
     """
+    from planner import cache_folder
     from planner.campaign import store
     from planner.campaign.recordings_source import recordings_source
-    from planner.cli.progress import progress_bar
     from planner.compare.bench import assemble, comparison_config
     from planner.compare.resume import conduct, recorded
     from planner.compare.tasks import Study
@@ -190,7 +177,11 @@ def compare(
     if campaign is None and given.campaign is not None:
         campaign = given.campaign.directory / store.CONFIG
     config = comparison_config(loaded, listed, campaign, simulation)
-    folder = out or _cache_folder()
+    try:
+        folder = out or cache_folder.folder("compare")
+    except RuntimeError:
+        what = "There is no home folder to keep results in; name one with --out."
+        raise InputError(what) from None
     with progress_bar("comparing", quiet=as_json) as progress:
         poses = recorded(listed, loaded.joints, config.modes, workers, progress)
         bench, remarks = assemble(loaded, config, poses)
@@ -198,21 +189,10 @@ def compare(
         found, damaged = conduct(bench, study, folder, scheduler, workers, progress)
     told = (*given.unlisted(listed), *remarks, *damaged)
     answer = comparison(bench, study, found, poses, told)
-    answer = answer.with_pictures(out, rrd, bench.key)
+    answer = answer.with_pictures(out, rrd)
     answer = replace(answer, seconds=time.perf_counter() - started)
     if out is not None:
         answer.write(out)
-    for run in answer.failed:
-        warn(f"The run of {run.strategy} with seed {run.seed} failed: {run.reason}")
+    for task, why in answer.failed.items():
+        warn(f"The run of {task.strategy} with seed {task.seed} failed: {why.reason}")
     return respond(answer, as_json)
-
-
-def _cache_folder() -> Path:
-    from planner import cache_folder
-
-    try:
-        return cache_folder.folder("compare")
-    except RuntimeError:
-        raise InputError(
-            "There is no home folder to keep results in; name one with --out."
-        ) from None

@@ -3,52 +3,44 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from planner.cli.answer import (
     AsJson,
     FromNames,
     PictureFormat,
     Rrd,
     WindowRate,
+    argument,
     option,
     refusals,
     respond,
 )
+from planner.cli.progress import progress_bar
 from planner.errors import InputError
 
 
 def modes(
-    paths: Annotated[
-        list[Path],
-        typer.Argument(metavar="PATH...", help="Hits or FRFs, of a pose or of any points."),
-    ],
+    paths: Annotated[list[Path], argument("Hits or FRFs, of a pose or of any points.", "PATH...")],
     band_hz: Annotated[tuple[float, float] | None, option("Band in Hz.", "LOW HIGH")] = None,
     force: Annotated[str | None, option("Force channel, if not labelled.", "CHANNEL")] = None,
     quantity: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND", help="Of unlabelled FRFs: accelerance, mobility or receptance."
-        ),
+        str | None, option("Of unlabelled FRFs: accelerance, mobility or receptance.", "KIND")
     ] = None,
-    estimator: Annotated[str, typer.Option(help="h1, h2 or hv.")] = "h1",
+    estimator: Annotated[str, option("h1, h2 or hv.")] = "h1",
     window_rate_1_s: WindowRate = 0.0,
     robot: Annotated[
-        Path | None,
-        typer.Option(metavar="ROBOT_TOML", help="Whose simulation guides labels over poses."),
+        Path | None, option("Whose simulation guides labels over poses.", "ROBOT_TOML")
     ] = None,
     plot: Annotated[Path | None, option("Draw the analysis into this folder.", "FOLDER")] = None,
     format_: PictureFormat = "png",
     rrd: Rrd = None,
     real: Annotated[
-        bool, typer.Option("--real", help="Of any points: real normal modes as shapes.")
+        bool, option("Of any points: real normal modes as shapes.", None, "--real")
     ] = False,
     export: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Of any points: write UFF and CSV files here."),
+        Path | None, option("Of any points: write UFF and CSV files here.", "FOLDER")
     ] = None,
     operating: Annotated[
-        bool, typer.Option("--operating", help="Responses alone, no force: unscaled modes.")
+        bool, option("Responses alone, no force: unscaled modes.", None, "--operating")
     ] = False,
     from_names: FromNames = False,
     as_json: AsJson = False,
@@ -57,7 +49,6 @@ def modes(
 
     Example: planner modes exports/P001/*.uff --plot pictures
     """
-    from planner.cli.progress import progress_bar
     from planner.dataset.frf_set import frf_set
     from planner.recording.folder import several_poses
     from planner.report.modal_analysis import (
@@ -85,7 +76,7 @@ def modes(
         given = paths[0], band_hz, robot, estimator, window_rate_1_s
         with progress_bar("identifying", quiet=as_json) as progress:
             answer = survey_report(survey(*given, progress))
-            answer = answer.with_pictures(pictures, paths[0].name)
+            answer = answer.with_figures(pictures, answer.drawings, paths[0].name)
         return respond(answer, as_json, refusals(answer.refused))
     if operating:
         from planner.report.modal_analysis import operating_report

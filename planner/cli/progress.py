@@ -10,7 +10,7 @@ from planner.progress import ProgressCallback
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress, ProgressColumn
+    from rich.progress import Progress
 
 FIRST_S, LAST_S = 5.0, 60.0  # between lines: the first one, and at most, doubling in between
 
@@ -27,6 +27,7 @@ def progress_bar(verb: str, quiet: bool) -> Iterator[ProgressCallback]:
     """A function that shows what is being done, and as a bar the share (0 to 1) that is done."""
     from rich.progress import (
         BarColumn,
+        Progress,
         SpinnerColumn,
         TaskProgressColumn,
         TextColumn,
@@ -35,7 +36,9 @@ def progress_bar(verb: str, quiet: bool) -> Iterator[ProgressCallback]:
 
     columns = (SpinnerColumn(), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
                TextColumn("{task.description}", markup=False))  # fmt: skip
-    with _shown(columns, quiet) as bar:
+    screen = console(quiet)
+    done, started = Event(), time.monotonic()
+    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task(verb, total=None)
 
         def progress(text: str, share: float) -> None:
@@ -43,22 +46,12 @@ def progress_bar(verb: str, quiet: bool) -> Iterator[ProgressCallback]:
                 bar.update(task, total=1.0)
             bar.update(task, description=f"{verb}: {text}", completed=share)
 
-        yield progress
-
-
-@contextmanager
-def _shown(columns: "tuple[ProgressColumn, ...]", quiet: bool) -> "Iterator[Progress]":
-    """Progress that moves on a terminal; elsewhere its last task is told in lines."""
-    from rich.progress import Progress
-
-    screen = console(quiet)
-    done, started = Event(), time.monotonic()
-    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        # On a terminal it moves; elsewhere it is told in lines.
         teller = Thread(target=_tell, args=(bar, screen, done, started), daemon=True)
         if not (quiet or screen.is_terminal):
             teller.start()
         try:
-            yield bar
+            yield progress
         finally:
             done.set()
             if teller.is_alive():

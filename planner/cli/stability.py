@@ -4,58 +4,50 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from planner.cli.answer import AsJson, FromNames, PictureFormat, Rrd, option, respond
+from planner.cli.answer import AsJson, FromNames, PictureFormat, Rrd, argument, option, respond
+from planner.cli.progress import progress_bar
 from planner.errors import InputError
 
 
 def stability(
     source: Annotated[
         Path,
-        typer.Argument(
-            metavar="SOURCE",
-            help="npz of predict, FRFs (a file or a folder), a campaign, modes TOML.",
-        ),
+        argument("npz of predict, FRFs (a file or a folder), a campaign, modes TOML.", "SOURCE"),
     ],
-    cut: Annotated[Path, typer.Option("--cut", metavar="CUT_TOML", help="Cutter and cut.")],
+    cut: Annotated[Path, option("Cutter and cut.", "CUT_TOML", "--cut")],
     pose: Annotated[str | None, option("Of the source's poses; all: each.", "NAME")] = None,
     path: Annotated[
-        Path | None,
-        typer.Option(metavar="CSV|PROGRAM", help="Of a campaign: poses, or G-code or APT."),
+        Path | None, option("Of a campaign: poses, or G-code or APT.", "CSV|PROGRAM")
     ] = None,
     origin: Annotated[
-        str | None,
-        typer.Option(metavar="X,Y,Z", help="Of a program: its zero in the robot's base, m."),
+        str | None, option("Of a program: its zero in the robot's base, m.", "X,Y,Z")
     ] = None,
     turns: Annotated[
-        bool, typer.Option("--turns", help="Along --path: turn the robot about the tool's axis.")
+        bool, option("Along --path: turn the robot about the tool's axis.", None, "--turns")
     ] = False,
     map_: Annotated[bool, option("Of a campaign: all over the workspace.", None, "--map")] = False,
     poses: Annotated[
-        int | None, typer.Option(min=2, max=200, help="Of a program (12), or of --map (40).")
+        int | None, option("Of a program (12), or of --map (40).", min=2, max=200)
     ] = None,
     tool: Annotated[Path | None, option("Put this tool on, as couple does.", "TOOL_TOML")] = None,
     reference: Annotated[
-        Path | None, typer.Option(metavar="TOOL_TOML", help="The tested tool, taken off before.")
+        Path | None, option("The tested tool, taken off before.", "TOOL_TOML")
     ] = None,
     robot: Annotated[
-        Path | None, typer.Option(metavar="ROBOT_TOML", help="Tells how the tip turns; see couple.")
+        Path | None, option("Tells how the tip turns; see couple.", "ROBOT_TOML")
     ] = None,
-    noise: Annotated[
-        float, typer.Option(metavar="PERCENT", min=0.0, help="With --tool: of FRFs without sd.")
-    ] = 0.0,
+    noise: Annotated[float, option("With --tool: of FRFs without sd.", "PERCENT", min=0.0)] = 0.0,
     peak_force_n: Annotated[
         float | None,
-        typer.Option(
+        option(
+            "Of a campaign: linearise joints that are not linear ([[law]]) for such hits.",
+            "N",
             "--peak-force-n",
-            metavar="N",
-            min=1e-3,
-            help="Of a campaign: linearise joints that are not linear ([[law]]) for such hits.",
+            min=0.001,
         ),
     ] = None,
     point: Annotated[str | None, option("How stable is this very point?", "RPM,DEPTH_M")] = None,
-    samples: Annotated[int, typer.Option(min=20, max=10_000, help="Of what is uncertain.")] = 200,
+    samples: Annotated[int, option("Of what is uncertain.", min=20, max=10000)] = 200,
     plot: Annotated[Path | None, option("Draw the lobes into this folder.", "FOLDER")] = None,
     format_: PictureFormat = "png",
     rrd: Rrd = None,
@@ -67,23 +59,11 @@ def stability(
     Example: planner stability cell7 --pose P001 --cut cut.toml --plot pictures
     """
     from planner.campaign.cut_source import StabilityRequest
-    from planner.cli.progress import progress_bar
     from planner.milling.cut import load_cut
     from planner.report.pictures import Pictures
 
-    asked = StabilityRequest(
-        source,
-        cut,
-        pose,
-        point,
-        samples,
-        tool,
-        reference,
-        robot,
-        noise / 100,
-        from_names,
-        peak_force_n,
-    )
+    coupled = tool, reference, robot, noise / 100
+    asked = StabilityRequest(source, cut, pose, point, samples, *coupled, from_names, peak_force_n)
     pictures = Pictures(plot, format_, rrd)
     check(path, origin, turns, poses, map_, pose)
     with progress_bar("computing", quiet=as_json) as progress:
@@ -122,34 +102,28 @@ def check(
 def couple(
     source: Annotated[
         Path,
-        typer.Argument(
-            metavar="SOURCE",
-            help="FRFs at the tested tool's tip: npz, measured (a file or folder; from one with "
+        argument(
+            "FRFs at the tested tool's tip: npz, measured (a file or folder; from one with "
             "recordings.csv those of predict.csv are predicted), or a campaign.",
+            "SOURCE",
         ),
     ],
-    tool: Annotated[Path, typer.Option(metavar="TOOL_TOML", help="The tool that is put on.")],
-    out: Annotated[Path, typer.Option(metavar="FILE.npz", help="Where its FRFs go.")],
+    tool: Annotated[Path, option("The tool that is put on.", "TOOL_TOML")],
+    out: Annotated[Path, option("Where its FRFs go.", "FILE.npz")],
     reference: Annotated[
-        Path | None,
-        typer.Option(metavar="TOOL_TOML", help="The tested tool, which is taken off."),
+        Path | None, option("The tested tool, which is taken off.", "TOOL_TOML")
     ] = None,
-    pose: Annotated[str | None, typer.Option(metavar="NAME", help="Which pose of SOURCE.")] = None,
+    pose: Annotated[str | None, option("Which pose of SOURCE.", "NAME")] = None,
     robot: Annotated[
-        Path | None,
-        typer.Option(metavar="ROBOT_TOML", help="Whose simulation tells how the tip turns."),
+        Path | None, option("Whose simulation tells how the tip turns.", "ROBOT_TOML")
     ] = None,
-    noise: Annotated[
-        float,
-        typer.Option(metavar="PERCENT", min=0.0, help="Of FRFs whose file states no sd."),
-    ] = 0.0,
+    noise: Annotated[float, option("Of FRFs whose file states no sd.", "PERCENT", min=0.0)] = 0.0,
     contact_from: Annotated[
-        Path | None,
-        typer.Option(metavar="FRFS", help="Measured with TOOL there: its contact is identified."),
+        Path | None, option("Measured with TOOL there: its contact is identified.", "FRFS")
     ] = None,
     band_hz: Annotated[
         tuple[float, float] | None,
-        typer.Option("--band-hz", metavar="LOW HIGH", help="Band in Hz, which has to be covered."),
+        option("Band in Hz, which has to be covered.", "LOW HIGH", "--band-hz"),
     ] = None,
     plot: Annotated[Path | None, option("Draw the FRFs into this folder.", "FOLDER")] = None,
     format_: PictureFormat = "png",
@@ -181,4 +155,5 @@ def couple(
     answer = coupling_report(before, coupled, target.name, tested_name, name, out)
     if contact is not None:
         answer = replace(answer, contact=contact.to_json())
-    return respond(answer.with_pictures(pictures, f"{answer.tool} at {answer.pose}"), as_json)
+    name = f"{answer.tool} at {answer.pose}"
+    return respond(answer.with_figures(pictures, answer.drawings, name), as_json)

@@ -1,25 +1,24 @@
 """Modes of a matrix of FRFs as files for other programs: universal file, tables."""
 
 import csv
-import io
-import warnings
-from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from planner.errors import writing
+from planner.export.uff import Dataset, function, mode_set, write_sets
 from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_modes import MatrixModes
-from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 from planner.version import __version__
 
 AXES = ("x", "y", "z")
+MODES = ("mode", "frequency_hz", "frequency_sd_hz", "scatter_hz", "damping_ratio",
+         "damping_sd", "mpc", "mpd_deg", "modal_mass_kg", "probability")  # fmt: skip
+VALUES = "mode", "node", "direction", "re", "im", "sd"
 TRACE = 240  # nodes of a trace line: the format allows 250
 
 
@@ -52,31 +51,23 @@ def export(what: Exported, folder: Path) -> list[Path]:
     with writing(folder, "another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         files = [folder / name for name in ("modes.uff", "frfs.uff", "modes.csv", "shapes.csv")]
-        _universal(files[0], [_header(what), *_geometry(what), *_shapes(what)])
-        _universal(files[1], [_header(what), *_frfs(what)])
-        _modes_table(what.found, files[2])
-        _shapes_table(what.found, files[3])
+        write_sets(files[0], [_header(what), *_geometry(what), *_shapes(what)])
+        write_sets(files[1], [_header(what), *_frfs(what)])
+        _table(files[2], MODES, _mode_rows(what.found))
+        _table(files[3], VALUES, _shape_rows(what.found))
         if apart := _vectors(what):
             files += [folder / name for name in ("vectors.uff", "vectors.csv")]
-            _universal(files[4], [_header(what), *_geometry(what), *_vector_sets(what, apart)])
-            _vectors_table(apart, files[5])
+            write_sets(files[4], [_header(what), *_geometry(what), *_vector_sets(what, apart)])
+            rows = [
+                (k, side, *row)
+                for k, side, dofs, vector, sd in apart
+                for row in _rows(dofs, vector, sd)
+            ]
+            _table(files[5], ("mode", "side", *VALUES[1:]), rows)
     return files
 
 
-def _universal(path: Path, sets: list[dict[str, Any]]) -> None:
-    """One dataset after the other; pyuff reads the whole file again after each it appends."""
-    import pyuff
-
-    with TemporaryDirectory() as aside, open(path, "wb") as file:
-        for k, one in enumerate(sets):
-            piece = Path(aside) / f"{k}.uff"
-            with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
-                warnings.simplefilter("ignore")
-                pyuff.UFF(str(piece)).write_sets([one], "add")
-            file.write(piece.read_bytes())
-
-
-def _header(what: Exported) -> dict[str, Any]:
+def _header(what: Exported) -> Dataset:
     mark = "simulated recordings" if what.matrix.simulated else "measured"
     return {
         "type": 151, "model_name": "modal analysis", "description": mark, "db_app": "planner",
@@ -85,7 +76,7 @@ def _header(what: Exported) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _geometry(what: Exported) -> list[dict[str, Any]]:
+def _geometry(what: Exported) -> list[Dataset]:
     units = {
         "type": 164, "units_code": 1, "units_description": "SI: Meter (newton)", "temp_mode": 1,
         "length": 1.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15,
@@ -101,7 +92,7 @@ def _geometry(what: Exported) -> list[dict[str, Any]]:
     return [units, {"type": 15, **place}, {"type": 2411, **place}, *_traces(what, numbers)]
 
 
-def _traces(what: Exported, numbers: dict[str, int]) -> list[dict[str, Any]]:
+def _traces(what: Exported, numbers: dict[str, int]) -> list[Dataset]:
     """Trace lines; neighbours that follow one another are drawn without lifting the pen."""
     assert what.geometry is not None
     found: list[list[int]] = [[]]
@@ -122,13 +113,14 @@ def _traces(what: Exported, numbers: dict[str, int]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _shapes(what: Exported) -> list[dict[str, Any]]:
+def _shapes(what: Exported) -> list[Dataset]:
     sets = []
     for k, mode in enumerate(what.found.modes, 1):
         nodes, motion = _motion(what.found.dofs, mode.shape, what.numbers)
         a = 2j * mode.pole.imag if mode.scaled else 0j
         said = "unit modal mass, kg^-1/2" if mode.scaled else "not scaled"
-        one = _complex_mode(k, mode, said, nodes, motion.real if what.real else motion, a)
+        texts = _named(k, mode.frequency_hz), said
+        one = mode_set(k, mode.pole, texts, nodes, motion.real if what.real else motion, a)
         if what.real:
             one |= {
                 "analysis_type": 2, "data_type": 2, "freq": mode.frequency_hz,
@@ -139,17 +131,8 @@ def _shapes(what: Exported) -> list[dict[str, Any]]:
     return sets
 
 
-def _complex_mode(
-    k: int, mode: Mode, said: str, nodes: list[int], motion: np.ndarray, a: complex
-) -> dict[str, Any]:
-    """Dataset 55 of a vector (n, 3) of a mode, counted from 1; `said` is its second line."""
-    columns = map(np.ascontiguousarray, motion.T)
-    return {
-        "type": 55, "id1": f"mode {k}: {mode.frequency_hz:.6g} Hz", "id2": said, "model_type": 1,
-        "data_ch": 2, "spec_data_type": 8, "load_case": 0, "mode_n": k, "node_nums": nodes,
-        "n_data_per_node": 3, "analysis_type": 3, "data_type": 5, "eig": mode.pole, "modal_a": a,
-        "modal_b": -mode.pole * a, **dict(zip(("r1", "r2", "r3"), columns, strict=True)),
-    }  # fmt: skip
+def _named(k: int, frequency_hz: float) -> str:
+    return f"mode {k}: {frequency_hz:.6g} Hz"
 
 
 Vectors = list[tuple[int, str, tuple[Dof, ...], np.ndarray, np.ndarray]]
@@ -169,23 +152,14 @@ def _vectors(what: Exported) -> Vectors:
     ]
 
 
-def _vector_sets(what: Exported, apart: Vectors) -> list[dict[str, Any]]:
+def _vector_sets(what: Exported, apart: Vectors) -> list[Dataset]:
     """The format knows no left vectors: the second line of each set says which it is."""
     sets = []
     for k, side, dofs, vector, _ in apart:
         mode, (nodes, motion) = what.found.modes[k - 1], _motion(dofs, vector, what.numbers)
-        said = f"{side} vector: R = right left^T / (2 i w_d)"
-        sets.append(_complex_mode(k, mode, said, nodes, motion, 2j * mode.pole.imag))
+        texts = _named(k, mode.frequency_hz), f"{side} vector: R = right left^T / (2 i w_d)"
+        sets.append(mode_set(k, mode.pole, texts, nodes, motion, 2j * mode.pole.imag))
     return sets
-
-
-def _vectors_table(apart: Vectors, path: Path) -> None:
-    rows = [
-        (k, side, dof.node, dof.direction, float(value.real), float(value.imag), float(error))
-        for k, side, dofs, vector, sd in apart
-        for dof, value, error in zip(dofs, vector, sd, strict=True)
-    ]
-    _table(path, ("mode", "side", "node", "direction", "re", "im", "sd"), rows)
 
 
 def _motion(
@@ -202,47 +176,41 @@ def _motion(
     return nodes, motion
 
 
-def _frfs(what: Exported) -> list[dict[str, Any]]:
+def _frfs(what: Exported) -> list[Dataset]:
     matrix, numbers = what.matrix, what.numbers
-    frequency = matrix.frequency_hz
-    even = bool(np.allclose(np.diff(frequency), frequency[1] - frequency[0], rtol=1e-6))
-    kind = {"ordinate_spec_data_type": 12, "ordinate_axis_lab": "Acceleration",
-            "ordinate_axis_units_lab": "m/s^2", "orddenom_spec_data_type": 13,
-            "orddenom_axis_lab": "Force", "orddenom_axis_units_lab": "N"}  # fmt: skip
+    title = "simulated" if matrix.simulated else "FRF"
+    felt, hit = ([(numbers[dof.node], dof) for dof in of] for of in
+                 (matrix.responses, matrix.references))  # fmt: skip
     return [
-        {
-            "type": 58, "binary": 0, "func_type": 4,
-            "id1": "simulated" if matrix.simulated else "FRF", "id2": "planner",
-            "rsp_node": numbers[matrix.responses[o].node], "rsp_dir": matrix.responses[o].number,
-            "ref_node": numbers[matrix.references[i].node], "ref_dir": matrix.references[i].number,
-            "data": matrix.accelerance[o, i], "x": frequency, "abscissa_spacing": int(even),
-            "abscissa_spec_data_type": 18, "abscissa_axis_lab": "Frequency",
-            "abscissa_axis_units_lab": "Hz", **(kind if matrix.scaled else {}),
-        }
+        function(matrix.accelerance[o, i], matrix.frequency_hz, felt[o], hit[i], title,
+                 matrix.scaled)
         for o, i in zip(*np.nonzero(matrix.measured), strict=True)
     ]  # fmt: skip
 
 
-def _modes_table(found: MatrixModes, path: Path) -> None:
-    names = ("mode", "frequency_hz", "frequency_sd_hz", "scatter_hz", "damping_ratio",
-             "damping_sd", "mpc", "mpd_deg", "modal_mass_kg", "probability")  # fmt: skip
-    rows = [
-        (k + 1, m.frequency_hz, m.frequency_sd_hz, m.scatter_hz, m.damping_ratio, m.damping_sd,
+def _mode_rows(found: MatrixModes) -> list[tuple[Any, ...]]:
+    return [
+        (k, m.frequency_hz, m.frequency_sd_hz, m.scatter_hz, m.damping_ratio, m.damping_sd,
          m.collinearity, m.deviation_deg, m.modal_mass_kg if m.scaled else "", m.probability)
-        for k, m in enumerate(found.modes)
+        for k, m in enumerate(found.modes, 1)
     ]  # fmt: skip
-    _table(path, names, rows)
 
 
-def _shapes_table(found: MatrixModes, path: Path) -> None:
-    names = "mode", "node", "direction", "re", "im", "sd"
-    rows = [
-        (k + 1, dof.node, dof.direction, float(value.real), float(value.imag), float(sd))
-        for k, mode in enumerate(found.modes)
+def _shape_rows(found: MatrixModes) -> list[tuple[Any, ...]]:
+    return [
+        (k, *row)
+        for k, mode in enumerate(found.modes, 1)
         if mode.shape_sd is not None
-        for dof, value, sd in zip(found.dofs, mode.shape, mode.shape_sd, strict=True)
+        for row in _rows(found.dofs, mode.shape, mode.shape_sd)
     ]
-    _table(path, names, rows)
+
+
+def _rows(dofs: tuple[Dof, ...], vector: np.ndarray, sd: np.ndarray) -> list[tuple[Any, ...]]:
+    """Of a vector (n,) its degrees of freedom, real and imaginary part, and sd."""
+    return [
+        (dof.node, dof.direction, float(value.real), float(value.imag), float(error))
+        for dof, value, error in zip(dofs, vector, sd, strict=True)
+    ]
 
 
 def _table(path: Path, names: tuple[str, ...], rows: list[tuple[Any, ...]]) -> None:

@@ -17,21 +17,20 @@ def modes_csv(found: ExportData) -> str:
     header = ["source", "pose", *found.joints.columns, "mode", "frequency_hz", "frequency_sd_hz",
               "damping_ratio", "damping_sd"]  # fmt: skip
     header += [f"shape_{a}_{part}" for a in AXES for part in ("re", "im")]
-    return _text(found, header, _mode_rows(found))
-
-
-def _mode_rows(found: ExportData) -> Iterator[list[object]]:
+    rows: list[list[object]] = []
     for one in found.measured:
         for k, m in enumerate(one.modes, 1):
             shape = [v for pair in m.shape for v in pair]
             numbers = m.frequency_hz, m.frequency_sd_hz, m.damping_ratio, m.damping_sd
-            yield ["measured", one.pose, *one.joints_deg, k, *numbers, *shape]
+            rows.append(["measured", one.pose, *one.joints_deg, k, *numbers, *shape])
     modes = found.modes
     for i, pose in enumerate(found.poses):
         for k in range(modes.frequency_hz.shape[1]):
             columns = modes.frequency_hz, modes.frequency_sd_hz, modes.damping_ratio
             numbers = [float(c[i, k]) for c in (*columns, modes.damping_sd)]
-            yield ["predicted", pose, *found.joints_deg[i].tolist(), k + 1, *numbers, *[""] * 6]
+            there = pose, *found.joints_deg[i].tolist(), k + 1
+            rows.append(["predicted", *there, *numbers, *[""] * 6])
+    return _text(found, header, rows)
 
 
 def frfs_csv(found: ExportData) -> str:

@@ -1,87 +1,107 @@
-"""Universal files: FRFs and coherences as dataset 58, modes as dataset 55 (SDRC 1995, as text)."""
+"""Universal files: FRFs and coherences as dataset 58, modes as dataset 55, by pyuff."""
 
-from collections.abc import Sequence
+import io
+import warnings
+from collections.abc import Iterable, Sequence
+from contextlib import redirect_stdout
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
 from planner.campaign.events import MeasuredMode
-from planner.frf.frf import Frf
+from planner.recording.dof import Dof
 
 AXES = "xyz"
-HIT_NODE, SENSOR_NODE = 1, 2
+HIT, SENSOR = (1, "HIT"), (2, "SENSOR")  # nodes of the tool: numbers and names
 FRF, COHERENCE = 4, 6  # function types of dataset 58
-COMPLEX_DOUBLE, REAL_DOUBLE = 6, 4
-ACCELERATION, FORCE, FREQUENCY, NONE = (12, "m/s^2"), (13, "N"), (18, "Hz"), (0, "NONE")
+ACCELERANCE = {"ordinate_spec_data_type": 12, "ordinate_axis_lab": "Acceleration",
+               "ordinate_axis_units_lab": "m/s^2", "orddenom_spec_data_type": 13,
+               "orddenom_axis_lab": "Force", "orddenom_axis_units_lab": "N"}  # fmt: skip
+Dataset = dict[str, Any]
 
 
-def frf_sets(
-    frequency_hz: np.ndarray, accelerance: np.ndarray, title: str, coherence: np.ndarray | None
-) -> str:
-    """Dataset 58 of every FRF of a matrix (3, 3, F) in m/s²/N; columns that are NaN are left out.
+def write_sets(path: Path, sets: Iterable[Dataset]) -> None:
+    """One dataset after the other; pyuff reads the whole file again after each it appends."""
+    import pyuff
 
-    The node of the hits is 1, that of the sensor 2; directions 1, 2, 3 are x, y, z. `coherence`
-    (3, 3, F) follows each FRF as function type 6 where it is known.
-    """
-    parts = []
-    for i, j in np.ndindex(3, 3):
-        if np.isfinite(accelerance[i, j]).all():
-            parts.append(_function(FRF, frequency_hz, accelerance[i, j], (i, j), title))
-            if coherence is not None and np.isfinite(coherence[i, j]).all():
-                parts.append(_function(COHERENCE, frequency_hz, coherence[i, j], (i, j), title))
-    return "".join(parts)
-
-
-def measured_sets(frf: Frf, title: str) -> str:
-    """Dataset 58 of a measured FRF matrix with its coherences."""
-    return frf_sets(frf.frequency_hz, frf.accelerance, title, frf.coherence)
-
-
-def mode_sets(modes: Sequence[MeasuredMode], title: str) -> str:
-    """Dataset 55 of each mode: complex eigenvalue in rad/s and shape at the sensor's node."""
-    return "".join(_mode(mode, number, title) for number, mode in enumerate(modes, 1))
+    with TemporaryDirectory() as aside, open(path, "wb") as file:
+        for k, one in enumerate(sets):
+            piece = Path(aside) / f"{k}.uff"
+            with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
+                warnings.simplefilter("ignore")
+                pyuff.UFF(str(piece)).write_sets([one], "add")
+            file.write(piece.read_bytes())
 
 
 def _line(text: str) -> str:
-    return f"{text.encode('ascii', 'replace').decode()[:80]:<80}\n"
+    """As much of a text as a line of the format holds."""
+    return text.encode("ascii", "replace").decode()[:80]
 
 
-def _function(
-    kind: int, frequency_hz: np.ndarray, values: np.ndarray, place: tuple[int, int], title: str
-) -> str:
-    """One dataset 58 with evenly spaced lines; `place` is (response, hit) from 0."""
-    i, j = place
-    form = COMPLEX_DOUBLE if np.iscomplexobj(values) else REAL_DOUBLE
-    step = float(frequency_hz[1] - frequency_hz[0]) if len(frequency_hz) > 1 else 0.0
-    names = f"response {AXES[i]}", f"hit {AXES[j]}"
-    head = [_line(t) for t in (title, f"{names[0]}, {names[1]}", "NONE", "NONE", "NONE")]
-    head.append(
-        f"{kind:5d}{0:10d}{0:5d}{0:10d} {'SENSOR':<10}{SENSOR_NODE:10d}{i + 1:4d}"
-        f" {'HIT':<10}{HIT_NODE:10d}{j + 1:4d}\n"
-    )
-    head.append(
-        f"{form:10d}{len(frequency_hz):10d}{1:10d}{frequency_hz[0]:13.5E}{step:13.5E}{0:13.5E}\n"
-    )
-    over, under = (ACCELERATION, FORCE) if kind == FRF else (NONE, NONE)
-    for number, unit in (FREQUENCY, over, under, NONE):
-        head.append(f"{number:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {unit:<20}\n")
-    flat = values.astype(complex).view(float) if form == COMPLEX_DOUBLE else values
-    return f"    -1\n    58\n{''.join(head)}{_numbers(flat)}    -1\n"
+def function(
+    values: np.ndarray, frequency_hz: np.ndarray, felt: tuple[int, Dof], hit: tuple[int, Dof],
+    title: str, scaled: bool = True, names: tuple[str, str] = ("NONE", "NONE"),
+) -> Dataset:  # fmt: skip
+    """Dataset 58 of an FRF (F,), complex, in m/s²/N where it is `scaled`, or of a coherence (F,).
+
+    `felt` and `hit` are node number and degree of freedom, `names` those of the nodes; lines (F,)
+    in Hz.
+    """
+    steps, frf = np.diff(frequency_hz), np.iscomplexobj(values)
+    return {
+        "type": 58, "binary": 0, "func_type": FRF if frf else COHERENCE,
+        "id1": _line(title), "id2": f"response {felt[1]}, hit {hit[1]}",
+        "rsp_ent_name": names[0], "ref_ent_name": names[1],
+        "rsp_node": felt[0], "rsp_dir": felt[1].number, "ref_node": hit[0],
+        "ref_dir": hit[1].number, "data": values, "x": frequency_hz,
+        "abscissa_spacing": int(np.allclose(steps, steps[0], rtol=1e-6)),
+        "abscissa_spec_data_type": 18, "abscissa_axis_lab": "Frequency",
+        "abscissa_axis_units_lab": "Hz", "orddenom_spec_data_type": 0,
+        **(ACCELERANCE if frf and scaled else {}),
+    }  # fmt: skip
 
 
-def _numbers(values: np.ndarray) -> str:
-    rows = [values[k : k + 4] for k in range(0, len(values), 4)]
-    return "".join("".join(f"{v:20.12E}" for v in row) + "\n" for row in rows)
+def mode_set(
+    k: int, pole: complex, texts: Sequence[str], nodes: Sequence[int], motion: np.ndarray,
+    a: complex = 0j,
+) -> Dataset:  # fmt: skip
+    """Dataset 55 of the k-th mode: pole in rad/s, modal a, and motion (n, 3), complex, of nodes."""
+    columns = map(np.ascontiguousarray, motion.T)
+    return {
+        "type": 55, **{f"id{i}": _line(text) for i, text in enumerate(texts, 1)}, "model_type": 1,
+        "data_ch": 2, "spec_data_type": 8, "load_case": 0, "mode_n": k, "node_nums": nodes,
+        "n_data_per_node": 3, "analysis_type": 3, "data_type": 5, "eig": pole, "modal_a": a,
+        "modal_b": -pole * a, **dict(zip(("r1", "r2", "r3"), columns, strict=True)),
+    }  # fmt: skip
 
 
-def _mode(mode: MeasuredMode, number: int, title: str) -> str:
-    w, z = 2 * np.pi * mode.frequency_hz, mode.damping_ratio
-    pole = complex(-z * w, w * np.sqrt(max(0.0, 1 - z * z)))
-    shape = np.array(mode.shape, dtype=float).ravel()
-    said = f"{mode.frequency_hz:.6g} Hz, damping ratio {z:.4g}"
-    head = [_line(t) for t in (title, f"mode {number}: {said}", "NONE", "NONE", "NONE")]
-    # Structural, complex eigenvalue of first order, 3 translations of displacement, complex.
-    head.append("".join(f"{v:10d}" for v in (1, 3, 2, 8, 5, 3)) + "\n")
-    head.append("".join(f"{v:10d}" for v in (2, 6, 1, number)) + "\n")
-    head.append("".join(f"{v:13.5E}" for v in (pole.real, pole.imag, 0, 0, 0, 0)) + "\n")
-    data = f"{SENSOR_NODE:10d}\n" + "".join(f"{v:13.5E}" for v in shape) + "\n"
-    return f"    -1\n    55\n{''.join(head)}{data}    -1\n"
+def tool_frfs(
+    frequency_hz: np.ndarray, accelerance: np.ndarray, title: str,
+    coherence: np.ndarray | None = None,
+) -> list[Dataset]:  # fmt: skip
+    """Every FRF of a matrix (3, 3, F) in m/s²/N; columns that are NaN are left out.
+
+    The node of the hits is 1, that of the sensor 2. `coherence` (3, 3, F) follows each FRF where it
+    is known.
+    """
+    names = SENSOR[1], HIT[1]
+    return [
+        function(of[i, j], frequency_hz, (SENSOR[0], Dof("", AXES[i])), (HIT[0], Dof("", AXES[j])),
+                 title, names=names)
+        for i, j in np.ndindex(3, 3) if np.isfinite(accelerance[i, j]).all()
+        for of in (accelerance, coherence) if of is not None and np.isfinite(of[i, j]).all()
+    ]  # fmt: skip
+
+
+def tool_modes(modes: Sequence[MeasuredMode], title: str) -> list[Dataset]:
+    """Each mode with its complex eigenvalue and its shape at the sensor's node."""
+    sets = []
+    for k, mode in enumerate(modes, 1):
+        w, z = 2 * np.pi * mode.frequency_hz, mode.damping_ratio
+        pole = complex(-z * w, w * np.sqrt(max(0.0, 1 - z * z)))
+        shape = np.array(mode.shape, dtype=float) @ [1, 1j]
+        said = f"mode {k}: {mode.frequency_hz:.6g} Hz, damping ratio {z:.4g}"
+        sets.append(mode_set(k, pole, (title, said), [SENSOR[0]], shape[None]))
+    return sets

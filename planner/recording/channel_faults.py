@@ -94,7 +94,8 @@ def _overload(name: str, unit: str, samples: np.ndarray, pulse: bool) -> Fault |
         top = float(np.max(sense * size))
         equal = sense * size >= top * (1 - 1e-6)
         # A pulse has one top; a decaying response reaches the same top again and again.
-        flat = _longest_run(equal) if pulse else int(np.sum(equal))
+        ends = np.flatnonzero(np.diff(np.concatenate([[0], equal.astype(int), [0]])))
+        flat = int(np.max(ends[1::2] - ends[::2])) if pulse else int(np.sum(equal))
         if not _by_chance(np.maximum(sense * size, 0.0), flat, pulse):
             level = float(samples[int(np.argmax(sense * size))])
             text = f"The {name} is clipped at {level:.4g} {unit} ({flat} samples)"
@@ -127,11 +128,6 @@ def step(samples: np.ndarray) -> float:
     steps = np.diff(np.unique(samples))
     steps = steps[steps > 1e-9 * np.max(np.abs(samples))]
     return float(np.min(steps)) if steps.size else 0.0
-
-
-def _longest_run(mask: np.ndarray) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))
 
 
 def without_filling(record: TimeRecord) -> TimeRecord:

@@ -132,18 +132,19 @@ def _opened(name: str) -> int:
 
 def time_unit(name: str, stated: str) -> Unit | None:
     """The unit of a column of times, in s where it is not said; None of any other column."""
-    unit = lookup(stated or unit_text(name))
-    if unit and unit.quantity == "time":
-        return unit
-    return lookup("s") if not unit and bare(name) in TIMES else None
+    return _unit_of(name, stated, Unit("time", "s", 1.0), TIMES)
 
 
 def frequency_unit(name: str, stated: str) -> Unit | None:
     """The same of a column of frequencies, in Hz where it is not said."""
+    return _unit_of(name, stated, Unit("frequency", "Hz", 1.0), FREQUENCIES)
+
+
+def _unit_of(name: str, stated: str, si: Unit, names: tuple[str, ...]) -> Unit | None:
     unit = lookup(stated or unit_text(name))
-    if unit and unit.quantity == "frequency":
-        return unit
-    return lookup("hz") if not unit and bare(name) in FREQUENCIES else None
+    if unit is None:
+        return si if bare(name) in names else None
+    return unit if unit.quantity == si.quantity else None
 
 
 def direction_in(name: str) -> int:
@@ -242,7 +243,7 @@ def axis_of(path: Path, attributes: Attributes) -> Axis:
     """What samples stand at. Raises InputError where it is stated twice and differently."""
     steps = [n for _, v in _of_keys(attributes, STEPS) if (n := number(v)) is not None and n]
     rates = [n for _, v in _of_keys(attributes, RATES) if (n := number(v)) is not None and n]
-    quantity, factor = _abscissa(attributes)
+    quantity, _, factor = next(_abscissae(attributes), Unit("time", "s", 1.0))
     found = [1 / rate for rate in rates] + [step * factor for step in steps]
     for step in found[1:]:
         if not abs(step - found[0]) <= UNEVEN * abs(found[0]):
@@ -250,7 +251,11 @@ def axis_of(path: Path, attributes: Attributes) -> Axis:
                 f"{path} states sampling steps of {found[0]:.6g} and {step:.6g} s for one channel; "
                 f"correct the one that is wrong."
             )
-    return Axis(quantity, found[0] if found else None, *_start(attributes, factor))
+    # Offset and date of the first sample, as LabVIEW means them, add up.
+    values = [value for _, value in _of_keys(attributes, _STARTS)]
+    dates = (date for value in values if (date := _date(value)) is not None)
+    offset = next((n * factor for value in values if (n := number(value)) is not None), None)
+    return Axis(quantity, found[0] if found else None, offset, next(dates, None))
 
 
 def is_axis(key: str) -> bool:
@@ -259,22 +264,13 @@ def is_axis(key: str) -> bool:
     return any(form in known for form in _forms(key))
 
 
-def _abscissa(attributes: Attributes) -> tuple[str, float]:
+def _abscissae(attributes: Attributes) -> Iterator[Unit]:
+    """Units stated of what samples stand at."""
     for key, value in attributes.items():
         if isinstance(value, str) and (_on_abscissa(key) or set(_forms(key)) & _X_UNITS):
             unit = lookup(value)
             if unit and unit.quantity in ("time", "frequency"):
-                return unit.quantity, unit.factor
-    return "time", 1.0
-
-
-def _start(attributes: Attributes, factor: float) -> tuple[float | None, float | None]:
-    """Offset and date of the first sample; as LabVIEW means them they add up."""
-    values = [value for _, value in _of_keys(attributes, _STARTS)]
-    dates = (date for value in values if (date := _date(value)) is not None)
-    numbers = (n for value in values if (n := number(value)) is not None)
-    offset = next(numbers, None)
-    return None if offset is None else offset * factor, next(dates, None)
+                yield unit
 
 
 def _date(value: object) -> float | None:

@@ -147,8 +147,10 @@ class _Reader:
             return {}
         if kind and dataset.dtype == h5py.ref_dtype:
             return self._elements(dataset, depth) if kind == "cell" else None
-        if kind == "char":
-            return _text(dataset[()])
+        if kind == "char":  # codes of UTF-16 in columns; several rows are a list
+            rows = (row.astype("<u2").tobytes() for row in np.atleast_2d(dataset[()].T))
+            texts = [row.decode("utf-16-le") for row in rows]
+            return texts[0] if len(texts) == 1 else tuple(text.strip() for text in texts)
         values: Any = dataset[()]
         fields = dataset.dtype.names or ()
         if fields == ("real", "imag"):
@@ -159,12 +161,6 @@ class _Reader:
             return np.asarray(values).T if kind in NUMBERS else None
         stated = _attributes(dataset)
         return tree_of({"": values}, stated) if stated and np.size(values) > 1 else values
-
-
-def _text(codes: np.ndarray) -> object:
-    """A text as MATLAB stores it, codes of UTF-16 in columns; several rows are a list."""
-    rows = [row.astype("<u2").tobytes().decode("utf-16-le") for row in np.atleast_2d(codes.T)]
-    return rows[0] if len(rows) == 1 else tuple(row.strip() for row in rows)
 
 
 def _stated(item: "h5py.Dataset | h5py.Group", name: str) -> str | None:

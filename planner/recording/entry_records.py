@@ -18,7 +18,7 @@ from planner.recording.column_names import (
 )
 from planner.recording.entry_columns import EntryColumn, EntryTree, found_in, named_from
 from planner.recording.named_columns import Named, holds_frfs, to_records
-from planner.recording.records import FrfRecord, Record, TimeRecord
+from planner.recording.records import FrfRecord, Record
 from planner.recording.sampling import LEAST_SAMPLES
 
 MOST_NAMED = 8  # arrays that a sentence names
@@ -72,8 +72,11 @@ def _wholes(path: Path, columns: Columns) -> list[_Whole]:
     _no_hit_is_lost(path, each)
     if wholes := [whole for _, some in each for whole in some]:
         return wholes
-    for part in _lengths(columns):
-        whole = _whole(path, part)
+    by_length: dict[int, list[EntryColumn]] = {}
+    for column in columns:
+        by_length.setdefault(len(column.values), []).append(column)
+    for part in by_length.values() if len(by_length) > 1 else ():
+        whole = _whole(path, tuple(part))
         if whole and not any(_belongs(c) for c in columns if len(c.values) != len(part[0].values)):
             return [whole]
     return []
@@ -86,16 +89,14 @@ def _whole(path: Path, columns: Columns) -> _Whole | None:
             (record,) = to_records(path, named_from(path, columns, by_place))
         except InputError:
             continue
-        if isinstance(record, FrfRecord) or _is_hit(record):
+        if isinstance(record, FrfRecord):
+            return record, columns
+        # Of a hit there is one force, and accelerations can be told apart.
+        forces = [c for c in record.channels if c.quantity == "force"]
+        felt = [(c.node, abs(c.direction)) for c in record.channels if c.quantity == "acceleration"]
+        if len(forces) == 1 and felt and len(set(felt)) == len(felt):
             return record, columns
     return None
-
-
-def _is_hit(record: TimeRecord) -> bool:
-    """One force, and accelerations that can be told apart."""
-    forces = [c for c in record.channels if c.quantity == "force"]
-    felt = [(c.node, abs(c.direction)) for c in record.channels if c.quantity == "acceleration"]
-    return len(forces) == 1 and bool(felt) and len(set(felt)) == len(felt)
 
 
 def _groups(columns: Columns) -> list[Columns]:
@@ -116,14 +117,6 @@ def _groups(columns: Columns) -> list[Columns]:
     if len(grouped) == 1:
         return [tuple(part) for part in grouped.values()]
     return [(*common, *part) for part in grouped.values()]
-
-
-def _lengths(columns: Columns) -> list[Columns]:
-    """Columns of each length, where they have several."""
-    by_length: dict[int, list[EntryColumn]] = {}
-    for column in columns:
-        by_length.setdefault(len(column.values), []).append(column)
-    return [tuple(part) for part in by_length.values()] if len(by_length) > 1 else []
 
 
 def _belongs(column: EntryColumn) -> bool:

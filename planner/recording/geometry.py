@@ -37,7 +37,12 @@ def read_geometry(paths: tuple[Path, ...]) -> Geometry | None:
     lines: list[tuple[str, str]] = []
     for path in paths:
         if path.suffix.lower() in SUFFIXES:
-            found = _sets(path)
+            found: list[Any] = []  # what cannot be read is left out: it is no measurement
+            with opened(path) as (file, kinds):
+                for index, kind in enumerate(kinds):
+                    if kind in (*NODES, TRACES, UNITS):
+                        with suppress(Exception):
+                            found.append(file.read_sets(index))
             factors = [float(s.get("length", 1.0)) for s in found if s["type"] == UNITS]
             # A dataset 164 states how many of the file's lengths make a metre.
             scale = 1 / factors[-1] if factors and factors[-1] > 0 else 1.0
@@ -53,14 +58,3 @@ def read_geometry(paths: tuple[Path, ...]) -> Geometry | None:
         return None
     known = tuple(dict.fromkeys(line for line in lines if set(line) <= set(position)))
     return Geometry(tuple(position), np.array(list(position.values())), known)
-
-
-def _sets(path: Path) -> list[dict[str, Any]]:
-    """Datasets of geometry; what cannot be read is left out: it is no measurement."""
-    found: list[Any] = []
-    with opened(path) as (file, kinds):
-        for index, kind in enumerate(kinds):
-            if kind in (*NODES, TRACES, UNITS):
-                with suppress(Exception):
-                    found.append(file.read_sets(index))
-    return found

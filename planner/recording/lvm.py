@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -50,21 +51,14 @@ class _Segment:
 
 @dataclass(frozen=True, eq=False)
 class _Channel:
-    """One column of numbers (n,), and what is stated of it as in entries of other files."""
+    """One column of numbers (n,), and what is stated of it as in entries of other files.
+
+    That is unit, x_unit ("s", of spectra "Hz"), dt, t0 (from start_time, if one is stated).
+    """
 
     name: str
     values: np.ndarray
-    unit: str
-    x_unit: str  # "s", of spectra "Hz"
-    t0: float  # from the date, if one is stated
-    dt: float
-    start_time: np.datetime64 | None
-
-    @property
-    def stated(self) -> dict[str, object]:
-        names = ("unit", "x_unit", "t0", "dt", "start_time")
-        each = {name: getattr(self, name) for name in names}
-        return {name: value for name, value in each.items() if value is not None}
+    stated: dict[str, Any]
 
 
 def read_lvm(path: Path) -> tuple[Record, ...]:
@@ -169,9 +163,9 @@ def _channel(
     of_spectrum = stated("X_Dimension") == "Frequency" or stated("X_Unit_Label") in ("Hz", "hertz")
     # Seconds since 1904 are a date themselves.
     date = _date(stated("Date"), stated("Time")) if abs(start) < 1e9 else None
-    x_unit = "Hz" if of_spectrum else "s"
-    name, unit = segment.names[column], stated("Y_Unit_Label")
-    return _Channel(name, values, unit, x_unit, start, step, date)
+    said = {"unit": stated("Y_Unit_Label"), "x_unit": "Hz" if of_spectrum else "s", "t0": start,
+            "dt": step, **({} if date is None else {"start_time": date})}  # fmt: skip
+    return _Channel(segment.names[column], values, said)
 
 
 def _cell(segment: _Segment, tag: str, column: int) -> str:
@@ -219,20 +213,19 @@ def _date(date: str, time: str) -> np.datetime64 | None:
 
 def _goes_on(before: list[_Channel], after: list[_Channel]) -> bool:
     """Whether each channel begins where it ended in the last segment."""
-    return len(before) == len(after) and all(
-        (a.name, a.unit, a.x_unit) == (b.name, b.unit, "s")
-        and abs(_after(a, b) / a.dt - len(a.values)) < max(0.5, UNEVEN * len(a.values))
-        for a, b in zip(before, after, strict=True)
-        if a.dt > 0
-    )
+    both = zip(before, after, strict=False)
+    return len(before) == len(after) and all(_follows(a, b) for a, b in both if a.stated["dt"] > 0)
 
 
-def _after(a: _Channel, b: _Channel) -> float:
-    """How long after `a` `b` begins, in s."""
-    apart = 0.0
-    if a.start_time is not None and b.start_time is not None:
-        apart = float((b.start_time - a.start_time) / np.timedelta64(1, "ns") * 1e-9)
-    return b.t0 - a.t0 + apart
+def _follows(a: _Channel, b: _Channel) -> bool:
+    first, then = a.stated, b.stated
+    if (a.name, first["unit"], first["x_unit"]) != (b.name, then["unit"], "s"):
+        return False
+    apart = then["t0"] - first["t0"]
+    if "start_time" in first and "start_time" in then:
+        apart += float((then["start_time"] - first["start_time"]) / np.timedelta64(1, "ns") * 1e-9)
+    count = len(a.values)
+    return abs(apart / first["dt"] - count) < max(0.5, UNEVEN * count)
 
 
 def _tree(channels: list[_Channel]) -> EntryTree:

@@ -10,7 +10,7 @@ them say the same: "Time [s]", "Acc X (g)", "Frequency (Hz)", "Real (m/N)", "Mag
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -222,7 +222,10 @@ def frf_record(path: Path, named: Named) -> FrfRecord:
         np.real(named.columns[e.parts["coherence"]]) if "coherence" in e.parts else unknown
         for e in entries
     ]
-    places = [entry.place or _stated_place(entry, entries, named) for entry in entries]
+    # Where they were felt and hit, as columns' names say, or the first lines of a file with one.
+    response, felt = _dof(named, "response", "resp", "output") if len(entries) == 1 else (0, "")
+    hit, hit_point = _dof(named, "hit", "reference", "ref", "input", "excitation")
+    places = [e.place or (felt, direction_in(e.stem) or response, hit_point, hit) for e in entries]
     return FrfRecord(
         path,
         frequency[keep],
@@ -276,7 +279,9 @@ def _entries(named: Named) -> list[_Entry]:
             stem, kind, place = str(own[1]), own[0], own[1]
         else:
             part = "" if _frequency(name, named) else _part(name, named)
-            stem, place, plain = _stem(name, part), None, name.lower()
+            # The stem is what a name says beside its part.
+            stem, place, plain = bare(name), None, name.lower()
+            stem = _PARTS[part].sub("", stem).strip(" _") if part in _PARTS else stem
             kinds = (kind for kind, words in _KINDS.items() if re.search(words, plain))
             kind = next(kinds, "unknown")
         if not part:
@@ -290,12 +295,6 @@ def _entries(named: Named) -> list[_Entry]:
         if part != "coherence" and kind != "unknown":
             entry.kind = kind
     return [entry for entry in entries if set(entry.parts) - {"coherence"}]
-
-
-def _stem(name: str, part: str) -> str:
-    """What a name says beside its part."""
-    plain = bare(name)
-    return _PARTS[part].sub("", plain).strip(" _") if part in _PARTS else plain
 
 
 def _values(path: Path, entry: _Entry, named: Named) -> tuple[str, bool, np.ndarray]:
@@ -337,16 +336,6 @@ def _polar(path: Path, entry: _Entry, named: Named, in_db: bool) -> np.ndarray:
         )
     size = 10.0 ** (magnitude / 20) if in_db else magnitude
     return size * np.exp(1j * np.deg2rad(phase * unit.factor))
-
-
-def _stated_place(entry: _Entry, entries: Sequence[_Entry], named: Named) -> Place:
-    """Where an FRF was felt and hit, as its column's name and the file's first lines say."""
-    response, felt = _dof(named, "response", "resp", "output")
-    hit, hit_point = _dof(named, "hit", "reference", "ref", "input", "excitation")
-    own = direction_in(entry.stem)
-    if len(entries) > 1:  # what the file states of its response is of none of them
-        felt, response = "", 0
-    return felt, own or response, hit_point, hit
 
 
 def _dof(named: Named, *words: str) -> tuple[int, str]:

@@ -31,22 +31,17 @@ def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]
     if pulse.peak_n < SILENCE or np.max(np.abs(hit.acceleration_m_s2)) < SILENCE:
         text = "Force or accelerations are zero throughout; check the cables."
         return (*hit.faults, Fault("dead", text))
-    faults = [*hit.faults, *_short(hit, limits), *_weak(hit, limits), *channel_faults(hit)]
+    (low, high), record_s = limits.band_hz, len(hit.force_n) / hit.sampling_rate_hz
+    faults = [*hit.faults]
+    if (high - low) * record_s < LEAST_LINES:
+        text = f"The record of {record_s:.3g} s resolves nothing between {low:g} and {high:g} Hz"
+        remedy = "record for longer, or correct the unit of the time."
+        faults.append(Fault("too_short", f"{text}; {remedy}"))
+    faults += [*_weak(hit, limits), *channel_faults(hit)]
     if any(f.kind == "too_weak" for f in faults):
         return tuple(faults)
     checks = (_pulse, _double, _soft)
     return (*faults, *(fault for check in checks for fault in check(hit, limits)))
-
-
-def _short(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
-    low, high = limits.band_hz
-    record_s = len(hit.force_n) / hit.sampling_rate_hz
-    if (high - low) * record_s < LEAST_LINES:
-        yield Fault(
-            "too_short",
-            f"The record of {record_s:.3g} s resolves nothing between {low:g} and {high:g} Hz; "
-            f"record for longer, or correct the unit of the time.",
-        )
 
 
 def _weak(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:

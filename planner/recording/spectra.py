@@ -43,18 +43,17 @@ def band_spectra(
 
 def excited_band(hits: Sequence[Hit]) -> tuple[float, float]:
     """Lowest and highest frequency in Hz to three digits, by the median of hits (n ≥ 1)."""
-    low, high = np.median([_band(hit) for hit in hits], axis=0)
+    bands = []
+    for hit in hits:
+        pulse, rate, samples = hit.pulse, hit.sampling_rate_hz, len(hit.force_n)
+        first, end = pulse.around(samples)
+        spectrum = np.abs(np.fft.rfft(hit.force_n[first:end] - pulse.offset_n, samples))
+        lost = spectrum < np.max(spectrum) * 10 ** (-LOST_DB / 20)
+        lost[: int(np.argmax(spectrum))] = False
+        line = int(np.argmax(lost)) if lost.any() else samples // 2
+        bands.append((FIRST_LINE * rate / samples, min(line / samples, OF_RATE) * rate))
+    low, high = np.median(bands, axis=0)
     return float(f"{low:.3g}"), float(f"{high:.3g}")
-
-
-def _band(hit: Hit) -> tuple[float, float]:
-    pulse, rate, samples = hit.pulse, hit.sampling_rate_hz, len(hit.force_n)
-    first, end = pulse.around(samples)
-    spectrum = np.abs(np.fft.rfft(hit.force_n[first:end] - pulse.offset_n, samples))
-    lost = spectrum < np.max(spectrum) * 10 ** (-LOST_DB / 20)
-    lost[: int(np.argmax(spectrum))] = False
-    line = int(np.argmax(lost)) if lost.any() else samples // 2
-    return FIRST_LINE * rate / samples, min(line / samples, OF_RATE) * rate
 
 
 def driving_point(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
@@ -63,7 +62,7 @@ def driving_point(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
     The sensor has to be near the point that is hit; only hits at the tcp are judged.
     """
     own = hit.channels_of(SENSOR)
-    if own is None or hit.hit_point != TCP or positive_share(own, band_hz) > TURNED:
+    if own is None or hit.hit_point != TCP or _positive_share(own, band_hz) > TURNED:
         return ()
     axis = AXES[hit.axis_index]
     text = (
@@ -73,7 +72,7 @@ def driving_point(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
     return (Fault("driving_point", text, refuse=False),)
 
 
-def positive_share(hit: Hit, band_hz: tuple[float, float]) -> float:
+def _positive_share(hit: Hit, band_hz: tuple[float, float]) -> float:
     """Share of |Im H|, in [0, 1], with the right sign; H of the hit's own axis, x, y, z heard."""
     force, answers = band_spectra(hit, band_hz, hit.pulse.offset_n)
     answer = answers[hit.axis_index]

@@ -79,19 +79,15 @@ def decoded(path: Path, most_bytes: int) -> str:
         return data.decode("cp1252" if marked is None else "latin-1", errors="replace")
 
 
+def _number(cell: str, kind: type[float] | type[complex] = float) -> complex | None:
+    try:
+        return kind(cell)
+    except ValueError:
+        return None
+
+
 def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
-def _is_complex(cell: str) -> bool:
-    try:
-        return complex(cell).imag != 0
-    except ValueError:
-        return False
+    return _number(cell) is not None
 
 
 def parse_table(path: Path, text: str) -> Named:
@@ -121,7 +117,8 @@ def _block(path: Path, lines: Sequence[str]) -> tuple[Form, int]:
     if found:
         start, _, form = min(found, key=lambda one: one[:2])
         return form, start
-    if sum(_is_complex(line.strip()) for line in lines[:100]) >= min(LEAST_ROWS, len(lines)):
+    numbers = [found for line in lines[:100] if (found := _number(line.strip(), complex))]
+    if sum(one.imag != 0 for one in numbers) >= min(LEAST_ROWS, len(lines)):
         raise InputError(
             f"{path} is a list of {len(lines)} complex numbers without frequency lines or units; "
             f"export FRFs with their frequencies."
@@ -176,7 +173,12 @@ def _header(
     units = next((u for row in rows[at + 1 :] if (u := _units(row, names))), [""] * width)
     if names[0].lower() in LABELS:
         names = ["time_s", *names[1:]]
-    return _distinct(names), units, attributes
+    # Names that stand several times get a number.
+    distinct = [
+        name if names.index(name) == i else f"{name} #{names[: i + 1].count(name)}"
+        for i, name in enumerate(names)
+    ]
+    return distinct, units, attributes
 
 
 def _header_cells(line: str, form: Form, width: int) -> list[str]:
@@ -230,14 +232,6 @@ def _pairs(line: str, row: Sequence[str]) -> list[tuple[str, str]]:
     value = re.split(r'[,;\t"]', value, maxsplit=1)[0].strip()
     usable = value and re.fullmatch(r"[\w .()/-]+", key)
     return [(key, value)] if usable else []
-
-
-def _distinct(names: Sequence[str]) -> list[str]:
-    """Names that stand several times get a number."""
-    return [
-        name if names.index(name) == i else f"{name} #{names[: i + 1].count(name)}"
-        for i, name in enumerate(names)
-    ]
 
 
 def _numbers(path: Path, rows: list[str], first: int, form: Form, width: int) -> np.ndarray:

@@ -47,9 +47,15 @@ def read_uff(path: Path) -> tuple[Record, ...]:
         raise InputError(
             f"{path} holds {names}, neither time histories nor FRFs; export one of these."
         )
-    _check_numbers(path, times + frfs)
-    records: list[Record] = []
-    records += [_time_record(path, hit) for hit in _by_hit(times)]
+    for number, s in enumerate(times + frfs, 1):
+        data = np.asarray(s["data"])
+        if len(data) != int(s["num_pts"]) or len(data) < 2:
+            raise InputError(
+                f"{path}: dataset {number} states {s['num_pts']} points and holds {len(data)}; "
+                f"the file is cut off, export it again."
+            )
+        check_numbers(path, f"dataset {number}", data)
+    records: list[Record] = [_time_record(path, hit) for hit in _by_hit(times)]
     if frfs:
         coherences = [s for s in sets if s["func_type"] == 6]
         records.append(_frf_record(path, frfs, coherences))
@@ -123,17 +129,6 @@ def _read_mixed(path: Path, s: dict[str, Any], first: int, end: int) -> None:
         values = np.frombuffer(body, line, count)
         s["x"] = values["x"].astype(float)
         s["data"] = values["y"] @ np.array([1.0, 1j][:parts])
-
-
-def _check_numbers(path: Path, sets: list[dict[str, Any]]) -> None:
-    for number, s in enumerate(sets, 1):
-        data = np.asarray(s["data"])
-        if len(data) != int(s["num_pts"]) or len(data) < 2:
-            raise InputError(
-                f"{path}: dataset {number} states {s['num_pts']} points and holds {len(data)}; "
-                f"the file is cut off, export it again."
-            )
-        check_numbers(path, f"dataset {number}", data)
 
 
 def _simulated(sets: list[dict[str, Any]]) -> bool:

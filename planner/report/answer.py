@@ -30,9 +30,8 @@ class Answer:
 
     def to_json(self) -> dict[str, Any]:
         """Builtin values only. NumPy arrays become lists, numbers that are not finite None."""
-        fields = dataclasses.fields(self)  # pyrefly: ignore[bad-argument-type]
-        values = {f.name: getattr(self, f.name) for f in fields if f.metadata.get("json", True)}
-        return {name: plain(v) for name, v in values.items() if v is not msgspec.UNSET}
+        own = dataclasses.fields(self)  # pyrefly: ignore[bad-argument-type]
+        return plain({f.name: getattr(self, f.name) for f in own if f.metadata.get("json", True)})
 
     def text(self) -> "RenderableType | None":
         """For the engineer, units in every column; None where there is nothing to say."""
@@ -41,12 +40,14 @@ class Answer:
     @property
     def end(self) -> "list[RenderableType]":
         """The last lines of a text: where pictures are, and whether recordings are simulated."""
-        from planner.report.text import SIMULATED, drawn
+        from rich.text import Text
 
-        made: list[RenderableType] = [
-            *drawn(getattr(self, "plots", ()), getattr(self, "rrd", None))
-        ]
-        return [*made, SIMULATED] if getattr(self, "simulated", False) else made
+        from planner.report.text import SIMULATED
+
+        plots, rrd = getattr(self, "plots", ()), getattr(self, "rrd", None)
+        made = [Text("\n  ".join(["Pictures:", *plots]))] if plots else []
+        made += [Text(f"Rerun recording: {rrd}")] if rrd else []
+        return [*made, *([SIMULATED] if getattr(self, "simulated", False) else [])]
 
     def with_figures(
         self,
@@ -65,14 +66,6 @@ class Answer:
         simulated = getattr(self, "simulated", False)
         written = pictures.write(draw(), name, note, more, simulated)
         return dataclasses.replace(self, **written)  # pyrefly: ignore[bad-specialization]
-
-    def drawings(self) -> "dict[str, Figure]":
-        """Its pictures by name."""
-        return {}
-
-    def with_pictures(self, pictures: "Pictures", name: str, note: str = "") -> Self:
-        """The same once its figures are drawn, where that is wanted."""
-        return self.with_figures(pictures, self.drawings, name, note)
 
     def _repr_html_(self) -> str:
         """What notebooks show."""
@@ -102,18 +95,17 @@ class Done(Answer):
 
 
 def plain(value: Any) -> Any:
-    """Builtin values of anything that an answer holds."""
+    """Builtin values of anything that an answer holds; what is UNSET in it is left out."""
     if isinstance(value, Answer):
         return value.to_json()
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        items = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
-        return {name: plain(v) for name, v in items.items() if v is not msgspec.UNSET}
+        value = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
     if isinstance(value, msgspec.Struct):
         value = msgspec.to_builtins(value)
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(k): plain(item) for k, item in value.items() if item is not msgspec.UNSET}
     if isinstance(value, list | tuple | set | frozenset):
         return [plain(item) for item in value]
     if isinstance(value, complex):

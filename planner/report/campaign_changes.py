@@ -15,74 +15,69 @@ from planner.campaign.events import Entry
 from planner.campaign.from_urdf import Guess, Guessed
 from planner.campaign.undo import in_words
 from planner.check.description import CheckRemark
-from planner.report.answer import Answer, Done
+from planner.report.answer import Answer, Done, plain
 from planner.report.text import command_line, table
 from planner.words import command
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NewCampaign(Answer):
-    """Answer of `new`: `campaign` is the folder, `modes` how many of them are modelled.
+    """Answer of `new`: a campaign that was just started, from a URDF alone where `guessed`."""
 
-    `findings` are what a check of the robot warns of. Of one begun from a URDF alone `guessed` is
-    all that was guessed, and `told` what to know of that.
-    """
+    started: Campaign
+    guessed: Guessed | None = None
 
-    campaign: str
-    robot: str
-    joints: tuple[str, ...]
-    modes: int
-    acquisition: str
-    remarks: tuple[str, ...]
-    findings: tuple[CheckRemark, ...] = ()
-    joint_units: Any = msgspec.UNSET
-    guessed: tuple[Guess, ...] = ()
-    told: tuple[str, ...] = ()
-
-    @classmethod
-    def of(cls, campaign: Campaign, guessed: Guessed | None = None) -> "NewCampaign":
-        """Of a campaign that was just started, from a URDF alone where it was `guessed`."""
-        cell = campaign.cell
-        config, robot, said = cell.config, cell.robot, tuple(cell.remarks)
+    @property
+    def findings(self) -> tuple[CheckRemark, ...]:
+        """What a check of the robot warns of and the campaign itself does not."""
+        cell = self.started.cell
         warned = (r for r in cell.examined.remarks if r.severity == "warning")
-        return cls(
-            str(campaign.directory), robot.name, tuple(robot.joint_names), config.modes.count,
-            config.acquisition.name, said, tuple(r for r in warned if r.what not in said),
-            robot.joints.declared, guessed.guesses if guessed else (),
-            guessed.remarks if guessed else (),
-        )  # fmt: skip
+        return tuple(r for r in warned if r.what not in cell.remarks)
+
+    def to_json(self) -> dict[str, Any]:
+        """All that was "guessed", and what to know of that ("told")."""
+        cell, guessed = self.started.cell, self.guessed
+        joints = cell.robot.joints
+        said = {
+            "campaign": str(self.started.directory), "robot": cell.robot.name,
+            "joints": joints.names, "modes": cell.config.modes.count,
+            "acquisition": cell.config.acquisition.name, "remarks": cell.remarks,
+            "findings": self.findings, "guessed": guessed.guesses if guessed else (),
+            "told": guessed.remarks if guessed else (), "joint_units": joints.declared,
+        }  # fmt: skip
+        return plain(said)
 
     def text(self) -> Group:
         """What was started, and how it goes on."""
+        cell, config, folder = self.started.cell, self.started.cell.config, self.started.directory
         warned = (f"Check: {finding.sentence}" for finding in self.findings)
-        remarks = "".join(f"{remark}\n" for remark in (*warned, *self.remarks, *self.told))
+        told = self.guessed.remarks if self.guessed else ()
         said = (
-            f"Campaign in {self.campaign}: robot {self.robot}, "
-            f"{self.modes} modes, chosen by {self.acquisition}.\n"
-            f"{remarks}".rstrip()
+            f"Campaign in {folder}: robot {cell.robot.name}, {config.modes.count} modes, chosen by "
+            f"{config.acquisition.name}."
         )
-        parts = [Text(said), command_line("Next: ", "planner", "next", self.campaign)]
-        return Group(*([_guesses(self.guessed)] if self.guessed else []), *parts)
+        parts = [Text("\n".join([said, *warned, *cell.remarks, *told]).rstrip())]
+        parts.append(command_line("Next: ", "planner", "next", folder))
+        guesses = [_guesses(self.guessed.guesses)] if self.guessed and self.guessed.guesses else []
+        return Group(*guesses, *parts)
 
 
 def _guesses(guessed: tuple[Guess, ...]) -> Table:
     """What was guessed; dampers follow their springs, and stand in the JSON alone."""
     made = table("guessed", "what", "value", "known to (1 sd)")
     for guess in guessed:
-        if not guess.what.startswith("damping"):
-            known = isinstance(guess.value, int | float)
-            value = f"{guess.value:.4g} {guess.unit}" if known else str(guess.value)
-            made.add_row(guess.what, Text(value.strip()), _known_to(guess))
+        if guess.what.startswith("damping"):
+            continue
+        value, known = str(guess.value), "–"
+        if isinstance(guess.value, int | float):
+            value = f"{guess.value:.4g} {guess.unit}".strip()
+            if guess.sd is not None and guess.what.startswith("stiffness"):
+                # By a factor, as their priors are of logarithms.
+                known = f"a factor of {1 + guess.sd / guess.value:.2g}"
+            elif guess.sd is not None:
+                known = f"± {guess.sd:.3g}"
+        made.add_row(guess.what, Text(value), known)
     return made
-
-
-def _known_to(guess: Guess) -> str:
-    """How well a guess is known: springs by a factor, as their priors are of logarithms."""
-    if guess.sd is None or not isinstance(guess.value, int | float):
-        return "–"
-    if guess.what.startswith("stiffness"):
-        return f"a factor of {1 + guess.sd / guess.value:.2g}"
-    return f"± {guess.sd:.3g}"
 
 
 @dataclass(frozen=True)
@@ -107,6 +102,11 @@ class ExampleFolder(Answer):
         return Group(Text(said), *(command_line("  ", *words) for words in commands))
 
 
+def kind_of(entry: Entry) -> str:
+    """What an entry of the log is, as the log has it."""
+    return msgspec.to_builtins(entry.event)["kind"]
+
+
 def undone(entries: Sequence[Entry]) -> Done:
     """Answer of `undo`: the log's entry that was taken back, and those that went with it."""
     keys, words = _told(entries, "undone")
@@ -122,9 +122,9 @@ def redone(entries: Sequence[Entry]) -> Done:
 def _told(entries: Sequence[Entry], what: str) -> tuple[dict[str, Any], str]:
     """Number, kind and words of the first entry, the others' words; and all words in one."""
     entry, *others = entries
-    kind, said = msgspec.to_builtins(entry.event)["kind"], [in_words(other) for other in others]
+    said = [in_words(other) for other in others]
     follow = f"; with it: {', '.join(said)}" if said else ""
-    keys = {what: entry.seq, "event": kind, "what": in_words(entry), "with_it": said}
+    keys = {what: entry.seq, "event": kind_of(entry), "what": in_words(entry), "with_it": said}
     return keys, f"{in_words(entry)}{follow}"
 
 

@@ -1,8 +1,10 @@
 """Answer of `compare`: learning curves of sampling strategies, and how they differ."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -20,7 +22,7 @@ from planner.compare.pool import PoolPose
 from planner.compare.processes import Failure
 from planner.compare.tasks import Run, Study, Task
 from planner.errors import InputError
-from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded
+from planner.report.answer import Answer, RefusedFile, encoded, plain
 from planner.report.pictures import Pictures
 from planner.report.text import table
 
@@ -28,40 +30,14 @@ PICTURE, TABLE = "learning_curves", "comparison.json"
 SHOWN = 8  # columns of measurements that fit
 
 
-@dataclass(frozen=True)
-class PairedStrategies:
-    """All strategies but one held against that one."""
-
-    baseline: str
-    against: Mapping[str, StrategyDifference | None]
-
-
-@dataclass(frozen=True)
-class FailedRun:
-    """A run that ended in an error."""
-
-    strategy: str
-    seed: int
-    reason: str
-
-
 @dataclass(frozen=True, eq=False)
 class ComparisonReport(Answer):
-    """Answer of `compare`; `acquisitions` says which one each strategy is, `models` its model."""
+    """Answer of `compare`; a task that `failed` has the reason."""
 
-    strategies: Mapping[str, StrategyCurve]
-    measurements_to_one_percent: Mapping[str, int | None]
-    minutes_to_one_percent: Mapping[str, float | None]
-    paired: PairedStrategies
-    acquisitions: Mapping[str, str]
-    models: Mapping[str, str]
-    robot: str
-    pool: int
-    repeats: int
-    initial: int
-    budget: int
-    simulation: str
-    failed: tuple[FailedRun, ...]
+    bench: Bench
+    study: Study
+    curves: Mapping[str, Curves]
+    failed: Mapping[Task, Failure]
     refused: tuple[RefusedFile, ...]
     remarks: tuple[str, ...]
     simulated: bool
@@ -69,25 +45,59 @@ class ComparisonReport(Answer):
     plots: tuple[str, ...] = ()
     rrd: str | None = None
     seconds: float = 0.0
-    curves: Mapping[str, Curves] | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
-    def with_pictures(self, out: Path | None, rrd: Path | None, key: str) -> "ComparisonReport":  # pyrefly: ignore[bad-override-param-name]
-        """The same with the picture in `out` and the Rerun file, where they are wanted.
+    @cached_property
+    def baseline(self) -> str:
+        """The strategy against which all others are held."""
+        return baseline_of(list(self.curves))
 
-        `key` is the pool's content hash.
-        """
-        curves = self.curves
-        if curves is None:
-            return self
-        title = f"Pool of {self.pool} poses, {self.repeats} repeats, simulation {self.simulation}"
+    @cached_property
+    def against(self) -> dict[str, StrategyDifference | None]:
+        """The others against it."""
+        base = self.baseline
+        others = {name: curve for name, curve in self.curves.items() if name != base}
+        return {name: paired(curve, self.curves[base]) for name, curve in others.items()}
+
+    @cached_property
+    def strategies(self) -> dict[str, StrategyCurve]:
+        """Medians over repeats."""
+        return {name: StrategyCurve.of(curve) for name, curve in self.curves.items()}
+
+    def to_json(self) -> dict[str, Any]:
+        """ "acquisitions" says which one each strategy is, "models" its model."""
+        study, bench, curves = self.study, self.bench, self.curves.items()
+        own = bench.config.surrogate.model
+        return plain({
+            "strategies": self.strategies,
+            "measurements_to_one_percent": {name: curve.to_goal for name, curve in curves},
+            "minutes_to_one_percent": {name: curve.minutes_to_goal for name, curve in curves},
+            "paired": {"baseline": self.baseline, "against": self.against},
+            "acquisitions": study.strategies,
+            "models": {name: model or own for name, model in study.models.items()},
+            "robot": bench.robot.name, "pool": len(bench.measurements), "repeats": study.repeats,
+            "initial": study.initial, "budget": study.budget,
+            "simulation": bench.config.fidelity.simulation,
+            "failed": [{"strategy": task.strategy, "seed": task.seed, "reason": why.reason}
+                       for task, why in self.failed.items()],
+            "refused": self.refused, "remarks": self.remarks, "simulated": self.simulated,
+            "out": self.out, "plots": self.plots, "rrd": self.rrd, "seconds": self.seconds,
+        })  # fmt: skip
+
+    def with_pictures(self, out: Path | None, rrd: Path | None) -> "ComparisonReport":
+        """The same with the picture in `out` and the Rerun file, where they are wanted."""
+        bench, study = self.bench, self.study
+        title = (
+            f"Pool of {len(bench.measurements)} poses, {study.repeats} repeats, simulation "
+            f"{bench.config.fidelity.simulation}"
+        )
 
         def figures():
             from planner.report.learning_curves import learning_figure
 
-            return {PICTURE: learning_figure(curves, title)}
+            return {PICTURE: learning_figure(self.curves, title)}
 
-        note = f"{title}\n\nPool {key}."
-        shown = self.with_figures(Pictures(out, rrd=rrd), figures, self.robot, note)
+        note = f"{title}\n\nPool {bench.key}."
+        shown = self.with_figures(Pictures(out, rrd=rrd), figures, bench.robot.name, note)
         return shown if out is None else replace(shown, out=str(out.absolute()))
 
     def write(self, folder: Path) -> None:
@@ -98,11 +108,13 @@ class ComparisonReport(Answer):
 
     def text(self) -> Group:
         """Curves as tables, then what each strategy needs to reach 1 %."""
-        columns = _spread(len(next(iter(self.strategies.values())).n))
+        bench, study, n = self.bench, self.study, len(next(iter(self.curves.values())).n)
+        # Up to SHOWN columns, first and last among them.
+        columns = np.unique(np.linspace(0, n - 1, min(n, SHOWN)).round().astype(int)).tolist()
         head = Text(
-            f"{self.robot}: pool of {self.pool} poses, {self.repeats} repeats from {self.initial} "
-            f"to {self.budget} measurements, simulation {self.simulation}; medians, on poses not "
-            f"used."
+            f"{bench.robot.name}: pool of {len(bench.measurements)} poses, {study.repeats} repeats "
+            f"from {study.initial} to {study.budget} measurements, simulation "
+            f"{bench.config.fidelity.simulation}; medians, on poses not used."
         )
         return Group(
             head,
@@ -124,14 +136,13 @@ class ComparisonReport(Answer):
 
     def _goals(self) -> RenderableType:
         made = table(
-            f"To 1 %, and compared with {self.paired.baseline} from the same initial poses "
+            f"To 1 %, and compared with {self.baseline} from the same initial poses "
             f"(95 % interval)",
             "strategy", "to 1 %", "robot (min)", "measurements more",
-            f"RMSE more after {self.budget} (points)", "wall (s)",
+            f"RMSE more after {self.study.budget} (points)", "wall (s)",
         )  # fmt: skip
-        for name, curve in self.strategies.items():
-            d = self.paired.against.get(name)
-            reached = self.measurements_to_one_percent[name], self.minutes_to_one_percent[name]
+        for name, curve in self.curves.items():
+            d, reached = self.against.get(name), (curve.to_goal, curve.minutes_to_goal)
             goal = after = "–"
             if d is not None:
                 to_goal = d.measurements_to_one_percent, d.measurements_to_one_percent_interval95
@@ -139,7 +150,7 @@ class ComparisonReport(Answer):
                 last = d.difference_percent[-1], d.difference_percent_interval95[-1]
                 after = _interval(*last, "+.3f")
             cells = ("–" if v is None else f"{v:.0f}" for v in reached)
-            made.add_row(name, *cells, goal, after, f"{curve.wall_seconds:.1f}")
+            made.add_row(name, *cells, goal, after, f"{self.strategies[name].wall_seconds:.1f}")
         return made
 
 
@@ -151,56 +162,20 @@ def comparison(
     remarks: tuple[str, ...],
 ) -> ComparisonReport:
     """Of all runs of a study; InputError where every run of a strategy failed."""
-    failed = tuple(
-        FailedRun(task.strategy, task.seed, answer.reason)
-        for task, answer in found.items()
-        if isinstance(answer, Failure)
-    )
-    curves = _by_name(study, found, failed)
-    baseline = baseline_of(list(curves))
-    against = {
-        name: paired(curve, curves[baseline]) for name, curve in curves.items() if name != baseline
-    }
-    return ComparisonReport(
-        strategies={name: StrategyCurve.of(curve) for name, curve in curves.items()},
-        measurements_to_one_percent={name: curve.to_goal for name, curve in curves.items()},
-        minutes_to_one_percent={name: curve.minutes_to_goal for name, curve in curves.items()},
-        paired=PairedStrategies(baseline, against),
-        acquisitions=study.strategies,
-        models={name: m or bench.config.surrogate.model for name, m in study.models.items()},
-        robot=bench.robot.name,
-        pool=len(bench.measurements),
-        repeats=study.repeats,
-        initial=study.initial,
-        budget=study.budget,
-        simulation=bench.config.fidelity.simulation,
-        failed=failed,
-        refused=tuple(RefusedFile(r.file, r.reason) for p in poses for r in p.refused),
-        remarks=remarks,
-        simulated=any(p.simulated for p in poses),
-        curves=curves,
-    )
-
-
-def _by_name(
-    study: Study, found: Mapping[Task, Run | Failure], failed: Sequence[FailedRun]
-) -> dict[str, Curves]:
-    """Curves by the names that the user gave."""
+    failed = {task: answer for task, answer in found.items() if isinstance(answer, Failure)}
+    runs = [run for run in found.values() if isinstance(run, Run)]
     curves = {}
-    for name, strategy in study.strategies.items():
-        asked = strategy, study.models[name]
-        runs = [r for r in found.values() if isinstance(r, Run) and (r.strategy, r.model) == asked]
-        if not runs:
-            raise InputError(f"Every run of {name} failed: {failed[0].reason}")
-        curves[name] = Curves.of(runs)
-    return curves
+    for name, strategy in study.strategies.items():  # as the user named them
+        own = [run for run in runs if (run.strategy, run.model) == (strategy, study.models[name])]
+        if not own:
+            why = next(iter(failed.values())).reason
+            raise InputError(f"Every run of {name} failed: {why}")
+        curves[name] = Curves.of(own)
+    refused = tuple(RefusedFile(r.file, r.reason) for p in poses for r in p.refused)
+    simulated = any(p.simulated for p in poses)
+    return ComparisonReport(bench, study, curves, failed, refused, remarks, simulated)
 
 
 def _interval(value: float, interval: np.ndarray, form: str) -> str:
     low, high = interval
     return f"{value:{form}} ({low:{form}}, {high:{form}})"
-
-
-def _spread(count: int) -> list[int]:
-    """Up to SHOWN places of `count`, first and last among them."""
-    return np.unique(np.linspace(0, count - 1, min(count, SHOWN)).round().astype(int)).tolist()

@@ -1,6 +1,6 @@
 """Answer of `couple`: the FRFs of another tool, how sure they are, and the hit that would tell."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,70 +14,80 @@ from planner.milling.coupling import (
     AMPLIFICATION_LIMIT,
     MOTIONS,
     CoupledFrf,
-    Resonance,
-    VerifyingHit,
     resonances,
     verifying_hit,
 )
 from planner.milling.tool import NUMBERS
-from planner.report.answer import NOT_IN_JSON, Answer
+from planner.report.answer import Answer, plain
 from planner.report.text import remarks, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class Amplification:
+def _amplified(coupled: CoupledFrf) -> dict[str, Any]:
     """How noise grows: the worst line, the limit, and the bands (Hz) in which it is exceeded."""
-
-    worst: float
-    at_hz: float
-    limit: float
-    above_limit_hz: tuple[tuple[float, float], ...]
-
-    @classmethod
-    def of(cls, frequency_hz: np.ndarray, values: np.ndarray) -> "Amplification":
-        """From values (F,) line by line."""
-        worst, f = int(np.argmax(values)), frequency_hz
-        over = np.ma.clump_masked(np.ma.masked_greater(values, AMPLIFICATION_LIMIT))
-        bands = tuple((float(f[part.start]), float(f[part.stop - 1])) for part in over)
-        return cls(float(values[worst]), float(f[worst]), AMPLIFICATION_LIMIT, bands)
-
-    @property
-    def sentence(self) -> str:
-        """What the engineer should mind; empty where nothing is above the limit."""
-        if not self.above_limit_hz:
-            return ""
-        bands = [f"{low:.4g} to {high:.4g} Hz" for low, high in self.above_limit_hz[:3]]
-        more = ", …" if len(self.above_limit_hz) > 3 else ""
-        return (
-            f"Errors of the measured FRFs grow more than {self.limit:g} times at "
-            f"{', '.join(bands)}{more}: do not rely on the coupled FRFs there."
-        )
+    values, f = coupled.amplification, coupled.frequency_hz
+    worst = int(np.argmax(values))
+    over = np.ma.clump_masked(np.ma.masked_greater(values, AMPLIFICATION_LIMIT))
+    bands = [(float(f[part.start]), float(f[part.stop - 1])) for part in over]
+    return {"worst": float(values[worst]), "at_hz": float(f[worst]), "limit": AMPLIFICATION_LIMIT,
+            "above_limit_hz": bands}  # fmt: skip
 
 
-@dataclass(frozen=True)
+def _to_mind(bands: list[tuple[float, float]]) -> str:
+    """What the engineer should mind; empty where nothing is above the limit."""
+    if not bands:
+        return ""
+    where = ", ".join(f"{low:.4g} to {high:.4g} Hz" for low, high in bands[:3])
+    more = ", …" if len(bands) > 3 else ""
+    return (
+        f"Errors of the measured FRFs grow more than {AMPLIFICATION_LIMIT:g} times at "
+        f"{where}{more}: do not rely on the coupled FRFs there."
+    )
+
+
+@dataclass(frozen=True, eq=False)
 class CouplingReport(Answer):
-    """Answer of `couple`; receptances in m/N, FRFs of `npz` in m/s²/N."""
+    """Answer of `couple`; receptances in m/N, FRFs of `npz` in m/s²/N.
+
+    `before` is the tip with the tested tool, whose name `reference` is.
+    """
 
     tool: str
     reference: str | None
     pose: str
     npz: str
-    frequency_hz: tuple[float, float]
-    lines: int
-    motions: tuple[str, ...]
-    resonances: tuple[Resonance, ...]
-    amplification: Amplification
-    verify: VerifyingHit
+    before: CoupledFrf
+    coupled: CoupledFrf
     contact: "dict[str, object] | msgspec.UnsetType" = msgspec.UNSET
-    simulated: bool = False
-    remarks: tuple[str, ...] = ()
     plots: tuple[str, ...] = ()
     rrd: str | None = None
-    before: CoupledFrf | None = field(default=None, metadata=NOT_IN_JSON)
-    coupled: CoupledFrf | None = field(default=None, metadata=NOT_IN_JSON)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the FRFs are of simulated recordings."""
+        return self.coupled.simulated
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the engineer should mind."""
+        held = ", ".join(MOTIONS[k] for k in range(3) if k not in self.coupled.kept)
+        none = f"Nothing was measured along the tool's own {held}: FRFs there are NaN."
+        grown = _to_mind(_amplified(self.coupled)["above_limit_hz"])
+        return tuple(filter(None, (*self.coupled.remarks, grown, none if held else "")))
+
+    def to_json(self) -> dict[str, Any]:
+        """With the band (Hz) of so many lines, and which motions are known."""
+        made = self.coupled
+        return plain({
+            "tool": self.tool, "reference": self.reference, "pose": self.pose, "npz": self.npz,
+            "frequency_hz": made.frequency_hz[[0, -1]], "lines": len(made.frequency_hz),
+            "motions": [MOTIONS[k] for k in made.kept], "resonances": resonances(made),
+            "amplification": _amplified(made), "verify": verifying_hit(made),
+            "contact": self.contact, "simulated": self.simulated, "remarks": self.remarks,
+            "plots": self.plots, "rrd": self.rrd,
+        })  # fmt: skip
 
     def text(self) -> Group:
         """A table of resonances, then what to mind and what to hit."""
@@ -85,14 +95,14 @@ class CouplingReport(Answer):
             f"{self.tool} at {self.pose}",
             *("direction", "peak (Hz)", "receptance (µm/N)", "sd (%)", "amplification"),
         )
-        for peak in self.resonances:
+        for peak in resonances(self.coupled):
             size = f"{1e6 * peak.receptance_m_n:.3g}"
             sd, grown = f"{peak.sd_percent:.1f}", f"{peak.amplification:.2f}"
             made.add_row(peak.direction, f"{peak.frequency_hz:.4g}", size, sd, grown)
-        worst = self.amplification
+        most = _amplified(self.coupled)
         lines = [
-            Text(f"Errors grow at most {worst.worst:.3g} times, at {worst.at_hz:.4g} Hz."),
-            Text(self.verify.sentence),
+            Text(f"Errors grow at most {most['worst']:.3g} times, at {most['at_hz']:.4g} Hz."),
+            Text(verifying_hit(self.coupled).sentence),
             Text(f"FRFs (m/s²/N) with sd: {self.npz}"),
         ]
         if isinstance(self.contact, dict):
@@ -101,8 +111,6 @@ class CouplingReport(Answer):
 
     def drawings(self) -> "dict[str, Figure]":
         """Receptances before and after, and how errors grow."""
-        if self.coupled is None:
-            return {}
         from planner.report.milling_plots import coupling_figure
 
         title = "Receptances of the tip, before and after"
@@ -131,20 +139,4 @@ def coupling_report(
 ) -> CouplingReport:
     """Write the npz and say what it holds; `before` is the tested tool's tip."""
     save_coupled(npz, coupled, pose)
-    amplification = Amplification.of(coupled.frequency_hz, coupled.amplification)
-    said = [*coupled.remarks]
-    if amplification.sentence:
-        said.append(amplification.sentence)
-    held = [MOTIONS[k] for k in range(3) if k not in coupled.kept]
-    if held:
-        said.append(
-            f"Nothing was measured along the tool's own {', '.join(held)}: FRFs there are NaN."
-        )
-    return CouplingReport(
-        tool, reference, pose, str(npz.resolve()),
-        (float(coupled.frequency_hz[0]), float(coupled.frequency_hz[-1])),
-        len(coupled.frequency_hz), tuple(MOTIONS[k] for k in coupled.kept),
-        resonances(coupled), amplification, verifying_hit(coupled), simulated=coupled.simulated,
-        remarks=tuple(said),
-        before=before, coupled=coupled,
-    )  # fmt: skip
+    return CouplingReport(tool, reference, pose, str(npz.resolve()), before, coupled)

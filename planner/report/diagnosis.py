@@ -197,7 +197,7 @@ class DiagnosisReport(Answer):
         from planner.dynamics.simulation import Simulation
         from planner.fit.identified import as_identification
         from planner.fit.write_robot import write_robot
-        from planner.report.diagnosis_plots import diagnosis_figures
+        from planner.report.frf_plots import diagnosis_figures
         from planner.report.pictures import Pictures
         from planner.robot.robot import Robot
 

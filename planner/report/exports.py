@@ -87,12 +87,10 @@ def export(
         raise InputError(f"{campaign.directory} has no measured pose yet; name poses with --poses.")
     loader = errors = None
     if kind == "model":
-        arrays = model_arrays(campaign, found)
-        file = f"{identifier(found.name)}_model.npz"
-        coordinates = ", ".join(str(name) for name in arrays["names"])
-        files: dict[str, Any] = {file: arrays}
-        loader = LOADER.format(file=file, coordinates=coordinates)
-        files[f"{identifier(found.name)}_model.py"] = loader.lstrip()
+        arrays, name = model_arrays(campaign, found), f"{identifier(found.name)}_model"
+        coordinates = ", ".join(map(str, arrays["names"]))
+        loader = LOADER.format(file=f"{name}.npz", coordinates=coordinates)
+        files: dict[str, Any] = {f"{name}.npz": arrays, f"{name}.py": loader.lstrip()}
         errors = tuple(arrays["error_percent"].tolist())
     elif kind == "uff":
         files = _uff(found)
@@ -120,44 +118,49 @@ def _refuse_contacts(robot: Robot, file: Path | None, rows: Sequence[PoseRow]) -
 def _program(campaign: Campaign, kind: str, folder: Path, rows: Sequence[PoseRow]) -> ExportedFiles:
     state, name = campaign.state, campaign.directory.name
     drive = [PoseToDrive(r.pose, tuple(r.joints_deg)) for r in rows]
-    if not drive:
-        found = (state.proposals[pose] for pose in state.open)
-        drive = [PoseToDrive(p.pose, p.joints_deg, p.hits) for p in found]
+    open_ = [state.proposals[pose] for pose in state.open]
+    drive = drive or [PoseToDrive(p.pose, p.joints_deg, p.hits) for p in open_]
     if not drive:
         raise InputError(
             f"{campaign.directory} has no open proposal; ask planner next first, or name --poses."
         )
-    simulated = state.simulated
-    text = program(kind, campaign.cell.robot, f"planner_{name}", drive, simulated)
+    text = program(kind, campaign.cell.robot, f"planner_{name}", drive, state.simulated)
     files = {f"{identifier(f'planner_{name}', 'C_')}{SUFFIXES[kind]}": text}
     names = tuple(d.pose for d in drive)
     told = (AS_URDF,) if campaign.cell.robot.config.controller == ControllerTable() else ()
-    return ExportedFiles(kind, _write(folder, files), names, simulated, remarks=told)
+    return ExportedFiles(kind, _write(folder, files), names, state.simulated, remarks=told)
 
 
 def _uff(found: ExportData) -> dict[str, Any]:
     """A file for each pose: FRFs and modes as measured, FRFs as predicted."""
     files, used = {}, set[str]()
     for one in found.measured:
-        name, title = unique(identifier(one.pose), used), f"{found.label}, pose {one.pose}"
-        files[f"{name}_measured.unv"] = uff.measured_sets(one.frf, f"{title}, measured")
-        files[f"{name}_modes.unv"] = uff.mode_sets(one.modes, f"{title}, measured")
+        name, title = (
+            unique(identifier(one.pose), used),
+            f"{found.label}, pose {one.pose}, measured",
+        )
+        frf = one.frf
+        sets = uff.tool_frfs(frf.frequency_hz, frf.accelerance, title, frf.coherence)
+        files[f"{name}_measured.unv"] = sets
+        files[f"{name}_modes.unv"] = uff.tool_modes(one.modes, title)
     used = set[str]()
     for i, pose in enumerate(found.poses):
         title = f"{found.label}, pose {pose}, predicted"
-        text = uff.frf_sets(found.frequency_hz, found.frf_mean[i], title, None)
-        files[f"{unique(identifier(pose), used)}_predicted.unv"] = text
+        sets = uff.tool_frfs(found.frequency_hz, found.frf_mean[i], title)
+        files[f"{unique(identifier(pose), used)}_predicted.unv"] = sets
     return files
 
 
 def _write(folder: Path, files: dict[str, Any]) -> tuple[str, ...]:
-    """Write texts, and arrays as .npz or .mat by the name; returns the paths."""
+    """Write texts, datasets, and arrays as .npz or .mat by the name; returns the paths."""
     with writing(folder, "another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in files.items():
             path = folder / name
             if isinstance(content, str):
                 path.write_text(content, encoding="utf-8", newline="")
+            elif path.suffix == ".unv":
+                uff.write_sets(path, content)
             elif path.suffix == ".mat":
                 from scipy.io import savemat
 

@@ -10,6 +10,7 @@ import jinja2
 from planner.errors import writing
 from planner.report.pictures import png
 from planner.version import __version__
+from planner.words import local_time, significant, with_sd
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,6 +31,7 @@ def rendered(template: str, **values: object) -> str:
         loader=loader, autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined
     )
     made.filters |= {"inline": inline, "cells": astuple}
+    made.filters |= {one.__name__: one for one in (local_time, significant, with_sd)}
     return made.get_template(template).render(version=__version__, **values)
 
 

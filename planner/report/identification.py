@@ -115,7 +115,7 @@ class IdentificationReport(Answer):
         assert self.basis is not None
         return self.basis.judged.final.identified.simulation
 
-    def with_pictures(self, pictures: Pictures) -> "IdentificationReport":  # pyrefly: ignore[bad-override]
+    def with_pictures(self, pictures: Pictures) -> "IdentificationReport":
         """The same once FRFs before and after are drawn, where that is wanted."""
         if not pictures.wanted or self.basis is None:
             return self

@@ -100,7 +100,13 @@ class PoseImport(Answer):
             return [Text(f"{before}; nothing changed.")]
         told = (*self.remarks, f"{self._copied()}.") if self.copies else self.remarks
         if self.unhit:
-            return [Text(self._without_hits()), *remarks(told)]
+            already = len(self.already_imported)
+            known = f", {already} known before" if already else ""
+            said = (
+                f"Pose {self.pose}: no hit accepted, {len(self.refused)} refused{known}; nothing "
+                f"changed, and the pose is still to be measured."
+            )
+            return [Text(said), *remarks(told)]
         made = table(
             f"Pose {self.pose}: {self._counts()}, {len(self.already_imported)} known before",
             *("mode", "frequency (Hz)", "expected (Hz)", "damping (%)"),
@@ -115,7 +121,10 @@ class PoseImport(Answer):
             f"{significant(before)} → {significant(after)} %" for before, after in both
         )
         said = Text(f"  sd of frequencies: {change} (refit {self.refit_seconds:.2f} s)")
-        return [made, *self._others(), *remarks(told), said]
+        count = len(self.frequency_sd_percent)
+        others = Text(f"  other: measured too, none of the {count} modes that are predicted")
+        beside = [] if all(mode.label for mode in self.modes) else [others]
+        return [made, *beside, *remarks(told), said]
 
     def _copied(self) -> str:
         """Which files have the data of others; "": none."""
@@ -134,12 +143,6 @@ class PoseImport(Answer):
         used = counted(len(self.accepted), "hit")
         return f"{used} accepted, {len(self.refused) - held} refused{waiting}"
 
-    def _others(self) -> list[Text]:
-        counted_on = len(self.frequency_sd_percent)
-        if all(mode.label for mode in self.modes):
-            return []
-        return [Text(f"  other: measured too, none of the {counted_on} modes that are predicted")]
-
     @property
     def known(self) -> bool:
         """Whether all of it is in use already."""
@@ -150,13 +153,6 @@ class PoseImport(Answer):
     def unhit(self) -> bool:
         """Whether nothing came of it: no hit was accepted, nor is one held."""
         return not (self.accepted or self.modes or self.question)
-
-    def _without_hits(self) -> str:
-        known = f", {len(self.already_imported)} known before" if self.already_imported else ""
-        return (
-            f"Pose {self.pose}: no hit accepted, {len(self.refused)} refused{known}; nothing "
-            f"changed, and the pose is still to be measured."
-        )
 
 
 @dataclass(frozen=True)

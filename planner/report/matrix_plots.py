@@ -32,10 +32,13 @@ def matrix_figures(
     matrix: FrfMatrix, found: MatrixModes, geometry: Geometry | None
 ) -> dict[str, Figure]:
     """Every picture by its name."""
-    poles = poles_by_stability(found.found.diagram, found.found.data.rate_1_s)
+    data = found.found.data
+    table = matrix.accelerance[..., np.isin(matrix.frequency_hz, data.frequency_hz)]
+    singular = singular_values(np.where(np.isfinite(table), table, 0.0))[:MOST_SINGULAR]
+    poles = poles_by_stability(found.found.diagram, data.rate_1_s)
     figures = {
         "stabilisation": stabilisation_figure(
-            found.found.data.frequency_hz, _singular(matrix, found), found,
+            data.frequency_hz, singular, found,
             f"Stabilisation diagram of {matrix.count} FRFs",
             f"singular values of {FRFS if matrix.scaled else SPECTRA}", poles,
         ),
@@ -52,13 +55,6 @@ def matrix_figures(
     return figures
 
 
-def _singular(matrix: FrfMatrix, found: MatrixModes) -> np.ndarray:
-    """(k, F) singular values of the complete rows, the few largest."""
-    lines = np.isin(matrix.frequency_hz, found.found.data.frequency_hz)
-    table = matrix.accelerance[..., lines]
-    return singular_values(np.where(np.isfinite(table), table, 0.0))[:MOST_SINGULAR]
-
-
 def _grid(count: int, title: str, size: float, **options: Any) -> tuple[Figure, list[Any]]:
     """A figure of so many equal panels, side by side."""
     columns = min(count, int(np.ceil(np.sqrt(1.6 * count))))
@@ -67,24 +63,26 @@ def _grid(count: int, title: str, size: float, **options: Any) -> tuple[Figure, 
     return figure, [figure.add_subplot(rows, columns, k + 1, **options) for k in range(count)]
 
 
+def _mode_by_mode(found: MatrixModes, title: str, size: float, **options: Any):
+    """A figure with a panel of each mode, if they are not too many: its number, panel, and mode."""
+    shown = found.modes[:MOST_SHOWN]
+    figure, axes = _grid(len(shown), title, size, **options)
+    return figure, list(zip(range(1, len(shown) + 1), axes, shown, strict=True))
+
+
 def complexity_figure(found: MatrixModes, title: str = "") -> Figure:
     """Every shape's points in the complex plane: on one line where all move in phase."""
-    shown = found.modes[:MOST_SHOWN]
-    figure, axes = _grid(len(shown), title, 2.1)
-    for k, (panel, mode) in enumerate(zip(axes, shown, strict=True)):
+    figure, each = _mode_by_mode(found, title, 2.1)
+    for k, panel, mode in each:
         shape = mode.shape / np.max(np.abs(mode.shape))
         zero = np.zeros(shape.size)
         panel.plot([zero, shape.real], [zero, shape.imag], color=MEASURED, lw=0.8, alpha=0.6)
         panel.plot(shape.real, shape.imag, ".", color=MODEL, ms=4)
-        panel.set_xlim(-1.1, 1.1)
-        panel.set_ylim(-1.1, 1.1)
-        panel.set_aspect("equal")
+        panel.set(xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), aspect="equal", xticks=[], yticks=[])
         panel.axhline(0, color="0.8", lw=0.6, zorder=0)
         panel.axvline(0, color="0.8", lw=0.6, zorder=0)
-        panel.set_xticks([])
-        panel.set_yticks([])
         panel.set_title(
-            f"{k + 1}: {mode.frequency_hz:.4g} Hz\nMPC {mode.collinearity:.3f}, "
+            f"{k}: {mode.frequency_hz:.4g} Hz\nMPC {mode.collinearity:.3f}, "
             f"MPD {mode.deviation_deg:.1f}°",
             fontsize=8,
         )
@@ -188,16 +186,15 @@ def _fill(panel: Any, points: np.ndarray) -> None:
 
 def shapes_figure(found: MatrixModes, geometry: Geometry, title: str = "") -> Figure:
     """Every shape at its largest motion, coloured by it, beside the structure at rest."""
-    shown = found.modes[:MOST_SHOWN]
-    figure, axes = _grid(len(shown), title, 3.0, projection="3d")
-    for k, (panel, mode) in enumerate(zip(axes, shown, strict=True)):
+    figure, each = _mode_by_mode(found, title, 3.0, projection="3d")
+    for k, panel, mode in each:
         motion = motions(found.dofs, mode.shape, geometry)
         _draw_lines(panel, geometry, geometry.position_m, "0.85")
         place = moved(geometry, motion, 0.0)
         _draw_lines(panel, geometry, place, "0.4")
         size = np.linalg.norm(np.real(motion), axis=1)
         panel.scatter(*place.T, c=size, cmap="plasma", s=9, depthshade=False)
-        panel.set_title(f"{k + 1}: {mode.frequency_hz:.4g} Hz", fontsize=9, pad=0)
+        panel.set_title(f"{k}: {mode.frequency_hz:.4g} Hz", fontsize=9, pad=0)
         drawn = np.concatenate([geometry.position_m, place])
         _finish(panel, drawn, 1.0)
         _fill(panel, drawn)
@@ -207,10 +204,9 @@ def shapes_figure(found: MatrixModes, geometry: Geometry, title: str = "") -> Fi
 
 def bars_figure(found: MatrixModes, title: str = "") -> Figure:
     """Real parts of all shapes with 2 sd over the degrees of freedom, where no place is known."""
-    shown = found.modes[:MOST_SHOWN]
-    figure, axes = _grid(len(shown), title, 2.6)
+    figure, each = _mode_by_mode(found, title, 2.6)
     names = [str(dof) for dof in found.dofs]
-    for k, (panel, mode) in enumerate(zip(axes, shown, strict=True)):
+    for k, panel, mode in each:
         x = np.arange(len(names))
         style = {"fmt": ".", "ms": 3, "lw": 0.8, "color": MEASURED}
         sd = None if mode.shape_sd is None else 2 * mode.shape_sd
@@ -219,5 +215,5 @@ def bars_figure(found: MatrixModes, title: str = "") -> Figure:
         step = max(1, len(names) // 6)
         panel.set_xticks(x[::step], names[::step], rotation=90, fontsize=6)
         panel.tick_params(axis="y", labelsize=6)
-        panel.set_title(f"{k + 1}: {mode.frequency_hz:.4g} Hz", fontsize=8)
+        panel.set_title(f"{k}: {mode.frequency_hz:.4g} Hz", fontsize=8)
     return figure

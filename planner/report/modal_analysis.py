@@ -1,6 +1,6 @@
 """From recordings to the answer of `modes`: one pose, any points, unlabelled FRFs, responses."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,14 +28,13 @@ from planner.recording.geometry import read_geometry
 from planner.recording.hits import without_unit
 from planner.recording.points import ANYWHERE, PointNames
 from planner.recording.read import READERS, read
-from planner.recording.records import Channel, TimeRecord
+from planner.recording.records import TimeRecord
 from planner.report.modes import ModeAnswer, ModesReport, named
 from planner.report.pictures import Pictures
 
 ESTIMATORS = ("h1", "h2", "hv")
 LONGEST_NAME = 40  # characters of a file's name in a title
 NO_PICTURES = Pictures()
-MOST_SINGULAR = 3  # curves of singular values of responses
 RESPONSES = ("acceleration", "velocity", "displacement", "voltage", "unknown")
 UNSCALED = (
     "UNSCALED: modes are from responses alone; their shapes have no scale and give no FRFs or "
@@ -69,7 +68,8 @@ def sources_of(paths: Sequence[Path], from_names: bool = False) -> tuple[Source,
     for path in paths:
         if (path / TABLE).is_file():
             rows = read_recordings(path, joint_columns(path), ANYWHERE, bare=True)
-            found += [_of_no_robot(Source.of(row)) for row in rows]
+            listed = map(Source.of, rows)  # points are those that the table says, of no robot
+            found += [replace(s, stated=replace(s.stated, names=PointNames())) for s in listed]
         elif path.is_dir():
             found += [Source(file, str(file)) for file in files_in(path, READERS)]
         elif path.is_file():
@@ -79,11 +79,6 @@ def sources_of(paths: Sequence[Path], from_names: bool = False) -> tuple[Source,
     return tuple(replace(source, from_name=from_names) for source in found)
 
 
-def _of_no_robot(source: Source) -> Source:
-    """Without names of points, but those that the table says."""
-    return replace(source, stated=replace(source.stated, names=PointNames()))
-
-
 def _titled(files: Sequence[str]) -> str:
     """The files' name in titles."""
     others = f" and {len(files) - 1} more" if len(files) > 1 else ""
@@ -91,12 +86,7 @@ def _titled(files: Sequence[str]) -> str:
 
 
 def _of_model(modal: ModalModel, **others: Any) -> ModesReport:
-    own: dict[str, Any] = {
-        "band_hz": modal.band_hz,
-        "fit_error": modal.fit_error,
-        "order": modal.order,
-        "remarks": modal.remarks,
-    }
+    own = {name: getattr(modal, name) for name in ("band_hz", "fit_error", "order", "remarks")}
     return ModesReport(modes=tuple(map(ModeAnswer.of, modal.modes)), **(own | others))
 
 
@@ -117,38 +107,37 @@ def modal_report(
         return _by_channel(sources, band_hz, force, pictures)
     band = band_hz or DEFAULT_BAND_HZ
     measured = measure(in_parts(sources), band, estimator, window_rate_1_s)
-    refused = [RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted]
-    if measured.modal is None:
+    verdicts, modal, frf = measured.verdicts, measured.modal, measured.frf
+    refused = tuple(RefusedFile(v.source.name, v.reason) for v in verdicts if not v.accepted)
+    if modal is None:
         reasons = [file.reason for file in refused] or list(measured.remarks)
         raise RefusedError(f"No modes could be identified: {reasons[0]}")
-    assert measured.frf is not None
-    simulated = any(v.simulated for v in measured.verdicts)
-    accepted = tuple(v.source.name for v in measured.verdicts if v.accepted)
-    found = identification(measured.frf, band) if pictures.wanted else None
+    assert frf is not None
     answer = _of_model(
-        measured.modal,
-        refused=tuple(refused),
-        accepted=accepted,
-        hits=measured.frf.hits,
-        usable_band_hz=measured.frf.usable_band_hz,
-        remarks=(*told_of_files(measured.verdicts), *measured.remarks),
+        modal,
+        refused=refused,
+        accepted=tuple(v.source.name for v in verdicts if v.accepted),
+        hits=frf.hits,
+        usable_band_hz=frf.usable_band_hz,
+        remarks=(*told_of_files(verdicts), *measured.remarks),
         amplitude=from_homogeneity(measured.homogeneity),
-        simulated=simulated,
+        simulated=any(v.simulated for v in verdicts),
     )
-    return _drawn(answer, pictures, measured.frf, found, measured.modal)
+    return _drawn(answer, pictures, frf, lambda: identification(frf, band), modal)
 
 
 def _drawn(
-    answer: ModesReport, pictures: Pictures, frf: Frf | None, found: PoleIdentification | None,
-    modal: ModalModel,
+    answer: ModesReport, pictures: Pictures, frf: Frf | None,
+    found: Callable[[], PoleIdentification | None], modal: ModalModel,
 ) -> ModesReport:  # fmt: skip
-    if found is None or not isinstance(answer.accepted, tuple):
-        return answer
-    from planner.report.modal_plots import modal_figures
+    def figures():
+        from planner.report.modal_plots import modal_figures
 
-    return answer.with_figures(
-        pictures, lambda: modal_figures(frf, found, modal), _titled(answer.accepted)
-    )
+        poles = found()
+        return modal_figures(frf, poles, modal) if poles else {}
+
+    accepted = answer.accepted if isinstance(answer.accepted, tuple) else ()
+    return answer.with_figures(pictures, figures, _titled(accepted))
 
 
 def _by_channel(
@@ -167,7 +156,7 @@ def _by_channel(
         raise InputError(f"{sources[0].name} holds no time histories; leave out --force.")
     modal, found = analyse_record(records[0], force_channel=force, band_hz=band_hz)
     answer = _of_model(modal, accepted=(sources[0].name,), simulated=records[0].simulated)
-    return _drawn(answer, pictures, None, found, modal)
+    return _drawn(answer, pictures, None, lambda: found, modal)
 
 
 def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -> ModesReport:
@@ -180,25 +169,17 @@ def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -
     record = joined(given.records)
     modal = modes_from_transfer_functions(record, quantity, given.band_hz)
 
-    name = _titled((record.source.name, *given.accepted[1:]))
-
     def figures():
-        from planner.report.modal_plots import auto_mac_figure, stabilisation_figure
+        from planner.report.modal_plots import unlabelled_figures
 
-        low, high = modal.band_hz
-        hz = record.frequency_hz
-        lines = (hz >= low) & (hz <= high)
-        size = np.linalg.norm(record.values[:, lines], axis=0)[None]
-        what = "singular value of the FRFs (as in the file)"
-        return {
-            "cmif": stabilisation_figure(hz[lines], size, modal, "CMIF", what),
-            "mac": auto_mac_figure(modal),
-        }
+        return unlabelled_figures(record, modal)
 
-    return _of_model(
+    answer = _of_model(
         modal, fit_error=None, accepted=given.accepted, refused=given.refused,
         simulated=record.simulated,
-    ).with_figures(pictures, figures, name)  # fmt: skip
+    )  # fmt: skip
+    name = _titled((record.source.name, *given.accepted[1:]))
+    return answer.with_figures(pictures, figures, name)
 
 
 def matrix_report(
@@ -225,9 +206,9 @@ def matrix_report(
 
     answer = ModesReport(
         modes=tuple(map(ModeAnswer.of, found.modes)),
-        dofs=tuple(named(dof) for dof in found.dofs),
-        responses=tuple(named(dof) for dof in matrix.responses),
-        references=tuple(named(dof) for dof in matrix.references),
+        dofs=tuple(map(named, found.dofs)),
+        responses=tuple(map(named, matrix.responses)),
+        references=tuple(map(named, matrix.references)),
         frfs=matrix.count,
         band_hz=found.band_hz,
         fit_error=found.found.fit_error,
@@ -267,9 +248,18 @@ def operating_report(
     sources = sources_of(paths)
     if len(sources) != 1:
         raise InputError("--operating analyses one record at a time; name one file.")
-    record, channels = _responses(sources[0].path)
+    path = sources[0].path
+    records = [record for record in read(path) if isinstance(record, TimeRecord)]
+    if not records:
+        raise InputError(f"{path} holds no time histories; --operating needs records of responses.")
+    record = records[0]  # channels that stand still are left out
+    channels = [c for c in record.channels if c.quantity in RESPONSES and np.ptp(c.samples) > 0]
+    if not channels:
+        raise InputError(f"{path} holds no response that moves; export accelerations.")
     samples = np.array([channel.samples for channel in channels])
-    dofs = tuple(_dof(channel) for channel in channels)
+    dofs = tuple(
+        Dof.of_uff(c.name if c.node in ("", "0") else c.node, c.direction) for c in channels
+    )
     sign = np.array([dof.sign for dof in dofs])
     found = operating_modes(sign[:, None] * samples, record.sampling_rate_hz, band_hz)
     faults = (*record.faults, *lost_samples(record))
@@ -279,28 +269,11 @@ def operating_report(
     if found.tones_hz:
         tones = ", ".join(f"{hz:.4g}" for hz in found.tones_hz)
         told.append(f"Tones, not modes, at {tones} Hz: what turns or hums there was left out.")
-    name = _titled([sources[0].path.name])
 
     def figures():
-        from planner.report.modal_plots import (
-            auto_mac_figure,
-            poles_by_stability,
-            singular_values,
-            stabilisation_figure,
-        )
+        from planner.report.modal_plots import operating_figures
 
-        hz, (low, high) = found.spectrum_hz, found.band_hz
-        inside = (hz >= low) & (hz <= high)
-        power = singular_values(found.spectrum[..., inside])[:MOST_SINGULAR]
-        said = "Stabilisation diagram, responses alone (unscaled)"
-        what = "cross power of the responses (each of unit variance)"
-        poles = poles_by_stability(found.diagram)
-        return {
-            "stabilisation": stabilisation_figure(
-                hz[inside], power, found, said, what, poles, "singular value"
-            ),
-            "mac": auto_mac_figure(found, "AutoMAC, unscaled"),
-        }
+        return operating_figures(found)
 
     note = "Responses alone give no scale: neither FRFs nor modal masses follow."
     return ModesReport(
@@ -312,20 +285,4 @@ def operating_report(
         accepted=(sources[0].name,),
         remarks=tuple(told),
         simulated=record.simulated,
-    ).with_figures(pictures, figures, name, note)
-
-
-def _responses(path: Path) -> tuple[TimeRecord, list[Channel]]:
-    """The record and its channels that move; those that stand still are left out."""
-    records = [record for record in read(path) if isinstance(record, TimeRecord)]
-    if not records:
-        raise InputError(f"{path} holds no time histories; --operating needs records of responses.")
-    channels = [c for c in records[0].channels if c.quantity in RESPONSES and np.ptp(c.samples) > 0]
-    if not channels:
-        raise InputError(f"{path} holds no response that moves; export accelerations.")
-    return records[0], channels
-
-
-def _dof(channel: Channel) -> Dof:
-    stated = channel.node not in ("", "0")
-    return Dof.of_uff(channel.node if stated else channel.name, channel.direction)
+    ).with_figures(pictures, figures, _titled([path.name]), note)

@@ -18,6 +18,7 @@ from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel
 from planner.modal.operating import OperatingModes
 from planner.modal.plscf import Diagram, stable
+from planner.recording.records import FrfRecord
 from planner.report.plot_marks import (
     AXES,
     COLUMNS,
@@ -60,6 +61,34 @@ def modal_figures(
         figures["coherence"] = coherence_figure(frf, modal, "Coherence")
     figures["mac"] = auto_mac_figure(modal)
     return figures
+
+
+def unlabelled_figures(record: FrfRecord, modal: ModalModel) -> dict[str, Figure]:
+    """Of FRFs without places: how large all are together, and the AutoMAC."""
+    lines = _inside(record.frequency_hz, modal.band_hz)
+    size = np.linalg.norm(record.values[:, lines], axis=0)[None]
+    what = "singular value of the FRFs (as in the file)"
+    diagram = stabilisation_figure(record.frequency_hz[lines], size, modal, "CMIF", what)
+    return {"cmif": diagram, "mac": auto_mac_figure(modal)}
+
+
+def operating_figures(found: OperatingModes) -> dict[str, Figure]:
+    """Of responses alone: the diagram over their power, and the AutoMAC."""
+    lines = _inside(found.spectrum_hz, found.band_hz)
+    diagram = stabilisation_figure(
+        found.spectrum_hz[lines],
+        singular_values(found.spectrum[..., lines])[: len(SINGULAR)],
+        found,
+        "Stabilisation diagram, responses alone (unscaled)",
+        "cross power of the responses (each of unit variance)",
+        poles_by_stability(found.diagram),
+        "singular value",
+    )
+    return {"stabilisation": diagram, "mac": auto_mac_figure(found, "AutoMAC, unscaled")}
+
+
+def _inside(hz: np.ndarray, band_hz: tuple[float, float]) -> np.ndarray:
+    return (hz >= band_hz[0]) & (hz <= band_hz[1])
 
 
 def singular_values(response: np.ndarray) -> np.ndarray:
@@ -167,9 +196,8 @@ def _entry(response: int, hit: int) -> str:
 
 def _magnitude(panel: Axes, frf: Frf, h: np.ndarray, sd: np.ndarray) -> None:
     size = np.abs(h)
-    low, high = frf.usable_band_hz
-    inside = (frf.frequency_hz >= low) & (frf.frequency_hz <= high)
-    seen = size[inside & np.isfinite(size) & (size > 0)]
+    usable = _inside(frf.frequency_hz, frf.usable_band_hz)
+    seen = size[usable & np.isfinite(size) & (size > 0)]
     if not seen.size:
         panel.text(0.5, 0.5, "not measured", transform=panel.transAxes, ha="center")
         return

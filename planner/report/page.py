@@ -6,8 +6,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from planner.campaign.campaign import Campaign
 from planner.campaign.config import CampaignConfig
 from planner.campaign.model_status import found_without
@@ -26,7 +24,7 @@ from planner.report.springs import COLUMNS, NOT_KNOWN
 from planner.report.status import StatusReport, status
 from planner.report.text import SIMULATED, number, with_sd
 from planner.robot.link_bodies import guessed_masses
-from planner.words import command, counted, local_time, significant
+from planner.words import command, counted, local_time
 
 if TYPE_CHECKING:
     from planner.campaign.cell import Cell
@@ -38,6 +36,11 @@ CHAPTERS = {
     "frfs": "FRFs", "learned": "simulation", "diagnosis": "diagnosis", "log": "log",
     "again": "reproduce", "meaning": "reading",
 }  # fmt: skip
+USES = {
+    "updated": "identified again from the recordings as they come",
+    "frozen": "as robot.toml states it",
+    "none": "not used",
+}
 CLASSES = {"error": "error", "warning": "warn"}
 
 
@@ -78,43 +81,30 @@ def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
         now=datetime.now(UTC).isoformat(timespec="minutes")[:16].replace("T", " "),
         status=now,
         simulated=SIMULATED.plain,
-        cards=_cards(state, now),
+        state=state,
+        rmse=percent(now.forecast.rmse_percent) if now.forecast.measurements else "–",
         chapters=[(id_, text) for id_, text in CHAPTERS.items() if id_ not in without],
         asked=_asked(cell, state),
         findings=[(CLASSES[r.severity], r.sentence) for r in cell.examined.remarks
                   if r.severity in CLASSES],
         **_measured(campaign, state, now),
         forecast=standing(now.forecast, now.waits_for) if state.used else nothing,
-        modes=_mode_rows(campaign),
+        over_workspace=campaign.model.workspace_prediction,
         left_out=left_out_figure(*found_without(campaign.model))
         if now.leave_one_out.values
         else None,
-        errors=_errors(now),
         **map_pictures(campaign),
         **frf_pictures(campaign, now.leave_one_out.worst),
         springs=[spring.cells for spring in now.springs],
         spring_columns=COLUMNS,
         springs_say=NOT_KNOWN,
         diagnosis=found,
-        log=_log(campaign),
+        entries=campaign.entries,
+        undone=taken_back(campaign.entries),
+        act=in_words,
         folder=command(folder.name),
         config=(folder / "campaign.toml").read_text("utf-8", "replace"),
-        files=_files(state),
     )  # fmt: skip
-
-
-def _cards(state: CampaignState, now: StatusReport) -> Rows:
-    lacks = f"; what lacks: {now.waits_for}" if now.waits_for else ""
-    target = f"target of {now.target_frequency_sd_percent:g} %{lacks}"
-    known = now.forecast
-    rmse = percent(known.rmse_percent) if known.measurements else "–"
-    return [
-        (len(state.used), "poses measured and used"),
-        (sum(len(m.accepted) for m in state.used), "hits used"),
-        (len(now.refused), "recordings refused, not replaced since"),
-        (rmse, "expected RMSE of frequencies over the workspace"),
-        ("reached" if now.done else "not reached", target),
-    ]
 
 
 def _asked(cell: "Cell", state: CampaignState) -> Rows:
@@ -126,7 +116,8 @@ def _asked(cell: "Cell", state: CampaignState) -> Rows:
         name for hit in hits for name in (hit.hit_point, *hit.response_points)
         if name and name not in (TCP, SENSOR)
     )  # fmt: skip
-    s = config.stop
+    simulation, s = config.fidelity.simulation, config.stop
+    springs, said = f"{len(robot.config.compliance)} elastic degrees of freedom", USES[simulation]
     target = (
         f"frequencies over the workspace to {s.frequency_sd_percent:g} % (RMSE) with "
         f"{100 * s.probability:g} % probability, after {s.measurements_min} to "
@@ -135,7 +126,7 @@ def _asked(cell: "Cell", state: CampaignState) -> Rows:
     rows = [
         ("Robot", f"{robot.name}: {len(robot.joint_names)} joints, {mass:.4g} kg move"),
         ("Masses", guessed_masses(links)),
-        ("Simulation", _simulation(config, len(robot.config.compliance))),
+        ("Simulation", said if simulation == "none" else f"{springs}, {said}"),
         ("Hit point and sensor", f"{robot.config.tcp_frame}, {robot.config.sensor_frame}"),
         ("Other points", ", ".join(points)),
         ("Workspace", _workspace(config, robot.joints)),
@@ -148,16 +139,6 @@ def _asked(cell: "Cell", state: CampaignState) -> Rows:
 
 def _range(values: Iterable[float]) -> str:
     return " to ".join(dict.fromkeys(f"{v:g}" for v in values))
-
-
-def _simulation(config: CampaignConfig, springs: int) -> str:
-    kind = config.fidelity.simulation
-    said = {
-        "updated": "identified again from the recordings as they come",
-        "frozen": "as robot.toml states it",
-        "none": "not used",
-    }[kind]
-    return said if kind == "none" else f"{springs} elastic degrees of freedom, {said}"
 
 
 def _workspace(config: CampaignConfig, joints: JointUnits) -> str:
@@ -189,7 +170,7 @@ def _measured(campaign: Campaign, state: CampaignState, now: StatusReport) -> di
         "stood": stood,
         "stood_says": said,
         "refused": [(r.pose, r.file, r.reason) for r in now.refused],
-        "held": [(h.measured.pose, h.question.text) for h in now.held],
+        "held": [(h.pose, h.question["text"]) for h in now.held if isinstance(h.question, dict)],
         "skipped": [(s.pose, s.reason or "–") for s in now.skipped],
         "remarks": [(m.pose, text) for m in state.recorded for text in m.remarks],
     }
@@ -204,38 +185,3 @@ def _pose(m: Measurement, starred: bool) -> list[object]:
         [number(100 * x.damping_ratio) for x in modes],
         local_time(m.time),
     ]  # fmt: skip
-
-
-def _mode_rows(campaign: Campaign) -> Rows:
-    """Mode by mode over the workspace: range of frequencies, sd now."""
-    found = campaign.model.workspace_prediction
-    percents = 100 * found.frequency_sd_hz / found.frequency_hz
-    return [
-        (f"mode {k}", f"{f.min():.2f} to {f.max():.2f}", significant(np.sqrt(np.mean(sd**2))),
-         significant(sd.max()), f"{z.min():.2f} to {z.max():.2f}")
-        for k, (f, sd, z) in enumerate(
-            zip(found.frequency_hz.T, percents.T, 100 * found.damping_ratio.T, strict=True), 1
-        )
-    ]  # fmt: skip
-
-
-def _errors(now: StatusReport) -> Rows:
-    return [
-        (f.pose, f.mode, f"{f.measured_hz:.3f}", f"{f.predicted_hz:.3f} ± {f.sd_hz:.3f}",
-         f"{100 * (f.measured_hz / f.predicted_hz - 1):+z.2f}")
-        for f in now.leave_one_out.frequencies
-    ]  # fmt: skip
-
-
-def _log(campaign: Campaign) -> Rows:
-    undone = taken_back(campaign.entries)
-    return [
-        (e.seq, local_time(e.time), in_words(e) + (" (taken back)" if e.seq in undone else ""))
-        for e in campaign.entries
-    ]
-
-
-def _files(state: CampaignState) -> Rows:
-    robot = sorted(state.configured.robot.items()) if state.configured else []
-    rows: Rows = [(f"robot/{name}", digest) for name, digest in robot]
-    return rows + [(f"{m.pose}: {h.file}", h.sha256) for m in state.recorded for h in m.hits]

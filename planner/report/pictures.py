@@ -54,7 +54,15 @@ class Pictures:
             note = f"{SIMULATED_TITLE} · {note}" if note else SIMULATED_TITLE
         for figure in figures.values():
             entitle(figure, name, simulated)
-        files = [] if self.folder is None else _files(figures, self.folder, self.format)
+        files = []
+        if self.folder is not None:
+            if self.folder.exists() and not self.folder.is_dir():
+                raise InputError(f"{self.folder} is a file; name a folder for the pictures.")
+            with writing(self.folder, "another folder"):
+                self.folder.mkdir(parents=True, exist_ok=True)
+                for key, figure in figures.items():
+                    files.append(self.folder.absolute() / f"{key}.{self.format}")
+                    save(figure, files[-1])
         if self.rrd is not None:
             from planner.report.rerun.figures import record_figures
 
@@ -72,17 +80,6 @@ def entitle(figure: "Figure", name: str, simulated: bool) -> "Figure":
     mark = f"{SIMULATED_TITLE} · " if simulated else ""
     figure.suptitle(f"{mark}{figure.get_suptitle()}\n{plain_text(name)}", fontsize=10)
     return figure
-
-
-def _files(figures: dict[str, "Figure"], folder: Path, form: str) -> list[Path]:
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder} is a file; name a folder for the pictures.")
-    files = [folder.absolute() / f"{name}.{form}" for name in figures]
-    with writing(folder, "another folder"):
-        folder.mkdir(parents=True, exist_ok=True)
-        for file, figure in zip(files, figures.values(), strict=True):
-            save(figure, file)
-    return files
 
 
 def png(figure: "Figure", dpi: int = 80) -> bytes:

@@ -1,6 +1,6 @@
 """Answer of `predict`: modes and FRFs with their uncertainty at given poses."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -67,6 +67,13 @@ class PosePrediction:
     outside: bool = False
     peak_force_n: float | Unset = UNSET
 
+    @classmethod
+    def of(
+        cls, pose: str, modes: tuple[ExpectedMode, ...], outside: bool, force_n: float
+    ) -> "PosePrediction":
+        """NaN is no force that was asked for."""
+        return cls(pose, modes, outside, UNSET if np.isnan(force_n) else float(force_n))
+
     @property
     def title(self) -> str:
         """Its name, and what is special."""
@@ -131,8 +138,11 @@ def predictions(
         said = () if there.simulation else (UNCHANGED,)
     outside, joints = ~campaign.cell.inside(angles), campaign.cell.robot.joints
     save_frfs(npz, lines, mean, sd, names, joints, angles, outside, force_n if asked else None)
-    modes = (ExpectedMode.all_of(prediction, i) for i in range(len(angles)))
-    poses = _poses(names, modes, outside, force_n)
+    forces = np.full(len(names), np.nan) if force_n is None else force_n
+    poses = tuple(
+        PosePrediction.of(name, ExpectedMode.all_of(prediction, i), bool(outside[i]), forces[i])
+        for i, name in enumerate(names)
+    )
     return PredictionReport(poses, str(npz.resolve()), len(campaign.state.used), said)
 
 
@@ -163,25 +173,11 @@ def robot_predictions(
     save_frfs(
         npz, lines, mean, None, names, robot.joints, q, None, force_n if asked.any() else None
     )
-    expected = (
-        tuple(
-            ExpectedMode(float(a), None, float(b), None)
-            for a, b in zip(*one, strict=True)
-            if band[0] <= a <= band[1]
-        )
-        for one in zip(f, ratio, strict=True)
-    )
     said = () if robot.config.law or not asked.any() else (UNCHANGED,)
-    shown = _poses(names, expected, np.zeros(len(names), bool), force_n)
-    return PredictionReport(shown, str(npz.resolve()), 0, said, str(robot.path.absolute()))
-
-
-def _poses(
-    names: Sequence[str], modes: Iterable[tuple[ExpectedMode, ...]], outside: np.ndarray,
-    force_n: np.ndarray | None,
-) -> tuple[PosePrediction, ...]:  # fmt: skip
-    forces = np.full(len(names), np.nan) if force_n is None else force_n
-    return tuple(
-        PosePrediction(name, one, bool(away), UNSET if np.isnan(n) else float(n))
-        for name, one, away, n in zip(names, modes, outside, forces, strict=True)
-    )
+    shown = []
+    for name, force, *own in zip(names, force_n, f, ratio, strict=True):
+        inside = ((hz, z) for hz, z in zip(*own, strict=True) if band[0] <= hz <= band[1])
+        expected = tuple(ExpectedMode(float(hz), None, float(z), None) for hz, z in inside)
+        shown.append(PosePrediction.of(name, expected, False, force))
+    there = str(robot.path.absolute())
+    return PredictionReport(tuple(shown), str(npz.resolve()), 0, said, there)

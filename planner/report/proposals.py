@@ -1,24 +1,21 @@
 """Answer of `next`: where to measure, and what to expect there."""
 
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Proposal, Question
+from planner.campaign.events import Proposal
 from planner.design.stopping import Forecast
 from planner.recording.joints import JointUnits
-from planner.report.answer import NOT_IN_JSON, Answer, plain
+from planner.report.answer import Answer, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import command_line, table
 from planner.words import counted
 
 if TYPE_CHECKING:
-    from planner.campaign.model import RepeatedPose
     from planner.design.parameter_sensitivity import BetterPlaces
 
 
@@ -29,14 +26,13 @@ class ProposedPose(Answer):
     proposal: Proposal
     expected: tuple[ExpectedMode, ...]
     room: tuple[str, ...] = ()  # which way +x, +y and +z of the tool point there
-    hits_per_axis: int = field(default=1, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
         """The proposal's own keys, "expected", and "axes_in_the_room"."""
         more = {"expected": plain(self.expected), "axes_in_the_room": list(self.room)}
         return {**plain(self.proposal), **more}
 
-    def parts(self, joints: JointUnits) -> list[RenderableType]:
+    def parts(self, joints: JointUnits, hits_per_axis: int) -> list[RenderableType]:
         """Angles, place and expected modes as text."""
         proposal = self.proposal
         values = (f"{value:.3f}" for value in proposal.joints_deg)
@@ -45,7 +41,7 @@ class ProposedPose(Answer):
         rows = ((str(k), *mode.cells) for k, mode in enumerate(self.expected, 1))
         expected = table("expected there", *columns, rows=rows)
         x, y, z = proposal.position_m
-        times = counted(self.hits_per_axis, "hit")
+        times = counted(hits_per_axis, "hit")
         hits = f"{times} along each of {', '.join(proposal.hits)} of the tcp frame"
         place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {hits}; {proposal.reason}"
         ways = ", ".join(f"+{axis} {way}" for axis, way in zip("xyz", self.room, strict=False))
@@ -53,50 +49,50 @@ class ProposedPose(Answer):
         return [angles, Text(place), *seen, expected]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ProposalsReport(Answer):
     """Answer of `next`; `places` is where to put a sensor, or to hit, at the first pose."""
 
     proposals: tuple[ProposedPose, ...]
-    joint_names: tuple[str, ...]
-    forecast: Forecast
-    repeat: "RepeatedPose | None"
-    remarks: tuple[str, ...] = ()
-    places: "BetterPlaces | None" = None
-    joint_units: Any = msgspec.UNSET
-    done: bool = False
-    waits_for: str = ""
-    campaign: Path | None = field(default=None, metadata=NOT_IN_JSON)
+    campaign: Campaign
+    places: "BetterPlaces | None"
 
     @property
-    def joints(self) -> JointUnits:
-        """Their names and units."""
-        return JointUnits.declared_as(self.joint_names, self.joint_units)
+    def remarks(self) -> tuple[str, ...]:
+        """Of the robot, and what waits for an answer."""
+        waiting = (unanswered(one.text) for one in self.campaign.state.questions)
+        return *self.campaign.cell.remarks, *waiting
 
     def to_json(self) -> dict[str, Any]:
         """With the forecast's sentence."""
-        return super().to_json() | {"forecast": forecast_json(self.forecast)}
+        model, joints = self.campaign.model, self.campaign.cell.robot.joints
+        return plain({
+            "proposals": self.proposals, "joint_names": joints.names,
+            "forecast": forecast_json(model.forecast), "repeat": model.repeat(),
+            "remarks": self.remarks, "places": self.places, "joint_units": joints.declared,
+            "done": bool(model.done), "waits_for": model.waits_for,
+        })  # fmt: skip
 
     def text(self) -> Group:
         """Each pose, then what one more measurement is worth."""
-        parts = [part for one in self.proposals for part in one.parts(self.joints)]
-        again = self.repeat.text if self.repeat else ""
+        cell, model = self.campaign.cell, self.campaign.model
+        each, joints = cell.config.cost.hits_per_axis, cell.robot.joints
+        parts = [part for one in self.proposals for part in one.parts(joints, each)]
+        repeat = model.repeat()
         places = self.places.sentence if self.places else ""
-        said = standing(self.forecast, self.waits_for, again), places
+        said = standing(model.forecast, model.waits_for, repeat.text if repeat else ""), places
         remarks = [Text(remark, style="yellow") for remark in self.remarks]
         return Group(*parts, Text(" ".join(filter(None, said))), *remarks, *self._then())
 
     def _then(self) -> list[Text]:
         """Where the recordings go, and the command that takes them in."""
-        if self.campaign is None:
-            return []
         pose = self.proposals[0].proposal.pose
         where = Text(
             f"Export the hits of {pose} into a folder of their own, say exports/{pose}, under any "
             f"names; where files do not say the axis that was hit, a recordings.csv beside them "
             f"does (columns pose, hit, file). Then:"
         )
-        act = "planner", "import", self.campaign, f"exports/{pose}", "--pose", pose
+        act = "planner", "import", self.campaign.directory, f"exports/{pose}", "--pose", pose
         return [where, command_line("  ", *act)]
 
 
@@ -114,9 +110,9 @@ def standing(forecast: Forecast, waits_for: str, again: str = "") -> str:
     return " ".join(filter(None, (reached, forecast.known, more)))
 
 
-def unanswered(question: Question) -> str:
+def unanswered(question: str) -> str:
     """Of hits that are held until it is answered."""
-    return f"Held, not used: {question.text} Answer with planner confirm, or withdraw."
+    return f"Held, not used: {question} Answer with planner confirm, or withdraw."
 
 
 def forecast_json(forecast: Forecast) -> dict[str, Any]:
@@ -130,22 +126,11 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
     from planner.campaign.proposals import places_for
     from planner.robot.place_names import axes_in_the_room
 
-    robot, model = campaign.cell.robot, campaign.model
-    each = campaign.cell.config.cost.hits_per_axis
+    robot = campaign.cell.robot
     q = robot.joints.internal([p.joints_deg for p in found])
     expected = campaign.model.predict(q)
-    return ProposalsReport(
-        tuple(
-            ProposedPose(p, ExpectedMode.all_of(expected, i), axes_in_the_room(robot, q[i]), each)
-            for i, p in enumerate(found)
-        ),
-        tuple(campaign.cell.robot.joint_names),
-        model.forecast,
-        model.repeat(),
-        (*campaign.cell.remarks, *map(unanswered, campaign.state.questions)),
-        places=places_for(model, campaign.state, found[0]),
-        joint_units=campaign.cell.robot.joints.declared,
-        done=bool(model.done),
-        waits_for=model.waits_for,
-        campaign=campaign.directory,
+    poses = tuple(
+        ProposedPose(p, ExpectedMode.all_of(expected, i), axes_in_the_room(robot, q[i]))
+        for i, p in enumerate(found)
     )
+    return ProposalsReport(poses, campaign, places_for(campaign.model, campaign.state, found[0]))

@@ -1,62 +1,53 @@
 """Answer of `replay`: each step of the log and whether computing it again gave the same."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import msgspec
-import numpy as np
 from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Proposal
 from planner.compare.counterfactual import OtherAcquisition
 from planner.progress import ProgressCallback
-from planner.recording.joints import JointUnits
 from planner.replay import Step, replay
-from planner.report.answer import Answer
+from planner.report.answer import Answer, plain
+from planner.report.campaign_changes import kind_of
 from planner.report.text import table
 
 
 @dataclass(frozen=True, eq=False)
-class ReplayedStep:
-    """An entry of the log; `check` is "identical", "close" (rounding), "differs" or "kept"."""
-
-    seq: int
-    time: str
-    event: str
-    check: str
-    detail: str
-    measurements: int
-    frequency_sd_percent: np.ndarray
-    instead: tuple[Proposal, ...]  # of another acquisition
-
-    @classmethod
-    def of(cls, step: Step) -> "ReplayedStep":
-        """Of a step of `planner.replay`."""
-        entry = step.entry
-        return cls(
-            entry.seq, entry.time, msgspec.to_builtins(entry.event)["kind"], step.check,
-            step.detail, len(step.model.labelled), step.model.frequency_sd_percent, step.instead,
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
 class ReplayReport(Answer):
-    """Answer of `replay`."""
+    """Answer of `replay`; "check" of a step: "identical", "close", "differs" or "kept"."""
 
-    campaign: str
-    steps: tuple[ReplayedStep, ...]
-    reproduced: bool
-    rrd: str | None
-    frequency_sd_percent: np.ndarray | None
+    campaign: Campaign
+    steps: tuple[Step, ...]
+    rrd: Path | None
     otherwise: OtherAcquisition | None
-    joint_units: Any = msgspec.UNSET
 
-    def _stands(self, pose: Proposal) -> str:
-        names = [""] * len(pose.joints_deg)
-        return JointUnits.declared_as(names, self.joint_units).listed(pose.joints_deg, 0)
+    @property
+    def reproduced(self) -> bool:
+        """Whether no step differs."""
+        return all(step.check != "differs" for step in self.steps)
+
+    def to_json(self) -> dict[str, Any]:
+        """Step by step; sds (count,) in % are over the workspace."""
+        steps = [
+            {
+                "seq": one.entry.seq, "time": one.entry.time,
+                "event": kind_of(one.entry), "check": one.check, "detail": one.detail,
+                "measurements": len(one.model.labelled),
+                "frequency_sd_percent": one.model.frequency_sd_percent, "instead": one.instead,
+            }
+            for one in self.steps
+        ]  # fmt: skip
+        said = {
+            "campaign": str(self.campaign.directory), "steps": steps,
+            "reproduced": self.reproduced, "rrd": str(self.rrd.resolve()) if self.rrd else None,
+            "frequency_sd_percent": steps[-1]["frequency_sd_percent"] if steps else None,
+            "otherwise": self.otherwise, "joint_units": self.campaign.cell.robot.joints.declared,
+        }  # fmt: skip
+        return plain(said)
 
     def text(self) -> Group:
         """The steps, the verdict, and what another acquisition would have saved."""
@@ -64,16 +55,17 @@ class ReplayReport(Answer):
         more = ["instead, joints at"] if asked else []
         made = table("Replay", "entry", "event", "check", "what", "sd of frequencies (%)", *more)
         for step in self.steps:
-            sd = "  ".join(f"{v:.2f}" for v in step.frequency_sd_percent)
-            poses = [self._stands(pose) for pose in step.instead]
+            sd = "  ".join(f"{v:.2f}" for v in step.model.frequency_sd_percent)
+            joints = self.campaign.cell.robot.joints
+            poses = [joints.listed(pose.joints_deg, 0) for pose in step.instead]
             made.add_row(
-                str(step.seq), step.event, step.check, step.detail, sd,
+                str(step.entry.seq), kind_of(step.entry), step.check, step.detail, sd,
                 *(["\n".join(poses)] if asked else []),
                 style="red" if step.check == "differs" else None,
             )  # fmt: skip
         lines = [f"The log was {'' if self.reproduced else 'NOT '}reproduced."]
         if self.rrd:
-            lines.append(f"Rerun recording: {self.rrd}")
+            lines.append(f"Rerun recording: {self.rrd.resolve()}")
         other = self.otherwise
         if other is None:
             return Group(made, Text("\n".join(lines)))
@@ -107,15 +99,8 @@ def replayed(
             last = until or len(campaign.entries)
             progress(f"entry {step.entry.seq}, {step.detail}", step.entry.seq / last)
             story.log(step.entry, step.model, step.measured)
-            steps.append(ReplayedStep.of(step))
+            steps.append(replace(step, measured=None))  # recordings are large
     if acquisition is not None:
         progress(f"playing {acquisition} on what was measured", 1.0)
-    return ReplayReport(
-        campaign=str(campaign.directory),
-        steps=tuple(steps),
-        reproduced=all(step.check != "differs" for step in steps),
-        rrd=str(rrd.resolve()) if rrd else None,
-        frequency_sd_percent=steps[-1].frequency_sd_percent if steps else None,
-        otherwise=OtherAcquisition.of(campaign, acquisition) if acquisition else None,
-        joint_units=campaign.cell.robot.joints.declared,
-    )
+    otherwise = OtherAcquisition.of(campaign, acquisition) if acquisition else None
+    return ReplayReport(campaign, tuple(steps), rrd, otherwise)

@@ -57,7 +57,8 @@ def _flat(
     both = (lines.obstacles, OBSTACLE, "obstacle"), (lines.shapes, SHAPE, "collision shape")
     for boxes, colour, label in both:
         for k, corners in enumerate(boxes):
-            hull = _outline(corners[:, pair])
+            flat = corners[:, pair]  # of a box seen edge on may be on a line
+            hull = flat[ConvexHull(flat, qhull_options="QJ").vertices]
             panel.fill(hull[:, 0], hull[:, 1], color=colour, alpha=0.12, lw=0,
                        label="" if k else label)  # fmt: skip
             panel.plot(*np.vstack([hull, hull[:1]]).T, color=colour, lw=0.6, alpha=0.6)
@@ -111,7 +112,8 @@ def _space(panel, lines: RobotLines, length: float) -> None:
         panel.plot(*np.array([start, end]).T, color=LINK, lw=3)
     for boxes, colour in ((lines.obstacles, OBSTACLE), (lines.shapes, SHAPE)):
         for corners in boxes:
-            for i, j in _edges(corners):
+            # Two of its eight corners, counted in binary, that an edge joins.
+            for i, j in ((i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit):
                 panel.plot(*corners[[i, j]].T, color=colour, lw=0.5, alpha=0.6)
     for _, place, axis in lines.joints:
         panel.plot(*np.array([place, place + 0.6 * length * axis]).T, color="black", lw=1.2)
@@ -123,13 +125,3 @@ def _space(panel, lines: RobotLines, length: float) -> None:
     panel.set_aspect("equal")
     panel.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
     panel.tick_params(labelsize=7)
-
-
-def _edges(corners: np.ndarray) -> list[tuple[int, int]]:
-    """Pairs of the eight corners of a box, counted in binary, that an edge joins."""
-    return [(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit]
-
-
-def _outline(points: np.ndarray) -> np.ndarray:
-    """Convex hull of points (n, 2), in order; those of a box seen edge on may be on a line."""
-    return points[ConvexHull(points, qhull_options="QJ").vertices]

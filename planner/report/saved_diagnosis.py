@@ -7,12 +7,9 @@ from typing import Any
 
 from planner.errors import InputError
 from planner.report.springs import RefittedSpring
-from planner.words import with_sd
 
 KEPT = "diagnosis.json"  # as `diagnose --out` writes it
-LEAST_SHOWN = 5e-4  # of a probability in the table: 0.05 %
 MOST_PICTURES = 4
-SIDES = {"nominal": "as given", "refitted": "refitted", "explained": "explained"}
 
 
 def diagnosis_of(directory: Path, given: Path | None = None) -> Path | None:
@@ -62,31 +59,7 @@ def _listed(places: set[str]) -> str:
 
 
 def chapter(file: Path) -> dict[str, Any]:
-    """Verdict, findings, what else was considered, agreement."""
+    """The answer, and the first of its pictures."""
     found = read_diagnosis(file)
-    parts = (("fit", "poses used"), ("held_out", "poses held out"))
-    sides = [
-        (f"{name}, {SIDES[side]}", found.get(where, {}).get(side) or {})
-        for where, name in parts for side in SIDES
-    ]  # fmt: skip
     pictures = [Path(p) for p in found.get("plots", ())[:MOST_PICTURES]]
-    return {
-        "verdict": found.get("verdict_text", found["verdict"]),
-        "findings": [
-            (one["text"], [(name, with_sd(v["value"], v["sd"]), v["unit"])
-                           for name, v in one["parameters"].items()])
-            for one in found["findings"]
-        ],
-        "candidates": [
-            (c["effect"].replace("_", " "), c["at"] or "–", f"{100 * c['probability']:.1f}")
-            for c in found["candidates"] if c["probability"] >= LEAST_SHOWN
-        ],
-        "agreement": [
-            (name, f"{one['frac']:.4f}", f"{one['frobenius']:.4f}")
-            for name, one in sides if one.get("frac") is not None
-        ],
-        "remarks": found.get("remarks", ()),
-        "pictures": [
-            (p, p.stem.replace("_", " ")) for p in pictures if p.is_file() and p.suffix == ".png"
-        ],
-    }  # fmt: skip
+    return found | {"pictures": [p for p in pictures if p.is_file() and p.suffix == ".png"]}

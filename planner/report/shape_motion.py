@@ -45,9 +45,10 @@ def _gif(geometry: Geometry, motion: np.ndarray, title: str, file: Path) -> None
         at = (points - middle) * scale
         return np.stack([SIZE[0] / 2 + at[:, 0], SIZE[1] / 2 + 15 - at[:, 1]], axis=1)
 
+    sizes = (np.linalg.norm(np.real(motion * np.exp(1j * phase)), axis=1) for phase in phases)
     frames = [
-        _frame(geometry, on_screen(rest), on_screen(path), _size(motion, phase), title)
-        for path, phase in zip(paths, phases, strict=True)
+        _frame(geometry, on_screen(rest), on_screen(path), size, title)
+        for path, size in zip(paths, sizes, strict=True)
     ]
     frames[0].save(file, save_all=True, append_images=frames[1:], duration=FRAME_MS, loop=0)
 
@@ -58,10 +59,6 @@ def _seen(position: np.ndarray) -> np.ndarray:
     right = np.array([-np.sin(turn), np.cos(turn), 0.0])
     up = np.array([-np.sin(rise) * np.cos(turn), -np.sin(rise) * np.sin(turn), np.cos(rise)])
     return position @ np.stack([right, up], axis=1)
-
-
-def _size(motion: np.ndarray, phase: float) -> np.ndarray:
-    return np.linalg.norm(np.real(motion * np.exp(1j * phase)), axis=1)
 
 
 def _frame(geometry: Geometry, rest: np.ndarray, points: np.ndarray, size: np.ndarray, title: str):

@@ -1,6 +1,7 @@
 """Springs in answers: as identified, and as a campaign's simulation has them, by robot.toml's."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -23,14 +24,6 @@ NOT_KNOWN = (
 
 
 @dataclass(frozen=True)
-class StatedSpring:
-    """Stiffness (N·m/rad) and damping (N·m·s/rad) as robot.toml states them."""
-
-    stiffness: float
-    damping: float
-
-
-@dataclass(frozen=True)
 class IdentifiedSpring:
     """A [[compliance]] block with its identified values; `identifiable` is the stiffness's.
 
@@ -48,7 +41,7 @@ class IdentifiedSpring:
     loss_factor: float
     loss_factor_sd: float | None
     loss_factor_identifiable: bool
-    nominal: StatedSpring
+    nominal: Mapping[str, float]  # stiffness and damping as robot.toml states them
     unit: str | msgspec.UnsetType = msgspec.UNSET  # of the stiffness of a shift: "N/m"
 
     @property
@@ -58,9 +51,9 @@ class IdentifiedSpring:
         axis = axis if self.unit is msgspec.UNSET else f"along {axis} (N/m, N·s/m)"
         return (
             f"{self.joint} {axis}",
-            _with_sd(self.stiffness, self.stiffness_sd),
+            with_exponent(self.stiffness, self.stiffness_sd, " (kept)"),
             "yes" if self.identifiable else "no",
-            _with_sd(self.damping, self.damping_sd),
+            with_exponent(self.damping, self.damping_sd, " (kept)"),
             "yes" if self.damping_identifiable else "no",
         )
 
@@ -131,24 +124,20 @@ def identified_springs(robot: "Robot", found: "Identification") -> tuple[Identif
             values[f"{kind}_sd"] = None if estimate is None else estimate.sd
             told = estimate is not None and estimate.identifiable
             values["identifiable" if kind == "stiffness" else f"{kind}_identifiable"] = told
-        stated = StatedSpring(block.stiffness, block.damping)
+        stated = {"stiffness": block.stiffness, "damping": block.damping}
         axis = tuple(block.axis)
         unit = "N/m" if block.slide else msgspec.UNSET
         springs.append(IdentifiedSpring(block.joint, axis, nominal=stated, unit=unit, **values))
     return tuple(springs)
 
 
-def _with_sd(value: float, sd: float | None) -> str:
-    return f"{with_exponent(value)} (kept)" if sd is None else with_exponent(value, sd)
-
-
-def with_exponent(value: float, sd: float | None = None) -> str:
-    """A value, and its sd where that is given, both with the exponent of the value."""
+def with_exponent(value: float, sd: float | None = None, without: str = "") -> str:
+    """A value and its sd, both with the exponent of the value; `without` one that is said."""
     exponent = 0 if 0.1 <= value < 1000 or value == 0 else math.floor(math.log10(value))
     power = f"e{exponent}" if exponent else ""
     scaled = value / 10**exponent
     said = f"{scaled:.3f}" if sd is None else with_sd(scaled, sd / 10**exponent, ".3f")
-    return f"{said}{power}"
+    return f"{said}{power}{without if sd is None else ''}"
 
 
 def _axis(axis: tuple[float, ...]) -> str:

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import msgspec
 import numpy as np
 from rich.console import Group
 from rich.table import Table
@@ -19,18 +18,12 @@ from planner.campaign.toolpath_poses import (
     turn_advice,
 )
 from planner.milling.cut import Cut, load_cut
-from planner.milling.lobes import (
-    PROBABILITY,
-    SampledLimits,
-    StabilityLimit,
-    sampled_limits,
-    stability_limits,
-)
-from planner.milling.machine import multiplier
+from planner.milling.lobes import PROBABILITY, StabilityLimit, sampled_limits, stability_limits
+from planner.milling.machine import Multiplier, multiplier
 from planner.milling.path import TURNS_DEG, PathLimits, limits_along, limits_by_feed
 from planner.milling.structure import Structure, limit_remarks, out_of_band_remark
 from planner.progress import ProgressCallback, no_progress, part_of
-from planner.report.answer import Answer
+from planner.report.answer import Answer, plain
 from planner.report.pictures import Pictures
 from planner.report.text import number, remarks, table
 from planner.words import significant
@@ -53,55 +46,68 @@ def depth_mm(depth_m: float, every: str, unit: str = "") -> str:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LimitsBySpeed(Answer):
-    """Per speed (n,): the smallest depth that chatters, and how.
+    """First losses of stability at each speed (n,) of a cut, and depths stable with 95 %, in m.
 
-    `depth_limit_m` is null where every depth that was asked for is stable, `depth_limit_m_at_95`
-    is stable with 95 % probability.
+    NaN or inf where every depth that was asked for is stable.
     """
 
-    spindle_rpm: np.ndarray
-    depth_limit_m: np.ndarray
-    kind: tuple[str | None, ...]
-    chatter_hz: np.ndarray
-    depth_limit_m_at_95: np.ndarray
-    method: str
+    cut: Cut
+    losses: tuple[StabilityLimit, ...]
+    robust_m: np.ndarray
     remarks: tuple[str, ...] = ()
     simulated: bool = False
     plots: tuple[str, ...] = ()
     rrd: str | None = None
 
+    def keys(self) -> dict[str, Any]:
+        """Those of its JSON beside what all have."""
+        return {}
+
+    def to_json(self) -> dict[str, Any]:
+        """Per speed the smallest depth that chatters (null: none), and how."""
+        each = self.losses
+        return plain({
+            "spindle_rpm": self.cut.speeds_rpm, "depth_limit_m": [one.depth_m for one in each],
+            "kind": [one.kind for one in each], "chatter_hz": [one.chatter_hz for one in each],
+            "depth_limit_m_at_95": self.robust_m, "method": self.cut.method,
+            "remarks": self.remarks, "simulated": self.simulated, "plots": self.plots,
+            "rrd": self.rrd, **self.keys(),
+        })  # fmt: skip
+
     def _table(self, title: str, last: str, cells: Sequence[str]) -> Table:
         """Some of the speeds, at most so many, and `cells` (n,) of a last column."""
         columns = "spindle (rpm)", "depth limit (mm)", "at 95 % (mm)", "chatter (Hz)"
-        made = table(f"{title}, {self.method.replace('_', ' ')}", *columns, last)
+        made = table(f"{title}, {self.cut.method.replace('_', ' ')}", *columns, last)
         for i in range(0, len(cells), max(1, -(-len(cells) // MOST_ROWS))):
-            depths = self.depth_limit_m[i], self.depth_limit_m_at_95[i]
+            depths = self.losses[i].depth_m, self.robust_m[i]
             made.add_row(
-                f"{self.spindle_rpm[i]:.0f}", *(depth_mm(depth, "–") for depth in depths),
-                number(self.chatter_hz[i], ".1f"), cells[i],
+                f"{self.cut.speeds_rpm[i]:.0f}", *(depth_mm(depth, "–") for depth in depths),
+                number(self.losses[i].chatter_hz, ".1f"), cells[i],
             )  # fmt: skip
         return made
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StabilityReport(LimitsBySpeed):
-    """Answer of `stability`, per speed (n,).
+    """Answer of `stability` at one pose; `there` is what holds at the point that was asked for."""
 
-    `depth_error` is the limit's relative change when more points per period are computed.
-    `multiplier` is the largest |µ| at the asked point, `multiplier_error` its numerical error.
-    """
+    there: Multiplier | None = None
 
-    depth_error: np.ndarray
-    multiplier: Any = msgspec.UNSET
-    multiplier_error: Any = msgspec.UNSET
+    def keys(self) -> dict[str, Any]:
+        """ "depth_error": the limits' relative changes when more points per period are computed."""
+        point = {}
+        if self.there is not None:
+            point = {"multiplier": self.there.size, "multiplier_error": self.there.error}
+        return {"depth_error": [one.error for one in self.losses], **point}
 
     def text(self) -> Group:
         """A table of speeds, then what else there is to say."""
-        made = self._table("First loss of stability", "kind", [k or "stable" for k in self.kind])
-        lines = [text for kind, text in KINDS.items() if kind in self.kind]
-        if self.multiplier is not msgspec.UNSET:
-            verdict = "stable" if self.multiplier < 1 else "not stable"
-            lines.append(f"At the point |µ| = {self.multiplier:.6f}: {verdict}.")
+        kinds = [one.kind or "stable" for one in self.losses]
+        lines = [text for kind, text in KINDS.items() if kind in kinds]
+        if self.there is not None:
+            verdict = "stable" if self.there.size < 1 else "not stable"
+            lines.append(f"At the point |µ| = {self.there.size:.6f}: {verdict}.")
+        made = self._table("First loss of stability", "kind", kinds)
         return Group(made, *map(Text, lines), *remarks(self.remarks), *self.end)
 
 
@@ -111,18 +117,29 @@ def stability_of(
     progress: ProgressCallback = no_progress,
 ) -> StabilityReport:
     """Raises InputError where source, cut or point are wrong."""
-    cut = load_cut(asked.cut)
-    point = asked.wanted
+    cut, point = load_cut(asked.cut), asked.wanted
     structure = structure_of(asked, cut)
     machine, samples = structure.machine(cut), structure.samples(cut, asked.samples)
     found = stability_limits(machine, part_of(progress, 0.0, LOBES_SHARE if samples else 1.0))
-    drawn = None
+    depth = robust = np.array([loss.depth_m for loss in found])
+    outside = out_of_band_remark(structure, np.array([loss.chatter_hz for loss in found]))
+    said, drawn = [*structure.remarks, *([outside] if outside else [])], None
     if samples:
         drawn = sampled_limits(samples, found, part_of(progress, LOBES_SHARE, 1.0))
-    answer = _at_one(cut, structure, found, drawn)
-    if point is not None:
-        there = multiplier(machine, *point)
-        answer = replace(answer, multiplier=there.size, multiplier_error=there.error)
+        robust, off = drawn.robust(), drawn.robust_sd()
+        off = off[np.isfinite(off)]
+        if off.size:
+            said.append(
+                f"Depths at {100 * PROBABILITY:.0f} % are from {len(drawn.depth_m)} samples, known "
+                f"to ± {100 * np.median(off):.1f} % (median over speeds)."
+            )
+        said += limit_remarks(structure, cut, depth, ~drawn.open(depth))
+    simulated = structure.frf is not None and structure.frf.simulated
+    there = None if point is None else multiplier(machine, *point)
+    answer = StabilityReport(
+        cut=cut, losses=found, robust_m=robust, remarks=tuple(said), simulated=simulated,
+        there=there,
+    )  # fmt: skip
 
     def figures():
         from planner.report.milling_plots import lobes_figure
@@ -133,60 +150,42 @@ def stability_of(
     return answer.with_figures(pictures or Pictures(), figures, name, LOBES)
 
 
-def _at_one(
-    cut: Cut, structure: Structure, found: tuple[StabilityLimit, ...], drawn: SampledLimits | None
-) -> StabilityReport:
-    depth = robust = np.array([loss.depth_m for loss in found])
-    chatter_hz = np.array([loss.chatter_hz for loss in found])
-    outside = out_of_band_remark(structure, chatter_hz)
-    said = [*structure.remarks, *([outside] if outside else [])]
-    if drawn is not None:
-        robust, off = drawn.robust(), drawn.robust_sd()
-        off = off[np.isfinite(off)]
-        if off.size:
-            said.append(
-                f"Depths at {100 * PROBABILITY:.0f} % are from {len(drawn.depth_m)} samples, known "
-                f"to ± {100 * np.median(off):.1f} % (median over speeds)."
-            )
-        said += limit_remarks(structure, cut, depth, ~drawn.open(depth))
-    return StabilityReport(
-        spindle_rpm=cut.speeds_rpm,
-        depth_limit_m=depth,
-        kind=tuple(loss.kind for loss in found),
-        chatter_hz=chatter_hz,
-        depth_limit_m_at_95=robust,
-        method=cut.method,
-        depth_error=np.array([loss.error for loss in found]),
-        remarks=tuple(said),
-        simulated=structure.frf is not None and structure.frf.simulated,
-    )
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PathReport(LimitsBySpeed):
-    """Answer of `stability` along a path, per speed (n,) the pose that allows the least.
+    """Answer of `stability` along a path: per speed (n,) the pose that allows the least."""
 
-    `best_depth_m_at_95` is what the whole path allows at `best_spindle_rpm`.
-    """
-
-    tightest_pose: tuple[str, ...]
-    poses: tuple[str, ...]
-    best_spindle_rpm: float
-    best_depth_m_at_95: float
+    limits: PathLimits
     feed: FeedAdvice
     turn: TurnAdvice | None = None
 
+    @property
+    def best(self) -> tuple[float, float]:
+        """The best speed (rpm), and what the whole path allows there (m)."""
+        at = self.limits.best_speed
+        return float(self.cut.speeds_rpm[at]), float(self.robust_m[at])
+
+    @property
+    def tightest(self) -> list[str]:
+        """(n,) the pose that allows the least."""
+        return [self.limits.names[i] for i in self.limits.tightest]
+
+    def keys(self) -> dict[str, Any]:
+        """ "best_depth_m_at_95" is what the whole path allows at "best_spindle_rpm"."""
+        rpm, depth = self.best
+        return {"tightest_pose": self.tightest, "poses": self.limits.names, "best_spindle_rpm": rpm,
+                "best_depth_m_at_95": depth, "feed": self.feed, "turn": self.turn}  # fmt: skip
+
     def text(self) -> Group:
         """A table of speeds, then the best of them."""
-        known = zip(self.tightest_pose, self.depth_limit_m, strict=True)
-        tightest = [pose if np.isfinite(depth) else "–" for pose, depth in known]
-        made = self._table(f"{len(self.poses)} poses", "tightest pose", tightest)
-        best = depth_mm(self.best_depth_m_at_95, EVERY, " mm")
+        poses, (rpm, depth) = self.limits.names, self.best
+        known = zip(self.tightest, self.losses, strict=True)
+        tightest = [pose if np.isfinite(loss.depth_m) else "–" for pose, loss in known]
+        made = self._table(f"{len(poses)} poses", "tightest pose", tightest)
         said = (
-            f"Best speed for the whole path: {self.best_spindle_rpm:.0f} rpm allows {best} with "
-            f"95 % probability."
+            f"Best speed for the whole path: {rpm:.0f} rpm allows {depth_mm(depth, EVERY, ' mm')} "
+            f"with 95 % probability."
         )
-        turned = self.turn.text(self.poses) if self.turn is not None else ""
+        turned = self.turn.text(poses) if self.turn is not None else ""
         said = " ".join(filter(None, (said, self.feed.text, turned)))
         return Group(made, Text(said), *remarks(self.remarks), *self.end)
 
@@ -212,9 +211,7 @@ def path_report(
         )
         answer = _at_all(poses, limits, cut)
         if way.turns:
-            turned = turn_advice(
-                travelled, cut, answer.best_spindle_rpm, part_of(progress, 0.5, 1.0)
-            )
+            turned = turn_advice(travelled, cut, answer.best[0], part_of(progress, 0.5, 1.0))
             answer = replace(answer, turn=turned)
         feed = travelled.feed_in_base(answer.feed.turn_deg[answer.feed.best])
         said = *outside(travelled.campaign, travelled.names, travelled.q), *answer.remarks
@@ -223,20 +220,16 @@ def path_report(
     def figures():
         from planner.report.milling_plots import path_figure, turns_figure
 
-        made = {"path": path_figure(limits, answer.best_spindle_rpm, answer.feed, cut)}
+        rpm = answer.best[0]
+        made = {"path": path_figure(limits, rpm, answer.feed, cut)}
         if answer.turn is not None:
-            rpm = answer.best_spindle_rpm
-            made["turns"] = turns_figure(answer.turn, answer.poses, rpm, cut.depth_m[1])
+            made["turns"] = turns_figure(answer.turn, limits.names, rpm, cut.depth_m[1])
         return made
 
     return answer.with_figures(pictures, figures, asked.source.name, PATH)
 
 
 def _at_all(poses: list[tuple[str, Structure]], limits: PathLimits, cut: Cut) -> PathReport:
-    first = np.argmin(limits.depth_m, axis=0)
-    tightest = [limits.found[p][i] for i, p in enumerate(first)]
-    robust, best = np.min(limits.robust_m, axis=0), limits.best_speed
-    rpm = cut.speeds_rpm
     said = [
         f"{name}: {text}" for (name, structure), row in zip(poses, limits.found, strict=True)
         if (text := out_of_band_remark(structure, np.array([loss.chatter_hz for loss in row])))
@@ -246,19 +239,14 @@ def _at_all(poses: list[tuple[str, Structure]], limits: PathLimits, cut: Cut) ->
         f"{name}: {text}" for (name, structure), row, known in rows
         for text in limit_remarks(structure, cut, row, known)
     ]  # fmt: skip
-    turned = limits_by_feed(poses, cut, float(rpm[best]))
+    first = np.argmin(limits.depth_m, axis=0)
+    turned = limits_by_feed(poses, cut, float(cut.speeds_rpm[limits.best_speed]))
     return PathReport(
-        spindle_rpm=rpm,
-        depth_limit_m=np.min(limits.depth_m, axis=0),
-        kind=tuple(loss.kind for loss in tightest),
-        chatter_hz=np.array([loss.chatter_hz for loss in tightest]),
-        depth_limit_m_at_95=robust,
-        tightest_pose=tuple(limits.names[i] for i in limits.tightest),
-        poses=limits.names,
-        best_spindle_rpm=float(rpm[best]),
-        best_depth_m_at_95=float(robust[best]),
-        feed=FeedAdvice(tuple(map(float, TURNS_DEG)), tuple(map(float, turned))),
-        method=cut.method,
+        cut=cut,
+        losses=tuple(limits.found[p][i] for i, p in enumerate(first)),
+        robust_m=np.min(limits.robust_m, axis=0),
         remarks=tuple(said),
         simulated=any(one.frf is not None and one.frf.simulated for _, one in poses),
+        limits=limits,
+        feed=FeedAdvice(tuple(map(float, TURNS_DEG)), tuple(map(float, turned))),
     )

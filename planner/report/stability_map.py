@@ -104,6 +104,12 @@ def map_report(
     )
     found, robust = limits_at_speed(poses, cut, rpm, asked.samples, part_of(progress, 0.5, 1.0))
     share = None if wanted is None else float(np.mean(robust > wanted[1]))
+    low, *_, high = campaign.frequency_lines
+    told = (
+        f"{', '.join(left_out)} {'is' if len(left_out) == 1 else 'are'} left out: the cut would "
+        f"chatter there outside the {low:g} to {high:g} Hz of the FRFs; widen band_hz in "
+        f"campaign.toml and measure over the band of the modes that chatter."
+    )
     joints = campaign.cell.robot.joints
     answer = MapReport(
         rpm, names, joints.shown(q), candidates.position_m[kept], found, robust,
@@ -111,7 +117,7 @@ def map_report(
         wanted_depth_m=wanted[1] if wanted else None,
         wanted_share=share,
         left_out=left_out,
-        remarks=_left_out(left_out, campaign.frequency_lines),
+        remarks=(told,) if left_out else (),
         simulated=campaign.state.simulated,
         joint_units=joints.declared,
     )  # fmt: skip
@@ -125,14 +131,3 @@ def map_report(
 
     note = f"At {rpm:.0f} rpm: poses by the depth stable with 95 %."
     return answer.with_figures(pictures, figures, asked.source.name, note)
-
-
-def _left_out(names: tuple[str, ...], lines: np.ndarray) -> tuple[str, ...]:
-    if not names:
-        return ()
-    one = len(names) == 1
-    return (
-        f"{', '.join(names)} {'is' if one else 'are'} left out: the cut would chatter there "
-        f"outside the {lines[0]:g} to {lines[-1]:g} Hz of the FRFs; widen band_hz in "
-        f"campaign.toml and measure over the band of the modes that chatter.",
-    )

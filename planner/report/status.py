@@ -12,11 +12,11 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Proposal, Question
+from planner.campaign.events import Proposal
 from planner.campaign.model_status import DecisionStatus, LeftOutValues, found_without, left_out
 from planner.campaign.state import Measurement
 from planner.design.stopping import Forecast
-from planner.report.answer import NOT_IN_JSON, Answer, plain
+from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.imports import asked_of
 from planner.report.proposals import forecast_json, standing, unanswered
 from planner.report.saved_diagnosis import diagnosis_of, read_diagnosis, two_answers
@@ -52,15 +52,18 @@ class MeasuredPoseStatus:
     simulated: bool
     time: str
     remarks: tuple[str, ...]
+    # Of held hits, until it is answered.
+    question: dict[str, Any] | msgspec.UnsetType = msgspec.UNSET
 
     @classmethod
-    def of(cls, m: Measurement, starred: bool) -> "MeasuredPoseStatus":
+    def of(cls, m: Measurement, starred: bool, held: bool = False) -> "MeasuredPoseStatus":
         """Of a measurement."""
         used = len(m.accepted)
         found = tuple(mode.frequency_hz for mode in m.modes if mode.likely)
+        asked = asked_of(m.pose, m.question) if held else None
         return cls(
             m.pose, m.joints_deg, used, len(m.hits) - used, found, m.withdrawn, starred,
-            m.simulated, m.time, m.remarks,
+            m.simulated, m.time, m.remarks, asked or msgspec.UNSET,
         )  # fmt: skip
 
     @property
@@ -69,19 +72,6 @@ class MeasuredPoseStatus:
         mark = (" ★" if self.starred else "") + (" withdrawn" if self.withdrawn else "")
         found = "  ".join(f"{f:.2f}" for f in self.frequency_hz) or "none"
         return self.pose + mark, str(self.hits), str(self.refused), found, local_time(self.time)
-
-
-@dataclass(frozen=True)
-class HeldPose(Answer):
-    """A pose whose hits are not used until a question is answered."""
-
-    measured: MeasuredPoseStatus
-    question: Question
-
-    def to_json(self) -> dict[str, Any]:
-        """The keys of a measured pose, and "question"."""
-        asked = asked_of(self.measured.pose, self.question)
-        return {**plain(self.measured), "question": asked}
 
 
 @dataclass(frozen=True)
@@ -140,14 +130,6 @@ class ModelStatus:
         )
 
 
-@dataclass(frozen=True)
-class LogStatus:
-    """Length of the log; bytes of a last line that a crash has torn."""
-
-    entries: int
-    torn_bytes: int
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StatusReport(ModelStatus, Answer):
     """Answer of `status`; `used` of the measured poses are those that the model rests on."""
@@ -158,9 +140,9 @@ class StatusReport(ModelStatus, Answer):
     open: tuple[Proposal, ...]
     skipped: tuple[SkippedProposal, ...]
     refused: tuple[RefusedHit, ...]
-    log: LogStatus
+    log: Mapping[str, int]  # entries; torn_bytes of a last line that a crash has torn
     stored_but_not_imported: tuple[str, ...]
-    held: tuple[HeldPose, ...]
+    held: tuple[MeasuredPoseStatus, ...]  # not used until a question is answered
     used: int
     plots: tuple[str, ...] = ()
     rrd: str | None = None
@@ -207,33 +189,31 @@ class StatusReport(ModelStatus, Answer):
         more += f", {without} without modes" if without else ""
         return f"{counted(self.used, 'pose')} measured{more}"
 
-    def _waiting(self) -> str:
-        held = ", ".join(h.measured.pose for h in self.held)
-        return f"; hit, and waiting for your answer: {held}" if held else ""
-
     def _lines(self) -> list[str]:
         each = enumerate(self.frequency_sd_percent, 1)
+        held = ", ".join(h.pose for h in self.held)
+        waiting = f"; hit, and waiting for your answer: {held}" if held else ""
         lines = [
-            "open: " + (", ".join(p.pose for p in self.open) or "none") + self._waiting(),
+            "open: " + (", ".join(p.pose for p in self.open) or "none") + waiting,
             "skipped: " + (", ".join(s.pose for s in self.skipped) or "none"),
             "sd of frequencies over the workspace: "
             + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)
             + f" (all together: target {self.target_frequency_sd_percent:g} %)",
             standing(self.forecast, self.waits_for),
-            f"log: {counted(self.log.entries, 'entry', 'entries')}",
+            f"log: {counted(self.log['entries'], 'entry', 'entries')}",
         ]
         if self.frf_sd_percent:
             whole, scale = map(significant, self.frf_sd_percent)
             lines.insert(3, f"sd of FRFs over the workspace: {whole} %, of which {scale} % is a "
                             f"scale common to all (gains and masses)")  # fmt: skip
-        if self.log.torn_bytes:
+        if self.log["torn_bytes"]:
             lines.append("The log's last line was torn by a crash; the next act sets it aside.")
         if self.stored_but_not_imported:
             lines.append(
                 f"{counted(len(self.stored_but_not_imported), 'recording')} stored, but the "
                 f"program stopped before the import: import again."
             )
-        lines += [unanswered(h.question) for h in self.held]
+        lines += [unanswered(h.question["text"]) for h in self.held if isinstance(h.question, dict)]
         lines += [self.decision.text] if self.decision else []
         lines += [*self.remarks, *self.leave_one_out.text]
         told = by_reason((r.file, r.reason) for r in self.refused)
@@ -269,10 +249,10 @@ def status(campaign: Campaign, diagnosis: Path | None = None) -> StatusReport:
         open=tuple(state.proposals[pose] for pose in state.open),
         skipped=tuple(SkippedProposal(p, r) for p, r in state.skipped.items()),
         refused=_still_refused(state),
-        log=LogStatus(state.events, campaign.torn_bytes),
+        log={"entries": state.events, "torn_bytes": campaign.torn_bytes},
         stored_but_not_imported=tuple(campaign.orphans()),
         held=tuple(
-            HeldPose(MeasuredPoseStatus.of(m, m.pose in state.starred), m.question)
+            MeasuredPoseStatus.of(m, m.pose in state.starred, held=True)
             for m in state.held.values()
             if m.question
         ),

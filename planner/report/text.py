@@ -35,6 +35,14 @@ def table(
     return made
 
 
+def plain_table(*columns: str) -> Table:
+    """The same without title and lines, as the session has room for."""
+    made = Table(box=None, header_style="bold", pad_edge=False)
+    for i, column in enumerate(columns):
+        made.add_column(column, justify="right" if i else "left")
+    return made
+
+
 def number(value: float | None, form: str = ".2f") -> str:
     """A number, or a dash where there is none."""
     return format(value, form) if value is not None and math.isfinite(value) else "–"
@@ -56,12 +64,6 @@ def with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:
 def remarks(lines: Sequence[str]) -> list[Text]:
     """What the engineer should mind, one line each."""
     return [Text(f"  {line}", style="yellow") for line in lines]
-
-
-def drawn(plots: Sequence[str], rrd: str | None = None) -> list[Text]:
-    """Where pictures and a Rerun recording are, if there are any."""
-    lines = [Text("\n  ".join(["Pictures:", *plots]))] if plots else []
-    return [*lines, Text(f"Rerun recording: {rrd}")] if rrd else lines
 
 
 def command_line(before: str, *words: object) -> Text:

@@ -14,9 +14,6 @@ from planner.recording.sampling import sampled_otherwise
 from planner.recording.spectra import driving_point
 from planner.session.inbox import FolderTable
 
-# As like as hits of one pose are (0.98 and more on the true robots of the tests); at poses that a
-# campaign proposes one after the other it is below 0.9. Chosen between.
-SAME_POSE = SAME
 BAD = ("repeat", "unsure", "unstated")  # kinds of verdicts on which something is to be done
 Part = tuple[Path, int]  # which of a file's hits, from 1
 
@@ -101,7 +98,7 @@ class Verdicts:
         """
         numbers, before = self.numbered(files, numbers), before or PoseBefore()
         found = [
-            (self._alone(path, *one, numbers[path, part]), len(parts))
+            (_alone(path, *one, numbers[path, part]), len(parts))
             for path in files for parts in (self._hits_of(path),)
             for part, one in enumerate(parts, 1)
         ]  # fmt: skip
@@ -117,15 +114,6 @@ class Verdicts:
         asked = self._unsure(judged, here)
         told = [*(asked.get(verdict.number, verdict) for verdict in judged), *late]
         return tuple(sorted(told, key=lambda verdict: verdict.number))
-
-    def _alone(
-        self, path: Path, verdict: FileVerdict, own: tuple[Hit, ...], number: int
-    ) -> HitVerdict:
-        kind = "repeat" if verdict.reason else "good"
-        kind = "unstated" if verdict.axis_missing else kind
-        text = verdict.reason or " ".join(verdict.remarks)
-        at_s = verdict.source.at_s
-        return HitVerdict(path, verdict.axis or "", kind, text, own, number, False, at_s)
 
     def _beside_repeats(self, judged: list[HitVerdict]) -> list[HitVerdict]:
         """With which do not go with the others, and what a vote among three and more says."""
@@ -156,21 +144,18 @@ class Verdicts:
                 came[verdict.path] = at
         late = [(v, at) for v in every if (at := came.get(v.path))]
         alike = [bool(self._alike(v, {at: hits.get(at, ())})) for v, at in late]
+        kinds = ["elsewhere" if self.table.row(v.path) else "late" for v, _ in late]
         return [
-            replace(
-                v,
-                kind="elsewhere" if self.table.row(v.path) else "late",
-                text="",
-                came=at,
-                alike=like,
-            )
-            for (v, at), like in zip(late, alike, strict=True)
+            replace(v, kind=kind, text="", came=at, alike=like)
+            for (v, at), kind, like in zip(late, kinds, alike, strict=True)
         ]
 
     def _alike(self, verdict: HitVerdict, hits: Mapping[str, tuple[Hit, ...]]) -> str:
         """The pose of which hits are answered like one of these; "": none is."""
         for pose, theirs in hits.items():
-            if any(likeness_to(hit, theirs, self._band) >= SAME_POSE for hit in verdict.hits):
+            # Of one pose it is 0.98 and more on the true robots of the tests; of poses that a
+            # campaign proposes one after the other below 0.9.
+            if any(likeness_to(hit, theirs, self._band) >= SAME for hit in verdict.hits):
                 return pose
         return ""
 
@@ -184,14 +169,14 @@ class Verdicts:
                 continue
             if doubt is not None:
                 others = " and ".join(good[j][0].name for j in doubt.others)
-                asked[verdict.number] = replace(
-                    verdict, kind="unsure", text=_asked(hit, doubt, others)
-                )
-            elif text := self._turned(verdict, hit, good):
+                text = _asked(hit, doubt, others)
+            else:
+                text = self._turned(hit, good)
+            if text:
                 asked[verdict.number] = replace(verdict, kind="unsure", text=text)
         return asked
 
-    def _turned(self, verdict: HitVerdict, hit: Hit, good: Sequence[tuple[HitVerdict, Hit]]) -> str:
+    def _turned(self, hit: Hit, good: Sequence[tuple[HitVerdict, Hit]]) -> str:
         """What is said of the one hit along an axis that is answered against its direction."""
         if not driving_point(hit, self._band):
             return ""
@@ -215,6 +200,12 @@ class Verdicts:
             judged = [read_one(one, self._band) for one in source.parts()]
             self._read[key] = [(verdict, hits) for verdict, hits, _ in judged]
         return self._read[key]
+
+
+def _alone(path: Path, found: FileVerdict, own: tuple[Hit, ...], number: int) -> HitVerdict:
+    kind = "unstated" if found.axis_missing else "repeat" if found.reason else "good"
+    text = found.reason or " ".join(found.remarks)
+    return HitVerdict(path, found.axis or "", kind, text, own, number, at_s=found.source.at_s)
 
 
 def _weak(verdict: HitVerdict, usable: list[Hit], before: tuple[Hit, ...]) -> HitVerdict:

@@ -15,6 +15,7 @@ from planner.dataset.screened_files import Source
 from planner.errors import NoPoseLeftError, PlannerError
 from planner.report.campaign_changes import redone, undone
 from planner.session import session_text
+from planner.session.diagnosis_process import LEAST
 from planner.session.pose_screen import page_with_hits, page_without_hits
 from planner.session.session_state import BAD, PoseInProgress, Session, SessionState
 from planner.words import by_reason, counted, short_name
@@ -152,20 +153,17 @@ def _refuse(session: Session, visit: PoseInProgress, files: Collection[Path]) ->
     chosen = tuple(path for path in visit.whole if path in files)
     if not chosen:
         return
-    stated = {path: _as_stated(session, visit, path) for path in chosen}
+    stated = {}  # what is said of a file now, by its table or itself
+    for path in chosen:
+        row = session.verdicts.table.row(path)
+        axes = {verdict.axis for verdict in visit.verdicts if verdict.path == path}
+        said = Source(path, str(path)) if row is None else Source.of(row)
+        stated[path] = replace(said, hit=axes.pop() if len(axes) == 1 else None)
     session.campaign.refuse(visit.proposal.pose, chosen, visit.reasons(chosen), stated)
     session.rerun_queue.note()
     numbers = [str(v.number) for v in visit.verdicts if v.path in chosen]
     said = f"{counted(len(numbers), 'hit')} set aside ({', '.join(numbers)})"
     session.say(f"{said}; hit again ([u] takes that back).")
-
-
-def _as_stated(session: Session, visit: PoseInProgress, path: Path) -> Source:
-    """What is said of a file now, by its table or itself; "" where nothing says an axis."""
-    row = session.verdicts.table.row(path)
-    axes = {verdict.axis for verdict in visit.verdicts if verdict.path == path}
-    said = Source(path, str(path)) if row is None else Source.of(row)
-    return replace(said, hit=axes.pop() if len(axes) == 1 else None)
 
 
 def import_waiting(
@@ -198,7 +196,7 @@ def import_waiting(
         for one in by_reason(told):
             session.say(f"Left out: {one.rstrip('.')}.", "yellow")
         state = replace(state, aside=state.aside | set(left.values()))
-        state = _imported(session, state, report)
+        state = _after(session, state, report)
     if not any(report.measurement and report.measurement.modes for report in reports):
         session.rerun_queue.show()
         return state
@@ -284,7 +282,7 @@ def measured(session: Session, state: SessionState, pose: str) -> SessionState:
     further = state.after(pose, model, logged, seconds, session.auto)
     if not session.screen.console.is_terminal:  # there it stands on the page
         session.say(further.progress.split("; ", 1)[1])
-    if session.explaining is not None and len(logged.used) >= session.explain_from:
+    if session.explaining is not None and len(state.used) >= LEAST:
         session.explaining.ask()
     if further.announced and not state.announced:
         session.say("The target of campaign.toml is reached.", "bold green")
@@ -322,17 +320,13 @@ def interrupted(session: Session) -> str:
     return f"Stopped: {there}: that is in the log; planner undo takes the last act back."
 
 
-def _imported(session: Session, state: SessionState, report: ImportReport) -> SessionState:
+def _after(session: Session, state: SessionState, report: ImportReport) -> SessionState:
     if report.question is not None:
         # Without anybody to ask, say so; else the question comes next.
         if session.auto and report.measured is not None:
             session.say(f"Held back, not used: {report.question.text}", "red")
         return state
-    return _after(session, state, report) if report.accepted or report.refused else state
-
-
-def _after(session: Session, state: SessionState, report: ImportReport) -> SessionState:
-    if report.question is not None:  # at the pose it was moved to it does not fit either
+    if not report.accepted and not report.refused:
         return state
     simulated = bool(report.measurement and report.measurement.simulated)
     notes = [Text(alert, style="yellow") for alert in report.alerts]

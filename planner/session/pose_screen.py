@@ -14,7 +14,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.dataset.screened_files import when
 from planner.recording.joints import JointUnits
-from planner.report.text import with_sd
+from planner.report.text import plain_table, with_sd
 from planner.robot.place_names import axes_in_the_room
 from planner.session.hit_verdicts import BAD, HitVerdict
 from planner.session.screen import ScreenText, fitted
@@ -83,8 +83,10 @@ class PosePage:
         parts += [ScreenText([None, Text(text)], 5) for text in self.streams[-LAST:]]
         parts += [_unfinished(*one) for one in self.unfinished[-2:]]
         parts += [ScreenText([None, Text(self.progress)], 6)] if self.progress else []
-        paths = _end(command(self.folder)), command(self.folder)
-        where = [Text(f"waiting for hits in {path}", "dim") for path in paths]
+        path, most = command(self.folder), WIDTH - 25
+        # Of one that is too long for the line the end: folders differ there.
+        end = path if len(path) <= most else f"…{path[1 - most :]}"
+        where = [Text(f"waiting for hits in {one}", "dim") for one in (end, path)]
         parts.append(ScreenText([None, *where], 4))
         parts.append(ScreenText([Text(self.keys, style="reverse")]))
         lines = fitted(parts, width, height - rows)
@@ -112,18 +114,15 @@ class PosePage:
         return [*parts, ScreenText(_forms(last))] if last else parts
 
     def _angles(self) -> Table:
-        angles = Table(box=None, header_style="bold", pad_edge=False)
-        angles.add_column("joint")
         slides = any(self.joints.slides)
-        angles.add_column("stands at" if slides else "angle (°)", justify="right")
+        angles = plain_table("joint", "stands at" if slides else "angle (°)")
         for i, value in enumerate(self.proposal.joints_deg):
             text = self.joints.text(i, value, 3) if slides else f"{value:.3f}"
             angles.add_row(self.joints.names[i], Text(text, style="bold"))
         return angles
 
     def _hits(self) -> Table:
-        made = Table(box=None, header_style="bold", pad_edge=False)
-        made.add_column(f"hit along, axes of {self.frame}")
+        made = plain_table(f"hit along, axes of {self.frame}")
         ways: dict[str, str] = dict(zip("xyz", self.room, strict=False))
         for axis in self.proposal.hits:
             count = self.counts[axis]
@@ -141,12 +140,9 @@ class PosePage:
             made.add_row(
                 Text(f"hit again along {axes}: {len(again)} of no use", style=COLOURS["repeat"])
             )
-        unsure = sum(hit.kind == "unsure" for hit in self.hits)
-        if unsure:
-            made.add_row(Text(f"{unsure} held: right?", style=COLOURS["unsure"]))
-        unstated = sum(hit.kind == "unstated" for hit in self.hits)
-        if unstated:
-            made.add_row(Text(f"{unstated} of no stated axis", style=COLOURS["unstated"]))
+        for kind, said in (("unsure", "held: right?"), ("unstated", "of no stated axis")):
+            if count := sum(hit.kind == kind for hit in self.hits):
+                made.add_row(Text(f"{count} {said}", style=COLOURS[kind]))
         if self.complete:
             made.add_row(Text("all hits are in", style="bold green"))
         return made
@@ -166,12 +162,6 @@ def keys_that_do(pairs: Sequence[tuple[str, str, bool]]) -> str:
         elif now:
             lines[-1] += f"  {one}" if lines[-1] else one
     return "\n".join(lines)
-
-
-def _end(path: str) -> str:
-    """The end of a path that is too long for the line: folders differ there."""
-    most = WIDTH - 25
-    return path if len(path) <= most else f"…{path[1 - most :]}"
 
 
 def remedy_first(text: str) -> tuple[str, str]:

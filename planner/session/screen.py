@@ -99,7 +99,13 @@ class Screen:
             self.console.print("\n" * (self.console.height - 1))
             self._left = False
         self.console.clear()
-        self.console.print(Group(*parts, *self._that_fit(room)))
+        fitting: list[Text] = []  # the last sentences for which there are so many lines
+        for note in reversed(self._notes):
+            room -= self._lines(note)
+            if room < 0:
+                break
+            fitting.insert(0, note)
+        self.console.print(Group(*parts, *fitting))
 
     @property
     def _height(self) -> int:
@@ -115,16 +121,6 @@ class Screen:
 
     def _lines(self, note: Text) -> int:
         return len(self.console.render_lines(note))
-
-    def _that_fit(self, room: int) -> list[Text]:
-        """The last sentences for which there are so many lines."""
-        fitting: list[Text] = []
-        for note in reversed(self._notes):
-            room -= self._lines(note)
-            if room < 0:
-                break
-            fitting.insert(0, note)
-        return fitting
 
 
 _RULER = UnbrokenConsole(width=80)  # only to ask how text wraps

@@ -179,8 +179,7 @@ class RerunQueue:
 class Session:
     """Nothing of it changes in the course of a session.
 
-    `started` and `deadline` are monotonic times (s); a diagnosis is asked for from
-    `explain_from` measured poses on.
+    `started` and `deadline` are monotonic times (s).
     """
 
     campaign: Campaign
@@ -192,7 +191,6 @@ class Session:
     auto: bool
     hits_per_pose: int | None
     explaining: DiagnosisProcess | None
-    explain_from: int
     started: float
     deadline: float | None
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.panel import Panel
-from rich.table import Table
 from rich.text import Text
 
 from planner.campaign.events import HitRecord, Question
@@ -13,7 +12,7 @@ from planner.campaign.hit_errors import systematic_errors
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.modal.modes import Mode
-from planner.report.text import SIMULATED, with_sd
+from planner.report.text import SIMULATED, plain_table, with_sd
 from planner.session.pose_screen import PosePage, remedy_first
 from planner.words import counted, short_name, significant
 
@@ -28,13 +27,6 @@ NONE_BAD = "No hit is to be repeated: press r again, or R, to set all that wait 
 NOTHING_NEW = "Nothing to import yet: no new recording is whole and usable."
 FULLY, SHORTLY = 2, 4  # refusals that are said in full, and those of which is said what to do
 LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it may be followed
-
-
-def _table(*columns: str) -> Table:
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="left" if i == 0 else "right")
-    return table
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +69,7 @@ def found_modes(pose: str, model: Model, before: Model | None) -> list[FoundMode
 
 def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
     """What came out against what was expected."""
-    table = _table(
+    table = plain_table(
         "mode", "measured (Hz)", "expected (Hz)", "off by (sd)", "damping (%)", "is this mode (%)"
     )
     for one in found_modes(report.pose, report.model, report.model_before):
@@ -94,7 +86,12 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
     parts: list[RenderableType] = [table, *_missed(report)]
     parts += [Text(_refused(hit), style="red") for hit in report.refused]
     parts += [Text(remark, style="yellow") for remark in report.remarks]
-    parts += [uncertainty_line(report.model), *([SIMULATED] if simulated else [])]
+    sd = ", ".join(
+        f"mode {k} {significant(v)} %" for k, v in enumerate(report.model.frequency_sd_percent, 1)
+    )
+    target = report.model.cell.config.stop.frequency_sd_percent
+    known = f"sd of frequencies over the workspace: {sd} (all together: target {target:g} %)"
+    parts += [Text(known), *([SIMULATED] if simulated else [])]
     title = f"Pose {report.pose}: {_in(report)}"
     return Panel(Group(*parts), title=title, title_align="left", expand=False)
 
@@ -118,7 +115,7 @@ def _missed(report: ImportReport) -> list[RenderableType]:
     hits = report.hit_errors()
     if not hits:
         return []
-    rows = _table("hit", "tilt of its direction", "beside the point")
+    rows = plain_table("hit", "tilt of its direction", "beside the point")
     for column in rows.columns[1:]:  # a number and its sd stay on one line, names may break
         column.no_wrap = True
     for hit in hits:
@@ -145,14 +142,6 @@ def question_panel(question: Question, pose: str, other: str) -> RenderableType:
 
 def _in(report: ImportReport) -> str:
     return f"{counted(len(report.accepted), 'hit')} in, {len(report.refused)} refused"
-
-
-def uncertainty_line(model: Model) -> Text:
-    """What the model does not know yet."""
-    sd = model.frequency_sd_percent
-    each = ", ".join(f"mode {k + 1} {significant(v)} %" for k, v in enumerate(sd))
-    target = model.cell.config.stop.frequency_sd_percent
-    return Text(f"sd of frequencies over the workspace: {each} (all together: target {target:g} %)")
 
 
 def not_now(key: str) -> str:

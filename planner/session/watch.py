@@ -15,7 +15,7 @@ from planner.replay import replay
 from planner.report.answer import Answer
 from planner.report.rerun.event_logger import EventLogger
 from planner.session import session_text
-from planner.session.diagnosis_process import LEAST, DiagnosisProcess
+from planner.session.diagnosis_process import DiagnosisProcess
 from planner.session.hit_verdicts import HitVerdict, Part, Verdicts
 from planner.session.inbox import FolderTable, Inbox
 from planner.session.key_commands import (
@@ -85,7 +85,7 @@ def watch(
         inbox = Inbox(folder, quiet_s, verdicts.unfit)
         return _run(Session(
             campaign, inbox, Screen(console), source, RerunQueue(campaign, story), verdicts,
-            auto or isinstance(source, NoKeys), hits_per_pose, explaining, LEAST, started,
+            auto or isinstance(source, NoKeys), hits_per_pose, explaining, started,
             None if limit_s is None else started + limit_s,
         ))  # fmt: skip
 
@@ -99,8 +99,13 @@ def _run(session: Session) -> SessionSummary:
         with session.screen.working("fitting the model to what was measured"):
             _ = campaign.model
         say_last_import(session)
-        while not state.stop:
-            state = _step(session, state)
+        while not state.stop:  # an interruption loses no more than one look at folder and keys
+            if state.visit is not None:
+                state = _at_pose(session, state, state.visit)
+            elif campaign.state.held and not session.auto:
+                state = _asked(session, state)
+            else:
+                state = arrive(session, state)
         session.rerun_queue.show()
         if state.stop != "quit":
             with console.status("finding what the simulation lacks"):
@@ -120,15 +125,6 @@ def _run(session: Session) -> SessionSummary:
         time.monotonic() - session.started,
         {p: m.question.text for p, m in campaign.state.held.items() if m.question},
     )
-
-
-def _step(session: Session, state: SessionState) -> SessionState:
-    """One look at folder and keys; an interruption loses no more than this."""
-    if state.visit is not None:
-        return _at_pose(session, state, state.visit)
-    if session.campaign.state.held and not session.auto:
-        return _asked(session, state)
-    return arrive(session, state)
 
 
 def _asked(session: Session, state: SessionState) -> SessionState:

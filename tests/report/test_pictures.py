@@ -19,8 +19,7 @@ from planner.modal.mac import mac
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 from planner.report.campaign_plots import frf_sheet, left_out_figure
-from planner.report.diagnosis_plots import STYLES, _residuals
-from planner.report.frf_plots import ComparedFrfs, Side, frf_map
+from planner.report.frf_plots import STYLES, ComparedFrfs, Side, _residuals, frf_map
 from planner.report.matrix_plots import geometry_figure, shapes_figure
 from planner.report.modal_plots import auto_mac_figure, frequency_figure, modal_figures
 from planner.report.pictures import Pictures, png, save

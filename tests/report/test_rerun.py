@@ -16,9 +16,8 @@ from planner.campaign.events import Proposal
 from planner.replay import replay
 from planner.report.rerun.campaign import RerunView, _blueprint
 from planner.report.rerun.event_logger import EventLogger
-from planner.report.rerun.figures import one_by_one, record_figures
+from planner.report.rerun.figures import one_by_one, open_stream, record_figures
 from planner.report.rerun.progress import MeasuredSeries
-from planner.report.rerun.stream import open_stream
 from tests.support.rerun_columns import columns_of, lines_of
 from tests.support.rerun_frames import WORLD, Frames, rotation
 from tests.support.robots import campaign_text, make_arm, urdf

@@ -19,8 +19,8 @@ from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
 from planner.report.plot_marks import AXES
-from planner.report.rerun.figures import draw, figure_view
-from planner.report.rerun.modes import BEFORE_US, GROUND, VIBRATION, ModeDrawing, mode_views
+from planner.report.rerun.figures import draw, figure_view, open_stream
+from planner.report.rerun.modes import BEFORE_US, GROUND, VIBRATION, draw_modes, mode_views
 from planner.report.rerun.progress import (
     MeasuredSeries,
     force_figure,
@@ -31,7 +31,6 @@ from planner.report.rerun.progress import (
     uncertainty,
 )
 from planner.report.rerun.robot import WORLD, RobotDrawing
-from planner.report.rerun.stream import open_stream
 
 TIMELINE = "measurement"
 COLOURS = {
@@ -70,7 +69,6 @@ class RerunView:
         self._progress = MeasuredSeries(
             self._stream, lambda path: self._stream.send_blueprint(_blueprint(cell, path))
         )
-        self._modes = ModeDrawing(self._stream)
         self._drawing = self._robot()
         self._obstacles()
         self._note("")
@@ -102,7 +100,10 @@ class RerunView:
                 rr.Boxes3D(
                     centers=[b.center_m for b in blocks],
                     sizes=[b.size_m for b in blocks],
-                    quaternions=[_quaternion(b.rpy_deg) for b in blocks],
+                    quaternions=[
+                        Rotation.from_euler("xyz", b.rpy_deg, degrees=True).as_quat()
+                        for b in blocks
+                    ],
                     labels=[b.name for b in blocks],
                     colors=COLOURS["obstacle"],
                 ),
@@ -151,8 +152,13 @@ class RerunView:
             draw(self._stream, f"frf/{axis}{axis}", figure)
         self._progress.log(number, measured_modes(pose, before))
         self._at(number)
-        self._modes.pose(model, pose, measured)
-        self._measured_poses(model)
+        draw_modes(self._stream, model, pose, measured)
+        q = np.array([p.q for p in model.labelled])
+        dots = rr.Points3D(
+            self._cell.robot.forward_batch(q)[1], radii=0.022, colors=COLOURS["measured"],
+            labels=[p.pose for p in model.labelled],
+        )  # fmt: skip
+        self._stream.log("cell/measured", dots)
         self.workspace(number, model)
         self.text(number, text, "INFO")
 
@@ -160,7 +166,8 @@ class RerunView:
         rotation, position = self._cell.robot.forward(pose.q)
         axes = sorted({hit.axis for hit in measured.hits})
         size = ARROW * self._cell.robot.arm_m
-        vectors = [size * hit_sign(a) * rotation[:, "xyz".index(a[1])] for a in axes]
+        sign = {"-": -size, "+": size}
+        vectors = [sign[a[0]] * rotation[:, AXES.index(a[1])] for a in axes]
         if axes:
             self._stream.log(
                 "cell/hits",
@@ -172,18 +179,6 @@ class RerunView:
                     colors=COLOURS["hit"],
                 ),
             )
-
-    def _measured_poses(self, model: Model) -> None:
-        q = np.array([p.q for p in model.labelled])
-        self._stream.log(
-            "cell/measured",
-            rr.Points3D(
-                self._cell.robot.forward_batch(q)[1],
-                radii=0.022,
-                colors=COLOURS["measured"],
-                labels=[p.pose for p in model.labelled],
-            ),
-        )
 
     def workspace(self, number: int, model: Model) -> None:
         """Candidates coloured by the sd of the natural frequencies (blue sure, yellow unsure)."""
@@ -213,16 +208,6 @@ class RerunView:
         with contextlib.suppress(Exception):  # a viewer that was closed meanwhile
             self._stream.flush(timeout_sec=10.0)
         self._stream.disconnect()
-
-
-def hit_sign(axis: str) -> float:
-    """Sense of a signed axis."""
-    return -1.0 if axis[0] == "-" else 1.0
-
-
-def _quaternion(rpy_deg: tuple[float, float, float]) -> np.ndarray:
-    """Quaternion (x, y, z, w) of roll, pitch and yaw about the world's axes."""
-    return Rotation.from_euler("xyz", rpy_deg, degrees=True).as_quat()
 
 
 def _eye(cell: Cell, near: float = 1.0) -> rrb.EyeControls3D:

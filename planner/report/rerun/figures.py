@@ -1,10 +1,15 @@
-"""Matplotlib figures in a Rerun recording: the plots of files and pages, as they are there.
+"""Rerun recordings, and Matplotlib figures in them: the plots of files and pages as they are there.
 
 Rerun's plots run over its timelines and linearly; frequency responses need neither. So a figure is
 a view in two dimensions: its frame and text an image, its lines strips that stay sharp however
 near one looks, and that hide one by one.
 """
 
+import hashlib
+import socket
+import subprocess
+import sys
+import time
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
@@ -17,12 +22,71 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.path import Path as Path2D
 
+from planner.errors import writing
 from planner.report.pictures import png
-from planner.report.rerun.stream import open_stream
 
+PORT = 9876
+VIEWER = f"rerun+http://127.0.0.1:{PORT}/proxy"
+VIEWER_START_S = 15.0
 DPI = 160
 WHITE = (255, 255, 255)  # behind what is drawn in black, whatever theme the viewer has
 More = Callable[[rr.RecordingStream], tuple[rrb.View | rrb.Container, rrb.TimePanel]]
+
+
+def open_stream(
+    identity: str, name: str, blueprint: rrb.Blueprint, rrd: Path | None, viewer: bool = False
+) -> rr.RecordingStream:
+    """A recording without a clock: the same `identity` and content give the same recording.
+
+    Raises InputError if the file cannot be written.
+    """
+    key = hashlib.sha256(identity.encode()).hexdigest()[:32]
+    stream = rr.RecordingStream("planner", recording_id=key, send_properties=False)
+    # The clock would make two recordings of one campaign differ.
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    sinks: list[rr.FileSink | rr.GrpcSink] = []
+    if rrd is not None:
+        with writing(rrd):
+            rrd.parent.mkdir(parents=True, exist_ok=True)
+            rrd.write_bytes(b"")
+        sinks.append(rr.FileSink(str(rrd)))
+    if viewer and _start_viewer():
+        sinks.append(rr.GrpcSink(VIEWER))
+    stream.set_sinks(*sinks, default_blueprint=blueprint)
+    stream.send_recording_name(name)
+    return stream
+
+
+def _start_viewer() -> bool:
+    """Open the viewer unless one listens already; False, with a word, if there can be none."""
+    if _listens():
+        return True
+    # The viewer listens on every network interface unless told otherwise.
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", str(PORT)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    until = time.monotonic() + VIEWER_START_S
+    while time.monotonic() < until and process.poll() is None:
+        if _listens():
+            # Without a display it listens first and ends then.
+            time.sleep(0.5)
+            if process.poll() is None:
+                return True
+        time.sleep(0.1)
+    if process.poll() is None:
+        process.kill()
+    print("The Rerun viewer did not open here; going on without it.", file=sys.stderr)
+    return False
+
+
+def _listens() -> bool:
+    with socket.socket() as probe:
+        probe.settimeout(0.2)
+        return probe.connect_ex(("127.0.0.1", PORT)) == 0
 
 
 def figure_view(path: str, name: str) -> rrb.Spatial2DView:
@@ -41,9 +105,11 @@ def draw(stream: rr.RecordingStream, path: str, figure: Figure, static: bool = F
     stream.log(f"{path}/frame", frame, static=static)
     for name, (panel, line) in sharp.items():
         line.set_linestyle("-")
+        alpha = line.get_alpha()
+        rgba = to_rgba(line.get_color(), 1.0 if alpha is None else alpha)
         strips = rr.LineStrips2D(
-            _strips(figure, panel, line), colors=_colour(line), draw_order=1.0 + line.zorder,
-            radii=rr.Radius.ui_points(0.5 * line.get_linewidth()),
+            _strips(figure, panel, line), colors=[round(255 * part) for part in rgba],
+            draw_order=1.0 + line.zorder, radii=rr.Radius.ui_points(0.5 * line.get_linewidth()),
         )  # fmt: skip
         stream.log(f"{path}/{name}", strips, static=static)
 
@@ -113,9 +179,3 @@ def _strips(figure: Figure, panel: Axes, line: Line2D) -> list[np.ndarray]:
     x, y = vertices[drawn].T
     places = np.stack([x, figure.bbox.height - y], axis=1) * DPI / figure.dpi
     return [part for part in np.split(places, starts) if len(part) > 1]
-
-
-def _colour(line: Line2D) -> list[int]:
-    alpha = line.get_alpha()
-    rgba = to_rgba(line.get_color(), 1.0 if alpha is None else alpha)
-    return [round(255 * share) for share in rgba]

@@ -56,56 +56,61 @@ def mode_views(count: int, eye: rrb.EyeControls3D) -> rrb.Container:
     return rrb.Grid(*views, figure_view("modes/mac", "MAC"), name="Modes")
 
 
-class ModeDrawing:
-    """Draws the modes of each measured pose, and the matrix that compares their shapes."""
+def draw_modes(
+    stream: rr.RecordingStream, model: Model, pose: LabelledPose, measured: MeasuredPose | None
+) -> None:
+    """The modes of a measured pose, at the recording's current time, moving from then on.
 
-    def __init__(self, stream: rr.RecordingStream):
-        self._stream = stream
+    With the matrix that compares their shapes.
+    """
+    robot, simulation = model.cell.robot, model.low.simulation
+    seen = measured_shapes(robot, pose, measured)
+    drawn = skeleton(robot, pose.q)
+    whole = None
+    if simulation is None:
+        seen = measured_alone(seen)
+    else:
+        layout = Layout(sensors=seen.names)
+        count = len(pose.modes)
+        whole, there = simulated_shapes(simulation, pose.q, drawn, layout, count)
+        mac = agreement(seen, there)
+        draw(stream, "modes/mac", _mac_figure(pose, mac, len(seen.names)))
+        seen = matched(seen, there)
+    for k in range(len(pose.modes)):
+        path = f"modes/mode_{k + 1}"
+        _still(stream, path, drawn, _title(pose, k), robot.arm_m)
+        size = LARGEST * robot.arm_m
+        if whole is not None and np.all(np.isfinite(whole.motion[k])):
+            rest, way = (_pieces(drawn, v) for v in (drawn.place_m, size * whole.motion[k]))
+            move_lines(stream, f"{path}/simulated", rest, way, THICK * robot.arm_m)
+        _points(stream, f"{path}/measured", seen, k, size, robot.arm_m)
 
-    def pose(self, model: Model, pose: LabelledPose, measured: MeasuredPose | None) -> None:
-        """Modes of a pose, at the recording's current time, moving from then on."""
-        robot, simulation = model.cell.robot, model.low.simulation
-        seen = measured_shapes(robot, pose, measured)
-        drawn = skeleton(robot, pose.q)
-        whole = None
-        if simulation is None:
-            seen = measured_alone(seen)
-        else:
-            layout = Layout(sensors=seen.names)
-            count = len(pose.modes)
-            whole, there = simulated_shapes(simulation, pose.q, drawn, layout, count)
-            mac = agreement(seen, there)
-            draw(self._stream, "modes/mac", _mac_figure(pose, mac, len(seen.names)))
-            seen = matched(seen, there)
-        for k in range(len(pose.modes)):
-            path = f"modes/mode_{k + 1}"
-            self._still(path, drawn, _title(pose, k), robot.arm_m)
-            size = LARGEST * robot.arm_m
-            if whole is not None and np.all(np.isfinite(whole.motion[k])):
-                rest, way = (_pieces(drawn, v) for v in (drawn.place_m, size * whole.motion[k]))
-                move_lines(self._stream, f"{path}/simulated", rest, way, THICK * robot.arm_m)
-            self._points(f"{path}/measured", seen, k, size, robot.arm_m)
 
-    def _still(self, path: str, drawn: Skeleton, title: str, reach_m: float) -> None:
-        lines = [drawn.place_m[list(pair)] for pair in drawn.lines]
-        self._stream.log(f"{path}/rest", rr.LineStrips3D(lines, radii=THIN * reach_m, colors=REST))
-        below = drawn.place_m[0] - [0.0, 0.0, 0.08 * reach_m]
-        self._stream.log(
-            f"{path}/title",
-            rr.Points3D([below], radii=0.0001, labels=[title], colors=BRIGHT, show_labels=True),
-        )
+def _still(
+    stream: rr.RecordingStream, path: str, drawn: Skeleton, title: str, reach_m: float
+) -> None:
+    lines = [drawn.place_m[list(pair)] for pair in drawn.lines]
+    stream.log(f"{path}/rest", rr.LineStrips3D(lines, radii=THIN * reach_m, colors=REST))
+    below = drawn.place_m[0] - [0.0, 0.0, 0.08 * reach_m]
+    stream.log(
+        f"{path}/title",
+        rr.Points3D([below], radii=0.0001, labels=[title], colors=BRIGHT, show_labels=True),
+    )
 
-    def _points(self, path: str, seen: PointShapes, k: int, size: float, reach_m: float) -> None:
-        """Sensors where they move to by the measured shape."""
-        known = np.all(np.isfinite(seen.motion[k]), axis=1)
-        places, motion = seen.place_m[known], size * seen.motion[k][known]
-        names = [f"{n} (measured)" for n, there in zip(seen.names, known, strict=True) if there]
-        balls = rr.Points3D(
-            places + motion.real, radii=BALL * reach_m, colors=MEASURED, labels=names,
-            show_labels=len(names) > 1,
-        )  # fmt: skip
-        self._stream.log(path, balls)
-        move_points(self._stream, path, places, motion)
+
+def _points(
+    stream: rr.RecordingStream, path: str, seen: PointShapes, k: int, size: float, reach_m: float
+) -> None:
+    """Sensors where they move to by the measured shape."""
+    known = np.all(np.isfinite(seen.motion[k]), axis=1)
+    places, motion = seen.place_m[known], size * seen.motion[k][known]
+    names = [f"{n} (measured)" for n, there in zip(seen.names, known, strict=True) if there]
+    balls = rr.Points3D(
+        places + motion.real, radii=BALL * reach_m, colors=MEASURED, labels=names,
+        show_labels=len(names) > 1,
+    )  # fmt: skip
+    stream.log(path, balls)
+    move_points(stream, path, places, motion)
 
 
 def move_lines(

@@ -128,14 +128,11 @@ class MeasuredSeries:
             self._arrange(self.path)
         for n, row in self._rows.items() if again else [(number, values)]:
             self._stream.set_time("measurement", sequence=n)
+            told = {name for earlier, known in self._rows.items() if earlier < n for name in known}
             for name, value in row.items():
-                self._series(name, n, value)
-
-    def _series(self, name: str, number: int, value: float) -> None:
-        path = f"{self.path}/{name}"
-        if not any(name in row for n, row in self._rows.items() if n < number):
-            self._stream.log(path, *_style(name), static=True)
-        self._stream.log(path, rr.Scalars(value))
+                if name not in told:
+                    self._stream.log(f"{self.path}/{name}", *_style(name), static=True)
+                self._stream.log(f"{self.path}/{name}", rr.Scalars(value))
 
 
 def _style(name: str) -> list[rr.SeriesLines | rr.SeriesPoints]:
@@ -148,17 +145,14 @@ def _style(name: str) -> list[rr.SeriesLines | rr.SeriesPoints]:
     label = {"low": "expected − 2 sd", "high": "expected + 2 sd", "all": "all modes"}
     said = label.get(kind, kind.replace("_low", " − 2 sd").replace("_high", " + 2 sd"))
     said = said.replace("_", " ")
-    colour = own[kind] if kind in own else mode_colour(int(kind.split("_")[1]) - 1)
+    colour = own.get(kind)
+    if colour is None:  # of a mode, bright enough for a dark ground
+        rgb = colormaps["tab10"]((int(kind.split("_")[1]) - 1) % 10)[:3]
+        colour = tuple((np.array(rgb) * 155 + 100).astype(int).tolist())
     thin = kind.endswith(("low", "high"))
     line = rr.SeriesLines(colors=colour, names=said, widths=0.7 if thin else 1.8)
     dots = rr.SeriesPoints(colors=colour, names=said, marker_sizes=4.0)
     return [dots] if kind == "measured" else [line] if thin or kind == "target" else [line, dots]
-
-
-def mode_colour(k: int) -> tuple[int, int, int]:
-    """The colour of mode k wherever it is drawn over a dark ground."""
-    red, green, blue = (np.array(colormaps["tab10"](k % 10)[:3]) * 155 + 100).astype(int)
-    return int(red), int(green), int(blue)
 
 
 def progress_views(path: str, count: int) -> rrb.Container:
