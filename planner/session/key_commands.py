@@ -282,7 +282,7 @@ def measured(session: Session, state: SessionState, pose: str) -> SessionState:
     further = state.after(pose, model, logged, seconds, session.auto)
     if not session.screen.console.is_terminal:  # there it stands on the page
         session.say(further.progress.split("; ", 1)[1])
-    if session.explaining is not None and len(state.used) >= LEAST:
+    if session.explaining is not None and len(logged.used) >= LEAST:
         session.explaining.ask()
     if further.announced and not state.announced:
         session.say("The target of campaign.toml is reached.", "bold green")
