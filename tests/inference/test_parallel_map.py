@@ -137,7 +137,7 @@ def test_a_helper_ends_with_a_process_that_is_killed(tmp_path):
         "    time.sleep(0.01)\n"
         "    return os.getpid()\n"
         "module._helper()[1].result()\n"
-        "found = set(module.side_by_side(who, range(99))) - {os.getpid()}\n"
+        "found = set(module.parallel_map(who, range(99))) - {os.getpid()}\n"
         "print(*found, flush=True)\n"
         "time.sleep(100)\n"
     )
