@@ -124,11 +124,12 @@ def from_records(records: tuple[FrfRecord, ...], window_rate_1_s: float = 0.0) -
     """
     first = records[0]
     frequency, frfs = labelled_frfs(records, "accelerance", RefusedError)
-    layout = _layout(frfs)
+    sensors, hit_points = [f.response[0] or SENSOR for f in frfs], [f.hit[0] or TCP for f in frfs]
+    layout = Layout(tuple(dict.fromkeys(hit_points)), tuple(dict.fromkeys(sensors)))
     shape = (*layout.shape, len(frequency))
     h, coherence = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
-    for one in frfs:
-        row, column = layout.sensors.index(_sensor(one)), layout.hits.index(_hit_point(one))
+    for one, sensor, point in zip(frfs, sensors, hit_points, strict=True):
+        row, column = layout.sensors.index(sensor), layout.hits.index(point)
         at = 3 * row + one.response[1], 3 * column + one.hit[1]
         h[at], coherence[at] = one.values, one.coherence
     given = np.array([[bool(np.isfinite(one).all()) for one in row] for row in h])
@@ -143,19 +144,6 @@ def from_records(records: tuple[FrfRecord, ...], window_rate_1_s: float = 0.0) -
     unknown = np.full(shape, np.nan)
     band = float(frequency[0]), float(frequency[-1])
     return Frf(frequency, h, unknown, coherence, hits, band, window_rate_1_s, layout=layout)
-
-
-def _sensor(one: LabelledFrf) -> str:
-    return one.response[0] or SENSOR
-
-
-def _hit_point(one: LabelledFrf) -> str:
-    return one.hit[0] or TCP
-
-
-def _layout(frfs: list[LabelledFrf]) -> Layout:
-    hits, sensors = dict.fromkeys(map(_hit_point, frfs)), dict.fromkeys(map(_sensor, frfs))
-    return Layout(tuple(hits), tuple(sensors))
 
 
 def exported(frf: Frf, source: Path, simulated: bool) -> FrfRecord:

@@ -59,20 +59,13 @@ class Frf:
         if not known[best].any():
             return None
         columns = 3 * best + np.arange(3)
-        parts = (self.accelerance, self.variance, self.coherence)
-        kept = (np.where(known[best][:, None], p[rows][:, columns], np.nan) for p in parts)
-        h, variance, coherence = kept
-        share = self.force_share
+        parts = {
+            name: np.where(known[best][:, None], getattr(self, name)[rows][:, columns], np.nan)
+            for name in ("accelerance", "variance", "coherence")
+        }
+        share = None if self.force_share is None else self.force_share[columns]
         counts = np.where(known[best], np.array(self.hits)[columns], 0).tolist()
-        return replace(
-            self,
-            accelerance=h,
-            variance=variance,
-            coherence=coherence,
-            hits=tuple(counts),
-            force_share=None if share is None else share[columns],
-            layout=TOOL,
-        )
+        return replace(self, **parts, hits=tuple(counts), force_share=share, layout=TOOL)
 
     def within(self, band_hz: tuple[float, float]) -> "Frf":
         """The same on the lines of a band only, edges included; two at least, to keep the spacing.
@@ -83,15 +76,9 @@ class Frf:
         kept = (self.frequency_hz >= low) & (self.frequency_hz <= high)
         if np.count_nonzero(kept) < 2:
             return self
-        share = None if self.force_share is None else self.force_share[:, kept]
-        return replace(
-            self,
-            frequency_hz=self.frequency_hz[kept],
-            accelerance=self.accelerance[..., kept],
-            variance=self.variance[..., kept],
-            coherence=self.coherence[..., kept],
-            force_share=share,
-        )
+        names = "frequency_hz", "accelerance", "variance", "coherence", "force_share"
+        parts = {name: getattr(self, name) for name in names}
+        return replace(self, **{k: v if v is None else v[..., kept] for k, v in parts.items()})
 
 
 def unreciprocal(frf: Frf) -> tuple[str, ...]:

@@ -67,7 +67,12 @@ class Agreement:
         max(0, 1 − ‖|M_meas| − |M_sim|‖ / ‖|M_meas|‖), the norms over poses and lines (Birk et al.
         2025, appendix B.2).
         """
-        return _similarity(self.error, self.size)
+        unknown = np.isnan(self.size)
+        parts = (np.where(unknown, 0.0, part) ** 2 for part in (self.error, self.size))
+        whole, measured = (np.sqrt(np.sum(part, axis=0)) for part in parts)
+        relative = np.divide(whole, measured, out=np.ones_like(whole), where=measured > 0)
+        relative = np.where((measured == 0) & (whole == 0), 0.0, relative)
+        return np.where(np.all(unknown, axis=0), np.nan, np.maximum(0.0, 1 - relative))
 
 
 def agreement(
@@ -86,8 +91,9 @@ def agreement(
             raise ValueError("a band needs frequency_hz")
         inside = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
         measured, simulated = measured[..., inside], simulated[..., inside]
-    error, size = _norms(measured, simulated)
-    return Agreement(frac(measured, simulated), complex_frac(measured, simulated), error, size)
+    shapes = frac(measured, simulated), complex_frac(measured, simulated)
+    a, b = np.broadcast_arrays(np.abs(measured), np.abs(simulated))
+    return Agreement(*shapes, _unit_and_length(a - b)[1], _unit_and_length(a)[1])
 
 
 def stack(parts: Sequence[Agreement]) -> Agreement:
@@ -132,21 +138,3 @@ def _unit_and_length(frf: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         np.divide(unit, size, out=unit, where=size > 0)
         length = length * size
     return unit, length[..., 0]
-
-
-def _norms(measured: np.ndarray, simulated: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Norms over lines of |measured| − |simulated| and |measured|, (..., F) to (...) each."""
-    a, b = np.broadcast_arrays(np.abs(measured), np.abs(simulated))
-    _check(a, b)
-    return _unit_and_length(a - b)[1], _unit_and_length(a)[1]
-
-
-def _similarity(error: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """max(0, 1 − E_rel) of norms per pose (n, ...), the poses' squares summed: (...)."""
-    unknown = np.isnan(size)
-    whole = np.sqrt(np.sum(np.where(unknown, 0.0, error) ** 2, axis=0))
-    measured = np.sqrt(np.sum(np.where(unknown, 0.0, size) ** 2, axis=0))
-    relative = np.divide(whole, measured, out=np.ones_like(whole), where=measured > 0)
-    relative = np.where((measured == 0) & (whole == 0), 0.0, relative)
-    similarity = np.maximum(0.0, 1 - relative)
-    return np.where(np.all(unknown, axis=0), np.nan, similarity)

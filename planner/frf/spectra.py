@@ -81,7 +81,14 @@ def transform(
     rate = hits[0].sampling_rate_hz
     if not all(same_rate(hit, hits[0]) for hit in hits):
         raise RefusedError("The hits of this pose have different sampling rates; use one.")
-    before, after, remarks = _alignment(hits)
+    # Samples before the peak, and from it on, that every hit has
+    before = min(hit.pulse.peak for hit in hits)
+    after = min(len(hit.force_n) - hit.pulse.peak for hit in hits)
+    if after < 64:
+        raise RefusedError("A record ends right after its pulse; record longer.")
+    remarks: tuple[str, ...] = ()
+    if before + after < 0.9 * max(len(hit.force_n) for hit in hits):
+        remarks = ("Records of different length were cut to the shortest.",)
     length = max(before + after, samples or 0)
     frequency = np.fft.rfftfreq(length, 1 / rate)
     # Margin: lines beyond the band, so that modes at its edge are met from both sides
@@ -91,18 +98,6 @@ def transform(
     found = tuple(_transform(hit, before, after, length, chosen, windows) for hit in hits)
     tail = float(np.mean([_tail(hit, before, after) for hit in hits]))
     return Spectra(frequency[chosen], found, tail, before / rate, remarks)
-
-
-def _alignment(hits: tuple[Hit, ...]) -> tuple[int, int, tuple[str, ...]]:
-    """Samples before the peak, and from it on, that every hit has."""
-    before = min(hit.pulse.peak for hit in hits)
-    after = min(len(hit.force_n) - hit.pulse.peak for hit in hits)
-    # Least samples of a record after its pulse
-    if after < 64:
-        raise RefusedError("A record ends right after its pulse; record longer.")
-    if before + after < 0.9 * max(len(hit.force_n) for hit in hits):
-        return before, after, ("Records of different length were cut to the shortest.",)
-    return before, after, ()
 
 
 def _transform(

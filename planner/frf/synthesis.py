@@ -3,7 +3,7 @@
 import numpy as np
 
 
-def pole(frequency_hz: np.ndarray, damping_ratio: np.ndarray) -> np.ndarray:
+def pole(frequency_hz: np.ndarray | float, damping_ratio: np.ndarray | float) -> np.ndarray:
     """Complex poles (rad/s) of natural frequencies (Hz) and damping ratios; shapes broadcast."""
     omega = 2 * np.pi * np.asarray(frequency_hz)
     zeta = np.asarray(damping_ratio)

@@ -9,7 +9,7 @@ et al., Phys. Rep. 470, 2009) in the slices of a tapered one.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import msgspec
@@ -40,11 +40,48 @@ class ToolMaterial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.modulus / (2 * (1 + self.poisson_ratio))
 
 
+# Places of the motions that a contact lets slip: across the axis, and turning about that.
+ACROSS, TURNING = (0, 1), (3, 4)
+
+
+class ToolContact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What holds a segment at its lower end; without it the segment is held rigidly.
+
+    Stiffness and damping are across the axis and in bending; `sd_percent` says how well known.
+    """
+
+    stiffness_n_m: float
+    stiffness_nm_rad: float
+    damping_ns_m: float = 0.0
+    damping_nms_rad: float = 0.0
+    sd_percent: float = 0.0
+
+    def transfer(self, omega: np.ndarray) -> np.ndarray:
+        """(F, 12, 12) of the state from the tip's side to the holder's; omega (F,) in rad/s.
+
+        Its sides move apart by its flexibility for each unit of force or moment.
+        """
+        out = np.zeros((len(omega), 12, 12), complex)
+        out[:, range(12), range(12)] = 1
+        for places, stiffness, damping in (
+            (ACROSS, self.stiffness_n_m, self.damping_ns_m),
+            (TURNING, self.stiffness_nm_rad, self.damping_nms_rad),
+        ):
+            for k in places:
+                out[:, k, 6 + k] = -1 / (stiffness + 1j * omega * damping)
+        return out
+
+    def scaled(self, name: str, factor: float) -> "ToolContact":
+        """The same with one of its four numbers multiplied."""
+        return msgspec.structs.replace(self, **{name: factor * getattr(self, name)})
+
+
 @dataclass(frozen=True)
 class Segment:
     """A piece of a round beam: length and diameters in m, at its holder's side and its tip's side.
 
-    `bore` is the diameter of a hole along it; `mass` (kg) sits at its end towards the tip.
+    `bore` is the diameter of a hole along it; `mass` (kg) sits at its end towards the tip;
+    `contact` holds it at its holder's side (None: rigidly).
     """
 
     length: float
@@ -53,6 +90,7 @@ class Segment:
     material: ToolMaterial
     bore: float = 0.0
     mass: float = 0.0
+    contact: ToolContact | None = None
 
     def at(self, place: float) -> "Section":
         """The section at a share of the length, 0 at the holder's side."""
@@ -131,14 +169,16 @@ TURNED = np.array([1.0, -1.0, 1.0, -1.0])
 
 
 def transfer(segments: Sequence[Segment], omega: np.ndarray) -> np.ndarray:
-    """(F, 12, 12) from the state at the tip to that at the holder, of segments holder first.
+    """(F, 12, 12) from the state at the tip to below the lowest contact, of segments holder first.
 
     omega (F,) in rad/s, > 0.
     """
     total = np.broadcast_to(np.eye(12, dtype=complex), (len(omega), 12, 12))
     omega = np.ascontiguousarray(omega, float)
     for segment in segments[::-1]:
-        total = _segment(segment, omega.tobytes()) @ total
+        total = _segment(replace(segment, contact=None), omega.tobytes()) @ total
+        if segment.contact is not None:
+            total = segment.contact.transfer(omega) @ total
     return total
 
 
@@ -153,7 +193,10 @@ def _segment(segment: Segment, lines: bytes) -> np.ndarray:
     for places, slope in rods:
         moved = _along(segment, lambda section, slope=slope: slope(section, omega))
         out[np.ix_(range(len(omega)), places, places)] = moved
-    return out @ point_mass(segment.mass, omega)
+    # The mass at its tip's side: motion there takes a force.
+    pushed = segment.mass * (omega**2)[:, None, None] * out[:, :, 6:9]
+    out[:, :, :3] += pushed
+    return out
 
 
 def _along(segment: Segment, slope: Callable[[Section], np.ndarray]) -> np.ndarray:
@@ -172,15 +215,6 @@ def _along(segment: Segment, slope: Callable[[Section], np.ndarray]) -> np.ndarr
     for one in slices[1:]:
         total = total @ one
     return total
-
-
-def point_mass(mass: float, omega: np.ndarray) -> np.ndarray:
-    """(F, 12, 12) across a mass in kg, from the tip's side to the holder's."""
-    out = np.zeros((len(omega), 12, 12), complex)
-    out[:, range(12), range(12)] = 1
-    for axis in range(3):
-        out[:, 6 + axis, axis] = mass * omega**2
-    return out
 
 
 def exponential(a: np.ndarray) -> np.ndarray:

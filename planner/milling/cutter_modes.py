@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 
 from planner.errors import InputError
+from planner.frf.synthesis import pole
 from planner.milling.cut import check_limits, check_unit
 from planner.milling.cutter_frf import CutterFrf
 from planner.modal.estimate_modes import PoleIdentification, identify, inflation
@@ -28,9 +29,9 @@ from planner.toml_file import load_toml
 class CutterModes:
     """Receptance H(s) = Σ_k [ψ_k l_kᵀ/(s − λ_k) + its conjugate] + residual, in m/N.
 
-    Poles (k,) in rad/s with a positive imaginary part, or real (then without a conjugate); shapes ψ
-    and drives l (k, d); `residual` (d, d) is the compliance of all higher modes. d is 3 in the
-    frame of the FRFs, or 2 in the plane of a cut.
+    Poles (k,) in rad/s with a positive imaginary part; shapes ψ and drives l (k, d); `residual`
+    (d, d) is the compliance of all higher modes. d is 3 in the frame of the FRFs, or 2 in the plane
+    of a cut.
     """
 
     poles: np.ndarray
@@ -38,23 +39,16 @@ class CutterModes:
     drives: np.ndarray
     residual: np.ndarray
 
-    @property
-    def weight(self) -> np.ndarray:
-        """(k,) 2 for poles that stand for a pair, 1 for real ones: of the real part."""
-        return np.where(self.poles.imag > 0, 2.0, 1.0)
-
     def receptance(self, frequency_hz: np.ndarray) -> np.ndarray:
         """(F, d, d) in m/N at frequencies (F,)."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=float)[:, None]
-        pair = self.poles.imag > 0
-        direct = 1 / (s - self.poles)
-        conjugate = np.where(pair, 1 / (s - self.poles.conj()), 0.0)
-        found = np.einsum("fk,ki,kj->fij", direct, self.shapes, self.drives)
-        found += np.einsum("fk,ki,kj->fij", conjugate, self.shapes.conj(), self.drives.conj())
+        up, down = 1 / (s - self.poles), 1 / (s - self.poles.conj())
+        found = np.einsum("fk,ki,kj->fij", up, self.shapes, self.drives)
+        found += np.einsum("fk,ki,kj->fij", down, self.shapes.conj(), self.drives.conj())
         return found + self.residual
 
     def in_plane(self, plane: np.ndarray) -> "CutterModes":
-        """In the plane of a cut, (2, 3) unit vectors; modes that do not show there are left out."""
+        """In the plane of a cut, (2, d) unit vectors; modes that do not show there are left out."""
         shapes, drives = self.shapes @ plane.T, self.drives @ plane.T
         size = np.linalg.norm(shapes, axis=1) * np.linalg.norm(drives, axis=1)
         whole = np.linalg.norm(self.shapes, axis=1) * np.linalg.norm(self.drives, axis=1)
@@ -76,13 +70,10 @@ def real_modes(
 
     direction (n, d): unit vectors along which each moves and is driven.
     """
-    omega = 2 * np.pi * np.asarray(frequency_hz, dtype=float)
-    zeta = np.asarray(damping_ratio, dtype=float)
-    damped = omega * np.sqrt(1 - zeta**2)
-    shapes = np.asarray(direction, dtype=complex)
-    drives = shapes / (2j * np.asarray(mass_kg) * damped)[:, None]
+    poles, shapes = pole(frequency_hz, damping_ratio), np.asarray(direction, dtype=complex)
+    drives = shapes / (2j * np.asarray(mass_kg) * poles.imag)[:, None]
     size = shapes.shape[1]
-    return CutterModes(-zeta * omega + 1j * damped, shapes, drives, np.zeros((size, size)))
+    return CutterModes(poles, shapes, drives, np.zeros((size, size)))
 
 
 class StatedMode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -53,11 +53,16 @@ def first_unstable(at: Monodromies, scan: np.ndarray) -> tuple[Level, Level] | N
     for first in range(0, len(scan), CHUNK):
         seen += levels(at, scan[first : first + CHUNK])
         seen = _with_peaks(at, seen)
-        for low, high in pairwise(seen):
-            if high[1] > 0:
-                return low, high
+        bracket = _bracket(seen)
+        if bracket is not None:
+            return bracket
         seen = seen[-2:]
     return None
+
+
+def _bracket(seen: list[Level]) -> tuple[Level, Level] | None:
+    """The first loss among levels, the first of which is stable."""
+    return next(((low, high) for low, high in pairwise(seen) if high[1] > 0), None)
 
 
 def _with_peaks(at: Monodromies, seen: list[Level]) -> list[Level]:
@@ -107,7 +112,11 @@ def stability_limits(
     check_structure(machine.modes)
     cut = machine.cut
     if cut.method == "zeroth_order":
-        return zeroth_order_limits(machine)
+        # By the average of the cutting force; kinds are Hopf, the error is not known.
+        found = zip(*limits(machine.floor(), cut.speeds_rpm, cut.teeth), strict=True)
+        return tuple(
+            StabilityLimit(d, "hopf", hz) if d <= cut.depth_m[1] else NO_LIMIT for d, hz in found
+        )
     scan = scanned_depths(machine.floor().floor_m, cut.depth_m[1])
     speeds = [float(rpm) for rpm in cut.speeds_rpm]
     if len(speeds) < MANY:
@@ -119,16 +128,6 @@ def stability_limits(
         lambda number, count: progress("lobes", count / len(blocks)),
     )
     return tuple(loss for block in found for loss in block)
-
-
-def zeroth_order_limits(machine: Machine) -> tuple[StabilityLimit, ...]:
-    """By the average of the cutting force; kind and error are not known to it, kinds are Hopf."""
-    cut = machine.cut
-    depths, chatter = limits(machine.floor(), cut.speeds_rpm, cut.teeth)
-    return tuple(
-        StabilityLimit(depth, "hopf", hertz) if depth <= cut.depth_m[1] else NO_LIMIT
-        for depth, hertz in zip(depths, chatter, strict=True)
-    )
 
 
 def monodromies(machine: Machine, rpm: float, factor: float = 1.0) -> Monodromies:
@@ -289,20 +288,10 @@ def _limits(machine: Machine, rpm: np.ndarray, around: np.ndarray) -> np.ndarray
         at = monodromies(machine, float(speed))
         bracket = None
         if np.isfinite(around[i]):
-            bracket = _bracket(levels(at, FIRST * around[i]))
+            bracket = _bracket([(0.0, -1.0), *levels(at, FIRST * around[i])])
         if bracket is None:
             above = scan if np.isnan(around[i]) else scan[scan > FIRST[-1] * around[i]]
             bracket = first_unstable(at, above) if len(above) else None
         if bracket is not None:
             found[i] = refined(at, *bracket, 1e-3)
     return found
-
-
-def _bracket(seen: list[Level]) -> tuple[Level, Level] | None:
-    """The first loss among levels that are coarse; before the first of them it is stable."""
-    before = (0.0, -1.0)
-    for level in seen:
-        if level[1] > 0:
-            return before, level
-        before = level
-    return None

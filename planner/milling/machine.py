@@ -147,19 +147,14 @@ class Machine:
 
     def floor(self) -> LobeCurves:
         """Zeroth-order curves over lines that resolve every mode."""
-        mean = mean_matrix(self.cut)
-        lines = resolving_lines(self.modes)
-        return curves(lines, self.modes.receptance(lines), mean)
-
-
-def resolving_lines(modes: CutterModes) -> np.ndarray:
-    """(F,) Hz: dense about each mode within its half-power band, and between."""
-    hertz, width = np.abs(modes.poles) / (2 * np.pi), -modes.poles.real / (2 * np.pi)
-    near = np.sinh(np.linspace(-9, 9, 241)) / 4  # half-widths: steps grow away from the mode
-    lines = (hertz[:, None] + width[:, None] * near).ravel()
-    wide = np.geomspace(hertz.min() / 20, hertz.max() * 20, 400)
-    lines = np.concatenate([lines, wide])
-    return np.unique(lines[(lines > wide[0]) & (lines < wide[-1])])
+        poles = self.modes.poles
+        hertz, width = np.abs(poles) / (2 * np.pi), -poles.real / (2 * np.pi)
+        # Dense about each mode within its half-power band: steps, in half-widths, grow away from it
+        near = np.sinh(np.linspace(-9, 9, 241)) / 4
+        wide = np.geomspace(hertz.min() / 20, hertz.max() * 20, 400)
+        lines = np.concatenate([(hertz[:, None] + width[:, None] * near).ravel(), wide])
+        lines = np.unique(lines[(lines > wide[0]) & (lines < wide[-1])])
+        return curves(lines, self.modes.receptance(lines), mean_matrix(self.cut))
 
 
 def check_structure(modes: CutterModes) -> None:

@@ -102,10 +102,12 @@ def limits_by_feed(poses: Sequence[tuple[str, Structure]], cut: Cut, rpm: float)
 
     About the tool's axis, from the feed towards axis × feed; inf where nothing is lost.
     """
-    one = _at_one_speed(cut, rpm)
+    machines = [structure.machine(_at_one_speed(cut, rpm)) for _, structure in poses]
+    turns = np.deg2rad(TURNS_DEG)
+    both = zip(np.cos(turns), np.sin(turns), strict=True)
+    planes = [np.array([[c, s], [-s, c]]) for c, s in both]
     return np.array([
-        min(_limit(_turned(structure.machine(one), turn)) for _, structure in poses)
-        for turn in np.deg2rad(TURNS_DEG)
+        min(_limit(replace(m, modes=m.modes.in_plane(plane))) for m in machines) for plane in planes
     ])  # fmt: skip
 
 
@@ -122,16 +124,6 @@ def _at_one_speed(cut: Cut, rpm: float) -> Cut:
 def _limit(machine: Machine) -> float:
     (loss,) = stability_limits(machine)
     return float(np.inf if np.isnan(loss.depth_m) else loss.depth_m)
-
-
-def _turned(machine: Machine, turn: float) -> Machine:
-    c, s = np.cos(turn), np.sin(turn)
-    plane, modes = np.array([[c, s], [-s, c]]), machine.modes
-    turned = replace(
-        modes, shapes=modes.shapes @ plane.T, drives=modes.drives @ plane.T,
-        residual=plane @ modes.residual @ plane.T,
-    )  # fmt: skip
-    return replace(machine, modes=turned)
 
 
 SAMPLES = 40

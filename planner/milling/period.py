@@ -152,10 +152,9 @@ def _points(
 def _build(
     modes: CutterModes, found: Engagement, points: _Points, speed: float, degree: int
 ) -> Period:
-    rule, weight = lobatto(degree), modes.weight
     duration = found.period / speed
     length, end = (found.end - found.start) / speed, found.end / speed
-    seen = (modes.shapes @ points.rows.T) * weight[:, None]  # (k, p)
+    seen = 2 * modes.shapes @ points.rows.T  # (k, p); a pole stands for a pair
     drive = modes.drives @ points.columns.T
     part = _integrals(modes.poles, length, degree)  # (k, e, i, j)
     whole = part[:, points.element, -1, points.place] * drive  # (k, p): at the element's end
@@ -182,7 +181,7 @@ def _build(
         now=None,
         before=None,
         time_s=points.time[first],
-        weight_s=(rule.weights[points.place] * length[points.element]) @ together,
+        weight_s=(lobatto(degree).weights[points.place] * length[points.element]) @ together,
         force=points.columns[first],
     )
 

@@ -50,8 +50,7 @@ def semi_monodromy(machine: Machine, rpm: float, count: int, depth: float) -> np
     force = np.linalg.solve(np.eye(2) - force @ rest, force)
     real, imag = np.diag(modes.poles.real), np.diag(modes.poles.imag)
     push = np.concatenate([modes.drives.real, modes.drives.imag])
-    shapes = modes.shapes * modes.weight[:, None]
-    seen = np.concatenate([shapes.real, -shapes.imag]).T
+    seen = 2 * np.concatenate([modes.shapes.real, -modes.shapes.imag]).T
     size, forced = len(push), push @ force
     # One exponential of [[A, B], [0, 0]] holds the transition and the integral of the force.
     both = np.zeros((count, size + 2, size + 2))

@@ -40,55 +40,13 @@ import msgspec
 import numpy as np
 
 from planner.errors import InputError
-from planner.milling.beam import Segment, ToolMaterial, transfer
+from planner.milling.beam import Segment, ToolContact, ToolMaterial, transfer
 from planner.toml_file import load_toml
 
-# Places of the motions that a contact lets slip: across the axis, and turning about that.
-ACROSS, TURNING = (0, 1), (3, 4)
 NUMBERS = ("stiffness_n_m", "stiffness_nm_rad", "damping_ns_m", "damping_nms_rad")
 
 
-class ToolContact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What holds a segment at its lower end; without it the segment is held rigidly.
-
-    Stiffness and damping are across the axis and in bending; `sd_percent` says how well known.
-    """
-
-    stiffness_n_m: float
-    stiffness_nm_rad: float
-    damping_ns_m: float = 0.0
-    damping_nms_rad: float = 0.0
-    sd_percent: float = 0.0
-
-    def transfer(self, omega: np.ndarray) -> np.ndarray:
-        """(F, 12, 12) of the state from the tip's side to the holder's; omega (F,) in rad/s.
-
-        Its sides move apart by its flexibility for each unit of force or moment.
-        """
-        out = np.zeros((len(omega), 12, 12), complex)
-        out[:, range(12), range(12)] = 1
-        for places, stiffness, damping in (
-            (ACROSS, self.stiffness_n_m, self.damping_ns_m),
-            (TURNING, self.stiffness_nm_rad, self.damping_nms_rad),
-        ):
-            for k in places:
-                out[:, k, 6 + k] = -1 / (stiffness + 1j * omega * damping)
-        return out
-
-    def scaled(self, name: str, factor: float) -> "ToolContact":
-        """The same with one of its four numbers multiplied."""
-        return msgspec.structs.replace(self, **{name: factor * getattr(self, name)})
-
-
 SAME_PLACE = 1e-9  # m
-
-
-@dataclass(frozen=True)
-class ToolPart:
-    """A segment, and the contact that holds it at its holder's side; None: rigidly."""
-
-    segment: Segment
-    contact: ToolContact | None = None
 
 
 class Point(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -105,7 +63,7 @@ class Point(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class Tool:
-    """Parts from the holder to the tip, the unit axis (3,) from holder to tip, measured points.
+    """Segments from the holder to the tip, the unit axis (3,) from holder to tip, measured points.
 
     The axis is that along which parts follow each other; files say where the spindle is, the other
     way.
@@ -113,19 +71,19 @@ class Tool:
 
     name: str
     axis: tuple[float, float, float]
-    parts: tuple[ToolPart, ...]
+    parts: tuple[Segment, ...]
     points: tuple[Point, ...] = ()
     says_spindle: bool = False  # whether its file has to_spindle, which older ones have not
 
     @property
     def length(self) -> float:
         """In m."""
-        return sum(part.segment.length for part in self.parts)
+        return sum(part.length for part in self.parts)
 
     @property
     def mass(self) -> float:
         """In kg."""
-        return sum(part.segment.weight for part in self.parts)
+        return sum(part.weight for part in self.parts)
 
     @property
     def frame(self) -> np.ndarray:
@@ -138,17 +96,12 @@ class Tool:
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
         """(F, 12, 12) of the state from the tip to below the lowest contact; omega in rad/s."""
-        total = np.broadcast_to(np.eye(12, dtype=complex), (len(omega), 12, 12))
-        for part in self.parts[::-1]:
-            total = transfer([part.segment], omega) @ total
-            if part.contact is not None:
-                total = part.contact.transfer(omega) @ total
-        return total
+        return transfer(self.parts, omega)
 
     def above(self, from_tip: float) -> "Tool":
         """The part of it between the tip and a section so many m away."""
         parts = _split(self.parts, from_tip)
-        ends = np.cumsum([part.segment.length for part in parts[::-1]])
+        ends = np.cumsum([part.length for part in parts[::-1]])
         own = list(parts[len(parts) - int(np.sum(ends < from_tip + SAME_PLACE)) :])
         if own:  # what holds the lowest is below the section
             own[0] = replace(own[0], contact=None)
@@ -165,31 +118,29 @@ class Tool:
         return replace(self, parts=tuple(parts))
 
 
-def _split(parts: tuple[ToolPart, ...], from_tip: float) -> tuple[ToolPart, ...]:
+def _split(parts: tuple[Segment, ...], from_tip: float) -> tuple[Segment, ...]:
     """Parts with an end so many m from the tip."""
     out, left = list(parts), from_tip
     for k in range(len(parts) - 1, -1, -1):
-        s = parts[k].segment
+        s = parts[k]
         if left <= SAME_PLACE:
             break
         if left < s.length - SAME_PLACE:
             width = s.end_diameter + left / s.length * (s.diameter - s.end_diameter)
             below = replace(s, length=s.length - left, end_diameter=width, mass=0.0)
-            above = replace(s, length=left, diameter=width)
-            out[k : k + 1] = [replace(parts[k], segment=below), ToolPart(above)]
+            out[k : k + 1] = [below, replace(s, length=left, diameter=width, contact=None)]
             break
         left -= s.length
     return tuple(out)
 
 
-def loaded(parts: tuple[ToolPart, ...], from_tip: float, mass: float) -> tuple[ToolPart, ...]:
+def loaded(parts: tuple[Segment, ...], from_tip: float, mass: float) -> tuple[Segment, ...]:
     """Parts with a mass (kg) so many m from the tip."""
     parts, length = _split(parts, from_tip), 0.0
     for k in range(len(parts) - 1, -1, -1):
         if abs(length - from_tip) < 10 * SAME_PLACE:
-            segment = replace(parts[k].segment, mass=parts[k].segment.mass + mass)
-            return (*parts[:k], replace(parts[k], segment=segment), *parts[k + 1 :])
-        length += parts[k].segment.length
+            return (*parts[:k], replace(parts[k], mass=parts[k].mass + mass), *parts[k + 1 :])
+        length += parts[k].length
     return parts  # at the very lowest end: the holder's, not the tool's
 
 
@@ -256,14 +207,14 @@ def load_tool(path: Path) -> Tool:
     return tool
 
 
-def _part(s: SegmentTable, material: ToolMaterial) -> ToolPart:
+def _part(s: SegmentTable, material: ToolMaterial) -> Segment:
     end = s.diameter_m if s.end_diameter_m is None else s.end_diameter_m
     start = s.diameter_m
     if s.flutes:
         start, end = FLUTED * start, FLUTED * end
     if s.equivalent_diameter_m is not None:
         start = end = s.equivalent_diameter_m
-    return ToolPart(Segment(s.length_m, start, end, material, s.bore_m, s.mass_kg), s.contact)
+    return Segment(s.length_m, start, end, material, s.bore_m, s.mass_kg, s.contact)
 
 
 UNITS = {

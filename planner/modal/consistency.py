@@ -37,11 +37,6 @@ class DrivingPoint:
     positive: float
     modes: float
 
-    @property
-    def right(self) -> bool:
-        """Whether its sign is as a structure's must be."""
-        return self.modes > 0.5
-
 
 @dataclass(frozen=True)
 class Reciprocity:
@@ -63,13 +58,12 @@ class Consistency:
     """
 
     driving: tuple[DrivingPoint, ...]
-    reciprocity: tuple[Reciprocity, ...]
     faults: tuple[str, ...]
     remarks: tuple[str, ...]
-    turned: tuple[Dof, ...] = ()
-    turned_rows: tuple[Dof, ...] = ()
-    untied: tuple[Dof, ...] = ()
-    odd: tuple[tuple[Dof, Dof], ...] = ()
+    turned: tuple[Dof, ...]
+    turned_rows: tuple[Dof, ...]
+    untied: tuple[Dof, ...]
+    odd: tuple[tuple[Dof, Dof], ...]
 
 
 def check(
@@ -79,12 +73,15 @@ def check(
     sides, (low, high) = RovingSides.of(matrix, found, modes), found.data.frequency_hz[[0, -1]]
     lines = (matrix.frequency_hz >= low) & (matrix.frequency_hz <= high)
     driving = tuple(_driving(matrix, sides, lines, *pair) for pair in sides.driving)
-    reciprocity = tuple(_reciprocity(matrix, found, modes, *pair) for pair in _pairs(matrix))
+    reciprocity = _reciprocity(sides, found, modes)
     # Least modes that tell of signs and places
     enough = modes.size >= 3
     # A sign is called wrong where less than this share of the modes' residues has the right one.
     wrong = tuple(point.dof for point in driving if point.modes < 0.3)
-    rows = _turned_rows(sides, geometry) if enough else ()
+    rows: tuple[Dof, ...] = ()
+    if enough and geometry is not None and sides.motions is not None:
+        against = turned_rows(sides.rows, sides.motions[0].real, geometry)
+        rows = tuple(sides.rows[k] for k in against)
     # At a point that both roved and stayed either may be turned; its neighbours tell.
     turned = tuple(dof for dof in wrong if dof not in rows)
     swapped: tuple[Exchange, ...] = ()
@@ -104,14 +101,7 @@ def check(
     told = () if faults else _remarks(reciprocity)
     if not driving:
         told = (*told, "No point was hit where it was felt: shapes are not scaled.")
-    return Consistency(driving, reciprocity, tuple(faults), told, turned, rows, untied, odd)
-
-
-def _turned_rows(sides: RovingSides, geometry: Geometry | None) -> tuple[Dof, ...]:
-    """Points whose rows move against all that is around them."""
-    if geometry is None or sides.motions is None:
-        return ()
-    return tuple(sides.rows[k] for k in turned_rows(sides.rows, sides.motions[0].real, geometry))
+    return Consistency(driving, tuple(faults), told, turned, rows, untied, odd)
 
 
 def _turned_row(dof: Dof, hit: bool) -> str:
@@ -135,31 +125,30 @@ def _driving(
     return DrivingPoint(dof, positive, modes)
 
 
-def _pairs(matrix: FrfMatrix) -> list[tuple[int, int, int, int]]:
-    """(o, i, o', i') of entries measured both ways."""
-    both = [(i, dof) for i, dof in enumerate(matrix.references) if dof in matrix.responses]
-    found = []
-    for (i, a), (j, b) in combinations(both, 2):
-        at = matrix.index(b), i, matrix.index(a), j
-        if matrix.measured[at[:2]] and matrix.measured[at[2:]]:
-            found.append(at)
-    return found
-
-
 def _reciprocity(
-    matrix: FrfMatrix, found: MatrixPoles, modes: np.ndarray, o: int, i: int, p: int, j: int
-) -> Reciprocity:
+    sides: RovingSides, found: MatrixPoles, modes: np.ndarray
+) -> tuple[Reciprocity, ...]:
+    """Of all pairs of points that were measured both ways."""
     # The heights of the peaks; the lines themselves differ wherever frequencies drift.
-    height = found.fit.residue[:, modes] / np.abs(found.fit.poles[modes].real)
-    entry = found.entries
-    one, other = height[entry[o, i]], height[entry[p, j]]
-    size = np.linalg.norm(one) * np.linalg.norm(other)
-    ratio = float(np.real(np.vdot(one, other)) / max(np.linalg.norm(one) ** 2, 1e-300))
-    variance = found.scale[modes] * found.fit.residue_variance[:, modes]
-    noise = 2 * (variance[entry[o, i]] + variance[entry[p, j]]) / found.fit.poles[modes].real ** 2
-    beyond = np.linalg.norm(one - other) ** 2 - np.sum(noise)
-    apart = float(np.sqrt(max(beyond, 0.0) / max(size, 1e-300)))
-    return Reciprocity(matrix.responses[o], matrix.references[i], apart, ratio)
+    decay, fit = np.abs(found.fit.poles[modes].real), found.fit
+    height = fit.residue[:, modes] / decay
+    noise = 2 * found.scale[modes] * fit.residue_variance[:, modes] / decay**2
+    entry = {pair: e for e, pair in enumerate(zip(found.rows, found.columns, strict=True))}
+    both = [(sides.rows.index(d), c) for c, d in enumerate(sides.columns) if d in sides.rows]
+    out = []
+    for (row, column), (row_too, column_too) in combinations(both, 2):
+        # Response at the second point to a hit at the first, and the other way round
+        pairs = [(row_too, column), (row, column_too)][:: -1 if sides.hit else 1]
+        if not all(pair in entry for pair in pairs):
+            continue
+        e, other = (entry[pair] for pair in pairs)
+        one, two = height[e], height[other]
+        size = np.linalg.norm(one) * np.linalg.norm(two)
+        ratio = float(np.real(np.vdot(one, two)) / max(np.linalg.norm(one) ** 2, 1e-300))
+        beyond = np.linalg.norm(one - two) ** 2 - np.sum(noise[e] + noise[other])
+        apart = float(np.sqrt(max(beyond, 0.0) / max(size, 1e-300)))
+        out.append(Reciprocity(sides.columns[column_too], sides.columns[column], apart, ratio))
+    return tuple(out)
 
 
 def _turned(

@@ -156,7 +156,6 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
             Mode(
                 frequency, float(sd[0]), damping, float(sd[1]), residue, residue_sd,
                 rank_one(residue)[0], probability(float(present[k]), supported, float(weak[k])),
-                support=supported,
             )
         )  # fmt: skip
     return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
@@ -164,16 +163,13 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
 
 def natural(pole: complex, covariance: np.ndarray) -> tuple[float, float, np.ndarray]:
     """Natural frequency (Hz), damping ratio and their standard deviations (linearised)."""
-    slope = natural_slope(pole)
-    sd = np.sqrt(np.maximum(0.0, np.diag(slope @ covariance @ slope.T)))
-    return abs(pole) / (2 * np.pi), -pole.real / abs(pole), sd
-
-
-def natural_slope(pole: complex) -> np.ndarray:
-    """(2, 2) change of natural frequency (Hz) and damping ratio with Re λ and Im λ (rad/s)."""
     size = abs(pole)
-    by_frequency = [pole.real / size / (2 * np.pi), pole.imag / size / (2 * np.pi)]
-    return np.array([by_frequency, [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3]])
+    slope = np.array([
+        [pole.real / size / (2 * np.pi), pole.imag / size / (2 * np.pi)],
+        [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3],
+    ])  # fmt: skip
+    sd = np.sqrt(np.maximum(0.0, np.diag(slope @ covariance @ slope.T)))
+    return size / (2 * np.pi), -pole.real / size, sd
 
 
 def support(pole: complex, sets: tuple[PoleSet, ...]) -> float:
@@ -200,9 +196,7 @@ def probability(presence: float, support: float, weak: float) -> float:
 MARGIN = 0.15
 
 
-def estimate_modes(
-    frf: Frf, band_hz: tuple[float, float], max_order: int = MAX_ORDER
-) -> ModalModel:
+def estimate_modes(frf: Frf, band_hz: tuple[float, float]) -> ModalModel:
     """All modes in `band_hz` (Hz), with standard deviations and probabilities.
 
     Poles are those of the structure: an exponential window of the records is part of the fitted
@@ -210,7 +204,7 @@ def estimate_modes(
     exceeds it, and from the error alone where the variance is unknown. Raises RefusedError where
     no mode can be found.
     """
-    found = identification(frf, band_hz, max_order)
+    found = identification(frf, band_hz)
     columns = np.flatnonzero(frf.measured)
     inside = [
         m for m in (found.modes if found else ()) if band_hz[0] <= m.frequency_hz <= band_hz[1]
@@ -226,14 +220,12 @@ def estimate_modes(
     return ModalModel(modes, band_hz, found.fit_error, found.order, remarks, doubtful)
 
 
-def identification(
-    frf: Frf, band_hz: tuple[float, float], max_order: int = MAX_ORDER
-) -> PoleIdentification | None:
+def identification(frf: Frf, band_hz: tuple[float, float]) -> PoleIdentification | None:
     """The same with everything in between (stabilisation diagram, fit), None without a mode.
 
     Raises RefusedError where too few frequency lines are usable.
     """
-    return identify(_select(frf, band_hz), max_order)
+    return identify(_select(frf, band_hz))
 
 
 def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:

@@ -8,7 +8,7 @@ from scipy.signal import find_peaks, peak_widths
 from planner.errors import InputError, RefusedError
 from planner.modal.estimate_modes import PoleIdentification, identify
 from planner.modal.fit_data import Data
-from planner.modal.mac import mac
+from planner.modal.mac import grouped, mac
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.residues import rank_one
@@ -50,7 +50,8 @@ def analyse_record(
     remarks = [*record.remarks, *(fault.text for fault in record.faults)]
     force = _force(record, force_channel)
     decays = _decays(record, force, remarks)
-    band = band_hz or _band(decays)
+    lowest = max(10 * decays.rate_hz / decays.samples.shape[-1], 0.01 * decays.rate_hz)
+    band = band_hz or (lowest, 0.45 * decays.rate_hz)
     decays, found = _identify_sound(record, decays, band, remarks)
     # Least probability.
     sure = [mode for mode in found.modes if mode.probability >= 0.5]
@@ -164,11 +165,6 @@ def _remark_on_pulse(force: Channel, hits: np.ndarray, rate: float, remarks: lis
         remarks.append(f"{force.name} is in {force.unit}, not N: FRFs cannot be scaled.")
 
 
-def _band(decays: _Decays) -> tuple[float, float]:
-    lowest = max(10 * decays.rate_hz / decays.samples.shape[-1], 0.01 * decays.rate_hz)
-    return lowest, 0.45 * decays.rate_hz
-
-
 def _identify_sound(
     record: TimeRecord, decays: _Decays, band: tuple[float, float], remarks: list[str]
 ) -> tuple[_Decays, PoleIdentification]:
@@ -205,11 +201,13 @@ def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarr
 
 def _rescaled(found: PoleIdentification, scale: np.ndarray) -> PoleIdentification:
     factor = scale[:, :, 0]
-    modes = []
-    for mode in found.modes:
-        residue = mode.residue * factor
-        sd, shape = mode.residue_sd * factor, rank_one(residue)[0]
-        modes.append(replace(mode, residue=residue, residue_sd=sd, shape=shape))
+    modes = (
+        replace(
+            mode, residue=mode.residue * factor, residue_sd=mode.residue_sd * factor,
+            shape=rank_one(mode.residue * factor)[0],
+        )
+        for mode in found.modes
+    )  # fmt: skip
     return replace(found, modes=tuple(modes))
 
 
@@ -219,14 +217,7 @@ def _merge(modes: list[Mode], remarks: list[str]) -> tuple[Mode, ...]:
     A mode whose frequency or damping changes as it dies away (friction, play) decays in several
     exponentials; two modes of one structure at one place would differ in shape.
     """
-    groups: list[list[Mode]] = []
-    for mode in modes:
-        last = groups[-1][-1] if groups else None
-        if last is not None and _same(last, mode):
-            groups[-1].append(mode)
-        else:
-            groups.append([mode])
-    return tuple(_merged(group, remarks) for group in groups)
+    return tuple(_merged(group, remarks) for group in grouped(modes, _same))
 
 
 def _same(a: Mode, b: Mode) -> bool:
@@ -255,10 +246,7 @@ def _merged(group: list[Mode], remarks: list[str]) -> Mode:
 
 
 def identify_decays(
-    samples: np.ndarray,
-    sampling_rate_hz: float,
-    band_hz: tuple[float, float],
-    max_order: int = MAX_ORDER,
+    samples: np.ndarray, sampling_rate_hz: float, band_hz: tuple[float, float]
 ) -> PoleIdentification | None:
     """Modes of simultaneous channels over several decays, None where there is none.
 
@@ -277,4 +265,4 @@ def identify_decays(
     if not np.any(spectrum):
         return None
     data = Data(frequency[chosen], spectrum, None, step_s=1 / sampling_rate_hz)
-    return identify(data, max_order)
+    return identify(data, MAX_ORDER)

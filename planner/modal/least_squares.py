@@ -221,14 +221,14 @@ def refine(
     poles = np.asarray(poles, complex)
 
     def at(parts: np.ndarray) -> ReducedFit:
-        return reduced_together(data, _complex(parts))
+        return reduced_together(data, complex_of(parts))
 
     def objective(parts: np.ndarray) -> ReducedFit | None:
-        return at(parts) if allowed(_complex(parts)) else None
+        return at(parts) if allowed(complex_of(parts)) else None
 
     start = np.concatenate([poles.real, poles.imag])
     parts, point = _minimised(objective, start, at(start))
-    return _finish(data, _complex(parts), point, variance)
+    return _finish(data, complex_of(parts), point, variance)
 
 
 def _minimised(
@@ -289,9 +289,17 @@ def shared_error(lines: Lines, fit: PoleFit, errors: np.ndarray) -> tuple[np.nda
     return change.T @ change, residue.reshape(*shape, 2, m)
 
 
-def _complex(parts: np.ndarray) -> np.ndarray:
-    real, imag = np.split(parts, 2)
+def complex_of(parts: np.ndarray) -> np.ndarray:
+    """(…, m) of real, then imaginary parts (…, 2m)."""
+    real, imag = np.split(parts, 2, axis=-1)
     return real + 1j * imag
+
+
+def scaled_inverse(normal: np.ndarray, rcond: float = 1e-15) -> np.ndarray:
+    """Pseudo-inverse of a normal matrix (n, n) whose unknowns differ in unit and size."""
+    unit = np.sqrt(np.maximum(np.diag(normal).real, 1e-300))
+    inverse = np.linalg.pinv(normal / unit[:, None] / unit, rcond=rcond, hermitian=True)
+    return inverse / unit[:, None] / unit
 
 
 def _finish(

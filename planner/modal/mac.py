@@ -1,6 +1,11 @@
 """Comparing shapes: MAC, how complex they are, and the real modes behind them."""
 
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
 import numpy as np
+
+Item = TypeVar("Item")
 
 
 def mac(a: np.ndarray, b: np.ndarray) -> float:
@@ -47,6 +52,17 @@ def phase_deviation_deg(shape: np.ndarray) -> float:
     along = np.abs(np.real(shape) * axis[0] + np.imag(shape) * axis[1])
     angle = np.arccos(np.clip(along / np.maximum(size, 1e-300), 0.0, 1.0))
     return float(np.rad2deg(size @ angle / np.sum(size)))
+
+
+def grouped(items: Iterable[Item], together: Callable[[Item, Item], bool]) -> list[list[Item]]:
+    """Items in their order, in groups in which each goes `together` with the one before it."""
+    groups: list[list[Item]] = []
+    for item in items:
+        if groups and together(groups[-1][-1], item):
+            groups[-1].append(item)
+        else:
+            groups.append([item])
+    return groups
 
 
 def real_normal_modes(poles: np.ndarray, shapes: np.ndarray) -> np.ndarray:

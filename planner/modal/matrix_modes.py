@@ -66,13 +66,9 @@ def modes_of_matrix(
         _mode(found, int(k), shape, entries, matrix.scaled)
         for k, shape in zip(inside, shapes, strict=True)
     ]
-    apart = _vectors(matrix, found, inside)
-    modes = tuple(
-        replace(mode, vectors=vectors and _alike(vectors, mode, dofs, matrix.responses))
-        for mode, vectors in zip(modes, apart, strict=True)
-    )
+    modes = _with_vectors(modes, dofs, matrix, found, inside)
     remarks = (*matrix.remarks, *checks.faults, *checks.remarks)
-    return MatrixModes(dofs, modes, band, remarks, found, checks)
+    return MatrixModes(dofs, tuple(modes), band, remarks, found, checks)
 
 
 def _put_right(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> MatrixPoles:
@@ -127,45 +123,39 @@ def _shapes(found: MatrixPoles, modes: list[int], entries: Entries) -> list[Fitt
     return [fitted(k, gain, one.shape) for k, one in zip(modes, free, strict=True)]
 
 
-def _vectors(matrix: FrfMatrix, found: MatrixPoles, modes: list[int]) -> list[Eigenvectors | None]:
-    """Right and left vectors of modes (indices), without reciprocity.
+def _with_vectors(
+    modes: list[Mode], dofs: tuple[Dof, ...], matrix: FrfMatrix, found: MatrixPoles,
+    inside: list[int],
+) -> list[Mode]:  # fmt: skip
+    """With right and left vectors of modes `inside` (indices), without reciprocity.
 
-    On the scale on which both are most alike at points that were felt and hit. None where rows and
-    columns fall apart into groups that share no entry: nothing ties their scales.
+    On the scale on which both are most alike at points that were felt and hit, with the shape's
+    sign. None where rows and columns fall apart into groups that share no entry: nothing ties their
+    scales.
     """
     felt, hit = len(matrix.responses), len(matrix.references)
     responses, references = np.array(list(found.entries)).T
     entries = Entries(responses, felt + references, felt + hit)
     group, _ = entries.groups
     if len(np.unique(group[entries.rows])) > 1:
-        return [None] * len(modes)
+        return modes
     there = [(matrix.index(d), i) for i, d in enumerate(matrix.references) if d in matrix.responses]
     o, i = np.array(there, int).reshape(-1, 2).T
 
-    def apart(k: int) -> Eigenvectors:
+    def apart(k: int, mode: Mode) -> Eigenvectors:
         variance = found.scale[k] * found.fit.residue_variance[:, k]
         fitted = fit_shape(entries, found.fit.residue[:, k], variance, found.fit.poles[k].imag)
         right, left = fitted.shape[:felt], fitted.shape[felt:]
         alike = np.sum(left[i] * right[o].conj()) / max(np.sum(np.abs(right[o]) ** 2), 1e-300)
         factor = np.sqrt(alike) if abs(alike) > 0 else realign(right)
-        size = abs(factor)
+        size, shape = abs(factor), dict(zip(dofs, mode.shape, strict=True))
+        same = [shape.get(dof, 0.0) for dof in matrix.responses]
+        factor = factor * (np.sign(np.vdot(same, factor * right).real) or 1.0)
         return Eigenvectors(
             factor * right, size * fitted.sd[:felt], left / factor, fitted.sd[felt:] / size
         )
 
-    return [apart(k) for k in modes]
-
-
-def _alike(
-    vectors: Eigenvectors, mode: Mode, dofs: tuple[Dof, ...], responses: tuple[Dof, ...]
-) -> Eigenvectors:
-    """With the sign of the mode's shape."""
-    shape = dict(zip(dofs, mode.shape, strict=True))
-    same = sum(
-        shape.get(d, 0.0).conjugate() * v for d, v in zip(responses, vectors.right, strict=True)
-    )
-    sign = np.sign(same.real) or 1.0
-    return replace(vectors, right=sign * vectors.right, left=sign * vectors.left)
+    return [replace(m, vectors=apart(k, m)) for k, m in zip(inside, modes, strict=True)]
 
 
 def _mode(found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, scaled: bool) -> Mode:

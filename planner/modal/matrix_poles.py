@@ -1,20 +1,32 @@
-"""Poles of a matrix of FRFs of any size: many references at once, missing entries allowed."""
+"""Poles of a matrix of FRFs of any size: many references at once, missing entries allowed.
 
-from dataclasses import dataclass
+Poles of the diagram are fitted, every set with its own; which of them are modes is judged then.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
 from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
-from planner.modal.matrix_selection import first_variance, judged, select_modes
+from planner.modal.least_squares import refine
+from planner.modal.mode_selection import doubt, excess, falls, presences, running_mean
 from planner.modal.plscf import Diagram, PoleSet, diagram, plscf, row_errors, stable
-from planner.modal.set_poles import SetPoles
+from planner.modal.set_poles import ROUNDS, DivergedPolesError, SetData, SetPoles, fit_sets
+from planner.modal.set_search import reestimated_sets
+from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
 
 MARGIN = 0.05  # of the band, beyond its edges
 # Of rows that fit the denominator of all the worse than the median by more than this, the weight is
 # taken down, so many times over; fewer rows than these cannot tell.
 ODD, REWEIGHED, LEAST_ROWS = 3.0, 3, 6
+# Share of the response at its frequency that a mode must be: one of the diagram's stable lines,
+# and one that only the fit's error tells of. Chosen on simulated plates and aeroplanes.
+PRESENT, PRESENT_ADDED = 0.03, 0.2
+# A pole that only the error tells of is no more damped than this, and lies above so many lines.
+DAMPING_ADDED, LINES_BELOW = 0.1, 6
+SETTLING = 2  # rounds of a fit that has been fitted before, to other lines or but for a few sets
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +88,7 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     # Entries measured together: those of one node of the side that roved
     nodes = np.array([matrix.responses[k].node for k in rows])
     sets = tuple(np.flatnonzero(nodes == node) for node in dict.fromkeys(nodes.tolist()))
-    fit, variance = select_modes(data, sets, first_variance(data, start), start, (rows, columns))
+    fit, variance = select_modes(SetData(data, sets, rows, columns), start)
     if not fit.poles.size:
         return None
     scale, weak, presence = judged(data, fit, variance)
@@ -124,3 +136,151 @@ def _references(measured: np.ndarray) -> np.ndarray:
         if complete > size:
             best, size = columns[:count], complete
     return np.array(best)
+
+
+def _variance(data: Data, fit: SetPoles) -> np.ndarray:
+    """(e, F) from the error of a fit: a level for each entry times one profile of lines."""
+    square = np.abs(data.response[:, 0] - fit.fitted) ** 2
+    flat = np.mean(square, axis=-1, keepdims=True)
+    lines = square.shape[1]
+    floor = 1e-20 * np.mean(np.abs(data.response[:, 0]) ** 2, axis=-1, keepdims=True)
+    profile = running_mean(np.mean(square / np.maximum(flat, floor), axis=0), max(10, lines // 20))
+    lost = max(0.1, 1 - (fit.poles.size + len(data.lines.rest)) / lines)
+    return flat * (0.9 * profile + 0.1) / lost + floor
+
+
+def select_modes(given: SetData, poles: np.ndarray) -> tuple[SetPoles, np.ndarray]:
+    """Fit with every set's own poles, weak modes left out and missing ones added."""
+    data, response = given.data, given.data.response[:, 0]
+    power = np.mean(np.abs(response) ** 2, axis=-1, keepdims=True)
+    # At first all entries share poles that stay as they are: poles that were refined so would leave
+    # weak modes to imitate how strong ones drift.
+    together = replace(given, sets=(np.arange(len(power)),))
+    fit = fit_sets(together, np.broadcast_to(power, response.shape), poles, rounds=0)
+    fit = _fit(given, variance := _variance(data, fit), poles, rounds=0)
+    # Rough rounds of the first fit, whose weights do not know yet how sets differ
+    fit = _fit(given, variance, fit.poles, fit.own, 2)
+    searched = False
+    # Passes of leaving out and adding
+    for _ in range(4):
+        variance = _variance(data, fit)
+        # Not before: sets would be moved to where they imitate the modes that a fit lacks.
+        if searched:
+            fit, variance = _settled(given, fit)
+        left = fit.part(_standing(data, fit, variance))
+        poles, own = merged_modes(given, left, variance)
+        # What a fit lacks is looked for where it has no mode too many.
+        if poles.size == fit.poles.size:
+            if searched:
+                break
+            added, searched = _missing(given, fit, variance), True
+            poles = np.append(poles, added)
+            own = np.column_stack([own, np.tile(added, (len(own), 1))])
+            if not added.size:
+                continue
+        if not poles.size:
+            return replace(left, poles=poles), variance
+        fit = _fit(given, variance, poles, own)
+    fit, variance = _settled(given, fit)
+    fit = _fit(given, variance, fit.poles, fit.own, SETTLING, every=True)
+    return fit, _variance(data, fit)
+
+
+def _settled(given: SetData, fit: SetPoles) -> tuple[SetPoles, np.ndarray]:
+    """The fit, and its variance, after those sets have been searched again that fit badly."""
+    variance = _variance(given.data, fit)
+    own = reestimated_sets(given, fit, variance)
+    if own is None:
+        return fit, variance
+    fit = _fit(given, variance, fit.poles, own, SETTLING)
+    return fit, _variance(given.data, fit)
+
+
+def _fit(
+    given: SetData, variance: np.ndarray, poles: np.ndarray, known: np.ndarray | None = None,
+    rounds: int = ROUNDS, every: bool = False,
+) -> SetPoles:  # fmt: skip
+    """Fit on thinned lines (or `every` one near a mode); poles that stray are left out."""
+    while True:
+        try:
+            lines = thinned(given.data, poles, every)
+            return fit_sets(given, variance, poles, rounds, known, lines)
+        except DivergedPolesError as error:
+            poles, known = poles[~error.astray], None
+
+
+def _standing(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
+    """(m,) bool: which poles are modes, or stand for those above the last line."""
+    _, weak, presence = judged(data, fit, variance)
+    return data.is_above(fit.poles) | (weak <= 1) & (presence >= PRESENT)
+
+
+def judged(
+    data: Data, fit: SetPoles, variance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(m,) noise beyond its variance, weakness (above 1: not established) and presence."""
+    frequency = np.abs(fit.poles) / (2 * np.pi)
+    scale = np.interp(frequency, data.frequency_hz, _excess(data, fit, variance))
+    # How the sets differ does not blur a mode: each has a pole of its own.
+    alone = np.diag(fit.covariance) - fit.spread / len(fit.own)
+    weak = doubt(data, fit.poles, alone, fit.significance, scale)
+    return scale, weak, presences(data, fit.poles, fit.residue)
+
+
+def _excess(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
+    """(F,) χ² per degree of freedom around each line, at least 1."""
+    error = (data.response[:, 0] - fit.fitted)[:, None]
+    m, each = fit.poles.size, fit.poles.size + len(data.lines.rest)
+    return excess(data, error, variance[:, None], 2 * (error.size - m - data.entries * each))
+
+
+def _missing(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
+    """Poles that the error still tells of, each tried on the lines around it."""
+    data = given.data
+    added: list[complex] = []
+    error = data.response[:, 0] - fit.fitted
+    weight = 2 / variance / _excess(data, fit, variance)
+    poles, fall = falls(data, weight, weight * error)
+    failed, step = 0, data.frequency_hz[1] - data.frequency_hz[0]
+    fall[poles.imag / (2 * np.pi) < LINES_BELOW * step] = 0.0
+    # Most added.
+    for _ in range(6):
+        best = int(np.argmax(fall))
+        # Most failed: candidates in a row that are no modes: weaker ones are not tried
+        if fall[best] <= data.threshold or failed == 2:
+            break
+        pole = complex(poles[best])
+        found = _tried(given, fit, variance, pole)
+        fall[np.abs(poles - pole) < REACH * abs(pole.real)] = 0.0
+        if found is not None and any(abs(found - p) < abs(p.real) for p in added):
+            found = None
+        failed = failed + 1 if found is None else 0
+        if found is not None:
+            added.append(found)
+            fall[np.abs(poles - found) < REACH * abs(found.real)] = 0.0
+    return np.array(added, complex)
+
+
+def _tried(given: SetData, fit: SetPoles, variance: np.ndarray, pole: complex) -> complex | None:
+    """The pole after a fit of the lines around it, where it is a mode; None where it is not."""
+    some, lines, near = around(given, fit, pole)
+    local, variance = some.data, variance[:, lines]
+    start = np.append(fit.poles[near], pole)
+    together = np.broadcast_to(variance[:, None], local.response.shape)
+    quick = refine(local.lines, local.response, together, start, local.allowed)
+    if presences(local, quick.poles, quick.residues.residue)[-1] < PRESENT_ADDED / 2:
+        return None
+    known = fit.own[:, near]
+    own = np.column_stack([known, np.full(len(known), quick.poles[-1])])
+    start = np.append(fit.poles[near], quick.poles[-1])
+    try:
+        after = fit_sets(some, variance, start, known=own)
+        new = after.poles[-1]
+        inside = local.frequency_hz[0] < new.imag / (2 * np.pi) < local.frequency_hz[-1]
+        present = presences(local, after.poles, after.residue)[-1]
+        if not (inside and present >= PRESENT_ADDED and -new.real < DAMPING_ADDED * abs(new)):
+            return None
+        before = fit_sets(some, variance, fit.poles[near], SETTLING, known)
+    except DivergedPolesError:
+        return None
+    return complex(new) if explains(some, before, after, variance) else None

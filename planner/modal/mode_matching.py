@@ -6,7 +6,6 @@ modes; free ones may exchange them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,7 +37,11 @@ def chances(gain: np.ndarray, ordered: bool = False) -> np.ndarray:
     """
     labels, modes = gain.shape
     out = np.zeros((labels, modes + 1))
-    columns = np.arange(modes) if ordered else _worth_counting(gain)
+    columns = np.arange(modes)
+    if not ordered:  # over subsets of the likeliest modes, none that are hopeless (odds of 2e-9)
+        largest = np.max(gain, axis=0, initial=-np.inf)
+        columns = np.sort(np.argsort(-largest)[:12])
+        columns = columns[largest[columns] > -40.0]
     odds = np.exp(np.clip(gain[:, columns], -400.0, 80.0) / 2)
     n = len(columns)
     if ordered:
@@ -60,14 +63,6 @@ def chances(gain: np.ndarray, ordered: bool = False) -> np.ndarray:
         ahead = ahead + np.bincount(after, taken, states)
     out[:, modes] = 1 - out[:, :modes].sum(axis=1)
     return np.clip(out, 0.0, 1.0)
-
-
-def _worth_counting(gain: np.ndarray) -> np.ndarray:
-    """Modes (indices) over whose subsets matchings are summed: the likeliest, none that are not."""
-    largest = np.max(gain, axis=0, initial=-np.inf)
-    columns = np.sort(np.argsort(-largest)[:12])
-    # Hopeless: gain below which a match is left out of the sum (odds of 2e-9)
-    return columns[largest[columns] > -40.0]
 
 
 def _best_ordered(gain: np.ndarray) -> np.ndarray:
@@ -101,28 +96,13 @@ ODDS_NONE, ODDS_SWAPPED, ODDS_GUIDE = -9.0, 9.0, 2.0
 Row = Sequence[Mode | None]
 
 
-@dataclass(frozen=True, eq=False)
-class Tree:
-    """Poses from a root to ever farther ones: `order` (n,), and each one's `parent` (−1: root)."""
+def _tree(x: np.ndarray, root: int) -> tuple[np.ndarray, np.ndarray]:
+    """Order (n,) of poses at x (n, d) along their shortest tree; parents (n,), −1 of the root."""
+    from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree  # 0.2 s
 
-    order: np.ndarray
-    parent: np.ndarray
-
-    @classmethod
-    def of(cls, x: np.ndarray, root: int) -> "Tree":
-        """The shortest tree of poses at x (n, d)."""
-        from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree  # 0.2 s
-
-        apart = np.linalg.norm(x[:, None] - x[None], axis=2) + 1e-9  # 0 would be no edge
-        order, parent = breadth_first_order(minimum_spanning_tree(apart), root, directed=False)
-        return cls(order, np.where(parent < 0, -1, parent))
-
-    def nearest_above(self, i: int, known: np.ndarray) -> int:
-        """The first pose above i that is known (n,), −1 if none is."""
-        above = int(self.parent[i])
-        while above >= 0 and not known[above]:
-            above = int(self.parent[above])
-        return above
+    apart = np.linalg.norm(x[:, None] - x[None], axis=2) + 1e-9  # 0 would be no edge
+    order, parent = breadth_first_order(minimum_spanning_tree(apart), root, directed=False)
+    return order, np.where(parent < 0, -1, parent)
 
 
 def name_chances(
@@ -140,17 +120,19 @@ def name_chances(
     where the guide has them.
     """
     n, k = guided.shape
-    tree = Tree.of(x, reference)
+    order, parent = _tree(x, reference)
     unit = max(1, x.shape[1]) ** 0.5
-    crossed = _guide_crossings(guided, tree, x)
+    crossed = _guide_crossings(guided, order, parent, x)
     known = np.array([[m is not None for m in row] for row in found]).reshape(n, k)
     chance = np.zeros((n, k, k))
     chance[reference] = np.eye(k)[guided[reference]]
-    for i in tree.order[1:]:
-        chance[i] = chance[tree.parent[i]]
+    for i in order[1:]:
+        chance[i] = chance[parent[i]]
         for b in range(k - 1):
             pair = known[:, b] & known[:, b + 1]
-            above = tree.nearest_above(i, pair)
+            above = parent[i]
+            while above >= 0 and not pair[above]:
+                above = parent[above]
             if not pair[i] or above < 0:
                 continue
             middle = (x[i] + x[above]) / 2
@@ -163,12 +145,14 @@ def name_chances(
     return chance
 
 
-def _guide_crossings(guided: np.ndarray, tree: Tree, x: np.ndarray) -> list[np.ndarray]:
+def _guide_crossings(
+    guided: np.ndarray, order: np.ndarray, parent: np.ndarray, x: np.ndarray
+) -> list[np.ndarray]:
     """For each two neighbouring places where in x (·, d) the guide has them exchange names."""
     k = guided.shape[1]
     out: list[list[np.ndarray]] = [[] for _ in range(k - 1)]
-    for i in tree.order[1:]:
-        above = tree.parent[i]
+    for i in order[1:]:
+        above = parent[i]
         before, after = np.argsort(guided[above]), np.argsort(guided[i])
         for b in range(k - 1):
             if set(before[: b + 1]) != set(after[: b + 1]):

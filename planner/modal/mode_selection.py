@@ -114,9 +114,7 @@ def _scatter(data: Data, refined: PoleFit, power: np.ndarray) -> np.ndarray:
     square = np.abs(_error(data, refined)) ** 2
     lines = data.frequency_hz.size
     lost = 1 - (2 * refined.poles.size + 2 * len(data.lines.rest)) / (2 * lines)
-    low, high = _windows(lines, max(10, lines // 20))
-    total = np.concatenate([np.zeros((*square.shape[:2], 1)), np.cumsum(square, axis=-1)], axis=-1)
-    local = (total[..., high] - total[..., low]) / (high - low)
+    local = running_mean(square, max(10, lines // 20))
     flat = np.mean(square, axis=-1, keepdims=True)
     # A little of the overall level keeps quiet stretches from being trusted without limit.
     # Least noise relative to the FRF: below it rounding rules.
@@ -124,10 +122,10 @@ def _scatter(data: Data, refined: PoleFit, power: np.ndarray) -> np.ndarray:
 
 
 def running_mean(values: np.ndarray, half: int) -> np.ndarray:
-    """Mean over a window of `half` values (F,) to either side, clipped at the ends."""
-    low, high = _windows(values.size, half)
-    total = np.concatenate([[0.0], np.cumsum(values)])
-    return (total[high] - total[low]) / (high - low)
+    """Mean over a window of `half` values (…, F) to either side, clipped at the ends."""
+    low, high = _windows(values.shape[-1], half)
+    total = np.cumsum(np.pad(values, [(0, 0)] * (values.ndim - 1) + [(1, 0)]), axis=-1)
+    return (total[..., high] - total[..., low]) / (high - low)
 
 
 def _windows(lines: int, half: int) -> tuple[np.ndarray, np.ndarray]:

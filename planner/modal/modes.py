@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.frf.synthesis import pole
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 
@@ -37,8 +38,7 @@ class Mode:
     `shape_sd` (n,), like `residue_sd`, is of real and imaginary part each. `collinearity` is the
     MPC, `deviation_deg` the MPD. `misfit` is χ² per degree of freedom that one shape leaves in the
     residues, `scatter_hz` the sd of the frequency from set to set of roving points beyond their
-    noise, `support` the share of the higher model orders that have this pole. `vectors` are of a
-    matrix of FRFs. What an analysis does not tell is NaN or None.
+    noise. `vectors` are of a matrix of FRFs. What an analysis does not tell is NaN or None.
     """
 
     frequency_hz: float
@@ -55,14 +55,12 @@ class Mode:
     deviation_deg: float = float("nan")
     misfit: float = float("nan")
     scatter_hz: float = 0.0
-    support: float = float("nan")
     vectors: Eigenvectors | None = None
 
     @property
     def pole(self) -> complex:
         """Pole λ in rad/s."""
-        w = 2 * np.pi * self.frequency_hz
-        return complex(-self.damping_ratio * w, w * np.sqrt(max(0.0, 1 - self.damping_ratio**2)))
+        return complex(pole(self.frequency_hz, self.damping_ratio))
 
     @property
     def modal_mass_kg(self) -> float:

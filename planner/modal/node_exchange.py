@@ -78,15 +78,6 @@ class RovingSides:
 SURPRISED, EXPLAINED, CLEARER, TURNED, NEXT = 2.0, 0.2, 2.0, 0.8, 1.0
 
 
-@dataclass(frozen=True)
-class Node:
-    """A node's rows (k,) of what is predicted, in the order of their directions."""
-
-    name: str
-    directions: tuple[str, ...]
-    rows: np.ndarray
-
-
 def exchanged_nodes(
     dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry
 ) -> tuple[str, str] | None:
@@ -97,67 +88,62 @@ def exchanged_nodes(
     found = predicted_rows(dofs, shapes, geometry)
     if found is None:
         return None
-    nodes = _nodes([dofs[k].positive for k in found.index])
-    gains = _gains(found, nodes)
+    rows: dict[str, dict[str, int]] = {}  # of each node, by direction
+    for row, dof in sorted(enumerate(dofs[k].positive for k in found.index), key=_direction):
+        rows.setdefault(dof.node, {})[dof.direction] = row
+    nodes = [np.array(list(own.values())) for own in rows.values()]
+    gains = _gains(found, nodes, [tuple(own) for own in rows.values()])
     a, b = (int(k) for k in np.unravel_index(np.argmax(gains), gains.shape))
     if not np.isfinite(gains[a, b]):
         return None
     surprise = _surprise(found, nodes)
     usual, before = float(np.median(surprise)), float(surprise[a] + surprise[b])
-    after = _exchanged(found, nodes[a], nodes[b])
+    values = found.values.copy()
+    values[np.r_[nodes[a], nodes[b]]] = found.values[np.r_[nodes[b], nodes[a]]]
+    after = replace(found, values=values)
     left = float(np.sum(_surprise(after, nodes)[[a, b]]))
     rivals = np.delete(gains[[a, b]], [a, b], axis=1)
+    again = _gains(after, nodes, [tuple(own) for own in rows.values()])
     clear = (
         before > 2 * SURPRISED * usual
         and left < EXPLAINED * before
         and np.max(rivals, initial=-np.inf) < gains[a, b] - CLEARER * usual
-        and max(_turned(found, node) for node in nodes) < TURNED * gains[a, b]
-        and np.max(_gains(after, nodes)[[a, b]]) < NEXT * usual
+        and max(_turned(found, own) for own in nodes) < TURNED * gains[a, b]
+        and np.max(again[[a, b]]) < NEXT * usual
     )
     first, second = sorted((a, b))  # which of both is rounding's
-    return (nodes[first].name, nodes[second].name) if clear else None
+    return (list(rows)[first], list(rows)[second]) if clear else None
 
 
-def _nodes(dofs: Sequence[Dof]) -> list[Node]:
-    rows: dict[str, list[int]] = {}
-    for k in sorted(range(len(dofs)), key=lambda k: dofs[k].direction):
-        rows.setdefault(dofs[k].node, []).append(k)
-    return [
-        Node(name, tuple(dofs[k].direction for k in own), np.array(own))
-        for name, own in rows.items()
-    ]
+def _direction(place: tuple[int, Dof]) -> str:
+    return place[1].direction
 
 
-def _surprise(found: RowPrediction, nodes: Sequence[Node]) -> np.ndarray:
-    """(n,) of nodes, over all modes and directions."""
+def _surprise(found: RowPrediction, nodes: Sequence[np.ndarray]) -> np.ndarray:
+    """(n,) of nodes, given by their rows, over all modes and directions."""
     each = np.sum(found.surprise, axis=1)
-    return np.array([np.sum(each[node.rows]) for node in nodes])
+    return np.array([np.sum(each[rows]) for rows in nodes])
 
 
-def _exchanged(found: RowPrediction, one: Node, other: Node) -> RowPrediction:
-    """As if the rows of two nodes had been exchanged."""
-    values = found.values.copy()
-    values[np.r_[one.rows, other.rows]] = found.values[np.r_[other.rows, one.rows]]
-    return replace(found, values=values)
-
-
-def _gains(found: RowPrediction, nodes: Sequence[Node]) -> np.ndarray:
+def _gains(
+    found: RowPrediction, nodes: Sequence[np.ndarray], directions: Sequence[tuple[str, ...]]
+) -> np.ndarray:
     """(n, n) fall of −2 log likelihood where two nodes are exchanged, −∞ where they can't be."""
     gains = np.full((len(nodes), len(nodes)), -np.inf)
-    for directions in {node.directions for node in nodes}:
-        alike = np.array([k for k, node in enumerate(nodes) if node.directions == directions])
+    for those in set(directions):
+        alike = np.array([k for k, own in enumerate(directions) if own == those])
         a, b = alike[np.array(np.triu_indices(alike.size, 1))]
-        one, other = (np.array([nodes[k].rows for k in part]) for part in (a, b))
+        one, other = (np.array([nodes[k] for k in part]) for part in (a, b))
         if a.size:
             values = found.values[np.concatenate([other, one], axis=1)]
             gains[a, b] = gains[b, a] = found.fall(np.concatenate([one, other], axis=1), values)
     return gains
 
 
-def _turned(found: RowPrediction, node: Node) -> float:
-    """The same where signs of the node are turned, in whichever directions explain most."""
-    sizes = range(1, node.rows.size + 1)
-    some = (np.array(rows) for size in sizes for rows in combinations(node.rows, size))
+def _turned(found: RowPrediction, node: np.ndarray) -> float:
+    """The same where signs of a node's rows are turned, in whichever directions explain most."""
+    sizes = range(1, node.size + 1)
+    some = (np.array(rows) for size in sizes for rows in combinations(node, size))
     return max(float(found.fall(rows, -found.values[rows])) for rows in some)
 
 

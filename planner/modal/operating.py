@@ -55,9 +55,15 @@ def operating_modes(
     values = values / np.maximum(np.std(values, axis=1, keepdims=True), 1e-300)
     size = np.std(np.asarray(samples, float), axis=1)
     band = band_hz or (max(0.004 * rate_hz, 20 * rate_hz / values.shape[1]), 0.4 * rate_hz)
-    values, rate = _thinned(values, rate_hz, band[1])
+    rate, factor = rate_hz, int(rate_hz / (2.5 * band[1]))  # oversampled by no more than that
+    if factor >= 2:
+        values = scipy.signal.decimate(values, factor, ftype="fir", axis=1)
+        rate = rate_hz / factor
     found = _diagram(values, rate, band)
-    lines = [line for line in stable(found, LEAST_ORDERS, SHARE) if _is_mode(line, band)]
+    lines = [
+        line for line in stable(found, LEAST_ORDERS, SHARE)
+        if band[0] <= line.frequency_hz <= band[1] and line.damping_ratio < MOST_DAMPING
+    ]  # fmt: skip
     tones = [line for line in lines if _kurtosis(values, rate, line.frequency_hz) < TONE]
     lines = [line for line in lines if line not in tones]
     if not lines:
@@ -92,25 +98,14 @@ def _once(modes: Iterable[Mode]) -> tuple[Mode, ...]:
     return tuple(sorted(kept, key=lambda mode: mode.frequency_hz))
 
 
-def _thinned(values: np.ndarray, rate: float, highest: float) -> tuple[np.ndarray, float]:
-    """Fewer samples where the band ends far below half the rate."""
-    # Oversampled: times the band's upper edge: records are thinned to no less
-    factor = int(rate / (2.5 * highest))
-    if factor < 2:
-        return values, rate
-    return scipy.signal.decimate(values, factor, ftype="fir", axis=1), rate / factor
-
-
-def _diagram(
-    values: np.ndarray, rate: float, band: tuple[float, float], most: int = MAX_ORDER
-) -> Diagram:
+def _diagram(values: np.ndarray, rate: float, band: tuple[float, float]) -> Diagram:
     channels = values.shape[0]
     # Periods of the lowest frequency that the lags of one side of the Hankel matrix span
     lags = int(np.clip(1.0 * rate / band[0], *BLOCKS))
     # Most entries: rows of the Hankel matrix
     lags = max(6, min(lags, 900 // channels, values.shape[1] // 8))
     left, size, _ = scipy.linalg.svd(_hankel(values, lags), full_matrices=False)
-    top = min(most, size.size - 1, channels * (lags - 1))
+    top = min(MAX_ORDER, size.size - 1, channels * (lags - 1))
     sets = [
         _poles(left[:, :n] * np.sqrt(size[:n]), channels, rate, n) for n in range(2, top + 1, 2)
     ]
@@ -144,10 +139,6 @@ def _poles(observed: np.ndarray, channels: int, rate: float, order: int) -> Pole
     shapes = shapes / np.maximum(np.linalg.norm(shapes, axis=1, keepdims=True), 1e-300)
     by_frequency = np.argsort(poles.imag)
     return PoleSet(order, poles[by_frequency], shapes[by_frequency])
-
-
-def _is_mode(line: Line, band: tuple[float, float]) -> bool:
-    return band[0] <= line.frequency_hz <= band[1] and line.damping_ratio < MOST_DAMPING
 
 
 def _kurtosis(values: np.ndarray, rate: float, frequency: float) -> float:

@@ -28,17 +28,6 @@ class PoleSet:
     participation: np.ndarray  # (k, inputs), unit length
 
 
-@dataclass(frozen=True)
-class _Circle:
-    """Map of the band onto the upper half of the unit circle: angle = (ω − base)·step."""
-
-    base: float  # rad/s
-    step: float  # s
-
-    def to_poles(self, z: np.ndarray) -> np.ndarray:
-        return np.log(z) / self.step + 1j * self.base
-
-
 def plscf(
     frequency_hz: np.ndarray,
     frf: np.ndarray,
@@ -53,10 +42,16 @@ def plscf(
     usually 1/variance. An order n gives n·inputs poles, of which those with positive frequency
     and damping are returned.
     """
-    circle, z = _circle(2 * np.pi * np.asarray(frequency_hz))
+    base, step, z = _circle(2 * np.pi * np.asarray(frequency_hz))
     scale, scaled = _scaled(frf)
     normal, coupling = _normal(z, scaled, weight, max(orders))
-    return tuple(_solve(order, normal, coupling, scale, circle) for order in orders)
+    found = []
+    for order in orders:
+        roots, participation = _solve(order, normal, coupling, scale)
+        poles = np.log(roots) / step + 1j * base
+        by_frequency = np.argsort(poles.imag)
+        found.append(PoleSet(order, poles[by_frequency], participation[by_frequency]))
+    return tuple(found)
 
 
 def row_errors(
@@ -67,7 +62,7 @@ def row_errors(
     One weight per row, the same for all lines. A row with a turned sign or with exchanged columns
     has other poles than the rest and stands out.
     """
-    _, z = _circle(2 * np.pi * np.asarray(frequency_hz))
+    *_, z = _circle(2 * np.pi * np.asarray(frequency_hz))
     scaled = _scaled(frf)[1]
     normal, coupling = _normal(z, scaled, weight, order)
     inputs = frf.shape[1]
@@ -90,13 +85,16 @@ def _scaled(frf: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return scale, frf / scale[:, None]
 
 
-def _circle(omega: np.ndarray) -> tuple[_Circle, np.ndarray]:
-    """The map of a band (rad/s), and where the lines lie on the circle."""
+def _circle(omega: np.ndarray) -> tuple[float, float, np.ndarray]:
+    """Base (rad/s) and step (s) of angle = (ω − base)·step, and where lines are on the circle.
+
+    The band lies on the upper half of the unit circle.
+    """
     low, high = omega[0], omega[-1]
     # A band far above zero is moved down, or most of the circle would hold no data.
     base = low if low > 0.5 * high else 0.0
     step = np.pi / (high - base)
-    return _Circle(base, step), np.exp(1j * (omega - base) * step)
+    return base, step, np.exp(1j * (omega - base) * step)
 
 
 def _normal(
@@ -122,19 +120,16 @@ def _normal(
         s = _two_sided(lags, (profile * h).reshape(-1, lines).T).real  # for lags −n…n
         products = np.einsum("oif,ojf->ijf", h.conj(), profile * h).reshape(-1, lines)
         t = _two_sided(lags, products.T).real.reshape(-1, inputs, inputs)
-        factor = _numerator_factor((lags @ profile).real, lag)
+        # R = LLᵀ, the Toeplitz matrix of sums by lag, with its ridge
+        r = (lags @ profile).real
+        gram = r[np.abs(lag)]
+        gram[index, index] *= 1 + RIDGE * (order + 1)
+        factor = np.linalg.cholesky(gram + RIDGE * r[0] * np.eye(order + 1))
         coupled = -s[lag + order].reshape(order + 1, -1)
         found = np.linalg.solve(factor, coupled).reshape(order + 1, order + 1, -1, inputs)
         reduced[own] = found.transpose(2, 0, 1, 3)
         total += t[lag + order].transpose(0, 2, 1, 3)
     return total, reduced
-
-
-def _numerator_factor(r: np.ndarray, lag: np.ndarray) -> np.ndarray:
-    """L (n+1, n+1) of R = LLᵀ, the Toeplitz matrix of sums r (n+1,) by lag, with its ridge."""
-    gram, size = r[np.abs(lag)], len(r)
-    gram[np.diag_indices(size)] *= 1 + RIDGE * size
-    return np.linalg.cholesky(gram + RIDGE * r[0] * np.eye(size))
 
 
 def _two_sided(lags: np.ndarray, data: np.ndarray) -> np.ndarray:
@@ -143,16 +138,19 @@ def _two_sided(lags: np.ndarray, data: np.ndarray) -> np.ndarray:
 
 
 def _solve(
-    order: int, normal: np.ndarray, coupling: np.ndarray, scale: np.ndarray, circle: _Circle
-) -> PoleSet:
+    order: int, normal: np.ndarray, coupling: np.ndarray, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Roots (k,) in the z-plane, in the upper half of the circle, and their participation."""
     coefficients = _denominator(order, normal, coupling)
-    z = 1 / _reciprocal_roots(coefficients)
+    # 1/z for det Σ A_r z^r = 0 with A₀ = I: eigenvalues of the block companion matrix
+    inputs = coefficients.shape[1]
+    companion = np.eye(order * inputs, k=-inputs)
+    companion[:inputs] = -coefficients[1:].transpose(1, 0, 2).reshape(inputs, -1)
+    roots = np.linalg.eigvals(companion)
+    z = 1 / roots[np.abs(roots) > 1e-12]
     z = z[(np.abs(z) < 1) & (np.abs(z) > 1e-6) & (z.imag > 0)].astype(complex)
-    poles = circle.to_poles(z)
     participation = _participation(coefficients, z) * scale
-    participation /= np.linalg.norm(participation, axis=1, keepdims=True)
-    by_frequency = np.argsort(poles.imag)
-    return PoleSet(order, poles[by_frequency], participation[by_frequency])
+    return z, participation / np.linalg.norm(participation, axis=1, keepdims=True)
 
 
 def _denominator(order: int, normal: np.ndarray, coupling: np.ndarray) -> np.ndarray:
@@ -166,15 +164,6 @@ def _denominator(order: int, normal: np.ndarray, coupling: np.ndarray) -> np.nda
     inner = block[inputs:, inputs:] + ridge * np.eye(size - inputs)
     a = -np.linalg.solve(inner, block[inputs:, :inputs])
     return np.concatenate([np.eye(inputs)[None], a.reshape(order, inputs, inputs)])
-
-
-def _reciprocal_roots(coefficients: np.ndarray) -> np.ndarray:
-    """1/z for det Σ A_r z^r = 0 with A₀ = I: eigenvalues of the block companion matrix."""
-    order, inputs = coefficients.shape[0] - 1, coefficients.shape[1]
-    companion = np.eye(order * inputs, k=-inputs)
-    companion[:inputs] = -coefficients[1:].transpose(1, 0, 2).reshape(inputs, -1)
-    roots = np.linalg.eigvals(companion)
-    return roots[np.abs(roots) > 1e-12]
 
 
 def _participation(coefficients: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -239,7 +228,11 @@ def diagram(sets: tuple[PoleSet, ...], band_hz: tuple[float, float]) -> Diagram:
     """
     growing: list[list[tuple[int, complex, np.ndarray]]] = []
     for index, entry in enumerate(sets):
-        poles, participation = _plausible(entry, band_hz)
+        size = np.abs(entry.poles)
+        frequency = size / (2 * np.pi)
+        keep = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+        keep &= -entry.poles.real < 0.3 * size
+        poles, participation = entry.poles[keep], entry.participation[keep]
         # Orders that a pole may be missing before its line counts as ended.
         open_lines = [g for g in growing if index - g[-1][0] <= 3]
         pairs = _pair(open_lines, poles, participation)
@@ -257,15 +250,6 @@ def stable(found: Diagram, least: int = 5, share: float = 0.4) -> tuple[Line, ..
     """Lines seen in at least `least` orders and in `share` of those since they first appeared."""
     need = min(least, max(2, len(found.sets) // 3))
     return tuple(x for x in found.lines if len(x.orders) >= need and x.share >= share)
-
-
-def _plausible(entry: PoleSet, band_hz: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    size = np.abs(entry.poles)
-    frequency = size / (2 * np.pi)
-    keep = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
-    # Max damping.
-    keep &= -entry.poles.real < 0.3 * size
-    return entry.poles[keep], entry.participation[keep]
 
 
 def _pair(lines: list, poles: np.ndarray, participation: np.ndarray) -> list[tuple[int, int]]:

@@ -12,6 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from planner.inference.student import widening_factor
+from planner.modal.least_squares import scaled_inverse
 
 ROUNDS = 60  # of alternating and of Gauss-Newton steps
 ROUGH, STILL = 1e-3, 1e-6  # a step below, relative to the shape, is the last: while weights change
@@ -187,10 +188,7 @@ class _RankOneProblem:
 
     def covariance(self, jacobian: np.ndarray, weight: np.ndarray) -> np.ndarray:
         """(unknowns, unknowns); directions that nothing determines count as known."""
-        normal = self.normal(jacobian, weight)
-        scale = np.sqrt(np.maximum(np.diag(normal).real, 1e-300))
-        inverse = np.linalg.pinv(normal / scale[:, None] / scale, rcond=1e-12, hermitian=True)
-        return inverse / scale[:, None] / scale
+        return scaled_inverse(self.normal(jacobian, weight), 1e-12)
 
     def error(self, found: np.ndarray, weight: np.ndarray) -> float:
         """χ² of the values and of the gains."""

@@ -7,13 +7,21 @@ with a variance that the sets tell (DerSimonian and Laird 1986); x is what is co
 agree, the variance is zero and all share one pole.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.inference.student import widening_factor
 from planner.modal.fit_data import Data
-from planner.modal.least_squares import ReducedFit, WeightedSets, fitted, reduced, slope_turn
+from planner.modal.least_squares import (
+    ReducedFit,
+    WeightedSets,
+    complex_of,
+    fitted,
+    reduced,
+    scaled_inverse,
+    slope_turn,
+)
 from planner.modal.residues import Lines
 
 ROUNDS = 4  # each a Gauss-Newton step of every set and of what is common
@@ -30,6 +38,25 @@ class DivergedPolesError(ValueError):
     def __init__(self, astray: np.ndarray) -> None:
         super().__init__("poles strayed")
         self.astray = astray
+
+
+@dataclass(frozen=True, eq=False)
+class SetData:
+    """What is fitted, responses (e, 1, F), and the entries (indices) of each set.
+
+    `rows` and `columns` (e,) of each entry, columns being those of the few references.
+    """
+
+    data: Data
+    sets: tuple[np.ndarray, ...]
+    rows: np.ndarray
+    columns: np.ndarray
+
+    def table(self, values: np.ndarray) -> np.ndarray:
+        """(r, c, …) of values (e, …), 0 where nothing was measured."""
+        out = np.zeros((self.rows.max() + 1, self.columns.max() + 1, *values.shape[1:]), complex)
+        out[self.rows, self.columns] = values
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,18 +78,26 @@ class SetPoles:
     fitted: np.ndarray
     significance: np.ndarray
 
+    def part(self, kept: np.ndarray) -> "SetPoles":
+        """Some of the modes (bool); what was fitted stays."""
+        both = np.tile(kept, 2)
+        return replace(
+            self, poles=self.poles[kept], own=self.own[:, kept], spread=self.spread[both],
+            covariance=self.covariance[np.ix_(both, both)], residue=self.residue[:, kept],
+            residue_variance=self.residue_variance[:, kept], significance=self.significance[kept],
+        )  # fmt: skip
+
 
 def fit_sets(
-    data: Data, sets: tuple[np.ndarray, ...], variance: np.ndarray, start: np.ndarray,
-    rounds: int = ROUNDS, known: np.ndarray | None = None, lines: np.ndarray | None = None,
+    given: SetData, variance: np.ndarray, start: np.ndarray, rounds: int = ROUNDS,
+    known: np.ndarray | None = None, lines: np.ndarray | None = None,
 ) -> SetPoles:  # fmt: skip
-    """Fit from common poles `start` (m,) in rad/s.
+    """Fit from common poles `start` (m,) in rad/s, with variance (e, F).
 
-    `sets` are the entries (indices) of each set; data.response (e, 1, F), variance (e, F). `known`
-    (k, m) are the sets' own poles to go on from; only some `lines` (indices) are fitted, where
-    stated. Raises DivergedPolesError where the data do not hold the poles.
+    `known` (k, m) are the sets' own poles to go on from; only some `lines` (indices) are fitted,
+    where stated. Raises DivergedPolesError where the data do not hold the poles.
     """
-    m = start.size
+    m, data, sets = start.size, given.data, given.sets
     common = np.concatenate([start.real, start.imag])
     own = np.tile(common, (len(sets), 1))
     if known is not None:
@@ -72,14 +107,14 @@ def fit_sets(
     chosen = slice(None) if lines is None else lines
     part = WeightedSets.of(data.lines.part(chosen), response[:, chosen], variance[:, chosen], sets)
     for _ in range(rounds):
-        point = reduced(part, _complex(own))
+        point = reduced(part, complex_of(own))
         spread = _spread(point, own, common)
         moved, covariance = _common(point, own, spread)
         # Longest step of a common pole in one round: half a bandwidth
         longest = np.tile(1.0 * np.abs(common[:m]), 2)
         step = np.clip(moved - common, -longest, longest)
         common = common + step
-        astray = [not data.allowed(pole[None]) for pole in _complex(common)]
+        astray = [not data.allowed(pole[None]) for pole in complex_of(common)]
         if any(astray):
             raise DivergedPolesError(np.array(astray))
         before = own
@@ -90,11 +125,6 @@ def fit_sets(
         if np.all(still) and np.all(np.abs(step) < 0.1 * np.sqrt(np.diag(covariance))):
             break
     return _finish(part, data.lines, own, common, spread, covariance)
-
-
-def _complex(parts: np.ndarray) -> np.ndarray:
-    real, imag = np.split(parts, 2, axis=-1)
-    return real + 1j * imag
 
 
 def _spread(point: ReducedFit, own: np.ndarray, common: np.ndarray) -> np.ndarray:
@@ -144,9 +174,7 @@ def _common(
     weighed = point.normal @ held
     precision = np.sum(weighed, axis=0)
     right = np.einsum("kab,kb->a", weighed, own) - np.einsum("kba,kb->a", held, point.gradient)
-    scale = np.sqrt(np.maximum(np.diag(precision), 1e-300))
-    covariance = np.linalg.pinv(precision / scale[:, None] / scale, hermitian=True)
-    covariance = covariance / scale[:, None] / scale
+    covariance = scaled_inverse(precision)
     return covariance @ right, covariance
 
 
@@ -176,8 +204,8 @@ def _finish(
     spread: np.ndarray, covariance: np.ndarray,
 ) -> SetPoles:  # fmt: skip
     m = common.size // 2
-    point = reduced(data, _complex(own))
-    residue, response = fitted(data, point, _complex(own), lines)
+    point = reduced(data, complex_of(own))
+    residue, response = fitted(data, point, complex_of(own), lines)
     # Own poles are as sure as the set and the others make them: a set that tells its own poles
     # hardly depends on what is common.
     held = _held(point, spread)
@@ -191,6 +219,6 @@ def _finish(
     residue_variance[data.entries[there]] = ((parts[..., :m] + parts[..., m:]) / 2)[there]
     factor = _student(point, spread)
     return SetPoles(
-        _complex(common), _complex(own), factor[:, None] * covariance * factor, spread, residue,
+        complex_of(common), complex_of(own), factor[:, None] * covariance * factor, spread, residue,
         residue_variance, response, point.significance(data.weight),
     )  # fmt: skip

@@ -12,44 +12,36 @@ from functools import cached_property
 import numpy as np
 
 from planner.modal.fit_data import Data
+from planner.modal.mac import grouped
 from planner.modal.residues import Lines, basis, stack, unit
-from planner.modal.set_poles import FARTHEST, SetPoles
+from planner.modal.set_poles import FARTHEST, SetData, SetPoles
 
-# Row and column of each entry, columns being those of the few references.
-Places = tuple[np.ndarray, np.ndarray]
 # Poles are looked for up to so many sds of the sets' poles, and half bandwidths, from the common
 # ones; the lines looked at reach so many half bandwidths farther.
 FAR, FAR_HALVES, REACH = 4.0, 2.0, 4.0
 FINE = (0.2, 0.06, 0.02)  # half bandwidths: steps of the refinement
 
 
-def reestimated_sets(
-    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray, places: Places
-) -> np.ndarray | None:
+def reestimated_sets(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray | None:
     """Poles (k, m) of all sets, those of badly fitted sets as found anew; None where none are."""
-    taking_part = participation(fit, places)
-    off = _off(data, sets, fit, variance) | _apart(sets, fit, places, taking_part)
+    shares = _participation(given, fit)[given.columns]
+    off = _off(given, fit, variance) | _apart(given, fit, shares)
     own, moved = fit.own.copy(), False
-    for modes in _together(data, fit):
+    for modes in _together(given.data, fit):
         for s in np.flatnonzero(off[:, modes].any(axis=1)):
-            rows, shares = places[0][sets[s]], taking_part[places[1][sets[s]]][:, modes]
-            found = _Neighbourhood.of(
-                data, fit, variance, rows, shares, sets[s], int(s), modes
-            ).best()  # fmt: skip
+            found = _Neighbourhood.of(given, fit, variance, shares, int(s), modes).best()
             if found is not None:
                 own[s, modes] = found
                 moved = True
     return own if moved else None
 
 
-def participation(fit: SetPoles, places: Places) -> np.ndarray:
+def _participation(given: SetData, fit: SetPoles) -> np.ndarray:
     """(columns, m) how modes take part at the references, of unit length.
 
     Most sets agree on it: rows count the less the worse they fit.
     """
-    rows, columns = places
-    table = np.zeros((int(rows.max()) + 1, int(columns.max()) + 1, fit.poles.size), complex)
-    table[rows, columns] = fit.residue
+    table = given.table(fit.residue)
     found = np.zeros(table.shape[1:], complex)
     for k, each in enumerate(np.moveaxis(table, -1, 0)):
         usual = float(np.median(np.linalg.norm(each, axis=1)))
@@ -80,39 +72,27 @@ def _together(data: Data, fit: SetPoles) -> list[np.ndarray]:
     """Modes (indices) among the lines, in groups whose peaks may overlap."""
     omega, far = 2 * np.pi * data.frequency_hz[[0, -1]], _reach(fit)
     inside = (fit.poles.imag > omega[0]) & (fit.poles.imag < omega[1])
-    groups: list[list[int]] = []
-    for k in np.argsort(fit.poles.imag):
-        if not inside[k]:
-            continue
-        last = groups[-1][-1] if groups else k
-        if groups and fit.poles[k].imag - fit.poles[last].imag < far[k] + far[last]:
-            groups[-1].append(int(k))
-        else:
-            groups.append([int(k)])
+    order = [int(k) for k in np.argsort(fit.poles.imag) if inside[k]]
+    groups = grouped(order, lambda a, b: np.diff(fit.poles[[a, b]].imag)[0] < far[a] + far[b])
     return [np.array(group) for group in groups]
 
 
-def _off(
-    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray
-) -> np.ndarray:
+def _off(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
     """(k, m) bool: sets whose error around a mode is half as much again as that of the usual."""
-    square = np.abs(data.response[:, 0] - fit.fitted) ** 2 / variance
-    off = np.zeros((len(sets), fit.poles.size), bool)
+    square = np.abs(given.data.response[:, 0] - fit.fitted) ** 2 / variance
+    off = np.zeros((len(given.sets), fit.poles.size), bool)
     for j in range(fit.poles.size):
-        lines = _near(data, fit, j)
+        lines = _near(given.data, fit, j)
         if lines.any():
             each = np.mean(square[:, lines], axis=1)
-            error = np.array([np.mean(each[chosen]) for chosen in sets])
+            error = np.array([np.mean(each[chosen]) for chosen in given.sets])
             off[:, j] = error > 1.5 * np.median(error)
     return off
 
 
-def _apart(
-    sets: tuple[np.ndarray, ...], fit: SetPoles, places: Places, taking_part: np.ndarray
-) -> np.ndarray:
-    """(k, m) bool: sets whose residues do not go with how the mode takes part."""
-    rows, columns = places
-    theirs = taking_part[columns]
+def _apart(given: SetData, fit: SetPoles, theirs: np.ndarray) -> np.ndarray:
+    """(k, m) bool: sets whose residues do not go with how the mode takes part (e, m)."""
+    rows = given.rows
     weight = 1 / np.maximum(2 * fit.residue_variance, 1e-300)
     shape = int(rows.max()) + 1, fit.poles.size
     along, power = np.zeros(shape, complex), np.zeros(shape)
@@ -120,7 +100,7 @@ def _apart(
     np.add.at(power, rows, weight * np.abs(theirs) ** 2)
     left = fit.residue - (along / np.maximum(power, 1e-300))[rows] * theirs
     square = weight * np.abs(left) ** 2
-    apart = np.array([np.mean(square[chosen], axis=0) for chosen in sets])
+    apart = np.array([np.mean(square[chosen], axis=0) for chosen in given.sets])
     # Beyond so many times their variance, and what is usual.
     return apart > 9.0 * np.maximum(np.median(apart, axis=0), 1.0)
 
@@ -149,10 +129,11 @@ class _Neighbourhood:
 
     @classmethod
     def of(
-        cls, data: Data, fit: SetPoles, variance: np.ndarray, rows: np.ndarray, shares: np.ndarray,
-        entries: np.ndarray, s: int, modes: np.ndarray,
+        cls, given: SetData, fit: SetPoles, variance: np.ndarray, shares: np.ndarray, s: int,
+        modes: np.ndarray,
     ) -> "_Neighbourhood":  # fmt: skip
-        """Of set s with its entries, rows (e,) and shares (e, n), around some modes (indices)."""
+        """Of set s around some modes (indices), which take part in all entries by shares (e, m)."""
+        data, entries = given.data, given.sets[s]
         chosen = np.flatnonzero(np.any([_near(data, fit, j) for j in modes], axis=0))
         lines, common = data.lines.part(chosen), fit.poles[modes]
         others = np.setdiff1d(np.arange(fit.poles.size), modes)
@@ -167,8 +148,9 @@ class _Neighbourhood:
         far = np.linalg.qr(stack(np.concatenate([line, 1j * line])).T)[0]
         values = stack(response * profile)
         return cls(
-            lines, profile, variance[:, 0] / 2, values - values @ far @ far.T, far, rows, shares,
-            common, fit.own[s, modes], _reach(fit)[modes], spread,
+            lines, profile, variance[:, 0] / 2, values - values @ far @ far.T, far,
+            given.rows[entries], shares[np.ix_(entries, modes)], common, fit.own[s, modes],
+            _reach(fit)[modes], spread,
         )  # fmt: skip
 
     def best(self) -> np.ndarray | None:

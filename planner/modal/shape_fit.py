@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from planner.modal.fit_data import Data
-from planner.modal.least_squares import PoleFit
+from planner.modal.least_squares import PoleFit, complex_of, slope_turn
 from planner.modal.rank_one_fit import Entries, fit_shape
 from planner.modal.residues import Residues, basis, basis_slope, unpack
 
@@ -55,7 +55,7 @@ class ShapeFit:
         own = self.root[2 * m :].reshape(*self.coefficients.shape, -1)
         return np.stack(
             [
-                self.root[: 2 * m].T @ _by_poles(c, slope, m) + part.T @ columns
+                self.root[: 2 * m].T @ slope_turn(c, m).T @ slope + part.T @ columns
                 for c, part in zip(self.coefficients, own, strict=True)
             ],
             axis=1,
@@ -68,9 +68,9 @@ class ShapeFit:
         for normal in np.random.default_rng(seed).standard_normal((count, self.root.shape[1])):
             by = self.root @ normal
             # Neither decay nor frequency is ever below zero, however unsure.
-            real, imag = np.split(at * np.exp(np.clip(by[: 2 * m] / at, -1.0, 1.0)), 2)
+            poles = complex_of(at * np.exp(np.clip(by[: 2 * m] / at, -1.0, 1.0)))
             moved = self.coefficients + by[2 * m :].reshape(self.coefficients.shape)
-            found.append((real + 1j * imag, unpack(moved, m)))
+            found.append((poles, unpack(moved, m)))
         return found
 
 
@@ -107,13 +107,6 @@ def shape_fit(
         root = np.sqrt(np.concatenate(grown))[:, None] * root
     per_freedom = point.chi2 / max(freedom - root.shape[1], 1)
     return ShapeFit(data, problem.poles(point.values), whole, root, problem.shaped, per_freedom)
-
-
-def _by_poles(coefficients: np.ndarray, slope: np.ndarray, m: int) -> np.ndarray:
-    """(2m, F) change of one entry's response with the poles' real and imaginary parts."""
-    real, imag = coefficients[:m, None], coefficients[m : 2 * m, None]
-    first, second = slope[:m], slope[m:]
-    return np.concatenate([real * first + imag * second, real * second - imag * first])
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +172,7 @@ class _ShapeProblem:
 
     def poles(self, values: np.ndarray) -> np.ndarray:
         """(m,) in rad/s."""
-        return values[: self.modes] + 1j * values[self.modes : 2 * self.modes]
+        return complex_of(values[: 2 * self.modes])
 
     def _shapes(self, values: np.ndarray) -> np.ndarray:
         """(k, n) of the modes that have one."""
@@ -216,7 +209,7 @@ class _ShapeProblem:
         size = 2 * m + own.size
         normal, gradient, square = np.zeros((size, size)), np.zeros(size), 0.0
         for e, (c, w) in enumerate(zip(own, self.weight, strict=True)):
-            part = np.concatenate([_by_poles(c, slope, m), columns])
+            part = np.concatenate([slope_turn(c, m).T @ slope, columns])
             off = self.response[e] - c @ columns
             index = np.r_[: 2 * m, 2 * m + e * each : 2 * m + (e + 1) * each]
             weighted = part.conj() * w

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from planner.modal.fit_data import Data
+from planner.modal.mac import grouped
 from planner.modal.residues import unit
-from planner.modal.set_poles import DivergedPolesError, SetPoles, fit_sets
-from planner.modal.set_search import Places, reestimated_sets
+from planner.modal.set_poles import DivergedPolesError, SetData, SetPoles, fit_sets
+from planner.modal.set_search import reestimated_sets
 
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
 # this share of the frequency, or within a bandwidth.
@@ -39,20 +40,9 @@ def thinned(data: Data, poles: np.ndarray, every: bool = False) -> np.ndarray:
     return np.flatnonzero(kept)
 
 
-def _made(data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, modes: np.ndarray) -> np.ndarray:
-    """Response (e, F) of some modes (indices), every set with its own poles."""
-    made = np.zeros((fit.residue.shape[0], data.frequency_hz.size), complex)
-    up, down = unit(data.lines, fit.own[:, modes]), unit(data.lines, fit.own[:, modes].conj())
-    for k, chosen in enumerate(sets):
-        part = fit.residue[np.ix_(chosen, modes)]
-        made[chosen] = part @ up[k] + part.conj() @ down[k]
-    return made
-
-
-def around(
-    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, pole: complex
-) -> tuple[Data, np.ndarray, np.ndarray]:
+def around(given: SetData, fit: SetPoles, pole: complex) -> tuple[SetData, np.ndarray, np.ndarray]:
     """The lines around a pole less the modes far from it, their indices, which modes are near."""
+    data = given.data
     step, centre = data.frequency_hz[1] - data.frequency_hz[0], pole.imag / (2 * np.pi)
     reach = max(REACH * abs(pole.real) / (2 * np.pi), LINES_AROUND * step)
     lines = thinned(data, np.append(fit.poles, pole))
@@ -62,92 +52,83 @@ def around(
     response = data.response[..., lines]
     part = replace(data, frequency_hz=data.frequency_hz[lines], response=response, near=False)
     near = np.abs(fit.poles.imag / (2 * np.pi) - centre) < reach
-    far = _made(part, sets, fit, np.flatnonzero(~near))
-    return replace(part, response=part.response - far[:, None]), lines, near
+    own = fit.own[:, ~near]
+    up, down = unit(part.lines, own), unit(part.lines, own.conj())
+    for k, chosen in enumerate(given.sets):
+        far = fit.residue[np.ix_(chosen, ~near)]
+        response[chosen, 0] -= far @ up[k] + far.conj() @ down[k]
+    return replace(given, data=part), lines, near
+
+
+def _chi2(local: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
+    """(e,) of each entry."""
+    return np.sum(2 / variance * np.abs(local.data.response[:, 0] - fit.fitted) ** 2, axis=1)
 
 
 def explains(
-    local: Data, less: SetPoles, more: SetPoles, variance: np.ndarray, margin: float = 1.0
+    local: SetData, less: SetPoles, more: SetPoles, variance: np.ndarray, margin: float = 1.0
 ) -> bool:
     """Whether a fit with more modes is better than chance makes it, `margin` times over."""
-    chi = [
-        float(np.sum(2 / variance * np.abs(local.response[:, 0] - fit.fitted) ** 2))
-        for fit in (less, more)
-    ]
-    scale = max(1.0, chi[1] / (2 * local.response.size))
-    return chi[0] - chi[1] > margin * local.threshold * scale
+    before, after = (float(np.sum(_chi2(local, fit, variance))) for fit in (less, more))
+    scale = max(1.0, after / (2 * local.data.response.size))
+    return before - after > margin * local.data.threshold * scale
 
 
-def _in_most(
-    local: Data, sets: tuple[np.ndarray, ...], less: SetPoles, more: SetPoles, variance: np.ndarray
-) -> bool:
+def _in_most(local: SetData, less: SetPoles, more: SetPoles, variance: np.ndarray) -> bool:
     """Whether a fit with one mode more is clearly better than chance makes it in most sets."""
-    square = [np.abs(local.response[:, 0] - fit.fitted) ** 2 for fit in (less, more)]
-    fall = np.sum(2 / variance * (square[0] - square[1]), axis=1)
-    each = [np.sum(fall[chosen]) / (2 * len(chosen) + 2) for chosen in sets]
+    fall = _chi2(local, less, variance) - _chi2(local, more, variance)
+    each = [np.sum(fall[chosen]) / (2 * len(chosen) + 2) for chosen in local.sets]
     return bool(np.median(each) > APART)
 
 
 def merged_modes(
-    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
-    places: Places,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    given: SetData, fit: SetPoles, variance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Poles (m,) and those of every set (k, m), with those made one that are one mode.
 
     What one pole for all sets cannot follow, several poles near it imitate; they excite and are
     excited alike.
     """
     order = np.argsort(fit.poles.imag)
-    poles, own = list(fit.poles), list(fit.own.T)
-    for group in _groups(fit, places, order):
+    poles, own, kept = fit.poles.copy(), fit.own.copy(), np.ones(fit.poles.size, bool)
+    for group in _groups(given, fit, order):
         pairs = [group[k : k + 2] for k in range(len(group) - 1)] if len(group) > 2 else []
         for tried in (group, *pairs):
-            one = _as_one(data, sets, fit, variance, tried, places)
+            one = _as_one(given, fit, variance, tried)
             if one is not None:
-                poles[tried[0]], own[tried[0]] = one
-                for k in tried[1:]:
-                    poles[k], own[k] = np.nan, np.full(len(sets), np.nan)
+                poles[tried[0]], own[:, tried[0]] = one
+                kept[tried[1:]] = False
                 break
-    kept = [k for k in order if np.isfinite(poles[k])]
-    return np.array([poles[k] for k in kept]), np.array([own[k] for k in kept]).T.reshape(
-        len(sets), len(kept)
-    )
+    order = order[kept[order]]
+    return poles[order], own[:, order]
 
 
-def _groups(fit: SetPoles, places: Places, order: np.ndarray) -> list[np.ndarray]:
+def _groups(given: SetData, fit: SetPoles, order: np.ndarray) -> list[np.ndarray]:
     """Indices of poles, increasing, that lie together and take part alike."""
-    groups: list[list[int]] = []
-    for k in order:
-        last = groups[-1][-1] if groups else k
+
+    def together(last: int, k: int) -> bool:
         gap = fit.poles[k].imag - fit.poles[last].imag
         width = 2 * max(abs(fit.poles[k].real), abs(fit.poles[last].real))
-        near = gap < max(width, TOGETHER * fit.poles[k].imag)
-        if groups and near and _alike(fit, places, last, k):
-            groups[-1].append(k)
-        else:
-            groups.append([k])
-    return [np.array(group) for group in groups if len(group) > 1]
+        return gap < max(width, TOGETHER * fit.poles[k].imag) and _alike(given, fit, last, k)
+
+    return [np.array(group) for group in grouped(order, together) if len(group) > 1]
 
 
-def _alike(fit: SetPoles, places: Places, first: int, second: int) -> bool:
+def _alike(given: SetData, fit: SetPoles, first: int, second: int) -> bool:
     """Whether two modes take part at the references alike; always so at a single one."""
-    rows, columns = places
-    vectors = []
-    for k in (first, second):
-        table = np.zeros((rows.max() + 1, columns.max() + 1), complex)
-        table[rows, columns] = fit.residue[:, k]
-        vectors.append(np.linalg.svd(table, full_matrices=False)[2][0])
+    tables = np.moveaxis(given.table(fit.residue[:, [first, second]]), -1, 0)
+    vectors = np.linalg.svd(tables, full_matrices=False)[2][:, 0]
     return bool(np.abs(np.vdot(*vectors)) ** 2 > ALIKE)
 
 
 def _as_one(
-    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
-    group: np.ndarray, places: Places,
-) -> tuple[complex, np.ndarray] | None:  # fmt: skip
+    given: SetData, fit: SetPoles, variance: np.ndarray, group: np.ndarray
+) -> tuple[complex, np.ndarray] | None:
     """Common pole and the sets' own of one mode instead of a group; None if that is worse."""
     share = fit.significance[group] / np.sum(fit.significance[group])
     middle = complex(np.sum(share * fit.poles[group]))
-    local, lines, near = around(data, sets, fit, middle)
+    local, lines, near = around(given, fit, middle)
+    variance = variance[:, lines]
     if not np.all(near[group]):
         return None
     start = fit.own[:, group] @ share
@@ -156,18 +137,16 @@ def _as_one(
     own = np.column_stack([fit.own[:, others], start])
     poles = np.append(fit.poles[others], middle)
     try:
-        one = fit_sets(local, sets, variance[:, lines], poles, MERGED_ROUNDS, own)
-        more = fit_sets(local, sets, variance[:, lines], fit.poles[near], known=fit.own[:, near])
-        if explains(local, one, more, variance[:, lines], APART):
+        one = fit_sets(local, variance, poles, MERGED_ROUNDS, own)
+        more = fit_sets(local, variance, fit.poles[near], known=fit.own[:, near])
+        if explains(local, one, more, variance, APART):
             # Where it is one mode, only sets that fitted it badly are explained better by two.
-            if _in_most(local, sets, one, more, variance[:, lines]):
+            found = reestimated_sets(local, one, variance)
+            if _in_most(local, one, more, variance) or found is None:
                 return None
-            own = reestimated_sets(local, sets, one, variance[:, lines], places)
-            if own is None:
-                return None
-            one = fit_sets(local, sets, variance[:, lines], one.poles, MERGED_ROUNDS, own)
+            one = fit_sets(local, variance, one.poles, MERGED_ROUNDS, found)
     except DivergedPolesError:
         return None
-    if explains(local, one, more, variance[:, lines], APART):
+    if explains(local, one, more, variance, APART):
         return None
     return complex(one.poles[-1]), one.own[:, -1]

@@ -10,7 +10,7 @@ probabilities sum over all matchings.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -92,15 +92,21 @@ def _named(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray) -> Trac
     Where a mode is missing between others its place is doubtful: there the guide's families decide.
     """
     order = np.argsort(guide.frequency_hz, axis=1, kind="stable")  # NaN comes last
-    ranked = _columns(guide, order)
+    rows, labels = np.arange(len(poses))[:, None], np.arange(order.shape[1])
+    ranked = replace(
+        guide, frequency_hz=guide.frequency_hz[rows, order], shape=guide.shape[rows, order]
+    )
     placed = _matched(poses, ranked, x, ordered=True)
     chance = name_chances(placed.modes, np.argsort(order, axis=1), x, guide.reference)
     place = np.array([least_cost(-c)[1] for c in chance])
-    rows, labels = np.arange(len(poses))[:, None], np.arange(order.shape[1])
     sure = placed.probability[rows, place]
     modes = [tuple(row[b] for b in p) for row, p in zip(placed.modes, place, strict=True)]
     rest = list(placed.unexpected)
-    gaps = [i for i, row in enumerate(placed.modes) if _gap(row)]
+    # A mode is missing below one that was found
+    gaps = [
+        i for i, row in enumerate(placed.modes)
+        if any(now is None and later is not None for now, later in pairwise(row))
+    ]  # fmt: skip
     if gaps:
         free = _matched(poses, guide, x, ordered=False)
         sure[gaps] = free.probability[gaps]
@@ -109,21 +115,10 @@ def _named(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray) -> Trac
     return Tracks(tuple(modes), sure * chance[rows, labels, place], tuple(rest))
 
 
-def _columns(guide: Guide, chosen: np.ndarray) -> Guide:
-    """The guide with the chosen columns (n, k) of every pose."""
-
-    rows = np.arange(len(chosen))[:, None]
-    return Guide(guide.frequency_hz[rows, chosen], guide.shape[rows, chosen], guide.reference)
-
-
-def _gap(row: Sequence[Mode | None]) -> bool:
-    """Whether a mode is missing below one that was found."""
-    return any(now is None and later is not None for now, later in pairwise(row))
-
-
 def _matched(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray, ordered: bool) -> Tracks:
     expected = np.log(guide.frequency_hz)
-    chosen = [_first(modes, *row) for modes, row in zip(poses, _rows(guide), strict=True)]
+    each = zip(poses, guide.frequency_hz, guide.shape, strict=True)
+    chosen = [_first(*one) for one in each]
     gains: list[np.ndarray] = []
     seen: list[list[np.ndarray]] = [chosen]
     certain = np.ones(expected.shape)
@@ -133,15 +128,16 @@ def _matched(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray, order
         gains = [belief.gain(i, modes) for i, modes in enumerate(poses)]
         chosen = [best(gain, ordered) for gain in gains]
         chance = [chances(gain, ordered) for gain in gains]
-        certain = np.array([_of(c, row) for c, row in zip(chance, chosen, strict=True)])
+        # Of no mode (−1) the last column tells.
+        both = zip(chance, chosen, strict=True)
+        certain = np.array([c[np.arange(len(row)), row] for c, row in both])
         if any(all(map(np.array_equal, chosen, before)) for before in seen):
             break
         seen.append(chosen)
-    return _tracks(poses, chosen, certain.reshape(expected.shape))
-
-
-def _rows(guide: Guide) -> list[tuple[np.ndarray, np.ndarray]]:
-    return list(zip(guide.frequency_hz, guide.shape, strict=True))
+    both = list(zip(poses, chosen, strict=True))
+    labelled = (tuple(None if j < 0 else modes[j] for j in row) for modes, row in both)
+    rest = (tuple(m for j, m in enumerate(modes) if j not in row) for modes, row in both)
+    return Tracks(tuple(labelled), certain.reshape(expected.shape), tuple(rest))
 
 
 def _first(modes: Sequence[Mode], expected_hz: np.ndarray, shape: np.ndarray) -> np.ndarray:
@@ -159,21 +155,6 @@ def _first(modes: Sequence[Mode], expected_hz: np.ndarray, shape: np.ndarray) ->
     found = best(gain, ordered=True)
     chosen[order[found >= 0]] = ranked[found[found >= 0]]
     return chosen
-
-
-def _of(chance: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    column = np.where(chosen < 0, chance.shape[1] - 1, chosen)
-    return chance[np.arange(len(chosen)), column]
-
-
-def _tracks(
-    poses: Sequence[Sequence[Mode]], chosen: list[np.ndarray], probability: np.ndarray
-) -> Tracks:
-    labelled, rest = [], []
-    for modes, row in zip(poses, chosen, strict=True):
-        labelled.append(tuple(None if j < 0 else modes[j] for j in row))
-        rest.append(tuple(m for j, m in enumerate(modes) if j not in row))
-    return Tracks(tuple(labelled), probability, tuple(rest))
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,12 +189,8 @@ class _Belief:
                 shape[i, label] = mode.shape
         ratio, sd = _kriged(log_hz - expected, own, certain, x)
         known = np.isfinite(damping)
-        middle = np.array(
-            [
-                np.median(c[f]) if f.any() else np.nan
-                for c, f in zip(damping.T, known.T, strict=True)
-            ]
-        )
+        both = zip(damping.T, known.T, strict=True)
+        middle = np.array([np.median(c[f]) if f.any() else np.nan for c, f in both])
         return cls(expected + ratio, sd, mixture(shape, certain, guide.shape, x, LENGTH), middle)
 
     def gain(self, i: int, modes: Sequence[Mode]) -> np.ndarray:

@@ -17,13 +17,16 @@ from typing import Any
 import numpy as np
 
 from planner.proof.refit import detectability
+from planner.truth.arms import ARMS
 from planner.truth.cases import (
     OUT_OF_LIBRARY_KINDS,
+    RANDOM,
     SINGLES,
     ConcealedCase,
     NothingDetectableError,
-    make,
+    make_case,
 )
+from planner.truth.measurement_errors import EVERYDAY, LABORATORY, ROUGH
 
 ENGINES = "arms", "tree"  # known arms by MuJoCo, robots drawn at random by a tree of frames
 NULL_SHARE, OUT_OF_LIBRARY_SHARE, PAIR_SHARE = 0.15, 0.15, 0.2  # shares of the cases
@@ -48,13 +51,9 @@ def deck(count: int, singles: Sequence[str], outsiders: Sequence[str], seed: int
 def answer(kind: str, engine: str, made: ConcealedCase) -> str:
     """What was concealed, and what a refit leaves of it: JSON, with salt against guessing."""
     effects = [
-        {
-            "effect": c.effect,
-            "at": c.at,
-            "parameters": c.parameters,
-            **asdict(detectability(c.question())),
-        }
-        for c in made.concealed
+        {"effect": c.effect, "at": c.at, "parameters": {**c.parameters, "size": c.size}}
+        | asdict(detectability(question()))
+        for c, question in zip(made.concealed, made.questions, strict=True)
     ]
     whole: dict[str, Any] = {
         "kind": kind,
@@ -69,11 +68,13 @@ def answer(kind: str, engine: str, made: ConcealedCase) -> str:
 
 
 def make_one(kind: str, engine: str, seed: int, folder: Path, laboratory: bool = False) -> str:
-    """Write a case of an engine of ENGINES; its answer."""
-    for attempt in range(SCENES):
+    """Write a case of an engine of ENGINES, known robots in turn; its answer."""
+    drawn = engine == "tree"
+    handling = LABORATORY if laboratory else ROUGH if drawn else EVERYDAY
+    for tried in range(seed, seed + SCENES * ANOTHER, ANOTHER):
+        robot = RANDOM if drawn else sorted(ARMS)[tried % len(ARMS)]
         try:
-            made = make(kind, seed + attempt * ANOTHER, folder, laboratory, engine == "tree")
-            return answer(kind, engine, made)
+            return answer(kind, engine, make_case(kind, robot, tried, folder, handling))
         except NothingDetectableError:
             continue
     raise SystemExit(f"No {kind} of seed {seed} shows in the noise; take another seed.")

@@ -22,13 +22,13 @@ from planner.modal.modes import Mode
 from planner.progress import ProgressCallback
 from planner.recording.records import Hit
 from planner.truth import inverse
+from planner.truth.cases import Visits
 from planner.truth.fault_injection import DampingScatter, HitVisit, InjectedFaults, quiet_hits
 from planner.truth.hits import Hammer, SimulatedHit, noisy
 from planner.truth.laws import BoucWen
 from planner.truth.measurement_errors import EVERYDAY, MeasurementErrors
 from planner.truth.model import Truth
 from planner.truth.nonlinear import Port
-from planner.truth.visits import Visits
 
 AT_ONCE = 12  # poses that are integrated together: what memory holds
 # Chosen: friction's stiffness over a joint's own, the angle (rad) at which it slides, and the

@@ -19,17 +19,16 @@ from planner.truth.arms import ARMS, Arm
 from planner.truth.detectability import ScoredCase, detection_problem, without_effect
 from planner.truth.deviation import Deviation
 from planner.truth.effects import EFFECTS, LINEAR, NONLINEAR
-from planner.truth.fault_injection import InjectedFaults, frfs, once, quiet_hits
-from planner.truth.hits import Hammer, write_predict
+from planner.truth.fault_injection import HitVisit, InjectedFaults, frfs, once, quiet_hits, windowed
+from planner.truth.hits import AXES, Hammer, SimulatedHit, noisy, write_predict, write_recordings
 from planner.truth.imperfections import imperfect
 from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY, LABORATORY, ROUGH, MeasurementErrors
+from planner.truth.measurement_errors import EVERYDAY, MeasurementErrors
 from planner.truth.model import Truth
 from planner.truth.out_of_library import ARTEFACTS
 from planner.truth.out_of_library import OUT_OF_LIBRARY as UNKNOWN
 from planner.truth.random_arms import draw_arm, standing
 from planner.truth.scene import PULSE_S, Draw, DrawnEffect, Scene, log_uniform
-from planner.truth.visits import Visits, record
 
 TABLE: dict[str, Draw] = {**EFFECTS, **ARTEFACTS, **UNKNOWN}
 SINGLES, OUT_OF_LIBRARY_KINDS = (*EFFECTS, *ARTEFACTS), tuple(UNKNOWN)
@@ -45,6 +44,8 @@ ATTEMPTS = 40
 PEAK_N = {"kr10": 150.0, "kr210": 1200.0, "irb6640": 1200.0}
 POSES, PREDICTED, OVERSAMPLING = 9, 4, 8
 RANDOM = "random"  # a robot that is drawn
+LEVELS = (0.4, 1.0, 2.5)  # of the middling peak force
+TWICE = 0.5  # how often the first pose is hit again at the end
 DAMPING_S = 9.5e-4  # C = s K: 3 % at 10 Hz, as robots in milling cells have
 
 
@@ -53,28 +54,17 @@ class NothingDetectableError(Exception):
 
 
 @dataclass(frozen=True)
-class ConcealedEffect:
-    """An effect and its place as a diagnosis states them; true parameters in SI.
-
-    `detection_problem` answers what tells of it; it is asked once the recordings have been written.
-    """
-
-    effect: str
-    at: str | None
-    parameters: Mapping[str, Any]
-    question: Callable[[], DetectionProblem]
-
-
-@dataclass(frozen=True)
 class ConcealedCase:
     """A case; `imperfections` are places that a diagnosis may name, too small to be asked for.
 
+    `questions` answer what tells of each effect; they are asked once recordings are written.
     `held_out`: names of poses, frequencies (F,) in Hz and true FRFs (real and imaginary parts;
     pose, response, hit, F).
     """
 
     robot: str
-    concealed: Sequence[ConcealedEffect]
+    concealed: Sequence[DrawnEffect]
+    questions: Sequence[Callable[[], DetectionProblem]] = ()
     imperfections: Sequence[tuple[str, str]] = ()
     held_out: Mapping[str, Any] = field(default_factory=dict)
 
@@ -82,47 +72,33 @@ class ConcealedCase:
 Load = Callable[[Deviation], Truth]
 
 
-def make(
-    kind: str, seed: int, folder: Path, laboratory: bool = False, random: bool = False
-) -> ConcealedCase:
-    """Write folder/robot and folder/recordings of a kind of case; known robots in turn, or drawn.
-
-    Raises NothingDetectableError for a seed of which nothing comes.
-    """
-    robot = RANDOM if random else sorted(ARMS)[seed % len(ARMS)]
-    errors = LABORATORY if laboratory else ROUGH if random else EVERYDAY
-    return make_case(kind, robot, seed, folder, errors)
-
-
 def make_case(
     kind: str, robot: str, seed: int, folder: Path, errors: MeasurementErrors = EVERYDAY
 ) -> ConcealedCase:
-    """The same of one of KINDS and a robot of ARMS or RANDOM; InputError for an unknown one."""
+    """Write folder/robot and folder/recordings of one of KINDS, of a robot of ARMS or RANDOM.
+
+    Raises NothingDetectableError for a seed of which nothing comes, InputError for unknown names.
+    """
     if kind not in KINDS or robot not in (*ARMS, RANDOM):
         raise InputError(f"No case {kind} of robot {robot}; kinds are {', '.join(KINDS)}.")
     rng = np.random.default_rng([seed, zlib.crc32(f"{kind} {robot}".encode())])
     own = np.random.default_rng([seed, zlib.crc32(b"handling")])
     per_joint = 1 if kind == "transverse_compliance" else int(rng.choice([1, 3]))
     scene, plain, hammer, load = _robot(robot, per_joint, folder / "robot", rng)
-    robot_is = imperfect(scene, plain, own)
-    plain = robot_is.injected
+    plain, imperfections = imperfect(scene, plain, own)
     scene = replace(scene, truth=load(plain.deviation))
     found = concealed(kind, scene, plain, load, rng)
     injected = found[-1].injected if found else plain
     recorded = _recorded(folder / "recordings", scene, injected, load, hammer, errors, rng, own)
-    effects = [
-        ConcealedEffect(
-            d.effect,
-            d.at,
-            {**d.parameters, "size": d.size},
-            partial(
-                detection_problem, recorded, without_effect(recorded.measured, before, d.injected)
-            ),
+    before = [plain, *(drawn.injected for drawn in found)]
+    asked = [
+        partial(
+            detection_problem, recorded, without_effect(recorded.measured, without, drawn.injected)
         )
-        for before, d in zip([plain, *(d.injected for d in found)], found, strict=False)
+        for without, drawn in zip(before, found, strict=False)
     ]
     name = scene.arm.name if robot == RANDOM else robot
-    return ConcealedCase(name, effects, robot_is.places, _held_out(injected, recorded))
+    return ConcealedCase(name, found, asked, imperfections, _held_out(injected, recorded))
 
 
 def _robot(
@@ -245,3 +221,58 @@ def _held_out(injected: InjectedFaults, case: ScoredCase) -> dict[str, Any]:
         "frequency_hz": frequency.tolist(),
         "frf": [H.real.tolist(), H.imag.tolist()],
     }
+
+
+@dataclass(frozen=True, eq=False)
+class Visits:
+    """What is done, and what recordings.csv says of it: pose's number and angles (dof,) in °."""
+
+    visits: Sequence[HitVisit]
+    poses: Sequence[int]
+    readbacks_deg: Sequence[np.ndarray]
+
+    @classmethod
+    def planned(
+        cls,
+        poses: np.ndarray,
+        hammer: Hammer,
+        errors: MeasurementErrors,
+        rng: np.random.Generator,
+        own: np.random.Generator,
+    ) -> "Visits":
+        """Three axes and three force levels at each pose (n, dof) in rad.
+
+        `own` draws what `errors` leaves open, so that all else is the same in the laboratory.
+        """
+        numbers = list(range(len(poses))) + ([0] if rng.random() < TWICE else [])
+        shots = [(f"{rng.choice(['+', '-'])}{a}", hammer.peak_n * k) for a in "xyz" for k in LEVELS]
+        planned, readbacks = [], []
+        common, axes = errors.common(own), [AXES.index(axis[1]) for axis, _ in shots]
+        for number, index in enumerate(numbers):
+            scatter = hammer.readback_deg * rng.uniform(-1, 1, len(poses[index]))
+            readbacks.append(np.round(np.rad2deg(poses[index]) + scatter, 4))
+            off = np.deg2rad(errors.readback_deg) * own.standard_normal(len(poses[index]))
+            aims = errors.aims(axes, own, common)
+            there = np.deg2rad(readbacks[-1]) + off
+            planned.append(HitVisit(there, shots, number / max(len(numbers) - 1, 1), aims))
+        return cls(planned, numbers, readbacks)
+
+
+def record(
+    folder: Path,
+    truth: Truth,
+    injected: InjectedFaults,
+    visits: Visits,
+    quiet: Sequence[Sequence[SimulatedHit]],
+    hammer: Hammer,
+    rng: np.random.Generator,
+) -> None:
+    """Write the hits `quiet` of all visits, with noise and with the window left on them."""
+    rows = []
+    counts: dict[tuple[int, str], int] = {}
+    for index, readback, hits in zip(visits.poses, visits.readbacks_deg, quiet, strict=True):
+        for hit in hits:
+            heard = windowed(injected.artefact, noisy(hit, hammer, rng), hammer)
+            repeat = counts[index, hit.axis] = counts.get((index, hit.axis), 0) + 1
+            rows.append((f"P{index + 1:02d}", readback, repeat, heard))
+    write_recordings(folder, truth.joint_names, rows, hammer, "concealed case")

@@ -2,7 +2,15 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 Vector = tuple[float, float, float]
+
+
+def triple(values: np.ndarray) -> Vector:
+    """The numbers of a vector (3,)."""
+    x, y, z = (float(v) for v in values)
+    return x, y, z
 
 
 @dataclass(frozen=True)

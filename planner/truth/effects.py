@@ -8,27 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.truth.deviation import (
-    AttachedMass,
-    AttachedResonator,
-    BentLink,
-    ScaledJoint,
-    StiffnessRipple,
-)
+from planner.truth import deviation, laws
 from planner.truth.fault_injection import InjectedFaults, JointDrift, LoadChange
 from planner.truth.imperfections import gas_spring
-from planner.truth.laws import (
-    AmplitudeSoftening,
-    Backlash,
-    BoucWen,
-    Friction,
-    Hardening,
-    HarmonicDrive,
-    ImpactDamping,
-    Iwan,
-    JointLaw,
-    LuGre,
-)
 from planner.truth.nonlinear import Port
 from planner.truth.scene import (
     REFERENCE_HZ,
@@ -54,7 +36,7 @@ def joint_stiffness(
     factor = log_uniform(rng, 0.3, 0.55) if rng.random() < 0.7 else log_uniform(rng, 2.0, 3.5)
     factor = factor**scene.size
     parameters: Parameters = {"factor": factor, "stiffness": factor * scene.stiffness(joint)}
-    change = deviate(injected, scaled=(ScaledJoint(joint, factor),))
+    change = deviate(injected, scaled=(deviation.ScaledJoint(joint, factor),))
     return DrawnEffect("joint_stiffness", joint, parameters, change)
 
 
@@ -109,7 +91,7 @@ def link_flexibility(
             1 / (1 / k + 1 / b) for k, b in zip((first, second), beam.bending, strict=True)
         )
         twist = 1 / (1 / twist + 1 / beam.torsion)
-    beam = BentLink(link, (first, second), twist, scene.arm.damping_s, elements)
+    beam = deviation.BentLink(link, (first, second), twist, scene.arm.damping_s, elements)
     others = tuple(b for b in injected.deviation.beams if b.link != link)
     change = replace(injected, deviation=replace(injected.deviation, beams=(*others, beam)))
     parameters: Parameters = {"bending_stiffness": [first, second], "torsion_stiffness": twist}
@@ -121,7 +103,7 @@ def added_mass(scene: Scene, injected: InjectedFaults, rng: np.random.Generator)
     number = scene.some_link(rng)
     mass = scene.size * scene.moving_kg * log_uniform(rng, 0.03, 0.15)
     place = rng.uniform(0.1, 1.0) * scene.length(number) + 0.1 * some_direction(rng)
-    lump = AttachedMass(f"link_{number}", triple(place), mass)
+    lump = deviation.AttachedMass(f"link_{number}", triple(place), mass)
     parameters: Parameters = {"mass": mass, "position_m": place.tolist()}
     return DrawnEffect("added_mass", lump.link, parameters, deviate(injected, added=(lump,)))
 
@@ -133,7 +115,7 @@ def local_resonator(
     number = scene.some_link(rng)
     low, high = scene.band_of_modes
     place = rng.uniform(0.3, 1.0) * scene.length(number)
-    main = AttachedResonator(
+    main = deviation.AttachedResonator(
         f"link_{number}",
         triple(place),
         triple(some_direction(rng)),
@@ -169,7 +151,9 @@ def angle_dependent_stiffness(
         joint, order = some_joint(scene, rng), int(rng.integers(1, 3))
         cosine, sine = scene.ripple(rng)
         parameters: Parameters = {"order": float(order), "cosine": cosine, "sine": sine}
-        change = deviate(injected, harmonics=(StiffnessRipple(joint, order, cosine, sine),))
+        change = deviate(
+            injected, harmonics=(deviation.StiffnessRipple(joint, order, cosine, sine),)
+        )
         return DrawnEffect("angle_dependent_stiffness", joint, parameters, change)
     spring = gas_spring(scene, (0.3 * scene.size, 0.6 * scene.size), rng)
     parameters = {k: float(v) for k, v in vars(spring).items() if k != "joint"}
@@ -202,11 +186,11 @@ def _in_joint(
     effect: str,
     injected: InjectedFaults,
     joint: str,
-    laws: list[JointLaw],
+    choice: list[laws.JointLaw],
     rng: np.random.Generator,
 ) -> DrawnEffect:
     """One of some laws at a joint, with its own numbers and its class as parameters."""
-    law = laws[int(rng.integers(len(laws)))]
+    law = choice[int(rng.integers(len(choice)))]
     numbers: Parameters = {k: float(v) for k, v in vars(law).items()}
     change = replace(injected, ports=(*injected.ports, Port(law, joint=joint)))
     return DrawnEffect(effect, joint, {**numbers, "law": type(law).__name__}, change)
@@ -221,12 +205,12 @@ def nonlinear_stiffness(
     share = log_uniform(rng, 0.6, 2.0) if hardens else rng.uniform(0.3, 0.6)
     change = scene.size * stiffness * share
     knee, sign = angle * log_uniform(rng, 0.2, 1.0), 1.0 if hardens else -1.0
-    laws: list[JointLaw] = [
-        Hardening(sign * change, knee),
-        HarmonicDrive(sign * change / 2, knee, knee * rng.uniform(1.5, 3.0)),
-        AmplitudeSoftening(-sign * change, knee),
+    choice: list[laws.JointLaw] = [
+        laws.Hardening(sign * change, knee),
+        laws.HarmonicDrive(sign * change / 2, knee, knee * rng.uniform(1.5, 3.0)),
+        laws.AmplitudeSoftening(-sign * change, knee),
     ]
-    return _in_joint("nonlinear_stiffness", injected, joint, laws, rng)
+    return _in_joint("nonlinear_stiffness", injected, joint, choice, rng)
 
 
 def friction(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) -> DrawnEffect:
@@ -236,13 +220,13 @@ def friction(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) -
     coulomb = stiffness * angle * log_uniform(rng, 0.05, 0.4)
     speed = 2 * np.pi * REFERENCE_HZ * angle
     stribeck, stiction = speed * log_uniform(rng, 0.05, 0.5), coulomb * rng.uniform(1.1, 1.6)
-    laws: list[JointLaw] = [
-        Friction(stiffness, coulomb),
-        BoucWen(stiffness, coulomb),
-        Iwan(stiffness, coulomb),
-        LuGre(stiffness, coulomb, float(stiction), stribeck, 0.02 * coulomb / speed),
+    choice: list[laws.JointLaw] = [
+        laws.Friction(stiffness, coulomb),
+        laws.BoucWen(stiffness, coulomb),
+        laws.Iwan(stiffness, coulomb),
+        laws.LuGre(stiffness, coulomb, float(stiction), stribeck, 0.02 * coulomb / speed),
     ]
-    return _in_joint("friction", injected, joint, laws, rng)
+    return _in_joint("friction", injected, joint, choice, rng)
 
 
 def backlash(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) -> DrawnEffect:
@@ -251,8 +235,11 @@ def backlash(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) -
     stiffness = float(scene.size * stiffness * rng.uniform(0.4, 0.8))
     gap = angle * log_uniform(rng, 0.1, 0.5)
     damping = stiffness / (2 * np.pi * REFERENCE_HZ * angle) * log_uniform(rng, 0.02, 0.2)
-    laws: list[JointLaw] = [Backlash(stiffness, gap), ImpactDamping(stiffness, gap, damping)]
-    return _in_joint("backlash", injected, joint, laws, rng)
+    choice: list[laws.JointLaw] = [
+        laws.Backlash(stiffness, gap),
+        laws.ImpactDamping(stiffness, gap, damping),
+    ]
+    return _in_joint("backlash", injected, joint, choice, rng)
 
 
 def drift(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) -> DrawnEffect:

@@ -1,6 +1,6 @@
 """A robot with something concealed, the sensor that listens to it, and the hits on it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,34 +12,20 @@ from planner.truth.measurement_errors import HitError, MeasuringChain
 from planner.truth.model import Truth
 from planner.truth.nonlinear import HitPose, Port, respond
 
-
-@dataclass(frozen=True)
-class StiffnessDrift:
-    """All stiffnesses times 1 + change · course(progress), progress 0 to 1 over the campaign.
-
-    course: "linear", "warming" (1 - exp(-4 p), nearly done at the end) or "step" (at half).
-    """
-
-    change: float
-    course: str = "linear"
-
-    def factor(self, progress: float) -> float:
-        """The factor at a time of the campaign."""
-        courses = {
-            "linear": progress,
-            "warming": 1 - np.exp(-4 * progress),
-            "step": float(progress >= 0.5),
-        }
-        return float(1 + self.change * courses[self.course])
-
-    def applied(self, truth: Truth, progress: float) -> Truth:
-        """The robot at a time of the campaign."""
-        return truth.changed(self.factor(progress))
+# How far a drift has come, of progress 0 to 1 over the campaign.
+COURSES: dict[str, Callable[[float], float]] = {
+    "linear": lambda progress: progress,
+    "warming": lambda progress: 1 - np.exp(-4 * progress),  # nearly done at the end
+    "step": lambda progress: float(progress >= 0.5),
+}
 
 
 @dataclass(frozen=True)
 class JointDrift:
-    """Stiffnesses that warm up or settle joint by joint: (joint, change, course) of each."""
+    """Stiffnesses that warm up or settle joint by joint: (joint, change, course) of each.
+
+    They are multiplied by 1 + change · course(progress), by one of COURSES; joint "": every spring.
+    """
 
     joints: tuple[tuple[str, float, str], ...]
 
@@ -47,8 +33,8 @@ class JointDrift:
         """The robot at a time of the campaign."""
         factors = np.ones(len(truth.springs))
         for joint, change, course in self.joints:
-            factor = StiffnessDrift(change, course).factor(progress)
-            factors[[s.joint == joint for s in truth.springs]] *= factor
+            own = [joint in ("", spring.joint) for spring in truth.springs]
+            factors[own] *= 1 + change * COURSES[course](progress)
         return truth.changed(factors)
 
 
@@ -118,7 +104,7 @@ class InjectedFaults:
 
     deviation: Deviation
     ports: tuple[Port, ...] = ()
-    drift: StiffnessDrift | JointDrift | DampingScatter | None = None
+    drift: JointDrift | DampingScatter | None = None
     load: LoadChange | None = None
     tone: Tone | None = None
     artefact: Artefact = field(default_factory=Artefact)
@@ -261,10 +247,9 @@ def frfs(
     visits: Sequence[HitVisit],
     hammer: Hammer,
     band_hz: tuple[float, float],
-    seed: int = 0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (F,) in Hz and FRFs (visit, 3, 3, F) in m/s²/N of visits from `once`."""
-    recorded = hit_poses(truth, injected, visits, hammer, np.random.default_rng(seed))
+    recorded = hit_poses(truth, injected, visits, hammer, np.random.default_rng(0))
     n = recorded[0][0].force_n.size
     frequency = np.fft.rfftfreq(n, 1 / hammer.sampling_rate_hz)
     used = (frequency >= band_hz[0]) & (frequency <= band_hz[1])

@@ -5,39 +5,17 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from scipy import signal
+
+from planner.truth.model import Truth
 
 OVERSAMPLING = 16  # time steps of the solution per sample of the analyser
 AXES = ("x", "y", "z")
 LEAST_HZ = 0.2  # below which 1/f noise grows no more
 FULL_SCALE = 4.0  # of a converter over what comes
 FLOOR_DAMPING = 0.3  # ratio, of a floor's first mode with machines on it; chosen
-
-
-class TrueRobot(Protocol):
-    """What can be hit. `model.Truth` is the linear one; one with friction or backlash fits too."""
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        """Actuated joints in order."""
-        ...
-
-    @property
-    def slides(self) -> tuple[bool, ...]:
-        """Which joints slide (m) and do not turn (rad); none where it is empty."""
-        ...
-
-    @property
-    def description(self) -> str:
-        """Engine and seed, for the header of every file."""
-        ...
-
-    def respond(self, q: np.ndarray, force_n: np.ndarray, axis: int, step_s: float) -> np.ndarray:
-        """Accelerations (3, n) of the sensor, from rest, to a force (n,) along tcp axis 0..2."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -82,7 +60,7 @@ class SimulatedHit:
 
 
 def simulate_hit(
-    truth: TrueRobot, q: np.ndarray, axis: str, hammer: Hammer, rng: np.random.Generator
+    truth: Truth, q: np.ndarray, axis: str, hammer: Hammer, rng: np.random.Generator
 ) -> SimulatedHit:
     """One hit at pose q (rad) along a signed axis of the tcp frame ("+x")."""
     force = pulse(hammer, rng)
@@ -227,7 +205,7 @@ def write_uff(
 
 
 def record_poses(
-    truth: TrueRobot,
+    truth: Truth,
     poses: Sequence[tuple[str, np.ndarray]],
     folder: Path,
     hits: Sequence[str] = ("+x", "+y", "+z"),

@@ -1,6 +1,6 @@
 """Small unlisted imperfections: no robot is quite what its simulation has, with nothing wrong."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,18 +23,13 @@ BEAM = 30.0, 100.0  # stiffness of a link as a beam over that of its joint
 COMPENSATOR = 0.005, 0.03  # of joint 2's stiffness
 
 
-@dataclass(frozen=True)
-class Imperfect:
-    """A robot with imperfections, and the names by which a diagnosis could rightly call them."""
-
-    injected: InjectedFaults
-    places: tuple[tuple[str, str], ...]
-
-
-def imperfect(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) -> Imperfect:
+def imperfect(
+    scene: Scene, injected: InjectedFaults, rng: np.random.Generator
+) -> tuple[InjectedFaults, tuple[tuple[str, str], ...]]:
     """Each joint a little nonlinear, rippled, drifting and soft across; links, hoses, a gas spring.
 
-    Damping is partly viscous, partly a loss factor, by a share of each gear's own.
+    Damping is partly viscous, partly a loss factor, by a share of each gear's own. With it the
+    names (effect, place) by which a diagnosis could rightly call them.
     """
     common = log_uniform(rng, *SOFT) if rng.random() < SOFT_SHARE else 1.0
     injected = replace(injected, deviation=replace(injected.deviation, common=common, mixed=1.0))
@@ -56,7 +51,7 @@ def imperfect(scene: Scene, injected: InjectedFaults, rng: np.random.Generator) 
     beam = BentLink(f"link_{number}", bending, twist, scene.arm.damping_s)
     injected = deviate(injected, beams=(beam,), compensators=(gas_spring(scene, COMPENSATOR, rng),))
     places += [("link_flexibility", beam.link), ("angle_dependent_stiffness", "joint_2")]
-    return Imperfect(injected, tuple(dict.fromkeys(places)))
+    return injected, tuple(dict.fromkeys(places))
 
 
 def _joint(

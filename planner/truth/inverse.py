@@ -27,15 +27,14 @@ def joint_angles(
     rotation: np.ndarray,
     position_m: np.ndarray,
     start: np.ndarray,
-    lower_rad: np.ndarray | None = None,
     upper_rad: np.ndarray | None = None,
 ) -> np.ndarray | None:
     """Angles (dof,) in rad that bring the tcp to `rotation` (3, 3), `position_m` (3,), or None.
 
-    Damped least squares from `start`, kept between bounds (default: the joint limits), which
-    can be narrowed to hold on to one branch of solutions.
+    Damped least squares from `start`, kept between the joint limits, of which the upper ones can be
+    narrowed to hold on to one branch of solutions.
     """
-    lower = truth.lower_rad if lower_rad is None else lower_rad
+    lower = truth.lower_rad
     upper = truth.upper_rad if upper_rad is None else upper_rad
     q = np.clip(np.asarray(start, dtype=float), lower, upper)
     error = np.full(6, np.inf)

@@ -51,6 +51,12 @@ class Elastic(OneState, ABC):
         return self.at(now), state
 
 
+def _slid(state: np.ndarray, way: np.ndarray, limit: Any) -> np.ndarray:
+    """Deflection of bristles after a way, which tends to ± limit."""
+    end = np.sign(way) * limit
+    return end + (state - end) * np.exp(-np.abs(way) / limit)
+
+
 def stacked(laws: Sequence[JointLaw]) -> JointLaw:
     """Laws of one class as one law of arrays (laws, hits), one row each."""
     kind: Any = type(laws[0])
@@ -110,10 +116,7 @@ class Friction(OneState):
         return 2 * self.stiffness
 
     def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
-        limit = self.coulomb / self.stiffness
-        way = now - before
-        end = np.sign(way) * limit
-        after = end + (state - end) * np.exp(-np.abs(way) / limit)
+        after = _slid(state, now - before, self.coulomb / self.stiffness)
         return self.stiffness * after, after
 
 
@@ -246,12 +249,10 @@ class LuGre(OneState):
         return 2 * self.stiffness + self.viscous / step_s
 
     def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
-        way = now - before
-        speed = way / step_s
+        speed = (now - before) / step_s
         drop = np.exp(-((speed / self.stribeck) ** 2))
         limit = (self.coulomb + (self.stiction - self.coulomb) * drop) / self.stiffness
-        end = np.sign(way) * limit
-        after = end + (state - end) * np.exp(-np.abs(way) / limit)
+        after = _slid(state, now - before, limit)
         return self.stiffness * after + self.viscous * speed, after
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from planner.truth.deviation import triple
 from planner.truth.hits import Hammer, SimulatedHit, largest_rms
 
 RUMBLE_HZ = 2.0, 8.0  # where a workshop's floor vibrates most; chosen
@@ -88,10 +89,10 @@ class MeasurementErrors:
         turn = Rotation.from_rotvec(np.deg2rad(self.mounting_deg) * rng.standard_normal(3))
         cross = self.cross_axis * rng.standard_normal((3, 3)) * (1 - np.eye(3))
         matrix = (np.diag(1 + self.gain * rng.standard_normal(3)) + cross) @ turn.as_matrix()
-        x, y, z = self.position_m * rng.standard_normal(3)
+        place = triple(self.position_m * rng.standard_normal(3))
         force = 1 + self.force_gain * float(rng.standard_normal())
         delay = abs(self.delay_s * float(rng.standard_normal()))
-        return MeasuringChain(matrix, (float(x), float(y), float(z)), force, delay)
+        return MeasuringChain(matrix, place, force, delay)
 
     def floor(
         self, hammer: Hammer, hits: Sequence[SimulatedHit], rng: np.random.Generator

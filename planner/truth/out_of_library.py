@@ -8,14 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.truth.deviation import (
-    AttachedResonator,
-    Bridge,
-    Feedback,
-    ServoLoop,
-    Spring,
-    StiffnessRipple,
-)
+from planner.truth import deviation
 from planner.truth.fault_injection import InjectedFaults, Tone
 from planner.truth.laws import Backlash, Contact, QuadraticDamping, Stops
 from planner.truth.nonlinear import Port
@@ -114,7 +107,7 @@ def nonreciprocal_feedback(
     driven, sensed = (f"joint_{i}" for i in rng.choice([1, 2, 3], 2, replace=False))
     size = float(np.sqrt(scene.stiffness(driven) * scene.stiffness(sensed)))
     gain = float(scene.size * size * rng.uniform(0.25, 0.6) * rng.choice([-1, 1]))
-    change = deviate(injected, feedback=(Feedback(driven, sensed, gain),))
+    change = deviate(injected, feedback=(deviation.Feedback(driven, sensed, gain),))
     return _unknown("nonreciprocal_feedback", change, driven=driven, sensed=sensed, gain=gain)
 
 
@@ -145,7 +138,7 @@ def bridging_cable(scene: Scene, injected: InjectedFaults, rng: np.random.Genera
     )
     stiffness = scene.size * log_uniform(rng, 0.5, 3.0) / scene.compliance(one - other)
     damping = scene.arm.damping_s * stiffness
-    bridge = Bridge(links, places, triple(direction), stiffness, damping)
+    bridge = deviation.Bridge(links, places, triple(direction), stiffness, damping)
     change = deviate(injected, bridges=(bridge,))
     return _unknown("bridging_cable", change, links=" ".join(links), stiffness=stiffness)
 
@@ -155,7 +148,7 @@ def rattling_part(scene: Scene, injected: InjectedFaults, rng: np.random.Generat
     number, (low, _) = scene.some_link(rng), scene.band_of_modes
     mass = scene.size * scene.moving_kg * log_uniform(rng, 0.01, 0.05)
     place = triple(rng.uniform(0.3, 1.0) * scene.length(number))
-    part = AttachedResonator(
+    part = deviation.AttachedResonator(
         f"link_{number}", place, triple(some_direction(rng)), mass, 0.3 * low, 0.1
     )
     stops = Stops(mass * (2 * np.pi * 3 * low) ** 2, log_uniform(rng, 1e-5, 2e-4))
@@ -179,7 +172,7 @@ def servo_loop(scene: Scene, injected: InjectedFaults, rng: np.random.Generator)
     """A drive's controller gives way slowly and holds against fast motion: a relaxing joint."""
     joint = some_joint(scene, rng, 3)
     share = scene.size * log_uniform(rng, 0.3, 1.5)
-    loop = ServoLoop(joint, share, log_uniform(rng, 3.0, 30.0))
+    loop = deviation.ServoLoop(joint, share, log_uniform(rng, 3.0, 30.0))
     return _unknown("servo_loop", deviate(injected, servos=(loop,)), joint=joint, share=share)
 
 
@@ -188,7 +181,9 @@ def loose_anchor(scene: Scene, injected: InjectedFaults, rng: np.random.Generato
     stiffness = scene.stiffness("joint_2") * log_uniform(rng, 2.0, 6.0) / scene.size
     x, y, z = np.append(some_direction(rng)[:2], 0.0)
     size = float(np.hypot(x, y))
-    tilt = Spring("base", (x / size, y / size, z), stiffness, scene.arm.damping_s * stiffness)
+    tilt = deviation.Spring(
+        "base", (x / size, y / size, z), stiffness, scene.arm.damping_s * stiffness
+    )
     change = deviate(injected, extra=(tilt,))
     gap = 0.3 * scene.angle("joint_2") * scene.stiffness("joint_2") / stiffness
     law = Backlash(stiffness * rng.uniform(0.4, 0.8), gap * log_uniform(rng, 0.3, 1.5))
@@ -216,7 +211,7 @@ def coupled_stiffness(
     """One joint's stiffness goes with another's angle, as of a belt or a coupled wrist."""
     driven, by = (str(joint) for joint in rng.choice(scene.joints[:5], 2, replace=False))
     cosine, sine = scene.ripple(rng)
-    wave = StiffnessRipple(driven, int(rng.integers(1, 4)), cosine, sine, by)
+    wave = deviation.StiffnessRipple(driven, int(rng.integers(1, 4)), cosine, sine, by)
     size = float(np.hypot(cosine, sine))
     change = deviate(injected, harmonics=(wave,))
     return _unknown("coupled_stiffness", change, joint=driven, by=by, size=size)

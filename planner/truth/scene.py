@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from planner.truth.arms import Arm
-from planner.truth.deviation import Spring
+from planner.truth.deviation import Spring, triple
 from planner.truth.fault_injection import InjectedFaults
 from planner.truth.model import Truth
 
@@ -106,12 +106,6 @@ def _swing(scene: Scene, joint: str, q: np.ndarray) -> float:
     residues = (scene.truth.own(joint) @ shapes)[:, None] * (entry @ hit.T)
     impulse = 0.6 * scene.peak_n * PULSE_S
     return float(np.max(np.sum(np.abs(residues[poles.imag > 0]), axis=0)) * 2 * impulse)
-
-
-def triple(values: np.ndarray) -> tuple[float, float, float]:
-    """The numbers of a vector (3,)."""
-    x, y, z = (float(v) for v in values)
-    return x, y, z
 
 
 def some_direction(rng: np.random.Generator) -> np.ndarray:

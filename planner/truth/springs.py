@@ -11,13 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.truth.deviation import (
-    AttachedResonator,
-    BentLink,
-    Compensator,
-    Deviation,
-    Spring,
-)
+from planner.truth.deviation import BentLink, Compensator, Deviation, Spring, triple
 
 STATED = ("stiffness", "n_m"), ("damping", "n_s_m")  # entries of a shift, with their units
 
@@ -75,7 +69,11 @@ def springs(
         for i, s in zip(gears, mixed([scattered[i] for i in gears], deviation), strict=True):
             scattered[i] = s
     bent = [s for beam in deviation.beams for s in _beam(beam, root)]
-    small = [_small(r, i) for i, r in enumerate(deviation.resonators)]
+    small = []
+    for i, r in enumerate(deviation.resonators):
+        w = 2 * np.pi * r.frequency_hz
+        k, c = r.mass_kg * w**2, 2 * r.damping_ratio * r.mass_kg * w
+        small.append(Spring(f"resonator {i}", r.direction, k, c, slide=True))
     found = (*scattered, *deviation.extra, *bent, *small)
     own = {s.joint: i for i, s in reversed(list(enumerate(found))) if _parallel(s, own_axes)}
     own |= {f"extra {k}": len(nominal) + k for k in range(len(deviation.extra))}
@@ -133,12 +131,6 @@ def _times(spring: Spring, factor: float) -> Spring:
     return replace(spring, stiffness=factor * spring.stiffness, damping=factor * spring.damping)
 
 
-def _small(small: AttachedResonator, number: int) -> Spring:
-    w = 2 * np.pi * small.frequency_hz
-    damping = 2 * small.damping_ratio * small.mass_kg * w
-    return Spring(f"resonator {number}", small.direction, small.mass_kg * w**2, damping, slide=True)
-
-
 def across(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Two unit vectors normal to one."""
     along = along / np.linalg.norm(along)
@@ -164,10 +156,8 @@ def _beam(beam: BentLink, root: ElementTree.Element) -> list[Spring]:
     found = []
     for element in range(beam.elements):
         for axis, whole in zip(axes, (*beam.bending, beam.torsion), strict=True):
-            x, y, z = (float(v) for v in axis)
-            k = whole * beam.elements
-            name = f"{beam.link} element {element}"
-            found.append(Spring(name, (x, y, z), k, beam.damping_s * k))
+            k, name = whole * beam.elements, f"{beam.link} element {element}"
+            found.append(Spring(name, triple(axis), k, beam.damping_s * k))
     return found
 
 

@@ -6,17 +6,17 @@ Theory of Matrix Structural Analysis, 1968) with lumped-free consistent masses, 
 together with the machine's matrices and solved line by line. A node has (x, θy, y, θx).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from scipy.signal import find_peaks
 
-from planner.milling.beam import Segment, ToolMaterial
+from planner.milling.beam import Segment, ToolContact, ToolMaterial
 from planner.milling.coupling import TipReceptance, couple
 from planner.milling.cutter_frf import CutterFrf
 from planner.milling.tip_files import two_point_receptance
-from planner.milling.tool import Point, Tool, ToolContact, ToolPart
+from planner.milling.tool import Point, Tool
 
 E, RHO, NU, LOSS = 5.4e11, 14500.0, 0.25, 0.001
 SHEAR = 6 * (1 + NU) / (7 + 6 * NU)
@@ -145,9 +145,9 @@ KEPT = np.ix_([0, 1, 3, 4], [0, 1, 3, 4])
 
 
 def tool(pieces, contact=None):
-    parts = [ToolPart(Segment(length, d, d, CARBIDE)) for length, d, _ in pieces]
+    parts = [Segment(length, d, d, CARBIDE) for length, d, _ in pieces]
     if contact is not None:
-        parts[0] = ToolPart(parts[0].segment, ToolContact(*contact))
+        parts[0] = replace(parts[0], contact=ToolContact(*contact))
     return Tool("a rod", (0.0, 0.0, 1.0), tuple(parts))
 
 

@@ -118,7 +118,7 @@ def simulate(
     kt, kr = cut.kt_n_m2, cut.kr_n_m2
     push = np.stack([-kt * np.cos(phi) - kr * np.sin(phi), kt * np.sin(phi) - kr * np.cos(phi)], -1)
     random = np.random.default_rng(seed)
-    shown = modes.shapes * modes.weight[:, None]  # (k, 2)
+    shown = 2 * modes.shapes  # (k, 2)
     z = np.repeat(random.standard_normal((1, len(modes.poles), 2)) @ [1, 1j], len(step), axis=0)
     z *= DISTURBED / np.abs(shown).max(axis=1)
     surface = np.zeros((cut.teeth, count, len(step)))

@@ -14,7 +14,7 @@ from planner.milling.beam import Segment, ToolMaterial
 from planner.milling.coupling import couple
 from planner.milling.cutter_frf import CutterFrf
 from planner.milling.tip_files import completed
-from planner.milling.tool import Tool, ToolPart
+from planner.milling.tool import Tool
 from planner.robot.config import Payload
 from planner.robot.robot import Robot
 
@@ -22,7 +22,7 @@ ROBOT = Path(__file__).parents[2] / "campaigns" / "kr240_plane" / "robot" / "rob
 FREQUENCY = np.arange(4.0, 60.0, 0.5)
 Q = np.deg2rad([14.0, -95.0, 100.0, 10.0, -40.0, 20.0])
 ROD = Segment(0.25, 0.06, 0.06, ToolMaterial(2e16, 7850.0, 0.3))  # as good as rigid
-TOOL = Tool("a rod", (0.0, 0.0, 1.0), (ToolPart(ROD),))
+TOOL = Tool("a rod", (0.0, 0.0, 1.0), (ROD,))
 
 
 @pytest.fixture(scope="module")

@@ -36,7 +36,7 @@ def written(path, text):
 
 def test_a_tool_as_stated(tmp_path):
     tool = load_tool(written(tmp_path, GOOD))
-    shank, flutes = (part.segment for part in tool.parts)
+    shank, flutes = tool.parts
     assert tool.length == pytest.approx(0.07)
     assert tool.axis == (0.0, 0.0, 1.0)
     assert flutes.diameter == pytest.approx(0.016)  # Kops and Vo's 80 %

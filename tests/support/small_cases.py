@@ -16,13 +16,7 @@ from planner.truth.deviation import (
     Spring,
     StiffnessRipple,
 )
-from planner.truth.fault_injection import (
-    Artefact,
-    HitVisit,
-    InjectedFaults,
-    StiffnessDrift,
-    hit_poses,
-)
+from planner.truth.fault_injection import Artefact, HitVisit, InjectedFaults, JointDrift, hit_poses
 from planner.truth.hits import Hammer, write_predict, write_recordings
 from planner.truth.load import load_truth
 from planner.truth.measurement_errors import LABORATORY, MeasurementErrors
@@ -39,6 +33,7 @@ SOFT = tuple(
 )
 TURNED = Rotation.from_euler("zyx", [15.0, -10.0, 5.0], degrees=True).as_matrix()
 GAIN, WINDOW_S, HOSE_HZ, HOSE_KG, MASS_KG = 0.7, 0.5, 21.0, 3.0, 25.0
+DRIFT = JointDrift((("", -0.15, "linear"),))
 
 
 @dataclass(frozen=True)
@@ -79,7 +74,7 @@ CONCEALED = {
     "polarity": _artefact("polarity", "sensor_z", gain=(1.0, 1.0, -1.0)),
     "gain": _artefact("sensor_gain", "sensor_y", gain=(1.0, GAIN, 1.0)),
     "window": _artefact("exponential_window", "sensor", window_s=WINDOW_S),
-    "drift": Concealed((("drift", "campaign"),), rest={"drift": StiffnessDrift(-0.15)}),
+    "drift": Concealed((("drift", "campaign"),), rest={"drift": DRIFT}),
     "angle": Concealed(
         (("angle_dependent_stiffness", "joint_2"),),
         {"harmonics": (StiffnessRipple("a2", 2, 0.35, 0.2),)},

@@ -48,7 +48,7 @@ def test_both_engines_are_one_robot_whatever_it_lacks(tmp_path, name):
     arm = replace(ARMS["irb6640"], damping_s=DAMPING_S)
     path, plain = arm.write(tmp_path), InjectedFaults(replace(SCATTER, seed=4))
     scene, rng = Scene(arm, load_truth(path), 1, arm.poses(2), 1e3), np.random.default_rng(2)
-    injected = TABLE[name](scene, imperfect(scene, plain, rng).injected, rng).injected
+    injected = TABLE[name](scene, imperfect(scene, plain, rng)[0], rng).injected
     one, other = (load_truth(path, injected.deviation, engine) for engine in ("mujoco", "tree"))
     same(one, other, scene.poses[1])
     same(one.loaded("spindle", 1.4), other.loaded("spindle", 1.4), scene.poses[1])

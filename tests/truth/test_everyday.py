@@ -28,7 +28,7 @@ def scene_of(robot: str, folder, seed: int = 1):
     arm = replace(ARMS[robot], damping_s=DAMPING_S)
     path, plain = arm.write(folder), InjectedFaults(replace(SCATTER, seed=seed))
     scene = Scene(arm, load_truth(path, plain.deviation), 1, arm.poses(3), PEAK_N[robot])
-    injected = imperfect(scene, plain, np.random.default_rng(seed)).injected
+    injected, _ = imperfect(scene, plain, np.random.default_rng(seed))
     return replace(scene, truth=load_truth(path, injected.deviation)), injected, path
 
 
@@ -112,7 +112,7 @@ def test_a_case_says_what_it_should_and_hides_the_rest(tmp_path, monkeypatch):
     [effect] = made.concealed
     assert effect.effect == "friction"
     assert effect.parameters["law"] in ("Friction", "BoucWen", "Iwan", "LuGre")
-    assert 0.03 <= effect.parameters["size"] <= 1
+    assert 0.03 <= effect.size <= 1
     assert ("drift", "campaign") in made.imperfections
     text = b"".join(p.read_bytes() for p in tmp_path.rglob("*") if p.is_file())
     assert not [w for w in (b"friction", b"rumble", b"nats", b"MuJoCo") if w in text]

@@ -18,7 +18,7 @@ from planner.truth.fault_injection import (
     Artefact,
     HitVisit,
     InjectedFaults,
-    StiffnessDrift,
+    JointDrift,
     Tone,
     frfs,
     hit_poses,
@@ -165,10 +165,11 @@ def test_an_uncorrected_window_adds_the_same_decay_to_every_mode(path):
 def test_drift_follows_its_course(path):
     truth = load_truth(path)
     for course, expected in (("linear", 0.85), ("step", 0.7), ("warming", 1 - 0.3 * 0.8646647)):
-        drift = StiffnessDrift(-0.3, course)
-        assert drift.factor(0.0) == 1.0
-        assert drift.factor(0.5) == pytest.approx(expected)
-    injected = InjectedFaults(Deviation(), drift=StiffnessDrift(-0.3))
+        drift = JointDrift((("", -0.3, course),))
+        factors = (drift.applied(truth, p).springs[0].stiffness for p in (0.0, 0.5))
+        ratios = [factor / truth.springs[0].stiffness for factor in factors]
+        assert ratios == pytest.approx([1.0, expected])
+    injected = InjectedFaults(Deviation(), drift=JointDrift((("", -0.3, "linear"),)))
     visits = [once(Q, 1e3), once(Q, 1e3, 1.0)]
     start, end = frfs(truth, injected, visits, QUIET, BAND)[1]
     assert start == pytest.approx(measured(truth), rel=0.02, abs=1e-4)
