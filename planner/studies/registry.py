@@ -18,6 +18,7 @@ FOLDERS = {
     "birk2025": "kr10_birk2025",
 }
 NAMES = tuple(FOLDERS)
+PACKAGE = "planner_study_"  # and the name, as which a study's files are loaded
 ALL = "all"
 ALIASES = {f"seed-00{i}": name for i, name in enumerate(NAMES)}  # what they were called before
 NEEDED = "mujoco"  # makes the recordings, as `planner.truth` has it
@@ -46,7 +47,7 @@ def load(name: str) -> ModuleType:
 
     It has RULES, and `study(progress, small)`, which gives a `Report`.
     """
-    package, folder = f"planner_study_{name}", folder_of(name)
+    package, folder = f"{PACKAGE}{name}", folder_of(name)
     if package not in sys.modules:
         spec = spec_from_file_location(
             package, folder / "study.py", submodule_search_locations=[str(folder)]

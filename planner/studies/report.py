@@ -1,19 +1,23 @@
 """What a study answers: tables, pictures and judged claims; its answer as JSON, text and files."""
 
+import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+import cloudpickle
 import msgspec
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from planner.progress import ProgressCallback, part_of
+from planner.inference.parallel import parallel_map
+from planner.progress import ProgressCallback, no_progress, part_of
 from planner.report.answer import Answer
 from planner.report.text import table
+from planner.studies import registry
 from planner.studies.claims import COLUMNS, HOLDS, IN_KIND, NOT, UNTESTED, PaperClaim
 
 if TYPE_CHECKING:
@@ -149,9 +153,30 @@ def shown_cell(value: Cell) -> str:
 def on_each(
     seeds: Sequence[int], run: Callable[[int, ProgressCallback], R], progress: ProgressCallback
 ) -> list[R]:
-    """What `run` gives of the robot of every seed, one after the other."""
-    parts = (part_of(progress, i / len(seeds), (i + 1) / len(seeds)) for i in range(len(seeds)))
-    return [run(seed, part) for seed, part in zip(seeds, parts, strict=True)]
+    """What a study's `run` gives of the robot of every seed, on two cores."""
+    return parallel_map(_RobotRun(run, len(seeds), progress), list(enumerate(seeds)))
+
+
+@dataclass(frozen=True)
+class _RobotRun(Generic[R]):
+    """`run` of one robot of several, here or in another process, which loads the study first."""
+
+    run: Callable[[int, ProgressCallback], R]
+    count: int
+    progress: ProgressCallback
+
+    def __call__(self, robot: tuple[int, int]) -> R:
+        number, seed = robot
+        part = part_of(self.progress, number / self.count, (number + 1) / self.count)
+        return self.run(seed, part)
+
+    def __reduce__(self) -> tuple[Callable, tuple]:
+        return _of_study, (self.run.__module__, cloudpickle.dumps(self.run), self.count)
+
+
+def _of_study(module: str, run: bytes, count: int) -> _RobotRun:
+    registry.load(module.partition(".")[0].removeprefix(registry.PACKAGE))
+    return _RobotRun(pickle.loads(run), count, no_progress)
 
 
 def r_squared(predicted: np.ndarray, measured: np.ndarray, axis: int | None = None) -> np.ndarray:

@@ -253,7 +253,7 @@ def test_the_diagnosis_runs_beside_the_session_and_is_said_when_it_is_through(
 
     campaign, _, inbox = cell
     monkeypatch.setattr("planner.session.diagnosis_process.diagnose_measured", diagnose)
-    monkeypatch.setattr("planner.session.watch.LEAST", 1)
+    monkeypatch.setattr("planner.session.key_commands.LEAST", 1)
     said = ""
     for number in range(2):
         deliver(campaign.next()[0], number)
