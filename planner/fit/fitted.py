@@ -8,7 +8,8 @@ import numpy as np
 
 from planner.effects.effect import Operator
 from planner.fit.gauss_newton import minimised
-from planner.fit.misfit import At, FrfMisfit
+from planner.fit.linearised import At
+from planner.fit.misfit import FrfMisfit
 from planner.fit.structure import RobotStructure
 
 SIZES = (0.004, 0.008, 0.015, 0.03, 0.06, 0.12, 0.3)  # of the discrepancy: no robot is linear

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from planner.fit.misfit import At, FrfMisfit
+from planner.fit.linearised import At
+from planner.fit.misfit import FrfMisfit
 
 GOOD, GROWTH, MOST_REJECTED, MOST_DAMPED = 0.5, 3.0, 8, 1e9
 SOFTER, STIFFER = 6.0, 0.8  # of a new spring's step, in shares of its compliance

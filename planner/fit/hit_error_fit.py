@@ -12,7 +12,7 @@ import numpy as np
 from planner.dataset.hit_columns import HitColumns
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import solve_poles
-from planner.fit.misfit import At
+from planner.fit.linearised import At
 from planner.fit.posterior import RobotPosterior
 from planner.measurement.nuisances import AIM, OF_HIT, Tolerances, hit_basis
 from planner.modal.residues import Lines, laplace, unit

@@ -17,6 +17,7 @@ from planner.dynamics.motion import Motion
 from planner.effects.effect import Gain, Motions
 from planner.fit.data import FrfData, among
 from planner.fit.inertias import spatial
+from planner.fit.linearised import Around, At, Eliminated
 from planner.fit.structure import REACH, RobotStructure
 from planner.measurement.nuisances import NuisanceCounts, Tolerances, actual_ports, basis
 from planner.robot.elastic_model import Matrices
@@ -30,54 +31,6 @@ FARTHEST = 4.0  # sds of what hits, readback and visits are linearised about
 NOTHING = 1e-9  # of an FRF's size, that has no logarithm
 UNUSED = 1e4  # sds of what was not measured, in the size of FRFs
 JITTER = 1e-6  # of the discrepancy's variance, that each line has for itself
-
-
-@dataclass(frozen=True, eq=False)
-class At:
-    """A misfit at x: χ², half its gradient and the normal of the data (the bodies' barrier in it).
-
-    `own` (n, l) are the likeliest numbers of each pose, `volume` what eliminating them costs.
-    `precision` is the prior's.
-    """
-
-    x: np.ndarray
-    chi2: float
-    gradient: np.ndarray
-    normal: np.ndarray
-    precision: np.ndarray
-    volume: float
-    value: float
-    own: np.ndarray
-    motion: Motion
-    eliminated: "Eliminated | None" = None
-
-    @cached_property
-    def covariance(self) -> np.ndarray:
-        """(D, D) of x by Laplace's method."""
-        return np.linalg.inv(self.normal + self.precision)
-
-
-@dataclass(frozen=True, eq=False)
-class Eliminated:
-    """All columns (n, D + l + 1, N) in units of the noise, the residual last.
-
-    `inverses` (n, l, l) of the own numbers' Cholesky factors L, `onto` L⁻¹ times their rows of the
-    Gram matrix.
-    """
-
-    white: np.ndarray
-    inverses: np.ndarray
-    onto: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Around:
-    """The model at x: columns (n, D + l + 1, r, c, F) by x and own numbers, the residual last."""
-
-    x: np.ndarray
-    accelerance: np.ndarray
-    columns: np.ndarray
-    motion: Motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,7 +264,7 @@ class FrfMisfit:
         """At x, linearised about own numbers (n, l); those of springs count from 0."""
         return self.weighed(self.around(x, own), keep)
 
-    def around(self, x: np.ndarray, own: np.ndarray | None = None) -> "Around":
+    def around(self, x: np.ndarray, own: np.ndarray | None = None) -> Around:
         """What does not depend on the discrepancy's size."""
         numbers, joints = self.nuisance_counts
         size = numbers.hits + joints
@@ -328,7 +281,7 @@ class FrfMisfit:
         columns[:, -1] = off
         return Around(x, h, columns, motion)
 
-    def weighed(self, around: "Around", keep: bool = False) -> At:
+    def weighed(self, around: Around, keep: bool = False) -> At:
         """By noise and discrepancy."""
         white = self._white(around.columns, around.accelerance)
         return self._eliminated(around.x, white, keep, around.motion)
