@@ -120,6 +120,7 @@ def test_what_no_effect_describes_is_unexplained(tmp_path, monkeypatch, most):
     assert answer["where"]["bands_hz"]
 
 
+@pytest.mark.slow
 def test_the_robot_that_is_written_is_read_back_and_predicts(tmp_path):
     of = CONCEALED["soft base"]
     case, out = small_case(tmp_path, of, EVERYDAY), tmp_path / "found"

@@ -1,6 +1,6 @@
 """Joints that are not linear are named from hits of different force; linear robots are not.
 
-`pytest -m slow tests/diagnosis/test_levels.py` adds a robot and a joint that hardens.
+`pytest -m slow tests/diagnosis/test_levels.py` adds a robot, and joints that harden and soften.
 """
 
 from collections.abc import Callable
@@ -114,7 +114,13 @@ def test_a_linear_robot_is_proportional(tmp_path: Path, seed: int, levels: tuple
             ("stiffness_change", "angle"),
             marks=pytest.mark.slow,
         ),
-        ("softening", "joint_3", "nonlinear_stiffness", ("stiffness_change", "angle")),
+        pytest.param(
+            "softening",
+            "joint_3",
+            "nonlinear_stiffness",
+            ("stiffness_change", "angle"),
+            marks=pytest.mark.slow,
+        ),
         ("friction", "joint_2", "friction", ("presliding_stiffness", "coulomb_torque")),
         ("backlash", "joint_3", "backlash", ("lost_stiffness", "half_gap")),
     ],

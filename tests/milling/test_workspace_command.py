@@ -1,4 +1,7 @@
-"""`planner stability` of a campaign: over its workspace, along a program, with another tool."""
+"""`planner stability` of a campaign: over its workspace, along a program, with another tool.
+
+`pytest -m slow tests/milling/test_workspace_command.py` turns along a program with another tool.
+"""
 
 import json
 
@@ -97,6 +100,7 @@ def test_poses_that_chatter_outside_the_band_are_left_out_of_the_map(tmp_path, c
     )
 
 
+@pytest.mark.slow
 def test_a_program_with_turns_and_another_tool(cell, tmp_path, capsys):
     said = asked(cell, capsys, *WAY, "--turns", "--plot", tmp_path, "--rrd", tmp_path / "path.rrd")
     assert "/figures/path/0/whole_path__95___probability" in lines_of(tmp_path / "path.rrd")

@@ -1,4 +1,7 @@
-"""Hyperparameters are averaged: the few samples kept stand for the whole posterior."""
+"""Hyperparameters are averaged: the few samples kept stand for the whole posterior.
+
+`pytest -m slow tests/surrogate/test_averaging.py` takes more points.
+"""
 
 import numpy as np
 import pytest
@@ -61,7 +64,7 @@ def brute_force(training, samples=20000):
     return low(r) + mean, np.sqrt(second), 1 / np.sum(w**2), inside
 
 
-@pytest.mark.parametrize(("n", "seed"), [(3, 1), (6, 2)])
+@pytest.mark.parametrize(("n", "seed"), [(3, 1), pytest.param(6, 2, marks=pytest.mark.slow)])
 def test_few_samples_stand_for_twenty_thousand(n, seed):
     training = problem(n, seed)
     fitted = fit_ar1(training, (PRIOR,), (PRIOR,), np.zeros(1), 256, 32)

@@ -1,4 +1,7 @@
-"""Every model of `[surrogate] model` is held to one contract."""
+"""Every model of `[surrogate] model` is held to one contract.
+
+`pytest -m slow tests/surrogate/test_frequency_models.py` adds MFDGP.
+"""
 
 import pickle
 from functools import cache
@@ -20,7 +23,10 @@ from planner.surrogate.modal_surrogate import (
 
 POSES, MODES = 14, 2
 WITHOUT_GP = "none"
-every = pytest.mark.parametrize("name", MODELS)
+every = pytest.mark.parametrize(
+    "name",
+    [pytest.param(m, marks=pytest.mark.slow if m == "mfdgp" else ()) for m in MODELS],
+)
 
 
 def simulated(x: np.ndarray) -> SimulatedModes:

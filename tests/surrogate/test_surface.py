@@ -1,4 +1,7 @@
-"""FRF-level fusion on a surface whose simulation is off by a smooth factor; the GP over a grid."""
+"""FRF-level fusion on a surface whose simulation is off by a smooth factor; the GP over a grid.
+
+`pytest -m slow tests/surrogate/test_surface.py` adds MFDGP.
+"""
 
 import time
 
@@ -7,7 +10,7 @@ import pytest
 
 from planner.errors import InputError
 from planner.surrogate.kernels import parse
-from planner.surrogate.models.frf_surface import SURFACES, Grid, fit_grid, fit_surface
+from planner.surrogate.models.frf_surface import Grid, fit_grid, fit_surface
 from planner.surrogate.models.mfdgp import Training
 
 LINES, POSES = np.linspace(5, 30, 20), np.linspace(0, 1, 9)
@@ -26,7 +29,13 @@ def measured(lines, poses):
 
 
 @pytest.mark.parametrize(
-    ("model", "logarithm"), [*((model, False) for model in SURFACES), ("GP", True)]
+    ("model", "logarithm"),
+    [
+        ("GP", False),
+        ("NARGP", False),
+        pytest.param("MFDGP", False, marks=pytest.mark.slow),
+        ("GP", True),
+    ],
 )
 def test_between_measured_poses_the_surface_is_met(model, logarithm):
     seen, wanted = POSES[::2], POSES[1::2]

@@ -1,4 +1,7 @@
-"""Two engines that share no formula are one robot; robots drawn at random are sound."""
+"""Two engines that share no formula are one robot; robots drawn at random are sound.
+
+`pytest -m slow tests/truth/test_engines.py` makes a whole case twice.
+"""
 
 from dataclasses import replace
 
@@ -80,6 +83,7 @@ def test_robots_drawn_at_random_stand_and_have_modes_in_the_band(tmp_path, seed)
         assert np.all((damping > 0.002) & (damping < 0.2))
 
 
+@pytest.mark.slow
 def test_a_case_of_a_robot_drawn_at_random_is_whole_and_the_same_again(tmp_path, monkeypatch):
     monkeypatch.setattr(cases, "POSES", 2)
     monkeypatch.setattr(cases, "PREDICTED", 1)
