@@ -126,29 +126,44 @@ def _weighed(
     matters: float,
     q: np.ndarray,
 ) -> list[NamedEffect]:
-    gained = best.evidence - explored.plain.evidence
-    lines = np.linspace(*_band(best), LINES)
-    whole = RobotPosterior.of(best)
-    h = _physics(whole, q, lines)
-    found = []
-    for effect in (*added(best), *_beyond(best)):
-        fewer = _without(explored, best, effect)
-        if fewer is None:
-            nats, change = gained, 1.0
-        else:
-            nats = best.evidence - fewer.evidence
-            other = _physics(RobotPosterior.of(fewer), q, lines)
+    """Each effect's size where the rest is refitted without it, smallest first given up.
+
+    What is too small to count is gone when the others are weighed: two hoses that stand for one
+    would each hide how much the other matters.
+    """
+    gained, lines = best.evidence - explored.plain.evidence, np.linspace(*_band(best), LINES)
+
+    def weigh(fit: StructureFit, effect: Operator) -> tuple[NamedEffect, StructureFit | None]:
+        fewer = _without(explored, fit, effect)
+        nats, change = gained, 1.0
+        if fewer is not None:
+            h, other = (_physics(RobotPosterior.of(f), q, lines) for f in (fit, fewer))
+            nats = fit.evidence - fewer.evidence
             change = float(np.linalg.norm(np.abs(h) - np.abs(other)) / np.linalg.norm(h))
         probability = sum(w for key, w in weights.items() if effect.name in key)
-        if effect in built(best):
+        if effect in built(fit):
             probability = float(expit(nats - RARE))
-        # Its size is as well known as its amplitude is.
-        least = matters * (GENERAL if effect.general else 1.0)
-        sure = norm.cdf((change - least) / (change / np.sqrt(2 * max(nats, 1.0)) + 1e-12))
-        there = nats > max(LEAST, OF_ALL * gained if effect.general else 0.0)
-        counts = there and (effect.absorbed or sure >= SURE)
-        found.append(NamedEffect(effect, float(nats), change, float(probability), bool(counts)))
+        counts = _counts(effect, nats, change, matters, gained)
+        return NamedEffect(effect, float(nats), change, float(probability), counts), fewer
+
+    found, fit = [weigh(best, effect)[0] for effect in _beyond(best)], best
+    while added(fit):
+        each = sorted((weigh(fit, e) for e in added(fit)), key=lambda pair: pair[0].change)
+        slight = next(((e, fewer) for e, fewer in each if not e.counts and fewer), None)
+        if slight is None:
+            found += [effect for effect, _ in each]
+            break
+        effect, fit = slight
+        found.append(effect)
     return sorted(found, key=lambda e: -e.change)
+
+
+def _counts(effect: Operator, nats: float, change: float, matters: float, gained: float) -> bool:
+    """Whether it is there and matters; its size is as well known as its amplitude is."""
+    least = matters * (GENERAL if effect.general else 1.0)
+    sure = norm.cdf((change - least) / (change / np.sqrt(2 * max(nats, 1.0)) + 1e-12))
+    there = nats > max(LEAST, OF_ALL * gained if effect.general else 0.0)
+    return bool(there and (effect.absorbed or sure >= SURE))
 
 
 def _beyond(best: StructureFit) -> list[Operator]:
