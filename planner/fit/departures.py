@@ -90,10 +90,13 @@ def masses_text(structure: RobotStructure, x: np.ndarray) -> str:
     told = sorted(moved, key=lambda m: -abs(m.more_kg) / m.sd_kg)[:TOLD]
     if not told:
         return ""
+    # Cables and covers that are gone make a link lighter, a tool that nobody stated heavier.
+    more = any(m.more_kg > 0 for m in told)
+    ask = "mounted there that robot.toml lacks" if more else "gone that robot.toml still has"
     return (
         f"The refit changed masses (each link with what is mounted on it): "
         f"{'; '.join(m.text for m in told)}. State what you know better ([[link]], [[payload]]); "
-        f"is something mounted there that robot.toml lacks?"
+        f"is something {ask}?"
     )
 
 

@@ -104,8 +104,9 @@ class IdentifiedRobot:
         if not found or self.poses >= PLACED:
             return found and f"The recordings show what robot.toml does not state. {found}"
         return (
-            f"The robot differs from what robot.toml states. It may be this: {found} From "
-            f"{counted(self.poses, 'pose')} it may as well be elsewhere: repair nothing yet, and "
+            f"The robot differs from what robot.toml states. All of this together explains it: "
+            f"{found} From {counted(self.poses, 'pose')} each may as well be something like it on "
+            f"another joint or link: repair nothing yet, and "
             f"measure {counted(PLACED - self.poses, 'more pose')}."
         )
 
