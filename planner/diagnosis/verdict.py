@@ -133,7 +133,9 @@ def _weighed(
     """
     gained, lines = best.evidence - explored.plain.evidence, np.linspace(*_band(best), LINES)
 
-    def weigh(fit: StructureFit, effect: Operator) -> tuple[NamedEffect, StructureFit | None]:
+    def weigh(
+        fit: StructureFit, effect: Operator, own: Operator
+    ) -> tuple[NamedEffect, StructureFit | None]:
         fewer = _without(explored, fit, effect)
         nats, change = gained, 1.0
         if fewer is not None:
@@ -144,18 +146,25 @@ def _weighed(
         if effect in built(fit):
             probability = float(expit(nats - RARE))
         counts = _counts(effect, nats, change, matters, gained)
-        return NamedEffect(effect, float(nats), change, float(probability), counts), fewer
+        return NamedEffect(own, float(nats), change, float(probability), counts), fewer
 
-    found, fit = [weigh(best, effect)[0] for effect in _beyond(best)], best
-    while added(fit):
-        each = sorted((weigh(fit, e) for e in added(fit)), key=lambda pair: pair[0].change)
+    found, fit, left = [weigh(best, e, e)[0] for e in _beyond(best)], best, list(added(best))
+    while left:
+        # What was settled by itself has effects of its own: those of the best are told.
+        pairs = zip(sorted(added(fit), key=_name), sorted(left, key=_name), strict=True)
+        each = sorted((weigh(fit, e, own) for e, own in pairs), key=lambda pair: pair[0].change)
         slight = next(((e, fewer) for e, fewer in each if not e.counts and fewer), None)
         if slight is None:
             found += [effect for effect, _ in each]
             break
         effect, fit = slight
         found.append(effect)
+        left = [own for own in left if own is not effect.operator]
     return sorted(found, key=lambda e: -e.change)
+
+
+def _name(effect: Operator) -> Place:
+    return effect.name
 
 
 def _counts(effect: Operator, nats: float, change: float, matters: float, gained: float) -> bool:
