@@ -229,7 +229,7 @@ def next_hit(
     # All explanations answer in proportion: the harder, the less noise.
     hardest = [float(found.recorded.level_n[-1])] if found.recorded.visits else []
     force_n = tuple(_at_most(force) for force in hardest)
-    joints = found.search.prior.library.stiff.robot.joints
+    joints = found.search.prior.effect_library.stiff.robot.joints
     return NextHit.best(tied, joints, poses, separation(tied, poses[1]), force_n=force_n)
 
 
@@ -242,7 +242,7 @@ def extra_sensor(
     None where nothing is tied, no such point is stated, or none tells much more than the sensors
     that there were.
     """
-    recorded, robot = found.recorded, found.search.prior.library.stiff.robot
+    recorded, robot = found.recorded, found.search.prior.effect_library.stiff.robot
     there = found.best.misfit.data.measured.layout.sensors
     places = {robot.points.sensor(name) for name in robot.points.axes} - {*there, SENSOR, TCP}
     if len(tied) < 2 or not places:

@@ -91,7 +91,7 @@ def level_laws(recorded: Dataset, found: StructureFit) -> Levels:
 
     Of several sensors and hit points, the ones most heard tell.
     """
-    config = found.structure.prior.library.simulation.robot.config
+    config = found.structure.prior.effect_library.simulation.robot.config
     groups, ports = hit_groups(recorded.most_heard, found), own_ports(found)
     return laws_of(groups, ports, config.diagnose.matters)
 

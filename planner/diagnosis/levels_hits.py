@@ -106,7 +106,7 @@ class HitGroup:
 def own_ports(found: StructureFit) -> tuple[JointPort, ...]:
     """The joints with a spring of their own."""
     s = found.structure
-    robot, stiffness = s.prior.library.simulation.robot, s.elasticity(found.at.x).stiffness
+    robot, stiffness = s.prior.effect_library.simulation.robot, s.elasticity(found.at.x).stiffness
     ports: dict[str, JointPort] = {}
     for own, spring in enumerate(s.springs):
         block = robot.config.compliance[spring]

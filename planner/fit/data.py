@@ -52,7 +52,7 @@ class FrfData:
     def poses(self, structure: RobotStructure) -> PosedBodies:
         """As effects see them."""
         springs = list(structure.springs)
-        bodies = structure.prior.library.simulation.elastic.bodies
+        bodies = structure.prior.effect_library.simulation.elastic.bodies
         jacobians = self.jacobians[..., springs]
         order = np.zeros(len(self.q)) if self.order is None else self.order
         return PosedBodies(self.q, self.measured.s, jacobians, bodies, structure.springs, order)

@@ -77,7 +77,7 @@ def refitted_masses(s: RobotStructure, x: np.ndarray) -> list[RefittedMass]:
 
 def _links(s: RobotStructure) -> list[str]:
     """Of each body."""
-    robot = s.prior.library.simulation.robot
+    robot = s.prior.effect_library.simulation.robot
     return [
         robot.link_of(b) if b in robot.joint_names else b.removesuffix(OUTER)
         for b in s.bodies.bodies

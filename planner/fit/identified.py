@@ -31,7 +31,7 @@ def as_identification(posterior: RobotPosterior) -> tuple[ExtendedModel, Identif
     what else is known is as unsure as they make it. Where nothing explains the FRFs, no parameter
     counts as known.
     """
-    structure, library = posterior.structure, posterior.structure.prior.library
+    structure, library = posterior.structure, posterior.structure.prior.effect_library
     simulation = posterior.simulation
     nominal = Simulation(simulation.robot)
     names = {p.name for p in structure.parameters}

@@ -128,7 +128,10 @@ class Search(Trials):
 
     def freed(self) -> StructureFit:
         """With every spring that there may be, and no operator."""
-        data, springs = self.data(SEARCHED), [e for e in self.prior.library.effects if e.springs]
+        data, springs = (
+            self.data(SEARCHED),
+            [e for e in self.prior.effect_library.effects if e.springs],
+        )
         stated = self.prior.stated(data.sensors)
         return converged(self.begun(data, replace(stated, effects=(*stated.effects, *springs))))
 

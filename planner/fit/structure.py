@@ -34,24 +34,24 @@ class RobotPrior:
     `bearings`: whether each is taken to give slightly, and loss factors to be there.
     """
 
-    library: EffectLibrary
+    effect_library: EffectLibrary
     bearings: bool = False
 
     @cached_property
     def built(self) -> tuple[Operator, ...]:
         """Effects that every robot has."""
-        return self.library.as_built() if self.bearings else self.library.there
+        return self.effect_library.as_built() if self.bearings else self.effect_library.there
 
     @cached_property
     def wide(self) -> Parametrisation:
         """Of the robot with every spring."""
-        r = self.library
+        r = self.effect_library
         return parametrise(r.simulation, r.priors)
 
     @cached_property
     def carried(self) -> ElasticModel:
         """The robot with every spring, its weight carried by those that robot.toml states."""
-        r = self.library
+        r = self.effect_library
         stiffness = r.simulation.elastic.stiffness.copy()
         stiffness[r.stated : len(r.simulation.robot.config.compliance)] = STIFF
         return r.simulation.elastic.carried_by(stiffness)
@@ -59,12 +59,12 @@ class RobotPrior:
     @cached_property
     def stiff(self) -> Parametrisation:
         """Of the robot as stated: its bodies are whole."""
-        r = self.library
+        r = self.effect_library
         return parametrise(r.stiff, r.stiff_priors)
 
     def stated(self, sensors: int = 1) -> "RobotStructure":
         """The robot as robot.toml states it."""
-        return RobotStructure(self, self.library.there, sensors)
+        return RobotStructure(self, self.effect_library.there, sensors)
 
     def as_built(self, sensors: int = 1) -> "RobotStructure":
         """With what every robot has, which robot.toml need not state."""
@@ -72,7 +72,7 @@ class RobotPrior:
 
     def bodies(self, springs: frozenset[int]) -> tuple[tuple[int, ...], BodyNumbers]:
         """Bodies that move by some of the springs: numbers among all, and theirs."""
-        r = self.library
+        r = self.effect_library
         wide, stiff = r.simulation.elastic, r.stiff.elastic
         joints = {r.simulation.robot.config.compliance[i].joint for i in springs}
         live, nominal, sds, names = [], [], [], []
@@ -109,7 +109,7 @@ class RobotStructure:
     @cached_property
     def springs(self) -> tuple[int, ...]:
         """Numbers of its springs among all: those that robot.toml states, and the effects'."""
-        own = range(self.prior.library.stated)
+        own = range(self.prior.effect_library.stated)
         return tuple(sorted({*own, *(i for e in self.effects for i in e.springs)}))
 
     @cached_property
@@ -307,12 +307,12 @@ KINDS = ("stiffness", "damping", "loss_factor")
 def effects_free(structure: RobotStructure) -> tuple[Operator, ...]:
     """Those of the repertoire that it has not."""
     there = {e.label for e in structure.effects}
-    return tuple(e for e in structure.prior.library.effects if e.label not in there)
+    return tuple(e for e in structure.prior.effect_library.effects if e.label not in there)
 
 
 def exported(structure: RobotStructure, x: np.ndarray) -> tuple[Simulation, Sequence[str]]:
     """The simulation that a structure is at x, and the names of its springs' parameters."""
-    library = structure.prior.library
+    library = structure.prior.effect_library
     robot = library.simulation.robot
     elasticity = structure.elasticity(x)
     blocks = [robot.config.compliance[i] for i in structure.springs]

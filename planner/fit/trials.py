@@ -98,7 +98,7 @@ class Trials:
         that gain more than `least` nats by it."""
         misfit = replace(base.misfit, data=self.data(lines))
         motions, gain = misfit.first_order(base.at.x, base.at.own)
-        free, every = effects_free(base.structure), self.prior.library.effects
+        free, every = effects_free(base.structure), self.prior.effect_library.effects
         again = (e for e in every if e.several and e not in free)  # more may hang on a link
         far = not explained(base)
         tried = (e for e in (*free, *again) if far or pulled(base, e))

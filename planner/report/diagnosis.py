@@ -185,7 +185,7 @@ class DiagnosisReport(Answer):
         search = self.found.search
         lines = frequency_lines(search.band_hz)
         mean, sd = self.predict(q, lines, peak_force_n)
-        joints = search.prior.library.stiff.robot.joints
+        joints = search.prior.effect_library.stiff.robot.joints
         save_frfs(npz, lines, mean, sd, poses, joints, q)
         return replace(self, npz=str(npz))
 
@@ -202,7 +202,7 @@ class DiagnosisReport(Answer):
         from planner.robot.robot import Robot
 
         found = self.found
-        robot = found.search.prior.library.stiff.robot
+        robot = found.search.prior.effect_library.stiff.robot
         _make_room(folder, robot)
         model, result = as_identification(found.robot)
         result = replace(result, simulation=found.simulation)
@@ -322,7 +322,7 @@ def _unwritten(found: "Diagnosis") -> tuple[str, ...]:
 def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> DiagnosisReport:
     """Of a diagnosis."""
     recorded, verdict = found.recorded, found.verdict
-    robot = found.search.prior.library.stiff.robot
+    robot = found.search.prior.effect_library.stiff.robot
     matters, names = robot.config.diagnose.matters, place_names(robot)
     place = Residuals.of(found.refitted, found.search.band_hz, matters)
     sides = (RobotPosterior.of(f).misfits(matters)[0] for f in (found.refitted, found.best))

@@ -163,7 +163,7 @@ def diagnosis_figures(found: Diagnosis) -> dict[str, Figure]:
     Of several sensors and hit points, FRFs are those of the first ones.
     """
     names, search = found.recorded.poses, found.search
-    matters = search.prior.library.stiff.robot.config.diagnose.matters
+    matters = search.prior.effect_library.stiff.robot.config.diagnose.matters
     before, after = (Residuals.of(f, search.band_hz, matters) for f in (found.refitted, found.best))
     data = search.data(LINES)
     seen = data.measured

@@ -51,7 +51,7 @@ class Cell:
         """Both explanations, settled."""
         data, prior = self.search.data(SEARCHED), self.search.prior
         found, built = [], prior.built
-        every = {effect.label: effect for effect in prior.library.effects}
+        every = {effect.label: effect for effect in prior.effect_library.effects}
         for label, place in PLACES.items():
             structure = RobotStructure(prior, (*built, every[label]), data.sensors)
             misfit = FrfMisfit(structure, data, self.search.tolerances)

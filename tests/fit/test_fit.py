@@ -43,7 +43,7 @@ def few(case, prior) -> FrfData:
 
 def structure_of(prior: RobotPrior, *labels: str) -> RobotStructure:
     found = RobotStructure(prior)
-    for effect in prior.library.effects:
+    for effect in prior.effect_library.effects:
         if effect.label in labels:
             found = found.with_effect(effect)
     assert len(found.effects) == len(labels)
@@ -179,7 +179,7 @@ def test_a_link_that_is_cut_and_whole_again_weighs_as_before(case, prior):
 def test_what_swings_stays_in_the_band(prior, few):
     structure = structure_of(prior, "local_resonator at link_4")
     misfit, x = FrfMisfit(structure, few, Tolerances(), 0.1), structure.mean.copy()
-    low, high = prior.library.simulation.robot.config.band_hz
+    low, high = prior.effect_library.simulation.robot.config.band_hz
     for hertz in (1.05 * low, high / 1.05):
         set_to(structure, x, "local_resonator", 1, np.log(hertz))
         set_to(structure, x, "local_resonator", 3, 1.0, 0.0, 0.0)
@@ -209,7 +209,7 @@ def test_a_soft_base_a_bending_link_and_a_hose_are_found_together(case):
 
 
 def test_what_was_found_is_recalled_as_it_was(case, prior):
-    tolerances = Tolerances.of(prior.library.simulation.robot.config)
+    tolerances = Tolerances.of(prior.effect_library.simulation.robot.config)
     search = Search(prior, case.frfs[:1], case.q[:1], case.band_hz, tolerances)
     found = search.found()
     again = search.recalled(found.remembered)
@@ -220,7 +220,7 @@ def test_what_was_found_is_recalled_as_it_was(case, prior):
 
 def test_what_may_give_beside_is_only_what_such_a_robot_can_have(case, prior):
     """A link from which mass was taken can weigh what it does, and its cut halves cannot."""
-    tolerances = Tolerances.of(prior.library.simulation.robot.config)
+    tolerances = Tolerances.of(prior.effect_library.simulation.robot.config)
     search = Search(prior, case.frfs[:1], case.q[:1], case.band_hz, tolerances)
     structure = structure_of(prior, "added_mass at link_2")
     misfit = FrfMisfit(structure, search.data(8), tolerances)
