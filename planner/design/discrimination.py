@@ -21,6 +21,7 @@ from planner.fit.explanations import Key, key_of, probabilities
 from planner.fit.fitted import StructureFit
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotPosterior
+from planner.fit.weights import Weights
 from planner.measurement.nuisances import OF_HAMMER
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout
@@ -112,9 +113,9 @@ class _Predicted:
         precision[np.ix_(same, same)] = (found.at.normal + found.at.precision)[np.ix_(same, same)]
         own = misfit.zero_nuisances()
         frf, columns, _ = misfit.columns(x, misfit.about(own, x))
-        noise = float(np.median((measured.sd / found.misfit.size)[measured.used]))
+        noise = float(np.median((measured.sd / found.misfit.data.weights.size)[measured.used]))
         there = replace(data.measured, accelerance=frf)
-        size = replace(misfit, data=replace(data, measured=there)).size
+        size = Weights(there).size
         there = replace(there, sd=noise * size)
         misfit = replace(misfit, data=replace(data, measured=there))
         both = block_diag(precision, np.eye(own.shape[1]))

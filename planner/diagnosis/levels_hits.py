@@ -11,7 +11,8 @@ from planner.dynamics.gradient import moved
 from planner.dynamics.motion import Motion
 from planner.fit.data import FrfData
 from planner.fit.fitted import StructureFit
-from planner.fit.misfit import ELL, SHARE, FrfMisfit
+from planner.fit.misfit import FrfMisfit
+from planner.fit.weights import ELL, SHARE
 from planner.frf.spectra import Spectra, Windows, transform
 from planner.measurement.measured_frfs import Measured
 from planner.measurement.nuisances import hit_basis

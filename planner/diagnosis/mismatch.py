@@ -36,7 +36,7 @@ class Residuals:
     def of(cls, fit: "StructureFit", band_hz: tuple[float, float], matters: float) -> "Residuals":
         """Of a fit on its lines, the likeliest misses of hits and chain taken out."""
         measured = fit.misfit.data.measured
-        noise = np.hypot(measured.sd, matters * fit.misfit.size)
+        noise = np.hypot(measured.sd, matters * fit.misfit.data.weights.size)
         square = np.where(
             measured.used, np.abs(RobotPosterior.of(fit).residual / noise) ** 2, np.nan
         )

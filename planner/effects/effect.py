@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from planner.dynamics.gradient import Impedance
+from planner.dynamics.motion import times_real
 
 # (columns (n, k, r, c, F) of changes of H, their prior sds (k,)) → nats gained, likeliest ψ (k,),
 # and by how much all other numbers (D,) of the fit move with it.
@@ -78,11 +79,7 @@ class Motions:
 
     def at(self, ports: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Motions (n, p, c, F) and (n, p, r, F) of ports (n, p, e)."""
-        hit, sensor = (
-            np.einsum("npe,nejf->npjf", ports, x, optimize=True)
-            for x in (self.x_hit, self.x_sensor)
-        )
-        return hit, sensor
+        return times_real(ports, self.x_hit), times_real(ports, self.x_sensor)
 
     def changed_by(self, added: Impedance) -> np.ndarray:
         """(n, p, r, c, F): how accelerances change with each number of what is added to Z."""

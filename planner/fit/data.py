@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from planner.effects.effect import PosedBodies
 from planner.fit.structure import RobotPrior, RobotStructure
+from planner.fit.weights import Weights
 from planner.frf.frf import Frf
 from planner.measurement.measured_frfs import Measured, common_band, matrices_at, stack
 from planner.robot.elastic_model import AngleSlopes, Matrices
@@ -43,6 +45,11 @@ class FrfData:
         elastic = prior.carried
         matrices = matrices_at(elastic, q, frfs, sloped=True)
         return cls(q, measured, matrices, elastic.body_jacobians(q), order)
+
+    @cached_property
+    def weights(self) -> Weights:
+        """How much what was measured counts."""
+        return Weights(self.measured)
 
     @property
     def sensors(self) -> int:

@@ -23,14 +23,8 @@ from planner.measurement.nuisances import NuisanceCounts, Tolerances, actual_por
 from planner.robot.elastic_model import Matrices
 from planner.robot.virtual_joints import inertia_basis
 
-ELL = 0.03  # of the frequency: lines so near share the discrepancy, about a half-power band
-SHARE = 0.3  # of the rms of all FRFs of a pose at a line, in the size of each
-LOG_FLOOR, LOG_DROP = 0.3, 0.3  # relative sds: no logarithm counts more; from which it counts none
-LOG_PRIOR = 10.0  # far away data err alike, and the prior counts for more
 FARTHEST = 4.0  # sds of what hits, readback and visits are linearised about
 NOTHING = 1e-9  # of an FRF's size, that has no logarithm
-UNUSED = 1e4  # sds of what was not measured, in the size of FRFs
-JITTER = 1e-6  # of the discrepancy's variance, that each line has for itself
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,60 +54,14 @@ class FrfMisfit:
     def with_rho(self, rho: float | None) -> "FrfMisfit":
         """With a discrepancy of another size; what does not depend on it is kept."""
         other = replace(self, rho=rho)
-        for name in ("matrices", "jacobians", "poses", "_weightless"):
-            if name in vars(self):
-                vars(other)[name] = vars(self)[name]
+        kept = ("matrices", "jacobians", "poses")
+        vars(other).update({name: vars(self)[name] for name in kept if name in vars(self)})
         return other
 
     @cached_property
     def poses(self):
         """As effects see them."""
         return self.data.poses(self.structure)
-
-    @cached_property
-    def size(self) -> np.ndarray:
-        """(n, r, c, F) of FRFs, to which the discrepancy is proportional; at least a share of
-        the rms of all of the pose at that frequency."""
-        m = self.data.measured
-        square = np.where(m.used, np.abs(m.accelerance) ** 2, 0.0)
-        count = np.maximum(m.used.sum(axis=(1, 2), keepdims=True), 1)
-        rms = np.sqrt(square.sum(axis=(1, 2), keepdims=True) / count)
-        size = np.sqrt(square + SHARE**2 * rms**2)
-        return np.where(size > 0, size, 1.0)
-
-    @cached_property
-    def whitening(self) -> np.ndarray:
-        """(n, r, c, F, F): inverse of the covariance's root, of real and imaginary part each."""
-        m, size, rho = self.data.measured, self.size, self.rho
-        assert rho is not None
-        width = ELL * m.frequency_hz
-        apart = (m.frequency_hz[:, :, None] - m.frequency_hz[:, None]) ** 2
-        both = width[:, :, None] ** 2 + width[:, None] ** 2
-        alike = np.sqrt(2 * width[:, :, None] * width[:, None] / both) * np.exp(-apart / both)
-        lines = np.arange(alike.shape[-1])
-        relative = np.repeat(alike[:, None, None] * (rho**2 / 2), size.shape[1], axis=1)
-        relative = np.repeat(relative, size.shape[2], axis=2)
-        noise = np.where(m.used, m.sd**2 / (2 * size**2), UNUSED**2)
-        relative[..., lines, lines] += noise + JITTER * rho**2
-        return np.linalg.inv(np.linalg.cholesky(relative)) / size[..., None, :]
-
-    @cached_property
-    def log_weight(self) -> np.ndarray:
-        """(n, r, c, F) of logarithms."""
-        m = self.data.measured
-        relative = np.where(m.used, m.sd, np.inf) / np.abs(m.accelerance)
-        kept = relative < LOG_DROP
-        sd = np.hypot(np.where(kept, relative, 1.0), LOG_FLOOR)
-        return np.where(kept, np.sqrt(2 / LOG_PRIOR) / sd, 0.0)
-
-    @cached_property
-    def noise_volume(self) -> float:
-        """ln of the determinant of the residuals' covariance."""
-        if self.rho is None:
-            return 0.0
-        used = self.data.measured.used
-        diagonal = np.log(np.einsum("...ff->...f", self.whitening))
-        return -4 * float(np.sum(np.where(used, diagonal, 0.0)))
 
     # ---------------------------------------------------------------- the model
 
@@ -291,20 +239,21 @@ class FrfMisfit:
         n, k = columns.shape[:2]
         if self.rho is None:
             told = self._told(h)
-            weight = np.where(told, self.log_weight / np.where(told, h, 1.0), 0.0)
+            weight = np.where(told, self.data.weights.logarithmic / np.where(told, h, 1.0), 0.0)
             scaled = columns * weight[:, None]
             return np.ascontiguousarray(scaled).reshape(n, k, -1).view(float)
         return self.whitened(columns)
 
     def _told(self, h: np.ndarray) -> np.ndarray:
         """(n, r, c, F) bool: where both have a logarithm; what no hit moves has none."""
-        return self.data.measured.used & (np.abs(h) > NOTHING * self.size)
+        return self.data.measured.used & (np.abs(h) > NOTHING * self.data.weights.size)
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
         """The same of plain residuals."""
         n, k, rows, sides, lines = columns.shape
         out = np.empty((n, k, 2, rows, sides, lines))
-        turned = np.swapaxes(self.whitening, -1, -2)
+        assert self.rho is not None
+        turned = np.swapaxes(self.data.weights.whitening(self.rho), -1, -2)
         for part, values in enumerate((columns.real, columns.imag)):
             given = np.moveaxis(np.ascontiguousarray(values), 1, 3)
             np.matmul(given, turned, out=np.moveaxis(out[:, :, part], 1, 3))
@@ -342,7 +291,8 @@ class FrfMisfit:
         away = at.x - s.mean
         prior = float(away @ s.precision @ away)
         spent = np.linalg.slogdet(at.normal + s.precision)[1] - np.linalg.slogdet(s.precision)[1]
-        return -0.5 * (at.chi2 + prior + at.volume + self.noise_volume + float(spent))
+        noise = 0.0 if self.rho is None else self.data.weights.volume(self.rho)
+        return -0.5 * (at.chi2 + prior + at.volume + noise + float(spent))
 
     def gain(
         self, at: At, columns: np.ndarray, sd: np.ndarray

@@ -9,8 +9,9 @@ from planner.dynamics.simulation import Simulation
 from planner.effects.effect import Operator
 from planner.fit.data import FrfData
 from planner.fit.fitted import StructureFit
-from planner.fit.misfit import SHARE, FrfMisfit
+from planner.fit.misfit import FrfMisfit
 from planner.fit.structure import RobotPrior, RobotStructure, exported
+from planner.fit.weights import SHARE
 from planner.inference.covariance import inverse
 from planner.measurement.measured_frfs import Measured
 from planner.measurement.nuisances import Tolerances
@@ -142,7 +143,8 @@ class RobotPosterior(RobotBelief):
         `least` is a relative sd that counts as noise.
         """
         misfit = self.found.misfit
-        m, noise = misfit.data.measured, np.hypot(misfit.data.measured.sd, least * misfit.size)
+        m = misfit.data.measured
+        noise = np.hypot(m.sd, least * misfit.data.weights.size)
         ratio = np.where(m.used, np.abs(self.residual / noise) ** 2, 0.0)
         count = np.maximum(m.used.sum(axis=(1, 2, 3)), 1)
         return float(ratio.sum() / count.sum()), ratio.sum(axis=(1, 2, 3)) / count
