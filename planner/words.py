@@ -2,7 +2,7 @@
 
 import math
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
 
@@ -10,6 +10,12 @@ from pathlib import Path
 def counted(count: int, one: str, more: str = "") -> str:
     """A number with its noun: "1 pose", "2 poses"; `more` is an unusual plural."""
     return f"{count} {one if count == 1 else more or f'{one}s'}"
+
+
+def listed(told: Sequence[str]) -> str:
+    """ "a", "a and b", "a, b and c"."""
+    *before, last = told
+    return f"{', '.join(before)} and {last}" if before else last
 
 
 def small(value: float, form: str = ".2f") -> str:

@@ -1,6 +1,6 @@
 """What an import asks and tells of new hits while the robot still stands there."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from planner.dataset.measure import MeasuredPose
 from planner.frf.frf import unreciprocal
 from planner.recording.records import Hit
 from planner.recording.repeats import Doubt, doubts, other_size
+from planner.words import listed
 
 
 def question_about(
@@ -69,7 +70,7 @@ def contradiction(pose: str, measured: MeasuredPose, known: int) -> Question | N
     for (_, others), own in camps.items():
         doubt = found[own[0]]
         assert doubt is not None
-        first, rest = (_listed(names[j] for j in one) for one in (own, others))
+        first, rest = (listed([Path(names[j]).name for j in one]) for one in (own, others))
         told.append(_told(hits[own[0]], doubt, first, rest, found[others[0]] is not None))
     if not told:
         return None
@@ -78,11 +79,6 @@ def contradiction(pose: str, measured: MeasuredPose, known: int) -> Question | N
         f"import back, and import all hits together. Is each of them right as it is?"
     )
     return Question(text, disagree=tuple(disagree))
-
-
-def _listed(names: Iterable[str]) -> str:
-    *before, last = (Path(name).name for name in names)
-    return f"{', '.join(before)} and {last}" if before else last
 
 
 def _told(hit: Hit, doubt: Doubt, first: str, others: str, both_doubted: bool) -> str:

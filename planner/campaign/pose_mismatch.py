@@ -9,7 +9,7 @@ pose, which bent what is expected.
 Without a simulation, or before the first measurement, nothing is expected.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,12 +21,10 @@ from planner.campaign.events import Question
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
-from planner.effects.table import EffectLibrary
 from planner.fit.expected import LINES, SIZES, ExpectedFrfs
 from planner.fit.identified_robot import PLACED
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
-from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
 from planner.inference.parallel import parallel_map
 from planner.recording.joints import JointUnits
@@ -42,8 +40,6 @@ SURE = 2
 # wrong: a joint beside its readback, a delay, the corner of a high-pass and the rate of a window.
 STEPS = 2.0 ** np.arange(1, 7)
 FINE = 0.02  # of where it is likeliest: so finely that is told
-# Measured poses among which one may be wrong unnoticed; of more it stands out
-MOST_BEFORE = 3
 MUCH = 10.0  # times farther than is stated hits may have struck, or joints may stand
 FAR_OFF_HITS = (
     "hits look struck far beside the tool's tip, or slanted: was it that point, and along its axes?"
@@ -94,8 +90,7 @@ def pose_mismatch(
     likely = _setpoint(model, state, pose, joints_deg)
     if sure and frf.layout == TOOL and FAR_OFF_HITS not in said:
         likely.append(far_off_hits(expected, q))
-    doubts = [*likely, readback_errors(expected, q)] if placed else likely
-    if not stated.doubted and not stated.best_alternative(doubts):
+    if stated.agree(likely):
         return None
     mistakes = [*likely, *_poses(model, state, pose, joints_deg)]
     if sure:
@@ -103,7 +98,12 @@ def pose_mismatch(
         mistakes += joint_offsets(joints, expected, frf, joints_deg)
     mistakes += (m for m in chain_faults(expected, q, frf, sure) if m.what not in said)
     fits = stated.best_alternative(mistakes)
-    if fits is None or (fits.about != "chain" and StatedHits(expected, fits.q, frf).doubted):
+    # Another known pose is none by chance; any angle may be, of the pose or of one before.
+    if (
+        fits is None
+        or fits.about == "readback"
+        or (fits.about != "chain" and StatedHits(expected, fits.q, frf).doubted)
+    ):
         fits = _earlier(model, state, pose, joints_deg, frf) or fits
     if fits is None and not stated.impossible:
         return None
@@ -143,6 +143,11 @@ class StatedHits:
     def doubted(self) -> bool:
         """Whether a mistake may explain it better."""
         return self.impossible or self.density[1] >= BETTER * SIZES[-1]
+
+    def agree(self, likely: Sequence[Alternative] = ()) -> bool:
+        """Whether nothing is to be asked: no mistake, of those `likely` beforehand none at all."""
+        far = [readback_errors(self.expected, self.q)] if self.placed else []
+        return not self.doubted and self.best_alternative([*likely, *far]) is None
 
     def best_alternative(self, mistakes: Sequence[Alternative]) -> Alternative | None:
         """The mistake that explains the hits, by evidence and size; None where none does."""
@@ -287,40 +292,78 @@ def flipped_signs(joints: JointUnits, joints_deg: tuple[float, ...]) -> Iterator
         yield Alternative(joints.internal([other])[0], what, about="readback")
 
 
+@dataclass(frozen=True, eq=False)
+class PosesTogether:
+    """Hits of poses q (n, dof) in rad, the new one last, that do not agree: which one is wrong?
+
+    Each is left out in turn, and held against what the others alone let expect: fitted by all
+    springs that there may be and the other effects that `found` has, which is quick.
+    """
+
+    found: RobotPosterior
+    band_hz: tuple[float, float]
+    joints: JointUnits
+    q: np.ndarray
+    frfs: tuple[Frf, ...]
+
+    def wrong(
+        self, likely: Sequence[Sequence[Alternative]], answered: Container[int] = ()
+    ) -> tuple[int, Alternative] | None:
+        """The earlier pose, and its angle, by which all are likelier than by any of the new one.
+
+        Of the first ones, that is: what came later was asked about when it came. `likely` are each
+        pose's own alternatives; the angles of those `answered` are right.
+        """
+        new = len(self.q) - 1
+        tried = [*(i for i in range(min(new, PLACED)) if i not in answered), new]
+        told = parallel_map(lambda i: self._left_out(i, likely[i]), tried)
+        value, i, angle = max(
+            ((value, i, angle) for i, (value, angle) in zip(tried, told, strict=True)),
+            key=lambda one: one[0],
+        )
+        if angle is None or i == new or value < told[-1][0] + LOG_ODDS:
+            return None
+        return i, angle
+
+    def _left_out(self, i: int, likely: Sequence[Alternative]) -> tuple[float, Alternative | None]:
+        """Log density of all with the likeliest angle of one, and that, where it is not as
+        stated."""
+        others, p = [k for k in range(len(self.q)) if k != i], self.found
+        frfs = tuple(self.frfs[k] for k in others)
+        search = Search(p.structure.prior, frfs, self.q[others], self.band_hz, p.tolerances)
+        fit = RobotPosterior.of(search.freed(p))
+        expected, angles = ExpectedFrfs(fit, self.band_hz), tuple(self.joints.shown(self.q[i]))
+        hits = StatedHits(expected, self.q[i], self.frfs[i], len(others) >= PLACED)
+        typed = [*likely, *flipped_signs(self.joints, angles)]
+        if len(others) >= SURE and not hits.agree():
+            typed += joint_offsets(self.joints, expected, self.frfs[i], angles)
+        found = hits.best_alternative(typed)
+        its = max(hits.density[0], hits.outlier_log_density)
+        if found is not None:
+            its = expected.density(found.q, self.frfs[i])[0] - found.rarer
+        return fit.found.evidence + its, found
+
+
 def _earlier(
     model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...], frf: Frf
 ) -> Alternative | None:
-    """An angle mistyped at one of few poses measured before, where all are likelier so.
+    """An angle mistyped at a pose measured before, where all are likelier so.
 
-    `frf` are the new hits of a pose at `joints_deg`. Each pose is left out in turn; the others are
-    fitted by all springs that there may be, which is quick.
+    `frf` are the new hits of a pose at `joints_deg`.
     """
-    joints, low, band = model.cell.robot.joints, model.low, model.cell.config.modes.band_hz
-    if low.nominal is None or len(model.used) > MOST_BEFORE or frf.layout.sensors != TOOL.sensors:
+    joints, fit = model.cell.robot.joints, model.low.identified_robot or model.low.rejected
+    if fit is None or frf.layout.sensors != TOOL.sensors:
         return None
     known = [*((m.pose, m.joints_deg) for m in model.used), (pose, joints_deg)]
-    typed = [[*_setpoint(model, state, *one), *flipped_signs(joints, one[1])] for one in known]
-    q, frfs = joints.internal([angles for _, angles in known]), (*model.frfs, frf)
-    prior, tolerances = RobotPrior(EffectLibrary.of(low.nominal, low.priors)), low.tolerances
-
-    def left_out(i: int) -> tuple[float, Alternative | None]:
-        others = [k for k in range(len(q)) if k != i]
-        search = Search(prior, tuple(frfs[k] for k in others), q[others], band, tolerances)
-        fit = RobotPosterior.of(search.freed())
-        expected = ExpectedFrfs(fit, band)
-        hits = StatedHits(expected, q[i], frfs[i])
-        found = hits.best_alternative(typed[i])
-        its = max(hits.density[0], hits.outlier_log_density)
-        if found is not None:
-            its = expected.density(found.q, frfs[i])[0] - found.rarer
-        return fit.found.evidence + its, found
-
-    told = parallel_map(left_out, range(len(q)))
-    best = int(np.argmax([value for value, _ in told]))
-    found = told[best][1]
-    if best == len(model.used) or found is None or told[best][0] < told[-1][0] + LOG_ODDS:
-        return None
-    return replace(found, pose=known[best][0], about="earlier")
+    q = joints.internal([angles for _, angles in known])
+    poses = PosesTogether(
+        fit.posterior, model.cell.config.modes.band_hz, joints, q, (*model.frfs, frf)
+    )
+    asked = [(m.pose, m.question) for m in model.used if m.question is not None]
+    right = {a.fits or name for name, a in asked if a.about in ("readback", "earlier")}
+    answered = [i for i, (name, _) in enumerate(known[:-1]) if name in right]
+    found = poses.wrong([_setpoint(model, state, *one) for one in known], answered)
+    return replace(found[1], pose=known[found[0]][0], about="earlier") if found else None
 
 
 def _either(joints: JointUnits, number: int, one: float, other: float) -> str:

@@ -6,7 +6,7 @@ with numbers ψ of its own, each with a normal prior, or both.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -62,6 +62,10 @@ class PosedBodies:
 
 # (3, 3, 3): what turns with a link at w moves what lies at e_v by ACROSS[v] w = w × e_v.
 ACROSS = np.array([np.cross(np.eye(3), e).T for e in np.eye(3)])
+
+
+# Values and sds of an effect's springs and numbers, by name, in their units.
+Values = Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,6 +225,14 @@ class Operator(ABC):
     @abstractmethod
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """What it is, for whoever stands at the robot; values and sds by name."""
+
+    def same_thing(self, mine: Values, others: Values) -> bool:
+        """Whether it is one thing with another of its kind at its place, by both values."""
+        return False
+
+    def words_together(self, each: Sequence[Values]) -> str:
+        """What all those are that are one thing (`same_thing`)."""
+        return self.words(each[0])
 
     def tables(self, values: Mapping[str, tuple[float, float]]) -> dict[str, list[dict[str, Any]]]:
         """Blocks of robot.toml that state it, beside its springs'."""

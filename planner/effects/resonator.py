@@ -15,12 +15,14 @@ from planner.effects.effect import (
     Operator,
     PosedBodies,
     Start,
+    Values,
     gain_of,
     moving,
     turning,
 )
+from planner.effects.parameters import axis_name
 from planner.robot.config import Resonator
-from planner.words import significant
+from planner.words import listed, significant
 
 LIGHTER = np.log(6.0)  # it is begun once more by so much
 SCREENED = 30  # frequencies over the band
@@ -32,6 +34,7 @@ NAMED = (("mass", "kg"), ("frequency", "Hz"), ("damping_ratio", "1"),
 # Sds of a stated one's numbers: logarithms of the first three, direction, place in m; and the
 # factor of its frequency from which it is another.
 STATED, ANOTHER = (0.7, 0.2, 0.7, *(0.3,) * 3, *(0.1,) * 3), 5.0
+SAME_SD = 2.0  # within which masses are one
 PAIRS = tuple((i, k) for i in range(3) for k in range(i, 3))
 
 
@@ -140,9 +143,27 @@ class LinkResonator(Operator):
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
+        return self.words_together([values])
+
+    def same_thing(self, mine: Values, others: Values) -> bool:
+        """One mass swings along several directions, as often as each of its springs has it."""
+        (mass, sd), (other, other_sd) = mine["mass"], others["mass"]
+        near = abs(mass - other) <= SAME_SD * np.hypot(sd, other_sd)
+        return bool(near and abs(_way(mine) @ _way(others)) < np.sqrt(0.5))
+
+    def words_together(self, each: Sequence[Values]) -> str:
+        """See `Operator.words_together`."""
+        mass, sd = np.array([values["mass"] for values in each]).T
+        told = significant(float(np.average(mass, weights=sd**-2.0)))
+        ways: dict[str, list[str]] = {}
+        for values in each:
+            hertz = f"{values['frequency'][0]:.1f} Hz"
+            ways.setdefault(hertz, []).append(axis_name(_nearest_axis(_way(values))))
+        at = [f"{hertz} along {listed(sorted(way))}" for hertz, way in sorted(ways.items())]
+        at = at if len(each) > 1 else [*ways]
         return (
-            f"Something of {significant(values['mass'][0])} kg on {self.at} swings on its own at "
-            f"{values['frequency'][0]:.1f} Hz: check hose pack, brackets and covers there."
+            f"Something of {told} kg on {self.at} swings on its own at {listed(at)}: check hose "
+            f"pack, brackets and covers there."
         )
 
     def tables(self, values: Mapping[str, tuple[float, float]]) -> dict[str, list[dict[str, Any]]]:
@@ -160,6 +181,19 @@ class LinkResonator(Operator):
             "damping_ratio": values["damping_ratio"][0],
         }
         return {"resonator": [block]}
+
+
+def _way(values: Values) -> np.ndarray:
+    way = np.array([values[f"direction_{axis}"][0] for axis in "xyz"])
+    return way / np.linalg.norm(way)
+
+
+def _nearest_axis(way: np.ndarray) -> tuple[float, float, float]:
+    """An axis of the link, where a direction is within 30° of it; else the direction."""
+    most = int(np.argmax(np.abs(way)))
+    near = abs(way[most]) > np.cos(np.pi / 6)
+    x, y, z = np.eye(3)[most] if near else np.round(way, 1) + 0.0
+    return float(x), float(y), float(z)
 
 
 def resonator_numbers(means: Sequence[float], sds: Sequence[float]) -> tuple[Number, ...]:

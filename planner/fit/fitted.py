@@ -30,13 +30,13 @@ class StructureFit:
     @cached_property
     def shares(self) -> tuple[float, ...]:
         """By how much of |H| at the measured poses each effect's going changes the best fit."""
-        h = self.at.motion.accelerance
-        found = []
-        for effect in self.structure.effects:
-            fewer = without(self, [effect])
-            gone = 0.0 * h if fewer is None else fewer.at.motion.accelerance
-            found.append(float(np.linalg.norm(gone - h) / np.linalg.norm(h)))
-        return tuple(found)
+        return tuple(self.share_of([effect]) for effect in self.structure.effects)
+
+    def share_of(self, effects: Sequence[Operator]) -> float:
+        """The same of several that go together."""
+        h, fewer = self.at.motion.accelerance, without(self, effects)
+        gone = 0.0 * h if fewer is None else fewer.at.motion.accelerance
+        return float(np.linalg.norm(gone - h) / np.linalg.norm(h))
 
     @property
     def remembered(self) -> "FitRecord":

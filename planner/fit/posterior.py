@@ -173,10 +173,30 @@ class RobotPosterior(RobotBelief):
     @cached_property
     def words(self) -> tuple[str, ...]:
         """What the structure has beside what is stated and that matters, and by how much."""
-        pairs = zip(self.structure.effects, self.found.shares, strict=True)
+        told, known = [], dict(zip(self.structure.effects, self.found.shares, strict=True))
+        for things in self._things:
+            first = things[0]
+            share = known[first] if len(things) == 1 else self.found.share_of(things)
+            if share >= MATTERS:
+                words = first.words_together([self.values(effect) for effect in things])
+                told.append((share, words.replace(first.at, first.name[1])))
         return tuple(
-            f"{effect.words(self.values(effect)).replace(effect.at, effect.at.split('#')[0])} "
-            f"Without that, simulated FRFs would be {significant(100 * share)} % off."
-            for effect, share in sorted(pairs, key=lambda pair: -pair[1])
-            if share >= MATTERS and not effect.stated
+            f"{words} Without that, simulated FRFs would be {significant(100 * share)} % off."
+            for share, words in sorted(told, reverse=True)
         )
+
+    @property
+    def _things(self) -> list[list[Operator]]:
+        """Effects beside what is stated; those that are one thing together."""
+        things: list[list[Operator]] = []
+        for effect in self.structure.effects:
+            mine = self.values(effect)
+            for one in things:
+                if one[0].name == effect.name and all(
+                    effect.same_thing(mine, self.values(other)) for other in one
+                ):
+                    one.append(effect)
+                    break
+            else:
+                things += [] if effect.stated else [[effect]]
+        return things

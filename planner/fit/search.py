@@ -35,6 +35,7 @@ from planner.fit.fitted import (
 )
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
+from planner.fit.posterior import RobotBelief
 from planner.fit.structure import RobotStructure, effects_free, exported
 from planner.fit.trials import FAR, LOG_STEPS, Trials, explained
 from planner.inference.parallel import parallel_map
@@ -126,14 +127,18 @@ class Search(Trials):
         misfit, x = self.again(known, self.data(SEARCHED), max(known.size, AGAIN))
         return converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
 
-    def freed(self) -> StructureFit:
-        """With every spring that there may be, and no operator."""
-        data, springs = (
-            self.data(SEARCHED),
-            [e for e in self.prior.effect_library.effects if e.springs],
-        )
+    def freed(self, known: RobotBelief | None = None) -> StructureFit:
+        """With every spring that there may be; of operators those that are `known`, from there."""
+        data, every = self.data(SEARCHED), self.prior.effect_library.effects
+        effects = [e for e in every if e.springs]
+        if known is not None:
+            effects += [e for e in known.structure.effects if not (e.springs or e.stated)]
         stated = self.prior.stated(data.sensors)
-        return converged(self.begun(data, replace(stated, effects=(*stated.effects, *springs))))
+        structure = replace(stated, effects=(*stated.effects, *effects))
+        x, own = structure.mean.copy(), slice(structure.inertial.stop, structure.chain.start)
+        if known is not None:
+            x[own] = structure.carried(known.structure, known.x)[own]
+        return converged(self.begun(data, structure, x))
 
     def recalled(self, known: FitRecord) -> StructureFit:
         """What was found of these FRFs before, as it was."""

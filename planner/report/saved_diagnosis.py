@@ -7,6 +7,7 @@ from typing import Any
 
 from planner.errors import InputError
 from planner.report.springs import RefittedSpring
+from planner.words import listed
 
 KEPT = "diagnosis.json"  # as `diagnose --out` writes it
 MOST_PICTURES = 4
@@ -46,16 +47,11 @@ def two_answers(springs: Sequence[RefittedSpring], found: Mapping[str, Any]) -> 
     if not added or not told or added == told:
         return ""
     return (
-        f"The campaign's model adds springs at {_listed(added)}, the diagnosis names "
-        f"{_listed(told)}. The model predicts, and so lets every joint and the floor tilt at once; "
-        f"the diagnosis adds only what the recordings cannot do without, and is what to go by for "
-        f"repairs."
+        f"The campaign's model adds springs at {listed(sorted(added))}, the diagnosis names "
+        f"{listed(sorted(told))}. The model predicts, and so lets every joint and the floor tilt "
+        f"at once; the diagnosis adds only what the recordings cannot do without, and is what to "
+        f"go by for repairs."
     )
-
-
-def _listed(places: set[str]) -> str:
-    *others, last = sorted(places)
-    return f"{', '.join(others)} and {last}" if others else last
 
 
 def chapter(file: Path) -> dict[str, Any]:

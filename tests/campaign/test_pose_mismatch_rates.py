@@ -5,7 +5,7 @@
 """
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -16,18 +16,19 @@ from planner.campaign.chain_mismatch import SpringDraws
 from planner.campaign.pose_mismatch import (
     SURE,
     Alternative,
+    PosesTogether,
     StatedHits,
     chain_faults,
     far_off_hits,
     flipped_signs,
     joint_offsets,
-    readback_errors,
 )
 from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import EffectLibrary
 from planner.fit.expected import ExpectedFrfs
+from planner.fit.fitted import FitRecord
 from planner.fit.identified_robot import PLACED
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
@@ -41,12 +42,13 @@ from tests.support.chain_cases import fault, judged
 from tests.support.fitted_cases import ARMS, POSES, Case, everyday, harder
 
 CASES, SEED = int(os.environ.get("QUESTIONED", "100")), int(os.environ.get("QUESTION_SEED", "3000"))
-MISREAD_DEG = 3.0
+MISREAD_DEG, EARLIER_DEG = 3.0, 5.0
 EACH = int(os.environ.get("QUESTION_EACH", "1"))
 CHAINS = (
     "× 1000", "÷ 9.81", "× 2", "a channel × 2", "wrong sign", "force's sign", "swapped axes",
     "turned by 90°",
 )  # fmt: skip
+FIRST = "first pose 5° off"
 FILTERED = "2 ms late", "AC-coupled", "windowed"
 
 
@@ -93,6 +95,8 @@ class Asker:
     poses: int
     joints: JointUnits
     expected: ExpectedFrfs | None = None
+    known_q: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    known_frfs: tuple[Frf, ...] = ()
 
     def of_chain(self, q: np.ndarray, frf: Frf) -> str:
         """By the simulation alone."""
@@ -100,15 +104,15 @@ class Asker:
         return "" if sums is None or judged(sums) is None else "chain"
 
     def asked(self, q: np.ndarray, frf: Frf, others: dict[str, np.ndarray]) -> str:
-        """A pose, "readback", "chain", "?" where nothing fits; "" where nothing is asked."""
+        """A pose, "readback", "earlier" and its number, "chain", "?" where nothing fits; "" where
+        nothing is asked."""
         if self.expected is None:
             return self.of_chain(q, frf)
         frf = frf.within(self.band_hz)
         sure, placed = self.poses >= SURE, self.poses >= PLACED
         stated = StatedHits(self.expected, q, frf, placed)
         likely = [far_off_hits(self.expected, q)] if sure else []
-        doubts = [*likely, readback_errors(self.expected, q)] if placed else likely
-        if not stated.doubted and not stated.best_alternative(doubts):
+        if stated.agree(likely):
             return ""
         mistakes = likely + [Alternative(there, "", name) for name, there in others.items()]
         if sure:
@@ -117,6 +121,13 @@ class Asker:
             mistakes += joint_offsets(self.joints, self.expected, frf, angles)
         mistakes += chain_faults(self.expected, q, frf, sure)
         found = stated.best_alternative(mistakes)
+        if found is None or found.about == "readback":
+            every, frfs = np.vstack([self.known_q, q]), (*self.known_frfs, frf)
+            posterior, none = self.expected.posterior, [()] * len(every)
+            together = PosesTogether(posterior, self.band_hz, self.joints, every, frfs)
+            wrong = together.wrong(none)
+            if wrong is not None:
+                return f"earlier {wrong[0]}"
         if found is not None:
             return found.pose or found.about
         if not stated.impossible:
@@ -133,14 +144,22 @@ def answers(
     prior, warm = RobotPrior(EffectLibrary.of(simulation, CAD_INERTIAS)), None
     first = Asker(SpringDraws(simulation, tolerances), case.band_hz, 0, simulation.robot.joints)
     poses, out = {f"P{k}": q for k, q in enumerate(case.q)}, []
+
+    def after(q: np.ndarray, warm: FitRecord | None) -> tuple[Asker, FitRecord]:
+        n, frfs = len(q), tuple(f.within(case.band_hz) for f in case.frfs[: len(q)])
+        fit = Search(prior, case.frfs[:n], q, case.band_hz, tolerances).found(warm)
+        expected = ExpectedFrfs(RobotPosterior.of(fit), case.band_hz)
+        known = replace(first, poses=n, expected=expected, known_q=q, known_frfs=frfs)
+        return known, fit.remembered
+
+    wrong, bent = case.q.copy(), None
+    wrong[0] += np.deg2rad(EARLIER_DEG) * np.eye(wrong.shape[1])[rng.integers(1, wrong.shape[1])]
     for n, (q, frf) in enumerate(zip(case.q, case.frfs, strict=True)):
         ask, true = first, f"P{(n + 1) % len(case.q)}"
         others = {name: there for name, there in poses.items() if name != f"P{n}"}
         one, chains = {}, CHAINS if mistaken else ()
         if n:
-            fit = Search(prior, case.frfs[:n], case.q[:n], case.band_hz, tolerances).found(warm)
-            expected, warm = ExpectedFrfs(RobotPosterior.of(fit), case.band_hz), fit.remembered
-            ask = replace(first, poses=n, expected=expected)
+            ask, warm = after(case.q[:n], warm)
         if n and mistaken:
             strange = case.frfs[(n + 1) % len(case.q)]
             unlisted = {name: there for name, there in others.items() if name != true}
@@ -160,9 +179,11 @@ def answers(
                 "x hit from behind": (ask.asked(q, against, others), "chain"),
                 "x listed as y": (ask.asked(q, listed, others), "chain"),
             }
+            bending, bent = after(wrong[:n], bent)
             if n >= SURE:
-                wrong = {name: filtered(name, case.measured[n]) for name in FILTERED}
-                one |= {name: (ask.asked(q, f, others), "chain") for name, f in wrong.items()}
+                one[FIRST] = (bending.asked(q, frf, others), "earlier 0")
+                wrong_chain = {name: filtered(name, case.measured[n]) for name in FILTERED}
+                one |= {name: (ask.asked(q, f, others), "chain") for name, f in wrong_chain.items()}
         one |= {
             name: (ask.asked(q, shown(frf, fault(name, rng)), others), "chain") for name in chains
         }
@@ -181,7 +202,7 @@ def test_how_often_is_asked(tmp_path):
             told = answers(case, np.random.default_rng(SEED + k), mistaken)
         for name in told[-1]:
             # From one pose another structure may explain what fits nothing that is known.
-            first = SURE if name in ("unlisted pose", *FILTERED) else 0
+            first = SURE if name in ("unlisted pose", FIRST, *FILTERED) else 0
             each = [one[name] for one in told[first:] if name in one]
             found.setdefault(name, []).append(each)
             print(k, arm, make.__name__, name, [answer for answer, _ in each], flush=True)
