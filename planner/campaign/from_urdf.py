@@ -102,7 +102,7 @@ def guess(urdf: Path, weights: StatedMasses, robot_toml: Path, planned: bool = T
         raise InputError(f"{urdf} has no joint that moves; name the URDF of a robot arm.")
     name = root.get("name") or urdf.stem
     config = RobotConfig(
-        name, str(urdf), chain.tcp, chain.tcp, held=chain.held, geometric_stiffness=True
+        name, str(urdf), chain.tcp, chain.sensor, held=chain.held, geometric_stiffness=True
     )
     robot = Robot.of(config, robot_toml)
     if weights.robot is None and nothing_stated(robot):
@@ -170,7 +170,11 @@ def _guesses(
     ranges: list[list[float]] | None,
 ) -> Iterator[Guess]:
     config = robot.config
-    yield Guess("tcp_frame, where the hammer hits and the sensor sits", chain.tcp, None)
+    if chain.sensor == chain.tcp:
+        yield Guess("tcp_frame, where the hammer hits and the sensor sits", chain.tcp, None)
+    else:
+        yield Guess("tcp_frame, where the hammer hits", chain.tcp, None)
+        yield Guess("sensor_frame, where the sensor sits", chain.sensor, None)
     if weights.payload is None:
         yield Guess("rated payload", round(payload, 3), round(PAYLOAD_SD * payload, 3), "kg")
     for table in config.link:

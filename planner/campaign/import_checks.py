@@ -13,7 +13,7 @@ from planner.dataset.measure import MeasuredPose
 from planner.frf.frf import unreciprocal
 from planner.recording.records import Hit
 from planner.recording.repeats import Doubt, doubts, other_size
-from planner.words import listed
+from planner.words import listed, with_sd
 
 
 def question_about(
@@ -163,6 +163,32 @@ def suspected_drift(
         f"on average: the robot may have drifted (warmth, load, clamping). Hit {early.pose}, "
         f"{which}, again ({joints.listed(early.joints_deg, 3)}) and import with --pose "
         f"{early.pose}: it says whether. It is proposed next.",
+    )
+
+
+def unexpected_modes(before: Model, model: Model, pose: str) -> tuple[str, ...]:
+    """A sentence on modes of a pose that lie elsewhere than expected; none where none does.
+
+    `before` expected them, `model` says which they are.
+    """
+    labelled = next((one for one in model.labelled if one.pose == pose), None)
+    if labelled is None or not before.labelled:
+        return ()
+    said = before.predict(labelled.q[None])
+    told = []
+    for k, mode in enumerate(labelled.modes):
+        hz, sd = float(said.frequency_hz[0, k]), float(said.frequency_sd_hz[0, k])
+        off = abs(mode.frequency_hz - hz) if mode else 0.0
+        width = float(np.hypot(sd, mode.frequency_sd_hz)) if mode else 1.0
+        if mode and off > max(DIFFERS_SD * width, SMALLEST * hz):
+            at = f"mode {k + 1} at {mode.frequency_hz:.2f} Hz, expected at {with_sd(hz, sd)} Hz"
+            told.append(f"{at} ({off / width:.0f} sd off)")
+    if not told:
+        return ()
+    return (
+        f"Not as expected: {'; '.join(told)}. Labels count modes from the lowest: one that was not "
+        f"expected may have come in between; else an angle of {pose}, or of a pose before, may be "
+        f"wrong.",
     )
 
 

@@ -16,7 +16,13 @@ from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.events import REFUSED, HitRecord, Question
 from planner.campaign.hit_errors import HitErrorEstimate
-from planner.campaign.import_checks import alerts, contradiction, question_about, suspected_drift
+from planner.campaign.import_checks import (
+    alerts,
+    contradiction,
+    question_about,
+    suspected_drift,
+    unexpected_modes,
+)
 from planner.campaign.imported_files import (
     Fresh,
     ImportedFiles,
@@ -303,6 +309,8 @@ def import_pose(
         keeps.keep_frf(measured.frf, measurement, table)
     model = campaign.model
     remarks = remarks_on(campaign.cell.robot.joints, state, judged, measurement, joints_deg, told)
+    if not event.question and any(hit.accepted for hit in hits):
+        remarks += (*unexpected_modes(before, model, pose), *model.remarks)
     return ImportReport(
         pose=pose,
         accepted=tuple(hit for hit in hits if hit.accepted and not event.question),
@@ -313,7 +321,7 @@ def import_pose(
         model_before=before,
         model=model,
         refit_seconds=time.perf_counter() - started,
-        remarks=(*remarks, *(() if event.question else model.remarks)),
+        remarks=remarks,
         left_out=judged.left_out,
         question=event.question,
         alerts=told,

@@ -28,7 +28,7 @@ from planner.surrogate.modal_surrogate import (
     ModalObservations,
     Surrogate,
 )
-from planner.words import counted
+from planner.words import counted, listed
 
 if TYPE_CHECKING:
     from planner.campaign.decision import Decision
@@ -277,6 +277,28 @@ class Model:
         return mean + above, np.hypot(sd, ABOVE_SD * np.abs(above))
 
     @property
+    def _axes(self) -> frozenset[str]:
+        """Along which axes any pose was hit."""
+        return frozenset().union(*(m.axes for m in self.used))
+
+    @property
+    def not_predicted(self) -> str:
+        """What to say of modes that every pose shows and that are none of those predicted; ""."""
+        others = []
+        for pose, measured in zip(self.labelled, self.used, strict=True):
+            given = {mode.frequency_hz for mode in pose.modes if mode is not None}
+            every = [m.frequency_hz for m in measured.modes if m.likely]
+            others.append([hz for hz in every if hz not in given])
+        if not others or not all(others):
+            return ""
+        hz, count = [f for own in others for f in own], self.cell.config.modes.count
+        return (
+            f"That is said of {counted(count, 'mode')}: every pose shows others that are not "
+            f"predicted (between {min(hz):.1f} and {max(hz):.1f} Hz). Where they matter, raise "
+            f"count in [modes] of campaign.toml."
+        )
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """What the engineer should know of the model: doubts about the simulation."""
         low = with_names(self.low.remark, place_names(self.cell.robot))
@@ -298,10 +320,16 @@ class Model:
         if len(self.labelled) >= FEW_POSES:
             percent = 100 * float(np.sqrt(np.mean(self.surrogate.visit_scatter**2)))
             if percent > 0.3:  # larger than usual
+                check = "Check temperature, clamping and readback."
+                partly = [m.pose for m in self.used if m.axes and m.axes < self._axes]
+                if partly:
+                    check = (
+                        f"Not every axis was hit at {listed(partly)}: hit the others there, too."
+                    )
                 found.append(
                     f"Frequencies scatter by {percent:.1g} % (sd) from visit to visit, more than "
                     f"the modal analysis states: predicted sds include it, further poses do not "
-                    f"lower it. Check temperature, clamping and readback."
+                    f"lower it. {check}"
                 )
         return tuple(found)
 

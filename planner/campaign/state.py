@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import msgspec
 
@@ -45,6 +46,25 @@ class Measurement:
     def accepted(self) -> tuple[HitRecord, ...]:
         """Hits in use."""
         return tuple(hit for hit in self.hits if hit.accepted)
+
+    @property
+    def axes(self) -> frozenset[str]:
+        """Along which axes it was hit, of hits in use; none of FRFs, which do not say."""
+        return frozenset(hit.hit[-1] for hit in self.accepted if hit.hit)
+
+    @property
+    def refused(self) -> tuple[HitRecord, ...]:
+        """Refused hits whose file was not accepted since, from whichever folder."""
+        return tuple(h for h in self.hits if not h.accepted and not self.replaced(h))
+
+    def replaced(self, hit: HitRecord) -> bool:
+        """Whether a file of the same name, along the same axis where it says one, is in use."""
+
+        def named(h: HitRecord) -> tuple[str, int, str | None]:
+            return Path(h.file).name, h.part, h.response
+
+        axes = {h.hit for h in self.accepted if named(h) == named(hit)}
+        return bool(axes) and (hit.hit is None or hit.hit in axes)
 
     @property
     def unhit(self) -> bool:

@@ -174,10 +174,10 @@ class DiscriminatingHit:
 
     @property
     def where(self) -> str:
-        """Axis, pose and its angles."""
+        """Axis, the pose's angles and its name."""
         names = [""] * len(self.joints_deg)
         angles = JointUnits.declared_as(names, self.joint_units).listed(self.joints_deg)
-        return f"along {self.hit} at {self.pose} ({angles})"
+        return f"along {self.hit} with the joints at {angles} ({self.pose})"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -88,7 +88,9 @@ def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
         findings=[(CLASSES[r.severity], r.sentence) for r in cell.examined.remarks
                   if r.severity in CLASSES],
         **_measured(campaign, state, now),
-        forecast=standing(now.forecast, now.waits_for) if state.used else nothing,
+        forecast=standing(now.forecast, now.waits_for, now.not_predicted)
+        if state.used
+        else nothing,
         over_workspace=campaign.model.workspace_prediction,
         left_out=left_out_figure(*found_without(campaign.model))
         if now.leave_one_out.values
@@ -180,7 +182,7 @@ def _pose(m: Measurement, starred: bool) -> list[object]:
     modes = [mode for mode in m.modes if mode.likely]
     mark = (" ★" if starred else "") + (" (withdrawn)" if m.withdrawn else "")
     return [
-        m.pose + mark, len(m.accepted), len(m.hits) - len(m.accepted),
+        m.pose + mark, len(m.accepted), len(m.refused),
         [with_sd(x.frequency_hz, x.frequency_sd_hz, ".3f") for x in modes],
         [number(100 * x.damping_ratio) for x in modes],
         local_time(m.time),

@@ -78,9 +78,9 @@ class ProposalsReport(Answer):
         cell, model = self.campaign.cell, self.campaign.model
         each, joints = cell.config.cost.hits_per_axis, cell.robot.joints
         parts = [part for one in self.proposals for part in one.parts(joints, each)]
-        repeat = model.repeat()
+        repeat, lacks = model.repeat(), (model.waits_for, model.not_predicted)
         places = self.places.sentence if self.places else ""
-        said = standing(model.forecast, model.waits_for, repeat.text if repeat else ""), places
+        said = standing(model.forecast, *lacks, repeat.text if repeat else ""), places
         remarks = [Text(remark, style="yellow") for remark in self.remarks]
         return Group(*parts, Text(" ".join(filter(None, said))), *remarks, *self._then())
 
@@ -96,10 +96,11 @@ class ProposalsReport(Answer):
         return [where, command_line("  ", *act)]
 
 
-def standing(forecast: Forecast, waits_for: str, again: str = "") -> str:
+def standing(forecast: Forecast, waits_for: str, not_predicted: str = "", again: str = "") -> str:
     """Whether the target is reached, how far frequencies are off, and what going on would bring.
 
-    `waits_for` is what lacks until the target is reached; `again` asks to hit a pose again.
+    `waits_for` is what lacks until the target is reached; `again` asks to hit a pose again;
+    `not_predicted` is said of modes beside those that the target is about.
     """
     if waits_for:
         lacks = f"The target is not reached yet; what lacks: {waits_for}."
@@ -107,7 +108,7 @@ def standing(forecast: Forecast, waits_for: str, again: str = "") -> str:
     more = again or forecast.outlook
     more = more and f"If you go on, {more[0].lower()}{more[1:]}"
     reached = "The target is reached: no more poses are needed."
-    return " ".join(filter(None, (reached, forecast.known, more)))
+    return " ".join(filter(None, (reached, not_predicted, forecast.known, more)))
 
 
 def unanswered(question: str) -> str:

@@ -58,11 +58,10 @@ class MeasuredPoseStatus:
     @classmethod
     def of(cls, m: Measurement, starred: bool, held: bool = False) -> "MeasuredPoseStatus":
         """Of a measurement."""
-        used = len(m.accepted)
         found = tuple(mode.frequency_hz for mode in m.modes if mode.likely)
         asked = asked_of(m.pose, m.question) if held else None
         return cls(
-            m.pose, m.joints_deg, used, len(m.hits) - used, found, m.withdrawn, starred,
+            m.pose, m.joints_deg, len(m.accepted), len(m.refused), found, m.withdrawn, starred,
             m.simulated, m.time, m.remarks, asked or msgspec.UNSET,
         )  # fmt: skip
 
@@ -108,6 +107,7 @@ class ModelStatus:
     springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
     waits_for: str = ""  # what lacks until the target is reached
     frf_sd_percent: tuple[float, ...] = ()  # of predicted FRFs, and of their common scale
+    not_predicted: str = ""  # modes that every pose shows beside those predicted
 
     @classmethod
     def of(cls, model: "Model") -> "ModelStatus":
@@ -127,6 +127,7 @@ class ModelStatus:
             springs=refitted_springs(model),
             waits_for=model.waits_for,
             frf_sd_percent=model.frf_sd_percent,
+            not_predicted=model.not_predicted,
         )
 
 
@@ -199,7 +200,7 @@ class StatusReport(ModelStatus, Answer):
             "sd of frequencies over the workspace: "
             + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)
             + f" (all together: target {self.target_frequency_sd_percent:g} %)",
-            standing(self.forecast, self.waits_for),
+            standing(self.forecast, self.waits_for, self.not_predicted),
             f"log: {counted(self.log['entries'], 'entry', 'entries')}",
         ]
         if self.frf_sd_percent:
@@ -222,14 +223,14 @@ class StatusReport(ModelStatus, Answer):
 
 def _still_refused(state: "CampaignState") -> tuple[RefusedHit, ...]:
     """Refused hits of which no corrected file was accepted since."""
-    every = [(m.pose, hit) for m in state.recorded for hit in m.hits]
-    accepted = {(pose, h.file, h.part, h.response) for pose, h in every if h.accepted}
-    refused = [*((pose, h) for pose, h in every if not h.accepted), *state.refused.values()]
-    return tuple(
-        RefusedHit(pose, h.file, h.reason)
-        for pose, h in refused
-        if (pose, h.file, h.part, h.response) not in accepted
-    )
+    told = [(m.pose, hit) for m in state.recorded for hit in m.refused]
+    known = {m.pose: m for m in state.recorded}
+    told += [
+        (pose, hit)
+        for pose, hit in state.refused.values()
+        if pose not in known or not known[pose].replaced(hit)
+    ]
+    return tuple(RefusedHit(pose, hit.file, hit.reason) for pose, hit in told)
 
 
 def status(campaign: Campaign, diagnosis: Path | None = None) -> StatusReport:

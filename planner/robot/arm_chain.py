@@ -14,17 +14,20 @@ from planner.robot.urdf_elements import SLIDING, TURNING, limits_of
 
 # Names of the frame where a tool is bolted on or hits, the likeliest first.
 TOOLS = ("tcp", "tool_center_point", "tool0", "tool", "ee_link", "flange", "end_effector", "ee")
+SENSORS = ("sensor", "accelerometer")  # of that where accelerations are measured
 
 
 @dataclass(frozen=True)
 class ArmChain:
-    """The arm of a URDF: its joints from the base, the frame at its end, other joints' places.
+    """The arm of a URDF: its joints from the base, the frames at its end where a tool and a sensor
+    are, other joints' places.
 
     `held` is for robot.toml; `others` are the joints that it names.
     """
 
     joints: tuple[str, ...]
     tcp: str
+    sensor: str  # the tool's, where no other is named so
     held: dict[str, float]
     others: tuple[str, ...]
 
@@ -46,6 +49,7 @@ def arm_chain(root: ElementTree.Element) -> ArmChain | None:
     return ArmChain(
         tuple(j.get("name", "") for j in joints),
         tree.tool(path[last]),
+        tree.sensor(path[last]),
         {_entry(j): _place(j) for j in others},
         tuple(j.get("name", "") for j in others),
     )
@@ -104,19 +108,30 @@ class _Tree:
         """The frame fixed to a link that a tool is likeliest to be bolted to: by its name, then
         the farthest one, rather one without a shape.
         """
+        depth = self._fixed_to(link)
+        return min(depth, key=lambda one: (_rank(one, TOOLS), -depth[one], one in self._shaped))
+
+    def sensor(self, link: str) -> str:
+        """The frame fixed to a link that is named as a sensor's; else that of the tool."""
+        found = min(self._fixed_to(link), key=lambda one: _rank(one, SENSORS))
+        return found if _rank(found, SENSORS) < len(SENSORS) else self.tool(link)
+
+    def _fixed_to(self, link: str) -> dict[str, int]:
+        """A link and all that are fixed to it, over how many joints."""
         found, depth = [link], {link: 0}
         for one in found:  # which grows meanwhile
             for child in self._below[one]:
                 if self.above[child].get("type") == "fixed" and child not in depth:
                     depth[child] = depth[one] + 1
                     found.append(child)
-        return min(found, key=lambda one: (_rank(one), -depth[one], one in self._shaped))
+        return depth
 
 
-def _rank(link: str) -> int:
-    name = link.lower()
-    ranks = [i for i, tool in enumerate(TOOLS) if name == tool or name.endswith(f"_{tool}")]
-    return min(ranks, default=len(TOOLS))
+def _rank(link: str, names: tuple[str, ...]) -> int:
+    """Which of the names a link has, by itself or after a prefix; their number: none."""
+    own = link.lower()
+    ranks = [i for i, name in enumerate(names) if own == name or own.endswith(f"_{name}")]
+    return min(ranks, default=len(names))
 
 
 def _free(joint: ElementTree.Element) -> bool:

@@ -12,17 +12,16 @@ import pytest
 from scipy.signal import butter, lfilter
 from threadpoolctl import threadpool_limits
 
-from planner.campaign.chain_mismatch import SpringDraws
-from planner.campaign.pose_mismatch import (
-    SURE,
+from planner.campaign.alternatives import (
     Alternative,
-    PosesTogether,
     StatedHits,
     chain_faults,
     far_off_hits,
     flipped_signs,
     joint_offsets,
 )
+from planner.campaign.chain_mismatch import SpringDraws
+from planner.campaign.poses_together import SURE, PosesTogether
 from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS

@@ -10,7 +10,7 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.import_checks import question_about
-from planner.campaign.pose_mismatch import SURE
+from planner.campaign.poses_together import SURE
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
