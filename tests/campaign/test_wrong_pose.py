@@ -79,17 +79,50 @@ def test_a_wrong_angle_at_the_first_pose_is_asked_about_at_the_next(tmp_path):
     assert first is None
     assert asked is not None
     assert (asked.about, asked.fits) == ("earlier", "P001")
-    assert f"is joint_4 {-read:.2f}° or {read:.2f}°?" in asked.text
+    # The other sign, or the setpoint, which are next to the same.
+    assert f"° or {read:.2f}°?" in asked.text
+    assert angle_asked(asked.text, 4) == pytest.approx(-read, abs=0.05)
     assert "--pose P001b" in how_to_answer(campaign.directory, "P002", asked)
+
+
+def test_a_few_degrees_at_the_first_pose_are_asked_about_at_the_third(tmp_path):
+    """Nothing but the hits tells: no setpoint is known. Those of the new pose are not accused."""
+    arm = make_generated_arm(tmp_path, 923, 4, 3)
+    campaign, reports = Campaign.new(tmp_path / "campaign", arm.robot_toml, arm.campaign_toml), []
+    for number in range(3):
+        (pose,) = campaign.next()
+        named = [(pose.pose, np.deg2rad(pose.joints_deg))]
+        folder = arm.record(tmp_path / pose.pose, named, number)
+        retyped(folder, {"pose": f"Y{number}"})
+        if number == 0:
+            right = pose.joints_deg[2]
+            retyped(folder, {"joint_3_deg": right + 5})
+        reports += campaign.import_paths((folder,))
+    asked = reports[-1].question
+    assert [report.question for report in reports[:-1]] == [None, None]
+    assert asked is not None
+    assert (asked.about, asked.fits) == ("earlier", "Y0")
+    assert angle_asked(asked.text, 3) == pytest.approx(right, abs=1.5)
+
+
+def angle_asked(text: str, joint: int) -> float:
+    """Which angle (°) of a joint a question names in place of the stated one."""
+    return float(text.split(f"is joint_{joint} ")[1].split("°", maxsplit=1)[0])
 
 
 def other_sign(folder, column: str) -> float:
     """A table that says the other sign of a joint's angle, in degrees: what it says then."""
     with open(folder / TABLE, newline="") as file:
+        read = -float(next(csv.DictReader(file))[column])
+    retyped(folder, {column: read})
+    return read
+
+
+def retyped(folder, told: dict[str, object]) -> None:
+    """A table that says something else in some columns, in each row."""
+    with open(folder / TABLE, newline="") as file:
         rows = list(csv.DictReader(file))
-    read = -float(rows[0][column])
     with open(folder / TABLE, "w", newline="") as file:
         table = csv.DictWriter(file, list(rows[0]))
         table.writeheader()
-        table.writerows({**row, column: read} for row in rows)
-    return read
+        table.writerows({**row, **told} for row in rows)
