@@ -237,9 +237,10 @@ def _robot_text(guessed: Guessed) -> str:
     ):
         document.add(tomlkit.comment(line))
     x, y, z = (round(float(v), 4) + 0.0 for v in EXAMPLE_M * _off_the_arm(guessed.robot))
+    both = ' and sensor_frame = "tcp"' if config.sensor_frame == config.tcp_frame else ""
     for line in (
         f"To move the tcp {EXAMPLE_M:g} m beyond {config.tcp_frame}, where a tool's tip is, write",
-        'tcp_frame = "tcp" and sensor_frame = "tcp" below, and at the end of this file:',
+        f'tcp_frame = "tcp"{both} below, and at the end of this file:',
         "[[point]]", 'name = "tcp"', f'link = "{config.tcp_frame}"',
         f"position_m = [{x}, {y}, {z}]",
     ):  # fmt: skip

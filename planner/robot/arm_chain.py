@@ -109,12 +109,15 @@ class _Tree:
         the farthest one, rather one without a shape.
         """
         depth = self._fixed_to(link)
-        return min(depth, key=lambda one: (_rank(one, TOOLS), -depth[one], one in self._shaped))
+
+        def unlikely(one: str) -> tuple[int, bool, int, bool]:
+            return _rank(one, TOOLS), _is_sensor(one), -depth[one], one in self._shaped
+
+        return min(depth, key=unlikely)
 
     def sensor(self, link: str) -> str:
         """The frame fixed to a link that is named as a sensor's; else that of the tool."""
-        found = min(self._fixed_to(link), key=lambda one: _rank(one, SENSORS))
-        return found if _rank(found, SENSORS) < len(SENSORS) else self.tool(link)
+        return next(filter(_is_sensor, self._fixed_to(link)), self.tool(link))
 
     def _fixed_to(self, link: str) -> dict[str, int]:
         """A link and all that are fixed to it, over how many joints."""
@@ -132,6 +135,10 @@ def _rank(link: str, names: tuple[str, ...]) -> int:
     own = link.lower()
     ranks = [i for i, name in enumerate(names) if own == name or own.endswith(f"_{name}")]
     return min(ranks, default=len(names))
+
+
+def _is_sensor(link: str) -> bool:
+    return _rank(link, SENSORS) < len(SENSORS)
 
 
 def _free(joint: ElementTree.Element) -> bool:

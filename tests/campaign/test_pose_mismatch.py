@@ -158,6 +158,15 @@ def test_hits_of_another_pose_are_held_until_confirmed(campaign, held, held_once
     assert fresh.question is not None
 
 
+def test_a_refused_import_says_nothing_of_the_robot_again(campaign, pool, tmp_path):
+    broken = tmp_path / "broken.csv"
+    broken.write_text("time_s,force_n\n0,0\n0.001,1\n")
+    assert campaign.model.remarks
+    (report,) = campaign.import_paths((broken,), "A11")
+    assert len(report.refused) == 1
+    assert not set(campaign.model.remarks) & set(report.remarks)
+
+
 def test_hits_listed_along_wrong_axes_are_asked_about(campaign, pool):
     """Of files that do not say their axes themselves."""
     rows, band_hz = pool.rows[WRONG], campaign.cell.config.modes.band_hz
