@@ -1,6 +1,5 @@
 """A campaign's model from its cell and its state: labels, simulation, surrogate."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from planner.campaign.labels import LabelledPose, label, observations
 from planner.campaign.low_fidelity import LowFidelity, Recall, identify_low_fidelity, in_memory
 from planner.campaign.model import FrfOf, Model
 from planner.campaign.state import CampaignState, Measurement
-from planner.dataset.hit_columns import PoseHits
+from planner.campaign.straightened import HitsOf, StraightenedHits
 from planner.design.parameter_sensitivity import FrfNoise
 from planner.frf.frf import Frf
 from planner.surrogate.average import Average
@@ -31,14 +30,15 @@ def build(
     cell: Cell,
     state: CampaignState,
     frf_of: FrfOf,
-    hits_of: Callable[[Measurement, ModesTable], PoseHits] | None = None,
+    hits_of: HitsOf | None = None,
     recall: Recall | None = None,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
     `frf_of` gives the tool's FRFs of a measurement, `hits_of` what its hits say at all points,
     which is asked only where the simulation learns. Without it nothing is told of single hits.
-    `recall` says what was found of the first measurements, so that nothing is found twice.
+    `recall` says what was found of the first measurements, so that nothing is found twice. Where
+    robot.toml states laws of joints, hits are taken as they would be without these.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
     noise, errors, tuned, learns = None, None, None, cell.config.fidelity.simulation == "updated"
@@ -48,7 +48,17 @@ def build(
         whole = tuple(h.whole for h in hits) if hits is not None else frfs
         joints = cell.robot.joints
         q = joints.internal([m.joints_deg for m in used])
-        low = identify_low_fidelity(low, whole, q, table.band_hz, used, recall or in_memory())
+        laws = cell.robot.config.law
+        straight = StraightenedHits(hits_of, used, q, table) if hits_of and laws else None
+        if straight is not None and low.nominal is not None:
+            low = replace(low, nominal=straight.referred(low.nominal))
+        low = identify_low_fidelity(
+            low, whole, q, table.band_hz, used, recall or in_memory(), straight and straight.frfs
+        )
+        if straight is not None and straight.latest:
+            hits, hits_of = straight.latest, straight.at_hand
+            frfs = tuple(h.averaged or f for h, f in zip(hits, frfs, strict=True))
+            whole = tuple(h.whole for h in hits)
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(whole, table.band_hz, misfit)
         if low.identified_robot is not None:
@@ -97,7 +107,7 @@ class _OfOneHit:
     """
 
     frf_of: FrfOf
-    hits_of: Callable[[Measurement, ModesTable], PoseHits]
+    hits_of: HitsOf
 
     def __call__(self, measurement: Measurement, table: ModesTable) -> Frf:
         found = self.hits_of(measurement, table).whole.of_tool

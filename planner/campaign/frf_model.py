@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from planner.dynamics.at_force import averaged, change_at_force, modes_at_force
+from planner.dynamics.at_force import change_at_force, modes_at_force, with_possible_laws
 from planner.dynamics.simulation import Simulation
 from planner.fit.posterior import RobotPosterior
 from planner.measurement.measured_frfs import Measured, common_band, stack
-from planner.recording.force_levels import peak_n
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
 from planner.surrogate.leave_one_out import left_out_modes
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
-    from planner.campaign.read_only import ReadOnlyCampaign
 
 Moments = tuple[np.ndarray, np.ndarray]  # mean and sd (n, 3, 3, F) of FRFs in m/s²/N
 ZONES = 5  # of the band, evenly on a logarithmic scale: they differ in what is left out
@@ -182,20 +180,12 @@ class ForceModel:
     simulation: Simulation | None
 
     @classmethod
-    def of(cls, campaign: "ReadOnlyCampaign") -> "ForceModel":
-        """Springs that were identified have what the campaign's own hits have of the laws."""
-        low = campaign.model.low
-        simulation = low.simulation
+    def of(cls, model: "Model") -> "ForceModel":
+        """Springs have of the laws what robot.toml says: hits they were identified from, too."""
+        simulation = model.low.simulation
         if simulation is None or not simulation.robot.config.law:
             return cls(None)
-        if low.identified_robot is None:
-            return cls(simulation)
-        visits = campaign.dataset(campaign.cell.config.modes.band_hz).visits
-        hits = [(visit.q, hit.axis_index, peak_n(hit)) for visit in visits for hit in visit.hits]
-        if not hits:
-            return cls(simulation)
-        q, axes, force_n = (np.array(column) for column in zip(*hits, strict=True))
-        return cls(averaged(simulation, q, axes, force_n))
+        return cls(with_possible_laws(simulation))
 
     def frf_change(
         self, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray, in_time: bool = True

@@ -17,7 +17,8 @@ from planner.fit.identified_robot import IdentifiedRobot
 from planner.fit.posterior import RobotBelief
 from planner.fit.result import Identification
 from planner.fit.search import Search
-from planner.fit.structure import RobotPrior
+from planner.fit.structure import RobotPrior, exported
+from planner.fit.trials import as_found
 from planner.frf import synthesis
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
@@ -34,6 +35,8 @@ FEW_POSES = 5
 Used = tuple[Measurement, ...]
 # What was found of these measurements before, or is found now.
 Recall = Callable[[Used, Callable[[], FitRecord]], FitRecord]
+# FRFs of the first measurements, so many, without what the laws of this simulation do to hits.
+Straighten = Callable[[Simulation, int], Sequence[Frf]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,31 +179,40 @@ def identify_low_fidelity(
     band_hz: tuple[float, float],
     used: Used = (),
     recall: Recall = lambda used, find: find(),
+    straighten: Straighten | None = None,
 ) -> LowFidelity:
     """The simulation identified from the FRFs measured at q (n, dof) in rad.
 
     They may be between any points. Where the measurements in use are named, what is found of n
     begins where that of the first 1, 2, 3, 4, 6, 8, 12, … led: it is a function of the measurements
-    in their order alone, whatever was computed before, and each step costs little.
+    in their order alone, whatever was computed before, and each step costs little. FRFs are those
+    that `straighten` gives by what was found before, if it is given; measurements are named then.
     """
-    if before.nominal is None or not frfs:
+    nominal = before.nominal
+    if nominal is None or not frfs:
         return before
     prior = before.prior
 
-    def search(count: int) -> Search:
-        first, few = tuple(frfs[:count]), count < FEW_POSES
-        return Search(prior, first, q[:count], band_hz, before.tolerances, widen=few)
+    def search(count: int, known: FitRecord | None) -> Search:
+        first, few = frfs[:count], count < FEW_POSES
+        if straighten is not None:
+            first = straighten(exported(*as_found(prior, known))[0] if known else nominal, count)
+        return Search(prior, tuple(first), q[:count], band_hz, before.tolerances, widen=few)
 
     def found(count: int) -> FitRecord:
         def find() -> FitRecord:
             fewer = _fewer(count)
-            return search(count).found(found(fewer) if fewer else None).remembered
+            known = found(fewer) if fewer else None
+            if straighten is not None:  # by what is found of hits without laws by the fit before
+                known = replace(search(count, known), widen=False).found(known).remembered
+            return search(count, known).found(known).remembered
 
         return recall(used[:count], find)
 
     with threadpool_limits(1):
-        whole = search(len(frfs))
-        fit = IdentifiedRobot.of(whole.recalled(found(len(used))) if used else whole.found())
+        known = found(len(used)) if used else None
+        whole = search(len(frfs), known)
+        fit = IdentifiedRobot.of(whole.found() if known is None else whole.recalled(known))
     return replace(before, identified_robot=fit)
 
 

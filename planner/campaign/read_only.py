@@ -284,10 +284,10 @@ class ReadOnlyCampaign:
 
     @property
     def at_force(self) -> "ForceModel":
-        """What a stated force changes; worked out at each call."""
+        """What a stated force changes."""
         from planner.campaign.frf_model import ForceModel
 
-        return ForceModel.of(self)
+        return ForceModel.of(self.model)
 
     def frf_at(
         self, q: np.ndarray, frequency_hz: np.ndarray | None = None

@@ -24,7 +24,7 @@ from planner.robot.mesh_files import urdf_source
 from planner.toml_file import read_toml_text
 
 if TYPE_CHECKING:
-    from planner.dataset.hit_columns import PoseHits
+    from planner.dataset.hit_columns import Correction, PoseHits
     from planner.frf.frf import Frf
 
 LOG = "log.jsonl"
@@ -332,8 +332,10 @@ class KeptRecordings:
 
         keep_frf(frf, self.sources(measurement), table.band_hz, table.window_rate_1_s)
 
-    def hits(self, measurement: Measurement, table: ModesTable) -> "PoseHits":
+    def hits(
+        self, measurement: Measurement, table: ModesTable, corrected: "Correction | None" = None
+    ) -> "PoseHits":
         """What the accepted hits of a measured pose say, each by itself and at all points."""
         from planner.dataset.hit_columns import hits_of
 
-        return hits_of(self.sources(measurement), table.band_hz, table.window_rate_1_s)
+        return hits_of(self.sources(measurement), table.band_hz, table.window_rate_1_s, corrected)

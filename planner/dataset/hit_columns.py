@@ -1,11 +1,12 @@
 """What each hit of a pose says by itself, on a few lines, and what one of them all would say."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from planner.dataset.dataset import LAID
-from planner.dataset.measure import MeasuredPose, of_tool, one_hit_frf
+from planner.dataset.measure import MeasuredPose, of_tool, one_hit_frf, tool_frf
 from planner.dataset.screened_files import Source
 from planner.dataset.store import user_store
 from planner.frf.frf import Frf
@@ -13,6 +14,7 @@ from planner.frf.spectra import Windows, transform
 from planner.recording.records import Hit
 
 LINES = 48  # of each hit, at most: four numbers a hit are told from 144 complex values
+Correction = Callable[[tuple[Hit, ...]], tuple[Hit, ...]]  # of the hits of a pose
 DROP = 0.1  # of a pulse's force spectrum, where it ceases to excite: 20 dB
 
 
@@ -47,11 +49,13 @@ class HitColumns:
 class PoseHits:
     """The accepted hits of a pose one by one, and `whole`, their FRFs at all points.
 
-    These are of one hit in the middle of all, see `MeasuredPose.one_hit_frf`.
+    These are of one hit in the middle of all, see `MeasuredPose.one_hit_frf`; `averaged` is the
+    tool's FRF of all, where hits were `corrected`.
     """
 
     columns: HitColumns
     whole: Frf
+    averaged: Frf | None = None
 
 
 def hit_columns(
@@ -96,24 +100,29 @@ def hit_columns(
 
 
 def hits_of(
-    sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float = 0.0
+    sources: tuple[Source, ...],
+    band_hz: tuple[float, float],
+    window_rate_1_s: float = 0.0,
+    corrected: Correction | None = None,
 ) -> PoseHits:
-    """Those of files that were accepted before, kept like FRFs."""
+    """Those of files that were accepted before, kept like FRFs unless they are `corrected`."""
     pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
 
     def make() -> PoseHits:
         read = [source.read() for source in sources]
         records = tuple(record for _, found in read for record in found)
-        every = tuple(hit for found, _ in read for hit in found)
-        at_tool = [of_tool(found) for found, _ in read]
-        file = tuple(number for number, found in enumerate(at_tool) for _ in found)
+        files = [number for number, (found, _) in enumerate(read) for _ in found]
+        every, how = tuple(hit for found, _ in read for hit in found), (band_hz, window_rate_1_s)
+        every = every if corrected is None else corrected(every)
+        at_tool = [(n, one) for n, hit in zip(files, every, strict=True) for one in of_tool((hit,))]
         columns = no_columns()
-        if file:
-            hits = tuple(hit for found in at_tool for hit in found)
-            columns = hit_columns(hits, file, band_hz, window_rate_1_s)
-        return PoseHits(columns, one_hit_frf(every, records, band_hz, window_rate_1_s))
+        if at_tool:
+            file, hits = zip(*at_tool, strict=True)
+            columns = hit_columns(hits, file, *how)
+        averaged = None if corrected is None else tool_frf(every, records, *how)
+        return PoseHits(columns, one_hit_frf(every, records, *how), averaged)
 
-    return pose.kept("hits", PoseHits, make)
+    return pose.kept("hits", PoseHits, make) if corrected is None else make()
 
 
 def no_columns() -> HitColumns:

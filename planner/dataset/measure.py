@@ -262,8 +262,7 @@ def frf_of(
         read = [source.read() for source in sources]
         hits = tuple(hit for found, _ in read for hit in found)
         frfs = tuple(record for _, found in read for record in found)
-        whole = _frf(hits, frfs, band_hz, "h1", window_rate_1_s)
-        return whole.of_tool or _nothing(whole)
+        return tool_frf(hits, frfs, band_hz, window_rate_1_s)
 
     return _accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, make)
 
@@ -290,6 +289,17 @@ def one_hit_frf(
     """`MeasuredPose.one_hit_frf` of accepted hits, or exported FRFs as they are."""
     found = MeasuredPose((), band_hz, "h1", window_rate_1_s, hits).one_hit_frf if hits else None
     return found or _frf(hits, records, band_hz, "h1", window_rate_1_s)
+
+
+def tool_frf(
+    hits: tuple[Hit, ...],
+    records: tuple[FrfRecord, ...],
+    band_hz: tuple[float, float],
+    window_rate_1_s: float = 0.0,
+) -> Frf:
+    """The tool's FRF of accepted hits, or of exported FRFs."""
+    whole = _frf(hits, records, band_hz, "h1", window_rate_1_s)
+    return whole.of_tool or _nothing(whole)
 
 
 def _nothing(frf: Frf) -> Frf:

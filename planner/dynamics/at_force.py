@@ -24,6 +24,7 @@ from planner.dynamics.vibration import (
     solve_poles,
 )
 from planner.errors import InputError
+from planner.recording.points import TOOL, Layout
 from planner.robot.elastic_model import Matrices
 from planner.robot.joint_laws import LawTable
 
@@ -58,6 +59,16 @@ def modes_at_force(
     return oscillatory(_poles(m, springs, m.sensor), count)
 
 
+def with_possible_laws(simulation: Simulation) -> Simulation:
+    """Without laws that would take away more than the spring of their joint has."""
+    config, stiffness = simulation.robot.config, simulation.elasticity.stiffness
+    possible = [
+        law for law in config.law
+        if stiffness[simulation.elastic.own_spring(law.joint)] + law.weakest > 0
+    ]  # fmt: skip
+    return simulation.with_laws(possible, config.hammer)
+
+
 def springs_at_force(simulation: Simulation, m: Matrices, force_n: np.ndarray) -> Elasticity:
     """Stiffness and damping (n, e) that laws come nearest to after hits of peak force_n (n,)."""
     if len(force_n) > TOGETHER:
@@ -84,30 +95,35 @@ def springs_at_force(simulation: Simulation, m: Matrices, force_n: np.ndarray) -
     return springs
 
 
-def averaged(
+def with_average(
     simulation: Simulation, q: np.ndarray, axes: np.ndarray, force_n: np.ndarray
 ) -> Simulation:
-    """The same where its springs have of the laws what h hits have on average, as fits to them.
+    """The same robot, told otherwise: springs with what h hits have of the laws on average.
 
-    Of hits at q (h, dof) in rad along axes (h,) 0 to 2 of the tool, with peak force_n (h,).
+    Of hits at q (dof,) in rad along axes (h,) 0 to 2 of the tool, with peak force_n (h,). What laws
+    do beside their springs is less then at such hits, so that an error in these matters less.
     """
-    config, springs = simulation.robot.config, simulation.elasticity
-    own = [simulation.elastic.own_spring(law.joint) for law in config.law]
-    grams, products = np.zeros((len(own), 2, 2)), np.zeros((len(own), 2))
-    for pose in np.unique(q, axis=0):
-        here = np.flatnonzero(np.all(q == pose, axis=1))
-        m = simulation.elastic.matrices(pose).at(np.zeros(len(here), dtype=int))
-        m = replace(m, hit=m.hit[np.arange(len(here)), axes[here]][:, None])
-        swing, speed = _after(simulation, m, _each(springs, len(here)), own, force_n[here])
-        for j, law in enumerate(config.law):
-            gram, product = _products(law, swing[:, j], speed[:, j])
-            grams[j] += gram.sum(axis=0)
-            products[j] += product.sum(axis=0)
-    laws = [
-        msgspec.structs.replace(law, in_spring=spring, in_damper_s=damper)
-        for law, (spring, damper) in zip(config.law, _solved(grams, products).tolist(), strict=True)
-    ]
-    return simulation.with_laws(laws, config.hammer)
+    robot, count = simulation.robot, len(force_n)
+    m = simulation.elastic.matrices(q).at(np.zeros(count, dtype=int))
+    m = replace(m, hit=m.hit[np.arange(count), axes][:, None])
+    there, stated = springs_at_force(simulation, m, force_n), simulation.elasticity
+    blocks, laws = list(robot.config.compliance), {law.joint: law for law in robot.config.law}
+    for joint, law in laws.items():
+        i = simulation.elastic.own_spring(joint)
+        if blocks[i].tie:
+            continue
+        k = float(there.stiffness[:, i].mean())
+        c = float(there.damping[:, i].mean())
+        spring, damper = (k - stated.stiffness[i]) / law.k, (c - stated.damping[i]) / law.k
+        laws[joint] = msgspec.structs.replace(
+            law, in_spring=law.in_spring + spring, in_damper_s=law.in_damper_s + damper
+        )
+        loss = blocks[i].loss_factor * blocks[i].stiffness / k
+        blocks[i] = msgspec.structs.replace(blocks[i], stiffness=k, damping=c, loss_factor=loss)
+    config = msgspec.structs.replace(
+        robot.config, compliance=tuple(blocks), law=tuple(laws.values())
+    )
+    return Simulation(replace(robot, config=config))
 
 
 def _products(law: LawTable, swing: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -205,20 +221,25 @@ def change_at_force(
 
 
 def measured_at_force(
-    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray
-) -> np.ndarray:
-    """Accelerance (n, 3, 3, F) in m/s²/N at q (n, dof) in rad, by hits of peak force_n (n,)."""
-    config, m = simulation.robot.config, simulation.elastic.matrices(q)
+    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray,
+    layout: Layout = TOOL,
+) -> np.ndarray:  # fmt: skip
+    """Accelerance (n, 3s, 3, F) in m/s²/N at q (n, dof) in rad, by hits of peak force_n (n,).
+
+    Of the hit point and the sensors of a layout.
+    """
+    config, m = simulation.robot.config, simulation.elastic.matrices(q, layout=layout)
     own = [simulation.elastic.own_spring(law.joint) for law in config.law]
     ports = _ports(m.mass.shape[1], own, len(q))
     rows = (np.concatenate([one, ports], axis=1) for one in (m.hit, m.sensor))
     base = _without_laws(simulation, own).solved(replace(m, hit=next(rows), sensor=next(rows)))
     step_s = 1 / (PER_PERIOD * config.band_hz[1])
     torque, pulse = _marched(simulation, base, force_n, step_s)
-    force = force_n[:, None] * _spectrum(pulse, frequency_hz, step_s)
-    shares = _spectrum(torque, frequency_hz, step_s) / force[:, None, None]
+    *torques, force = _spectrum([*torque.reshape(-1, len(pulse)), pulse], frequency_hz, step_s)
+    shares = np.reshape(torques, (*torque.shape[:-1], -1)) / force / force_n[:, None, None, None]
     whole = accelerance(base, frequency_hz)
-    return whole[:, :3, :3] - np.einsum("nslf,nlhf->nshf", whole[:, :3, 3:], shares)
+    answers = whole[:, : m.sensor.shape[1]]
+    return answers[:, :, :3] - np.einsum("nslf,nlhf->nshf", answers[:, :, 3:], shares)
 
 
 def _without_laws(simulation: Simulation, own: list[int]) -> Simulation:
@@ -243,7 +264,7 @@ def _marched(
     t = step_s * np.arange(np.ceil((length_s + _fading_s(poles, step_s)) / step_s))
     pulse = np.where(t < length_s, np.sin(np.pi * t / length_s) ** 2, 0.0)
     # By hits, then by torques.
-    felt = base.residues[:, :, 3:] * _one_of_pairs(poles)[..., None, None]
+    felt = base.residues[:, :, -len(laws) :] * _one_of_pairs(poles)[..., None, None]
     z = (poles * step_s)[..., None, None]
     grow, newer = np.exp(z), step_s * (np.expm1(z) - z) / z**2
     older = step_s * (1 + np.exp(z) * (z - 1)) / z**2
@@ -268,8 +289,9 @@ def _marched(
     return np.moveaxis(out, 0, -1), pulse
 
 
-def _spectrum(values: np.ndarray, frequency_hz: np.ndarray, step_s: float) -> np.ndarray:
-    """(…, F) of values (…, T) that begin at 0 and stay as they end."""
+def _spectrum(courses: Sequence[np.ndarray], frequency_hz: np.ndarray, step_s: float) -> np.ndarray:
+    """(n, F) of courses (n, T) that begin at 0 and stay as they end."""
+    values = np.array(courses)
     iw, t = 2j * np.pi * frequency_hz, step_s * np.arange(values.shape[-1])
     end = np.exp(-iw * t[-1]) * (1 / iw - step_s / 2)
-    return step_s * values @ np.exp(-iw * t[:, None]) + values[..., -1:] * end
+    return step_s * values @ np.exp(-iw * t[:, None]) + values[:, -1:] * end

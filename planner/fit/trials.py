@@ -42,6 +42,16 @@ FAR = 100.0  # nats below which nothing is followed
 FOLLOWED, SETTLED, FARTHEST = 6, 3, 3  # how many are followed, settled, come from afar
 
 
+def as_found(
+    prior: RobotPrior, known: FitRecord, sensors: int = 1
+) -> tuple[RobotStructure, np.ndarray]:
+    """The structure that was found before, and its numbers; those it lacks as expected."""
+    structure = RobotStructure(prior, known.effects, sensors)
+    numbers = dict(zip(known.names, known.x, strict=True))
+    pairs = zip(structure.names, structure.mean, strict=True)
+    return structure, np.array([numbers.get(name, mean) for name, mean in pairs])
+
+
 @dataclass(frozen=True, eq=False)
 class Trials:
     """FRFs measured at q (n, dof) in rad, of a robot known before by `prior`, to fit them."""
@@ -74,10 +84,7 @@ class Trials:
     def again(self, known: FitRecord, data: FrfData, size: float) -> tuple[FrfMisfit, np.ndarray]:
         """The misfit of what was found before on `data`, and its numbers; those it lacks as
         expected."""
-        structure = RobotStructure(self.prior, known.effects, data.sensors)
-        numbers = dict(zip(known.names, known.x, strict=True))
-        pairs = zip(structure.names, structure.mean, strict=True)
-        x = np.array([numbers.get(name, mean) for name, mean in pairs])
+        structure, x = as_found(self.prior, known, data.sensors)
         return FrfMisfit(structure, data, self.tolerances, size, self.floor), x
 
     def begun(

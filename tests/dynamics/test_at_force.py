@@ -9,12 +9,11 @@ import pytest
 
 from planner.dynamics.at_force import (
     accelerance_at_force,
-    averaged,
     change_at_force,
     measured_at_force,
     modes_at_force,
 )
-from planner.dynamics.simulation import Elasticity, Simulation
+from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.truth.arms import ARMS
 from planner.truth.cases import DAMPING_S, PEAK_N
@@ -115,23 +114,3 @@ def test_a_mode_moves_with_the_force_as_the_peak_does(tmp_path: Path, kind: str)
     moved, peak = np.log(found[1] / found[0]), np.log(seen[1] / seen[0])
     assert 0.3 < peak / moved < 1
     assert found[0] == pytest.approx(seen[0], rel=0.02)
-
-
-def test_springs_fitted_to_hits_have_the_law_already(tmp_path: Path):
-    """Identified at a force, nothing changes at that force; at others it does."""
-    simulation, q = (bent := Bent.of("hardening", tmp_path)).simulation, bent.q
-    stiff = simulation.elasticity.stiffness.copy()
-    stiff[simulation.elastic.own_spring(JOINT)] *= 1.2
-    e = simulation.elasticity
-    fitted = simulation.changed(Elasticity(stiff, e.damping, e.loss_factor))
-    axes, hertz = np.arange(3), np.linspace(5, 60, 40)
-    known = averaged(fitted, np.repeat(q, 3, axis=0), axes, np.full(3, PEAK))
-    changes = [
-        modes_at_force(known, q, np.array([force_n]), 1).frequency_hz[0, 0]
-        / fitted.frequencies(q, 1).frequency_hz[0, 0]
-        for force_n in (0.2 * PEAK, PEAK, 5 * PEAK)
-    ]
-    assert changes[0] < 0.97
-    assert changes[1] == pytest.approx(1, abs=1e-3)
-    assert changes[2] > 1.03
-    assert not change_at_force(known, q, np.array([np.nan]), hertz).any()

@@ -28,7 +28,7 @@ def urdf() -> str:
     return "\n".join(text)
 
 
-def make_plain_arm(folder: Path, softer: float = 1.0) -> Path:
+def make_plain_arm(folder: Path, softer: float = 1.0, damping_s: float = 4e-4) -> Path:
     """Write the robot folder, its springs that much softer; returns robot.toml."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "plain.urdf").write_text(urdf())
@@ -39,7 +39,7 @@ def make_plain_arm(folder: Path, softer: float = 1.0) -> Path:
     for i, (axis, stiffness) in enumerate(zip(AXES, STIFFNESS, strict=True), 1):
         k = stiffness / softer
         lines += ["[[compliance]]", f'joint = "joint_{i}"', f"axis = {list(axis)}"]
-        lines += [f"stiffness = {k}", f"damping = {4e-4 * k}"]
+        lines += [f"stiffness = {k}", f"damping = {damping_s * k}"]
     path = folder / "robot.toml"
     path.write_text("\n".join(lines) + "\n")
     return path

@@ -1,0 +1,81 @@
+"""Hits of a campaign whose robot.toml states laws of joints, as springs alone would answer them."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from planner.campaign.config import ModesTable
+from planner.campaign.state import Measurement
+from planner.dataset.hit_columns import Correction, PoseHits
+from planner.dynamics.at_force import with_average, with_possible_laws
+from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
+from planner.measurement.straightened_hits import straightened_hits, struck_n
+from planner.recording.points import TCP
+from planner.recording.records import Hit
+
+
+class HitsOf(Protocol):
+    """What the hits of a measurement say, if need be once they are corrected."""
+
+    def __call__(
+        self, measurement: Measurement, table: ModesTable, corrected: Correction | None = None, /
+    ) -> PoseHits: ...
+
+
+class StraightenedHits:
+    """Those of measurements in use at q (n, dof) in rad; `latest` is what was asked for last."""
+
+    def __init__(
+        self, hits_of: HitsOf, used: tuple[Measurement, ...], q: np.ndarray, table: ModesTable
+    ):
+        self.latest: tuple[PoseHits, ...] = ()
+        self._hits_of, self._table = hits_of, table
+        self._used = tuple(zip(used, q, strict=True))
+
+    def frfs(self, simulation: Simulation, count: int) -> tuple[Frf, ...]:
+        """At all points, of the first so many, without what the laws of a simulation do."""
+        how = self._table.band_hz[1], self._table.window_rate_1_s
+        simulation = with_possible_laws(simulation)
+
+        def corrected(q: np.ndarray) -> Correction:
+            return lambda hits: straightened_hits(hits, q, simulation, *how)
+
+        self.latest = tuple(
+            self._hits_of(m, self._table, corrected(q)) for m, q in self._used[:count]
+        )
+        return tuple(hits.whole for hits in self.latest)
+
+    def referred(self, simulation: Simulation) -> Simulation:
+        """The same robot, its springs with what the hits of the first pose have of its laws."""
+        struck: list[Hit] = []
+
+        def seen(hits: tuple[Hit, ...]) -> tuple[Hit, ...]:
+            struck.extend(hit for hit in hits if hit.hit_point == TCP)
+            return hits
+
+        (measurement, q), *_ = self._used
+        self._hits_of(measurement, self._table, seen)
+        if not struck:
+            return simulation
+        axes = np.array([hit.axis_index for hit in struck])
+        return with_average(simulation, q, axes, struck_n(simulation, struck))
+
+    @property
+    def at_hand(self) -> "HitsAtHand":
+        """`latest` by pose."""
+        pairs = zip(self._used, self.latest, strict=True)
+        return HitsAtHand({m.pose: hits for (m, _), hits in pairs})
+
+
+@dataclass(frozen=True)
+class HitsAtHand:
+    """What hits say of poses, by name: `HitsOf` that reads no file."""
+
+    poses: dict[str, PoseHits]
+
+    def __call__(
+        self, measurement: Measurement, table: ModesTable, corrected: Correction | None = None, /
+    ) -> PoseHits:
+        return self.poses[measurement.pose]
