@@ -100,6 +100,10 @@ class LawTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_def
     shares of that stiffness: `in_spring`, and `in_damper_s` in s (both 0: its spring and damper are
     those beside the law). So the law counts where a force is stated (`peak_force_n` of
     predict.csv), and springs are as stated elsewhere.
+
+    A campaign takes out of each hit what the law does at its force, and identifies the robot from
+    what is left: hits may be of several levels. Where no force is stated it predicts what hits as
+    those of its first pose show on average.
     """
 
     joint: str

@@ -31,7 +31,7 @@ HAMMER = Hammer(peak_n=30.0, duration_s=0.008, record_s=2.56, sampling_rate_hz=4
 
 @pytest.fixture(scope="module")
 def struck(tmp_path_factory):
-    """Truth, what it conceals, and a campaign of one pose, hit at three levels along each axis."""
+    """Truth, what it conceals, and a campaign of one pose, hit at two levels along each axis."""
     root = tmp_path_factory.mktemp("straightened")
     robot, rng = make_plain_arm(root / "robot", damping_s=2e-3), np.random.default_rng(1)
     deviation = Deviation(3, stiffness=0.08, damping=0.08, inertia=0.02, com_m=0.002)
