@@ -107,22 +107,20 @@ def with_average(
     m = simulation.elastic.matrices(q).at(np.zeros(count, dtype=int))
     m = replace(m, hit=m.hit[np.arange(count), axes][:, None])
     there, stated = springs_at_force(simulation, m, force_n), simulation.elasticity
-    blocks, laws = list(robot.config.compliance), {law.joint: law for law in robot.config.law}
-    for joint, law in laws.items():
-        i = simulation.elastic.own_spring(joint)
-        if blocks[i].tie:
+    blocks, laws = list(robot.config.compliance), list(robot.config.law)
+    own = [simulation.elastic.own_spring(law.joint) for law in laws]
+    for number, (i, law) in enumerate(zip(own, robot.config.law, strict=True)):
+        if blocks[i].tie or i in own[:number]:  # what a spring has of all its laws, the first has
             continue
         k = float(there.stiffness[:, i].mean())
         c = float(there.damping[:, i].mean())
         spring, damper = (k - stated.stiffness[i]) / law.k, (c - stated.damping[i]) / law.k
-        laws[joint] = msgspec.structs.replace(
+        laws[number] = msgspec.structs.replace(
             law, in_spring=law.in_spring + spring, in_damper_s=law.in_damper_s + damper
         )
         loss = blocks[i].loss_factor * blocks[i].stiffness / k
         blocks[i] = msgspec.structs.replace(blocks[i], stiffness=k, damping=c, loss_factor=loss)
-    config = msgspec.structs.replace(
-        robot.config, compliance=tuple(blocks), law=tuple(laws.values())
-    )
+    config = msgspec.structs.replace(robot.config, compliance=tuple(blocks), law=tuple(laws))
     return Simulation(replace(robot, config=config))
 
 
