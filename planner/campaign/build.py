@@ -52,9 +52,9 @@ def build(
         straight = StraightenedHits(hits_of, used, q, table) if hits_of and laws else None
         if straight is not None and low.nominal is not None:
             low = replace(low, nominal=straight.referred(low.nominal))
-        low = identify_low_fidelity(
-            low, whole, q, table.band_hz, used, recall or in_memory(), straight and straight.frfs
-        )
+        straighten = None if straight is None else straight.frfs
+        known = recall or in_memory()
+        low = identify_low_fidelity(low, whole, q, table.band_hz, used, known, straighten)
         if straight is not None and straight.latest:
             hits, hits_of = straight.latest, straight.at_hand
             frfs = tuple(h.averaged or f for h, f in zip(hits, frfs, strict=True))
