@@ -178,10 +178,12 @@ def new_files(
             left_out.append(record_of(source, "", "", str(error)))
             continue
         if owner.get(digest, pose) != pose:
+            back = command("planner", "withdraw", directory, owner[digest])
             reason = (
                 f"it has the same data as {first[digest]}, imported as a recording of pose "
-                f"{owner[digest]}, and cannot belong to {pose} too; delete it, or put the right "
-                f"file there"
+                f"{owner[digest]}, and cannot belong to {pose} too; put the right file here, or, "
+                f"if it is right here, take back what was imported there ({back}) and import both "
+                f"again"
             )
             if len(delivery.sources) == 1 + len(elsewhere):
                 raise InputError(f"{source.path}: {reason}.")

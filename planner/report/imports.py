@@ -208,11 +208,17 @@ def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
     if asked.about == "earlier":
         wrong = command("planner", "withdraw", directory, asked.fits)
         again = command("planner", "import", directory, "FOLDER", "--pose", f"{asked.fits}b")
+        before, ask, also = asked.fits, wrong, f"then {confirm}"
+        if asked.fits == pose:  # `withdraw` and `confirm` are of the new hits while these are held
+            before = f"those of {pose} before"
+            ask = f"{command('planner', 'undo', directory)}, {wrong}"
+            own = command("planner", "import", directory, "FOLDER", "--pose", f"{pose}c")
+            also = f"then import the new ones as one of their own ({own})"
         return (
             f"{asked.text} The new hits of {pose} are held, not used. Where the angles of "
-            f"{asked.fits} are wrong: {wrong}, correct them in recordings.csv, import its files "
-            f"once more as another pose ({again}), then {confirm}; if they are right, and those of "
-            f"{pose} are wrong: {withdraw}."
+            f"{before} are wrong: {ask}, correct them in recordings.csv, import its files "
+            f"once more as another pose ({again}), {also}; if they are right, and those of "
+            f"{'the new hits' if asked.fits == pose else pose} are wrong: {withdraw}."
         )
     if asked.disagree or asked.about:
         right = "they are" if asked.about else "each is"

@@ -145,6 +145,7 @@ def test_a_file_of_another_pose_does_not_keep_the_others_out(cell, tmp_path):
     code, _, said = call("import", folder, there)
     assert (code, said.count("Refused"), left.name in said) == (3, 1, True)
     assert f"recording of pose {pose.pose}, and cannot belong to {second.pose}" in said
+    assert f"(planner withdraw '{folder}' {pose.pose})" in " ".join(said.split())
     assert [len(m.accepted) for m in Campaign(folder).state.used] == [9, 8]
 
 

@@ -83,6 +83,10 @@ def test_a_wrong_angle_at_the_first_pose_is_asked_about_at_the_next(tmp_path):
     assert f"° or {read:.2f}°?" in asked.text
     assert angle_asked(asked.text, 4) == pytest.approx(-read, abs=0.05)
     assert "--pose P001b" in how_to_answer(campaign.directory, "P002", asked)
+    # Of new hits of the same pose `withdraw` would set aside these: their import is undone first.
+    own = how_to_answer(campaign.directory, "P001", asked)
+    assert own.index("planner undo") < own.index("planner withdraw") < own.index("--pose P001b")
+    assert "--pose P001c" in own
 
 
 def test_a_few_degrees_at_the_first_pose_are_asked_about_at_the_third(tmp_path):
