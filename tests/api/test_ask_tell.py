@@ -72,6 +72,7 @@ def test_a_pose_told_again_replaces_what_was_told(stiffer):
                                rtol=0.02)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_frfs_teach_the_simulation_itself(stiffer):
     lines, loop = np.arange(2.0, 90.0, 0.5), AskTell(TOML, tables("updated"))
     rng = np.random.default_rng(3)

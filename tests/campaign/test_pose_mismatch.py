@@ -252,6 +252,7 @@ def _put(campaign, joints):
         campaign.append(msgspec.structs.replace(last.event, proposals=changed))
 
 
+@pytest.mark.slow
 def test_more_hits_at_a_measured_pose_are_looked_at_alone(campaign, pool, tmp_path):
     extra = tmp_path / "extra.uff"
     shutil.copy(pool.rows["A21"][0].file, extra)

@@ -88,6 +88,7 @@ def test_drift_is_suspected_until_it_was_looked_at_or_its_hint_is_gone(act, left
     assert fold([Entry(n, "", one) for n, one in enumerate(acts, 1)]).doubt == left
 
 
+@pytest.mark.slow
 def test_a_robot_that_softened_is_told_by_the_command(tmp_path):
     robot = make_plain_arm(tmp_path / "robot")
     plan = plain_campaign(tmp_path / "plan" / "campaign.toml", "maximin_lhs")

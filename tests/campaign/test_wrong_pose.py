@@ -89,6 +89,7 @@ def test_a_wrong_angle_at_the_first_pose_is_asked_about_at_the_next(tmp_path):
     assert "--pose P001c" in own
 
 
+@pytest.mark.slow
 def test_a_few_degrees_at_the_first_pose_are_asked_about_at_the_third(tmp_path):
     """Nothing but the hits tells: no setpoint is known. Those of the new pose are not accused."""
     arm = make_generated_arm(tmp_path, 923, 4, 3)

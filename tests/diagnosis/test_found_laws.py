@@ -26,9 +26,8 @@ LEVELS = (0.25, 4.0)  # of the middling force; recorded were 0.4, 1 and 2.5
 
 
 # None of these seeds was used while this was built.
-@pytest.mark.parametrize(
-    "seed", [21, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (22, 23))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [21, 22, 23])
 def test_a_law_is_written_and_predicts_other_poses_and_forces(tmp_path: Path, seed: int):
     robot, recorded, law = made(tmp_path, seed, "hardening", "joint_2", count=2)
     assert law is not None

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.truth.deviation import Deviation, Spring
@@ -40,6 +41,7 @@ def worst_percent(campaign: Campaign, truth: Truth) -> float:
     return float(100 * np.sqrt(np.mean(off**2, axis=0)).max())
 
 
+@pytest.mark.slow
 def test_the_simulation_explains_what_all_sensors_heard(tmp_path: Path) -> None:
     campaign, truth = measured(tmp_path)
     model = campaign.model

@@ -51,6 +51,7 @@ def bare(toml: Path, q: np.ndarray, sensors: tuple[str, ...] = ("sensor",)) -> n
     return replace(load_truth(toml), sensors=sensors).modes(q, 4)[0]
 
 
+@pytest.mark.slow
 def test_frequencies_are_given_without_the_sensors(
     surveyed: tuple[Path, Path, np.ndarray],
 ) -> None:
