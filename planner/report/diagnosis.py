@@ -10,7 +10,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.design.discrimination import LIKELY, ExtraSensor, NextHit, in_words
-from planner.diagnosis.diagnose import ThreefoldSimilarity
+from planner.diagnosis.diagnose import Established, ThreefoldSimilarity
 from planner.diagnosis.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
 from planner.dynamics.at_force import change_at_force
 from planner.effects.effect import Operator
@@ -67,14 +67,19 @@ def established_effects(
     found: "Diagnosis", undecided: "Sequence[Candidate]", names: Mapping[str, str]
 ) -> tuple[EstablishedEffect, ...]:
     """Those of signals and of fits; `names` are the robot's own of places, see `place_names`."""
-    others = "; ".join(in_words(c.places, c.probability) for c in undecided[1:])
-    rest = f" These recordings cannot tell it from: {others}." if others else ""
+
+    def rest(e: Established) -> str:
+        without = [c for c in undecided[1:] if (e.effect, e.at) not in c.places]
+        if e.change is None or not without:
+            return ""
+        others = "; ".join(in_words(c.places, c.probability) for c in without)
+        return f" These recordings cannot tell it from: {others}."
+
     return tuple(
         EstablishedEffect(
             e.effect, e.at, e.probability, None if e.change is None else 100 * e.change,
             {name: ParameterValue(*value) for name, value in e.parameters.items()},
-            with_names(f"{e.text} ({probable(e.probability)}){'' if e.change is None else rest}",
-                       names),
+            with_names(f"{e.text} ({probable(e.probability)}){rest(e)}", names),
         )
         for e in found.findings
     )  # fmt: skip

@@ -120,8 +120,9 @@ class PoseImport(Answer):
         change = ", ".join(
             f"{significant(before)} → {significant(after)} %" for before, after in both
         )
-        said = Text(f"  sd of frequencies: {change} (refit {self.refit_seconds:.2f} s)")
         count = len(self.frequency_sd_percent)
+        refit = f"refit {self.refit_seconds:.2f} s"
+        said = Text(f"  sd of the frequencies of modes 1 to {count}: {change} ({refit})")
         others = Text(f"  other: measured too, none of the {count} modes that are predicted")
         beside = [] if all(mode.label for mode in self.modes) else [others]
         return [made, *beside, *remarks(told), said]

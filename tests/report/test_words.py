@@ -108,7 +108,9 @@ def test_an_import_says_how_a_small_sd_changed():
     before, after = np.array([0.0123, 1.26]), np.array([0.0091, 0.84])
     refused = (RefusedFile("x.uff", "A second pulse."),)
     done = PoseImport("P001", ("y.uff",), refused, (), (), 0.5, before, after, (), None, False)
-    assert "sd of frequencies: 0.012 → 0.0091 %, 1.3 → 0.84 %" in printed(*done.parts())
+    assert "sd of the frequencies of modes 1 to 2: 0.012 → 0.0091 %, 1.3 → 0.84 %" in printed(
+        *done.parts()
+    )
 
 
 def report(verdict: str, *ranked) -> DiagnosisReport:
