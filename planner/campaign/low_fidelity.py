@@ -29,7 +29,7 @@ BELIEVED = 0.99  # in a simulation that fits the recordings
 # what is not explained of |H|: resonances of a few per cent of damping shift by so much of it.
 RIGHT, DAMPING = 0.001, 0.05
 # The same after one pose, when no other has shown yet whether the structure is the right one: 95 %
-# intervals held 0.89 of the truths with RIGHT and hold 0.96 with this, on 20 robots of another
+# intervals held 0.87 of the truths with RIGHT and hold 0.93 with this, on 30 robots of another
 # engine (`tests/campaign/test_few_poses.py`).
 UNCHECKED = 0.012
 # Fewer poses tell neither the structure for sure, nor the scatter from visit to visit, nor, left
