@@ -142,10 +142,11 @@ def _asked(pose: str, off_percent: float, fits: Alternative | None) -> Question:
     elif fits is not None and fits.about == "readback":
         text = f"These hits {fits.what} Are the angles right as they are?"
     elif fits is not None and fits.about == "earlier":
-        those = f"those of {fits.pose}" + (" before" if fits.pose == pose else "")
+        again = fits.pose == pose
+        those = f"those of {fits.pose}" + (" before" if again else "")
+        whose = "the angles stated then" if again else "its angles"
         text = (
-            f"These hits contradict {those}, and {those} {fits.what} Are the angles of {those} "
-            f"right as they are?"
+            f"These hits contradict {those}, and {those} {fits.what} Are {whose} right as they are?"
         )
     else:
         instead = fits.what if fits else "fit no other known pose either"

@@ -4,11 +4,14 @@
 """
 
 import csv
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.events import Proposal, Question
 from planner.campaign.import_checks import question_about
 from planner.campaign.poses_together import SURE
 from planner.dataset.measure import MeasuredPose, measure
@@ -66,22 +69,18 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path, poses):
 
 def test_a_wrong_angle_at_the_first_pose_is_asked_about_at_the_next(tmp_path):
     """Nothing tells then: the simulation alone lacks too much. It bends what is expected after."""
-    arm = make_generated_arm(tmp_path, 923, 4, 3)
-    campaign, reports = Campaign.new(tmp_path / "campaign", arm.robot_toml, arm.campaign_toml), []
-    for number in range(2):
-        (pose,) = campaign.next()
-        named = [(pose.pose, np.deg2rad(pose.joints_deg))]
-        folder = arm.record(tmp_path / pose.pose, named, number)
-        if number == 0:
-            read = other_sign(folder, "joint_4_deg")
-        reports += campaign.import_paths((folder,))
-    first, asked = (report.question for report in reports)
+    read: list[float] = []
+
+    def retype(number: int, folder: Path, _: Proposal) -> None:
+        read.extend([] if number else [other_sign(folder, "joint_4_deg")])
+
+    campaign, (first, asked) = asked_of(tmp_path, 2, retype)
     assert first is None
     assert asked is not None
     assert (asked.about, asked.fits) == ("earlier", "P001")
     # The other sign, or the setpoint, which are next to the same.
-    assert f"° or {read:.2f}°?" in asked.text
-    assert angle_asked(asked.text, 4) == pytest.approx(-read, abs=0.05)
+    assert f"° or {read[0]:.2f}°?" in asked.text
+    assert angle_asked(asked.text, 4) == pytest.approx(-read[0], abs=0.05)
     assert "--pose P001b" in how_to_answer(campaign.directory, "P002", asked)
     # Of new hits of the same pose `withdraw` would set aside these: their import is undone first.
     own = how_to_answer(campaign.directory, "P001", asked)
@@ -92,22 +91,35 @@ def test_a_wrong_angle_at_the_first_pose_is_asked_about_at_the_next(tmp_path):
 @pytest.mark.slow
 def test_a_few_degrees_at_the_first_pose_are_asked_about_at_the_third(tmp_path):
     """Nothing but the hits tells: no setpoint is known. Those of the new pose are not accused."""
-    arm = make_generated_arm(tmp_path, 923, 4, 3)
-    campaign, reports = Campaign.new(tmp_path / "campaign", arm.robot_toml, arm.campaign_toml), []
-    for number in range(3):
-        (pose,) = campaign.next()
-        named = [(pose.pose, np.deg2rad(pose.joints_deg))]
-        folder = arm.record(tmp_path / pose.pose, named, number)
+    right: list[float] = []
+
+    def retype(number: int, folder: Path, pose: Proposal) -> None:
         retyped(folder, {"pose": f"Y{number}"})
         if number == 0:
-            right = pose.joints_deg[2]
-            retyped(folder, {"joint_3_deg": right + 5})
-        reports += campaign.import_paths((folder,))
-    asked = reports[-1].question
-    assert [report.question for report in reports[:-1]] == [None, None]
+            right.append(pose.joints_deg[2])
+            retyped(folder, {"joint_3_deg": right[0] + 5})
+
+    _, (*before, asked) = asked_of(tmp_path, 3, retype)
+    assert before == [None, None]
     assert asked is not None
     assert (asked.about, asked.fits) == ("earlier", "Y0")
-    assert angle_asked(asked.text, 3) == pytest.approx(right, abs=1.5)
+    assert angle_asked(asked.text, 3) == pytest.approx(right[0], abs=1.5)
+
+
+def asked_of(
+    tmp_path: Path, poses: int, retype: Callable[[int, Path, Proposal], None]
+) -> tuple[Campaign, list[Question | None]]:
+    """What is asked of each pose of a generated arm, whose table `retype` writes over."""
+    arm = make_generated_arm(tmp_path, 923, 4, 3)
+    campaign, reports = Campaign.new(tmp_path / "campaign", arm.robot_toml, arm.campaign_toml), []
+    for number in range(poses):
+        (pose,) = campaign.next()
+        folder = arm.record(
+            tmp_path / pose.pose, [(pose.pose, np.deg2rad(pose.joints_deg))], number
+        )
+        retype(number, folder, pose)
+        reports += campaign.import_paths((folder,))
+    return campaign, [report.question for report in reports]
 
 
 def angle_asked(text: str, joint: int) -> float:

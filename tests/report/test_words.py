@@ -3,6 +3,7 @@ does not contradict itself, and forecasts that hold."""
 
 import io
 from dataclasses import dataclass, fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,12 +13,18 @@ from rich.text import Text
 
 from planner.cli.answer import respond
 from planner.design.stopping import percent
-from planner.diagnosis.diagnose import ThreefoldSimilarity
+from planner.diagnosis.diagnose import Established, ThreefoldSimilarity
 from planner.diagnosis.mismatch import MismatchShares
 from planner.diagnosis.odd_pose import OddPose
+from planner.diagnosis.verdict import Candidate
 from planner.measurement.agreement import Similarity
 from planner.report.answer import Answer, RefusedFile
-from planner.report.diagnosis import DiagnosisReport, EffectAtPlace, RankedExplanation
+from planner.report.diagnosis import (
+    DiagnosisReport,
+    EffectAtPlace,
+    RankedExplanation,
+    established_effects,
+)
 from planner.report.imports import PoseImport
 from planner.report.predictions import ExpectedMode
 from planner.report.saved_diagnosis import two_answers
@@ -237,3 +244,15 @@ def test_ranges_hold_the_truth_about_as_often_as_they_should():
         held += low <= true and (high is None or true <= high)
     assert told > 200
     assert held / told > 0.6
+
+
+def test_a_finding_may_be_taken_for_explanations_without_it():
+    base, hose, bearing = ("base_compliance", "base"), ("local_resonator", "link_2"), (
+        "transverse_compliance", "joint_2")  # fmt: skip
+    found = [Established(*place, 0.9, 0.2, {}, "So.") for place in (base, hose)]
+    undecided = [Candidate((base, hose), 0.6), Candidate((base, bearing), 0.4)]
+    told = established_effects(SimpleNamespace(findings=found), undecided, {})
+    of_base, of_hose = (effect.text for effect in told)
+    assert "cannot tell it from" not in of_base
+    assert "cannot tell it from: " in of_hose
+    assert "transverse compliance at joint_2" in of_hose
