@@ -55,6 +55,7 @@ def build(
         straighten = None if straight is None else straight.frfs
         known = recall or in_memory()
         low = identify_low_fidelity(low, whole, q, table.band_hz, used, known, straighten)
+        q = low.stood(q)
         if straight is not None and straight.latest:
             hits, hits_of = straight.latest, straight.at_hand
             frfs = tuple(h.averaged or f for h, f in zip(hits, frfs, strict=True))

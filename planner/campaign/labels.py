@@ -21,7 +21,7 @@ MODAL = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"  # of a
 
 @dataclass(frozen=True, eq=False)
 class LabelledPose:
-    """A measured pose, q (dof,) in rad, with its modes by label (None: not found there).
+    """A measured pose, q (dof,) in rad where it stood, with its modes by label (None: not found).
 
     `simulated` are the simulation's (1, count), NaN where it has no such mode.
     """
@@ -48,10 +48,11 @@ def label(
     """
     if not measurements:
         return ()
-    q = cell.robot.joints.internal([m.joints_deg for m in measurements])
+    low = low or cell.frozen
+    q = low.stood(cell.robot.joints.internal([m.joints_deg for m in measurements]))
     modes = [tuple(to_mode(mode) for mode in m.modes) for m in measurements]
     count = cell.config.modes.count
-    simulated = (low or cell.frozen).simulate(q, ABOVE)
+    simulated = low.simulate(q, ABOVE)
     guide = Guide(simulated.frequency_hz, simulated.shape)
     if not np.any(np.isfinite(simulated.frequency_hz)):
         guide = Guide.by_example(modes, count + ABOVE)

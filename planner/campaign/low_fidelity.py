@@ -10,10 +10,11 @@ from threadpoolctl import threadpool_limits
 from planner.campaign.state import Measurement
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
+from planner.effects.misread_angle import misread_angles
 from planner.effects.parameters import CAD_INERTIAS, Priors
 from planner.effects.table import EffectLibrary
 from planner.fit.fitted import FitRecord
-from planner.fit.identified_robot import IdentifiedRobot
+from planner.fit.identified_robot import PLACED, IdentifiedRobot
 from planner.fit.posterior import RobotBelief
 from planner.fit.result import Identification
 from planner.fit.search import Search
@@ -92,6 +93,13 @@ class LowFidelity:
             self.identified_robot.identified.simulation if self.identified_robot else self.nominal
         )
 
+    def stood(self, q: np.ndarray) -> np.ndarray:
+        """Where the joints stood at measured poses, stated as q (n, dof) in rad."""
+        if self.identified_robot is None:
+            return q
+        belief = self.identified_robot.posterior
+        return q + belief.structure.stood_off(belief.x, q)
+
     def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
         """Simulated modes of poses q (n, dof) in rad; NaN without a simulation.
 
@@ -151,7 +159,8 @@ class LowFidelity:
         if fit is None:
             return ""
         if fit.fits:
-            return " ".join(filter(None, (fit.scale, fit.words, fit.departures)))
+            misread = fit.posterior.misread
+            return " ".join(filter(None, (*misread, fit.scale, fit.words, fit.departures)))
         text = (
             f"Fitted to the recordings, the simulation still differs from them by "
             f"{self.misfit_sds:.2g} times their noise: it lacks physics"
@@ -203,7 +212,11 @@ def identify_low_fidelity(
         first, few = frfs[:count], count < FEW_POSES
         if straighten is not None:
             first = straighten(exported(*as_found(prior, known))[0] if known else nominal, count)
-        return Search(prior, tuple(first), q[:count], band_hz, before.tolerances, widen=few)
+        poses = [m.pose for m in used[:count]] if count >= PLACED else []
+        read = misread_angles(nominal.robot.joints, q[: len(poses)], poses)
+        return Search(
+            prior, tuple(first), q[:count], band_hz, before.tolerances, widen=few, readings=read
+        )
 
     def found(count: int) -> FitRecord:
         def find() -> FitRecord:

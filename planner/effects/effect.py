@@ -6,18 +6,28 @@ with numbers ψ of its own, each with a normal prior, or both.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.motion import times_real
 
-# (columns (n, k, r, c, F) of changes of H, their prior sds (k,)) → nats gained, likeliest ψ (k,),
-# and by how much all other numbers (D,) of the fit move with it.
-Gain = Callable[[np.ndarray, np.ndarray], tuple[float, np.ndarray, np.ndarray]]
+
+class Gain(Protocol):
+    """What columns gain beside all else, to first order."""
+
+    def __call__(
+        self, columns: np.ndarray, sd: np.ndarray, poses: slice = slice(None)
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        """Nats, likeliest ψ (k,), and by how much all other numbers (D,) of the fit move with it.
+
+        `columns` (n, k, r, c, F) are changes of H at those `poses`, of prior sds (k,); at others
+        there are none.
+        """
+        ...
 
 
 @dataclass(frozen=True)
@@ -72,7 +82,8 @@ Values = Mapping[str, tuple[float, float]]
 class Motions:
     """How hits (n, e, c, F) and sensors (n, e, r, F) move the springs, per unit of force.
 
-    `accelerance` (n, r, c, F) is what the fit so far has, `measured` what was recorded.
+    `accelerance` (n, r, c, F) is what the fit so far has, `measured` what was recorded;
+    `by_angle` (n, dof, r, c, F) how the former changes with the joints' angles, if that is known.
     """
 
     poses: PosedBodies
@@ -80,6 +91,7 @@ class Motions:
     x_sensor: np.ndarray
     accelerance: np.ndarray
     measured: np.ndarray
+    by_angle: np.ndarray | None = None
 
     def at(self, ports: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Motions (n, p, c, F) and (n, p, r, F) of ports (n, p, e)."""
@@ -163,6 +175,10 @@ class Operator(ABC):
 
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance | None:
         """What it adds to the dynamic stiffness beside its springs, with slopes by ψ."""
+        return None
+
+    def stood_off(self, q: np.ndarray, psi: np.ndarray) -> np.ndarray | None:
+        """(n, dof) in rad or m: by how much joints stood beside their readback q (n, dof)."""
         return None
 
     def chain(self, s: np.ndarray, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

@@ -110,7 +110,10 @@ class FrfMisfit:
             scaled = m.by_angle.mass * (now / nominal)[:, None, None, None]
             m = replace(m, by_angle=replace(m.by_angle, mass=scaled))
         s, shape = self.data.measured.s, self.data.measured.accelerance.shape[1:3]
-        ports = None if eta is None else actual_ports(eta, s, self.tolerances, shape)
+        ports = None
+        if eta is not None:
+            ports = actual_ports(eta, s, self.tolerances, shape)
+            ports = replace(ports, angle=ports.angle + self.structure.stood_off(x, self.data.q))
         elasticity = self.structure.elasticity(x)
         there = self.impedances(x) if added is None else added
         return moved(m, elasticity, s, mass, [z for z in there if z is not None], ports)
@@ -169,6 +172,10 @@ class FrfMisfit:
         out[:, s.chain] = open_[:, numbers.hits : numbers.known]
         out[:, s.size : s.size + numbers.hits] = open_[:, : numbers.hits]
         out[:, s.size + numbers.hits : own] = open_[:, numbers.known :]
+        for effect, at in zip(s.effects, s.own, strict=True):
+            off = effect.stood_off(self.data.q, np.ones(1))
+            if off is not None and motion.by_angle is not None:
+                out[:, at.start] = np.einsum("nj,nj...->n...", off, motion.by_angle)
         np.multiply(visits, self.tolerances.visit_stiffness, out=out[:, own:-1])
         return self.through_chain(x, h, out[:, :-1]), out, motion
 
@@ -248,12 +255,12 @@ class FrfMisfit:
         """(n, r, c, F) bool: where both have a logarithm; what no hit moves has none."""
         return self.data.measured.used & (np.abs(h) > NOTHING * self.data.weights.size)
 
-    def whitened(self, columns: np.ndarray) -> np.ndarray:
-        """The same of plain residuals."""
+    def whitened(self, columns: np.ndarray, poses: slice = slice(None)) -> np.ndarray:
+        """The same of plain residuals, of some poses."""
         n, k, rows, sides, lines = columns.shape
         out = np.empty((n, k, 2, rows, sides, lines))
         assert self.rho is not None
-        turned = np.swapaxes(self.data.weights.whitening(self.rho), -1, -2)
+        turned = np.swapaxes(self.data.weights.whitening(self.rho)[poses], -1, -2)
         for part, values in enumerate((columns.real, columns.imag)):
             given = np.moveaxis(np.ascontiguousarray(values), 1, 3)
             np.matmul(given, turned, out=np.moveaxis(out[:, :, part], 1, 3))
@@ -295,16 +302,16 @@ class FrfMisfit:
         return -0.5 * (at.chi2 + prior + at.volume + noise + float(spent))
 
     def gain(
-        self, at: At, columns: np.ndarray, sd: np.ndarray
+        self, at: At, columns: np.ndarray, sd: np.ndarray, poses: slice = slice(None)
     ) -> tuple[float, np.ndarray, np.ndarray]:
         """See `Gain`, of columns (n, k, r, c, F) of sds (k,)."""
         s, d = self.structure, self.structure.size
-        kept, new = at.eliminated, self.whitened(columns)
+        kept, new = at.eliminated, self.whitened(columns, poses)
         assert kept is not None
-        both = kept.white @ np.swapaxes(new, 1, 2)
-        taken, k = kept.inverses @ both[:, d:-1], new.shape[1]
+        both = kept.white[poses] @ np.swapaxes(new, 1, 2)
+        taken, k = kept.inverses[poses] @ both[:, d:-1], new.shape[1]
         flat, across = new.transpose(1, 0, 2).reshape(k, -1), taken.reshape(-1, k)
-        onto = kept.onto.reshape(len(across), -1)
+        onto = kept.onto[poses].reshape(len(across), -1)
         square = flat @ flat.T - across.T @ across
         cross = both[:, :d].sum(axis=0) - onto[:, :d].T @ across
         pull = both[:, -1].sum(axis=0) - across.T @ onto[:, -1]
@@ -330,7 +337,11 @@ class FrfMisfit:
         motion, x = at.motion, at.x
         sensor = self.through_chain(x, motion.scaled(motion.x_sensor).swapaxes(1, 2)).swapaxes(1, 2)
         m, h = self.data.measured, self.through_chain(x, motion.accelerance)
-        return Motions(self.poses, motion.x_hit, sensor, h, np.where(m.used, m.accelerance, h))
+        by = motion.by_angle
+        if by is not None:
+            by = np.stack([self.through_chain(x, one) for one in by.swapaxes(0, 1)], 1)
+        recorded = np.where(m.used, m.accelerance, h)
+        return Motions(self.poses, motion.x_hit, sensor, h, recorded, by)
 
 
 def _times(factor: np.ndarray, h: np.ndarray) -> np.ndarray:

@@ -173,17 +173,26 @@ class RobotPosterior(RobotBelief):
     @cached_property
     def words(self) -> tuple[str, ...]:
         """What the structure has beside what is stated and that matters, and by how much."""
+        return tuple(
+            f"{words} Without that, simulated FRFs would be {significant(100 * share)} % off."
+            for share, words in self._told(artefacts=False)
+        )
+
+    @cached_property
+    def misread(self) -> tuple[str, ...]:
+        """Where recordings are not of what they are said to be of, where that matters."""
+        return tuple(words for _, words in self._told(artefacts=True) if self.explains)
+
+    def _told(self, artefacts: bool) -> list[tuple[float, str]]:
+        """Shares of FRFs that effects change, largest first, and what each is."""
         told, known = [], dict(zip(self.structure.effects, self.found.shares, strict=True))
         for things in self._things:
             first = things[0]
             share = known[first] if len(things) == 1 else self.found.share_of(things)
-            if share >= MATTERS:
+            if share >= MATTERS and first.artefact == artefacts:
                 words = first.words_together([self.values(effect) for effect in things])
                 told.append((share, words.replace(first.at, first.name[1])))
-        return tuple(
-            f"{words} Without that, simulated FRFs would be {significant(100 * share)} % off."
-            for share, words in sorted(told, reverse=True)
-        )
+        return sorted(told, reverse=True)
 
     @property
     def _things(self) -> list[list[Operator]]:

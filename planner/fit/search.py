@@ -238,7 +238,7 @@ class Search(Trials):
         motions, gain = base.misfit.first_order(base.at.x, base.at.own)
         psi = best.at.x[best.structure.own[best.structure.effects.index(effect)]]
         others = [
-            e for e in effects_free(base.structure)
+            e for e in self.free(base.structure)
             if type(e) is type(effect) and e.at != effect.at.split("#")[0]
         ]  # fmt: skip
         ends = self.compete(base, [e.moved_to(effect, psi, motions, gain) for e in others])

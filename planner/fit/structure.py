@@ -273,6 +273,14 @@ class RobotStructure:
                 out[self.bodies.bodies.index(added[0])] += added[1]
         return out
 
+    def stood_off(self, x: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """(n, dof) in rad or m: by how much joints stood beside their readback q (n, dof)."""
+        out = np.zeros(q.shape)
+        for effect, own in zip(self.effects, self.own, strict=True):
+            off = effect.stood_off(q, x[own])
+            out += 0.0 if off is None else off
+        return out
+
     def massive(self, x: np.ndarray) -> bool:
         """Whether bodies to which effects add something are still such as matter can form."""
         added = self.added_inertia(x)

@@ -9,9 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.effects.effect import Start
+from planner.effects.effect import Operator, Start, gain_of
 from planner.fit.data import FrfData
 from planner.fit.departures import departed
+from planner.fit.explanations import RARE
 from planner.fit.fitted import (
     SIZES,
     FitRecord,
@@ -64,6 +65,7 @@ class Trials:
     on_step: Callable[[str], None] = lambda _: None
     order: np.ndarray | None = None  # as in `FrfData.of`
     floor: float = 0.0  # as in `FrfMisfit`
+    readings: tuple[Operator, ...] = ()  # of these poses, that may be wrong
 
     def __getstate__(self) -> Mapping[str, object]:
         """For another process, which tells nothing."""
@@ -87,6 +89,12 @@ class Trials:
         structure, x = as_found(self.prior, known, data.sensors)
         return FrfMisfit(structure, data, self.tolerances, size, self.floor), x
 
+    def free(self, structure: RobotStructure) -> tuple[Operator, ...]:
+        """Effects that a structure has not."""
+        there = {e.label for e in structure.effects}
+        own = (e for e in self.readings if e.label not in there)
+        return (*effects_free(structure), *own)
+
     def begun(
         self, data: FrfData, structure: RobotStructure, x: np.ndarray | None = None
     ) -> StructureFit:
@@ -109,7 +117,10 @@ class Trials:
         again = (e for e in every if e.several and e not in free)  # more may hang on a link
         far = not explained(base)
         tried = (e for e in (*free, *again) if far or pulled(base, e))
-        return leaders([s for e in tried for s in e.starts(motions, gain)], least)
+        kept = leaders([s for e in tried for s in e.starts(motions, gain)], least)
+        mine = self.free(base.structure)[len(free) :]
+        read = sorted((s for e in mine for s in e.starts(motions, gain)), key=gain_of)[-1:]
+        return kept + [s for s in read if s.gain_nats > max(least, RARE)]
 
     def compete(
         self,

@@ -1,0 +1,110 @@
+"""A joint misread at one of the poses: what it does to FRFs, and that it is found where it is."""
+
+import numpy as np
+import pytest
+
+from planner.dynamics.simulation import Simulation
+from planner.effects.misread_angle import MisreadAngle, misread_angles
+from planner.effects.parameters import CAD_INERTIAS
+from planner.effects.table import EffectLibrary
+from planner.fit.data import FrfData
+from planner.fit.misfit import FrfMisfit
+from planner.fit.posterior import RobotPosterior
+from planner.fit.search import Search
+from planner.fit.structure import RobotPrior
+from planner.measurement.nuisances import Tolerances
+from planner.robot.robot import Robot
+from tests.support.fitted_cases import Case, everyday
+
+POSE, JOINT, OFF_DEG = 0, 2, 5.0
+NAMES = "P001", "P002", "P003"
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory) -> Case:
+    """A robot of another engine with a soft base, a link that bends and a hose."""
+    return everyday("arm of four", 7, tmp_path_factory.mktemp("case"))
+
+
+@pytest.fixture(scope="module")
+def prior(case) -> RobotPrior:
+    return RobotPrior(EffectLibrary.of(Simulation(Robot.load(case.toml)), CAD_INERTIAS))
+
+
+def read(prior: RobotPrior, q: np.ndarray) -> tuple[MisreadAngle, ...]:
+    return misread_angles(prior.effect_library.stiff.robot.joints, q, NAMES[: len(q)])
+
+
+def one(prior: RobotPrior, q: np.ndarray) -> MisreadAngle:
+    return next(e for e in read(prior, q) if e.at == f"joint_{JOINT + 1} of {NAMES[POSE]}")
+
+
+def test_its_slope_is_the_derivative(case, prior):
+    data = FrfData.of(prior, case.frfs[:2], case.q[:2], case.band_hz, 12)
+    misfit = FrfMisfit(prior.stated().with_effect(one(prior, case.q[:2])), data, Tolerances())
+    x = misfit.structure.mean.copy()
+    at = misfit.structure.own[-1].start
+    x[at] = 0.05
+    about = misfit.about(misfit.zero_nuisances(), x)
+    _, columns, _ = misfit.columns(x, about)
+    step = 1e-5 * np.eye(len(x))[at]
+    ahead, behind = (misfit.motion(y, about).accelerance for y in (x + step, x - step))
+    slope = (ahead - behind) / 2e-5
+    np.testing.assert_allclose(columns[:, at], slope, rtol=0, atol=1e-4 * np.abs(slope).max())
+    assert not slope[1 - POSE].any()
+    assert slope[POSE].any()
+
+
+def test_frfs_are_those_of_where_the_joint_stood(case, prior):
+    """To second order in the angle."""
+    effect, off = one(prior, case.q[:2]), []
+    structure = prior.stated().with_effect(effect)
+    x, at = structure.mean.copy(), structure.own[-1].start
+    for angle in (0.02, 0.01):
+        x[at] = angle
+        stood = case.q[:2] + structure.stood_off(x, case.q[:2])
+        assert stood[POSE, JOINT] - case.q[POSE, JOINT] == pytest.approx(angle)
+        both = []
+        for s, q in ((structure, case.q[:2]), (prior.stated(), stood)):
+            misfit = FrfMisfit(
+                s, FrfData.of(prior, case.frfs[:2], q, case.band_hz, 12), Tolerances()
+            )
+            here = x if s is structure else s.mean
+            both.append(
+                misfit.motion(here, misfit.about(misfit.zero_nuisances(), here)).accelerance
+            )
+        off.append(np.linalg.norm(both[0] - both[1]) / np.linalg.norm(both[1]))
+    assert off[0] < 0.01
+    assert off[0] == pytest.approx(4 * off[1], rel=0.25)
+
+
+def found(case: Case, prior: RobotPrior, q: np.ndarray, readings: tuple[MisreadAngle, ...]):
+    frfs = tuple(frf.within(case.band_hz) for frf in case.frfs[:3])
+    robot = prior.effect_library.stiff.robot
+    tolerances = Tolerances.of(robot.config, robot.joints.slides)
+    search = Search(prior, frfs, q, case.band_hz, tolerances, readings=readings)
+    return RobotPosterior.of(search.found())
+
+
+def test_a_joint_five_degrees_off_is_found_and_no_other(case, prior):
+    wrong = case.q[:3].copy()
+    wrong[POSE, JOINT] += np.deg2rad(OFF_DEG)
+    told = found(case, prior, wrong, read(prior, wrong))
+    (effect,) = [e for e in told.structure.effects if isinstance(e, MisreadAngle)]
+    assert effect.at == f"joint_{JOINT + 1} of {NAMES[POSE]}"
+    angle, sd = np.rad2deg(told.values(effect)["angle"])
+    assert angle == pytest.approx(-OFF_DEG, abs=3 * float(np.hypot(sd, 0.1)))
+    (text,) = told.misread
+    assert f"At {NAMES[POSE]} a{JOINT + 1} stood at" in text
+    assert not any(NAMES[POSE] in words for words in told.words)
+
+
+def test_none_is_found_where_all_are_right(case, prior):
+    right = found(case, prior, case.q[:3], read(prior, case.q[:3]))
+    assert not [e for e in right.structure.effects if isinstance(e, MisreadAngle)]
+    assert right.misread == ()
+
+
+def test_a_pose_not_measured_is_where_it_is_said_to_be(case, prior):
+    structure = prior.stated().with_effect(one(prior, case.q[:2]))
+    assert not structure.stood_off(structure.mean + 0.1, case.unseen).any()
