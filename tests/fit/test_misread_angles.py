@@ -3,18 +3,19 @@
 import numpy as np
 import pytest
 
+from planner.campaign.low_fidelity import LowFidelity
 from planner.dynamics.simulation import Simulation
 from planner.effects.misread_angle import MisreadAngle, misread_angles
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import EffectLibrary
 from planner.fit.data import FrfData
+from planner.fit.identified_robot import IdentifiedRobot
 from planner.fit.misfit import FrfMisfit
-from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
-from tests.support.fitted_cases import Case, everyday
+from tests.support.fitted_cases import COUNTED, Case, everyday
 
 POSE, JOINT, OFF_DEG = 0, 2, 5.0
 NAMES = "P001", "P002", "P003"
@@ -83,26 +84,36 @@ def found(case: Case, prior: RobotPrior, q: np.ndarray, readings: tuple[MisreadA
     robot = prior.effect_library.stiff.robot
     tolerances = Tolerances.of(robot.config, robot.joints.slides)
     search = Search(prior, frfs, q, case.band_hz, tolerances, readings=readings)
-    return RobotPosterior.of(search.found())
+    return LowFidelity(COUNTED, Simulation(robot), tolerances, IdentifiedRobot.of(search.found()))
 
 
 def test_a_joint_five_degrees_off_is_found_and_no_other(case, prior):
     wrong = case.q[:3].copy()
     wrong[POSE, JOINT] += np.deg2rad(OFF_DEG)
-    told = found(case, prior, wrong, read(prior, wrong))
+    low = found(case, prior, wrong, read(prior, wrong))
+    assert low.identified_robot is not None
+    told = low.identified_robot.posterior
     (effect,) = [e for e in told.structure.effects if isinstance(e, MisreadAngle)]
     assert effect.at == f"joint_{JOINT + 1} of {NAMES[POSE]}"
     angle, sd = np.rad2deg(told.values(effect)["angle"])
     assert angle == pytest.approx(-OFF_DEG, abs=3 * float(np.hypot(sd, 0.1)))
     (text,) = told.misread
     assert f"At {NAMES[POSE]} a{JOINT + 1} stood at" in text
-    assert not any(NAMES[POSE] in words for words in told.words)
+    assert low.remark.startswith(text)
+    assert low.remark.count(NAMES[POSE]) == text.count(NAMES[POSE])  # among no findings
+    stood = low.stood(wrong)
+    assert stood[POSE, JOINT] == pytest.approx(wrong[POSE, JOINT] + np.deg2rad(angle))
+    stood[POSE, JOINT] = wrong[POSE, JOINT]
+    np.testing.assert_array_equal(stood, wrong)
 
 
 def test_none_is_found_where_all_are_right(case, prior):
-    right = found(case, prior, case.q[:3], read(prior, case.q[:3]))
+    low = found(case, prior, case.q[:3], read(prior, case.q[:3]))
+    assert low.identified_robot is not None
+    right = low.identified_robot.posterior
     assert not [e for e in right.structure.effects if isinstance(e, MisreadAngle)]
     assert right.misread == ()
+    np.testing.assert_array_equal(low.stood(case.q[:3]), case.q[:3])
 
 
 def test_a_pose_not_measured_is_where_it_is_said_to_be(case, prior):
