@@ -1,4 +1,4 @@
-"""Pictures of Busch et al. 2022: figures 7 to 11, and FRFs from the modes of five poses (12).
+"""Pictures of Busch et al. 2022: figures 7 to 11, A4, and FRFs from the modes of five poses (12).
 
 Figure 12 as published: ω by AR1, ξ by a GP with the cubic kernel, real and imaginary parts of
 residues by GPs with the RBF kernel, each by itself; samples of all of them by quasi-Monte Carlo.
@@ -77,7 +77,12 @@ def pictures(
             ten, KERNELS, "Figure 10: damping ratios, 15 poses trained, 20 predicted",
             "RMSE (% of critical)",
         ),
-        "busch2022_figure_11": _figure_11(eleven),
+        "busch2022_figure_11": _residues(
+            eleven, 1, "Figure 11: residues, 15 poses trained, 20 predicted", "RMSE / mode's rms"
+        ),
+        "busch2022_figure_a4": _residues(
+            eleven, 0, "Figure A4: residues, 15 poses trained, 20 predicted", "R²", FLOOR
+        ),
     }  # fmt: skip
 
 
@@ -114,12 +119,13 @@ def _figure_8(eight: np.ndarray, shown: tuple[int, ...]) -> Figure:
     return figure
 
 
-def _figure_11(eleven: np.ndarray) -> Figure:
-    title = "Figure 11: residues, 15 poses trained, 20 predicted"
+def _residues(
+    eleven: np.ndarray, score: int, title: str, what: str, floor: float | None = None
+) -> Figure:
     figure, grid = panels((10.0, 6.4), title, 2, 2)
     modes = _modes(eleven.shape[1])
     for panel, name, scores in zip(grid.flat, RESIDUES, eleven, strict=True):
-        drawing.bars(panel, modes, KERNELS, scores[..., 1], "RMSE / mode's rms")
+        drawing.bars(panel, modes, KERNELS, scores[..., score], what, floor)
         panel.set_title(f"R {name.replace(' ', ', ')} part", fontsize=10)
     name_axes(figure, grid)
     return figure
@@ -161,13 +167,10 @@ def figure_12(seen: AnalysedPoses, small: bool = False) -> Rebuilt:
     draws = FEW_DRAWS if small else DRAWS
     samples = np.abs(_published(seen, train, target, hz, draws))
     low, middle, high = np.quantile(samples, (0.025, 0.5, 0.975), axis=0)
-    fitted = fit_surrogate(_rows(seen.modes, train, seen.x))
-    prediction = fitted.predict(seen.x[there], _simulated(seen.modes.simulated, there))
+    fitted = fit_surrogate(_rows(seen.every, train, seen.x))
+    prediction = fitted.predict(seen.x[there], _simulated(seen.every.simulated, there))
     mean, sd = (moment[0] for moment in frf_moments(prediction, hz))
-    own = _rows(seen.modes, there, seen.x)
-    best = synthesis.accelerance(
-        hz, synthesis.pole(own.frequency_hz, own.damping_ratio), own.residue
-    )[0]
+    best = synthesised(seen.every, target, hz)
     size = [np.abs(measured[i, j]) for i, j in PAIRS]
     noise = [1.96 * sd_measured[i, j] for i, j in PAIRS]
     inside = [(m > a - n) & (m < b + n) for m, a, b, n in zip(size, low, high, noise, strict=True)]
@@ -185,6 +188,13 @@ def figure_12(seen: AnalysedPoses, small: bool = False) -> Rebuilt:
         float(np.mean(ours)),
         draws,
     )
+
+
+def synthesised(modes: ModalObservations, pose: int, hz: np.ndarray) -> np.ndarray:
+    """Accelerances (3, 3, F) in m/s²/N of a pose, put together from the modes found there."""
+    known = np.isfinite(modes.frequency_hz[pose])
+    poles = synthesis.pole(modes.frequency_hz[pose][known], modes.damping_ratio[pose][known])
+    return synthesis.accelerance(hz, poles, modes.residue[pose][known])
 
 
 def _published(
@@ -210,13 +220,15 @@ def saltelli(dimensions: int, draws: int, seed: int = 0) -> np.ndarray:
 
 
 def _moments(seen: AnalysedPoses, train: np.ndarray, target: int) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and sd (modes, 10) of what is predicted at the target, each by its own GP."""
-    x, modes = seen.x, seen.modes
-    count = modes.frequency_hz.shape[1]
-    mean, sd = np.empty((2, count, 2 + 2 * len(PAIRS)))
-    for k in range(count):
-        low = modes.simulated.frequency_hz[:, k]
+    """Mean and sd (modes, 10) of what is predicted at the target, each by its own GP.
 
+    Of modes that were found at all the poses trained with.
+    """
+    x, modes = seen.x, seen.every
+    found = np.flatnonzero(np.all(np.isfinite(modes.frequency_hz[train]), axis=0))
+    mean, sd = np.empty((2, len(found), 2 + 2 * len(PAIRS)))
+    for row, k in enumerate(found.tolist()):
+        low = modes.simulated.frequency_hz[:, k]
         frequency = Samples.of(x[train], modes.frequency_hz[train, k])
         models: list[FidelityLevel] = [
             fit_nargp(
@@ -235,7 +247,7 @@ def _moments(seen: AnalysedPoses, train: np.ndarray, target: int) -> tuple[np.nd
             for part in (residue.real, residue.imag):
                 models.append(fit_likelihood(Samples.of(x[train], part), "rbf", isotropic=True))
         told = [model.predict(x[[target]]) for model in models]
-        mean[k], sd[k] = ([float(t[i][0]) for t in told] for i in (0, 1))
+        mean[row], sd[row] = ([float(t[i][0]) for t in told] for i in (0, 1))
     return mean, sd
 
 
