@@ -24,7 +24,7 @@ from planner.robot.default_properties import (
     nothing_stated,
     total_stated,
 )
-from planner.robot.link_bodies import guessed_masses, link_bodies, lowest_m
+from planner.robot.link_bodies import guessed_masses, link_bodies, lowest_m, mounted
 from planner.robot.robot import Robot
 from planner.robot.urdf import read_tree
 from planner.robot.workspace import ranges_inside, tool_direction, workspace_in_front
@@ -212,7 +212,8 @@ def _remarks(robot: Robot, chain: ArmChain, weights: StatedMasses) -> Iterator[s
             f"{chain.joints[-1]}; {', '.join(chain.others)} stay where [held] of robot.toml says."
         )
     first = f'tcp_frame = "{chain.tcp}", where the hammer hits (robot.toml says how to move it)'
-    first += "" if weights.tool else " and the tool ([[payload]] there, or --tool-mass-kg here)"
+    if not weights.tool and not mounted(robot, link_bodies(robot)):
+        first += " and the tool ([[payload]] there, or --tool-mass-kg here)"
     asked = ["[workspace] of campaign.toml", "floor, table and fence as [[obstacle]]"]
     asked += [] if weights.payload else ["the rated payload, by which springs are guessed"]
     yield f"Put right first: {first}; then {'; '.join(asked)}."

@@ -17,7 +17,8 @@ from planner.check.examine import (
 from planner.report.answer import Answer, plain
 from planner.report.text import number, table
 from planner.robot.joint_laws import NUMBER_ENTRIES, LawTable
-from planner.words import counted
+from planner.robot.link_bodies import mounted
+from planner.words import counted, listed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -94,7 +95,13 @@ class RobotCheckReport(Answer):
     def _carried(self) -> str:
         """What [[payload]] of robot.toml adds to the links that move, in words."""
         mass = sum(body.mass for body in self.found.robot.config.payload)
-        return f", and {mass:.4g} kg of [[payload]]" if mass else ", no tool ([[payload]]) stated"
+        if mass:
+            return f", and {mass:.4g} kg of [[payload]]"
+        tool = mounted(self.found.robot, self.found.links)
+        if tool:
+            own = sum(link.mass for link in tool)
+            return f", {own:.4g} kg of it the URDF's {listed([link.name for link in tool])}"
+        return ", no tool ([[payload]]) stated"
 
 
 def _cell(pose: CheckedPose, most_hz: float) -> str:

@@ -155,6 +155,13 @@ def _ends(robot: Robot, joint: int) -> list[np.ndarray]:
     return [place.translation + place.rotation @ (v * linkage.axes[own]) for v in way]
 
 
+def mounted(robot: Robot, links: tuple[LinkBody, ...]) -> tuple[LinkBody, ...]:
+    """Links with a mass fixed to what the last joint carries: the tool, where the URDF has it."""
+    number = robot.model.frames[robot.tcp_id].parentJoint
+    last = ("", *robot.linkage.names)[number]
+    return tuple(b for b in links if last and b.joint == last and not b.first and b.mass > 0)
+
+
 @dataclass(frozen=True, eq=False)
 class Skeleton:
     """The robot at a pose as points (p, 3) in the world, m, and lines between pairs of them."""

@@ -122,6 +122,19 @@ def test_joints_beside_the_arm_are_held_and_named(tmp_path):
     assert with_rail["joint_units"] == ["mm", *["deg"] * 6]
 
 
+def test_a_spindle_that_the_description_has_is_the_tool(tmp_path):
+    urdf, cell = whole(tmp_path / "src"), tmp_path / "cell"
+    spindle = (
+        '<link name="spindle"><inertial><mass value="9.5"/><inertia ixx="0.1" ixy="0" ixz="0" '
+        'iyy="0.1" iyz="0" izz="0.1"/></inertial></link><joint name="mount" type="fixed">'
+        '<parent link="tool0"/><child link="spindle"/></joint></robot>'
+    )
+    urdf.write_text(urdf.read_text().replace("</robot>", spindle))
+    assert "and the tool ([[payload]]" not in said("new", cell, "--urdf", urdf)
+    checked = " ".join(said("check", cell / "robot" / "robot.toml").split())
+    assert "9.5 kg of it the URDF's spindle" in checked
+
+
 def test_the_screen_says_what_to_put_right_first(tmp_path):
     cell = tmp_path / "cell"
     screen = " ".join(said("new", cell, "--urdf", published(tmp_path), *GIVEN).split())
