@@ -8,10 +8,8 @@ of a global search (differential evolution) with the paper's population and gene
 begins as the paper's does: a Latin hypercube with dampings in the lower eighth.
 
 Where to measure: with covariance Σ of the parameters' logarithms and Fisher information F of the
-hits at a pose, the next D-optimal point is that of the largest ½ log det(I + Lᵀ F L), Σ = L Lᵀ
-(Fedorov 1972); the next one for predicting leaves least expected error of FRFs at all points, what
-parameters leave and what no parameters explain together (as Seo et al. 2000 choose for a GP). Both
-at the stated parameters: before anything is measured, which is when it is asked.
+hits at a pose, the next point is that of the largest ½ log det(I + Lᵀ F L), Σ = L Lᵀ (Fedorov
+1972), at the stated parameters: before anything is measured, which is when it is asked.
 """
 
 from collections.abc import Sequence
@@ -49,7 +47,6 @@ POPULATION = 14  # times the parameters: 168 and 336; the paper has 182 and 336
 FEW_GENERATIONS = 2  # of the small version
 LINES = 60  # that are compared
 STEPS, FEW_STEPS = 30, 15  # of either climb; of the small version
-ALIKE_RAD, JITTER = 0.3, 1e-6  # of what no parameters explain; chosen before any was tried
 AT_BOUND = 0.01  # of a bound's logarithmic width: nearer to it, a parameter is at its bound
 
 
@@ -216,13 +213,11 @@ def percent(agreement: Agreement) -> tuple[float, float]:
 class Informative:
     """What hits at n poses would tell of p parameters' logarithms.
 
-    `covariance` (p, p) before, `information` (n, 3, p, p) of a hit along each axis, by `values`
-    real numbers a pose.
+    `covariance` (p, p) before, `information` (n, 3, p, p) of a hit along each axis.
     """
 
     covariance: np.ndarray
     information: np.ndarray
-    values: float
 
     @classmethod
     def of(
@@ -231,12 +226,10 @@ class Informative:
     ) -> "Informative":  # fmt: skip
         """At poses q (n, dof) in rad, with the noise of these FRFs and a misfit as found."""
         robot = RobotBelief.stated(robot_prior(simulation, priors), EXACT_HITS)
-        noise = FrfNoise.of(tuple(frfs), band_hz, misfit)
-        open_ = UncertainParameters(robot, noise, band_hz)
+        open_ = UncertainParameters(robot, FrfNoise.of(tuple(frfs), band_hz, misfit), band_hz)
         springs = slice(0, len(robot.structure.parameters))
         told = open_.information(q)[:, :, springs, springs]
-        values = 2 * 9 * (band_hz[1] - band_hz[0]) / noise.step_hz
-        return cls(open_.covariance[springs, springs], told, values)
+        return cls(open_.covariance[springs, springs], told)
 
     def best(self, count: int) -> np.ndarray:
         """Rows (count,), the most informative first, each hit along all axes."""
@@ -250,27 +243,6 @@ class Informative:
             chosen.append(int(np.argmax(gain)))
             covariance = root @ np.linalg.inv(gained[chosen[-1]]) @ root.T
             covariance = (covariance + covariance.T) / 2
-        return np.array(chosen)
-
-    def predicting(self, q: np.ndarray, count: int) -> np.ndarray:
-        """Rows (count,) after which FRFs at all poses q (n, dof) in rad are expected best.
-
-        What no parameters explain is as large as the misfit, and alike at poses ALIKE_RAD apart:
-        it keeps points apart.
-        """
-        told = self.information.sum(axis=1)
-        of_frfs, precision = told.mean(axis=0) / self.values, np.linalg.inv(self.covariance)
-        apart = np.sum((q[:, None] - q) ** 2, axis=-1)
-        rest = np.exp(-0.5 * apart / ALIKE_RAD**2)  # covariance (n, n), so far
-        chosen: list[int] = []
-        for _ in range(count):
-            by_parameters = np.trace(np.linalg.inv(precision + told) @ of_frfs, axis1=1, axis2=2)
-            gained = np.mean(rest**2, axis=0) / (np.diag(rest) + JITTER)
-            left = by_parameters - gained
-            left[chosen] = np.inf
-            chosen.append(best := int(np.argmin(left)))
-            precision = precision + told[best]
-            rest = rest - np.outer(rest[best], rest[best]) / (rest[best, best] + JITTER)
         return np.array(chosen)
 
     def determined(self, rows: np.ndarray, axes: Sequence[int] = (0, 1, 2)) -> int:
