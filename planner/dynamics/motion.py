@@ -127,7 +127,7 @@ class Motion:
         """(n, 3s, 3h, F) in rad/s² per N: how the sensor turns."""
         return self.moving(self.matrices.sensor_turn)
 
-    @property
+    @cached_property
     def by_angle(self) -> np.ndarray | None:
         """(n, dof, 3s, 3h, F) in m/s²/N per rad of each joint; None where slopes are not known."""
         slopes = self.matrices.by_angle

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.effects.effect import Operator
+from planner.effects.effect import Operator, gain_of
 from planner.fit.explanations import (
     RARE,
     ExploredStructures,
@@ -37,7 +37,7 @@ from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotBelief
 from planner.fit.structure import RobotStructure, effects_free, exported
-from planner.fit.trials import FAR, LOG_STEPS, Trials, explained
+from planner.fit.trials import FAR, FOLLOWED, LOG_STEPS, Trials, explained
 from planner.inference.parallel import parallel_map
 from planner.measurement.measured_frfs import completed
 
@@ -230,7 +230,10 @@ class Search(Trials):
         return [self._from(tried, base.misfit.data) for tried in ends]
 
     def displaced(self, best: StructureFit, effect: Operator) -> list[StructureFit]:
-        """With an operator at other places than where it is, likeliest first."""
+        """With an operator at other places than where it is, likeliest first.
+
+        Of many places those that the first order ranks first.
+        """
         held = effect.springs or effect.stated
         base = None if held else without(best, [effect], steps=0)
         if base is None:
@@ -241,7 +244,8 @@ class Search(Trials):
             e for e in self.free(base.structure)
             if type(e) is type(effect) and e.at != effect.at.split("#")[0]
         ]  # fmt: skip
-        ends = self.compete(base, [e.moved_to(effect, psi, motions, gain) for e in others])
+        starts = [e.moved_to(effect, psi, motions, gain) for e in others]
+        ends = self.compete(base, sorted(starts, key=gain_of, reverse=True)[:FOLLOWED])
         return [*map(converged, ends[:1]), *ends[1:]]
 
     def _last(self, best: StructureFit) -> StructureFit:
