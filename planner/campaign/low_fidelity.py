@@ -100,6 +100,11 @@ class LowFidelity:
         belief = self.identified_robot.posterior
         return q + belief.structure.stood_off(belief.x, q)
 
+    @property
+    def misread(self) -> tuple[str, ...]:
+        """Where they stood elsewhere than is stated, in a sentence each."""
+        return self.identified_robot.posterior.misread if self.identified_robot else ()
+
     def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
         """Simulated modes of poses q (n, dof) in rad; NaN without a simulation.
 
@@ -159,8 +164,7 @@ class LowFidelity:
         if fit is None:
             return ""
         if fit.fits:
-            misread = fit.posterior.misread
-            return " ".join(filter(None, (*misread, fit.scale, fit.words, fit.departures)))
+            return " ".join(filter(None, (*self.misread, fit.scale, fit.words, fit.departures)))
         text = (
             f"Fitted to the recordings, the simulation still differs from them by "
             f"{self.misfit_sds:.2g} times their noise: it lacks physics"

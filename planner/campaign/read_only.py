@@ -208,31 +208,32 @@ class ReadOnlyCampaign:
         """Of `used_recordings`, and raises as they do."""
         from planner.dataset.dataset import Dataset
 
-        return Dataset.of(
+        found = Dataset.of(
             self.used_recordings,
             band_hz,
             window_rate_1_s=window_rate_1_s,
             progress=progress,
             name=str(self.directory),
         )
+        return replace(found, remarks=(*self.model.low.misread, *found.remarks))
 
     @property
     def used_recordings(self) -> "tuple[Recording, ...]":
-        """The accepted recordings of all poses in use, in the order of import.
+        """The accepted recordings of all poses in use, in the order of import, where these stood.
 
         Raises InputError where there are none.
         """
         from planner.dataset.visits import Recording
 
-        kept, joints = self.recordings, self.cell.robot.joints
-        found = tuple(
-            Recording(measurement.pose, joints.internal(measurement.joints_deg), source)
-            for measurement in self.state.used
+        kept, used = self.recordings, self.state.used
+        if not used:
+            raise InputError(f"{self.directory} holds no hits yet; import recordings first.")
+        stated = self.cell.robot.joints.internal([m.joints_deg for m in used])
+        return tuple(
+            Recording(measurement.pose, q, source)
+            for measurement, q in zip(used, self.model.low.stood(stated), strict=True)
             for source in kept.sources(measurement)
         )
-        if not found:
-            raise InputError(f"{self.directory} holds no hits yet; import recordings first.")
-        return found
 
     def orphans(self) -> list[str]:
         """Recordings stored without an import: the program was stopped in between."""

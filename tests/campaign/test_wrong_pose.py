@@ -13,6 +13,7 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal, Question
 from planner.campaign.import_checks import question_about
+from planner.campaign.low_fidelity import LowFidelity
 from planner.campaign.poses_together import SURE
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
@@ -86,6 +87,17 @@ def test_a_wrong_angle_at_the_first_pose_is_asked_about_at_the_next(tmp_path):
     own = how_to_answer(campaign.directory, "P001", asked)
     assert own.index("planner undo") < own.index("planner withdraw") < own.index("--pose P001b")
     assert "--pose P001c" in own
+
+
+def test_other_commands_take_poses_where_they_stood(tmp_path, monkeypatch):
+    arm = make_generated_arm(tmp_path, 922, 4, 3)
+    campaign = measured(arm, tmp_path, 1)
+    stated = np.deg2rad(campaign.state.used[0].joints_deg)
+    assert all(np.array_equal(r.q, stated) for r in campaign.used_recordings)
+    monkeypatch.setattr(LowFidelity, "stood", lambda self, q: q + 0.1)
+    monkeypatch.setattr(LowFidelity, "misread", ("At P001 a1 stood elsewhere.",))
+    np.testing.assert_allclose(campaign.used_recordings[0].q, stated + 0.1)
+    assert campaign.dataset(BAND_HZ).remarks[0] == "At P001 a1 stood elsewhere."
 
 
 @pytest.mark.slow
