@@ -113,8 +113,17 @@ class Search(Trials):
         return replace(self, frfs=tuple(out))
 
     def _ended(self, best: StructureFit) -> StructureFit:
-        found = self._last(best)
+        found = self._last(self._believed(best))
         return replace(found, wider=self._widened(found)) if self.widen else found
+
+    def _believed(self, best: StructureFit) -> StructureFit:
+        """Without misread angles where more is left than may be: they stand in for anything."""
+        labels = {e.label for e in self.readings}
+        read = [e for e in best.structure.effects if e.label in labels]
+        if not read or size_of(best) <= SIZES[0]:
+            return best
+        fewer = without(best, read)
+        return best if fewer is None else converged(settled(fewer.misfit, fewer.at))
 
     def _plain(self) -> StructureFit:
         """With nothing that robots need not have."""
