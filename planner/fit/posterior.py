@@ -180,7 +180,7 @@ class RobotPosterior(RobotBelief):
 
     @cached_property
     def misread(self) -> tuple[str, ...]:
-        """Where recordings are not of what they are said to be of."""
+        """Where recordings are not of what they are said to be of, where that matters."""
         return tuple(words for _, words in self._told(artefacts=True))
 
     def _told(self, artefacts: bool) -> list[tuple[float, str]]:
@@ -189,7 +189,7 @@ class RobotPosterior(RobotBelief):
         for things in self._things:
             first = things[0]
             share = known[first] if len(things) == 1 else self.found.share_of(things)
-            if first.artefact == artefacts and (artefacts or share >= MATTERS):
+            if share >= MATTERS and first.artefact == artefacts:
                 words = first.words_together([self.values(effect) for effect in things])
                 told.append((share, words.replace(first.at, first.name[1])))
         return sorted(told, reverse=True)
