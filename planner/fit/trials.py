@@ -118,7 +118,8 @@ class Trials:
         far = not explained(base)
         tried = (e for e in (*free, *again) if far or pulled(base, e))
         kept = leaders([s for e in tried for s in e.starts(motions, gain)], least)
-        mine = self.free(base.structure)[len(free) :]
+        # Of all joints at all poses the first order tells which it is.
+        mine = (e for e in self.free(base.structure) if e not in free)
         read = sorted((s for e in mine for s in e.starts(motions, gain)), key=gain_of)[-1:]
         return kept + [s for s in read if s.gain_nats > max(least, RARE)]
 
