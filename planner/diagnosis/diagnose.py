@@ -213,21 +213,22 @@ def _explored(
     what a law has on average, from pose to pose, by effects that are not there.
     """
 
-    def explored() -> ExploredStructures:
+    def explored(known: StructureFit | None = None) -> ExploredStructures:
         steps = replace(search, on_step=lambda text: progress(f"fitting: {text}", 0.5))
-        return steps.explored()
+        return steps.explored(known)
 
     found, levels, straight = explored(), None, recorded
     for _ in range(ROUNDS if recorded.visits else 0):
         progress("comparing hits of different force", 0.85)
-        told = level_laws(recorded, most_probable(found.settled))
+        best = most_probable(found.settled)
+        told = level_laws(recorded, best)
         levels = told if levels is None or told.laws else levels
         if not told.laws or recorded.most_heard is not recorded:
             break
-        there = RobotPosterior.of(most_probable(found.settled)).simulation
+        there = RobotPosterior.of(best).simulation
         straight = straightened(recorded, with_laws(there, told.laws, recorded))
         search = searching(straight.ended_frfs, straight.q, simulation, _order(straight))
-        found = explored()
+        found = explored(best)
     return straight, search, found, levels
 
 

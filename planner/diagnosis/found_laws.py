@@ -6,8 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from planner.dataset.dataset import Dataset
+from planner.dataset.visits import Visit
 from planner.diagnosis.levels import LevelLaw
 from planner.dynamics.simulation import Simulation
+from planner.inference.parallel import parallel_map
 from planner.measurement.straightened_hits import straightened_hits
 from planner.recording.force_levels import pulse_s
 from planner.robot.config import HammerTable
@@ -36,7 +38,8 @@ def with_laws(simulation: Simulation, found: Sequence[LevelLaw], recorded: Datas
 def straightened(recorded: Dataset, simulation: Simulation) -> Dataset:
     """Recordings as springs alone would answer, what is beyond them taken out."""
     how = recorded.band_hz[1], recorded.window_rate_1_s
-    return recorded.corrected(
-        replace(visit, hits=straightened_hits(visit.hits, visit.q, simulation, *how))
-        for visit in recorded.visits
-    )
+
+    def one(visit: Visit) -> Visit:
+        return replace(visit, hits=straightened_hits(visit.hits, visit.q, simulation, *how))
+
+    return recorded.corrected(parallel_map(one, recorded.visits))

@@ -47,9 +47,13 @@ class Impedance:
 
     def add_to(self, z: np.ndarray) -> None:
         """Add it to z (n, F, e, e)."""
-        for number, coefficient in self.values:
-            whole = np.swapaxes(self.ports, 1, 2) @ self.shapes[number] @ self.ports
-            z += coefficient[..., None, None] * whole[:, None]
+        if not self.values:
+            return
+        numbers, coefficients = zip(*self.values, strict=True)
+        ports = self.ports[:, None]
+        whole = np.swapaxes(ports, 2, 3) @ self.shapes[list(numbers)] @ ports
+        each = np.stack([np.broadcast_to(c, z.shape[:2]) for c in coefficients], axis=2)
+        z += (each @ whole.reshape(len(z), len(numbers), -1)).reshape(z.shape)
 
     def gradient(self, x_hit: np.ndarray, x_sensor: np.ndarray, out: np.ndarray) -> None:
         """X_sᵀ dZ X_h into out (n, p, 3s, 3h, F), of solutions (n, e, 3, F)."""

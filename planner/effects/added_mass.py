@@ -50,12 +50,12 @@ class AddedMass(Operator):
     def _start(self, motions: Motions, gain: Gain, place: np.ndarray) -> Start:
         there = self.impedance(motions.poses, np.array([1.0, *place, *self.mean[4:]]))
         columns = motions.changed_by(there)[:, :4]
-        nats, psi, moved = gain(columns, np.array([1.0, 0.7, 0.7, 0.7]))
+        [(nats, psi)] = gain(columns, np.array([1.0, 0.7, 0.7, 0.7]))
         mass = float(np.clip(psi[0], -FARTHEST, FARTHEST))
         if abs(mass) < LEAST:
             mass = LEAST
         place = place + np.clip(psi[1:4] / mass, -1, 1)
-        return Start(self, np.array([mass, *place, *self.mean[4:]]), nats, moved)
+        return Start(self, np.array([mass, *place, *self.mean[4:]]), nats)
 
     def moved_to(self, found: Operator, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
         """The same matter on another link: springs that move both feel it as they did."""

@@ -35,7 +35,7 @@ class SensorGain(Operator):
         psi = np.array([np.clip(of[channel] - others, -2, 2)])
         column = np.zeros_like(motions.accelerance)[:, None]
         column[:, 0, channel::3] = motions.accelerance[:, channel::3]
-        return (Start(self, psi, gain(column, self.sd)[0]),)
+        return (Start(self, psi, gain(column, self.sd)[0][0]),)
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
@@ -92,7 +92,7 @@ class SensorRotation(Operator):
         psi = Rotation.from_matrix(turned).as_rotvec()
         shape = (len(h), h.shape[1] // 3, 3, *h.shape[2:])
         columns = [np.einsum("ij,nmjcf->nmicf", a.T, h.reshape(shape)) for a in ACROSS]
-        nats, small, _ = gain(np.stack([c.reshape(h.shape) for c in columns], 1), self.sd)
+        [(nats, small)] = gain(np.stack([c.reshape(h.shape) for c in columns], 1), self.sd)
         return Start(self, psi, nats), Start(self, small, nats)
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
@@ -121,7 +121,7 @@ class ChannelDelay(Operator):
         fits = [float(np.sum(cross * np.exp(s * delay)).real) for delay in DELAYS_S]
         column = (-s * motions.accelerance)[:, None]
         psi = np.array([DELAYS_S[int(np.argmax(fits))]])
-        return (Start(self, psi, gain(column, self.sd)[0]),)
+        return (Start(self, psi, gain(column, self.sd)[0][0]),)
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""

@@ -21,11 +21,11 @@ class Gain(Protocol):
 
     def __call__(
         self, columns: np.ndarray, sd: np.ndarray, poses: slice = slice(None)
-    ) -> tuple[float, np.ndarray, np.ndarray]:
-        """Nats, likeliest ψ (k,), and by how much all other numbers (D,) of the fit move with it.
+    ) -> list[tuple[float, np.ndarray]]:
+        """Nats and the likeliest ψ (k,) of each k columns.
 
-        `columns` (n, k, r, c, F) are changes of H at those `poses`, of prior sds (k,); at others
-        there are none.
+        `columns` (n, … · k, r, c, F) are changes of H at those `poses`, of prior sds (k,); at
+        others there are none.
         """
         ...
 
@@ -47,10 +47,11 @@ class Number:
 
 @dataclass(frozen=True, eq=False)
 class PosedBodies:
-    """PosedBodies q (n, dof) in rad at s (n, F), and how e springs move bodies, (n, B, 6, e).
+    """Poses q (n, dof) in rad at s (n, F), and how e springs move bodies, (n, B, 6, e).
 
     `springs` (e,) are the numbers of the springs among all that the robot may have; `order` (n,) is
-    how much of the campaign was over, 0 to 1, when each pose was hit.
+    how much of the campaign was over, 0 to 1, when each pose was hit; joints read `readback`
+    (n, dof) and stood at q.
     """
 
     q: np.ndarray
@@ -59,6 +60,7 @@ class PosedBodies:
     bodies: tuple[str, ...]
     springs: tuple[int, ...]
     order: np.ndarray
+    readback: np.ndarray
 
     def body(self, joint: str) -> np.ndarray:
         """(n, 6, e): how the springs move what turns with a joint, linear part first."""
@@ -108,13 +110,11 @@ class Motions:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """An effect, where a fit begins with it (ψ, and by how much the other numbers move, if they
-    do), and the nats that the first order promises."""
+    """An effect, ψ where a fit begins with it, and the nats that the first order promises."""
 
     effect: "Operator"
     psi: np.ndarray
     gain_nats: float
-    moved: np.ndarray | None = None
 
 
 def gain_of(start: Start) -> float:

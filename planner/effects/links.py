@@ -48,8 +48,8 @@ class LinkSpring(Operator):
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """By its columns"""
         columns = motions.changed_by(self.impedance(motions.poses, np.zeros(len(SHAPES))))
-        nats, psi, moved = gain(columns, self.sd)
-        return (Start(self, psi, nats, moved),)
+        [(nats, psi)] = gain(columns, self.sd)
+        return (Start(self, psi, nats),)
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """See `Operator.vanishing`."""

@@ -40,9 +40,9 @@ class MisreadAngle(Operator):
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """By its column."""
         assert motions.by_angle is not None
-        here = self._among(motions.poses.q)
-        nats, psi, moved = gain(motions.by_angle[here, self.number, None], self.sd, here)
-        return (Start(self, psi, nats, moved),)
+        here = self._among(motions.poses.readback)
+        [(nats, psi)] = gain(motions.by_angle[here, self.number, None], self.sd, here)
+        return (Start(self, psi, nats),)
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """See `Operator.vanishing`."""

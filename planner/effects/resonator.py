@@ -79,42 +79,42 @@ class LinkResonator(Operator):
     def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
         """The best of many frequencies; its direction and mass are the first order's."""
         low, high = self.band_hz
-        tried = [
-            self.at_frequency(f, motions, gain) for f in np.geomspace(low * 1.1, high, SCREENED)
-        ]
+        tried = self.at_frequencies(np.geomspace(low * 1.1, high, SCREENED), motions, gain)
         return (max(tried, key=gain_of),)
 
-    def at_frequency(self, hertz: float, motions: Motions, gain: Gain) -> Start:
-        """Where it begins at one frequency: six columns, one for each pair of directions."""
-        poses, middle = motions.poses, self.mean
-        hit, sensor = motions.at(poses.carried(self.joint, middle[6:9]))
-        s, omega = poses.s, 2 * np.pi * hertz
-        above = 2 * SCREEN_DAMPING * omega * s + omega**2
-        shown = (-(s**4) * above / (s**2 + above))[:, None, None]
-        columns = [
-            shown
-            * (
-                sensor[:, i][:, :, None] * hit[:, k][:, None]
-                + (i != k) * sensor[:, k][:, :, None] * hit[:, i][:, None]
-            )
+    def at_frequencies(self, hertz: np.ndarray, motions: Motions, gain: Gain) -> list[Start]:
+        """Where it begins at each: six columns, one for each pair of directions."""
+        poses = motions.poses
+        hit, sensor = motions.at(poses.carried(self.joint, self.mean[6:9]))
+        pairs = [
+            sensor[:, i][:, :, None] * hit[:, k][:, None]
+            + (i != k) * sensor[:, k][:, :, None] * hit[:, i][:, None]
             for i, k in PAIRS
         ]
-        usual = float(np.exp(middle[0]))
+        s, omega = poses.s[:, None], 2 * np.pi * hertz[:, None]
+        above = 2 * SCREEN_DAMPING * omega * s + omega**2
+        shown = -(s**4) * above / (s**2 + above)
+        columns = shown[:, :, None, None, None] * np.stack(pairs, axis=1)[:, None]
+        usual = float(np.exp(self.mean[0]))
         sds = usual * np.array([1.0 if i == k else 0.5 for i, k in PAIRS])
-        nats, psi, moved = gain(np.stack(columns, axis=1), sds)
+        told = gain(columns.reshape(len(s), -1, *columns.shape[3:]), sds)
+        return [self._start(f, *one) for f, one in zip(hertz, told, strict=True)]
+
+    def _start(self, hertz: float, nats: float, psi: np.ndarray) -> Start:
+        """Of the columns' likeliest factors (6,)."""
+        usual, start = float(np.exp(self.mean[0])), self.mean.copy()
         dyad = np.zeros((3, 3))
         for value, (i, k) in zip(psi, PAIRS, strict=True):
             dyad[i, k] = dyad[k, i] = value
         sizes, ways = np.linalg.eigh(dyad)
         most = int(np.argmax(np.abs(sizes)))
-        start = middle.copy()
         start[0] = np.log(np.clip(abs(sizes[most]), 0.2 * usual, 5 * usual))
         start[1], start[3:6] = np.log(hertz), ways[:, most]
-        return Start(self.towards(ways[:, most]), start, nats, moved)
+        return Start(self.towards(ways[:, most]), start, nats)
 
     def moved_to(self, found: Operator, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
         """It keeps frequency and damping."""
-        begun = self.at_frequency(float(np.exp(psi[1])), motions, gain)
+        [begun] = self.at_frequencies(np.exp(psi[1:2]), motions, gain)
         return replace(begun, psi=np.array([*begun.psi[:2], psi[2], *begun.psi[3:]]))
 
     def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:

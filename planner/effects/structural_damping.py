@@ -43,8 +43,8 @@ class LossFactors(Operator):
         """By the columns of all loss factors."""
         usual = np.exp(self.mean)
         columns = motions.changed_by(self.impedance(motions.poses, self.mean))
-        nats, share, moved = gain(columns, np.ones(len(usual)))
-        return (Start(self, np.log(np.clip(share * usual, LEAST, MOST)), nats, moved),)
+        [(nats, share)] = gain(columns, np.ones(len(usual)))
+        return (Start(self, np.log(np.clip(share * usual, LEAST, MOST)), nats),)
 
     def beyond(self, psi: np.ndarray, viscous: Mapping[int, float]) -> bool:
         """Whether most springs dissipate so instead of by their dampers."""

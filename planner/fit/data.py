@@ -1,6 +1,6 @@
 """FRFs of several poses on chosen lines, and the robot's matrices there."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,7 +11,7 @@ from planner.fit.structure import RobotPrior, RobotStructure
 from planner.fit.weights import Weights
 from planner.frf.frf import Frf
 from planner.measurement.measured_frfs import Measured, common_band, matrices_at, stack
-from planner.robot.elastic_model import AngleSlopes, Matrices
+from planner.robot.elastic_model import AngleSlopes, ElasticModel, Matrices
 
 SMALLEST = 1e-4  # relative sd of any value: no record is more exact
 
@@ -25,6 +25,7 @@ class FrfData:
     matrices: Matrices
     jacobians: np.ndarray
     order: np.ndarray | None = None  # nothing changes in the course of time
+    off: np.ndarray | float = 0.0  # (n, dof) by which joints stood beside their readback q
 
     @classmethod
     def of(
@@ -62,7 +63,36 @@ class FrfData:
         bodies = structure.prior.effect_library.simulation.elastic.bodies
         jacobians = self.jacobians[..., springs]
         order = np.zeros(len(self.q)) if self.order is None else self.order
-        return PosedBodies(self.q, self.measured.s, jacobians, bodies, structure.springs, order)
+        stood, s = self.q + self.off, self.measured.s
+        return PosedBodies(stood, s, jacobians, bodies, structure.springs, order, self.q)
+
+    def stood(self, off: np.ndarray, elastic: ElasticModel) -> "FrfData":
+        """The same where joints stood off (n, dof) beside their readback."""
+        key = off.tobytes()
+        if key not in self._stood:
+            self._stood.clear()
+            self._stood[key] = self._moved(off, elastic)
+        return self._stood[key]
+
+    @cached_property
+    def _stood(self) -> dict[bytes, "FrfData"]:
+        return {}
+
+    def __getstate__(self) -> Mapping[str, object]:
+        """For another process, which finds that itself."""
+        return {name: value for name, value in vars(self).items() if name != "_stood"}
+
+    def _moved(self, off: np.ndarray, elastic: ElasticModel) -> "FrfData":
+        rows = np.flatnonzero(np.any(off != 0, axis=1))
+        q, measured = (self.q + off)[rows], self.measured.at(rows)
+        found = measured.loaded(elastic.with_slopes(q, measured.layout), elastic.robot)
+        jacobians = self.jacobians.copy()
+        jacobians[rows] = elastic.body_jacobians(q)
+        other = replace(
+            self, matrices=self.matrices.replaced(rows, found), jacobians=jacobians, off=off
+        )
+        vars(other)["weights"] = self.weights
+        return other
 
     def at(self, poses: np.ndarray) -> "FrfData":
         """Of some of the poses, by their numbers."""
@@ -72,6 +102,7 @@ class FrfData:
             self.matrices.at(poses),
             self.jacobians[poses],
             None if self.order is None else self.order[poses],
+            self.off if isinstance(self.off, float) else self.off[poses],
         )
 
 

@@ -54,11 +54,16 @@ class StructureFit:
         return FitRecord(s.effects, s.names, self.at.x, self.at.own, size_of(self), shares)
 
     @property
-    def settled(self) -> bool:
-        """Whether one more step would gain next to nothing."""
+    def promised(self) -> float:
+        """Nats that one more step promises."""
         s, at = self.structure, self.at
         downhill = at.gradient + s.precision @ (at.x - s.mean)
-        return float(downhill @ np.linalg.solve(at.normal + s.precision, downhill)) < 2 * RESTED
+        return 0.5 * float(downhill @ np.linalg.solve(at.normal + s.precision, downhill))
+
+    @property
+    def settled(self) -> bool:
+        """Whether one more step would gain next to nothing."""
+        return self.promised < RESTED
 
     @property
     def structure(self) -> RobotStructure:
@@ -80,6 +85,11 @@ class FitRecord:
     size: float
     shares: tuple[float, ...]
     wider: "FitRecord | None" = None
+
+    @property
+    def labels(self) -> frozenset[str]:
+        """Of its effects."""
+        return frozenset(e.label for e in self.effects)
 
 
 @dataclass(frozen=True, eq=False)

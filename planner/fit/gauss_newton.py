@@ -1,27 +1,42 @@
 """One solver: damped Gauss–Newton steps (Levenberg–Marquardt) of a misfit from x on."""
 
+from typing import Protocol, TypeVar
+
 import numpy as np
 
-from planner.fit.linearised import At
-from planner.fit.misfit import FrfMisfit
+from planner.fit.linearised import Numbers, Point
 
 GOOD, GROWTH, MOST_REJECTED, MOST_DAMPED = 0.5, 3.0, 8, 1e9
 SOFTER, STIFFER = 6.0, 0.8  # of a new spring's step, in shares of its compliance
 
 
+P_co = TypeVar("P_co", bound=Point, covariant=True)
+
+
+class Misfit(Protocol[P_co]):
+    """Of numbers x, beside `own` numbers of poses."""
+
+    @property
+    def numbers(self) -> Numbers: ...
+
+    def possible(self, x: np.ndarray) -> bool: ...
+
+    def __call__(self, x: np.ndarray, own: np.ndarray | None = None) -> P_co: ...
+
+
 def minimised(
-    misfit: FrfMisfit,
+    misfit: Misfit[P_co],
     x: np.ndarray,
     steps: int,
     tolerance: float = 0.5,
     own: np.ndarray | None = None,
     by_prior: bool = False,
-) -> At:
+) -> P_co:
     """Where at most so many steps lead, none of which promises less than `tolerance` nats.
 
     `by_prior`: damped in the prior's sds, not the data's: so it follows what they leave open.
     """
-    s = misfit.structure
+    s = misfit.numbers
     low, high = s.least, s.most
     at, rejected, growth = misfit(x, own), 0, GROWTH
     damping = 1e-2 if by_prior else 1e-3
@@ -36,7 +51,7 @@ def minimised(
         promised = -float(gradient @ step + 0.5 * step @ normal @ step)
         if promised < tolerance:
             break
-        there = np.clip(_moved(misfit, at.x, step), low, high)
+        there = np.clip(_moved(s, at.x, step), low, high)
         tried = misfit(there, at.own) if misfit.possible(there) else None
         if tried is not None and tried.value < at.value:
             if at.value - tried.value > GOOD * promised:
@@ -50,11 +65,9 @@ def minimised(
     return at
 
 
-def _moved(misfit: FrfMisfit, x: np.ndarray, step: np.ndarray) -> np.ndarray:
+def _moved(s: Numbers, x: np.ndarray, step: np.ndarray) -> np.ndarray:
     """No number goes farther than it may; springs not stated go in compliance, in which FRFs are
     linear."""
-    s = misfit.structure
-    out = x + np.clip(step, -s.longest, s.longest)
-    new = [i for i in range(s.stiffnesses) if not s.parameters[i].stated]
+    out, new = x + np.clip(step, -s.longest, s.longest), list(s.compliant)
     out[new] = x[new] - np.log1p(np.clip(-step[new], -STIFFER, SOFTER))
     return out

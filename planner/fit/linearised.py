@@ -9,22 +9,45 @@ from planner.dynamics.motion import Motion
 
 
 @dataclass(frozen=True, eq=False)
-class At:
-    """A misfit at x: χ², half its gradient and the normal of the data (the bodies' barrier in it).
+class Numbers:
+    """What is known of numbers x before: mean, precision, bounds, the longest steps, and which are
+    stiffnesses that go in compliance."""
 
-    `own` (n, l) are the likeliest numbers of each pose, `volume` what eliminating them costs.
-    `precision` is the prior's.
+    mean: np.ndarray
+    precision: np.ndarray
+    least: np.ndarray
+    most: np.ndarray
+    longest: np.ndarray
+    compliant: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A misfit at x: half of χ² with the prior's, half of χ²'s slopes and curvature.
+
+    `own` (n, l) are the likeliest numbers of each pose.
     """
 
     x: np.ndarray
-    chi2: float
+    value: float
     gradient: np.ndarray
     normal: np.ndarray
+    own: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class At(Point):
+    """A misfit of FRFs at x (the bodies' barrier is in its slopes and curvature).
+
+    `own` were linearised about `about`; `volume` is what eliminating them costs. `precision` is the
+    prior's.
+    """
+
+    chi2: float
     precision: np.ndarray
     volume: float
-    value: float
-    own: np.ndarray
     motion: Motion
+    about: np.ndarray
     eliminated: "Eliminated | None" = None
 
     @cached_property
@@ -54,3 +77,4 @@ class Around:
     accelerance: np.ndarray
     columns: np.ndarray
     motion: Motion
+    about: np.ndarray

@@ -14,10 +14,10 @@ import numpy as np
 
 from planner.dynamics.gradient import Impedance, Inertias, motion_slopes, moved
 from planner.dynamics.motion import Motion
-from planner.effects.effect import Gain, Motions
+from planner.effects.effect import Gain, Motions, Operator
 from planner.fit.data import FrfData, among
 from planner.fit.inertias import spatial
-from planner.fit.linearised import Around, At, Eliminated
+from planner.fit.linearised import Around, At, Eliminated, Numbers
 from planner.fit.structure import REACH, RobotStructure
 from planner.measurement.nuisances import NuisanceCounts, Tolerances, actual_ports, basis
 from planner.robot.elastic_model import Matrices
@@ -51,9 +51,23 @@ class FrfMisfit:
         springs, live = list(self.structure.springs), list(self.structure.live)
         return np.ascontiguousarray(self.data.jacobians[:, live][..., springs])
 
+    @property
+    def numbers(self) -> Numbers:
+        """See `RobotStructure.numbers`."""
+        return self.structure.numbers
+
     def with_rho(self, rho: float | None) -> "FrfMisfit":
         """With a discrepancy of another size; what does not depend on it is kept."""
-        other = replace(self, rho=rho)
+        return self._keeping(replace(self, rho=rho))
+
+    def with_effect(self, effect: Operator) -> "FrfMisfit":
+        """Of a structure with one effect more."""
+        other = replace(self, structure=self.structure.with_effect(effect))
+        same = other.structure.springs == self.structure.springs
+        return self._keeping(other) if same else other
+
+    def _keeping(self, other: "FrfMisfit") -> "FrfMisfit":
+        """What hangs on the springs alone."""
         kept = ("matrices", "jacobians", "poses")
         vars(other).update({name: vars(self)[name] for name in kept if name in vars(self)})
         return other
@@ -62,6 +76,13 @@ class FrfMisfit:
     def poses(self):
         """As effects see them."""
         return self.data.poses(self.structure)
+
+    def placed(self, x: np.ndarray) -> "FrfMisfit":
+        """With poses where they stood by x."""
+        off = self.structure.stood_off(x, self.data.q)
+        if not off.any():
+            return self
+        return replace(self, data=self.data.stood(off, self.structure.prior.carried))
 
     # ---------------------------------------------------------------- the model
 
@@ -113,7 +134,6 @@ class FrfMisfit:
         ports = None
         if eta is not None:
             ports = actual_ports(eta, s, self.tolerances, shape)
-            ports = replace(ports, angle=ports.angle + self.structure.stood_off(x, self.data.q))
         elasticity = self.structure.elasticity(x)
         there = self.impedances(x) if added is None else added
         return moved(m, elasticity, s, mass, [z for z in there if z is not None], ports)
@@ -155,6 +175,14 @@ class FrfMisfit:
         visits = by_block[:, :e] + by_block[:, e : 2 * e]  # dampers scatter with their springs
         return out, visits
 
+    def spring_slopes(self, motion: Motion, x: np.ndarray) -> np.ndarray:
+        """Derivatives (n, P, r, c, F) by the springs' numbers alone."""
+        s = self.structure
+        raw = motion_slopes(motion, s.elasticity(x))[:, : len(s.springs) * len(s.spread)]
+        out = np.empty((len(raw), len(s.parameters), *raw.shape[2:]), dtype=complex)
+        s.spring_slopes(raw, out)
+        return out
+
     def columns(self, x: np.ndarray, eta: np.ndarray) -> tuple[np.ndarray, np.ndarray, Motion]:
         """Accelerance (n, r, c, F), columns (n, D + l + 1, r, c, F) by x and own numbers, motion.
 
@@ -189,11 +217,12 @@ class FrfMisfit:
             if given is None:
                 continue
             raw, (factor, slopes) = h, given
-            h = _times(factor, raw)
+            between = [1] * (raw.ndim - factor.ndim)
+            h = times(factor.reshape(len(factor), *between, *factor.shape[1:]), raw)
             if columns is not None:
-                columns[:] = _times(factor[:, None], columns)
+                columns[:] = times(factor[:, None], columns)
                 for k, slope in enumerate(slopes):
-                    columns[:, own.start + k] = _times(slope, raw)
+                    columns[:, own.start + k] = times(slope, raw)
         return h
 
     @cached_property
@@ -227,19 +256,20 @@ class FrfMisfit:
         if own is not None:
             given[:, :size] = np.clip(own[:, :size], -FARTHEST, FARTHEST)
         m, d = self.data.measured, self.structure.size
-        h, columns, motion = self.columns(x, self.about(given, x))
+        about = self.about(given, x)
+        h, columns, motion = self.placed(x).columns(x, about)
         there = np.einsum("nl,nlijf->nijf", given[:, :size], columns[:, d : d + size])
         if self.rho is None:
             off = h * np.log(np.where(self._told(h), h / m.accelerance, 1.0)) - there
         else:
             off = np.where(m.used, h - m.accelerance, 0.0) - there
         columns[:, -1] = off
-        return Around(x, h, columns, motion)
+        return Around(x, h, columns, motion, about)
 
     def weighed(self, around: Around, keep: bool = False) -> At:
         """By noise and discrepancy."""
         white = self._white(around.columns, around.accelerance)
-        return self._eliminated(around.x, white, keep, around.motion)
+        return self._eliminated(around, white, keep)
 
     def _white(self, columns: np.ndarray, h: np.ndarray) -> np.ndarray:
         """(n, k, N) real, of (n, k, r, c, F)."""
@@ -266,8 +296,8 @@ class FrfMisfit:
             np.matmul(given, turned, out=np.moveaxis(out[:, :, part], 1, 3))
         return out.reshape(n, k, -1)
 
-    def _eliminated(self, x: np.ndarray, white: np.ndarray, keep: bool, motion: Motion) -> At:
-        s, d = self.structure, self.structure.size
+    def _eliminated(self, around: Around, white: np.ndarray, keep: bool) -> At:
+        s, d, x = self.structure, self.structure.size, around.x
         count = white.shape[1] - d - 1
         mine = slice(d, d + count)
         gram = white @ np.swapaxes(white, 1, 2)
@@ -288,7 +318,8 @@ class FrfMisfit:
         away = x - s.mean
         value = 0.5 * (chi2 + float(away @ s.precision @ away))
         kept = Eliminated(white, inverses, ontos) if keep else None
-        return At(x, chi2, gradient, normal, s.precision, volume, value, own, motion, kept)
+        there = around.motion, around.about
+        return At(x, value, gradient, normal, own, chi2, s.precision, volume, *there, kept)
 
     # ---------------------------------------------------------------- what follows from it
 
@@ -301,10 +332,14 @@ class FrfMisfit:
         noise = 0.0 if self.rho is None else self.data.weights.volume(self.rho)
         return -0.5 * (at.chi2 + prior + at.volume + noise + float(spent))
 
-    def gain(
-        self, at: At, columns: np.ndarray, sd: np.ndarray, poses: slice = slice(None)
-    ) -> tuple[float, np.ndarray, np.ndarray]:
-        """See `Gain`, of columns (n, k, r, c, F) of sds (k,)."""
+    def beside(
+        self, at: At, columns: np.ndarray, poses: slice = slice(None)
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What columns (n, k, r, c, F) at some poses do to χ² when all numbers at `at` follow them.
+
+        Half its slopes (k,), half its curvature (k, k), and by how much the numbers (D, k) follow
+        each; those are at their best before.
+        """
         s, d = self.structure, self.structure.size
         kept, new = at.eliminated, self.whitened(columns, poses)
         assert kept is not None
@@ -316,21 +351,31 @@ class FrfMisfit:
         cross = both[:, :d].sum(axis=0) - onto[:, :d].T @ across
         pull = both[:, -1].sum(axis=0) - across.T @ onto[:, -1]
         slope = at.gradient + s.precision @ (at.x - s.mean)
-        moved = at.covariance @ cross
-        square -= cross.T @ moved
-        pull -= moved.T @ slope
-        inner = square * np.outer(sd, sd) + np.eye(k)
-        z = -np.linalg.solve(inner, pull * sd)
-        nats = 0.5 * float(z @ inner @ z) - 0.5 * float(np.linalg.slogdet(inner)[1])
-        return nats, z * sd, -at.covariance @ (slope + cross @ (z * sd))
+        follow = -at.covariance @ cross
+        return pull + follow.T @ slope, square + cross.T @ follow, follow
+
+    def gain(
+        self, at: At, columns: np.ndarray, sd: np.ndarray, poses: slice = slice(None)
+    ) -> list[tuple[float, np.ndarray]]:
+        """See `Gain`."""
+        pull, square, _ = self.beside(at, columns, poses)
+        found = []
+        for first in range(0, len(pull), len(sd)):
+            own = slice(first, first + len(sd))
+            inner = square[own, own] * np.outer(sd, sd) + np.eye(len(sd))
+            z = -np.linalg.solve(inner, pull[own] * sd)
+            nats = 0.5 * float(z @ inner @ z) - 0.5 * float(np.linalg.slogdet(inner)[1])
+            found.append((nats, z * sd))
+        return found
 
     def first_order(self, x: np.ndarray, own: np.ndarray) -> tuple[Motions, Gain]:
-        """How hits and sensors move the springs at x, and what columns gain beside all else.
-
-        Own numbers (n, l) are told once more before.
-        """
-        at = self(x, self(x, own).own, keep=True)
+        """How hits and sensors move the springs at x, and what columns gain beside all else."""
+        at = self.kept(x, own)
         return self.motions(at), partial(self.gain, at)
+
+    def kept(self, x: np.ndarray, own: np.ndarray) -> At:
+        """At x with all that is needed to put columns beside it; own numbers are told once more."""
+        return self(x, self(x, own).own, keep=True)
 
     def motions(self, at: At) -> Motions:
         """How hits and sensors move the springs, as effects' first-order columns need it."""
@@ -341,10 +386,10 @@ class FrfMisfit:
         if by is not None:
             by = np.stack([self.through_chain(x, one) for one in by.swapaxes(0, 1)], 1)
         recorded = np.where(m.used, m.accelerance, h)
-        return Motions(self.poses, motion.x_hit, sensor, h, recorded, by)
+        return Motions(self.placed(x).poses, motion.x_hit, sensor, h, recorded, by)
 
 
-def _times(factor: np.ndarray, h: np.ndarray) -> np.ndarray:
+def times(factor: np.ndarray, h: np.ndarray) -> np.ndarray:
     """Factors (…, 3, 3, F) of each sensor times accelerances (…, 3s, c, F)."""
     apart = h.reshape(*h.shape[:-3], h.shape[-3] // 3, 3, *h.shape[-2:])
     return np.einsum("...ijf,...sjcf->...sicf", factor, apart).reshape(h.shape)

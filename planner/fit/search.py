@@ -1,9 +1,9 @@
 """Which effects a robot has: what is likeliest is looked at until nothing beside it is likelier.
 
 Beside a set of effects are those with one more, one less, one elsewhere, and one exchanged for any
-other. Operators are ranked by their first-order columns, springs are always tried nonlinearly, a
-few steps each; where much is left all are fitted from what is stated too, by logarithms first, lest
-what is missing be hidden by what it bent. The best are settled, and what is settled is kept.
+other. Operators are ranked by their first-order columns and tried with all else linear (`OneMore`);
+where that leaves much, all are fitted from what is stated too, by logarithms first, lest what is
+missing be hidden by what it bent. The best are settled, and what is settled is kept.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -37,13 +37,13 @@ from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotBelief
 from planner.fit.structure import RobotStructure, effects_free, exported
-from planner.fit.trials import FAR, FOLLOWED, LOG_STEPS, Trials, explained
+from planner.fit.trials import FAR, FAR_OFF, FOLLOWED, LOG_STEPS, Trials, explained
 from planner.inference.parallel import parallel_map
 from planner.measurement.measured_frfs import completed
 
 SEARCHED, SCREENED, LAST = 24, 48, 44  # lines a pose: while searching, for operators, at the end
 SETTLED = 4  # of those that compete
-MOST, FROM_AFAR = 6, 2  # effects; and up to so many, more are tried from what is stated too
+MOST = 6  # effects
 COMPLETIONS = 2  # rounds
 STIFF_AT_FIRST = 3.0  # prior sds of springs that may be there
 AGAIN = 0.03  # least size with which what was found before goes on
@@ -59,36 +59,51 @@ class Search(Trials):
     widen: bool = False  # whether `StructureFit.wider` is asked for
     thorough: bool = False  # whether what explains them is compared with all that is beside it
 
-    def explored(self) -> ExploredStructures:
-        """From the robot as it is known to be built on."""
+    def explored(self, known: StructureFit | None = None) -> ExploredStructures:
+        """From the robot as it is known to be built on, and from what explained such FRFs."""
         plain = self._plain()
-        return ExploredStructures(plain, self._explore([plain]))
+        begun = [plain] if known is None else [plain, self._recovered(known.tried.record)]
+        return ExploredStructures(plain, self._explore(begun))
 
     def found(self, warm: FitRecord | None = None) -> StructureFit:
         """The effects that explain them best; from what was found before, if that is given.
 
-        Decays that the ends of records cut off are filled in as it has them, and it goes on.
+        Decays that the ends of records cut off are filled in as what was known has them, until that
+        is found again, and at last as it has them.
         """
-        best = self._found(warm)
-        for _ in range(COMPLETIONS if any(np.isfinite(f.tail_s) for f in self.frfs) else 0):
-            known = best.tried.record
+        known, begun = warm, self if warm is None else self._completed(warm)
+        best = begun._found(warm)
+        for _ in range(COMPLETIONS if self._cut_off else 0):
+            again = best.tried.record
+            if known is not None and known.labels == again.labels:
+                break
+            known = again
             best = self._completed(known)._gone_on(known)
-        return best
+        if self._cut_off:
+            known = best.tried.record
+            begun = self._completed(known)
+            best = begun._recovered(known)
+        return begun._ended(best)
+
+    @property
+    def _cut_off(self) -> bool:
+        return any(np.isfinite(f.tail_s) for f in self.frfs)
 
     def _found(self, warm: FitRecord | None) -> StructureFit:
         if not self.extend:
-            return self._ended(self._plain())
+            return self._plain()
         known = [] if warm is None else [self._recovered(warm)]
-        if not known or not explained(known[0]):
+        if not known or self.widen or not explained(known[0]):
             known.append(self._plain())
-        best = most_probable(self._explore(known, warm is not None))
+        # What stands in for what fewer poses could not tell may hide it: from both, apart.
+        best = most_probable(one for k in known for one in self._explore([k], warm is not None))
         # All springs may give at once, which none of them shows alone; but what did not explain
         # fewer poses is only mended.
         if not explained(best) and (warm is None or warm.size <= SIZES[0]):
             best = most_probable(
                 [best, *self._explore([self._pruned(self.freed())], warm is not None)]
             )
-        return self._ended(best)
+        return best
 
     def _pruned(self, found: StructureFit) -> StructureFit:
         """Without what by the first order is not worth how rare it is."""
@@ -101,11 +116,11 @@ class Search(Trials):
 
     def _gone_on(self, known: FitRecord) -> StructureFit:
         best = self._recovered(known)
-        return self._ended(most_probable(self._explore([best], True)) if self.extend else best)
+        return most_probable(self._explore([best], True)) if self.extend else best
 
     def _completed(self, known: FitRecord) -> "Search":
         """With the decays that records cut off, as a structure has them."""
-        if not any(np.isfinite(f.tail_s) for f in self.frfs):
+        if not self._cut_off:
             return self
         misfit, x = self.again(known, self.data(SEARCHED), known.size)
         simulation = exported(misfit.structure, x)[0]
@@ -195,23 +210,25 @@ class Search(Trials):
                 yield [self._fewer(best, effect, near)]
         if key_of(best) not in extended:
             extended.add(key_of(best))
-            yield self._further(best, afar=len(effects) < FROM_AFAR)
+            more = self._further(best)
+            if all(size_of(one) > FAR_OFF for one in (best, *more)):
+                more += self._from_afar(best)
+            yield more
         for effect in effects:
             yield self.displaced(best, effect)
         for effect in effects if len(effects) > 1 and not near else ():
             fewer = pool.get(_less(best, effect)) or self._fewer(best, effect, near)
             if key_of(fewer) not in extended:
                 extended.add(key_of(fewer))
-                yield [fewer, *self._further(fewer)]
-        if len(effects) >= FROM_AFAR and not near and not explained(best):
-            yield self._from_afar(best)
+                yield [fewer, *self._exchanged(fewer, best, pool)]
 
     def _fewer(self, best: StructureFit, effect: Operator, near: bool) -> StructureFit:
-        """Without an effect: from where it is, and, not only `near`, from what is stated."""
+        """Without an effect: from where it is, and, where much is left then and not only what is
+        `near` is wanted, from what is stated."""
         bent = without(best, [effect])
         if bent is not None:
             bent = settled(bent.misfit, bent.at)
-            if near:
+            if near or size_of(bent) <= FAR_OFF:
                 return bent
         structure = best.structure.without(effect)
         x, own = structure.mean.copy(), slice(structure.inertial.stop, structure.chain.start)
@@ -221,17 +238,23 @@ class Search(Trials):
         afar = converged(self.begun(best.misfit.data, structure, x))
         return afar if bent is None else max(bent, afar, key=evidence_of)
 
-    def _further(self, base: StructureFit, afar: bool = False) -> list[StructureFit]:
+    def _further(self, base: StructureFit) -> list[StructureFit]:
         """With one effect more, settled, likeliest first."""
         if len(added(base)) >= MOST:
             return []
         # Of what explains the FRFs first order and few steps tell what more would gain.
         near = explained(base) and not self.thorough
         starts = self.starts(base, SCREENED, RARE if near else 0.0)
-        return self.compete(base, starts, count=SETTLED, afar=afar, behind=0.0 if near else FAR)
+        return self.compete(base, starts, count=SETTLED, behind=0.0 if near else FAR)
+
+    def _exchanged(self, fewer: StructureFit, best: StructureFit, pool: Pool) -> list[StructureFit]:
+        """With another effect in place of the one that the likeliest has more."""
+        starts = self.starts(fewer, SCREENED)
+        new = [s for s in starts if key((*added(fewer), s.effect)) not in pool]
+        return self.compete(fewer, new, count=SETTLED, against=best)
 
     def _from_afar(self, base: StructureFit) -> list[StructureFit]:
-        """The same, all from what is stated."""
+        """The same, all from what is stated: what is missing may be hidden by what it bent."""
         if len(added(base)) >= MOST:
             return []
         nearest = self.nearest(base, self.starts(base, SCREENED))
@@ -254,7 +277,8 @@ class Search(Trials):
             if type(e) is type(effect) and e.at != effect.at.split("#")[0]
         ]  # fmt: skip
         starts = [e.moved_to(effect, psi, motions, gain) for e in others]
-        ends = self.compete(base, sorted(starts, key=gain_of, reverse=True)[:FOLLOWED])
+        starts = sorted(starts, key=gain_of, reverse=True)[:FOLLOWED]
+        ends = self.compete(base, starts, against=best)
         return [*map(converged, ends[:1]), *ends[1:]]
 
     def _last(self, best: StructureFit) -> StructureFit:

@@ -10,44 +10,27 @@ from planner.fit.structure import RobotStructure
 
 KEPT = 6  # operators by first order beside the best of each kind
 PULLED = 1.5  # prior sds, from which another prior may pay
+STRAYED = 1.5  # prior sds softer than stated
 
 
-def placed(base: StructureFit, start: Start) -> list[np.ndarray]:
-    """Where fits with one more effect begin: all else as it is, and moved with it."""
-    structure = base.structure.with_effect(start.effect)
-    x = structure.carried(base.structure, base.at.x)
-    effect = structure.effects[-1]
-    if not effect.springs:
-        moved = x
-        if start.moved is not None:  # as the first order has it
-            moved = structure.carried(base.structure, base.at.x + start.moved)
-            moved = np.clip(moved, structure.least, structure.most)
-        begun = [(x, p) for p in (start.psi, *effect.beside(start.psi))]
-        if moved is not x:
-            begun.append((moved, start.psi))
-        out = []
-        for x, psi in begun:
-            z = x.copy()
-            z[structure.own[-1]] = psi
-            out.append(z)
-        return out
-    new = [i for i, p in enumerate(structure.parameters) if set(p.blocks) & set(effect.springs)]
-    stiff = [i for i in new if i < structure.stiffnesses]
-    x[stiff] = structure.mean[stiff] + structure.sd[stiff]
-    starts = [x]
-    # Stated springs that strayed far softer may stand in for the new ones: back to what is stated,
-    # the new ones as soft as they were.
+def in_place_of(base: StructureFit, structure: RobotStructure) -> list[np.ndarray]:
+    """Where a fit with one effect's springs more may begin: in place of stated ones that strayed.
+
+    Those that are far softer may stand in for the new ones: back to what is stated, the new ones
+    as soft as they were.
+    """
+    x, known = structure.carried(base.structure, base.at.x), set(base.structure.names)
+    stiffnesses = range(structure.stiffnesses)
+    new = [i for i in stiffnesses if structure.names[i] not in known]
     away = (x - structure.mean) / structure.sd
-    stated = [i for i in range(structure.stiffnesses) if structure.parameters[i].stated]
-    far = [i for i in stated if away[i] < -1.5]
-    if far:
-        z = x.copy()
-        softest = x[far].min()
-        z[far] = structure.mean[far]
-        low, high = structure.mean[stiff] - 3 * structure.sd[stiff], structure.mean[stiff]
-        z[stiff] = np.clip(softest, low, high)
-        starts.append(z)
-    return starts
+    far = [i for i in stiffnesses if structure.parameters[i].stated and away[i] < -STRAYED]
+    if not (new and far):
+        return []
+    softest = x[far].min()
+    x[far] = structure.mean[far]
+    low, high = structure.mean[new] - 3 * structure.sd[new], structure.mean[new]
+    x[new] = np.clip(softest, low, high)
+    return [x]
 
 
 def from_stated(structure: RobotStructure, start: Start) -> Iterable[np.ndarray]:

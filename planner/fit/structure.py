@@ -16,6 +16,7 @@ from planner.effects.effect import Operator, SpringPrior
 from planner.effects.parameters import Parameter, Parametrisation, parametrise
 from planner.effects.table import EffectLibrary
 from planner.fit.inertias import BodyNumbers, body_numbers, pseudo_inertia
+from planner.fit.linearised import Numbers
 from planner.measurement.nuisances import OF_HAMMER, OF_SENSOR
 from planner.robot.config import BASE, LOSS_FACTOR_BELOW, Harmonic, Resonator
 from planner.robot.elastic_model import ElasticModel
@@ -245,6 +246,12 @@ class RobotStructure:
         parts = [np.full(len(self.parameters), springs), np.full(self.bodies.size, others)]
         parts += [others * e.sd for e in self.effects]
         return np.concatenate([*parts, np.full(self.chain.stop - self.chain.start, chain)])
+
+    @cached_property
+    def numbers(self) -> Numbers:
+        """What is known of x; springs that robot.toml does not state go in compliance."""
+        new = tuple(i for i in range(self.stiffnesses) if not self.parameters[i].stated)
+        return Numbers(self.mean, self.precision, self.least, self.most, self.longest, new)
 
     def elasticity(self, x: np.ndarray) -> Elasticity:
         """Its springs at x; a damper that is not stated stays away."""

@@ -25,7 +25,8 @@ from planner.fit.fitted import (
 )
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
-from planner.fit.starts import from_stated, leaders, placed, pulled
+from planner.fit.one_more import OneMore
+from planner.fit.starts import from_stated, in_place_of, leaders, pulled
 from planner.fit.structure import RobotPrior, RobotStructure, effects_free
 from planner.frf.frf import Frf
 from planner.inference.parallel import parallel_map
@@ -36,10 +37,12 @@ ROUGH, AFAR = (
     12,
 )  # lines a pose: of many a few steps each, and by logarithms from what is stated
 ANNEALED = ((0.5, 6), (0.2, 8), (0.07, 8))  # sizes by which a start comes near, and steps at each
-LOG_STEPS, NEARER, FEW, FURTHER = 60, 24, 6, 4  # steps: until near, of many from afar, of each
-# tried, of the best
+LOG_STEPS, NEARER, FEW, OF_ONE, FURTHER = 60, 24, 6, 12, 4  # steps: until near, of many from afar,
+# of springs in place of others, of one effect's own numbers, of the best
 HOPELESS = 4.0  # nats, below which a further step is not worth it while many are tried
 FAR = 100.0  # nats below which nothing is followed
+WON_BACK = 0.5  # share of what an effect is worth, below which another does not take its place
+FAR_OFF = 0.03  # of |H|, not explained: few steps may not lead home
 FOLLOWED, SETTLED, FARTHEST = 6, 3, 3  # how many are followed, settled, come from afar
 
 
@@ -129,23 +132,26 @@ class Trials:
         starts: Sequence[Start],
         *,
         count: int = SETTLED,
-        afar: bool = False,
         behind: float = FAR,
+        against: StructureFit | None = None,
     ) -> list[StructureFit]:
-        """Starts (`placed`) beside it: a few steps each, where much is left and `afar` from what is
-        stated too, the best farther, `count` settled.
+        """Starts beside it: a few steps each, the best farther, `count` settled.
 
-        None is followed that by then is so many nats `behind` the base.
+        None is followed that by then is so many nats `behind` the base, or has won back less than
+        a share of what that is `against` what it shall replace.
         """
-        rough, data = self._on(base, self.data(ROUGH)), base.misfit.data
+        data = base.misfit.data
+        lines = self.data(ROUGH) if size_of(base) > FAR_OFF else data
+        rough = self._on(base, lines)
         pool = parallel_map(lambda s: self._few(rough, s), starts)
-        if afar and not explained(base):
-            near = self.nearest(base, starts)
-            pool += parallel_map(lambda at: self.begun_with(rough, *at).tried, near)
         least = rough.evidence - behind
+        if against is not None:
+            best = self._on(against, lines).evidence
+            least = rough.evidence + WON_BACK * (best - rough.evidence)
         near = _best_of_each(p for p in pool if p and p.evidence > least)
-        followed = parallel_map(lambda p: self._stepped(p, data), near[:FOLLOWED])
-        near = _best_of_each(followed)[:count]
+        near = _best_of_each(parallel_map(lambda p: self._stepped(p, data), near[:FOLLOWED]))
+        won = near[0].evidence - base.evidence if near else 0.0
+        near = [p for p in near if p.evidence - base.evidence >= min(WON_BACK * won, won)][:count]
         ends = parallel_map(lambda p: self._settled(p, data), near)
         return sorted((self._from(p, data) for p in ends), key=evidence_of, reverse=True)
 
@@ -162,23 +168,24 @@ class Trials:
         return StructureFit(misfit, misfit(x, tried.record.own), tried.evidence)
 
     def _on(self, found: StructureFit, data: FrfData) -> StructureFit:
-        """The same on other lines."""
+        """The same on other lines, where it would be at its best."""
         misfit = FrfMisfit(
             found.structure, data, self.tolerances, found.misfit.rho, self.floor
         )  # fmt: skip
-        at = misfit(found.at.x, found.at.own)
-        return StructureFit(misfit, at, misfit.evidence(at))
+        at = misfit.kept(found.at.x, found.at.own)
+        there = StructureFit(misfit, at, misfit.evidence(at))
+        return replace(there, evidence=there.evidence + there.promised)
 
     def _few(self, base: StructureFit, start: Start) -> Tried | None:
-        structure = base.structure.with_effect(start.effect)
-        misfit = replace(base.misfit, structure=structure)
-        # Where the first order leads to no robot that can be, it begins without the effect.
-        none = structure.carried(base.structure, base.at.x)
-        begun = [x for x in placed(base, start) if misfit.possible(x)]
-        ends = []
-        for x in begun or [x for x in (none,) if misfit.possible(x)]:
-            at = minimised(misfit, x, FEW, HOPELESS, base.at.own)
-            ends.append(StructureFit(misfit, at, misfit.evidence(at)).tried)
+        more = OneMore(base, start.effect)
+        begun = more.begun((start.psi, *start.effect.beside(start.psi)))
+        ends = [more.tried(own, OF_ONE) for own in begun]
+        there = in_place_of(base, more.wider.structure)
+        # Far from home what springs make of all else is not linear.
+        there += map(more.whole, begun if more.springs and size_of(base) > FAR_OFF else ())
+        for x in filter(more.wider.possible, there):
+            at = minimised(more.wider, x, FEW, HOPELESS, base.at.own)
+            ends.append(StructureFit(more.wider, at, more.wider.evidence(at)).tried)
         return max(ends, key=evidence_of, default=None)
 
     def begun_with(self, base: StructureFit, start: Start, x: np.ndarray) -> StructureFit:
@@ -233,5 +240,5 @@ def explained(found: StructureFit) -> bool:
 def _best_of_each(pool: Iterable[Tried]) -> list[Tried]:
     best: dict[frozenset[str], Tried] = {}
     for one in sorted(pool, key=evidence_of):
-        best[frozenset(e.label for e in one.record.effects)] = one
+        best[one.record.labels] = one
     return sorted(best.values(), key=evidence_of, reverse=True)

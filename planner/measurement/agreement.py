@@ -44,7 +44,8 @@ def fit_similarity(
     """
     band = common_band(frfs, band_hz or simulation.robot.config.band_hz)
     measured = stack(frfs, band, lines, MODEL_ERROR)
-    matrices = measured.loaded(simulation.elastic.matrices(q, layout=measured.layout), simulation)
+    there = simulation.elastic.matrices(q, layout=measured.layout)
+    matrices = measured.loaded(there, simulation.robot)
     h = response(matrices, simulation.elasticity, measured.s)
     if np.isfinite(measured.tail_s).any():  # cut off at the records' ends as the measured ones are
         h -= cut_off(simulation.solved(matrices), measured.s, measured.tail_s)

@@ -49,11 +49,11 @@ class Measured:
         parts = self.frequency_hz, self.s, self.accelerance, self.sd, self.tail_s
         return Measured(*(part[poses] for part in parts), layout=self.layout)
 
-    def loaded(self, matrices: Matrices, simulation: Simulation) -> Matrices:
+    def loaded(self, matrices: Matrices, robot: Robot) -> Matrices:
         """Matrices between the points of `layout` with the mass of sensors that were there."""
         count = np.count_nonzero(self.used, axis=(2, 3)).reshape(len(self.used), -1, 3)
         there = np.sum(count, axis=2) > 0
-        return with_sensors(matrices, simulation.robot, self.layout, there)
+        return with_sensors(matrices, robot, self.layout, there)
 
 
 def common_band(frfs: Sequence[Frf], band_hz: tuple[float, float]) -> tuple[float, float]:

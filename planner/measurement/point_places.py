@@ -75,7 +75,7 @@ def _differences(
     Of all sensors as if at each point of `wide`, and of all hits.
     """
     own = measured.layout
-    loaded = measured.loaded(simulation.elastic.matrices(q, layout=own), simulation)
+    loaded = measured.loaded(simulation.elastic.matrices(q, layout=own), simulation.robot)
     matrices = replace(simulation.elastic.matrices(q, layout=wide), mass=loaded.mass)
     h = response(matrices, simulation.elasticity, measured.s)
     h = h.reshape(len(q), len(wide.sensors), 3, len(wide.hits), 3, -1)

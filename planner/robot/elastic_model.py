@@ -72,6 +72,27 @@ class Matrices:
         slopes = None if self.by_angle is None else self.by_angle.at(poses)
         return Matrices(*(getattr(self, name)[poses] for name in names), by_angle=slopes)
 
+    def replaced(self, poses: np.ndarray, other: "Matrices") -> "Matrices":
+        """With those of `other` at some of the poses."""
+        names = [name for name in self.__dataclass_fields__ if name != "by_angle"]
+        slopes = None
+        if self.by_angle is not None and other.by_angle is not None:
+            slopes = AngleSlopes(**_put(self.by_angle, poses, other.by_angle))
+        return Matrices(**_put(self, poses, other, names), by_angle=slopes)
+
+
+def _put(
+    these: Matrices | AngleSlopes,
+    poses: np.ndarray,
+    others: Matrices | AngleSlopes,
+    names: Sequence[str] = (),
+) -> dict[str, np.ndarray]:
+    """Arrays of these, in rows `poses` those of others."""
+    out = {name: getattr(these, name).copy() for name in names or these.__dataclass_fields__}
+    for name, values in out.items():
+        values[poses] = getattr(others, name)
+    return out
+
 
 class ElasticModel:
     """A robot with its elastic degrees of freedom. Raises InputError if there are none.
