@@ -25,7 +25,7 @@ class FrfData:
     matrices: Matrices
     jacobians: np.ndarray
     order: np.ndarray | None = None  # nothing changes in the course of time
-    off: np.ndarray | float = 0.0  # (n, dof) by which joints stood beside their readback q
+    off: np.ndarray | float = 0.0  # (n, dof), rad or m: joints stood so far off q
 
     @classmethod
     def of(
@@ -67,7 +67,8 @@ class FrfData:
         return PosedBodies(stood, s, jacobians, bodies, structure.springs, order, self.q)
 
     def stood(self, off: np.ndarray, elastic: ElasticModel) -> "FrfData":
-        """The same where joints stood off (n, dof) beside their readback."""
+        """The same where joints stood off (n, dof) in rad or m beside their readback; kept for the
+        latest `off`."""
         key = off.tobytes()
         if key not in self._stood:
             self._stood.clear()

@@ -78,7 +78,7 @@ class FrfMisfit:
         return self.data.poses(self.structure)
 
     def placed(self, x: np.ndarray) -> "FrfMisfit":
-        """With poses where they stood by x."""
+        """With matrices where joints stood by x, exactly; itself where none was misread."""
         off = self.structure.stood_off(x, self.data.q)
         if not off.any():
             return self

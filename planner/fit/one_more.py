@@ -1,7 +1,7 @@
 """A fit with one effect more whose other numbers follow it linearly: a step costs next to nothing.
 
 The effect's own response is exact, all else is eliminated by the columns of the fit without it
-(variable projection), so that only its own few numbers are looked for.
+(variable projection: Golub and Pereyra 1973), so that only its own few numbers are looked for.
 """
 
 from collections.abc import Iterable
@@ -22,14 +22,15 @@ HELD = 1e9  # precisions of what is looked for itself and so does not follow
 
 @dataclass(frozen=True, eq=False)
 class OwnPoint(Point):
-    """By how much more than without the effect; by how much the other numbers (D,) follow."""
+    """Value in nats more than without the effect; by how much the fit's numbers (D,) follow."""
 
     followed: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class OneMore:
-    """`found`, all that is needed at its x being kept, with an effect more."""
+    """`found`, whose point is `FrfMisfit.kept`, with an effect more: a misfit of its own numbers
+    (k,), which `minimised` takes."""
 
     found: StructureFit
     effect: Operator
