@@ -13,7 +13,7 @@ from planner.campaign.alternatives import (
     joint_offsets,
 )
 from planner.fit.expected import ExpectedFrfs
-from planner.fit.fitted import StructureFit
+from planner.fit.fitted import StructureFit, explains_all
 from planner.fit.identified_robot import PLACED
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
@@ -44,8 +44,8 @@ class PosesTogether:
     def wrong(
         self, likely: Sequence[Sequence[Alternative]], answered: Container[int] = ()
     ) -> tuple[int, Alternative] | None:
-        """The earlier pose, and its angle, with which all are likelier than as stated, or with any
-        angle of the new pose.
+        """The earlier pose, and its angle, with which all is explained, and likelier than as
+        stated, or with any angle of the new pose.
 
         Of the first ones, that is: what came later was asked about when it came. `likely` are each
         pose's own alternatives; the angles of those `answered` are right.
@@ -56,12 +56,14 @@ class PosesTogether:
         found = [(i, angle) for i, angle in zip(tried, angles, strict=True) if angle is not None]
         if not any(i < new for i, _ in found):
             return None
-        stated, *each = parallel_map(self._evidence, [None, *found])
-        (most, (i, angle)), *others = sorted(
-            zip(each, found, strict=True), key=lambda one: one[0], reverse=True
+        (stated, _), *each = parallel_map(self._evidence, [None, *found])
+        (most, all_of_it, (i, angle)), *others = sorted(
+            ((*one, which) for one, which in zip(each, found, strict=True)),
+            key=lambda one: one[0],
+            reverse=True,
         )
-        least = max([stated, *(value for value, (k, _) in others if k == new)])
-        return (i, angle) if i < new and most > least + LOG_ODDS else None
+        least = max([stated, *(value for value, _, (k, _) in others if k == new)])
+        return (i, angle) if i < new and all_of_it and most > least + LOG_ODDS else None
 
     def _fit(self, q: np.ndarray, poses: Sequence[int]) -> StructureFit:
         """Of some of the poses, at q (n, dof)."""
@@ -80,10 +82,10 @@ class PosesTogether:
             typed += joint_offsets(self.joints, expected, self.frfs[i], stated)
         return hits.best_alternative(typed)
 
-    def _evidence(self, one: tuple[int, Alternative] | None) -> float:
-        """Of all together, with one pose's other angle."""
-        every, q = range(len(self.q)), self.q.copy()
-        if one is None:
-            return self._fit(q, every).evidence
-        q[one[0]] = one[1].q
-        return self._fit(q, every).evidence - one[1].rarer
+    def _evidence(self, one: tuple[int, Alternative] | None) -> tuple[float, bool]:
+        """Of all together, with one pose's other angle, and whether that explains them."""
+        q, rarer = self.q.copy(), 0.0
+        if one is not None:
+            q[one[0]], rarer = one[1].q, one[1].rarer
+        found = self._fit(q, range(len(q)))
+        return found.evidence - rarer, explains_all(found)

@@ -153,6 +153,11 @@ def size_of(found: StructureFit) -> float:
     return _rho(found.misfit)
 
 
+def explains_all(found: StructureFit) -> bool:
+    """Whether as little is left as may be: else an angle stands in for anything that is."""
+    return size_of(found) <= SIZES[0]
+
+
 def evidence_of(found: "StructureFit | Tried") -> float:
     return found.evidence
 

@@ -28,6 +28,7 @@ from planner.fit.fitted import (
     StructureFit,
     converged,
     evidence_of,
+    explains_all,
     removal_costs,
     settled,
     size_of,
@@ -132,10 +133,10 @@ class Search(Trials):
         return replace(found, wider=self._widened(found)) if self.widen else found
 
     def _believed(self, best: StructureFit) -> StructureFit:
-        """Without misread angles where more is left than may be: they stand in for anything."""
+        """Without misread angles where something is left."""
         labels = {e.label for e in self.readings}
         read = [e for e in best.structure.effects if e.label in labels]
-        if not read or size_of(best) <= SIZES[0]:
+        if not read or explains_all(best):
             return best
         fewer = without(best, read)
         return best if fewer is None else converged(settled(fewer.misfit, fewer.at))
