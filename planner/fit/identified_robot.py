@@ -6,13 +6,11 @@ from itertools import combinations
 import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
-from planner.effects.parameters import Priors
 from planner.fit.departures import departures_text
 from planner.fit.fitted import StructureFit
 from planner.fit.frequency_uncertainty import frequency_sd
-from planner.fit.identified import ExtendedModel, as_identification
 from planner.fit.posterior import RobotPosterior
-from planner.fit.result import Estimate, Identification
+from planner.fit.result import Estimate, Identification, as_identification
 from planner.words import counted, significant
 
 BEYOND = 2.0  # sds of the gains, from which their deviation is told
@@ -24,11 +22,10 @@ ABOVE, NOT_THERE = 2, 1.0  # modes that a wider structure may have beside; ln f 
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedRobot:
-    """What so many `poses` taught the simulation; `structure` and `identified` say it in numbers
-    of springs and bodies, effects held as they are."""
+    """What so many `poses` taught the simulation; `identified` says it in numbers of springs and
+    bodies, effects held as they are."""
 
     posterior: RobotPosterior
-    structure: ExtendedModel
     identified: Identification
     poses: int = PLACED
     wider: "IdentifiedRobot | None" = None
@@ -38,7 +35,7 @@ class IdentifiedRobot:
         """From the structure that was found."""
         posterior = RobotPosterior.of(found)
         wider = None if found.wider is None else cls.of(found.wider)
-        return cls(posterior, *as_identification(posterior), len(found.misfit.data.q), wider)
+        return cls(posterior, as_identification(posterior), len(found.misfit.data.q), wider)
 
     def frequency_sd(self, q: np.ndarray, modes: SimulatedModes) -> np.ndarray:
         """Sd of ln f (n, count) of its `modes` at q (n, dof) in rad.
@@ -62,14 +59,14 @@ class IdentifiedRobot:
         return self.posterior.explains
 
     @property
-    def priors(self) -> Priors:
-        """Those it was identified with."""
-        return self.structure.priors
-
-    @property
     def stated(self) -> int:
         """How many springs, the first ones, robot.toml states."""
-        return len(self.structure.simulation.robot.config.compliance) - self.structure.added
+        return self.posterior.structure.prior.effect_library.stated
+
+    @property
+    def added(self) -> int:
+        """How many it does not state."""
+        return len(self.identified.simulation.robot.config.compliance) - self.stated
 
     @property
     def unstated(self) -> tuple[Estimate, ...]:

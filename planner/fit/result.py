@@ -5,7 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.effects.parameters import Parametrisation
+from planner.effects.parameters import Parametrisation, parametrise
+from planner.fit.departures import departed
+from planner.fit.posterior import RobotPosterior
+from planner.measurement.agreement import MODEL_ERROR
 
 # The data have told something of a direction once its sd is half of what it was before.
 TOLD = 0.5
@@ -63,24 +66,57 @@ class Identification:
         return {e.name: e for e in self.estimates}[name]
 
 
-def estimates(
-    parametrisation: Parametrisation, mean: np.ndarray, covariance: np.ndarray
-) -> tuple[Estimate, ...]:
-    """Marginal estimates of the springs' parameters."""
-    sd = np.sqrt(np.diagonal(covariance))
-    return tuple(
+def as_identification(posterior: RobotPosterior) -> Identification:
+    """Of the springs of the structure that was found, those that its effects brought among them.
+
+    An added mass is inertia of its body; effects' other numbers are held where they were found, and
+    what else is known is as unsure as they make it. Where nothing explains the FRFs, no parameter
+    counts as known.
+    """
+    structure, library = posterior.structure, posterior.structure.prior.effect_library
+    simulation, names = posterior.simulation, {p.name for p in posterior.structure.parameters}
+    bounds = {n: b for n, b in library.priors.bounds.items() if n in names}
+    p = parametrise(Simulation(simulation.robot), library.priors_with(bounds))
+    turned = _logarithms(posterior, p)
+    values, covariance = np.exp(turned @ posterior.x), turned @ posterior.covariance @ turned.T
+    prior = turned @ np.linalg.inv(structure.precision) @ turned.T
+    sd, before = np.sqrt(np.diagonal(covariance)), np.sqrt(np.diagonal(prior))
+    doubted = {structure.names[i] for i in departed(structure, posterior.x)}
+    estimates = tuple(
         Estimate(
-            p.name,
-            p.kind,
-            p.blocks,
-            float(np.exp(mean[i])),
+            one.name,
+            one.kind,
+            one.blocks,
+            float(values[i]),
             float(sd[i]),
-            p.median,
-            p.log_sd,
-            p.unit,
+            one.median,
+            float(before[i]),
+            one.unit,
+            posterior.explains and one.name not in doubted,
         )
-        for i, p in enumerate(parametrisation.parameters)
+        for i, one in enumerate(p.parameters)
     )
+    left, converged = undetermined(p, covariance), posterior.found.settled
+    misfits = posterior.misfits(MODEL_ERROR)
+    return Identification(simulation, estimates, covariance, *misfits, left, converged)
+
+
+def _logarithms(posterior: RobotPosterior, p: Parametrisation) -> np.ndarray:
+    """(P, D): by which x is turned into the logarithms of the springs' parameters."""
+    structure = posterior.structure
+    turned = np.zeros((len(p.parameters), structure.size))
+    by_name = {name: k for k, name in enumerate(structure.names)}
+    springs = {q.name: q for q in structure.parameters}
+    stiffness = [q for q in structure.parameters if q.kind == "stiffness"]
+    for i, parameter in enumerate(p.parameters):
+        name = parameter.name
+        if name not in by_name:  # a loss factor that an effect brought
+            name = next(n for n in by_name if n.startswith(f"{name} of "))
+        turned[i, by_name[name]] = 1.0
+        if parameter.kind == "damping":  # known by its ratio to the stiffness
+            blocks = set(springs[name].blocks)
+            turned[i, by_name[next(q.name for q in stiffness if blocks & set(q.blocks))]] = 1.0
+    return turned
 
 
 def undetermined(parametrisation: Parametrisation, covariance: np.ndarray) -> tuple[str, ...]:

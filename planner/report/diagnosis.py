@@ -200,7 +200,7 @@ class DiagnosisReport(Answer):
         Raises InputError where they cannot be written.
         """
         from planner.dynamics.simulation import Simulation
-        from planner.fit.identified import as_identification
+        from planner.fit.result import as_identification
         from planner.fit.write_robot import write_robot
         from planner.report.frf_plots import diagnosis_figures
         from planner.report.pictures import Pictures
@@ -209,9 +209,9 @@ class DiagnosisReport(Answer):
         found = self.found
         robot = found.search.prior.effect_library.stiff.robot
         _make_room(folder, robot)
-        model, result = as_identification(found.robot)
-        result = replace(result, simulation=found.simulation)
-        made = write_robot(folder / "robot.toml", model.simulation.robot, result, found.laws)
+        linear = as_identification(found.robot)
+        result = replace(linear, simulation=found.simulation)
+        made = write_robot(folder / "robot.toml", linear.simulation.robot, result, found.laws)
         again, search = Simulation(Robot.load(made.robot_toml)), found.search
         alone = fit_similarity(again, search.frfs, search.q, search.band_hz)
         drawn = self.with_figures(Pictures(folder), lambda: diagnosis_figures(found), robot.name)

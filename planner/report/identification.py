@@ -48,7 +48,7 @@ class IdentificationBasis:
     @property
     def fitted(self) -> "Robot":
         """The robot with everything that was fitted, as stated."""
-        return self.judged.final.structure.simulation.robot
+        return self.judged.final.identified.simulation.robot
 
     def compared(self, band_hz: tuple[float, float]) -> "ComparedFrfs | None":
         """FRFs before and after it, pose by pose; None where the tool was not measured."""
@@ -208,7 +208,7 @@ def identification_report(
         simulated=dataset.simulated,
         band_hz=band_hz,
         inertias=inertias,
-        added=judged.final.structure.added,
+        added=judged.final.added,
         basis=basis,
     )
 

@@ -90,7 +90,7 @@ def refitted_springs(model: "Model") -> tuple[RefittedSpring, ...]:
     fit = model.low.identified_robot
     if fit is None:
         return ()
-    blocks, stated = fit.structure.simulation.robot.config.compliance, fit.stated
+    blocks, stated = fit.identified.simulation.robot.config.compliance, fit.stated
     told = {
         number: estimate
         for estimate in fit.identified.estimates if estimate.kind == "stiffness"

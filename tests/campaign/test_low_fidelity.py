@@ -127,7 +127,7 @@ def test_damping_that_is_partly_a_loss_factor_is_no_lack_of_compliance(tmp_path)
     )
     assert after.is_identified
     assert after.identified_robot is not None
-    assert after.identified_robot.structure.added == 0
+    assert after.identified_robot.added == 0
     assert "loss factors" in after.remark
     assert "swings" not in after.remark
 

@@ -13,9 +13,9 @@ from planner.fit.departures import departures_text, masses_text, refitted_masses
 from planner.fit.fitted import SIZES, StructureFit
 from planner.fit.frequency_uncertainty import log_frequency_slope
 from planner.fit.gauss_newton import minimised
-from planner.fit.identified import as_identification
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotBelief, RobotPosterior
+from planner.fit.result import as_identification
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior, RobotStructure, exported
 from planner.fit.trials import explained
@@ -240,7 +240,7 @@ def test_nothing_counts_as_known_where_nothing_explains(prior, few, size, explai
     structure = structure_of(prior, "structural_damping at joints")
     misfit = FrfMisfit(structure, few, Tolerances(), size)
     posterior = RobotPosterior.of(StructureFit(misfit, misfit(structure.mean), 0.0))
-    told = as_identification(posterior)[1].estimates
+    told = as_identification(posterior).estimates
     assert "loss_factor" in {estimate.kind for estimate in told}
     assert {estimate.explained for estimate in told} == {explained}
 
