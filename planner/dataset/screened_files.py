@@ -51,7 +51,8 @@ class Source:
         frfs = [record for record in records if isinstance(record, FrfRecord)]
         if frfs and not self.part:
             given = tuple(located(self.placed(record), self.stated) for record in frfs)
-            self._check_hits({"xyz"[abs(d) - 1] for r in given for d in r.reference_direction if d})
+            struck = {abs(hit.direction) for record in given for _, hit in record.places}
+            self._check_hits({axis for k, axis in enumerate("xyz", 1) if k in struck})
             return (), given
         if self.hits:
             every = hits_from(records, None, self.stated)

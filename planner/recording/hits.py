@@ -15,6 +15,7 @@ from planner.recording.records import (
     AXES,
     NOTICED,
     Channel,
+    End,
     Fault,
     FrfRecord,
     Hit,
@@ -42,36 +43,29 @@ def with_axes(record: FrfRecord, hit: str | None, response: str | None) -> FrfRe
 
     Raises InputError where file and table name different axes.
     """
-    return replace(
-        record,
-        reference_direction=_completed(record, record.reference_direction, hit, "hit"),
-        response_direction=_completed(record, record.response_direction, response, "response"),
-    )
+    struck = _completed(record, [struck for _, struck in record.places], hit, "hit")
+    felt = _completed(record, [felt for felt, _ in record.places], response, "response")
+    return replace(record, places=tuple(zip(felt, struck, strict=True)))
 
 
 def located(record: FrfRecord, stated: StatedPoints) -> FrfRecord:
     """The record with its nodes by the names of the points. Raises InputError as `hits_from`."""
-    count, source = len(record.values), record.source
-    felt = [
-        _axis_there(source, stated, *at)
-        for at in zip(record.response_node or [""] * count, record.response_direction, strict=True)
-    ]
-    reference = [stated.hit_at(source, node) for node in record.reference_node or [""] * count]
-    return replace(record, response_node=tuple(felt), reference_node=tuple(reference))
+    source = record.source
+    felt = [end._replace(node=_axis_there(source, stated, *end)) for end, _ in record.places]
+    struck = [end._replace(node=stated.hit_at(source, end.node)) for _, end in record.places]
+    return replace(record, places=tuple(zip(felt, struck, strict=True)))
 
 
-def _completed(
-    record: FrfRecord, own: tuple[int, ...], axis: str | None, what: str
-) -> tuple[int, ...]:
-    """Directions of FRFs, unknown ones (0) as the table says."""
+def _completed(record: FrfRecord, own: list[End], axis: str | None, what: str) -> list[End]:
+    """Ends of FRFs, unknown directions (0) as the table says."""
     said = hit_direction(axis) if axis else 0
-    other = next((d for d in own if d and said and abs(d) != abs(said)), None)
+    other = next((d for _, d in own if d and said and abs(d) != abs(said)), None)
     if other is not None and (what == "hit" or len(own) == 1):
         raise InputError(
             f"{record.source} says that its {what} is along {_name(other)}, the table says "
             f"{axis}; correct the one that is wrong."
         )
-    return tuple(direction or said for direction in own)
+    return [end._replace(direction=end.direction or said) for end in own]
 
 
 def _axis_there(source: object, stated: StatedPoints, node: str, direction: int) -> str:

@@ -26,7 +26,7 @@ from planner.recording.folder import files_in
 from planner.recording.lvm import read_lvm
 from planner.recording.mat5 import is_version_5, read_mat5
 from planner.recording.named_columns import Named, to_records
-from planner.recording.records import FrfRecord, Record, TimeRecord, check_records
+from planner.recording.records import End, FrfRecord, Record, TimeRecord, check_records
 from planner.recording.stream import cut_into_hits
 from planner.recording.text_tables import read_text
 from planner.recording.uff import read_uff
@@ -245,22 +245,19 @@ def place_in_name(path: Path) -> tuple[str, str, str, str]:
 
 def placed_by_name(record: FrfRecord, name: str) -> FrfRecord:
     """FRFs with what they do not state themselves from their file's name; of several the hit."""
-    count = len(record.values)
-    response_node, response, hit_node, hit = place_in_name(Path(name))
-    if count > 1:
-        response_node, response = "", ""
+    node, response, hit_node, hit = place_in_name(Path(name))
+    if len(record.places) > 1:
+        node, response = "", ""
 
-    def nodes(own: tuple[str, ...], named: str) -> tuple[str, ...]:
-        return tuple(named if node in ("", "0") else node for node in own or ("",) * count)
+    def completed(own: End, node: str, axis: str) -> End:
+        named = node if own.node in ("", "0") else own.node
+        return End(named, own.direction or hit_direction(axis))
 
-    felt, struck = hit_direction(response), hit_direction(hit)
-    return replace(
-        record,
-        response_direction=tuple(d or felt for d in record.response_direction),
-        reference_direction=tuple(d or struck for d in record.reference_direction),
-        response_node=nodes(record.response_node, response_node),
-        reference_node=nodes(record.reference_node, hit_node),
+    own = (
+        (completed(felt, node, response), completed(struck, hit_node, hit))
+        for felt, struck in record.places
     )
+    return replace(record, places=tuple(own))
 
 
 def read_frfs(path: Path, from_names: bool = False) -> tuple[FrfRecord, ...]:
