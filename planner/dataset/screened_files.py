@@ -210,7 +210,7 @@ def read_one(
 ) -> tuple[FileVerdict, tuple[Hit, ...], list[FrfRecord]]:
     """One file, judged by itself: the verdict, its usable hits, its FRFs."""
     from planner.recording.channel_faults import by_good_sensors
-    from planner.recording.screening import ScreeningLimits, screen
+    from planner.recording.screening import screen
     from planner.recording.spectra import driving_point
 
     try:
@@ -222,10 +222,9 @@ def read_one(
         missing = isinstance(error, AxisNotStatedError)
         text = renamed(str(error), (source,))
         return FileVerdict(source, False, text, axis_missing=missing), (), []
-    limits = replace(ScreeningLimits(), band_hz=band_hz)
     heard = [by_good_sensors(hit) for hit in found]
     judged = [
-        (hit, (*told, *screen(hit, limits), *driving_point(hit, band_hz))) for hit, told in heard
+        (hit, (*told, *screen(hit, band_hz), *driving_point(hit, band_hz))) for hit, told in heard
     ]
     told = tuple(f.text for _, faults in judged for f in faults if not f.refuse)
     simulated, axis = any(hit.simulated for hit in found), found[0].axis
