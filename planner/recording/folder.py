@@ -30,11 +30,9 @@ def several_poses(paths: list[Path], least: int = 2) -> bool:
     """Whether a single folder is named whose recordings.csv lists that many poses at least."""
     if len(paths) != 1 or not (paths[0] / TABLE).is_file():
         return False
-    header, rows = read_table(paths[0] / TABLE)
-    if "pose" not in header:
-        return True  # said where the table is read in earnest
-    at = header.index("pose")
-    return len({cells[at].strip() for _, cells in rows}) >= least
+    header, rows = _rows(paths[0] / TABLE)
+    # A table without poses is refused where it is read in earnest.
+    return "pose" not in header or len({row.cell("pose") for row in rows}) >= least
 
 
 def joint_columns(folder: Path) -> JointUnits:

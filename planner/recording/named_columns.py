@@ -156,10 +156,9 @@ def _channel(name: str, values: np.ndarray, named: Named) -> Channel:
     return Channel(name, quantity, si, direction, np.real(values).astype(float) * factor, node)
 
 
-_OWN = re.compile(r"(accelerance|mobility|receptance|coherence)_([xyz])([xyz])(_re|_im|)$")
-_BETWEEN = re.compile(
-    r"(accelerance|mobility|receptance|coherence)_(.+)_([xyz])_(.+)_([xyz])(_re|_im|)$"
-)
+_KIND = "(accelerance|mobility|receptance|coherence)_"
+_OWN = re.compile(rf"{_KIND}()([xyz])()([xyz])(_re|_im|)$", re.IGNORECASE)
+_BETWEEN = re.compile(rf"{_KIND}(.+)_([xyz])_(.+)_([xyz])(_re|_im|)$")
 _SI = {"accelerance": "m/s^2/N", "mobility": "m/s/N", "receptance": "m/N", "unknown": ""}
 _WORDS = {
     "im": r"im|imag|imaginary|imaginär|imaginärteil|imaginaire",
@@ -252,18 +251,11 @@ def _frequency(name: str, named: Named) -> bool:
 
 def _own(name: str) -> tuple[str, tuple[End, End], str] | None:
     """Quantity, place, and "_re", "_im" or "" of a column that has one of planner's names."""
-    found = _OWN.match(name.lower())
-    if found:
-        return found[1], (_along("", found[2]), _along("", found[3])), found[4]
-    found = _BETWEEN.match(name)
-    if found:
-        ends = _along(found[2], found[3]), _along(found[4], found[5])
-        return found[1], ends, found[6]
-    return None
-
-
-def _along(point: str, axis: str) -> End:
-    return End(point, hit_direction(axis))
+    found = _OWN.match(name) or _BETWEEN.match(name)
+    if not found:
+        return None
+    kind, felt, i, hit, j, part = found.groups()
+    return kind.lower(), (End(felt, hit_direction(i)), End(hit, hit_direction(j))), part.lower()
 
 
 def _part(name: str, named: Named) -> str:
