@@ -25,7 +25,7 @@ from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.modal.modes import ModalModel
 from planner.progress import ProgressCallback, no_progress
-from planner.recording.force_levels import levels, peak_n
+from planner.recording.force_levels import level_of, levels, peak_n
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, together
 from planner.recording.records import Hit
@@ -297,8 +297,7 @@ class Dataset:
 
     def level(self, hit: Hit) -> int:
         """Which of `level_n` a hit belongs to."""
-        weakest = [group[0] for group in self._by_level[1:]]
-        return int(np.searchsorted(weakest, peak_n(hit), side="right"))
+        return int(level_of(np.array(peak_n(hit)), self._by_level))
 
 
 def _known(frfs: Iterable[Frf | None]) -> tuple[Frf, ...]:

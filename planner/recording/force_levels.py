@@ -46,6 +46,11 @@ def by_level(hits: tuple[Hit, ...]) -> tuple[tuple[Hit, ...], ...]:
     return tuple(tuple(group) for group in groups)
 
 
+def level_of(peaks_n: np.ndarray, groups: Sequence[np.ndarray]) -> np.ndarray:
+    """Which of the `levels` each of some peaks (n,) in N belongs to."""
+    return np.searchsorted([group[0] for group in groups[1:]], peaks_n, side="right")
+
+
 def levels(peaks_n: np.ndarray) -> list[np.ndarray]:
     """Peaks (n,) in N, sorted, by level: weakest first.
 

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.recording.force_levels import levels, peak_n
+from planner.recording.force_levels import level_of, levels, peak_n
 from planner.recording.records import AXES, Fault, Hit
 from planner.recording.sampling import same_rate
 from planner.recording.screening import SILENCE
@@ -81,9 +81,8 @@ class _Alike:
 
     @classmethod
     def of(cls, hits: Sequence[Hit], band_hz: tuple[float, float]) -> "_Alike":
-        peaks = [peak_n(hit) for hit in hits]
-        weakest = [group[0] for group in levels(np.sort(peaks))[1:]]
-        level = np.searchsorted(weakest, peaks, side="right")
+        peaks = np.array([peak_n(hit) for hit in hits])
+        level = level_of(peaks, levels(np.sort(peaks)))
         return cls(_frfs(hits, band_hz), np.array([hit.axis_index for hit in hits]), level)
 
     @cached_property
