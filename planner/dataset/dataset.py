@@ -25,7 +25,7 @@ from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.modal.modes import ModalModel
 from planner.progress import ProgressCallback, no_progress
-from planner.recording.force_levels import level_of, levels, peak_n
+from planner.recording.force_levels import level_of, levels
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, together
 from planner.recording.records import Hit
@@ -286,7 +286,7 @@ class Dataset:
 
     @cached_property
     def _by_level(self) -> list[np.ndarray]:
-        return levels(np.sort([peak_n(hit) for visit in self.visits for hit in visit.hits]))
+        return levels(np.sort([hit.pulse.peak_n for visit in self.visits for hit in visit.hits]))
 
     @cached_property
     def level_n(self) -> np.ndarray:
@@ -297,7 +297,7 @@ class Dataset:
 
     def level(self, hit: Hit) -> int:
         """Which of `level_n` a hit belongs to."""
-        return int(level_of(np.array(peak_n(hit)), self._by_level))
+        return int(level_of(np.array(hit.pulse.peak_n), self._by_level))
 
 
 def _known(frfs: Iterable[Frf | None]) -> tuple[Frf, ...]:

@@ -115,16 +115,19 @@ def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:
 
     Raises InputError if there are none.
     """
-    found = sorted(p for p in folder.rglob("*") if p.is_file())
     found = [
-        path for path in found
-        if path.name not in TABLES
-        and not any(part[0] == "." for part in path.relative_to(folder).parts)
+        path for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name not in TABLES and shown(path, folder)
         and (path.parent == folder or path.suffix.lower() in suffixes)
     ]  # fmt: skip
     if not found:
         raise InputError(f"{folder} holds no recordings; name a folder that does.")
     return found
+
+
+def shown(path: Path, folder: Path) -> bool:
+    """Whether neither a path in a folder nor what it lies in there is hidden."""
+    return not any(part[0] == "." for part in path.relative_to(folder).parts)
 
 
 def read_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:

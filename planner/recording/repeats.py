@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.recording.force_levels import level_of, levels, peak_n
+from planner.recording.force_levels import level_of, levels
 from planner.recording.records import AXES, Fault, Hit
 from planner.recording.sampling import same_rate
 from planner.recording.screening import SILENCE
@@ -81,7 +81,7 @@ class _Alike:
 
     @classmethod
     def of(cls, hits: Sequence[Hit], band_hz: tuple[float, float]) -> "_Alike":
-        peaks = np.array([peak_n(hit) for hit in hits])
+        peaks = np.array([hit.pulse.peak_n for hit in hits])
         level = level_of(peaks, levels(np.sort(peaks)))
         return cls(_frfs(hits, band_hz), np.array([hit.axis_index for hit in hits]), level)
 
