@@ -220,9 +220,9 @@ def _read_anew(path: Path) -> ReadFile:
     return ReadFile(whole, tuple(hit for hits in cut for hit in hits))
 
 
-_AXES = re.compile(r"(?:^|[^a-z])([+-]?[xyz])_?([+-]?[xyz])$", re.IGNORECASE)
+_AXES = re.compile(r"(?:^|[^a-z])()([+-]?[xyz])_?()([+-]?[xyz])$", re.IGNORECASE)
 _NODES = re.compile(r"(?:^|[^a-z0-9])h?(\d+)([+-]?[xyz]?)[_,-](\d+)([+-]?[xyz]?)$", re.IGNORECASE)
-_DIGITS = re.compile(r"(?:^|[^a-z0-9])h(\d)(\d)$", re.IGNORECASE)
+_DIGITS = re.compile(r"(?:^|[^a-z0-9])h(\d)()(\d)()$", re.IGNORECASE)
 
 
 def place_in_name(path: Path) -> tuple[str, str, str, str]:
@@ -231,12 +231,8 @@ def place_in_name(path: Path) -> tuple[str, str, str, str]:
     Raises InputError where it says nothing.
     """
     stem = path.name.removesuffix(".gz").rpartition(".")[0]
-    if found := _NODES.search(stem):
+    if found := _NODES.search(stem) or _DIGITS.search(stem) or _AXES.search(stem):
         return found[1], found[2], found[3], found[4]
-    if found := _DIGITS.search(stem):
-        return found[1], "", found[2], ""
-    if found := _AXES.search(stem):
-        return "", found[1], "", found[2]
     raise InputError(
         f"{path}: its name says neither axes nor nodes; call it such as tap_yx (response y, hit "
         f"x), H3_1 or 3y_1x (nodes), or leave out --from-names."

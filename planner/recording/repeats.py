@@ -157,12 +157,9 @@ class _Alike:
 
     def _repeated(self, i: int) -> Doubt | None:
         for axis, centre in self._across(self.axes[i]).items():
-            sizes = np.linalg.norm(self.frfs[i]), np.linalg.norm(centre)
-            ratio = float(min(sizes) / max(*sizes, SILENCE))
-            alike = _likeness(self.frfs[i], centre)
-            if abs(alike) * ratio >= SAME:
+            if abs(_likeness_in_size(self.frfs[i], centre)) >= SAME:
                 others = tuple(int(j) for j in np.flatnonzero(self.axes == axis))
-                return Doubt(others, alike, AXES[axis])
+                return Doubt(others, _likeness(self.frfs[i], centre), AXES[axis])
         return None
 
 
@@ -175,10 +172,7 @@ def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float])
     if not same:
         return 0.0
     frf, *theirs = _frfs((hit, *same), band_hz)
-    own = float(np.linalg.norm(frf))
-    sizes = [(own, float(np.linalg.norm(one))) for one in theirs]
-    shares = [min(pair) / max(*pair, SILENCE) for pair in sizes]
-    return max(_likeness(frf, one) * share for one, share in zip(theirs, shares, strict=True))
+    return max(_likeness_in_size(frf, one) for one in theirs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,6 +277,12 @@ def _likeness(frf: np.ndarray, centre: np.ndarray) -> float:
     """1 where two FRFs are the same in size, sign and phase; 0 or less where unrelated."""
     scale = np.linalg.norm(frf) * np.linalg.norm(centre)
     return float(np.real(np.vdot(centre, frf)) / scale) if scale > 0 else 0.0
+
+
+def _likeness_in_size(frf: np.ndarray, other: np.ndarray) -> float:
+    """The same, less where they differ in size."""
+    sizes = float(np.linalg.norm(frf)), float(np.linalg.norm(other))
+    return _likeness(frf, other) * (min(sizes) / max(*sizes, SILENCE))
 
 
 # ln of sizes by which repeats differ: hands and force levels by some 30 % at most. Chosen.
