@@ -9,7 +9,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from planner.dataset.level_columns import Column, column
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.store import Store, user_store
 from planner.dataset.visits import (
@@ -26,7 +25,7 @@ from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.modal.modes import ModalModel
 from planner.progress import ProgressCallback, no_progress
-from planner.recording.force_levels import levels, peak_n
+from planner.recording.force_levels import level_of, levels
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, together
 from planner.recording.records import Hit
@@ -59,7 +58,7 @@ class Recorded(Protocol):
 class Dataset:
     """Poses that were hit, in the order of recording; made by `read`, `of` or `of_visits`.
 
-    It never changes. FRFs, modes and columns are computed when they are first asked for. n counts
+    It never changes. FRFs and modes are computed when they are first asked for. n counts
     the poses with an FRF, v the visits with a hit. `refused` names the files that could not be
     used, each with its reason; `window_rate_1_s` is that of an exponential window that all
     channels carry.
@@ -287,7 +286,7 @@ class Dataset:
 
     @cached_property
     def _by_level(self) -> list[np.ndarray]:
-        return levels(np.sort([peak_n(hit) for visit in self.visits for hit in visit.hits]))
+        return levels(np.sort([hit.pulse.peak_n for visit in self.visits for hit in visit.hits]))
 
     @cached_property
     def level_n(self) -> np.ndarray:
@@ -298,28 +297,7 @@ class Dataset:
 
     def level(self, hit: Hit) -> int:
         """Which of `level_n` a hit belongs to."""
-        weakest = [group[0] for group in self._by_level[1:]]
-        return int(np.searchsorted(weakest, peak_n(hit), side="right"))
-
-    @cached_property
-    def columns(self) -> tuple[tuple[Column, ...], ...]:
-        """Of each visit: one column per hit axis and force level that was hit, weakest first."""
-        return self.columns_at(LAID)
-
-    def columns_at(self, laid_1_s: float) -> tuple[tuple[Column, ...], ...]:
-        """As `columns`, with an exponential window of this rate (1/s) laid over the records."""
-        length = max(len(hit.force_n) for visit in self.visits for hit in visit.hits)
-        out = []
-        for visit in self.visits:
-            groups: dict[tuple[int, int], list[Hit]] = {}
-            for hit in visit.hits:
-                groups.setdefault((hit.axis_index, self.level(hit)), []).append(hit)
-            found = [
-                column(tuple(hits), *at, length, self.band_hz, laid_1_s, self.window_rate_1_s)
-                for at, hits in sorted(groups.items())
-            ]
-            out.append(tuple(found))
-        return tuple(out)
+        return int(level_of(np.array(hit.pulse.peak_n), self._by_level))
 
 
 def _known(frfs: Iterable[Frf | None]) -> tuple[Frf, ...]:

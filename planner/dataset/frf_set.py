@@ -8,7 +8,7 @@ from planner.dataset.measure import DEFAULT_BAND_HZ, MeasuredPose
 from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.dataset.store import user_store
 from planner.errors import PlannerError, RefusedError, RefusedFile
-from planner.frf.exported import exported, places
+from planner.frf.exported import exported
 from planner.frf.matrix import FrfMatrix, matrix_of
 from planner.recording.geometry import read_geometry
 from planner.recording.points import ANYWHERE
@@ -176,8 +176,6 @@ def _placed(frfs: Sequence[FrfRecord]) -> bool:
 def _of_one_point(frfs: Sequence[FrfRecord]) -> bool:
     """Whether FRFs are all three responses of one point, or of a format without points."""
     pairs = _pairs(frfs)
-    if not all(record.response_node for record in frfs):
-        return any(along for _, along, *_ in pairs)
     if len({(felt, hit) for felt, _, hit, _ in pairs}) > 1:
         return False
     hits = {hit for *_, hit in pairs}
@@ -187,5 +185,5 @@ def _of_one_point(frfs: Sequence[FrfRecord]) -> bool:
 
 def _pairs(frfs: Sequence[FrfRecord]) -> set[tuple[str, int, str, int]]:
     """Node and direction, without its sign, of every response and of its hit."""
-    every = (place for record in frfs for place in places(record))
+    every = ((*felt, *hit) for record in frfs for felt, hit in record.places)
     return {(felt, abs(along), hit, abs(struck)) for felt, along, hit, struck in every}

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dataset.dataset import LAID
-from planner.dataset.measure import MeasuredPose, of_tool, one_hit_frf, tool_frf
+from planner.dataset.measure import accepted, of_tool, one_hit_frf, read_accepted, tool_frf
 from planner.dataset.screened_files import Source
-from planner.dataset.store import user_store
 from planner.frf.frf import Frf
 from planner.frf.spectra import Windows, transform
 from planner.recording.records import Hit
@@ -106,15 +105,14 @@ def hits_of(
     corrected: Correction | None = None,
 ) -> PoseHits:
     """Those of files that were accepted before, kept like FRFs unless they are `corrected`."""
-    pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
+    pose, how = accepted(sources, band_hz, window_rate_1_s), (band_hz, window_rate_1_s)
 
     def make() -> PoseHits:
-        read = [source.read() for source in sources]
-        records = tuple(record for _, found in read for record in found)
-        files = [number for number, (found, _) in enumerate(read) for _ in found]
-        every, how = tuple(hit for found, _ in read for hit in found), (band_hz, window_rate_1_s)
+        read, records = read_accepted(sources)
+        every = tuple(hit for _, hit in read)
         every = every if corrected is None else corrected(every)
-        at_tool = [(n, one) for n, hit in zip(files, every, strict=True) for one in of_tool((hit,))]
+        both = zip(read, every, strict=True)
+        at_tool = [(number, one) for (number, _), hit in both for one in of_tool((hit,))]
         columns = no_columns()
         if at_tool:
             file, hits = zip(*at_tool, strict=True)

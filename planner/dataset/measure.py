@@ -1,6 +1,6 @@
 """From the files of one pose to its modes: read, screen, average, identify; each step once."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
@@ -259,25 +259,34 @@ def frf_of(
     """The tool's FRF of files that were accepted before: the one that `measure` gave then."""
 
     def make() -> Frf:
-        read = [source.read() for source in sources]
-        hits = tuple(hit for found, _ in read for hit in found)
-        frfs = tuple(record for _, found in read for record in found)
-        return tool_frf(hits, frfs, band_hz, window_rate_1_s)
+        hits, records = read_accepted(sources)
+        every = tuple(hit for _, hit in hits)
+        return tool_frf(every, records, band_hz, window_rate_1_s)
 
-    return _accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, make)
+    return accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, make)
 
 
 def keep_frf(
     frf: Frf, sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float
 ) -> None:
     """Keep what `frf_of` will be asked for, now that it is at hand."""
-    _ = _accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, lambda: frf)
+    _ = accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, lambda: frf)
 
 
-def _accepted(
+def accepted(
     sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float
 ) -> MeasuredPose:
+    """Files that were accepted before, where what follows from them is kept."""
     return MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
+
+
+def read_accepted(
+    sources: Sequence[Source],
+) -> tuple[list[tuple[int, Hit]], tuple[FrfRecord, ...]]:
+    """Their hits, each with its file's number, and exported FRFs."""
+    read = [source.read() for source in sources]
+    hits = [(number, hit) for number, (found, _) in enumerate(read) for hit in found]
+    return hits, tuple(record for _, found in read for record in found)
 
 
 def one_hit_frf(
@@ -297,16 +306,11 @@ def tool_frf(
     band_hz: tuple[float, float],
     window_rate_1_s: float = 0.0,
 ) -> Frf:
-    """The tool's FRF of accepted hits, or of exported FRFs."""
+    """The tool's FRF of accepted hits, or of exported FRFs; NaN where others were measured."""
     whole = _frf(hits, records, band_hz, "h1", window_rate_1_s)
-    return whole.of_tool or _nothing(whole)
-
-
-def _nothing(frf: Frf) -> Frf:
-    """The tool's FRF of a pose where others were measured."""
-    empty = np.full((3, 3, len(frf.frequency_hz)), np.nan)
-    return replace(
-        frf, accelerance=empty + 0j, variance=empty, coherence=empty, hits=(0, 0, 0),
+    empty = np.full((3, 3, len(whole.frequency_hz)), np.nan)
+    return whole.of_tool or replace(
+        whole, accelerance=empty + 0j, variance=empty, coherence=empty, hits=(0, 0, 0),
         force_share=None, layout=TOOL,
     )  # fmt: skip
 

@@ -7,8 +7,15 @@ from pathlib import Path
 from typing import TypeVar
 
 from planner.errors import AxisNotStatedError, InputError, PlannerError
+from planner.recording.channel_faults import by_good_sensors
+from planner.recording.hits import hits_from, located, with_axes
 from planner.recording.points import StatedPoints
+from planner.recording.read import hits_in, placed_by_name, read_hits
 from planner.recording.records import NOTICED, Fault, FrfRecord, Hit, PoseRow, Record
+from planner.recording.repeats import screen_repeats
+from planner.recording.sampling import sampled_otherwise
+from planner.recording.screening import screen
+from planner.recording.spectra import driving_point
 from planner.words import counted
 
 RecordT = TypeVar("RecordT", bound=Record)
@@ -44,19 +51,19 @@ class Source:
 
     def read(self) -> tuple[tuple[Hit, ...], tuple[FrfRecord, ...]]:
         """Hits, or exported FRFs, that the file holds. Raises InputError or RefusedError."""
-        from planner.recording.hits import hits_from, located
-        from planner.recording.read import read_hits
-
-        records: tuple[Record, ...] = read_hits(self.path)
+        records: Sequence[Record] = read_hits(self.path)
         frfs = [record for record in records if isinstance(record, FrfRecord)]
         if frfs and not self.part:
             given = tuple(located(self.placed(record), self.stated) for record in frfs)
-            self._check_hits({"xyz"[abs(d) - 1] for r in given for d in r.reference_direction if d})
+            struck = {abs(hit.direction) for record in given for _, hit in record.places}
+            self._check_hits({axis for k, axis in enumerate("xyz", 1) if k in struck})
             return (), given
         if self.hits:
             every = hits_from(records, None, self.stated)
             self._check_hits({hit.axis[1] for hit in every})
-        return hits_from(self._meant(records), self.hit, self.stated), ()
+        if self.part:
+            records = [r for r in records if not isinstance(r, FrfRecord)][self.part - 1 :][:1]
+        return hits_from(records, self.hit, self.stated), ()
 
     def _check_hits(self, found: set[str]) -> None:
         """Raise InputError where a file was not hit along the axes that the table lists for it."""
@@ -68,20 +75,10 @@ class Source:
 
     def placed(self, record: RecordT) -> RecordT:
         """FRFs with the places that they do not state themselves; time histories as they are."""
-        from planner.recording.hits import with_axes
-        from planner.recording.read import placed_by_name
-
         if not isinstance(record, FrfRecord):
             return record
         named = placed_by_name(record, self.name) if self.from_name else record
         return with_axes(named, self.hit, self.response)  # pyrefly: ignore[bad-return]
-
-    def _meant(self, records: tuple[Record, ...]) -> tuple[Record, ...]:
-        """Of a file's records those that are meant."""
-        if not self.part:
-            return records
-        times = [record for record in records if not isinstance(record, FrfRecord)]
-        return tuple(times[self.part - 1 : self.part])
 
     @property
     def whole_name(self) -> str:
@@ -90,8 +87,6 @@ class Source:
 
     def parts(self) -> "tuple[Source, ...]":
         """Each of the file's hits by itself, where there are several; the file must be readable."""
-        from planner.recording.read import hits_in
-
         if self.part:
             return (self,)
         return tuple(
@@ -183,8 +178,6 @@ def _refuse_others(
     verdicts: list[FileVerdict], hits: list[tuple[Hit, ...]], records: list[FrfRecord]
 ) -> None:
     """Refuse what cannot be averaged with most hits of the pose: FRFs, and other sampling rates."""
-    from planner.recording.sampling import sampled_otherwise
-
     own = [number for number, found in enumerate(hits) for _ in found]
     said = sampled_otherwise([hit for found in hits for hit in found])
     other = {number: text for number, text in zip(own, said, strict=True) if text}
@@ -208,10 +201,6 @@ def read_one(
     source: Source, band_hz: tuple[float, float]
 ) -> tuple[FileVerdict, tuple[Hit, ...], list[FrfRecord]]:
     """One file, judged by itself: the verdict, its usable hits, its FRFs."""
-    from planner.recording.channel_faults import by_good_sensors
-    from planner.recording.screening import ScreeningLimits, screen
-    from planner.recording.spectra import driving_point
-
     try:
         found, frfs = source.read()
         if frfs:
@@ -221,10 +210,9 @@ def read_one(
         missing = isinstance(error, AxisNotStatedError)
         text = renamed(str(error), (source,))
         return FileVerdict(source, False, text, axis_missing=missing), (), []
-    limits = replace(ScreeningLimits(), band_hz=band_hz)
     heard = [by_good_sensors(hit) for hit in found]
     judged = [
-        (hit, (*told, *screen(hit, limits), *driving_point(hit, band_hz))) for hit, told in heard
+        (hit, (*told, *screen(hit, band_hz), *driving_point(hit, band_hz))) for hit, told in heard
     ]
     told = tuple(f.text for _, faults in judged for f in faults if not f.refuse)
     simulated, axis = any(hit.simulated for hit in found), found[0].axis
@@ -232,7 +220,8 @@ def read_one(
     if all(reasons):
         return FileVerdict(source, False, " ".join(reasons), axis, simulated, told), (), []
     hits = tuple(hit for (hit, _), reason in zip(judged, reasons, strict=True) if not reason)
-    refused = _refused_hits(source, reasons) if any(reasons) else ()
+    names = [part.name for part in source.parts()] if any(reasons) else reasons
+    refused = tuple(one for one in zip(names, reasons, strict=True) if one[1])
     return FileVerdict(source, True, "", axis, simulated, told, False, refused), hits, []
 
 
@@ -241,12 +230,6 @@ def _why_refused(faults: Sequence[Fault]) -> str:
     noticed = [f.text for f in faults if f.kind == NOTICED]
     reasons = [f.text for f in faults if f.refuse]
     return " ".join((*reasons, *noticed)) if reasons else ""
-
-
-def _refused_hits(source: Source, reasons: list[str]) -> tuple[tuple[str, str], ...]:
-    """Names of a file's hits that have a reason, and the reasons."""
-    names = (part.name for part in source.parts())
-    return tuple(one for one in zip(names, reasons, strict=True) if one[1])
 
 
 def renamed(text: str, sources: tuple[Source, ...]) -> str:
@@ -260,21 +243,16 @@ def _agreeing(
     hits: list[tuple[Hit, ...]], verdicts: list[FileVerdict], band_hz: tuple[float, float]
 ) -> tuple[Hit, ...]:
     """Hits that do not disagree with the repeats of their axis; verdicts follow."""
-    from planner.recording.repeats import screen_repeats
-
     every = [(number, hit) for number, found in enumerate(hits) for hit in found]
     kept = []
     faults = screen_repeats(tuple(hit for _, hit in every), band_hz)
     for (number, hit), found in zip(every, faults, strict=True):
-        refusing = [fault for fault in found if fault.refuse]
-        if not refusing:
+        verdict = verdicts[number]
+        if not (text := " ".join(fault.text for fault in found if fault.refuse)):
             kept.append(hit)
-            continue
-        text, verdict = " ".join(fault.text for fault in refusing), verdicts[number]
-        if len(hits[number]) > 1:
-            verdicts[number] = replace(
-                verdict, refused_hits=(*verdict.refused_hits, (verdict.source.name, text))
-            )
+        elif len(hits[number]) > 1:
+            refused = *verdict.refused_hits, (verdict.source.name, text)
+            verdicts[number] = replace(verdict, refused_hits=refused)
         else:
             verdicts[number] = replace(verdict, accepted=False, reason=text)
     return tuple(kept)

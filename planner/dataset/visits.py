@@ -12,7 +12,7 @@ import numpy as np
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
-from planner.recording.folder import TABLE, TABLES, read_recordings
+from planner.recording.folder import TABLE, TABLES, read_recordings, shown
 from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames
 from planner.recording.read import READERS, read
@@ -85,9 +85,8 @@ def table_folders(path: Path) -> tuple[Path, ...]:
     """
     if path.name == TABLE or (path / TABLE).is_file():
         return (path.parent if path.name == TABLE else path,)
-    found = (table.parent.relative_to(path) for table in path.rglob(TABLE))
-    shown = (folder for folder in found if not any(part[0] == "." for part in folder.parts))
-    return tuple(path / folder for folder in sorted(shown, key=_numbered))
+    found = (table.parent for table in path.rglob(TABLE) if shown(table, path))
+    return tuple(sorted(found, key=lambda folder: _numbered(folder.relative_to(path))))
 
 
 def _numbered(folder: Path) -> list[tuple[str, int]]:
@@ -153,8 +152,8 @@ def unlisted_folders(path: Path, listed: Sequence[Recording]) -> tuple[str, ...]
 
 def _may_be_read(file: Path, top: Path) -> bool:
     """Whether a file below a folder is shown and has a format of recordings."""
-    shown = not any(part[0] == "." for part in file.relative_to(top).parts)
-    return shown and file.suffix.lower() in READERS and file.name not in TABLES and file.is_file()
+    known = file.suffix.lower() in READERS and file.name not in TABLES
+    return known and shown(file, top) and file.is_file()
 
 
 def _has_recordings(folder: Path) -> bool:

@@ -16,7 +16,6 @@ from planner.fit.weights import ELL, SHARE
 from planner.frf.spectra import Spectra, Windows, transform
 from planner.measurement.measured_frfs import Measured
 from planner.measurement.nuisances import hit_basis
-from planner.recording.force_levels import peak_n
 
 FADED = 0.1  # of the window's weight, below which nothing is told of a motion
 
@@ -146,7 +145,7 @@ def _groups(
     variance = (noise + np.abs(h) ** 2 * force_noise) / np.abs(force[:, None, lines]) ** 2
     motion = _motion(found, own, visit.q, f, s)
     axes = np.array([hit.axis_index for hit in visit.hits])
-    peaks = np.array([peak_n(hit) for hit in visit.hits])
+    peaks = np.array([hit.pulse.peak_n for hit in visit.hits])
     means = {int(a): h[axes == a].mean(axis=0) for a in np.unique(axes)}
     rms = np.sqrt(np.mean([np.abs(m) ** 2 for m in means.values()], axis=(0, 1)))
     answered = motion.accelerance[:, :, :3][..., lines]

@@ -1,10 +1,15 @@
 """A tone that sounds without any hit: a pump, a fan, the mains. No physics of the robot."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from planner.dataset.dataset import Dataset
-from planner.dataset.level_columns import Column
+from planner.dataset.dataset import LAID, Dataset
+from planner.dataset.visits import Visit
 from planner.diagnosis.finding import Finding
+from planner.frf.estimator import of_spectra
+from planner.frf.spectra import Windows, transform
+from planner.recording.records import Hit
 
 WIDTH_HZ = 1.0  # half of what a tone takes up under the window
 CONCENTRATED = 0.6  # share of the levels' differences that lies there, at all poses together
@@ -19,7 +24,7 @@ def screen_tone(recorded: Dataset) -> Finding | None:
     A tone adds the same to weak and strong hits, so that their FRFs differ there. Resonances,
     where a nonlinear joint shows, move with the pose.
     """
-    pairs = [pair for columns in recorded.columns for pair in _pairs(columns)]
+    pairs = [pair for visit in recorded.visits for pair in _pairs(recorded, visit)]
     if not pairs:
         return None
     frequency = pairs[0][0].frequency_hz
@@ -27,10 +32,10 @@ def screen_tone(recorded: Dataset) -> Finding | None:
     for weak, strong in pairs:
         variance = weak.variance + strong.variance
         used = np.all(np.isfinite(variance), axis=0)
-        square = np.abs(weak.accelerance - strong.accelerance) ** 2 * np.abs(weak.force) ** 2
-        scale = np.where(used, variance * np.abs(weak.force) ** 2, 1.0).mean()
+        square = np.abs(weak.accelerance - strong.accelerance) ** 2 * weak.power
+        scale = np.where(used, variance * weak.power, 1.0).mean()
         excess += np.where(used, square.sum(axis=0) / scale, 0.0)
-        noise += np.where(used, (variance * np.abs(weak.force) ** 2).sum(axis=0) / scale, 0.0)
+        noise += np.where(used, (variance * weak.power).sum(axis=0) / scale, 0.0)
     over = np.maximum(excess - noise, 0.0)
     line = int(np.argmax(over))
     near = np.abs(frequency - frequency[line]) <= WIDTH_HZ
@@ -69,11 +74,44 @@ def _kept(recorded: Dataset, hz: float) -> float:
     return float(np.sqrt(after / before))
 
 
-def _pairs(columns: tuple[Column, ...]) -> list[tuple[Column, Column]]:
-    """Weakest and strongest column of each hit axis."""
+@dataclass(frozen=True, eq=False)
+class _Column:
+    """Accelerance (r, F) of hits along an axis at one force level, under a window of rate LAID.
+
+    `variance` (r, F) is E|δH|² of the records' noise, ∞ where the pulse does not excite; hits of a
+    level differ by more where the structure is not linear. `power` (F,) is |F|² of the first hit.
+    """
+
+    frequency_hz: np.ndarray
+    accelerance: np.ndarray
+    variance: np.ndarray
+    power: np.ndarray
+
+    @classmethod
+    def of(cls, recorded: Dataset, hits: list[Hit]) -> "_Column":
+        """Of the hits of a level; the longest record makes the lines common to all."""
+        low, high = recorded.band_hz
+        longest = max(len(hit.force_n) for visit in recorded.visits for hit in visit.hits)
+        windows, axis = Windows(LAID, recorded.window_rate_1_s), hits[0].axis_index
+        spectra = transform(tuple(hits), recorded.band_hz, windows, longest)
+        frf = of_spectra(spectra, recorded.band_hz, windows, by_scatter=False)
+        f, usable = frf.frequency_hz, frf.usable_band_hz[1]
+        lines = (f >= low) & (f <= high)
+        excited = (f < usable) | (usable == f[-1])
+        variance = np.where(excited, frf.variance[:, axis], np.inf)
+        force = spectra.hits[0].force / hits[0].sampling_rate_hz
+        accelerance = frf.accelerance[:, axis][:, lines]
+        return cls(f[lines], accelerance, variance[:, lines], np.abs(force[lines]) ** 2)
+
+
+def _pairs(recorded: Dataset, visit: Visit) -> list[tuple[_Column, _Column]]:
+    """Weakest and strongest level of each hit axis."""
     out = []
     for axis in range(3):
-        group = [c for c in columns if c.axis == axis]
-        if len(group) > 1:
-            out.append((group[0], group[-1]))
+        levels: dict[int, list[Hit]] = {}
+        for hit in (hit for hit in visit.hits if hit.axis_index == axis):
+            levels.setdefault(recorded.level(hit), []).append(hit)
+        if len(levels) > 1:
+            ends = levels[min(levels)], levels[max(levels)]
+            out.append((_Column.of(recorded, ends[0]), _Column.of(recorded, ends[1])))
     return out

@@ -2,9 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,10 +10,7 @@ from planner.errors import PlannerError, RefusedError
 from planner.frf.frf import Frf
 from planner.frf.quantities import convert
 from planner.recording.points import NOT_STATED, SENSOR, TCP, TOOL, Layout
-from planner.recording.records import AXES, FrfRecord
-
-# What a record states of each of its FRFs.
-OF_EACH = "response_direction", "reference_direction", "response_node", "reference_node"
+from planner.recording.records import AXES, End, FrfRecord
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +48,7 @@ def labelled_frfs(
     keep, found = frequency > 0, []
     for record in records:
         values = convert(frequency[keep], record.values[:, keep], record.quantity, quantity)
-        for k, (felt, i, hit, j) in enumerate(places(record)):
+        for k, ((felt, i), (hit, j)) in enumerate(record.places):
             along_axes = 1 <= abs(i) <= 3 and 1 <= abs(j) <= 3
             if nodes is not None and not (along_axes and {felt, hit} <= nodes):
                 continue
@@ -96,25 +91,14 @@ def joined(records: Sequence[FrfRecord]) -> FrfRecord:
             f"{other.source} holds FRFs of kind {other.quantity}, {first.source} of kind "
             f"{first.quantity}; name files of one kind."
         )
-    of_each: dict[str, Any] = {
-        name: tuple(chain(*(getattr(r, name) for r in records))) for name in OF_EACH
-    }
     return replace(
         first,
         values=np.concatenate([record.values for record in records]),
         coherence=np.concatenate([record.coherence for record in records]),
         remarks=tuple(dict.fromkeys(told for record in records for told in record.remarks)),
         simulated=any(record.simulated for record in records),
-        **of_each,
+        places=tuple(place for record in records for place in record.places),
     )
-
-
-def places(record: FrfRecord) -> list[tuple[str, int, str, int]]:
-    """Node and direction where each FRF was felt, then where it was hit; nodes "" where none is."""
-    none = ("",) * len(record.values)
-    felt = record.response_node or none, record.response_direction
-    hit = record.reference_node or none, record.reference_direction
-    return list(zip(*felt, *hit, strict=True))
 
 
 def from_records(records: tuple[FrfRecord, ...], window_rate_1_s: float = 0.0) -> Frf:
@@ -152,28 +136,27 @@ def exported(frf: Frf, source: Path, simulated: bool) -> FrfRecord:
     Directions are 1, 2, 3 for x, y, z, and 0 where files state none.
     """
     entries = np.argwhere(np.isfinite(frf.accelerance).all(axis=-1))
-    response = [_place(frf.layout.sensors, int(row), SENSOR) for row, _ in entries]
-    reference = [_place(frf.layout.hits, int(column), TCP) for _, column in entries]
+    places = [
+        (_end(frf.layout.sensors, row, SENSOR), _end(frf.layout.hits, column, TCP))
+        for row, column in entries.tolist()
+    ]
     rows, columns = entries.T
     return FrfRecord(
         source,
         frf.frequency_hz,
         frf.accelerance[rows, columns],
-        tuple(direction for _, direction in response),
-        tuple(direction for _, direction in reference),
+        tuple(places),
         "accelerance",
         "m/s^2/N",
         frf.coherence[rows, columns],
         frf.remarks,
         simulated,
-        tuple(node for node, _ in response),
-        tuple(node for node, _ in reference),
     )
 
 
-def _place(points: tuple[str, ...], at: int, unnamed: str) -> tuple[str, int]:
+def _end(points: tuple[str, ...], at: int, unnamed: str) -> End:
     """Node and direction of a row or column."""
     name, direction = points[at // 3], at % 3 + 1
     if name.endswith(NOT_STATED):
         name, direction = name.removesuffix(NOT_STATED), 0
-    return "" if name == unnamed else name, direction
+    return End("" if name == unnamed else name, direction)

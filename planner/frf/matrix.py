@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.errors import InputError, RefusedError
-from planner.frf.exported import common_lines, places
+from planner.frf.exported import common_lines
 from planner.frf.quantities import DERIVATIVE, convert
 from planner.recording.dof import Dof
 from planner.recording.records import FrfRecord
@@ -87,8 +87,8 @@ def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfM
         kind, known = _kind(record, quantity, remarks)
         scaled &= known
         values = convert(frequency[keep], record.values[:, keep], kind, "accelerance")
-        for k, one in enumerate(places(record)):
-            felt, hit = Dof.of_uff(*one[:2]), Dof.of_uff(*one[2:])
+        for k, ends in enumerate(record.places):
+            felt, hit = (Dof.of_uff(*end) for end in ends)
             if not np.any(values[k]):
                 dead.append(f"{felt} hit at {hit}")
                 continue

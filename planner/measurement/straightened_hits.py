@@ -11,7 +11,7 @@ import numpy as np
 from planner.dynamics.at_force import measured_at_force
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import accelerance
-from planner.recording.force_levels import peak_n, pulse_s
+from planner.recording.force_levels import pulse_s
 from planner.recording.points import Layout
 from planner.recording.records import Hit
 
@@ -46,7 +46,7 @@ def struck_n(simulation: Simulation, hits: Sequence[Hit]) -> np.ndarray:
     Their own pulses may be shorter or longer.
     """
     pulse = simulation.robot.config.hammer.pulse_ms / 1e3
-    return np.array([peak_n(hit) * pulse_s(hit) / pulse for hit in hits])
+    return np.array([hit.pulse.peak_n * pulse_s(hit) / pulse for hit in hits])
 
 
 def _changes(hits: list[Hit], q: np.ndarray, simulation: Simulation, up_to_hz: float) -> np.ndarray:

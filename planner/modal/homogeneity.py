@@ -21,7 +21,7 @@ from planner.frf.spectra import Windows, transform
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac
 from planner.modal.modes import ModalModel, Mode
-from planner.recording.force_levels import by_level, peak_n
+from planner.recording.force_levels import by_level
 from planner.recording.records import Hit
 from planner.recording.repeats import untilted
 
@@ -168,7 +168,7 @@ def _level(
     """The pose's modes refined on one level's FRF."""
     k = len(modal.modes)
     values = [np.full(k, np.nan) for _ in range(4)]
-    force = float(np.mean([peak_n(hit) for hit in hits]))
+    force = float(np.mean([hit.pulse.peak_n for hit in hits]))
     try:
         found = estimate_modes(frf, band_hz).modes
     except RefusedError:

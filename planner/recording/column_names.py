@@ -150,9 +150,7 @@ def _unit_of(name: str, stated: str, si: Unit, names: tuple[str, ...]) -> Unit |
 def direction_in(name: str) -> int:
     """±1, ±2, ±3 of the axis that a channel's name says ("Acc X", "a_-y"); 0 if it says none."""
     found = _DIRECTION.search(f"{name} ")
-    if not found:
-        return 0
-    return (AXES.index(found[2].lower()) + 1) * (-1 if found[1] == "-" else 1)
+    return hit_direction(found[1] + found[2]) if found else 0
 
 
 def hit_direction(text: str) -> int:

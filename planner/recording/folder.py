@@ -30,11 +30,9 @@ def several_poses(paths: list[Path], least: int = 2) -> bool:
     """Whether a single folder is named whose recordings.csv lists that many poses at least."""
     if len(paths) != 1 or not (paths[0] / TABLE).is_file():
         return False
-    header, rows = read_table(paths[0] / TABLE)
-    if "pose" not in header:
-        return True  # said where the table is read in earnest
-    at = header.index("pose")
-    return len({cells[at].strip() for _, cells in rows}) >= least
+    header, rows = _rows(paths[0] / TABLE)
+    # A table without poses is refused where it is read in earnest.
+    return "pose" not in header or len({row.cell("pose") for row in rows}) >= least
 
 
 def joint_columns(folder: Path) -> JointUnits:
@@ -117,16 +115,19 @@ def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:
 
     Raises InputError if there are none.
     """
-    found = sorted(p for p in folder.rglob("*") if p.is_file())
     found = [
-        path for path in found
-        if path.name not in TABLES
-        and not any(part[0] == "." for part in path.relative_to(folder).parts)
+        path for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name not in TABLES and shown(path, folder)
         and (path.parent == folder or path.suffix.lower() in suffixes)
     ]  # fmt: skip
     if not found:
         raise InputError(f"{folder} holds no recordings; name a folder that does.")
     return found
+
+
+def shown(path: Path, folder: Path) -> bool:
+    """Whether neither a path in a folder nor what it lies in there is hidden."""
+    return not any(part[0] == "." for part in path.relative_to(folder).parts)
 
 
 def read_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:

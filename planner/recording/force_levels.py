@@ -11,11 +11,6 @@ SAME_LEVEL = 1.8
 FAR_BELOW = 0.1  # of the median of other hits; chosen, for no hand misses its force by so much
 
 
-def peak_n(hit: Hit) -> float:
-    """Largest force of a hit over its offset, in N."""
-    return hit.pulse.peak_n
-
-
 def pulse_s(hit: Hit) -> float:
     """Impulse of a hit over its peak: about the width of its pulse at half its height."""
     pulse = hit.pulse
@@ -28,8 +23,8 @@ def far_below(hit: Hit, others: Sequence[Hit]) -> float | None:
 
     A level that is there more than once is meant.
     """
-    peak = peak_n(hit)
-    peaks = [peak_n(one) for one in others if one.axis_index == hit.axis_index]
+    peak = hit.pulse.peak_n
+    peaks = [one.pulse.peak_n for one in others if one.axis_index == hit.axis_index]
     meant = any(max(p, peak) < SAME_LEVEL * min(p, peak) for p in peaks)
     usual = float(np.median(peaks)) if peaks else 0.0
     return None if meant or peak >= FAR_BELOW * usual else usual
@@ -38,12 +33,17 @@ def far_below(hit: Hit, others: Sequence[Hit]) -> float | None:
 def by_level(hits: tuple[Hit, ...]) -> tuple[tuple[Hit, ...], ...]:
     """The hits by strength, weakest level first; a gap of SAME_LEVEL between peaks separates."""
     groups: list[list[Hit]] = []
-    for hit in sorted(hits, key=peak_n):
-        if groups and peak_n(hit) < SAME_LEVEL * peak_n(groups[-1][-1]):
+    for hit in sorted(hits, key=lambda hit: hit.pulse.peak_n):
+        if groups and hit.pulse.peak_n < SAME_LEVEL * groups[-1][-1].pulse.peak_n:
             groups[-1].append(hit)
         else:
             groups.append([hit])
     return tuple(tuple(group) for group in groups)
+
+
+def level_of(peaks_n: np.ndarray, groups: Sequence[np.ndarray]) -> np.ndarray:
+    """Which of the `levels` each of some peaks (n,) in N belongs to."""
+    return np.searchsorted([group[0] for group in groups[1:]], peaks_n, side="right")
 
 
 def levels(peaks_n: np.ndarray) -> list[np.ndarray]:

@@ -15,6 +15,7 @@ from planner.recording.records import (
     AXES,
     NOTICED,
     Channel,
+    End,
     Fault,
     FrfRecord,
     Hit,
@@ -42,43 +43,41 @@ def with_axes(record: FrfRecord, hit: str | None, response: str | None) -> FrfRe
 
     Raises InputError where file and table name different axes.
     """
-    return replace(
-        record,
-        reference_direction=_completed(record, record.reference_direction, hit, "hit"),
-        response_direction=_completed(record, record.response_direction, response, "response"),
-    )
+    struck = _completed(record, [struck for _, struck in record.places], hit, "hit")
+    felt = _completed(record, [felt for felt, _ in record.places], response, "response")
+    return replace(record, places=tuple(zip(felt, struck, strict=True)))
 
 
 def located(record: FrfRecord, stated: StatedPoints) -> FrfRecord:
     """The record with its nodes by the names of the points. Raises InputError as `hits_from`."""
-    count, source = len(record.values), record.source
-    felt = [
-        _axis_there(source, stated, *at)
-        for at in zip(record.response_node or [""] * count, record.response_direction, strict=True)
-    ]
-    reference = [stated.hit_at(source, node) for node in record.reference_node or [""] * count]
-    return replace(record, response_node=tuple(felt), reference_node=tuple(reference))
+    source = record.source
+    felt = [end._replace(node=_axis_there(source, stated, *end)) for end, _ in record.places]
+    struck = [end._replace(node=stated.hit_at(source, end.node)) for _, end in record.places]
+    return replace(record, places=tuple(zip(felt, struck, strict=True)))
 
 
-def _completed(
-    record: FrfRecord, own: tuple[int, ...], axis: str | None, what: str
-) -> tuple[int, ...]:
-    """Directions of FRFs, unknown ones (0) as the table says."""
+def _completed(record: FrfRecord, own: list[End], axis: str | None, what: str) -> list[End]:
+    """Ends of FRFs, unknown directions (0) as the table says."""
     said = hit_direction(axis) if axis else 0
-    other = next((d for d in own if d and said and abs(d) != abs(said)), None)
+    other = next((d for _, d in own if d and said and abs(d) != abs(said)), None)
     if other is not None and (what == "hit" or len(own) == 1):
         raise InputError(
             f"{record.source} says that its {what} is along {_name(other)}, the table says "
             f"{axis}; correct the one that is wrong."
         )
-    return tuple(direction or said for direction in own)
+    return [end._replace(direction=end.direction or said) for end in own]
+
+
+def _along(direction: int) -> str:
+    """ "x", "y" or "z" of a direction; "" where it is unknown or a rotation."""
+    return AXES[abs(direction) - 1] if 1 <= abs(direction) <= len(AXES) else ""
 
 
 def _axis_there(source: object, stated: StatedPoints, node: str, direction: int) -> str:
     """The point at a node, whose sensor has an axis along a direction (±1, ±2, ±3; 0 unknown)."""
     point = stated.response_at(source, node)
     axes = stated.names.axes_of(point)
-    along = AXES[abs(direction) - 1] if 1 <= abs(direction) <= 3 else ""
+    along = _along(direction)
     if along not in axes:
         raise InputError(
             f"{source}{stated.where} has a response along {along} at {point}, whose sensor has "
@@ -112,10 +111,10 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
     order = sorted(responses, key=lambda dof: (places.index(dof.node), dof.number))
     signs = [-1.0 if responses[d].direction < 0 else 1.0 for d in order]
     samples = np.array([responses[d].samples * s for d, s in zip(order, signs, strict=True)])
-    told, hit_point = _hit_direction(force, axis), stated.hit_at(source, force.node)
-    if stated.names.anywhere and not any(told):
+    hit_point = stated.hit_at(source, force.node)
+    if stated.names.anywhere and not _along(force.direction) and not hit_direction(axis or ""):
         axis, hit_point = AXES[0], hit_point + NOT_STATED
-    name = _axis(record, force, axis, remarks)
+    name = _axis(source, force, axis, remarks)
     if unlabelled := without_unit(record):
         remarks.append(f"Left out, as their unit is not known: {unlabelled}.")
     return Hit(
@@ -140,8 +139,7 @@ def _at_points(
     """
     names, axes = stated.names, dict[str, set[str]]()
     for c in accelerations:
-        along = AXES[abs(c.direction) - 1] if 1 <= abs(c.direction) <= 3 else ""
-        axes.setdefault(c.node, set()).add(along)
+        axes.setdefault(c.node, set()).add(_along(c.direction))
     whole = [node for node, own in axes.items() if own >= set(names.axes_of(SENSOR))]
     known = [node for node in axes if stated.knows_response(node)]
     if not names.nodes:
@@ -163,14 +161,12 @@ def _responses(
     if stated.names.anywhere:
         return _anywhere(record, accelerations, stated)
     found: dict[Dof, Channel] = {}
-    whole = bool(accelerations)
     for channel in accelerations:
-        if not 1 <= abs(channel.direction) <= 3:
-            whole = False
+        if not _along(channel.direction):
             break
         point = _axis_there(record.source, stated, channel.node, channel.direction)
-        whole = whole and Dof(point, AXES[abs(channel.direction) - 1]) not in found
-        found[Dof(point, AXES[abs(channel.direction) - 1])] = channel
+        found[Dof(point, _along(channel.direction))] = channel
+    whole = 0 < len(found) == len(accelerations)
     tool = stated.names.axes_of(SENSOR)
     of_tool = [dof.direction for dof in found if dof.node == SENSOR]
     if not whole or (of_tool and not set(of_tool) >= set(tool)):
@@ -210,14 +206,10 @@ def _anywhere(
     return found
 
 
-def _hit_direction(force: Channel, axis: str | None) -> tuple[int, int]:
-    """As the file and as the table of recordings says it; 0 where it does not."""
-    own = force.direction if 1 <= abs(force.direction) <= 3 else 0
-    return own, hit_direction(axis) if axis else 0
-
-
-def _axis(record: TimeRecord, force: Channel, axis: str | None, remarks: list[str]) -> str:
-    source, (own, stated) = record.source, _hit_direction(force, axis)
+def _axis(source: Path, force: Channel, axis: str | None, remarks: list[str]) -> str:
+    """Along which axis it was hit, as the file and the table of recordings say it."""
+    own = force.direction if _along(force.direction) else 0
+    stated = hit_direction(axis) if axis else 0
     if axis and not stated:
         raise InputError(f'{source}: hit "{axis}" is no signed axis such as +x; correct it.')
     if not own and not stated:
@@ -228,7 +220,7 @@ def _axis(record: TimeRecord, force: Channel, axis: str | None, remarks: list[st
     if own and stated and own != stated:
         if abs(own) != abs(stated) or own < 0:
             raise InputError(
-                f"{record.source} says it was hit along {_name(own)}, the table says "
+                f"{source} says it was hit along {_name(own)}, the table says "
                 f"{_name(stated)}; correct the one that is wrong."
             )
         remarks.append(f"The file names the axis without its sign; {_name(stated)} is used.")

@@ -7,14 +7,14 @@ something else, and evaluates what stands in the cells.
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.entry_columns import MOST_ENTRIES, EntryTree, tree_of
+from planner.recording.entry_columns import MOST_ENTRIES, tree_of
 from planner.recording.entry_records import records_of
 from planner.recording.records import Record, check_numbers
 from planner.recording.sampling import UNEVEN, sampling_rate
@@ -49,16 +49,9 @@ class _Segment:
         return self.announced and not self.rows and not whole
 
 
-@dataclass(frozen=True, eq=False)
-class _Channel:
-    """One column of numbers (n,), and what is stated of it as in entries of other files.
-
-    That is unit, x_unit ("s", of spectra "Hz"), dt, t0 (from start_time, if one is stated).
-    """
-
-    name: str
-    values: np.ndarray
-    stated: dict[str, Any]
+# By name, columns of numbers (n,) and what is stated of each as in entries of other files: unit,
+# x_unit ("s", of spectra "Hz"), dt, t0 (from start_time, if one is stated).
+_Channels = dict[str, tuple[np.ndarray, dict[str, Any]]]
 
 
 def read_lvm(path: Path) -> tuple[Record, ...]:
@@ -69,23 +62,26 @@ def read_lvm(path: Path) -> tuple[Record, ...]:
     text = decoded(path, MAX_BYTES)
     if not text.startswith(FIRST_LINE):
         return read_text(path)  # as LabVIEW's "no header" writes it: a table
-    parts: list[list[_Channel]] = []
+    parts: list[_Channels] = []
     head: dict[str, str] = {}
     for segment in _segments(text):
         head = segment.head
         if segment.cut_off:
             raise InputError(f"{path} ends within a header; the file is cut off, export it again.")
-        channels = list(_channels(path, segment))
+        channels = _channels(path, segment)
         if parts and _goes_on(parts[-1], channels):
-            parts[-1] = [
-                replace(a, values=np.concatenate([a.values, b.values]))
-                for a, b in zip(parts[-1], channels, strict=True)
-            ]
+            parts[-1] = {
+                name: (np.concatenate([values, channels[name][0]]), said)
+                for name, (values, said) in parts[-1].items()
+            }
         elif channels:
             parts.append(channels)
     if not parts:
         raise InputError(f"{path} holds headers and no data; export it again.")
-    trees = {f"segment {number}": _tree(part) for number, part in enumerate(parts, 1)}
+    trees = {
+        f"segment {number}": {n: tree_of({"": values}, said) for n, (values, said) in part.items()}
+        for number, part in enumerate(parts, 1)
+    }
     return records_of(path, tree_of(trees, head))
 
 
@@ -123,14 +119,15 @@ def _segments(text: str) -> Iterator[_Segment]:
         yield current
 
 
-def _channels(path: Path, segment: _Segment) -> Iterator[_Channel]:
-    """Columns with their steps and starts."""
+def _channels(path: Path, segment: _Segment) -> _Channels:
+    """Columns with their steps and starts; those of one name, or without, with their numbers."""
     columns = {
         column: _numbers(path, segment, column)
         for column, name in enumerate(segment.names[:MOST_ENTRIES] if segment.rows else [])
         if name != COMMENT and (name or _cell(segment, "Samples", column))
     }
     times = [column for column in columns if segment.names[column] == ABSCISSA]
+    found: list[tuple[str, np.ndarray, dict[str, Any]]] = []
     for column, values in columns.items():
         at = max((t for t in times if t < column), default=-1)
         if column in times or not values.size:
@@ -140,19 +137,27 @@ def _channels(path: Path, segment: _Segment) -> Iterator[_Channel]:
             c for c in columns if c > at and c not in times and not any(at < t < c for t in times)
         ]
         owner = max(own, key=lambda c: columns[c].size)
-        yield _channel(path, segment, column, values, owner, columns.get(at, np.zeros(0)))
+        said = _stated(path, segment, column, len(values), owner, columns.get(at, np.zeros(0)))
+        found.append((segment.names[column], values, said))
+    names = [name for name, *_ in found]
+    return {
+        f"{name} ({number})" if names.count(name) > 1 or not name else name: (values, said)
+        for number, (name, values, said) in enumerate(found, 1)
+    }
 
 
-def _channel(
-    path: Path, segment: _Segment, column: int, values: np.ndarray, owner: int, x: np.ndarray
-) -> _Channel:
+def _stated(
+    path: Path, segment: _Segment, column: int, held: int, owner: int, x: np.ndarray
+) -> dict[str, Any]:
+    """What is stated of a column that holds so many samples."""
+
     def stated(tag: str, at: int = column) -> str:
         return _cell(segment, tag, at)
 
     count = stated("Samples")
-    if count.isdecimal() and int(count) > len(values):
+    if count.isdecimal() and int(count) > held:
         raise InputError(
-            f"{path} states {count} samples of {segment.names[column]} and holds {len(values)}; "
+            f"{path} states {count} samples of {segment.names[column]} and holds {held}; "
             f"the file is cut off, export it again."
         )
     start, step = (_number(path, tag, stated(tag)) for tag in ("X0", "Delta_X"))
@@ -163,9 +168,8 @@ def _channel(
     of_spectrum = stated("X_Dimension") == "Frequency" or stated("X_Unit_Label") in ("Hz", "hertz")
     # Seconds since 1904 are a date themselves.
     date = _date(stated("Date"), stated("Time")) if abs(start) < 1e9 else None
-    said = {"unit": stated("Y_Unit_Label"), "x_unit": "Hz" if of_spectrum else "s", "t0": start,
+    return {"unit": stated("Y_Unit_Label"), "x_unit": "Hz" if of_spectrum else "s", "t0": start,
             "dt": step, **({} if date is None else {"start_time": date})}  # fmt: skip
-    return _Channel(segment.names[column], values, said)
 
 
 def _cell(segment: _Segment, tag: str, column: int) -> str:
@@ -179,19 +183,16 @@ def _numbers(path: Path, segment: _Segment, column: int) -> np.ndarray:
     texts = [row[column].replace(",", ".") if column < len(row) else "" for row in segment.rows]
     while texts and not texts[-1]:
         texts.pop()
-    try:
-        return np.array(texts, dtype=float)
-    except ValueError:
-        pass
+    values = np.empty(len(texts))
     for row, text in enumerate(texts):
         try:
-            float(text)
+            values[row] = float(text)
         except ValueError:
             raise InputError(
                 f"{path}, row {segment.first_row + row}: {segment.names[column]} is "
                 f"{text[:20] or 'empty'}, no number; the file is cut off or mixed, export it again."
             ) from None
-    return np.zeros(0)
+    return values
 
 
 def _number(path: Path, tag: str, text: str) -> float:
@@ -211,27 +212,20 @@ def _date(date: str, time: str) -> np.datetime64 | None:
         return None
 
 
-def _goes_on(before: list[_Channel], after: list[_Channel]) -> bool:
+def _goes_on(before: _Channels, after: _Channels) -> bool:
     """Whether each channel begins where it ended in the last segment."""
-    both = zip(before, after, strict=False)
-    return len(before) == len(after) and all(_follows(a, b) for a, b in both if a.stated["dt"] > 0)
+    alike = [*before] == [*after]
+    return alike and all(
+        _follows(len(values), said, after[name][1])
+        for name, (values, said) in before.items()
+        if said["dt"] > 0
+    )
 
 
-def _follows(a: _Channel, b: _Channel) -> bool:
-    first, then = a.stated, b.stated
-    if (a.name, first["unit"], first["x_unit"]) != (b.name, then["unit"], "s"):
+def _follows(count: int, first: dict[str, Any], then: dict[str, Any]) -> bool:
+    if (first["unit"], first["x_unit"]) != (then["unit"], "s"):
         return False
     apart = then["t0"] - first["t0"]
     if "start_time" in first and "start_time" in then:
         apart += float((then["start_time"] - first["start_time"]) / np.timedelta64(1, "ns") * 1e-9)
-    count = len(a.values)
     return abs(apart / first["dt"] - count) < max(0.5, UNEVEN * count)
-
-
-def _tree(channels: list[_Channel]) -> EntryTree:
-    parts, names = {}, [channel.name for channel in channels]
-    for number, channel in enumerate(channels, 1):
-        same = names.count(channel.name) > 1 or not channel.name
-        name = f"{channel.name} ({number})" if same else channel.name
-        parts[name] = tree_of({"": channel.values}, channel.stated)
-    return EntryTree({}, parts)

@@ -31,7 +31,14 @@ from planner.recording.column_names import (
     time_unit,
     unit_text,
 )
-from planner.recording.records import AXES, Channel, FrfRecord, Record, TimeRecord, check_numbers
+from planner.recording.records import (
+    Channel,
+    End,
+    FrfRecord,
+    Record,
+    TimeRecord,
+    check_numbers,
+)
 from planner.recording.sampling import UNEVEN, aligned, sampling_rate
 
 _AT = re.compile(r"acceleration_(.+)_[xyz]$")
@@ -149,10 +156,9 @@ def _channel(name: str, values: np.ndarray, named: Named) -> Channel:
     return Channel(name, quantity, si, direction, np.real(values).astype(float) * factor, node)
 
 
-_OWN = re.compile(r"(accelerance|mobility|receptance|coherence)_([xyz])([xyz])(_re|_im|)$")
-_BETWEEN = re.compile(
-    r"(accelerance|mobility|receptance|coherence)_(.+)_([xyz])_(.+)_([xyz])(_re|_im|)$"
-)
+_KIND = "(accelerance|mobility|receptance|coherence)_"
+_OWN = re.compile(rf"{_KIND}()([xyz])()([xyz])(_re|_im|)$", re.IGNORECASE)
+_BETWEEN = re.compile(rf"{_KIND}(.+)_([xyz])_(.+)_([xyz])(_re|_im|)$")
 _SI = {"accelerance": "m/s^2/N", "mobility": "m/s/N", "receptance": "m/N", "unknown": ""}
 _WORDS = {
     "im": r"im|imag|imaginary|imaginär|imaginärteil|imaginaire",
@@ -165,7 +171,6 @@ _PARTS = {part: re.compile(rf"(?<![^\W_])({words})(?![^\W_])") for part, words i
 _KINDS = {"accelerance": "accelerance|inertance", "mobility": "mobility",
           "receptance": "receptance|compliance|flexibility"}  # fmt: skip
 _COMPLETE = ({"complex"}, {"re", "im"}, {"magnitude", "phase"})
-Place = tuple[str, int, str, int]  # response's point and axis (±1, ±2, ±3; 0 unknown), the hit's
 
 
 @dataclass
@@ -174,7 +179,7 @@ class _Entry:
 
     stem: str
     kind: str = "unknown"
-    place: Place | None = None
+    place: tuple[End, End] | None = None
     parts: dict[str, str] = field(default_factory=dict)
 
     def takes(self, part: str) -> bool:
@@ -223,22 +228,20 @@ def frf_record(path: Path, named: Named) -> FrfRecord:
         for e in entries
     ]
     # Where they were felt and hit, as columns' names say, or the first lines of a file with one.
-    response, felt = _dof(named, "response", "resp", "output") if len(entries) == 1 else (0, "")
-    hit, hit_point = _dof(named, "hit", "reference", "ref", "input", "excitation")
-    places = [e.place or (felt, direction_in(e.stem) or response, hit_point, hit) for e in entries]
+    alone = len(entries) == 1
+    felt = _end(named, "response", "resp", "output") if alone else End("", 0)
+    hit = _end(named, "hit", "reference", "ref", "input", "excitation")
+    said = [felt._replace(direction=direction_in(e.stem) or felt.direction) for e in entries]
     return FrfRecord(
         path,
         frequency[keep],
         np.array([values[keep] for _, _, values in read]),
-        tuple(place[1] for place in places),
-        tuple(place[3] for place in places),
+        tuple(e.place or (end, hit) for e, end in zip(entries, said, strict=True)),
         kind,
         _SI[kind] if known else "",
         np.array(coherence)[:, keep],
         named.remarks,
         named.simulated,
-        tuple(place[0] for place in places),
-        tuple(place[2] for place in places),
     )
 
 
@@ -246,19 +249,13 @@ def _frequency(name: str, named: Named) -> bool:
     return frequency_unit(name, named.units.get(name, "")) is not None
 
 
-def _own(name: str) -> tuple[str, Place, str] | None:
+def _own(name: str) -> tuple[str, tuple[End, End], str] | None:
     """Quantity, place, and "_re", "_im" or "" of a column that has one of planner's names."""
-    found = _OWN.match(name.lower())
-    if found:
-        return found[1], ("", _axis(found[2]), "", _axis(found[3])), found[4]
-    found = _BETWEEN.match(name)
-    if found:
-        return found[1], (found[2], _axis(found[3]), found[4], _axis(found[5])), found[6]
-    return None
-
-
-def _axis(name: str) -> int:
-    return AXES.index(name) + 1
+    found = _OWN.match(name) or _BETWEEN.match(name)
+    if not found:
+        return None
+    kind, felt, i, hit, j, part = found.groups()
+    return kind.lower(), (End(felt, hit_direction(i)), End(hit, hit_direction(j))), part.lower()
 
 
 def _part(name: str, named: Named) -> str:
@@ -338,7 +335,7 @@ def _polar(path: Path, entry: _Entry, named: Named, in_db: bool) -> np.ndarray:
     return size * np.exp(1j * np.deg2rad(phase * unit.factor))
 
 
-def _dof(named: Named, *words: str) -> tuple[int, str]:
+def _end(named: Named, *words: str) -> End:
     """Direction and point of one end, as attributes such as `hit`, `Ref DOF` say ("+x", "3:+x")."""
     direction, point = 0, named.attribute(*(f"{word}point" for word in words)) or ""
     for word in words:
@@ -350,4 +347,4 @@ def _dof(named: Named, *words: str) -> tuple[int, str]:
                 direction = hit_direction(found[2])
                 # A number of a channel is no number of a node.
                 point = point or (found[1] or "" if end in ("dof", "node") else "")
-    return direction, point.strip()
+    return End(point.strip(), direction)

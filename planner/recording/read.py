@@ -26,7 +26,7 @@ from planner.recording.folder import files_in
 from planner.recording.lvm import read_lvm
 from planner.recording.mat5 import is_version_5, read_mat5
 from planner.recording.named_columns import Named, to_records
-from planner.recording.records import FrfRecord, Record, TimeRecord, check_records
+from planner.recording.records import End, FrfRecord, Record, TimeRecord, check_records
 from planner.recording.stream import cut_into_hits
 from planner.recording.text_tables import read_text
 from planner.recording.uff import read_uff
@@ -220,9 +220,9 @@ def _read_anew(path: Path) -> ReadFile:
     return ReadFile(whole, tuple(hit for hits in cut for hit in hits))
 
 
-_AXES = re.compile(r"(?:^|[^a-z])([+-]?[xyz])_?([+-]?[xyz])$", re.IGNORECASE)
+_AXES = re.compile(r"(?:^|[^a-z])()([+-]?[xyz])_?()([+-]?[xyz])$", re.IGNORECASE)
 _NODES = re.compile(r"(?:^|[^a-z0-9])h?(\d+)([+-]?[xyz]?)[_,-](\d+)([+-]?[xyz]?)$", re.IGNORECASE)
-_DIGITS = re.compile(r"(?:^|[^a-z0-9])h(\d)(\d)$", re.IGNORECASE)
+_DIGITS = re.compile(r"(?:^|[^a-z0-9])h(\d)()(\d)()$", re.IGNORECASE)
 
 
 def place_in_name(path: Path) -> tuple[str, str, str, str]:
@@ -231,12 +231,8 @@ def place_in_name(path: Path) -> tuple[str, str, str, str]:
     Raises InputError where it says nothing.
     """
     stem = path.name.removesuffix(".gz").rpartition(".")[0]
-    if found := _NODES.search(stem):
+    if found := _NODES.search(stem) or _DIGITS.search(stem) or _AXES.search(stem):
         return found[1], found[2], found[3], found[4]
-    if found := _DIGITS.search(stem):
-        return found[1], "", found[2], ""
-    if found := _AXES.search(stem):
-        return "", found[1], "", found[2]
     raise InputError(
         f"{path}: its name says neither axes nor nodes; call it such as tap_yx (response y, hit "
         f"x), H3_1 or 3y_1x (nodes), or leave out --from-names."
@@ -245,22 +241,19 @@ def place_in_name(path: Path) -> tuple[str, str, str, str]:
 
 def placed_by_name(record: FrfRecord, name: str) -> FrfRecord:
     """FRFs with what they do not state themselves from their file's name; of several the hit."""
-    count = len(record.values)
-    response_node, response, hit_node, hit = place_in_name(Path(name))
-    if count > 1:
-        response_node, response = "", ""
+    node, response, hit_node, hit = place_in_name(Path(name))
+    if len(record.places) > 1:
+        node, response = "", ""
 
-    def nodes(own: tuple[str, ...], named: str) -> tuple[str, ...]:
-        return tuple(named if node in ("", "0") else node for node in own or ("",) * count)
+    def completed(own: End, node: str, axis: str) -> End:
+        named = node if own.node in ("", "0") else own.node
+        return End(named, own.direction or hit_direction(axis))
 
-    felt, struck = hit_direction(response), hit_direction(hit)
-    return replace(
-        record,
-        response_direction=tuple(d or felt for d in record.response_direction),
-        reference_direction=tuple(d or struck for d in record.reference_direction),
-        response_node=nodes(record.response_node, response_node),
-        reference_node=nodes(record.reference_node, hit_node),
+    own = (
+        (completed(felt, node, response), completed(struck, hit_node, hit))
+        for felt, struck in record.places
     )
+    return replace(record, places=tuple(own))
 
 
 def read_frfs(path: Path, from_names: bool = False) -> tuple[FrfRecord, ...]:

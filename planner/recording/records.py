@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -64,29 +65,35 @@ class TimeRecord:
     at_s: float | None = None
 
 
+class End(NamedTuple):
+    """Where an FRF was felt, or hit: a point's name and the direction there.
+
+    Directions are ±1, ±2, ±3, 0 where the file states none; up to ±6 they are rotations. A node is
+    "0" where the file states none, "" where its format knows none.
+    """
+
+    node: str
+    direction: int
+
+
 @dataclass(frozen=True, eq=False)
 class FrfRecord:
     """FRFs exported by an analyser (UFF function type 4 and the like).
 
-    `values[k]` is the response `response_direction[k]` (±1, ±2, ±3; 0 unknown) per unit force in
-    `reference_direction[k]`; `quantity` is "accelerance" (m/s²/N), "mobility", "receptance" or
-    "unknown"; `unit` the unit of the values. `coherence` is NaN where the file has none.
-    `response_node` and `reference_node` (k,) name the points, "0" where the file states none;
-    they are empty where the format knows no points. Directions up to ±6 are rotations.
+    `values[k]` is the response per unit force at `places[k]`, felt and hit; `quantity` is
+    "accelerance" (m/s²/N), "mobility", "receptance" or "unknown"; `unit` the unit of the values.
+    `coherence` is NaN where the file has none.
     """
 
     source: Path
     frequency_hz: np.ndarray  # (F,)
     values: np.ndarray  # (k, F) complex
-    response_direction: tuple[int, ...]
-    reference_direction: tuple[int, ...]
+    places: tuple[tuple[End, End], ...]
     quantity: str
     unit: str
     coherence: np.ndarray  # (k, F)
     remarks: tuple[str, ...] = ()
     simulated: bool = False
-    response_node: tuple[str, ...] = ()
-    reference_node: tuple[str, ...] = ()
 
 
 Record = TimeRecord | FrfRecord
@@ -207,7 +214,7 @@ def check_numbers(path: Path, name: str, values: np.ndarray) -> None:
 
 def _check_frfs(path: Path, record: FrfRecord) -> None:
     lines, values = record.frequency_hz, record.values
-    if lines.ndim != 1 or len(lines) < 2 or values.ndim != 2 or values.shape[1] != len(lines):
+    if len(lines) < 2:
         raise InputError(
             f"{path} holds FRFs of shape {values.shape} over {lines.size} frequency lines; export "
             f"FRFs and their frequencies together."
@@ -217,5 +224,3 @@ def _check_frfs(path: Path, record: FrfRecord) -> None:
         raise InputError(f"{path}: the FRFs' frequency lines do not rise; export them in order.")
     for number, row in enumerate(values, 1):
         check_numbers(path, f"FRF {number}", row)
-    if record.coherence.shape != values.shape:
-        raise InputError(f"{path}: coherence and FRFs differ in length; export them together.")

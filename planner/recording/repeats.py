@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.recording.force_levels import levels, peak_n
+from planner.recording.force_levels import level_of, levels
 from planner.recording.records import AXES, Fault, Hit
 from planner.recording.sampling import same_rate
 from planner.recording.screening import SILENCE
@@ -81,9 +81,8 @@ class _Alike:
 
     @classmethod
     def of(cls, hits: Sequence[Hit], band_hz: tuple[float, float]) -> "_Alike":
-        peaks = [peak_n(hit) for hit in hits]
-        weakest = [group[0] for group in levels(np.sort(peaks))[1:]]
-        level = np.searchsorted(weakest, peaks, side="right")
+        peaks = np.array([hit.pulse.peak_n for hit in hits])
+        level = level_of(peaks, levels(np.sort(peaks)))
         return cls(_frfs(hits, band_hz), np.array([hit.axis_index for hit in hits]), level)
 
     @cached_property
@@ -158,12 +157,9 @@ class _Alike:
 
     def _repeated(self, i: int) -> Doubt | None:
         for axis, centre in self._across(self.axes[i]).items():
-            sizes = np.linalg.norm(self.frfs[i]), np.linalg.norm(centre)
-            ratio = float(min(sizes) / max(*sizes, SILENCE))
-            alike = _likeness(self.frfs[i], centre)
-            if abs(alike) * ratio >= SAME:
+            if abs(_likeness_in_size(self.frfs[i], centre)) >= SAME:
                 others = tuple(int(j) for j in np.flatnonzero(self.axes == axis))
-                return Doubt(others, alike, AXES[axis])
+                return Doubt(others, _likeness(self.frfs[i], centre), AXES[axis])
         return None
 
 
@@ -176,10 +172,7 @@ def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float])
     if not same:
         return 0.0
     frf, *theirs = _frfs((hit, *same), band_hz)
-    own = float(np.linalg.norm(frf))
-    sizes = [(own, float(np.linalg.norm(one))) for one in theirs]
-    shares = [min(pair) / max(*pair, SILENCE) for pair in sizes]
-    return max(_likeness(frf, one) * share for one, share in zip(theirs, shares, strict=True))
+    return max(_likeness_in_size(frf, one) for one in theirs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,6 +277,12 @@ def _likeness(frf: np.ndarray, centre: np.ndarray) -> float:
     """1 where two FRFs are the same in size, sign and phase; 0 or less where unrelated."""
     scale = np.linalg.norm(frf) * np.linalg.norm(centre)
     return float(np.real(np.vdot(centre, frf)) / scale) if scale > 0 else 0.0
+
+
+def _likeness_in_size(frf: np.ndarray, other: np.ndarray) -> float:
+    """The same, less where they differ in size."""
+    sizes = float(np.linalg.norm(frf)), float(np.linalg.norm(other))
+    return _likeness(frf, other) * (min(sizes) / max(*sizes, SILENCE))
 
 
 # ln of sizes by which repeats differ: hands and force levels by some 30 % at most. Chosen.

@@ -1,7 +1,6 @@
 """Screening of hits: what a careful engineer would refuse while standing at the robot."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,44 +12,41 @@ QUIET_SAMPLES, ANSWER_S = 12, 0.25  # from which noise is judged, and the answer
 SILENCE = 1e-12  # N or m/s²: below, a channel is silent; chosen, far below any noise
 
 
-@dataclass(frozen=True)
-class ScreeningLimits:
-    """When a hit is refused. Ratios are of the pulse's peak unless stated."""
+# When a hit is refused.
+SECOND_PEAK = 0.12  # of the pulse's peak
+LEAST_SNR = 8.0  # peak force over noise
+LEAST_RESPONSE_SNR = 6.0  # of the strongest channel, soon after the pulse
+ROLL_OFF_DB = 20.0  # force spectrum at the band's end, below its top in the band
+LEAST_PRETRIGGER = 2  # samples before the pulse
 
-    band_hz: tuple[float, float] = (4.0, 60.0)
-    second_peak: float = 0.12
-    least_snr: float = 8.0  # peak force over noise
-    least_response_snr: float = 6.0  # of the strongest channel, soon after the pulse
-    roll_off_db: float = 20.0  # force spectrum at the band's end, below its top in the band
-    least_pretrigger: int = 2  # samples before the pulse
+Band = tuple[float, float]  # in Hz
 
 
-def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]:
+def screen(hit: Hit, band_hz: Band) -> tuple[Fault, ...]:
     """Faults of one hit by itself; those with `refuse` make it unusable."""
-    limits, pulse = limits or ScreeningLimits(), hit.pulse
+    pulse = hit.pulse
     if pulse.peak_n < SILENCE or np.max(np.abs(hit.acceleration_m_s2)) < SILENCE:
         text = "Force or accelerations are zero throughout; check the cables."
         return (*hit.faults, Fault("dead", text))
-    (low, high), record_s = limits.band_hz, len(hit.force_n) / hit.sampling_rate_hz
+    (low, high), record_s = band_hz, len(hit.force_n) / hit.sampling_rate_hz
     faults = [*hit.faults]
     if (high - low) * record_s < LEAST_LINES:
         text = f"The record of {record_s:.3g} s resolves nothing between {low:g} and {high:g} Hz"
         remedy = "record for longer, or correct the unit of the time."
         faults.append(Fault("too_short", f"{text}; {remedy}"))
-    faults += [*_weak(hit, limits), *channel_faults(hit)]
+    faults += [*_weak(hit), *channel_faults(hit)]
     if any(f.kind == "too_weak" for f in faults):
         return tuple(faults)
-    checks = (_pulse, _double, _soft)
-    return (*faults, *(fault for check in checks for fault in check(hit, limits)))
+    return (*faults, *_pulse(hit), *_double(hit), *_soft(hit, band_hz))
 
 
-def _weak(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
+def _weak(hit: Hit) -> Iterator[Fault]:
     peak, noise, ratio = hit.pulse.peak_n, hit.pulse.noise_n, _response_snr(hit)
-    if peak < limits.least_snr * noise:
+    if peak < LEAST_SNR * noise:
         text = f"The force peak of {peak:.3g} N is only {peak / noise:.1f} times the noise"
         yield Fault("too_weak", f"{text}; hit harder.")
     told = any(fault.kind == "not_at_rest" for fault in hit.faults)
-    if ratio is not None and not told and ratio < limits.least_response_snr:
+    if ratio is not None and not told and ratio < LEAST_RESPONSE_SNR:
         text = f"The response is only {ratio:.1f} times the noise before the hit; hit harder."
         yield Fault("too_weak", text)
 
@@ -72,7 +68,7 @@ def _response_snr(hit: Hit) -> float | None:
     return float(np.max(answer / np.maximum(noise, SILENCE)))
 
 
-def _pulse(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
+def _pulse(hit: Hit) -> Iterator[Fault]:
     pulse, samples = hit.pulse, len(hit.force_n)
     if hit.force_n[pulse.peak] <= pulse.offset_n:
         yield Fault(
@@ -80,13 +76,13 @@ def _pulse(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
             f"The force pulse of {pulse.peak_n:.3g} N is negative: a hammer only pushes; check the "
             f"polarity of the force channel.",
         )
-    if pulse.first < limits.least_pretrigger:
+    if pulse.first < LEAST_PRETRIGGER:
         yield Fault("truncated", "The pulse starts at the record's edge; set a pre-trigger.")
     elif pulse.end > samples - 8 or pulse.peak > 0.8 * samples:
         yield Fault("truncated", "The record ends right after the pulse; check the trigger.")
 
 
-def _double(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
+def _double(hit: Hit) -> Iterator[Fault]:
     """A second pulse: force that rises again after it had fallen.
 
     An anti-alias filter rings after a pulse, but what it adds above zero is never more than what
@@ -98,7 +94,7 @@ def _double(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
     rest = np.concatenate([force[: max(0, pulse.first - 1)], force[pulse.end + 1 :]])
     second = float(np.max(rest, initial=0.0))
     valley = _valley(force[pulse.first : pulse.end])
-    least = max(limits.second_peak * peak, 6 * pulse.noise_n, 1.5 * ringing)
+    least = max(SECOND_PEAK * peak, 6 * pulse.noise_n, 1.5 * ringing)
     if max(second, valley) > least:
         yield Fault(
             "double_hit",
@@ -118,12 +114,12 @@ def _valley(pulse: np.ndarray) -> float:
     return rise
 
 
-def _soft(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
+def _soft(hit: Hit, band_hz: Band) -> Iterator[Fault]:
     force = hit.force_n - np.median(hit.force_n)
     size = 1 << int(np.ceil(np.log2(4 * len(force))))
     spectrum = np.abs(np.fft.rfft(force, size))
     frequency = np.fft.rfftfreq(size, 1 / hit.sampling_rate_hz)
-    low, high = limits.band_hz
+    low, high = band_hz
     last = 0.45 * hit.sampling_rate_hz
     inside = spectrum[(frequency >= low) & (frequency <= high)]
     end = spectrum[(frequency >= 0.9 * high) & (frequency <= high)]
@@ -137,7 +133,7 @@ def _soft(hit: Hit, limits: ScreeningLimits) -> Iterator[Fault]:
         )
     elif inside.size and end.size:
         drop = 20 * np.log10(np.max(inside) / max(float(np.mean(end)), 1e-30))
-        if drop > limits.roll_off_db:
+        if drop > ROLL_OFF_DB:
             yield Fault(
                 "too_soft",
                 f"The pulse is too soft: its spectrum has fallen by {drop:.0f} dB at {high:g} Hz; "

@@ -8,7 +8,13 @@ import numpy as np
 from planner.recording.channel_faults import lost_samples
 from planner.recording.pulse import NORMAL_MAD, RISING_SAMPLES
 from planner.recording.records import Fault, TimeRecord
-from planner.recording.screening import ANSWER_S, SILENCE, ScreeningLimits
+from planner.recording.screening import (
+    ANSWER_S,
+    LEAST_RESPONSE_SNR,
+    LEAST_SNR,
+    SECOND_PEAK,
+    SILENCE,
+)
 
 # No hand hits again so soon on purpose, and fewer samples tell nothing: such pulses are one hit.
 APART_S, APART_SAMPLES = 0.5, 64
@@ -56,17 +62,16 @@ def _pulses(force_n: np.ndarray, rate_hz: float) -> list[tuple[int, int]]:
     A pulse is a hit where one of a single hit would make it a double hit (`second_peak`) beside
     any other; so the softest hits of a stream tell which pulses are still to be told.
     """
-    limits = ScreeningLimits()
     size = np.abs(force_n - np.median(force_n))
-    floor = limits.least_snr * NORMAL_MAD * float(np.median(size))
-    least, found = limits.second_peak * float(np.max(size)), []
+    floor = LEAST_SNR * NORMAL_MAD * float(np.median(size))
+    least, found = SECOND_PEAK * float(np.max(size)), []
     apart = max(APART_S * rate_hz, APART_SAMPLES)
     while True:
         groups = _groups(np.flatnonzero(size > max(least, floor)), apart)
         if len(groups) <= max(1, len(found)):
             return found or groups
         found = groups
-        least = limits.second_peak * min(float(np.max(size[a:b])) for a, b in groups)
+        least = SECOND_PEAK * min(float(np.max(size[a:b])) for a, b in groups)
 
 
 def _groups(samples: np.ndarray, apart: float) -> list[tuple[int, int]]:
@@ -135,6 +140,6 @@ def _part(record: TimeRecord, one: _Struck, struck: list[_Struck]) -> TimeRecord
             f"The structure was not at rest: before this hit it moved by {100 * one.restless:.0f}"
         )
         text += " % of its answer; wait longer between hits."
-        refuse = one.restless > 1 / ScreeningLimits().least_response_snr
+        refuse = one.restless > 1 / LEAST_RESPONSE_SNR
         told.append(Fault("not_at_rest", text, refuse))
     return replace(part, faults=tuple(told))

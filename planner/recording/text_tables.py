@@ -79,15 +79,12 @@ def decoded(path: Path, most_bytes: int) -> str:
         return data.decode("cp1252" if marked is None else "latin-1", errors="replace")
 
 
-def _number(cell: str, kind: type[float] | type[complex] = float) -> complex | None:
+def _is_number(cell: str, kind: type[float] | type[complex] = float) -> bool:
     try:
-        return kind(cell)
+        kind(cell)
     except ValueError:
-        return None
-
-
-def _is_number(cell: str) -> bool:
-    return _number(cell) is not None
+        return False
+    return True
 
 
 def parse_table(path: Path, text: str) -> Named:
@@ -117,7 +114,7 @@ def _block(path: Path, lines: Sequence[str]) -> tuple[Form, int]:
     if found:
         start, _, form = min(found, key=lambda one: one[:2])
         return form, start
-    numbers = [found for line in lines[:100] if (found := _number(line.strip(), complex))]
+    numbers = [complex(line) for line in lines[:100] if _is_number(line, complex)]
     if sum(one.imag != 0 for one in numbers) >= min(LEAST_ROWS, len(lines)):
         raise InputError(
             f"{path} is a list of {len(lines)} complex numbers without frequency lines or units; "

@@ -11,7 +11,14 @@ import numpy as np
 
 from planner.errors import ForeignFileError, InputError
 from planner.recording.column_names import MOTIONS, Unit, lookup, lookup_ratio
-from planner.recording.records import Channel, FrfRecord, Record, TimeRecord, check_numbers
+from planner.recording.records import (
+    Channel,
+    End,
+    FrfRecord,
+    Record,
+    TimeRecord,
+    check_numbers,
+)
 from planner.recording.sampling import aligned, sampling_rate
 
 if TYPE_CHECKING:
@@ -236,15 +243,12 @@ def _frf_record(
         path,
         frequency,
         np.array(values),
-        tuple(int(s["rsp_dir"]) for s in sets),
-        tuple(int(s["ref_dir"]) for s in sets),
+        tuple(zip(_ends(sets, "rsp"), _ends(sets, "ref"), strict=True)),
         quantity,
         unit,
         np.array(coherence),
         remarks,
         _simulated(sets),
-        _nodes(sets, "rsp"),
-        _nodes(sets, "ref"),
     )
 
 
@@ -253,13 +257,13 @@ def _place(s: dict[str, Any]) -> tuple[int, ...]:
     return tuple(int(s[f"{end}_{what}"]) for end in ("rsp", "ref") for what in ("node", "dir"))
 
 
-def _nodes(sets: list[dict[str, Any]], end: str) -> tuple[str, ...]:
-    """Names of the nodes at one end ("rsp", "ref"): numbers, else the entities' names."""
-    numbers = [str(int(s[f"{end}_node"])) for s in sets]
-    if any(number != "0" for number in numbers):
-        return tuple(numbers)
-    names = [str(s[f"{end}_ent_name"]).strip() for s in sets]
-    return tuple("0" if name.upper() in _NONE else name for name in names)
+def _ends(sets: list[dict[str, Any]], end: str) -> list[End]:
+    """One end ("rsp", "ref") of each: nodes are numbers, else the entities' names."""
+    nodes = [str(int(s[f"{end}_node"])) for s in sets]
+    if set(nodes) == {"0"}:
+        names = [str(s[f"{end}_ent_name"]).strip() for s in sets]
+        nodes = ["0" if name.upper() in _NONE else name for name in names]
+    return [End(node, int(s[f"{end}_dir"])) for node, s in zip(nodes, sets, strict=True)]
 
 
 def _unit_of_ratio(path: Path, s: dict[str, Any]) -> Unit:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from planner.dataset.screened_files import FileVerdict, Source, not_averaged, read_one, when
-from planner.recording.force_levels import far_below, peak_n
+from planner.recording.force_levels import far_below
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import version
 from planner.recording.records import Hit
@@ -63,7 +63,7 @@ class Verdicts:
         self, band_hz: tuple[float, float], points: PointNames, table: FolderTable | None = None
     ):
         self._band = band_hz
-        self._stated = StatedPoints() if points == PointNames() else StatedPoints(names=points)
+        self._stated = StatedPoints(names=points)
         self.table = table or FolderTable()
         self._read: dict[tuple, list[tuple[FileVerdict, tuple[Hit, ...]]]] = {}
 
@@ -217,8 +217,8 @@ def _weak(verdict: HitVerdict, usable: list[Hit], before: tuple[Hit, ...]) -> Hi
     if usual is None:
         return verdict
     text = (
-        f"{peak_n(own):.3g} N, others {usual:.3g} N (median) along {own.axis[-1]}; hit harder, or "
-        f"as softly once more if a level of its own is meant."
+        f"{own.pulse.peak_n:.3g} N, others {usual:.3g} N (median) along {own.axis[-1]}; "
+        f"hit harder, or as softly once more if a level of its own is meant."
     )
     return replace(verdict, kind="repeat", text=text, weak=True)
 

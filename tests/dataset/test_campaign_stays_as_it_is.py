@@ -50,7 +50,7 @@ def test_recordings_in_use_and_nothing_else(campaign):
     given = recordings_source(campaign.directory, None, 0.0)
     robot = campaign.cell.robot
     recorded = given.read(robot, campaign.cell.config.modes.band_hz, no_progress)
-    assert len(recorded.ended_frfs) == len(recorded.modes) == len(recorded.columns) == 2
+    assert len(recorded.ended_frfs) == len(recorded.modes) == len(recorded.visits) == 2
     used = campaign.state.used
     assert recorded.poses == tuple(m.pose for m in used)
     np.testing.assert_allclose(recorded.q, np.deg2rad([m.joints_deg for m in used]))

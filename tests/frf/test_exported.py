@@ -11,7 +11,7 @@ from planner.frf.exported import from_records, labelled_frfs
 from planner.frf.matrix import matrix_of
 from planner.milling import cutter_frf, tip_files
 from planner.milling.tool import Point, Tool
-from planner.recording.records import FrfRecord
+from planner.recording.records import End, FrfRecord
 
 LINES = np.arange(0.0, 100.0, 2.0)
 TOOL = Tool("rod", (0.0, 0.0, 1.0), (), (Point("1", 0.0), Point("5", 0.02)))
@@ -19,13 +19,20 @@ TOOL = Tool("rod", (0.0, 0.0, 1.0), (), (Point("1", 0.0), Point("5", 0.02)))
 
 def record(name: str, lines: np.ndarray = LINES, **changes) -> FrfRecord:
     """x and y, hit and felt at node 1."""
-    directions = [(i, j) for i in (1, -2) for j in (1, 2)]
+    places = tuple((End("1", i), End("1", j)) for i in (1, -2) for j in (1, 2))
     return replace(
         FrfRecord(
-            Path(name), lines, np.ones((4, len(lines)), complex), *zip(*directions, strict=True),
-            "accelerance", "m/s^2/N", np.ones((4, len(lines))), (), False, ("1",) * 4, ("1",) * 4,
+            Path(name), lines, np.ones((4, len(lines)), complex), places,
+            "accelerance", "m/s^2/N", np.ones((4, len(lines))),
         ), **changes,
     )  # fmt: skip
+
+
+def placed(response_node: str, response: int, hit: int) -> FrfRecord:
+    """The second FRF is at another place."""
+    first, _, *others = record("").places
+    place = (End(response_node, response), End("1", hit))
+    return record("b.uff", places=(first, place, *others))
 
 
 SHIFTED = record("b.uff", LINES + 0.5)
@@ -39,8 +46,8 @@ SHIFTED = record("b.uff", LINES + 0.5)
         (record("a.uff", LINES + 0.5), "a.uff mixes frequency lines; export one grid."),
         (record("b.uff", unit=""), "b.uff: it is not stated .* label them."),
         (record("b.uff", quantity="unknown"), "b.uff: it is not stated .* label them."),
-        (record("b.uff", response_direction=(1, 0, 1, 2)), "b.uff: FRF 2 does not .* label them."),
-        (record("b.uff", reference_direction=(4, 1, 1, 2)), "b.uff: FRF 1 does not .* label them."),
+        (placed("1", 0, 1), "b.uff: FRF 2 does not .* label them."),
+        (placed("1", 1, 4), "b.uff: FRF 2 does not .* label them."),
     ],
 )
 def test_what_is_not_as_it_must_be_is_refused(second, words):
@@ -76,6 +83,6 @@ def test_lines_as_headers_round_them_are_the_same():
 
 
 def test_what_other_nodes_and_rotations_have_is_left_out_where_nodes_are_named():
-    others = record("a.uff", response_node=("1", "7", "1", "5"), response_direction=(1, 1, 5, 2))
-    _, frfs = labelled_frfs((others,), "receptance", InputError, frozenset(("1", "5")))
-    assert [one.response for one in frfs] == [("1", 0), ("5", 1)]
+    others = placed("7", 1, 1), placed("1", 5, 1)
+    _, frfs = labelled_frfs(others, "receptance", InputError, frozenset(("1", "5")))
+    assert [one.response for one in frfs] == [("1", 0), ("1", 1), ("1", 1)] * 2

@@ -7,7 +7,7 @@ from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.exported import from_records
 from planner.modal.estimate_modes import estimate_modes
-from planner.recording.records import FrfRecord
+from planner.recording.records import End, FrfRecord
 from tests.support.simulated_hits import RATE_HZ, exact_accelerance, make_hit
 
 BAND = (4.0, 60.0)
@@ -89,7 +89,7 @@ def test_exported_receptance_becomes_accelerance():
     pairs = [(i, j) for i in range(3) for j in range(3)]
     record = FrfRecord(
         make_hit(np.random.default_rng(0)).source, f, np.array([receptance[p] for p in pairs]),
-        tuple(i + 1 for i, _ in pairs), tuple(-(j + 1) for _, j in pairs), "receptance", "m/N",
+        tuple((End("", i + 1), End("", -(j + 1))) for i, j in pairs), "receptance", "m/N",
         np.full((9, f.size), np.nan),
     )  # fmt: skip
     frf = from_records((record,))

@@ -146,8 +146,7 @@ def test_columns_of_frfs_between_points() -> None:
     assert isinstance(found, FrfRecord)
     assert np.array_equal(found.values, [lines + 2j * lines])
     own = located(found, StatedPoints(names=NAMES))
-    assert (own.response_node, own.reference_node) == (("elbow",), ("base",))
-    assert (own.response_direction, own.reference_direction) == ((2,), (1,))
+    assert own.places == ((("elbow", 2), ("base", 1)),)
 
 
 def test_layouts_are_joined_and_found_again() -> None:

@@ -9,7 +9,7 @@ from planner.errors import InputError, RefusedError
 from planner.frf.synthesis import accelerance, pole
 from planner.modal.transfer_functions import modes_from_transfer_functions
 from planner.recording.read import read
-from planner.recording.records import FrfRecord
+from planner.recording.records import End, FrfRecord
 
 # Peaks picked by eye from the CMIF, below 2 kHz and above the suspension (6.7 and 9.2 Hz), and
 # what else stands there: mains hum at 50, 150 and 250 Hz.
@@ -19,8 +19,8 @@ HUM_HZ = (50, 150, 250)
 
 def record(values: np.ndarray, lines: np.ndarray, quantity: str = "unknown") -> FrfRecord:
     nothing = np.full(values.shape, np.nan)
-    zeros = (0,) * len(values)
-    return FrfRecord(Path("some.mat"), lines, values, zeros, zeros, quantity, "", nothing)
+    places = ((End("", 0), End("", 0)),) * len(values)
+    return FrfRecord(Path("some.mat"), lines, values, places, quantity, "", nothing)
 
 
 def synthetic(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -40,13 +40,13 @@ def clipped(samples):
 )  # fmt: skip
 def test_a_bad_channel_costs_its_sensor_and_no_other(kind, spoil, said):
     hit = by_two_sensors(np.random.default_rng(0), spoil)
-    assert kind in {fault.kind for fault in screen(hit)}
+    assert kind in {fault.kind for fault in screen(hit, BAND)}
     left, told = by_good_sensors(hit)
     assert left.responses == hit.responses[:3]
     np.testing.assert_array_equal(left.acceleration_m_s2, hit.acceleration_m_s2[:3])
     assert [fault.kind for fault in told] == [kind]
     assert said in told[0].text
-    assert not any(fault.refuse for fault in (*told, *screen(left)))
+    assert not any(fault.refuse for fault in (*told, *screen(left, BAND)))
 
 
 def test_good_sensors_stay_and_the_only_one_is_refused_as_before():
@@ -57,7 +57,7 @@ def test_good_sensors_stay_and_the_only_one_is_refused_as_before():
     dead = alone.acceleration_m_s2 * np.array([[1.0], [0.0], [1.0]])
     alone = replace(alone, acceleration_m_s2=dead)
     assert by_good_sensors(alone) == (alone, ())
-    assert {fault.kind for fault in screen(alone) if fault.refuse} == {"dead"}
+    assert {fault.kind for fault in screen(alone, BAND) if fault.refuse} == {"dead"}
 
 
 def test_a_hit_whose_sign_is_turned_answers_against_itself():

@@ -109,7 +109,7 @@ def test_frfs_of_a_measuring_program_are_read(tmp_path):
     (record,) = read(tmp_path / "frfs.mat")
     assert isinstance(record, FrfRecord)
     assert (record.quantity, record.unit) == ("accelerance", "m/s^2/N")
-    assert record.response_direction == (1, 2, 3)
+    assert [felt.direction for felt, _ in record.places] == [1, 2, 3]
     at = np.searchsorted(lines, record.frequency_hz)
     np.testing.assert_allclose(record.frequency_hz, lines[at])
     np.testing.assert_allclose(record.values, np.outer([1e-3, 2e-3, 3e-3], values[at]))

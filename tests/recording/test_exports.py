@@ -118,7 +118,7 @@ def test_frfs_as_text(tmp_path, form, decimal):
     path.write_text(f"# hit: +x\n# response: -y\n{head}\n{rows.replace('.', decimal)}")
     (record,) = read(path)
     assert (record.quantity, record.unit) == ("accelerance", "m/s^2/N")
-    assert (record.response_direction, record.reference_direction) == ((-2,), (1,))
+    assert record.places == ((("", -2), ("", 1)),)
     np.testing.assert_allclose(record.frequency_hz, LINES)
     np.testing.assert_allclose(record.values[0], FRF, rtol=1e-6)
     np.testing.assert_allclose(record.coherence[0], 0.99)

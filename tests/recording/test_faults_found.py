@@ -16,7 +16,7 @@ import pytest
 
 from planner.recording.records import Hit
 from planner.recording.repeats import screen_repeats
-from planner.recording.screening import ScreeningLimits, screen
+from planner.recording.screening import screen
 from planner.truth.deviation import Deviation
 from planner.truth.hits import AXES, Hammer, largest_rms, noisy, pulse, sampled
 from planner.truth.load import load_truth
@@ -189,8 +189,7 @@ def places(folder: Path) -> list[tuple[Path, np.ndarray, tuple[float, float]]]:
 
 def refused(hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> list[str]:
     """Kind of the fault of each hit, empty for a good one, as an import judges them."""
-    limits = replace(ScreeningLimits(), band_hz=band_hz)
-    kinds = [next((f.kind for f in screen(hit, limits) if f.refuse), "") for hit in hits]
+    kinds = [next((f.kind for f in screen(hit, band_hz) if f.refuse), "") for hit in hits]
     good = [i for i, kind in enumerate(kinds) if not kind]
     for i, faults in zip(good, screen_repeats(tuple(hits[i] for i in good), band_hz), strict=True):
         kinds[i] = next((f.kind for f in faults if f.refuse), "")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.dataset.dataset import Dataset, Visit
-from planner.recording.force_levels import levels, peak_n
+from planner.recording.force_levels import levels
 from planner.recording.records import Hit
 
 
@@ -32,5 +32,5 @@ def test_levels_are_told_apart_whether_or_not_forces_lie_in_between(seed):
     assert len(levels(np.sort(scattered(rng, 1200.0, 3000.0) + between))) > 1
     hits = tuple(pushed(peak) for peak in rng.permutation(np.geomspace(500, 3500, 24)))
     recorded = Dataset.of_visits((Visit("P1", np.zeros(6), 0.0, hits),), (5.0, 50.0))
-    groups = levels(np.sort([peak_n(hit) for hit in hits]))
-    assert all(peak_n(hit) in groups[recorded.level(hit)] for hit in hits)
+    groups = levels(np.sort([hit.pulse.peak_n for hit in hits]))
+    assert all(hit.pulse.peak_n in groups[recorded.level(hit)] for hit in hits)

@@ -64,7 +64,7 @@ def test_units_that_cannot_be_are_refused(tmp_path, factor, kind):
     path, table = tmp_path / "hit.mat", columns()
     write_mat(path, {**table, **{name: table[name] * by for name, by in factor.items()}})
     (hit,) = hits_from(read(path))
-    assert kind in {fault.kind for fault in screen(hit) if fault.refuse}
+    assert kind in {fault.kind for fault in screen(hit, (4.0, 60.0)) if fault.refuse}
 
 
 @pytest.mark.parametrize("compressed", [False, True])

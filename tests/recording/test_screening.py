@@ -13,7 +13,7 @@ BAND = (4.0, 60.0)
 
 
 def refused(hit) -> set[str]:
-    return {fault.kind for fault in screen(hit) if fault.refuse}
+    return {fault.kind for fault in screen(hit, BAND) if fault.refuse}
 
 
 def test_good_hits_are_not_refused():
@@ -53,7 +53,7 @@ def test_bad_hits_are_refused_for_the_right_reason(seed):
     }  # fmt: skip
     for kind, hit in cases.items():
         assert kind in refused(hit), kind
-        for fault in screen(hit):
+        for fault in screen(hit, BAND):
             assert fault.text.endswith("."), fault
 
 

@@ -39,9 +39,7 @@ def test_universal_files_read_back_as_they_were(named, tmp_path):
         assert isinstance(record, FrfRecord)
         frf = named.frf_of(m, table)
         assert (record.quantity, record.unit, record.simulated) == ("accelerance", "m/s^2/N", True)
-        for k, (i, j) in enumerate(
-            zip(record.response_direction, record.reference_direction, strict=True)
-        ):
+        for k, ((_, i), (_, j)) in enumerate(record.places):
             np.testing.assert_allclose(record.values[k], frf.accelerance[i - 1, j - 1], rtol=1e-9)
             np.testing.assert_allclose(record.coherence[k], frf.coherence[i - 1, j - 1], rtol=1e-9)
         np.testing.assert_allclose(record.frequency_hz, frf.frequency_hz, rtol=1e-5)
