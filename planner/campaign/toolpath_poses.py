@@ -311,6 +311,6 @@ def turn_advice(
     # With the feeds as they are in the base frame, whatever the cut says.
     poses = travelled.standing(found).structures(msgspec.structs.replace(cut, feed_in="path"))
     for k, ((i, turn, _), (_, structure)) in enumerate(zip(found, poses, strict=True)):
-        depth[i, int(np.argmin(np.abs(TURNS_DEG - turn)))] = limit_at(structure, cut, rpm)
+        depth[i, int(np.argmin(np.abs(TURNS_DEG - turn)))] = limit_at(structure.machine(cut), rpm)
         progress("turns", (k + 1) / len(found))
     return TurnAdvice.of(depth)

@@ -11,7 +11,6 @@ from planner.frf.quantities import convert
 from planner.milling.cutter_frf import CutterFrf, of_accelerance
 from planner.milling.cutter_modes import CutterFit, CutterModes, real_modes
 from planner.milling.lobes import sampled_limits, stability_limits
-from planner.milling.semi_discretisation import semi_growth
 from planner.milling.structure import (
     Structure,
     explaining,
@@ -20,7 +19,7 @@ from planner.milling.structure import (
     of_frf,
     sampled,
 )
-from tests.support.milling_cases import cut, machine, one_mode, two_each_way
+from tests.support.milling_cases import cut, machine, one_mode, semi_growth, two_each_way
 
 LINES = np.arange(200.0, 2400.0, 2.0)
 
