@@ -121,17 +121,22 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
     sff = np.einsum("nr,nf->rf", weight, square)  # (r, F)
     sxx = np.einsum("nr,nrf->rf", weight, np.abs(response) ** 2)
     sxf = np.einsum("nr,nrf,nf->rf", weight, response, force.conj())
-    if estimator == "one_hit":
-        return _one_hit(group)
-    h = _frf(sff, sxx, sxf, estimator)
     told = weight[:, :, None] * square[:, None] / sff  # (n, r, F), sums to 1 over hits
+    h = _frf(sff, sxx, sxf, estimator)
+    if estimator == "one_hit":
+        strength = np.sum(square, axis=1) * np.sum(1 / noise, axis=1)
+        told = np.broadcast_to((strength / strength.sum())[:, None, None], response.shape)
+        h = np.sum(told * response / force[:, None], axis=0)
     force_share = np.array([s.force_noise for s in group])[:, None] / square  # (n, F)
     share = np.mean(np.sum(told**2 * force_share[:, None], axis=0), axis=0)
-    alone = np.einsum("nr,nr,nf->rf", weight**2, noise, square) / sff**2
+    alone = np.sum(told**2 * noise[..., None] / square[:, None], axis=0)
+    unknown = np.full(h.shape, np.nan)
+    if estimator == "one_hit":
+        return h, alone + np.abs(h) ** 2 * share, unknown, share
     if not by_scatter:
         variance = alone + np.abs(h) ** 2 * share
     elif len(group) == 1:
-        variance = alone if group[0].noise_known else np.full(h.shape, np.nan)
+        variance = alone if group[0].noise_known else unknown
         variance = variance + (np.abs(h) ** 2 * share if estimator == "weighted" else 0.0)
     else:
         left = np.abs(response - h * force[:, None]) ** 2
@@ -146,24 +151,7 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
             parts = [_smooth(e, 11) * t for e, t in zip(error, told, strict=True)]
             variance = np.sum(parts, axis=0) / sff
     coherence = np.clip(np.abs(sxf) ** 2 / np.maximum(sff * sxx, 1e-300), 0.0, 1.0)
-    return h, variance, coherence if len(group) > 1 else np.full(h.shape, np.nan), share
-
-
-def _one_hit(group: list[HitSpectra]) -> Estimated:
-    """Mean of the hits' own FRFs, each with one share."""
-    force = np.array([s.force for s in group])  # (n, F)
-    response = np.array([s.response for s in group])  # (n, r, F)
-    square = np.abs(force) ** 2
-    strength = np.array(
-        [np.sum(power) * np.sum(1 / s.noise) for power, s in zip(square, group, strict=True)]
-    )
-    share = strength / strength.sum()
-    h = np.einsum("n,nrf->rf", share, response / force[:, None])
-    noise = np.array([s.noise for s in group])[..., None] / square[:, None]
-    doubt = np.array([s.force_noise for s in group])[:, None] / square
-    relative = np.einsum("n,nf->f", share**2, doubt)
-    variance = np.einsum("n,nrf->rf", share**2, noise) + np.abs(h) ** 2 * relative
-    return h, variance, np.full(variance.shape, np.nan), relative
+    return h, variance, coherence if len(group) > 1 else unknown, share
 
 
 def _frf(sff: np.ndarray, sxx: np.ndarray, sxf: np.ndarray, estimator: str) -> np.ndarray:

@@ -26,11 +26,10 @@ import numpy as np
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import receptance, solve_poles
 from planner.errors import InputError
+from planner.frf import synthesis
 from planner.frf.exported import labelled_frfs
-from planner.frf.synthesis import pole
 from planner.milling.coupling import TipReceptance
 from planner.milling.cutter_frf import CutterFrf, read_npz, row_of
-from planner.milling.cutter_modes import CutterModes
 from planner.milling.tool import Point, Tool
 from planner.modal.estimate_modes import identify
 from planner.modal.fit_data import Data
@@ -173,12 +172,14 @@ def _modes(path: Path, noise: float) -> TipReceptance:
                 f"{path}, mode {number}: frequency_hz and from_tip_m have to be above zero and "
                 f"damping_ratio between 0 and 1; correct it."
             )
-    poles = pole([m.frequency_hz for m in table.mode], [m.damping_ratio for m in table.mode])
+    poles = synthesis.pole(
+        [m.frequency_hz for m in table.mode], [m.damping_ratio for m in table.mode]
+    )
     right, left = (
         np.array([_tip_and_turn(getattr(m, side), m.from_tip_m) for m in table.mode])
         for side in ("right", "left")
     )
-    c = np.moveaxis(CutterModes(poles, right, left, np.zeros((4, 4))).receptance(frequency), 0, -1)
+    c = synthesis.receptance(frequency, poles, right[:, :, None] * left[:, None])
     return TipReceptance.known(frequency, c, noise * np.abs(c), (0, 1, 3, 4))
 
 

@@ -88,11 +88,7 @@ class Tool:
     @property
     def frame(self) -> np.ndarray:
         """(3, 3): columns are the tool's own x, y, z in the axes of the FRFs."""
-        z = np.array(self.axis)
-        first = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
-        x = first - z * (z @ first)
-        x /= np.linalg.norm(x)
-        return np.column_stack([x, np.cross(z, x), z])
+        return frame_along(np.array(self.axis))
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
         """(F, 12, 12) of the state from the tip to below the lowest contact; omega in rad/s."""
@@ -116,6 +112,15 @@ class Tool:
         parts = list(self.parts)
         parts[number] = replace(parts[number], contact=contact)
         return replace(self, parts=tuple(parts))
+
+
+def frame_along(axis: np.ndarray) -> np.ndarray:
+    """(3, 3): columns are the axes of a frame whose z is along an axis (3,)."""
+    z = axis / np.linalg.norm(axis)
+    first = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
+    x = first - z * (z @ first)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
 
 
 def _split(parts: tuple[Segment, ...], from_tip: float) -> tuple[Segment, ...]:
