@@ -15,13 +15,20 @@ would show another mean miss, which no single hit explains.
 import numpy as np
 
 from planner.frf.frf import Frf
-from planner.frf.spectra import HitSpectra, Spectra, Windows, transform
+from planner.frf.spectra import (
+    HitSpectra,
+    Spectra,
+    Windows,
+    running_mean,
+    transform,
+    window_sum,
+)
 from planner.recording.points import Layout
 from planner.recording.records import Hit
 
 ESTIMATORS = "h1", "h2", "hv", "weighted", "one_hit"
 DROP_DB = 20.0  # of the force spectrum, where the pulse ceases to excite
-LEVEL_LINES = 15  # over which scatter of weighted hits is compared with what their noise explains
+LEVEL_LINES = 7  # to either side, over which scatter is compared with what noise explains
 PRIOR = 12.0  # real values of scatter that the pooled level counts for, beside those near a line
 
 # FRF, variance, coherence (r, F) of one hit axis, and the share (F,) of the force's noise.
@@ -147,9 +154,8 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
         else:
             # Noise may grow with the hit: each counts with its own error (White's, HC2).
             error = left / np.maximum(1 - told, 1e-6)
-            # Lines over which the variance, which varies slowly, is averaged
-            parts = [_smooth(e, 11) * t for e, t in zip(error, told, strict=True)]
-            variance = np.sum(parts, axis=0) / sff
+            # Lines to either side over which the variance, which varies slowly, is averaged
+            variance = np.sum(running_mean(error, 5) * told, axis=0) / sff
     coherence = np.clip(np.abs(sxf) ** 2 / np.maximum(sff * sxx, 1e-300), 0.0, 1.0)
     return h, variance, coherence if len(group) > 1 else unknown, share
 
@@ -168,19 +174,11 @@ def _frf(sff: np.ndarray, sxx: np.ndarray, sxf: np.ndarray, estimator: str) -> n
 def _level(scatter: np.ndarray, degrees: int) -> np.ndarray:
     """Noise (r, F) beside what the records say: near each line, drawn toward the channels' mean."""
     pooled = float(np.mean(scatter)) / degrees
-    near = _smooth(scatter, LEVEL_LINES) / degrees
-    ones = np.ones(scatter.shape[1])
-    lines = np.convolve(ones, np.ones(min(LEVEL_LINES, ones.size)), mode="same")
+    near = running_mean(scatter, LEVEL_LINES) / degrees
+    lines = window_sum(np.ones(scatter.shape[1]), LEVEL_LINES)
     # Real values near a line: two a line, of which windows leave about one in four independent.
     values = 2 * degrees * lines / 4
     return (PRIOR * pooled + values * near) / (PRIOR + values)
-
-
-def _smooth(values: np.ndarray, lines: int) -> np.ndarray:
-    """Running mean of (k, F) over so many lines, shorter at the ends."""
-    kernel = np.ones(min(lines, values.shape[1]))
-    count = np.convolve(np.ones(values.shape[1]), kernel, mode="same")
-    return np.array([np.convolve(row, kernel, mode="same") for row in values]) / count
 
 
 def _usable(spectra: Spectra, band_hz: tuple[float, float]) -> tuple[float, float]:

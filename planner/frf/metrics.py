@@ -75,22 +75,11 @@ class Agreement:
         return np.where(np.all(unknown, axis=0), np.nan, np.maximum(0.0, 1 - relative))
 
 
-def agreement(
-    measured: np.ndarray,
-    simulated: np.ndarray,
-    frequency_hz: np.ndarray | None = None,
-    band_hz: tuple[float, float] | None = None,
-) -> Agreement:
-    """Agreement of FRFs (n, response, hit, F) on the lines of a band (edges included), or on all.
+def agreement(measured: np.ndarray, simulated: np.ndarray) -> Agreement:
+    """Agreement of FRFs (n, response, hit, F).
 
-    Raises ValueError where the band holds no line, or the simulation no number where one was
-    measured.
+    Raises ValueError where there is no line, or no simulated number where one was measured.
     """
-    if band_hz is not None:
-        if frequency_hz is None:
-            raise ValueError("a band needs frequency_hz")
-        inside = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
-        measured, simulated = measured[..., inside], simulated[..., inside]
     shapes = frac(measured, simulated), complex_frac(measured, simulated)
     a, b = np.broadcast_arrays(np.abs(measured), np.abs(simulated))
     return Agreement(*shapes, unit_and_length(a - b)[1], unit_and_length(a)[1])

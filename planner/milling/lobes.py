@@ -218,10 +218,10 @@ class SampledLimits:
         """(n,) the depth that is stable with a probability, inf where no loss is so likely."""
         return _quantile(self.depth_m, 1 - probability)
 
-    def robust_sd(self, probability: float = PROBABILITY) -> np.ndarray:
+    def robust_sd(self) -> np.ndarray:
         """(n,) standard error of `robust` by replicates, relative."""
         parts = np.array_split(self.depth_m, REPLICATES)
-        found = np.array([_quantile(part, 1 - probability) for part in parts])
+        found = np.array([_quantile(part, 1 - PROBABILITY) for part in parts])
         with np.errstate(invalid="ignore"):
             return np.std(found, axis=0, ddof=1) / np.sqrt(REPLICATES) / np.mean(found, axis=0)
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from planner.frf.spectra import running_mean, window_sum
 from planner.modal.fit_data import Data
 from planner.modal.least_squares import PoleFit, refine
 from planner.modal.residues import basis, rank_one, synthesize, unit
@@ -126,19 +127,6 @@ def _scatter(data: Data, refined: PoleFit) -> np.ndarray:
     return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + 1e-10**2 * _first_variance(data)
 
 
-def running_mean(values: np.ndarray, half: int) -> np.ndarray:
-    """Mean over a window of `half` values (…, F) to either side, clipped at the ends."""
-    low, high = _windows(values.shape[-1], half)
-    total = np.cumsum(np.pad(values, [(0, 0)] * (values.ndim - 1) + [(1, 0)]), axis=-1)
-    return (total[..., high] - total[..., low]) / (high - low)
-
-
-def _windows(lines: int, half: int) -> tuple[np.ndarray, np.ndarray]:
-    """First and one past the last line of a window around every line, clipped at the ends."""
-    index = np.arange(lines)
-    return np.clip(index - half, 0, None), np.clip(index + half + 1, None, lines)
-
-
 def _error(data: Data, refined: PoleFit) -> np.ndarray:
     return data.response - model(data, refined)
 
@@ -168,10 +156,10 @@ def excess(data: Data, error: np.ndarray, variance: np.ndarray, degrees: int) ->
     lines = error.size
     freedom = degrees / (2 * lines * data.entries)
     half = max(5, lines // 40)
-    low, high = _windows(lines, half)
+    count = window_sum(np.ones(lines), half)
     local = running_mean(error, half) / max(freedom, 0.1)
     # A window of few lines scatters by itself; only what exceeds that is excess.
-    noise = 1 + 2 / np.sqrt((high - low) * data.entries / data.correlated)
+    noise = 1 + 2 / np.sqrt(count * data.entries / data.correlated)
     local = np.maximum(local / noise, np.mean(error) / max(freedom, 0.1))
     return data.correlated * np.maximum(1.0, local)
 
