@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from planner.errors import PlannerError, RefusedError
 from planner.frf.frf import Frf
 from planner.frf.quantities import convert
-from planner.recording.points import NOT_STATED, SENSOR, TCP, TOOL, Layout
+from planner.recording.points import SENSOR, TCP, TOOL, Layout
 from planner.recording.records import AXES, FrfRecord
 
 # What a record states of each of its FRFs.
@@ -144,36 +143,3 @@ def from_records(records: tuple[FrfRecord, ...], window_rate_1_s: float = 0.0) -
     unknown = np.full(shape, np.nan)
     band = float(frequency[0]), float(frequency[-1])
     return Frf(frequency, h, unknown, coherence, hits, band, window_rate_1_s, layout=layout)
-
-
-def exported(frf: Frf, source: Path, simulated: bool) -> FrfRecord:
-    """Every FRF of the matrix with its nodes ("" where files state none) and directions.
-
-    Directions are 1, 2, 3 for x, y, z, and 0 where files state none.
-    """
-    entries = np.argwhere(np.isfinite(frf.accelerance).all(axis=-1))
-    response = [_place(frf.layout.sensors, int(row), SENSOR) for row, _ in entries]
-    reference = [_place(frf.layout.hits, int(column), TCP) for _, column in entries]
-    rows, columns = entries.T
-    return FrfRecord(
-        source,
-        frf.frequency_hz,
-        frf.accelerance[rows, columns],
-        tuple(direction for _, direction in response),
-        tuple(direction for _, direction in reference),
-        "accelerance",
-        "m/s^2/N",
-        frf.coherence[rows, columns],
-        frf.remarks,
-        simulated,
-        tuple(node for node, _ in response),
-        tuple(node for node, _ in reference),
-    )
-
-
-def _place(points: tuple[str, ...], at: int, unnamed: str) -> tuple[str, int]:
-    """Node and direction of a row or column."""
-    name, direction = points[at // 3], at % 3 + 1
-    if name.endswith(NOT_STATED):
-        name, direction = name.removesuffix(NOT_STATED), 0
-    return "" if name == unnamed else name, direction

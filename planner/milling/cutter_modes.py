@@ -96,12 +96,8 @@ class ModeFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def modes(self) -> CutterModes:
         """As poles and shapes, in the frame of the file."""
-        return real_modes(
-            np.array([m.frequency_hz for m in self.mode]),
-            np.array([m.damping_ratio for m in self.mode]),
-            np.array([m.mass_kg for m in self.mode]),
-            np.array([m.direction for m in self.mode]),
-        )
+        numbers = np.array([(m.frequency_hz, m.damping_ratio, m.mass_kg) for m in self.mode])
+        return real_modes(*numbers.T, np.array([m.direction for m in self.mode]))
 
     @property
     def relative_sds(self) -> np.ndarray:
