@@ -146,14 +146,9 @@ def contact(cut: Cut, depth_m: float, longest_rad: float) -> Engagement:
         if cutting:
             cuts = np.linspace(a, b, 1 + max(1, int(np.ceil((b - a) / longest_rad))))
             found += [(x, y, cutting, k) for x, y in pairwise(cuts)]
-    return Engagement(
-        float(period),
-        start,
-        np.array([f[0] for f in found]),
-        np.array([f[1] for f in found]),
-        tuple(f[2] for f in found),
-        np.array([f[3] for f in found]),
-    )
+    first, last, teeth, segment = zip(*found, strict=True)
+    arrays = np.array(first), np.array(last), teeth, np.array(segment)
+    return Engagement(float(period), start, *arrays)
 
 
 def _distinct(values: np.ndarray, period: float) -> np.ndarray:

@@ -62,9 +62,7 @@ def _step_matrices(machine: Machine, count: int, depth: float) -> np.ndarray:
     cut, (start, _) = machine.cut, machine.cut.immersion_rad
     fine = count * AVERAGED
     edges = start + 2 * np.pi / cut.teeth * (np.arange(fine) + 0.5) / fine
-    total = 0.0
-    for tooth in range(cut.teeth):
-        for turn in range(2):
-            tips = edges + 2 * np.pi * (tooth / cut.teeth + turn)
-            total = total + tooth_matrix(cut, tips, depth)
+    # Every tooth, in this turn and the next: a helix may still cut where its tip has left.
+    tips = edges[:, None] + 2 * np.pi / cut.teeth * np.arange(2 * cut.teeth)
+    total = tooth_matrix(cut, tips, depth).sum(axis=1)
     return np.mean(np.reshape(total, (count, AVERAGED, 2, 2)), axis=1)
