@@ -184,4 +184,4 @@ def _receptance(parameters: np.ndarray, hz: np.ndarray) -> np.ndarray:
     back = np.linalg.inv(_departure(count))
     right, left = (back @ (parts[0, k] + 1j * parts[1, k]) for k in (0, 1))
     f, zeta = np.exp(parameters[:2])
-    return receptance(hz, pole([f], [min(zeta, 0.95)]), np.outer(right, left)[None])
+    return receptance(hz, pole(np.array([f]), min(zeta, 0.95)), np.outer(right, left)[None])

@@ -96,8 +96,10 @@ class ModeFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def modes(self) -> CutterModes:
         """As poles and shapes, in the frame of the file."""
-        numbers = np.array([(m.frequency_hz, m.damping_ratio, m.mass_kg) for m in self.mode])
-        return real_modes(*numbers.T, np.array([m.direction for m in self.mode]))
+        hertz, damping, mass = np.array(
+            [(m.frequency_hz, m.damping_ratio, m.mass_kg) for m in self.mode]
+        ).T
+        return real_modes(hertz, damping, mass, np.array([m.direction for m in self.mode]))
 
     @property
     def relative_sds(self) -> np.ndarray:

@@ -172,9 +172,8 @@ def _modes(path: Path, noise: float) -> TipReceptance:
                 f"{path}, mode {number}: frequency_hz and from_tip_m have to be above zero and "
                 f"damping_ratio between 0 and 1; correct it."
             )
-    poles = synthesis.pole(
-        [m.frequency_hz for m in table.mode], [m.damping_ratio for m in table.mode]
-    )
+    hertz, damping = np.array([(m.frequency_hz, m.damping_ratio) for m in table.mode]).T
+    poles = synthesis.pole(hertz, damping)
     right, left = (
         np.array([_tip_and_turn(getattr(m, side), m.from_tip_m) for m in table.mode])
         for side in ("right", "left")
