@@ -1,5 +1,7 @@
 """Modal synthesis: poles and residues to FRFs, the one formula that every stage shares."""
 
+import math
+
 import numpy as np
 
 
@@ -24,7 +26,7 @@ def receptance(frequency_hz: np.ndarray, poles: np.ndarray, residues: np.ndarray
     poles = np.asarray(poles)
     residues = np.asarray(residues)
     out = residues.shape[poles.ndim :]
-    flat = residues.reshape(*poles.shape, -1)
+    flat = residues.reshape(*poles.shape, math.prod(out))  # of no mode, too
     basis = 1 / (iw - poles[..., None])
     basis_conj = 1 / (iw - poles.conj()[..., None])
     found = np.einsum("...mk,...mf->...kf", flat, basis)

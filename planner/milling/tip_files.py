@@ -172,10 +172,11 @@ def _modes(path: Path, noise: float) -> TipReceptance:
                 f"{path}, mode {number}: frequency_hz and from_tip_m have to be above zero and "
                 f"damping_ratio between 0 and 1; correct it."
             )
-    hertz, damping = np.array([(m.frequency_hz, m.damping_ratio) for m in table.mode]).T
+    stated = [(m.frequency_hz, m.damping_ratio) for m in table.mode]
+    hertz, damping = np.reshape(stated, (-1, 2)).T
     poles = synthesis.pole(hertz, damping)
     right, left = (
-        np.array([_tip_and_turn(getattr(m, side), m.from_tip_m) for m in table.mode])
+        np.reshape([_tip_and_turn(getattr(m, side), m.from_tip_m) for m in table.mode], (-1, 4))
         for side in ("right", "left")
     )
     c = synthesis.receptance(frequency, poles, right[:, :, None] * left[:, None])
