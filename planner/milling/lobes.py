@@ -264,10 +264,8 @@ def sampled_limits(
         found = _limits(machine, machine.cut.speeds_rpm[chosen], around[chosen])
         return _between(around, chosen, found)
 
-    def done(number: int, count: int) -> None:
-        progress("samples", count / len(machines))
-
-    return SampledLimits(np.array(parallel_map(one, list(machines), done)))
+    told = parallel_map(one, list(machines), lambda _, n: progress("samples", n / len(machines)))
+    return SampledLimits(np.array(told))
 
 
 def _between(around: np.ndarray, chosen: np.ndarray, values: np.ndarray) -> np.ndarray:
