@@ -31,7 +31,7 @@ from planner.campaign.state import CampaignState, Measurement
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
-from planner.modal.modes import ModalModel, Mode
+from planner.modal.modes import UNSCALED, ModalModel, Mode
 from planner.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -202,9 +202,7 @@ def _mode(given: Mode | Mapping[str, float] | Sequence[float]) -> MeasuredMode:
         raise InputError(
             f"A mode of {f:g} ± {sd:g} Hz, damping {zeta:g} ± {damping_sd:g}, is none."
         )
-    none = Mode(f, sd, zeta, damping_sd, np.full((3, 3), np.nan + 0j), np.full((3, 3), np.nan),
-                np.full(3, np.nan + 0j))  # fmt: skip
-    return from_mode(none)
+    return from_mode(Mode(f, sd, zeta, damping_sd, *UNSCALED, np.full(3, np.nan + 0j)))
 
 
 def _unmeasured(band_hz: tuple[float, float]) -> Frf:

@@ -101,9 +101,7 @@ class ToolChange:
         from planner.milling.coupling import couple
 
         found = couple(tip, self.target, self.tested)
-        h, sd = found.accelerance[:3, :3].copy(), found.accelerance_sd[:3, :3]
-        unknown = [k for k in range(3) if k not in found.kept]
-        h[unknown] = h[:, unknown] = np.nan
+        h, sd = found.accelerance[:3, :3], found.accelerance_sd[:3, :3]
         frf = of_accelerance(f"{name}, {self.target.name}", found.frequency_hz, h, sd)
         return replace(frf, simulated=found.simulated), (*self.remarks, *found.remarks)
 

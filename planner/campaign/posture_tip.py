@@ -15,7 +15,7 @@ from planner.dataset.frf_set import frf_set
 from planner.dataset.screened_files import Source
 from planner.errors import InputError, RefusedError
 from planner.frf.matrix import FrfMatrix
-from planner.frf.synthesis import pole
+from planner.frf.synthesis import pole, receptance
 from planner.milling.coupling import TipReceptance
 from planner.milling.cutter_frf import CutterFrf
 from planner.milling.tip_files import two_point_receptance, two_points_of
@@ -184,6 +184,4 @@ def _receptance(parameters: np.ndarray, hz: np.ndarray) -> np.ndarray:
     back = np.linalg.inv(_departure(count))
     right, left = (back @ (parts[0, k] + 1j * parts[1, k]) for k in (0, 1))
     f, zeta = np.exp(parameters[:2])
-    p, s = pole(np.array(f), np.array(min(zeta, 0.95))), 2j * np.pi * hz
-    residue = np.outer(right, left)[..., None]
-    return residue / (s - p) + residue.conj() / (s - p.conj())
+    return receptance(hz, pole(np.array([f]), min(zeta, 0.95)), np.outer(right, left)[None])

@@ -13,6 +13,7 @@ from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.path import limit_at
 from planner.milling.structure import Structure
+from planner.milling.tool import frame_along
 from planner.milling.toolpath import is_toolpath, read_toolpath
 from planner.progress import ProgressCallback, no_progress
 from planner.recording.folder import read_poses
@@ -189,13 +190,7 @@ def _program(
 
 def _upright(axis: np.ndarray, spindle: np.ndarray, turn_deg: float) -> np.ndarray:
     """Rotation (3, 3) of a tcp whose own axis (3,) is to point along `spindle` of the base."""
-    frames = []
-    for z in (axis / np.linalg.norm(axis), spindle):
-        first = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
-        x = first - z * (z @ first)
-        x /= np.linalg.norm(x)
-        frames.append(np.column_stack([x, np.cross(z, x), z]))
-    return about(spindle, turn_deg) @ frames[1] @ frames[0].T
+    return about(spindle, turn_deg) @ frame_along(spindle) @ frame_along(axis).T
 
 
 def _followed(
@@ -311,6 +306,6 @@ def turn_advice(
     # With the feeds as they are in the base frame, whatever the cut says.
     poses = travelled.standing(found).structures(msgspec.structs.replace(cut, feed_in="path"))
     for k, ((i, turn, _), (_, structure)) in enumerate(zip(found, poses, strict=True)):
-        depth[i, int(np.argmin(np.abs(TURNS_DEG - turn)))] = limit_at(structure, cut, rpm)
+        depth[i, int(np.argmin(np.abs(TURNS_DEG - turn)))] = limit_at(structure.machine(cut), rpm)
         progress("turns", (k + 1) / len(found))
     return TurnAdvice.of(depth)

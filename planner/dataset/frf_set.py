@@ -8,8 +8,7 @@ from planner.dataset.measure import DEFAULT_BAND_HZ, MeasuredPose
 from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.dataset.store import user_store
 from planner.errors import PlannerError, RefusedError, RefusedFile
-from planner.frf.exported import exported
-from planner.frf.matrix import FrfMatrix, matrix_of
+from planner.frf.matrix import FrfMatrix, matrix_of, matrix_of_hits
 from planner.recording.geometry import read_geometry
 from planner.recording.points import ANYWHERE
 from planner.recording.read import read
@@ -137,14 +136,7 @@ def _struck(
         raise RefusedError(f"No modes could be identified: {reasons[0]}")
     used = [v for v in verdicts if v.accepted]
     path, simulated = used[0].source.path, any(v.simulated for v in used)
-    plain, windowed = (
-        replace(
-            matrix_of((exported(one, path, simulated),)),
-            exponential_rate_1_s=one.exponential_rate_1_s,
-            tail_s=one.tail_s,
-        )
-        for one in (frf, ended)
-    )
+    plain, windowed = (matrix_of_hits(one, path, simulated) for one in (frf, ended))
     return FrfSet(
         (),
         tuple(source.path for source in sources),

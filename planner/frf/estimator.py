@@ -15,13 +15,20 @@ would show another mean miss, which no single hit explains.
 import numpy as np
 
 from planner.frf.frf import Frf
-from planner.frf.spectra import HitSpectra, Spectra, Windows, transform
+from planner.frf.spectra import (
+    HitSpectra,
+    Spectra,
+    Windows,
+    running_mean,
+    transform,
+    window_sum,
+)
 from planner.recording.points import Layout
 from planner.recording.records import Hit
 
 ESTIMATORS = "h1", "h2", "hv", "weighted", "one_hit"
 DROP_DB = 20.0  # of the force spectrum, where the pulse ceases to excite
-LEVEL_LINES = 15  # over which scatter of weighted hits is compared with what their noise explains
+LEVEL_LINES = 7  # to either side, over which scatter is compared with what noise explains
 PRIOR = 12.0  # real values of scatter that the pooled level counts for, beside those near a line
 
 # FRF, variance, coherence (r, F) of one hit axis, and the share (F,) of the force's noise.
@@ -121,17 +128,22 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
     sff = np.einsum("nr,nf->rf", weight, square)  # (r, F)
     sxx = np.einsum("nr,nrf->rf", weight, np.abs(response) ** 2)
     sxf = np.einsum("nr,nrf,nf->rf", weight, response, force.conj())
-    if estimator == "one_hit":
-        return _one_hit(group)
-    h = _frf(sff, sxx, sxf, estimator)
     told = weight[:, :, None] * square[:, None] / sff  # (n, r, F), sums to 1 over hits
+    h = _frf(sff, sxx, sxf, estimator)
+    if estimator == "one_hit":
+        strength = np.sum(square, axis=1) * np.sum(1 / noise, axis=1)
+        told = np.broadcast_to((strength / strength.sum())[:, None, None], response.shape)
+        h = np.sum(told * response / force[:, None], axis=0)
     force_share = np.array([s.force_noise for s in group])[:, None] / square  # (n, F)
     share = np.mean(np.sum(told**2 * force_share[:, None], axis=0), axis=0)
-    alone = np.einsum("nr,nr,nf->rf", weight**2, noise, square) / sff**2
+    alone = np.sum(told**2 * noise[..., None] / square[:, None], axis=0)
+    unknown = np.full(h.shape, np.nan)
+    if estimator == "one_hit":
+        return h, alone + np.abs(h) ** 2 * share, unknown, share
     if not by_scatter:
         variance = alone + np.abs(h) ** 2 * share
     elif len(group) == 1:
-        variance = alone if group[0].noise_known else np.full(h.shape, np.nan)
+        variance = alone if group[0].noise_known else unknown
         variance = variance + (np.abs(h) ** 2 * share if estimator == "weighted" else 0.0)
     else:
         left = np.abs(response - h * force[:, None]) ** 2
@@ -142,28 +154,10 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
         else:
             # Noise may grow with the hit: each counts with its own error (White's, HC2).
             error = left / np.maximum(1 - told, 1e-6)
-            # Lines over which the variance, which varies slowly, is averaged
-            parts = [_smooth(e, 11) * t for e, t in zip(error, told, strict=True)]
-            variance = np.sum(parts, axis=0) / sff
+            # Lines to either side over which the variance, which varies slowly, is averaged
+            variance = np.sum(running_mean(error, 5) * told, axis=0) / sff
     coherence = np.clip(np.abs(sxf) ** 2 / np.maximum(sff * sxx, 1e-300), 0.0, 1.0)
-    return h, variance, coherence if len(group) > 1 else np.full(h.shape, np.nan), share
-
-
-def _one_hit(group: list[HitSpectra]) -> Estimated:
-    """Mean of the hits' own FRFs, each with one share."""
-    force = np.array([s.force for s in group])  # (n, F)
-    response = np.array([s.response for s in group])  # (n, r, F)
-    square = np.abs(force) ** 2
-    strength = np.array(
-        [np.sum(power) * np.sum(1 / s.noise) for power, s in zip(square, group, strict=True)]
-    )
-    share = strength / strength.sum()
-    h = np.einsum("n,nrf->rf", share, response / force[:, None])
-    noise = np.array([s.noise for s in group])[..., None] / square[:, None]
-    doubt = np.array([s.force_noise for s in group])[:, None] / square
-    relative = np.einsum("n,nf->f", share**2, doubt)
-    variance = np.einsum("n,nrf->rf", share**2, noise) + np.abs(h) ** 2 * relative
-    return h, variance, np.full(variance.shape, np.nan), relative
+    return h, variance, coherence if len(group) > 1 else unknown, share
 
 
 def _frf(sff: np.ndarray, sxx: np.ndarray, sxf: np.ndarray, estimator: str) -> np.ndarray:
@@ -180,19 +174,11 @@ def _frf(sff: np.ndarray, sxx: np.ndarray, sxf: np.ndarray, estimator: str) -> n
 def _level(scatter: np.ndarray, degrees: int) -> np.ndarray:
     """Noise (r, F) beside what the records say: near each line, drawn toward the channels' mean."""
     pooled = float(np.mean(scatter)) / degrees
-    near = _smooth(scatter, LEVEL_LINES) / degrees
-    ones = np.ones(scatter.shape[1])
-    lines = np.convolve(ones, np.ones(min(LEVEL_LINES, ones.size)), mode="same")
+    near = running_mean(scatter, LEVEL_LINES) / degrees
+    lines = window_sum(np.ones(scatter.shape[1]), LEVEL_LINES)
     # Real values near a line: two a line, of which windows leave about one in four independent.
     values = 2 * degrees * lines / 4
     return (PRIOR * pooled + values * near) / (PRIOR + values)
-
-
-def _smooth(values: np.ndarray, lines: int) -> np.ndarray:
-    """Running mean of (k, F) over so many lines, shorter at the ends."""
-    kernel = np.ones(min(lines, values.shape[1]))
-    count = np.convolve(np.ones(values.shape[1]), kernel, mode="same")
-    return np.array([np.convolve(row, kernel, mode="same") for row in values]) / count
 
 
 def _usable(spectra: Spectra, band_hz: tuple[float, float]) -> tuple[float, float]:

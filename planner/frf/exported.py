@@ -2,15 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from planner.errors import PlannerError, RefusedError
 from planner.frf.frf import Frf
 from planner.frf.quantities import convert
-from planner.recording.points import NOT_STATED, SENSOR, TCP, TOOL, Layout
-from planner.recording.records import AXES, End, FrfRecord
+from planner.recording.points import SENSOR, TCP, TOOL, Layout
+from planner.recording.records import AXES, FrfRecord
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,35 +127,3 @@ def from_records(records: tuple[FrfRecord, ...], window_rate_1_s: float = 0.0) -
     unknown = np.full(shape, np.nan)
     band = float(frequency[0]), float(frequency[-1])
     return Frf(frequency, h, unknown, coherence, hits, band, window_rate_1_s, layout=layout)
-
-
-def exported(frf: Frf, source: Path, simulated: bool) -> FrfRecord:
-    """Every FRF of the matrix with its nodes ("" where files state none) and directions.
-
-    Directions are 1, 2, 3 for x, y, z, and 0 where files state none.
-    """
-    entries = np.argwhere(np.isfinite(frf.accelerance).all(axis=-1))
-    places = [
-        (_end(frf.layout.sensors, row, SENSOR), _end(frf.layout.hits, column, TCP))
-        for row, column in entries.tolist()
-    ]
-    rows, columns = entries.T
-    return FrfRecord(
-        source,
-        frf.frequency_hz,
-        frf.accelerance[rows, columns],
-        tuple(places),
-        "accelerance",
-        "m/s^2/N",
-        frf.coherence[rows, columns],
-        frf.remarks,
-        simulated,
-    )
-
-
-def _end(points: tuple[str, ...], at: int, unnamed: str) -> End:
-    """Node and direction of a row or column."""
-    name, direction = points[at // 3], at % 3 + 1
-    if name.endswith(NOT_STATED):
-        name, direction = name.removesuffix(NOT_STATED), 0
-    return End("" if name == unnamed else name, direction)

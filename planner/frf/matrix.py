@@ -2,13 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from planner.errors import InputError, RefusedError
 from planner.frf.exported import common_lines
+from planner.frf.frf import Frf
 from planner.frf.quantities import DERIVATIVE, convert
 from planner.recording.dof import Dof
+from planner.recording.points import NOT_STATED, SENSOR, TCP
 from planner.recording.records import FrfRecord
 
 
@@ -48,7 +51,7 @@ class FrfMatrix:
     def driving(self) -> tuple[tuple[int, int], ...]:
         """(response, reference) of the driving points: entries hit where they were felt."""
         found = ((self.index(d), i) for i, d in enumerate(self.references) if d in self.responses)
-        return tuple((o, i) for o, i in found if self.measured[o, i])
+        return tuple(pair for pair in found if self.measured[pair])
 
     @property
     def hit(self) -> bool:
@@ -72,6 +75,10 @@ class FrfMatrix:
         return self.responses.index(dof)
 
 
+# Where an FRF was felt and hit, along which signed directions, its values and coherence (F,).
+Entry = tuple[Dof, Dof, np.ndarray, np.ndarray]
+
+
 def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfMatrix:
     """One matrix of all FRFs of all files, by node and direction.
 
@@ -80,54 +87,69 @@ def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfM
     """
     frequency = common_lines(records, RefusedError)
     remarks = [r for record in records for r in record.remarks]
-    sums: dict[tuple[Dof, Dof], list[np.ndarray]] = {}
-    coherences: dict[tuple[Dof, Dof], np.ndarray] = {}
-    scaled, keep, dead = True, frequency > 0, []
+    scaled, keep = True, frequency > 0
+    entries: list[Entry] = []
     for record in records:
         kind, known = _kind(record, quantity, remarks)
         scaled &= known
         values = convert(frequency[keep], record.values[:, keep], kind, "accelerance")
-        for k, ends in enumerate(record.places):
-            felt, hit = (Dof.of_uff(*end) for end in ends)
-            if not np.any(values[k]):
-                dead.append(f"{felt} hit at {hit}")
-                continue
-            key = felt.positive, hit.positive
-            sums.setdefault(key, []).append(felt.sign * hit.sign * values[k])
-            coherences[key] = record.coherence[k][keep]
-    if not sums:
-        raise RefusedError(f"{records[0].source}: all FRFs are zero; export them again.")
+        each = zip(record.places, values, record.coherence[:, keep], strict=True)
+        entries += [(Dof.of_uff(*felt), Dof.of_uff(*hit), *held) for (felt, hit), *held in each]
+    found = _matrix(frequency[keep], entries, remarks, records[0].source)
+    simulated = any(record.simulated for record in records)
+    return replace(found, scaled=scaled, simulated=simulated)
+
+
+def matrix_of_hits(frf: Frf, source: Path, simulated: bool) -> FrfMatrix:
+    """The same of FRFs that were estimated here; `source` is named where they are refused."""
+    entries: list[Entry] = [
+        (_place(frf.layout.sensors, o, SENSOR), _place(frf.layout.hits, i, TCP),
+         frf.accelerance[o, i], frf.coherence[o, i])
+        for o, i in np.argwhere(np.isfinite(frf.accelerance).all(axis=-1)).tolist()
+    ]  # fmt: skip
+    found = _matrix(frf.frequency_hz, entries, list(frf.remarks), source)
+    rate, tail = frf.exponential_rate_1_s, frf.tail_s
+    return replace(found, simulated=simulated, exponential_rate_1_s=rate, tail_s=tail)
+
+
+def _place(points: tuple[str, ...], at: int, unnamed: str) -> Dof:
+    """Of a row or column; points that no file names have no node."""
+    name, direction = points[at // 3], at % 3 + 1
+    if name.endswith(NOT_STATED):
+        name, direction = name.removesuffix(NOT_STATED), 0
+    return Dof.of_uff("" if name == unnamed else name, direction)
+
+
+def _matrix(
+    frequency: np.ndarray, entries: Sequence[Entry], remarks: list[str], source: Path
+) -> FrfMatrix:
+    seen: dict[tuple[Dof, Dof], list[tuple[np.ndarray, np.ndarray]]] = {}
+    for felt, hit, values, coherence in entries:
+        if np.any(values):
+            turned = felt.sign * hit.sign * values
+            seen.setdefault((felt.positive, hit.positive), []).append((turned, coherence))
+    if not seen:
+        raise RefusedError(f"{source}: all FRFs are zero; export them again.")
+    dead = [f"{felt} hit at {hit}" for felt, hit, values, _ in entries if not np.any(values)]
     if dead:
         named = ", ".join(dead[:3]) + (" …" if len(dead) > 3 else "")
         remarks.append(f"{len(dead)} FRFs are zero throughout and were left out: {named}.")
-    twice = [key for key, values in sums.items() if len(values) > 1]
+    twice = [key for key, found in seen.items() if len(found) > 1]
     if twice:
         remarks.append(
             f"{len(twice)} FRFs were measured more than once (the first: {twice[0][0]} hit at "
             f"{twice[0][1]}); their mean is used."
         )
-    return _matrix(frequency[keep], sums, coherences, scaled, remarks, records)
-
-
-def _matrix(
-    frequency: np.ndarray,
-    sums: dict[tuple[Dof, Dof], list[np.ndarray]],
-    coherences: dict[tuple[Dof, Dof], np.ndarray],
-    scaled: bool,
-    remarks: list[str],
-    records: Sequence[FrfRecord],
-) -> FrfMatrix:
-    responses = tuple(sorted({felt for felt, _ in sums}, key=by_number))
-    references = tuple(sorted({hit for _, hit in sums}, key=by_number))
+    responses, references = (
+        tuple(sorted(set(side), key=by_number)) for side in zip(*seen, strict=True)
+    )
     shape = len(responses), len(references), frequency.size
-    values, coherence = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
-    for (felt, hit), entries in sums.items():
+    h, coherence = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
+    for (felt, hit), found in seen.items():
         at = responses.index(felt), references.index(hit)
-        values[at] = np.mean(entries, axis=0)
-        coherence[at] = coherences[felt, hit]
-    simulated = any(record.simulated for record in records)
+        h[at], coherence[at] = np.mean([values for values, _ in found], axis=0), found[-1][1]
     told = tuple(dict.fromkeys(remarks))
-    return FrfMatrix(frequency, responses, references, values, coherence, scaled, told, simulated)
+    return FrfMatrix(frequency, responses, references, h, coherence, True, told)
 
 
 def by_number(dof: Dof) -> tuple[int, int, str, int]:

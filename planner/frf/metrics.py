@@ -31,7 +31,7 @@ def complex_frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
     """
     a, b = np.broadcast_arrays(measured, simulated)
     _check(a, b)
-    a, b = _unit_and_length(a)[0], _unit_and_length(b)[0]
+    a, b = unit_and_length(a)[0], unit_and_length(b)[0]
     inner = np.abs(np.sum(a.conj() * b, axis=-1)) ** 2
     both_zero = ~(np.any(a != 0, axis=-1) | np.any(b != 0, axis=-1))
     return np.where(both_zero, 1.0, np.minimum(inner, 1.0))
@@ -75,25 +75,14 @@ class Agreement:
         return np.where(np.all(unknown, axis=0), np.nan, np.maximum(0.0, 1 - relative))
 
 
-def agreement(
-    measured: np.ndarray,
-    simulated: np.ndarray,
-    frequency_hz: np.ndarray | None = None,
-    band_hz: tuple[float, float] | None = None,
-) -> Agreement:
-    """Agreement of FRFs (n, response, hit, F) on the lines of a band (edges included), or on all.
+def agreement(measured: np.ndarray, simulated: np.ndarray) -> Agreement:
+    """Agreement of FRFs (n, response, hit, F).
 
-    Raises ValueError where the band holds no line, or the simulation no number where one was
-    measured.
+    Raises ValueError where there is no line, or no simulated number where one was measured.
     """
-    if band_hz is not None:
-        if frequency_hz is None:
-            raise ValueError("a band needs frequency_hz")
-        inside = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
-        measured, simulated = measured[..., inside], simulated[..., inside]
     shapes = frac(measured, simulated), complex_frac(measured, simulated)
     a, b = np.broadcast_arrays(np.abs(measured), np.abs(simulated))
-    return Agreement(*shapes, _unit_and_length(a - b)[1], _unit_and_length(a)[1])
+    return Agreement(*shapes, unit_and_length(a - b)[1], unit_and_length(a)[1])
 
 
 def stack(parts: Sequence[Agreement]) -> Agreement:
@@ -127,12 +116,13 @@ def _check(measured: np.ndarray, simulated: np.ndarray) -> None:
         raise ValueError("the simulated FRF has no number where one was measured")
 
 
-def _unit_and_length(frf: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Scaled to length 1 over the lines (..., F), and the length (...).
+def unit_and_length(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vectors (..., F) scaled to length 1, and their lengths (...).
 
     The largest entry goes first, so that no square overflows; zero stays zero.
     """
-    unit, length = np.array(frf, np.result_type(frf, 1.0)), np.ones((*frf.shape[:-1], 1))
+    unit = np.array(vectors, np.result_type(vectors, 1.0))
+    length = np.ones((*unit.shape[:-1], 1))
     for ord_ in (np.inf, 2):
         size = np.linalg.norm(unit, ord_, axis=-1, keepdims=True)
         np.divide(unit, size, out=unit, where=size > 0)

@@ -65,6 +65,17 @@ class Spectra:
     remarks: tuple[str, ...]
 
 
+def window_sum(values: np.ndarray, half: int) -> np.ndarray:
+    """Sum of real values (…, F) over so many lines to either side, fewer at the ends."""
+    window, lines = np.ones(2 * half + 1), slice(half, half + values.shape[-1])
+    return np.apply_along_axis(lambda row: np.convolve(row, window)[lines], -1, values)
+
+
+def running_mean(values: np.ndarray, half: int) -> np.ndarray:
+    """Mean of real values (…, F) over so many lines to either side, fewer at the ends."""
+    return window_sum(values, half) / window_sum(np.ones(values.shape[-1]), half)
+
+
 def transform(
     hits: tuple[Hit, ...],
     band_hz: tuple[float, float],

@@ -1,5 +1,7 @@
 """Modal synthesis: poles and residues to FRFs, the one formula that every stage shares."""
 
+import math
+
 import numpy as np
 
 
@@ -11,21 +13,25 @@ def pole(frequency_hz: np.ndarray | float, damping_ratio: np.ndarray | float) ->
 
 
 def accelerance(frequency_hz: np.ndarray, poles: np.ndarray, residues: np.ndarray) -> np.ndarray:
-    """Accelerance (m/s²/N) of modes.
+    """Accelerance (..., *out, F) in m/s²/N of modes (Busch et al. 2022, eq. 9), as `receptance`."""
+    return (2j * np.pi * np.asarray(frequency_hz)) ** 2 * receptance(frequency_hz, poles, residues)
+
+
+def receptance(frequency_hz: np.ndarray, poles: np.ndarray, residues: np.ndarray) -> np.ndarray:
+    """Receptance (..., *out, F) = Σ_m [R/(iω−λ) + R*/(iω−λ*)] in m/N of modes.
 
     frequency_hz (F,); poles (..., m) in rad/s; residues (..., m, *out) in m/(N·s).
-    Returns (..., *out, F) = −ω² Σ_m [R/(iω−λ) + R*/(iω−λ*)] (Busch et al. 2022, eq. 9).
     """
     iw = 2j * np.pi * np.asarray(frequency_hz)
     poles = np.asarray(poles)
     residues = np.asarray(residues)
     out = residues.shape[poles.ndim :]
-    flat = residues.reshape(*poles.shape, -1)
+    flat = residues.reshape(*poles.shape, math.prod(out))  # of no mode, too
     basis = 1 / (iw - poles[..., None])
     basis_conj = 1 / (iw - poles.conj()[..., None])
-    receptance = np.einsum("...mk,...mf->...kf", flat, basis)
-    receptance = receptance + np.einsum("...mk,...mf->...kf", flat.conj(), basis_conj)
-    return (iw**2 * receptance).reshape(*poles.shape[:-1], *out, iw.size)
+    found = np.einsum("...mk,...mf->...kf", flat, basis)
+    found = found + np.einsum("...mk,...mf->...kf", flat.conj(), basis_conj)
+    return found.reshape(*poles.shape[:-1], *out, iw.size)
 
 
 MOST = 2000

@@ -245,20 +245,25 @@ class VerifyingHit:
 
 def resonances(coupled: CoupledFrf) -> tuple[Resonance, ...]:
     """Peaks of the direct FRFs, direction by direction, by frequency."""
-    size = np.nan_to_num(np.abs(coupled.receptance[range(3), range(3)]))
-    found = []
-    for k in range(3):
-        for line in find_peaks(size[k])[0]:
-            # Peaks below this share of the largest of the three directions are not listed.
-            if size[k, line] >= 0.02 * size.max():
-                relative = 100 * coupled.sd[k, k, line] / size[k, line]
-                found.append(
-                    Resonance(
-                        AXES[k], float(coupled.frequency_hz[line]), float(size[k, line]),
-                        float(relative), float(coupled.amplification[line]),
-                    )
-                )  # fmt: skip
-    return tuple(found)
+    size = _direct(coupled)
+    # Peaks below this share of the largest of the three directions are not listed.
+    least = 0.02 * size.max()
+    return tuple(
+        _at(coupled, k, line) for k in range(3) for line in find_peaks(size[k], least)[0]
+    )  # fmt: skip
+
+
+def _direct(coupled: CoupledFrf) -> np.ndarray:
+    """(3, F) sizes of the direct FRFs, 0 where nothing is known."""
+    return np.nan_to_num(np.abs(coupled.receptance[range(3), range(3)]))
+
+
+def _at(coupled: CoupledFrf, axis: int, line: int) -> Resonance:
+    size = np.abs(coupled.receptance[axis, axis, line])
+    return Resonance(
+        AXES[axis], float(coupled.frequency_hz[line]), float(size),
+        float(100 * coupled.sd[axis, axis, line] / size), float(coupled.amplification[line]),
+    )  # fmt: skip
 
 
 def verifying_hit(coupled: CoupledFrf) -> VerifyingHit:
@@ -266,22 +271,14 @@ def verifying_hit(coupled: CoupledFrf) -> VerifyingHit:
 
     By its absolute sd, for a resonance matters to the cut by its size; without any sd the largest.
     """
-    peaks = resonances(coupled)
-    if peaks:
-        sd = [p.receptance_m_n * p.sd_percent for p in peaks]
-        size = [p.receptance_m_n for p in peaks]
-        best = peaks[int(np.argmax(sd if max(sd) > 0 else size))]
-        axis = AXES.index(best.direction)
-        line = int(np.argmin(np.abs(coupled.frequency_hz - best.frequency_hz)))
-    else:
-        direct = np.nan_to_num(np.abs(coupled.receptance[range(3), range(3)]))
-        axis, line = (int(k) for k in np.unravel_index(np.argmax(direct), direct.shape))
-    return VerifyingHit(
-        f"+{AXES[axis]}",
-        float(coupled.frequency_hz[line]),
-        float(np.abs(coupled.receptance[axis, axis, line])),
-        float(coupled.sd[axis, axis, line]),
-    )
+    direct = _direct(coupled)
+    largest = np.unravel_index(np.argmax(direct), direct.shape)
+    each = [
+        (peak.receptance_m_n * peak.sd_percent / 100, peak.receptance_m_n, peak)
+        for peak in resonances(coupled) or (_at(coupled, *map(int, largest)),)
+    ]
+    sd, size, best = max(each, key=lambda one: one[:2])
+    return VerifyingHit(f"+{best.direction}", best.frequency_hz, size, sd)
 
 
 FARTHEST = np.log(1e3)  # from the numbers stated: the prior's bounds

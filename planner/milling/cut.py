@@ -54,6 +54,10 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         low, high, count = self.spindle_rpm
         return np.linspace(low, high, count)
 
+    def at_speed(self, rpm: float) -> "Cut":
+        """The same at one speed."""
+        return msgspec.structs.replace(self, spindle_rpm=(rpm, rpm, 1))
+
     @property
     def plane(self) -> np.ndarray:
         """(2, 3) unit vectors of the cut in the frame of the FRFs: feed, and axis × feed."""

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from planner.errors import InputError
-from planner.frf.synthesis import pole
+from planner.frf.synthesis import pole, receptance
 from planner.milling.cut import check_limits, check_unit
 from planner.milling.cutter_frf import CutterFrf
 from planner.modal.estimate_modes import PoleIdentification, identify, inflation
@@ -41,11 +41,8 @@ class CutterModes:
 
     def receptance(self, frequency_hz: np.ndarray) -> np.ndarray:
         """(F, d, d) in m/N at frequencies (F,)."""
-        s = 2j * np.pi * np.asarray(frequency_hz, dtype=float)[:, None]
-        up, down = 1 / (s - self.poles), 1 / (s - self.poles.conj())
-        found = np.einsum("fk,ki,kj->fij", up, self.shapes, self.drives)
-        found += np.einsum("fk,ki,kj->fij", down, self.shapes.conj(), self.drives.conj())
-        return found + self.residual
+        residues = self.shapes[:, :, None] * self.drives[:, None]
+        return np.moveaxis(receptance(frequency_hz, self.poles, residues), -1, 0) + self.residual
 
     def in_plane(self, plane: np.ndarray) -> "CutterModes":
         """In the plane of a cut, (2, d) unit vectors; modes that do not show there are left out."""
@@ -99,12 +96,10 @@ class ModeFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def modes(self) -> CutterModes:
         """As poles and shapes, in the frame of the file."""
-        return real_modes(
-            np.array([m.frequency_hz for m in self.mode]),
-            np.array([m.damping_ratio for m in self.mode]),
-            np.array([m.mass_kg for m in self.mode]),
-            np.array([m.direction for m in self.mode]),
-        )
+        hertz, damping, mass = np.array(
+            [(m.frequency_hz, m.damping_ratio, m.mass_kg) for m in self.mode]
+        ).T
+        return real_modes(hertz, damping, mass, np.array([m.direction for m in self.mode]))
 
     @property
     def relative_sds(self) -> np.ndarray:

@@ -73,7 +73,7 @@ APART = 1e-9  # rad: breakpoints closer than this are one
 class Rule:
     """Lobatto points (s+1,) of a polynomial of degree s on [0, 1], and its integrals.
 
-    `points` (s+1, q) and `values` (s+1, q, s+1): Gauss points of [0, c_i], as shares of c_i, with
+    `points` (q,) and `values` (s+1, q, s+1): Gauss points of every [0, c_i], as shares of c_i, with
     the Lagrange polynomials there times the weights. `weights` (s+1,) integrate over [0, 1].
     """
 
@@ -92,7 +92,7 @@ def lobatto(degree: int) -> Rule:
     x, w = (x + 1) / 2, w / 2
     values = lagrange(nodes, nodes[:, None] * x[None, :]) * w[None, :, None]
     whole = np.einsum("qj,q->j", lagrange(nodes, x), w)
-    return Rule(nodes, np.broadcast_to(x, (len(nodes), len(x))), values, whole)
+    return Rule(nodes, x, values, whole)
 
 
 def lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -146,14 +146,9 @@ def contact(cut: Cut, depth_m: float, longest_rad: float) -> Engagement:
         if cutting:
             cuts = np.linspace(a, b, 1 + max(1, int(np.ceil((b - a) / longest_rad))))
             found += [(x, y, cutting, k) for x, y in pairwise(cuts)]
-    return Engagement(
-        float(period),
-        start,
-        np.array([f[0] for f in found]),
-        np.array([f[1] for f in found]),
-        tuple(f[2] for f in found),
-        np.array([f[3] for f in found]),
-    )
+    first, last, teeth, segment = zip(*found, strict=True)
+    arrays = np.array(first), np.array(last), teeth, np.array(segment)
+    return Engagement(float(period), start, *arrays)
 
 
 def _distinct(values: np.ndarray, period: float) -> np.ndarray:
@@ -183,9 +178,6 @@ def each_tooth(cut: Cut, tooth: int, angle: np.ndarray, depth_m: float) -> np.nd
     """(m, 2, 2) of one tooth that is known to cut, at tip angles (m,) of the first tooth."""
     start, _ = cut.immersion_rad
     phi = np.mod(angle + tooth_angles(cut)[tooth] - start + APART, 2 * np.pi) + start - APART
-    lag = cut.lag_rad_m * depth_m
-    if lag == 0:
-        return force_direction(phi, cut)[:, :, None] * chip_direction(phi)[:, None, :]
     # The upper part of a long helix may still cut where the tip came round again.
-    turns = 2 * np.pi * np.arange(1 + int(lag // (2 * np.pi) + 1))
+    turns = 2 * np.pi * np.arange(2 + int(cut.lag_rad_m * depth_m // (2 * np.pi)))
     return tooth_matrix(cut, phi[:, None] + turns, depth_m).sum(axis=1)

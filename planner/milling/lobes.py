@@ -93,7 +93,7 @@ MANY, BLOCK = 60, 10  # speeds from which two processes share them, in blocks of
 
 @dataclass(frozen=True)
 class StabilityLimit:
-    """First loss at one speed: depth in m (NaN: none), kind, chatter frequency, relative error."""
+    """First loss at one speed: depth in m (inf: none), kind, chatter frequency, relative error."""
 
     depth_m: float
     kind: str | None = None
@@ -102,7 +102,12 @@ class StabilityLimit:
     points: int = 0
 
 
-NO_LIMIT = StabilityLimit(np.nan)
+NO_LIMIT = StabilityLimit(np.inf)
+
+
+def depths_of(losses: Sequence[StabilityLimit]) -> np.ndarray:
+    """(n,) in m, inf where nothing is lost."""
+    return np.array([loss.depth_m for loss in losses])
 
 
 def stability_limits(
@@ -213,19 +218,19 @@ class SampledLimits:
         """(n,) the depth that is stable with a probability, inf where no loss is so likely."""
         return _quantile(self.depth_m, 1 - probability)
 
-    def robust_sd(self, probability: float = PROBABILITY) -> np.ndarray:
+    def robust_sd(self) -> np.ndarray:
         """(n,) standard error of `robust` by replicates, relative."""
         parts = np.array_split(self.depth_m, REPLICATES)
-        found = np.array([_quantile(part, 1 - probability) for part in parts])
+        found = np.array([_quantile(part, 1 - PROBABILITY) for part in parts])
         with np.errstate(invalid="ignore"):
             return np.std(found, axis=0, ddof=1) / np.sqrt(REPLICATES) / np.mean(found, axis=0)
 
     def open(self, depth_m: np.ndarray) -> np.ndarray:
-        """(n,) bool: where limits (n,) in m (NaN: none) may well be others."""
+        """(n,) bool: where limits (n,) in m (inf: none) may well be others."""
         low, high = np.quantile(self.depth_m, (0.05, 0.95), axis=0, method="nearest")
         with np.errstate(invalid="ignore"):
-            known = (high - low) / 2 <= OPEN * depth_m
-        return ~known & ~(np.isinf(low) & ~np.isfinite(depth_m))
+            known = (high - low) / 2 <= OPEN * np.where(np.isinf(depth_m), np.nan, depth_m)
+        return ~known & ~(np.isinf(low) & np.isinf(depth_m))
 
     def probability(self, depths: np.ndarray) -> np.ndarray:
         """(speeds, depths) of being stable at depths (b,) in m."""
@@ -249,21 +254,18 @@ def sampled_limits(
     progress: ProgressCallback = no_progress,
 ) -> SampledLimits:
     """Of samples of a machine whose own first losses are known, at the same speeds."""
-    around = np.array([loss.depth_m for loss in nominal])
+    around = depths_of(nominal)
     chosen = np.unique(np.linspace(0, len(around) - 1, min(len(around), MOST_SPEEDS)).round())
     chosen = chosen.astype(int)
 
     def one(machine: Machine) -> np.ndarray:
         if machine.cut.method == "zeroth_order":
-            found = np.array([loss.depth_m for loss in stability_limits(machine)])
-            return np.where(np.isnan(found), np.inf, found)
+            return depths_of(stability_limits(machine))
         found = _limits(machine, machine.cut.speeds_rpm[chosen], around[chosen])
         return _between(around, chosen, found)
 
-    def done(number: int, count: int) -> None:
-        progress("samples", count / len(machines))
-
-    return SampledLimits(np.array(parallel_map(one, list(machines), done)))
+    told = parallel_map(one, list(machines), lambda _, n: progress("samples", n / len(machines)))
+    return SampledLimits(np.array(told))
 
 
 def _between(around: np.ndarray, chosen: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -275,8 +277,9 @@ def _between(around: np.ndarray, chosen: np.ndarray, values: np.ndarray) -> np.n
     finite = np.where(np.isfinite(values), values, 0.0)
     beyond = np.interp(at, chosen, np.isinf(values).astype(float)) > 0
     depth = np.where(beyond, np.inf, np.interp(at, chosen, finite))
-    share = np.interp(at, chosen, finite / around[chosen])  # NaN beside what has no limit
-    return np.where(np.isfinite(share * around) & ~beyond, share * around, depth)
+    known = np.where(np.isinf(around), np.nan, around)  # NaN beside what has no limit
+    share = np.interp(at, chosen, finite / known[chosen])
+    return np.where(np.isfinite(share * known) & ~beyond, share * known, depth)
 
 
 def _limits(machine: Machine, rpm: np.ndarray, around: np.ndarray) -> np.ndarray:
@@ -290,7 +293,7 @@ def _limits(machine: Machine, rpm: np.ndarray, around: np.ndarray) -> np.ndarray
         if np.isfinite(around[i]):
             bracket = _bracket([(0.0, -1.0), *levels(at, FIRST * around[i])])
         if bracket is None:
-            above = scan if np.isnan(around[i]) else scan[scan > FIRST[-1] * around[i]]
+            above = scan if np.isinf(around[i]) else scan[scan > FIRST[-1] * around[i]]
             bracket = first_unstable(at, above) if len(above) else None
         if bracket is not None:
             found[i] = refined(at, *bracket, 1e-3)

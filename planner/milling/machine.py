@@ -69,7 +69,7 @@ def _followed(values: np.ndarray) -> np.ndarray:
 
 
 def limits(found: LobeCurves, rpm: np.ndarray, teeth: int) -> tuple[np.ndarray, np.ndarray]:
-    """First loss at speeds (n,) in rpm: depth in m, chatter frequency in Hz; NaN where none is.
+    """First loss at speeds (n,) in rpm: depth in m (inf: none), chatter frequency in Hz (NaN).
 
     Between lines 1/λ is straight.
     """
@@ -93,7 +93,7 @@ def limits(found: LobeCurves, rpm: np.ndarray, teeth: int) -> tuple[np.ndarray, 
             best = int(np.argmin(here))
             depth[i] = here[best]
             chatter[i] = hertz[line[best]] + share[best] * np.diff(hertz)[line[best]]
-    return np.where(np.isfinite(depth), depth, np.nan), chatter
+    return depth, chatter
 
 
 Monodromies = Callable[[np.ndarray], list[np.ndarray]]  # of depths (B,) in m

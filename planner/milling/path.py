@@ -8,7 +8,13 @@ import numpy as np
 from scipy.stats import norm
 
 from planner.milling.cut import Cut
-from planner.milling.lobes import PROBABILITY, StabilityLimit, sampled_limits, stability_limits
+from planner.milling.lobes import (
+    PROBABILITY,
+    StabilityLimit,
+    depths_of,
+    sampled_limits,
+    stability_limits,
+)
 from planner.milling.machine import Machine, multipliers
 from planner.milling.structure import Structure, moved
 from planner.progress import ProgressCallback, no_progress, part_of
@@ -31,8 +37,7 @@ class PathLimits:
     @property
     def depth_m(self) -> np.ndarray:
         """(p, n) first losses, inf where there is none."""
-        depth = np.array([[loss.depth_m for loss in row] for row in self.found])
-        return np.where(np.isnan(depth), np.inf, depth)
+        return np.array([depths_of(row) for row in self.found])
 
     @property
     def tightest(self) -> np.ndarray:
@@ -51,14 +56,13 @@ def limits_along(
     samples: int,
     progress: ProgressCallback = no_progress,
 ) -> PathLimits:
-    """Limits at every pose, with so many samples of what is uncertain."""
+    """Limits at every pose, with so many samples of what is uncertain (0: as if it were known)."""
     found, robust, known = [], [], []
     for i, (_, structure) in enumerate(poses):
         part = part_of(progress, i / len(poses), (i + 1) / len(poses))
         own = stability_limits(structure.machine(cut))
         drawn = structure.samples(cut, samples)
-        depth = np.array([loss.depth_m for loss in own])
-        depth = np.where(np.isnan(depth), np.inf, depth)
+        depth = depths_of(own)
         limits = sampled_limits(drawn, own, part) if drawn else None
         robust.append(depth if limits is None else limits.robust(PROBABILITY))
         known.append(depth > 0 if limits is None else ~limits.open(depth))
@@ -77,24 +81,7 @@ def best_speed_of(
     """Of at most so many of the cut's speeds that in rpm at which the tightest pose allows most."""
     low, high, count = cut.spindle_rpm
     fewer = msgspec.structs.replace(cut, spindle_rpm=(low, high, min(count, most)))
-    least = np.full(len(fewer.speeds_rpm), np.inf)
-    for i, (_, structure) in enumerate(poses):
-        depth = np.array([loss.depth_m for loss in stability_limits(structure.machine(fewer))])
-        least = np.fmin(least, depth)
-        progress("poses", (i + 1) / len(poses))
-    return float(fewer.speeds_rpm[int(np.argmax(least))])
-
-
-def limits_at_speed(
-    poses: Sequence[tuple[str, Structure]],
-    cut: Cut,
-    rpm: float,
-    samples: int,
-    progress: ProgressCallback = no_progress,
-) -> tuple[np.ndarray, np.ndarray]:
-    """(p,) first losses in m at a speed, and depths that are stable with 95 %; inf: none lost."""
-    limits = limits_along(poses, _at_one_speed(cut, rpm), samples, progress)
-    return limits.depth_m[:, 0], limits.robust_m[:, 0]
+    return float(fewer.speeds_rpm[limits_along(poses, fewer, 0, progress).best_speed])
 
 
 def limits_by_feed(poses: Sequence[tuple[str, Structure]], cut: Cut, rpm: float) -> np.ndarray:
@@ -102,28 +89,20 @@ def limits_by_feed(poses: Sequence[tuple[str, Structure]], cut: Cut, rpm: float)
 
     About the tool's axis, from the feed towards axis × feed; inf where nothing is lost.
     """
-    machines = [structure.machine(_at_one_speed(cut, rpm)) for _, structure in poses]
+    machines = [structure.machine(cut) for _, structure in poses]
     turns = np.deg2rad(TURNS_DEG)
     both = zip(np.cos(turns), np.sin(turns), strict=True)
     planes = [np.array([[c, s], [-s, c]]) for c, s in both]
     return np.array([
-        min(_limit(replace(m, modes=m.modes.in_plane(plane))) for m in machines) for plane in planes
+        min(limit_at(replace(m, modes=m.modes.in_plane(plane)), rpm) for m in machines)
+        for plane in planes
     ])  # fmt: skip
 
 
-def limit_at(structure: Structure, cut: Cut, rpm: float) -> float:
+def limit_at(machine: Machine, rpm: float) -> float:
     """Depth in m that is stable at a speed in rpm, inf where nothing is lost."""
-    return _limit(structure.machine(_at_one_speed(cut, rpm)))
-
-
-def _at_one_speed(cut: Cut, rpm: float) -> Cut:
-    """The cut at one speed."""
-    return msgspec.structs.replace(cut, spindle_rpm=(rpm, rpm, 1))
-
-
-def _limit(machine: Machine) -> float:
-    (loss,) = stability_limits(machine)
-    return float(np.inf if np.isnan(loss.depth_m) else loss.depth_m)
+    (loss,) = stability_limits(replace(machine, cut=machine.cut.at_speed(rpm)))
+    return float(loss.depth_m)
 
 
 SAMPLES = 40

@@ -35,7 +35,7 @@ class Period:
     """Matrices of one period over states z (s,), n chips y, v of this and the last one, m forces.
 
     y = S z₀ + b L (N y − B v) and z₁ = E z₀ + b W (N y − B v), where E is `free`, S `seen`, L
-    `reply`, W `push`, N `now`, B `before` (None: the identity); b is the depth. States are real
+    `reply`, W `push`, N `now`, B `before`; b is the depth. States are real
     parts of the modes', then imaginary ones. `time_s`, `weight_s` and `force` (m, 2) are of the
     points at which forces act.
     """
@@ -45,8 +45,8 @@ class Period:
     seen: np.ndarray
     reply: np.ndarray
     push: np.ndarray
-    now: np.ndarray | None
-    before: np.ndarray | None
+    now: np.ndarray
+    before: np.ndarray
     time_s: np.ndarray
     weight_s: np.ndarray
     force: np.ndarray
@@ -55,32 +55,22 @@ class Period:
         """(B, s + n, s + n): (z, v) one period later, at depths (B,) in m."""
         b = np.asarray(depths, dtype=float)[:, None, None]
         states, chips = len(self.free), len(self.seen)
-        reply_now, push_now = self._times(self.now)
-        reply_before, push_before = self._times(self.before)
+        start = np.broadcast_to(self.seen, (len(b), *self.seen.shape))
         solved = np.linalg.solve(
-            np.eye(chips) - b * reply_now,
-            np.concatenate(
-                [np.broadcast_to(self.seen, (len(b), *self.seen.shape)), -b * reply_before], 2
-            ),
+            np.eye(chips) - b * (self.reply @ self.now),
+            np.concatenate([start, -b * (self.reply @ self.before)], axis=2),
         )
         found = np.empty((len(b), states + chips, states + chips))
         found[:, states:] = solved
-        found[:, :states] = b * (push_now @ solved)
+        found[:, :states] = b * (self.push @ self.now @ solved)
         found[:, :states, :states] += self.free
-        found[:, :states, states:] -= b * push_before
+        found[:, :states, states:] -= b * (self.push @ self.before)
         return found
-
-    def _times(self, matrix: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-        return (
-            (self.reply, self.push) if matrix is None else (self.reply @ matrix, self.push @ matrix)
-        )
 
     def forces(self, vector: np.ndarray, multiplier: complex, depth: float) -> np.ndarray:
         """(m,): forces of the vibration that an eigenvector (z, v) of the monodromy stands for."""
         v = vector[len(self.free) :]
-        y = multiplier * v
-        now = y if self.now is None else self.now @ y
-        return depth * (now - (v if self.before is None else self.before @ v))
+        return depth * (self.now @ (multiplier * v) - self.before @ v)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,8 +168,8 @@ def _build(
         seen=np.concatenate([over.real, -over.imag]).T[first],
         reply=reply[first] @ together,
         push=np.concatenate([to_end.real, to_end.imag]) @ together,
-        now=None,
-        before=None,
+        now=np.eye(len(first)),
+        before=np.eye(len(first)),
         time_s=points.time[first],
         weight_s=(lobatto(degree).weights[points.place] * length[points.element]) @ together,
         force=points.columns[first],

@@ -17,7 +17,7 @@ STEPS, PER_RADIAN = 24, 3.0  # of a period, and more per radian of the fastest m
 AVERAGED = 16  # points of a step, over which the directional matrix is averaged
 
 
-def semi_monodromies(machine: Machine, rpm: float, factor: float = 1.0) -> Monodromies:
+def semi_monodromies(machine: Machine, rpm: float, factor: float) -> Monodromies:
     """A function of depths in m that gives their monodromy matrices; `factor` multiplies steps.
 
     Raises InputError where teeth do not follow at equal angles.
@@ -30,15 +30,6 @@ def semi_monodromies(machine: Machine, rpm: float, factor: float = 1.0) -> Monod
     angle = machine.fastest * 60 / (rpm * machine.cut.teeth)
     count = int(np.ceil(factor * np.ceil(STEPS + PER_RADIAN * angle)))
     return lambda depths: [semi_monodromy(machine, rpm, count, float(b)) for b in depths]
-
-
-def semi_growth(machine: Machine, rpm: float, depth: float, count: int | None = None) -> float:
-    """Largest |µ| at a speed and a depth in m, with `count` steps of a tooth's period."""
-    if count is None:
-        (built,) = semi_monodromies(machine, rpm, 2.0)(np.array([depth]))
-    else:
-        built = semi_monodromy(machine, rpm, count, depth)
-    return float(np.max(np.abs(np.linalg.eigvals(built))))
 
 
 def semi_monodromy(machine: Machine, rpm: float, count: int, depth: float) -> np.ndarray:
@@ -71,9 +62,7 @@ def _step_matrices(machine: Machine, count: int, depth: float) -> np.ndarray:
     cut, (start, _) = machine.cut, machine.cut.immersion_rad
     fine = count * AVERAGED
     edges = start + 2 * np.pi / cut.teeth * (np.arange(fine) + 0.5) / fine
-    total = 0.0
-    for tooth in range(cut.teeth):
-        for turn in range(2):
-            tips = edges + 2 * np.pi * (tooth / cut.teeth + turn)
-            total = total + tooth_matrix(cut, tips, depth)
+    # Every tooth, in this turn and the next: a helix may still cut where its tip has left.
+    tips = edges[:, None] + 2 * np.pi / cut.teeth * np.arange(2 * cut.teeth)
+    total = tooth_matrix(cut, tips, depth).sum(axis=1)
     return np.mean(np.reshape(total, (count, AVERAGED, 2, 2)), axis=1)

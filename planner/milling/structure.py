@@ -118,7 +118,7 @@ class Structure:
     def samples(self, cut: Cut, count: int = SAMPLES, seed: int = SEED) -> list[Machine]:
         """So many machines that are as likely as each other; none where nothing is uncertain."""
         sds = cut.kt_sd_percent / 100, cut.kr_sd_percent / 100
-        if not np.any(self.spread > 0) and not any(sds) and self.fit is None:
+        if not count or not (np.any(self.spread > 0) or any(sds) or self.fit is not None):
             return []
         machine, each = self.machine(cut), -(-count // REPLICATES)
         drawn = [
@@ -208,7 +208,7 @@ def out_of_band_remark(structure: Structure, chatter_hz: np.ndarray) -> str | No
 def limit_remarks(
     structure: Structure, cut: Cut, depth_m: np.ndarray, known: np.ndarray
 ) -> list[str]:
-    """On limits (n,) in m, NaN or inf where there is none, and whether samples agree on them."""
+    """On limits (n,) in m, inf where there is none, and whether samples agree on them."""
     fit, said = structure.fit, []
     if fit is None:
         return []

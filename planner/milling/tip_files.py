@@ -26,8 +26,8 @@ import numpy as np
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import receptance, solve_poles
 from planner.errors import InputError
+from planner.frf import synthesis
 from planner.frf.exported import labelled_frfs
-from planner.frf.synthesis import pole
 from planner.milling.coupling import TipReceptance
 from planner.milling.cutter_frf import CutterFrf, read_npz, row_of
 from planner.milling.tool import Point, Tool
@@ -166,18 +166,20 @@ def _modes(path: Path, noise: float) -> TipReceptance:
     if not (0 < low < high and 2 <= count <= 200_000):
         raise InputError(f"{path}: lines_hz has to be [from above 0, to, how many]; correct it.")
     frequency = np.linspace(low, high, count)
-    iw = 2j * np.pi * frequency
-    c = np.zeros((4, 4, count), complex)
     for number, mode in enumerate(table.mode, 1):
         if not (mode.frequency_hz > 0 and 0 < mode.damping_ratio < 1 and mode.from_tip_m > 0):
             raise InputError(
                 f"{path}, mode {number}: frequency_hz and from_tip_m have to be above zero and "
                 f"damping_ratio between 0 and 1; correct it."
             )
-        shape = [_tip_and_turn(side, mode.from_tip_m) for side in (mode.right, mode.left)]
-        residue = np.outer(*shape)[..., None]
-        p = pole(np.array(mode.frequency_hz), np.array(mode.damping_ratio))
-        c += residue / (iw - p) + residue.conj() / (iw - p.conj())
+    stated = [(m.frequency_hz, m.damping_ratio) for m in table.mode]
+    hertz, damping = np.reshape(stated, (-1, 2)).T
+    poles = synthesis.pole(hertz, damping)
+    right, left = (
+        np.reshape([_tip_and_turn(getattr(m, side), m.from_tip_m) for m in table.mode], (-1, 4))
+        for side in ("right", "left")
+    )
+    c = synthesis.receptance(frequency, poles, right[:, :, None] * left[:, None])
     return TipReceptance.known(frequency, c, noise * np.abs(c), (0, 1, 3, 4))
 
 

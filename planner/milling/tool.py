@@ -33,6 +33,7 @@ tip, still means that.
 """
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -88,11 +89,7 @@ class Tool:
     @property
     def frame(self) -> np.ndarray:
         """(3, 3): columns are the tool's own x, y, z in the axes of the FRFs."""
-        z = np.array(self.axis)
-        first = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
-        x = first - z * (z @ first)
-        x /= np.linalg.norm(x)
-        return np.column_stack([x, np.cross(z, x), z])
+        return frame_along(np.array(self.axis))
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
         """(F, 12, 12) of the state from the tip to below the lowest contact; omega in rad/s."""
@@ -116,6 +113,15 @@ class Tool:
         parts = list(self.parts)
         parts[number] = replace(parts[number], contact=contact)
         return replace(self, parts=tuple(parts))
+
+
+def frame_along(axis: np.ndarray) -> np.ndarray:
+    """(3, 3): columns are the axes of a frame whose z is along an axis (3,)."""
+    z = axis / np.linalg.norm(axis)
+    first = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
+    x = first - z * (z @ first)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
 
 
 def _split(parts: tuple[Segment, ...], from_tip: float) -> tuple[Segment, ...]:
@@ -166,6 +172,20 @@ class SegmentTable(msgspec.Struct, forbid_unknown_fields=True):
     mass_kg: float = 0.0
     contact: ToolContact | None = None
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Diameters in m, at the holder's side and the tip's."""
+        end = self.end_diameter_m
+        return self.diameter_m, self.diameter_m if end is None else end
+
+    @property
+    def bending(self) -> tuple[float, float]:
+        """Those of the rod as which it bends."""
+        if self.equivalent_diameter_m is not None:
+            return self.equivalent_diameter_m, self.equivalent_diameter_m
+        factor = FLUTED if self.flutes else 1.0
+        return factor * self.ends[0], factor * self.ends[1]
+
 
 class ToolTable(msgspec.Struct, forbid_unknown_fields=True):
     """A tool, segment by segment from the holder to the tip.
@@ -189,7 +209,10 @@ def load_tool(path: Path) -> Tool:
     except InputError as error:
         raise InputError(_with_unit(path, str(error), str(error.__cause__))) from None
     _check(path, table)
-    parts = tuple(_part(s, table.material[s.material]) for s in table.segment)
+    parts = tuple(
+        Segment(s.length_m, *s.bending, table.material[s.material], s.bore_m, s.mass_kg, s.contact)
+        for s in table.segment
+    )
     points = tuple(msgspec.structs.replace(p, node=str(p.node)) for p in table.point)
     stated = table.to_spindle is not None
     to_tip = -np.array(table.to_spindle) if stated else np.array(table.axis or TO_TIP)
@@ -205,16 +228,6 @@ def load_tool(path: Path) -> Tool:
             parts = loaded(tool.parts, point.from_tip_m, point.sensor_mass_kg)
             tool = replace(tool, parts=parts)
     return tool
-
-
-def _part(s: SegmentTable, material: ToolMaterial) -> Segment:
-    end = s.diameter_m if s.end_diameter_m is None else s.end_diameter_m
-    start = s.diameter_m
-    if s.flutes:
-        start, end = FLUTED * start, FLUTED * end
-    if s.equivalent_diameter_m is not None:
-        start = end = s.equivalent_diameter_m
-    return Segment(s.length_m, start, end, material, s.bore_m, s.mass_kg, s.contact)
 
 
 UNITS = {
@@ -255,17 +268,14 @@ def _check(path: Path, table: ToolTable) -> None:
             )
     for name, m in table.material.items():
         where = f"{path}, material {name}"
-        _positive(where, youngs_modulus_pa=m.youngs_modulus_pa, density_kg_m3=m.density_kg_m3)
-        _not_negative(where, loss_factor=m.loss_factor)
+        _check_signs(where, m, ("youngs_modulus_pa", "density_kg_m3"), ("loss_factor",))
         if not -1 < m.poisson_ratio < 0.5:
             raise InputError(f"{where}: poisson_ratio is {m.poisson_ratio:g}; correct it.")
     for number, s in enumerate(table.segment, 1):
         _check_segment(f"{path}, segment {number}", s, table.material)
     for number, p in enumerate(table.point, 1):
-        _not_negative(
-            f"{path}, point {number}",
-            from_tip_m=p.from_tip_m, place_sd_m=p.place_sd_m, sensor_mass_kg=p.sensor_mass_kg,
-        )  # fmt: skip
+        signed = "from_tip_m", "place_sd_m", "sensor_mass_kg"
+        _check_signs(f"{path}, point {number}", p, (), signed)
     if len({str(p.node) for p in table.point}) < len(table.point):
         raise InputError(f"{path} lists a [[point]] with the same node twice; correct node.")
 
@@ -275,31 +285,21 @@ def _check_segment(where: str, s: SegmentTable, materials: dict[str, ToolMateria
         raise InputError(
             f"{where} is of {s.material!r}, which has no [material.{s.material}]; add that."
         )
-    end = s.diameter_m if s.end_diameter_m is None else s.end_diameter_m
-    _positive(where, length_m=s.length_m, diameter_m=s.diameter_m, end_diameter_m=end)
-    _not_negative(where, bore_m=s.bore_m, mass_kg=s.mass_kg, flutes=s.flutes)
-    if s.equivalent_diameter_m is not None:
-        _positive(where, equivalent_diameter_m=s.equivalent_diameter_m)
-    narrow = min(s.diameter_m, end, s.equivalent_diameter_m or np.inf)
-    if s.bore_m >= narrow * (FLUTED if s.flutes and s.equivalent_diameter_m is None else 1.0):
+    lengths = "length_m", "diameter_m", "end_diameter_m", "equivalent_diameter_m"
+    _check_signs(where, s, lengths, ("bore_m", "mass_kg", "flutes"))
+    if s.bore_m >= min(*s.ends, *s.bending):
         raise InputError(f"{where}: a bore of {s.bore_m} m leaves nothing of it; correct bore_m.")
     if s.contact is not None:
-        c = s.contact
-        _positive(f"{where}, contact", stiffness_n_m=c.stiffness_n_m,
-                  stiffness_nm_rad=c.stiffness_nm_rad)  # fmt: skip
-        _not_negative(f"{where}, contact", damping_ns_m=c.damping_ns_m,
-                      damping_nms_rad=c.damping_nms_rad, sd_percent=c.sd_percent)  # fmt: skip
+        _check_signs(f"{where}, contact", s.contact, NUMBERS[:2], (*NUMBERS[2:], "sd_percent"))
 
 
-def _positive(where: str, **values: float) -> None:
-    _signed(where, values, np.nextafter(0, 1), "has to be above zero")
-
-
-def _not_negative(where: str, **values: float) -> None:
-    _signed(where, values, 0.0, "cannot be negative")
-
-
-def _signed(where: str, values: dict[str, float], least: float, said: str) -> None:
-    for name, value in values.items():
-        if not least <= value < np.inf:
-            raise InputError(f"{where}: {name} is {value:g}; it {said}, correct it.")
+def _check_signs(
+    where: str, table: msgspec.Struct, positive: Sequence[str], others: Sequence[str]
+) -> None:
+    """InputError for the first stated entry that is not above zero, or of the others below it."""
+    for name in (*positive, *others):
+        value = getattr(table, name)
+        if value is None or 0 < value < np.inf or (value == 0 and name in others):
+            continue
+        said = "has to be above zero" if name in positive else "cannot be negative"
+        raise InputError(f"{where}: {name} is {value:g}; it {said}, correct it.")

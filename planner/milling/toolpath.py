@@ -166,15 +166,13 @@ def _arc(
     swept = (first - last if clockwise else last - first) % (2 * np.pi) or 2 * np.pi
     swept = 2 * np.pi if swept < 1e-9 else swept
     count = int(np.ceil(swept / ARC_STEP))
-    found = []
-    for i in range(1, count + 1):
-        angle = first + (-1 if clockwise else 1) * swept * i / count
-        point = a + (b - a) * i / count
-        point[[u, v]] = centre + np.linalg.norm(p - centre) * np.array(
-            [np.cos(angle), np.sin(angle)]
-        )
-        found.append(point if i < count else b.copy())
-    return found
+    share = np.arange(1, count + 1) / count
+    angle = first + (-1 if clockwise else 1) * swept * share
+    points = a + (b - a) * share[:, None]
+    around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    points[:, [u, v]] = centre + np.linalg.norm(p - centre) * around
+    points[-1] = b
+    return list(points)
 
 
 def _apt(path: Path, text: str) -> tuple[list[Move], np.ndarray]:

@@ -18,8 +18,8 @@ from planner.modal.motion_fields import turned_rows
 from planner.modal.node_exchange import (
     Exchange,
     RovingSides,
+    exchanged_by_columns,
     exchanged_by_neighbours,
-    exchanges,
     turning_helps,
 )
 from planner.recording.dof import Dof
@@ -89,7 +89,7 @@ def check(
     if len(rows) == 1 and not turned:
         swapped = exchanged_by_neighbours(sides, geometry)
     elif enough and not turning_helps(sides, turned):
-        swapped = exchanges(sides, geometry)
+        swapped = exchanged_by_columns(sides) or exchanged_by_neighbours(sides, geometry)
     turned, rows = ((), ()) if swapped else (turned, rows)
     faults = [exchange.text for exchange in swapped]
     faults += _turned(turned, len(driving), reciprocity)

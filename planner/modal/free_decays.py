@@ -10,7 +10,7 @@ from planner.modal.estimate_modes import PoleIdentification, identify
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped, mac
 from planner.modal.mode_selection import model
-from planner.modal.modes import ModalModel, Mode
+from planner.modal.modes import UNSCALED, ModalModel, Mode
 from planner.modal.residues import rank_one
 from planner.recording.records import Channel, TimeRecord
 
@@ -228,7 +228,8 @@ def _same(a: Mode, b: Mode) -> bool:
 
 def _merged(group: list[Mode], remarks: list[str]) -> Mode:
     energy = [float(np.sum(np.abs(m.residue) ** 2) / -m.pole.real) for m in group]
-    main = group[int(np.argmax(energy))].unscaled()
+    strongest, (residue, sd) = group[int(np.argmax(energy))], UNSCALED
+    main = replace(strongest, residue=residue, residue_sd=sd)
     if len(group) == 1:
         return main
     frequency = np.array([mode.frequency_hz for mode in group])

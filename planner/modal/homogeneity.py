@@ -166,18 +166,14 @@ def _level(
     hits: tuple[Hit, ...], frf: Frf, modal: ModalModel, band_hz: tuple[float, float]
 ) -> Level:
     """The pose's modes refined on one level's FRF."""
-    k = len(modal.modes)
-    values = [np.full(k, np.nan) for _ in range(4)]
     force = float(np.mean([hit.pulse.peak_n for hit in hits]))
     try:
         found = estimate_modes(frf, band_hz).modes
     except RefusedError:
         found = ()
-    for j, mode in enumerate(modal.modes):
-        near = _same(mode, found)
-        if near is not None:
-            values[0][j], values[1][j] = near.frequency_hz, near.frequency_sd_hz
-            values[2][j], values[3][j] = near.damping_ratio, near.damping_sd
+    near = [_same(mode, found) for mode in modal.modes]
+    names = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"
+    values = (np.array([getattr(mode, name, np.nan) for mode in near]) for name in names)
     return Level(force, len(hits), *values)
 
 

@@ -295,9 +295,14 @@ def complex_of(parts: np.ndarray) -> np.ndarray:
     return real + 1j * imag
 
 
-def scaled_inverse(normal: np.ndarray, rcond: float = 1e-15) -> np.ndarray:
-    """Pseudo-inverse of a normal matrix (n, n) whose unknowns differ in unit and size."""
-    unit = np.sqrt(np.maximum(np.diag(normal).real, 1e-300))
+def scaled_inverse(
+    normal: np.ndarray, rcond: float = 1e-15, least: np.ndarray | float = 1e-300
+) -> np.ndarray:
+    """Pseudo-inverse of a matrix (n, n) of unknowns that differ in unit and size.
+
+    Diagonal entries count as `least` (n,) at least: below, rounding rules.
+    """
+    unit = np.sqrt(np.maximum(np.diag(normal).real, least))
     inverse = np.linalg.pinv(normal / unit[:, None] / unit, rcond=rcond, hermitian=True)
     return inverse / unit[:, None] / unit
 

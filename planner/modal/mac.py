@@ -5,6 +5,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from planner.frf.metrics import unit_and_length
+
 Item = TypeVar("Item")
 
 
@@ -15,16 +17,8 @@ def mac(a: np.ndarray, b: np.ndarray) -> float:
 
 def mac_matrix(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """MAC of every shape in a (k, n) with every one in b (l, n); 0 where a shape is zero."""
-    unit_a, unit_b = _unit(a), _unit(b)
+    unit_a, unit_b = (unit_and_length(np.asarray(shapes))[0] for shapes in (a, b))
     return np.clip(np.abs(unit_a.conj() @ unit_b.T) ** 2, 0.0, 1.0)
-
-
-def _unit(shapes: np.ndarray) -> np.ndarray:
-    shapes = np.asarray(shapes, complex)
-    largest = np.max(np.abs(shapes), axis=-1, keepdims=True)
-    shapes = np.divide(shapes, largest, out=np.zeros_like(shapes), where=largest > 0)
-    norm = np.linalg.norm(shapes, axis=-1, keepdims=True)
-    return np.divide(shapes, norm, out=np.zeros_like(shapes), where=norm > 0)
 
 
 def phase_collinearity(shape: np.ndarray) -> float:

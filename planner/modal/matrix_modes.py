@@ -14,7 +14,7 @@ from planner.modal.mac import (
     real_normal_modes,
 )
 from planner.modal.matrix_poles import MatrixPoles, identify_matrix
-from planner.modal.modes import Eigenvectors, Mode
+from planner.modal.modes import UNSCALED, Eigenvectors, Mode
 from planner.modal.motion_fields import expected
 from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, fit_shape, row_gain
 from planner.modal.residues import realign
@@ -176,9 +176,8 @@ def _mode(found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, sca
     likely = probability(
         float(found.presence[k]), support(pole, found.diagram.sets), float(found.weak[k])
     )
-    nothing = np.full((3, 3), np.nan)
     return Mode(
-        frequency, float(sd[0]), damping, float(sd[1]), nothing.astype(complex), nothing, shape,
+        frequency, float(sd[0]), damping, float(sd[1]), *UNSCALED, shape,
         likely, shape_sd, scaled, phase_collinearity(shape), phase_deviation_deg(shape),
         fitted.misfit, float(spread),
     )  # fmt: skip

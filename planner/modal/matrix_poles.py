@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
+from planner.frf.spectra import running_mean
 from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.least_squares import refine
-from planner.modal.mode_selection import doubt, excess, falls, presences, running_mean
+from planner.modal.mode_selection import doubt, excess, falls, presences
 from planner.modal.plscf import Diagram, PoleSet, diagram, plscf, row_errors, stable
 from planner.modal.set_poles import ROUNDS, DivergedPolesError, SetData, SetPoles, fit_sets
 from planner.modal.set_search import reestimated_sets

@@ -1,11 +1,13 @@
 """Which poles are modes: fit, leave out what the data do not need, add what they still miss."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
+from planner.frf.spectra import running_mean, window_sum
 from planner.modal.fit_data import Data
 from planner.modal.least_squares import PoleFit, refine
 from planner.modal.residues import basis, rank_one, synthesize, unit
@@ -89,27 +91,31 @@ def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
 
 def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
     """PoleFit fit; an unknown variance is taken from the error itself."""
-    power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
-    variance = data.variance
-    if variance is None and before is not None:
-        variance = before.variance
-    rounds = 1 if data.variance is not None else 2
-    if variance is None:
-        variance, rounds = np.broadcast_to(power, data.response.shape), 3
-    refined = None
-    for k in range(rounds):
-        start = poles if refined is None else refined.poles
+    known = data.variance is not None
+    variance = _first_variance(data) if known or before is None else before.variance
+
+    def fitted(start: np.ndarray) -> PoleFit:
         plane = data.to_plane(start)
-        refined = refine(data.lines, data.response, variance, plane, data.allowed)
-        refined = _in_rad_s(data, refined)
-        if data.variance is None and k < rounds - 1:
-            variance = _scatter(data, refined, power)
-    assert refined is not None
+        found = refine(data.lines, data.response, variance, plane, data.allowed)
+        return _in_rad_s(data, found)
+
+    refined = fitted(poles)
+    for _ in range(0 if known else 2 if before is None else 1):
+        variance = _scatter(data, refined)
+        refined = fitted(refined.poles)
     beyond = excess(data, _error(data, refined), variance, refined.degrees)
     return replace(refined, excess=beyond)
 
 
-def _scatter(data: Data, refined: PoleFit, power: np.ndarray) -> np.ndarray:
+def _first_variance(data: Data) -> np.ndarray:
+    """The known variance, or the power of each response."""
+    if data.variance is not None:
+        return data.variance
+    power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
+    return np.broadcast_to(power, data.response.shape)
+
+
+def _scatter(data: Data, refined: PoleFit) -> np.ndarray:
     """Variance from the error of the fit, a running mean over a tenth of the lines."""
     square = np.abs(_error(data, refined)) ** 2
     lines = data.frequency_hz.size
@@ -118,20 +124,7 @@ def _scatter(data: Data, refined: PoleFit, power: np.ndarray) -> np.ndarray:
     flat = np.mean(square, axis=-1, keepdims=True)
     # A little of the overall level keeps quiet stretches from being trusted without limit.
     # Least noise relative to the FRF: below it rounding rules.
-    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + 1e-10**2 * power
-
-
-def running_mean(values: np.ndarray, half: int) -> np.ndarray:
-    """Mean over a window of `half` values (…, F) to either side, clipped at the ends."""
-    low, high = _windows(values.shape[-1], half)
-    total = np.cumsum(np.pad(values, [(0, 0)] * (values.ndim - 1) + [(1, 0)]), axis=-1)
-    return (total[..., high] - total[..., low]) / (high - low)
-
-
-def _windows(lines: int, half: int) -> tuple[np.ndarray, np.ndarray]:
-    """First and one past the last line of a window around every line, clipped at the ends."""
-    index = np.arange(lines)
-    return np.clip(index - half, 0, None), np.clip(index + half + 1, None, lines)
+    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + 1e-10**2 * _first_variance(data)
 
 
 def _error(data: Data, refined: PoleFit) -> np.ndarray:
@@ -163,10 +156,10 @@ def excess(data: Data, error: np.ndarray, variance: np.ndarray, degrees: int) ->
     lines = error.size
     freedom = degrees / (2 * lines * data.entries)
     half = max(5, lines // 40)
-    low, high = _windows(lines, half)
+    count = window_sum(np.ones(lines), half)
     local = running_mean(error, half) / max(freedom, 0.1)
     # A window of few lines scatters by itself; only what exceeds that is excess.
-    noise = 1 + 2 / np.sqrt((high - low) * data.entries / data.correlated)
+    noise = 1 + 2 / np.sqrt(count * data.entries / data.correlated)
     local = np.maximum(local / noise, np.mean(error) / max(freedom, 0.1))
     return data.correlated * np.maximum(1.0, local)
 
@@ -259,24 +252,25 @@ def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:
 
 def _missing(data: Data, current: PoleFit, tried: list[complex]) -> complex | None:
     """Pole of the atom that would lower χ² most, if by more than chance can (None: nowhere)."""
-    weight = (2 / current.variance / current.excess).reshape(data.entries, -1)
-    error = weight * _error(data, current).reshape(data.entries, -1)
-    poles, fall = falls(data, weight, error)
-    for pole in tried:
-        fall[np.abs(poles - pole) < 0.5 * abs(pole.real)] = 0.0
-    best = int(np.argmax(fall))
-    return complex(poles[best]) if fall[best] > data.threshold else None
+    return _best_atom(data, current.variance * current.excess, _error(data, current), tried)
 
 
 def strongest(data: Data) -> np.ndarray:
     """(0 or 1,) pole of the atom that explains most of the responses, alone."""
-    power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
-    variance = np.broadcast_to(power, data.response.shape)
-    if data.variance is not None:
-        variance = data.variance
+    found = _best_atom(data, _first_variance(data), data.response)
+    return np.array([] if found is None else [found], complex)
+
+
+def _best_atom(
+    data: Data, variance: np.ndarray, error: np.ndarray, tried: Sequence[complex] = ()
+) -> complex | None:
+    """Pole of the atom that explains most of an error, apart from those tried; None by chance."""
     weight = (2 / variance).reshape(data.entries, -1)
-    poles, fall = falls(data, weight, weight * data.response.reshape(data.entries, -1))
-    return poles[[int(np.argmax(fall))]] if np.max(fall) > data.threshold else poles[:0]
+    poles, fall = falls(data, weight, weight * error.reshape(data.entries, -1))
+    for pole in tried:
+        fall[np.abs(poles - pole) < 0.5 * abs(pole.real)] = 0.0
+    best = int(np.argmax(fall))
+    return complex(poles[best]) if fall[best] > data.threshold else None
 
 
 def presences(data: Data, poles: np.ndarray, residue: np.ndarray) -> np.ndarray:

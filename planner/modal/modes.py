@@ -1,7 +1,7 @@
 """Experimental modes of one pose."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -103,10 +103,9 @@ class Mode:
             relative = np.hypot(2 * self.frequency_sd_hz / self.frequency_hz, sd / size)
             return stiffness, stiffness * relative
 
-    def unscaled(self) -> "Mode":
-        """The same without residues, which nothing scales."""
-        nothing = np.full((3, 3), np.nan)
-        return replace(self, residue=nothing.astype(complex), residue_sd=nothing)
+
+# Residues of a mode, and their sds, where nothing scales them.
+UNSCALED = np.full((3, 3), np.nan + 0j), np.full((3, 3), np.nan)
 
 
 @dataclass(frozen=True, eq=False)

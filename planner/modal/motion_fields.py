@@ -30,7 +30,9 @@ def motion_fields(dofs: Sequence[Dof], geometry: Geometry) -> list[np.ndarray]:
     place = np.array([geometry.at(dof.node) for dof in dofs])
     direction = np.array([DIRECTIONS.index(dof.positive.direction) for dof in dofs])
     nodes = np.array(list({dof.node: place[k] for k, dof in enumerate(dofs)}.values()))
-    spacing = float(np.median(_nearest(nodes)))
+    between = np.linalg.norm(nodes[:, None] - nodes, axis=-1)
+    np.fill_diagonal(between, np.inf)
+    spacing = float(np.median(np.min(between, axis=1)))
     same = direction[:, None] == direction
     apart = np.linalg.norm(place[:, None] - place, axis=-1)
     fields = []
@@ -41,12 +43,6 @@ def motion_fields(dofs: Sequence[Dof], geometry: Geometry) -> list[np.ndarray]:
     if ends.issuperset(dof.node for dof in dofs) and np.all(direction > 0):
         fields += _of_beams(dofs, direction, geometry)
     return [field / np.mean(np.diag(field)) for field in fields]
-
-
-def _nearest(place: np.ndarray) -> np.ndarray:
-    """(n,) distance of each point to the next."""
-    apart = np.linalg.norm(place[:, None] - place, axis=-1)
-    return np.min(apart + np.diag(np.full(len(place), np.inf)), axis=1)
 
 
 def _of_beams(dofs: Sequence[Dof], direction: np.ndarray, geometry: Geometry) -> list[np.ndarray]:

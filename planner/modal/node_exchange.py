@@ -24,13 +24,15 @@ class RovingSides:
     """Rows are the points of the longer side (which roved), columns those that stayed.
 
     `table` (r, c, m): residues times 2iω_d, nearly real up to one phase for each mode; NaN where
-    not measured. `hit` says whether the rows were hit (a roving hammer) or felt.
+    not measured. `hit` says whether the rows were hit (a roving hammer) or felt, `driving` are the
+    (row, column) of points that were measured against themselves.
     """
 
     rows: tuple[Dof, ...]
     columns: tuple[Dof, ...]
     table: np.ndarray
     hit: bool
+    driving: tuple[tuple[int, int], ...]
 
     @classmethod
     def of(cls, matrix: FrfMatrix, found: MatrixPoles, modes: np.ndarray) -> "RovingSides":
@@ -38,14 +40,7 @@ class RovingSides:
         values, side = found.fit.residue[:, modes] * 2j * found.fit.poles[modes].imag, matrix.roved
         table = np.full((*side.measured.shape, modes.size), np.nan + 0j)
         table[found.rows, found.columns] = values
-        return cls(side.responses, side.references, table, matrix.hit)
-
-    @property
-    def driving(self) -> tuple[tuple[int, int], ...]:
-        """(row, column) of points that were measured against themselves."""
-        places = {dof: k for k, dof in enumerate(self.rows)}
-        found = ((places[d], i) for i, d in enumerate(self.columns) if d in places)
-        return tuple(pair for pair in found if np.isfinite(self.table[pair][0]))
+        return cls(side.responses, side.references, table, matrix.hit, side.driving)
 
     @cached_property
     def motions(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -191,16 +186,8 @@ class Exchange:
         )
 
 
-def exchanges(sides: RovingSides, geometry: Geometry | None) -> tuple[Exchange, ...]:
-    """Points that were exchanged: told by rows and columns, else by the neighbours."""
-    motions = sides.motions
-    if motions is None:
-        return ()
-    return _against_columns(sides, *motions) or exchanged_by_neighbours(sides, geometry)
-
-
 def exchanged_by_neighbours(sides: RovingSides, geometry: Geometry | None) -> tuple[Exchange, ...]:
-    """Points that were exchanged, told by the neighbours alone."""
+    """Points that were exchanged, told by their neighbours."""
     if sides.motions is None or geometry is None:
         return ()
     pair = exchanged_nodes(sides.rows, sides.motions[0].real, geometry)
@@ -221,13 +208,13 @@ def turning_helps(sides: RovingSides, turned: tuple[Dof, ...]) -> bool:
     return _misfit(shape, (sign[:, None] * columns)[stayed], rows) < FITS
 
 
-def _against_columns(
-    sides: RovingSides, shape: np.ndarray, columns: np.ndarray
-) -> tuple[Exchange, ...]:
+def exchanged_by_columns(sides: RovingSides) -> tuple[Exchange, ...]:
+    """Points that were exchanged, told by rows and columns of the same points."""
+    if sides.motions is None or len(sides.driving) < 2:
+        return ()
+    shape, columns = sides.motions
     rows = [o for o, _ in sides.driving]
     weights = columns[[i for _, i in sides.driving]]
-    if len(rows) < 2:
-        return ()
     stated = _misfit(shape, weights, rows)
     tried: dict[tuple[Dof, Dof], float] = {}
     for row in rows:

@@ -16,7 +16,7 @@ import scipy.signal
 
 from planner.errors import RefusedError
 from planner.modal.mac import mac, phase_collinearity, phase_deviation_deg
-from planner.modal.modes import Mode
+from planner.modal.modes import UNSCALED, Mode
 from planner.modal.plscf import Diagram, Line, PoleSet, diagram, stable
 from planner.modal.residues import realign
 
@@ -196,10 +196,10 @@ def _mode(line: Line, parts: list[tuple[complex, np.ndarray]], size: np.ndarray)
         shape_sd = np.sqrt(np.mean(np.abs(off) ** 2, axis=0) / 2) / root
     seen = len(parts) / SEGMENTS
     return Mode(
-        line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, shape[:, None],
-        shape_sd[:, None], shape, float(np.clip(0.3 * line.share + 0.7 * seen, 0.0, 1.0)), shape_sd,
+        line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, *UNSCALED, shape,
+        float(np.clip(0.3 * line.share + 0.7 * seen, 0.0, 1.0)), shape_sd,
         collinearity=phase_collinearity(shape), deviation_deg=phase_deviation_deg(shape),
-    ).unscaled()  # fmt: skip
+    )  # fmt: skip
 
 
 def _spectrum(values: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from planner.modal.fit_data import Data
-from planner.modal.least_squares import PoleFit, complex_of, slope_turn
+from planner.modal.least_squares import PoleFit, complex_of, scaled_inverse, slope_turn
 from planner.modal.rank_one_fit import Entries, fit_shape
 from planner.modal.residues import Residues, basis, basis_slope, unpack
 
@@ -259,10 +259,7 @@ class _ShapeProblem:
         # What earlier groups leave no freedom has a variance of rounding alone.
         least = np.maximum(1e-13 * np.diag(covariance), 1e-300)
         for group in self._nothings():
-            own = covariance[np.ix_(group, group)]
-            unit = np.sqrt(np.maximum(np.diag(own), least[group]))
-            inverse = np.linalg.pinv(own / unit[:, None] / unit, rcond=1e-10, hermitian=True)
-            inverse = inverse / unit[:, None] / unit
+            inverse = scaled_inverse(covariance[np.ix_(group, group)], 1e-10, least[group])
             # Chance of what is nothing not to be called something
             if values[group] @ inverse @ values[group] > chi2.ppf(0.999, group.size):
                 continue

@@ -13,7 +13,7 @@ from planner.frf.quantities import DERIVATIVE, convert
 from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.mode_selection import presences
-from planner.modal.modes import ModalModel, Mode
+from planner.modal.modes import UNSCALED, ModalModel, Mode
 from planner.modal.plscf import Line, diagram, plscf, stable
 from planner.modal.residues import lsfd, rank_one
 from planner.recording.records import FrfRecord
@@ -112,9 +112,8 @@ def _mode(line: Line, residue: np.ndarray, certain: float) -> Mode:
         float(np.std(np.abs(late)) / (2 * np.pi)),
         line.damping_ratio,
         float(np.std(-late.real / np.abs(late))),
-        residue,
-        residue.real,
+        *UNSCALED,
         rank_one(residue)[0],
         # Rough: how often it was there, how still it stood, how much of the response it is.
         float(certain * (1 - line.scatter)),
-    ).unscaled()
+    )

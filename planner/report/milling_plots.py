@@ -12,7 +12,7 @@ from scipy.stats import rankdata
 from planner.campaign.toolpath_poses import FeedAdvice, TurnAdvice
 from planner.milling.coupling import AMPLIFICATION_LIMIT, CoupledFrf
 from planner.milling.cut import Cut
-from planner.milling.lobes import SampledLimits, StabilityLimit
+from planner.milling.lobes import SampledLimits, StabilityLimit, depths_of
 from planner.milling.path import PathLimits
 from planner.report.plot_marks import AXES, MEASURED, MODEL, empty, magnitude, name_axes, panels
 
@@ -30,10 +30,10 @@ def lobes_figure(
     point: tuple[float, float] | None,
 ) -> Figure:  # fmt: skip
     """Depth limits in mm over speeds in rpm, with probabilities; below it the chatter frequency."""
-    rpm, depth = cut.speeds_rpm, 1e3 * np.array([loss.depth_m for loss in found])
+    rpm, depth = cut.speeds_rpm, 1e3 * depths_of(found)
     figure, grid = panels((9.0, 6.5), _title(cut), 2, height_ratios=(3, 1))
     upper, lower = grid[:, 0]
-    highest = np.nanmax(depth) if np.any(np.isfinite(depth)) else 1e3 * cut.depth_m[1]
+    highest = max(depth[np.isfinite(depth)], default=1e3 * cut.depth_m[1])
     top = min(1e3 * cut.depth_m[1], ROOM * max(highest, 1e3 * point[1] if point else 0.0))
     shown = np.where(np.isfinite(depth), depth, 2 * top)
     if drawn is None:

@@ -18,7 +18,13 @@ from planner.campaign.toolpath_poses import (
     turn_advice,
 )
 from planner.milling.cut import Cut, load_cut
-from planner.milling.lobes import PROBABILITY, StabilityLimit, sampled_limits, stability_limits
+from planner.milling.lobes import (
+    PROBABILITY,
+    StabilityLimit,
+    depths_of,
+    sampled_limits,
+    stability_limits,
+)
 from planner.milling.machine import Multiplier, multiplier
 from planner.milling.path import TURNS_DEG, PathLimits, limits_along, limits_by_feed
 from planner.milling.structure import Structure, limit_remarks, out_of_band_remark
@@ -48,7 +54,7 @@ def depth_mm(depth_m: float, every: str, unit: str = "") -> str:
 class LimitsBySpeed(Answer):
     """First losses of stability at each speed (n,) of a cut, and depths stable with 95 %, in m.
 
-    NaN or inf where every depth that was asked for is stable.
+    inf where every depth that was asked for is stable.
     """
 
     cut: Cut
@@ -121,7 +127,7 @@ def stability_of(
     structure = structure_of(asked, cut)
     machine, samples = structure.machine(cut), structure.samples(cut, asked.samples)
     found = stability_limits(machine, part_of(progress, 0.0, LOBES_SHARE if samples else 1.0))
-    depth = robust = np.array([loss.depth_m for loss in found])
+    depth = robust = depths_of(found)
     outside = out_of_band_remark(structure, np.array([loss.chatter_hz for loss in found]))
     said, drawn = [*structure.remarks, *([outside] if outside else [])], None
     if samples:

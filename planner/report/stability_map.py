@@ -11,7 +11,7 @@ from rich.text import Text
 from planner.campaign.cut_source import StabilityRequest, ToolChange, at_poses_in_band
 from planner.errors import InputError
 from planner.milling.cut import Cut
-from planner.milling.path import best_speed_of, limits_at_speed
+from planner.milling.path import best_speed_of, limits_along
 from planner.milling.structure import OutOfBandError, Structure
 from planner.progress import ProgressCallback, no_progress, part_of
 from planner.report.answer import Answer
@@ -102,7 +102,8 @@ def map_report(
     rpm = (
         wanted[0] if wanted else best_speed_of(poses, cut, MOST_SPEEDS, part_of(progress, 0.0, 0.5))
     )
-    found, robust = limits_at_speed(poses, cut, rpm, asked.samples, part_of(progress, 0.5, 1.0))
+    limits = limits_along(poses, cut.at_speed(rpm), asked.samples, part_of(progress, 0.5, 1.0))
+    robust = limits.robust_m[:, 0]
     share = None if wanted is None else float(np.mean(robust > wanted[1]))
     low, *_, high = campaign.frequency_lines
     told = (
@@ -112,7 +113,7 @@ def map_report(
     )
     joints = campaign.cell.robot.joints
     answer = MapReport(
-        rpm, names, joints.shown(q), candidates.position_m[kept], found, robust,
+        rpm, names, joints.shown(q), candidates.position_m[kept], limits.depth_m[:, 0], robust,
         names[int(np.argmin(robust))],
         wanted_depth_m=wanted[1] if wanted else None,
         wanted_share=share,

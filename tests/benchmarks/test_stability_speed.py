@@ -8,8 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from planner.milling.machine import Machine, multipliers
 from planner.milling.period import Discretisation
-from planner.milling.semi_discretisation import semi_growth
-from tests.support.milling_cases import MULTIPLIERS, cut, machine, one_mode
+from tests.support.milling_cases import MULTIPLIERS, cut, machine, one_mode, semi_growth
 
 RPM, DEPTH_MM = 5000.0, 0.5
 

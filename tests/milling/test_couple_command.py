@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import pyuff
 
 from planner.campaign.posture_tip import posture_tip
 from planner.cli.run import run
@@ -88,28 +87,17 @@ def test_what_was_coupled_can_be_coupled_again(coupled, tmp_path):
     assert found == pytest.approx(np.moveaxis(tip.receptance[:, :2, :2], 0, -1), rel=1e-6)
 
 
-def exported(path, tip, nodes, directions=(1, 2)):
+def exported(path, tip, nodes):
     """Two points of the rod as an analyser exports them: accelerance between all directions."""
-    uff, f = pyuff.UFF(str(path)), tip.frequency_hz
-    c = tip.receptance
-    turn = {1: np.array([1, 0, 0, 1.0]), 2: np.array([0, 1, -1.0, 0])}
-    places = {}
-    for node, distance in nodes:
-        for d in directions:
-            here = turn[d] * np.array([1, 1, -distance, -distance])
-            places[node, d] = here
-    for (node, i), response in places.items():
-        for (hit, j), force in places.items():
-            h = np.einsum("a,fab,b->f", response, c, force) * (2j * np.pi * f) ** 2
-            entry = {
-                "type": 58, "binary": 0, "func_type": 4, "id1": "SIMULATED", "rsp_node": node,
-                "rsp_dir": i, "ref_node": hit, "ref_dir": j, "data": h, "x": f,
-                "abscissa_spacing": 1, "abscissa_min": f[0], "abscissa_inc": f[1] - f[0],
-                "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12,
-                "ordinate_axis_units_lab": "m/s^2", "orddenom_spec_data_type": 13,
-                "orddenom_axis_units_lab": "N",
-            }  # fmt: skip
-            uff.write_sets(entry, "add")
+    turn = {"x": np.array([1, 0, 0, 1.0]), "y": np.array([0, 1, -1.0, 0])}
+    places = {
+        Dof(str(node), d): turn[d] * np.array([1, 1, -distance, -distance])
+        for node, distance in nodes for d in turn
+    }  # fmt: skip
+    ends, f = np.array(list(places.values())), tip.frequency_hz
+    h = np.einsum("oa,fab,ib->oif", ends, tip.receptance, ends) * (2j * np.pi * f) ** 2
+    dofs = tuple(places)
+    return write_matrix(path, FrfMatrix(f, dofs, dofs, h, np.full(h.shape, np.nan), True))
 
 
 def rod(path, **changes):
@@ -153,8 +141,8 @@ def test_a_missing_point_is_named(few, tmp_path):
 def test_another_grid_of_the_same_length_is_refused(few, tmp_path):
     """In one file the reader sees it; in records of several, what unites them."""
     path, shifted = tmp_path / "frfs.uff", replace(few, frequency_hz=few.frequency_hz + 1.0)
-    exported(path, few, ((1, 0.0),))
-    exported(path, shifted, ((5, 0.02),))
+    parts = (few, ((1, 0.0),)), (shifted, ((5, 0.02),))
+    path.write_bytes(b"".join(exported(path, *part).read_bytes() for part in parts))
     cut = tmp_path / "cut.toml"
     cut.write_text(CUT)
     couple = ["couple", path, "--tool", LEI / "target.toml", "--reference", rod(tmp_path)]

@@ -164,6 +164,14 @@ def measured(values, noise=0.0, seed=0):
     return CutterFrf("two points", FREQUENCY, moved + sd * (a + 1j * b) / np.sqrt(2), sd)
 
 
+TESTED, PUT_ON = tool(REFERENCE, RIGID_ENOUGH), tool(TARGET, LOOSER)
+
+
+def tip_of(values, noise=0.0, seed=0):
+    """Receptances at the tested tool's tip, of its tip and a point 20 mm behind it."""
+    return two_point_receptance(measured(values, noise, seed), ACROSS, TESTED, Point("1a", 0.02))
+
+
 @pytest.fixture(scope="module")
 def assembled():
     base = machine()
@@ -173,18 +181,14 @@ def assembled():
 
 def test_two_points_tell_the_rotations_of_a_bending_tool(assembled):
     reference, target = assembled
-    ref = tool(REFERENCE, RIGID_ENOUGH)
-    tip = two_point_receptance(measured(reference), ACROSS, ref, Point("1a", 0.02))
-    found = couple(tip, tool(TARGET, LOOSER), ref)
+    found = couple(tip_of(reference), PUT_ON, TESTED)
     size = np.sqrt(np.einsum("iif,jjf->ijf", np.abs(target), np.abs(target)))
     assert np.max(np.abs(found.receptance[KEPT] - target) / size) < 1e-5
 
 
 def test_one_percent_noise_and_what_the_sd_says_of_it(assembled):
     reference, target = assembled
-    ref = tool(REFERENCE, RIGID_ENOUGH)
-    tip = two_point_receptance(measured(reference, 0.01, 3), ACROSS, ref, Point("1a", 0.02))
-    found = couple(tip, tool(TARGET, LOOSER), ref)
+    found = couple(tip_of(reference, 0.01, 3), PUT_ON, TESTED)
     error = np.abs(found.receptance[KEPT] - target)
     assert np.sqrt(np.mean((error / found.sd[KEPT]) ** 2)) == pytest.approx(1.0, abs=0.08)
     for k in range(2):
@@ -194,14 +198,11 @@ def test_one_percent_noise_and_what_the_sd_says_of_it(assembled):
 
 def test_amplification_is_the_growth_of_errors(assembled):
     reference, _ = assembled
-    ref, put = tool(REFERENCE, RIGID_ENOUGH), tool(TARGET, LOOSER)
-    exact = couple(
-        two_point_receptance(measured(reference), ACROSS, ref, Point("1a", 0.02)), put, ref
-    )
+    exact = couple(tip_of(reference), PUT_ON, TESTED)
     grown = np.zeros(len(FREQUENCY))
     for seed in range(25):
-        tip = two_point_receptance(measured(reference, 1e-5, seed), ACROSS, ref, Point("1a", 0.02))
-        off = (couple(tip, put, ref).receptance - exact.receptance)[:2, :2]
+        found = couple(tip_of(reference, 1e-5, seed), PUT_ON, TESTED)
+        off = (found.receptance - exact.receptance)[:2, :2]
         grown += np.sum(np.abs(off) ** 2, axis=(0, 1)) / 25
     size = np.sum(np.abs(exact.receptance[:2, :2]) ** 2, axis=(0, 1))
     ratio = np.sqrt(grown / size) / 1e-5 / exact.amplification
@@ -213,8 +214,8 @@ def test_taking_off_undoes_putting_on():
     rng = np.random.default_rng(0)
     half = rng.standard_normal((6, 6, 5)) * 1e-7
     holder = TipReceptance.known(np.linspace(10, 900, 5), half + np.swapaxes(half, 0, 1))
-    on = couple(holder, tool(TARGET, LOOSER))
-    back = couple(TipReceptance.known(on.frequency_hz, on.receptance), None, tool(TARGET, LOOSER))
+    on = couple(holder, PUT_ON)
+    back = couple(TipReceptance.known(on.frequency_hz, on.receptance), None, PUT_ON)
     assert back.receptance == pytest.approx(np.moveaxis(holder.receptance, 0, -1), rel=1e-8)
 
 
@@ -224,9 +225,9 @@ def test_a_tool_along_any_axis(axis):
     rng = np.random.default_rng(1)
     half = rng.standard_normal((6, 6, 4)) * np.repeat([1e-7, 1e-6], 3)[:, None, None]
     c, f = half + np.swapaxes(half, 0, 1), np.linspace(10, 900, 4)
-    straight, other = tool(TARGET, LOOSER), Tool("t", axis, tool(TARGET, LOOSER).parts)
+    other = Tool("t", axis, PUT_ON.parts)
     turn = np.kron(np.eye(2), other.frame)
-    expected = couple(TipReceptance.known(f, c), straight).receptance
+    expected = couple(TipReceptance.known(f, c), PUT_ON).receptance
     turned = np.einsum("ij,jkf,lk->ilf", turn, c, turn)
     found = couple(TipReceptance.known(f, turned), other).receptance
     assert found == pytest.approx(np.einsum("ij,jkf,lk->ilf", turn, expected, turn), rel=1e-7)
@@ -234,10 +235,12 @@ def test_a_tool_along_any_axis(axis):
 
 def test_an_uncertain_contact_widens_the_answer(assembled):
     reference, _ = assembled
-    ref, put = tool(REFERENCE, RIGID_ENOUGH), tool(TARGET, LOOSER)
-    tip = two_point_receptance(measured(reference), ACROSS, ref, Point("1a", 0.02))
-    contact = ToolContact(*LOOSER, sd_percent=20.0)
-    sd = couple(tip, put.held(0, contact), ref).sd[0, 0]
-    moved = couple(tip, put.held(0, contact.scaled("stiffness_n_m", 1.2)), ref).receptance[0, 0]
-    assert np.nanmax(couple(tip, put, ref).sd) == 0
-    assert np.all(sd >= np.abs(moved - couple(tip, put, ref).receptance[0, 0]) * (1 - 1e-9))
+    tip, contact = tip_of(reference), ToolContact(*LOOSER, sd_percent=20.0)
+    softer = contact.scaled("stiffness_n_m", 1.2)
+    known, sure, moved = (
+        couple(tip, held, TESTED)
+        for held in (PUT_ON, PUT_ON.held(0, contact), PUT_ON.held(0, softer))
+    )
+    assert np.nanmax(known.sd) == 0
+    off = np.abs(moved.receptance - known.receptance)[0, 0]
+    assert np.all(sure.sd[0, 0] >= off * (1 - 1e-9))

@@ -6,7 +6,7 @@ import pytest
 from planner.campaign.config import load_campaign_config
 from planner.campaign.decision import Decision
 from planner.errors import InputError
-from planner.milling.lobes import stability_limits
+from planner.milling.lobes import depths_of, stability_limits
 from planner.milling.path import decide, limits_along, limits_by_feed
 from planner.milling.structure import Structure
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way
@@ -58,11 +58,8 @@ def test_path_takes_the_tightest_pose_and_the_speed_that_suits_all():
     stiff = Structure(one_mode(), np.zeros(4))
     soft = Structure(one_mode((0.6, 0.8)), np.zeros(4))
     both = limits_along([("a", stiff), ("b", soft)], given, 20)
-    alone = [
-        [loss.depth_m for loss in stability_limits(machine(structure.modes, given))]
-        for structure in (stiff, soft)
-    ]
-    least = np.nanmin(np.nan_to_num(alone, nan=np.inf), axis=0)
+    alone = [depths_of(stability_limits(s.machine(given))) for s in (stiff, soft)]
+    least = np.min(alone, axis=0)
     np.testing.assert_allclose(np.min(both.robust_m, axis=0), least)
     assert both.best_speed == int(np.argmax(least))
 
@@ -76,7 +73,7 @@ def test_feed_turned_into_a_mode_is_the_cut_turned():
         milling="down", radial_immersion=0.3, depth_m=(0.0, 0.02, 10), spindle_rpm=(RPM, RPM, 1)
     )
     wanted = stability_limits(machine(one_mode((0.0, -1.0)), across))[0].depth_m
-    assert turned[6] == pytest.approx(np.inf if np.isnan(wanted) else wanted, rel=1e-6)
+    assert turned[6] == pytest.approx(wanted, rel=1e-6)
     assert turned[12] == pytest.approx(turned[0], rel=1e-6)
 
 

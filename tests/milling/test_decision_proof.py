@@ -29,7 +29,7 @@ from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.milling.cut import Cut, load_cut
 from planner.milling.cutter_frf import of_accelerance
-from planner.milling.lobes import stability_limits
+from planner.milling.lobes import depths_of, stability_limits
 from planner.milling.structure import of_frf
 from planner.modal.estimate_modes import estimate_modes
 from planner.truth.deviation import Deviation
@@ -120,7 +120,7 @@ def make_case(folder: Path, seed: int, simulation: str) -> DecisionCase:
 def true_limits(truth: Truth, q: np.ndarray, given: Cut) -> np.ndarray:
     """(n,) in m at the cut's speeds."""
     known = of_frf(of_accelerance("true", LINES, truth.accelerance(q, LINES), None), given)
-    return np.array([loss.depth_m for loss in stability_limits(known.machine(given))])
+    return depths_of(stability_limits(known.machine(given)))
 
 
 def play(case: DecisionCase, strategy: str, budget: int):

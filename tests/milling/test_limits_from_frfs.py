@@ -13,9 +13,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import pyuff
 
 from planner.cli.run import run
+from planner.frf.matrix import FrfMatrix
+from planner.recording.dof import Dof
+from tests.support.matrix_files import write_matrix
 
 # Cuts that follow each other from structure to structure.
 CUT = """
@@ -86,19 +88,8 @@ class Tap:
         parts = rng.standard_normal((2, *h.shape)) / np.sqrt(2)
         h = h + self.noise * np.abs(h).max() * (parts[0] + 1j * parts[1])
         frfs, modes, cut = folder / "tap.uff", folder / "modes.toml", folder / "cut.toml"
-        sets = [
-            {
-                "type": 58, "binary": 1, "func_type": 4, "id1": "SIMULATED", "rsp_node": 1,
-                "rsp_dir": i + 1, "ref_node": 1, "ref_dir": j + 1, "data": h[i, j], "x": lines,
-                "abscissa_spacing": 1, "abscissa_min": lines[0], "abscissa_inc": self.step_hz,
-                "ord_data_type": 6, "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12,
-                "ordinate_axis_units_lab": "m/s^2", "orddenom_spec_data_type": 13,
-                "orddenom_axis_units_lab": "N",
-            }
-            for i in range(2) for j in range(2)
-        ]  # fmt: skip
-        for one in sets:
-            pyuff.UFF(str(frfs)).write_sets(one, "add")
+        ends = Dof("1", "x"), Dof("1", "y")
+        write_matrix(frfs, FrfMatrix(lines, ends, ends, h, np.full(h.shape, np.nan), True))
         modes.write_text("".join(
             f"[[mode]]\nfrequency_hz = {f!r}\ndamping_ratio = {z!r}\nmass_kg = {m!r}\n"
             f"direction = {d.tolist()}\n"

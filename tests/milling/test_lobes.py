@@ -19,7 +19,6 @@ from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.lobes import stability_limits
 from planner.milling.machine import Machine, limits, multiplier
-from planner.milling.semi_discretisation import semi_growth
 from tests.support.milling_cases import (
     MULTIPLIERS,
     ONE_MODE,
@@ -28,6 +27,7 @@ from tests.support.milling_cases import (
     cut,
     machine,
     one_mode,
+    semi_growth,
     two_each_way,
     two_equal,
 )

@@ -8,10 +8,10 @@ import pytest
 
 from planner.errors import InputError
 from planner.frf.quantities import convert
+from planner.milling.cut import Cut
 from planner.milling.cutter_frf import CutterFrf, of_accelerance
 from planner.milling.cutter_modes import CutterFit, CutterModes, real_modes
-from planner.milling.lobes import sampled_limits, stability_limits
-from planner.milling.semi_discretisation import semi_growth
+from planner.milling.lobes import depths_of, sampled_limits, stability_limits
 from planner.milling.structure import (
     Structure,
     explaining,
@@ -20,7 +20,7 @@ from planner.milling.structure import (
     of_frf,
     sampled,
 )
-from tests.support.milling_cases import cut, machine, one_mode, two_each_way
+from tests.support.milling_cases import cut, machine, one_mode, semi_growth, two_each_way
 
 LINES = np.arange(200.0, 2400.0, 2.0)
 
@@ -42,17 +42,23 @@ def crossed() -> CutterModes:
     return CutterModes(modes.poles, shapes, drives, 5e-9 * np.array([[1.0, 0.2], [0.1, 0.8]]))
 
 
+def check_limits(frf: CutterFrf, modes: CutterModes, given: Cut, rtol: float) -> Structure:
+    """FRFs give the limits of their modes; returns what was found of them."""
+    found = of_frf(frf, given)
+    wanted = depths_of(stability_limits(machine(modes, given)))
+    depth = depths_of(stability_limits(found.machine(given)))
+    np.testing.assert_allclose(depth, wanted, rtol=rtol)
+    assert np.all(np.isfinite(wanted))
+    return found
+
+
 @pytest.mark.parametrize("method", ["full_discretisation", "zeroth_order"])
 def test_frfs_give_the_limits_of_their_modes(method: str):
     given = cut(
         milling="down", radial_immersion=0.5, spindle_rpm=(5000.0, 15000.0, 5), method=method,
         depth_m=(0.0, 0.05, 10),
     )  # fmt: skip
-    found = stability_limits(of_frf(tip(crossed()), given).machine(given))
-    wanted = stability_limits(machine(crossed(), given))
-    np.testing.assert_allclose(
-        [loss.depth_m for loss in found], [loss.depth_m for loss in wanted], rtol=2e-3
-    )
+    check_limits(tip(crossed()), crossed(), given, 2e-3)
 
 
 def test_methods_agree_on_cross_frfs_and_residual_compliance():
@@ -84,16 +90,12 @@ def test_frfs_that_lack_an_axis_of_the_cut_are_refused():
 @pytest.mark.parametrize(("lacking", "taken"), [(((0, 1), (1, 0)), "0"), (((1, 0),), "xy")])
 def test_cross_frfs_that_lack_are_taken_as_the_others_or_nothing_and_named(lacking, taken):
     """Machinists tap along feed and normal alone: xx and yy."""
-    given, full = cut(milling="down", radial_immersion=0.5), tip(two_each_way())
-    part = replace(full, receptance=full.receptance.copy())
+    given, part = cut(milling="down", radial_immersion=0.5), tip(two_each_way())
     for i, j in lacking:
         part.receptance[i, j] = np.nan
-    found = of_frf(part, given)
+    found = check_limits(part, two_each_way(), given, 1e-6)
     assert [f"lacks the FRF {'xy'[i]}{'xy'[j]}: it is taken as {taken}." in " ".join(found.remarks)
             for i, j in lacking] == [True] * len(lacking)  # fmt: skip
-    depth = [[loss.depth_m for loss in stability_limits(s.machine(given))]
-             for s in (found, of_frf(full, given))]  # fmt: skip
-    np.testing.assert_allclose(*depth, rtol=1e-6)
 
 
 @pytest.mark.parametrize("method", ["zeroth_order", "full_discretisation"])
@@ -106,11 +108,7 @@ def test_limits_are_not_lost_between_lines(method: str, step_hz: float):
     )  # fmt: skip
     given = cut(milling="down", radial_immersion=0.5, kt_n_m2=7e8, method=method,
                 spindle_rpm=(1200.0, 2400.0, 4), depth_m=(0.0, 0.2, 100))  # fmt: skip
-    found = of_frf(tip(modes, step_hz * np.arange(1, 121)), given)
-    depth = [[loss.depth_m for loss in stability_limits(m)] for m in
-             (found.machine(given), machine(modes, given))]  # fmt: skip
-    assert np.all(np.isfinite(depth[1]))
-    np.testing.assert_allclose(*depth, rtol=1e-4)
+    check_limits(tip(modes, step_hz * np.arange(1, 121)), modes, given, 1e-4)
 
 
 def test_two_modes_that_are_alike_stay_two():
@@ -118,10 +116,7 @@ def test_two_modes_that_are_alike_stay_two():
     modes = real_modes(np.array([81.6, 82.5]), np.array([0.02, 0.04]), np.array([15.0, 40.0]),
                        np.array([[1.0, 0.0], [np.cos(0.15), np.sin(0.15)]]))  # fmt: skip
     given = cut(spindle_rpm=(2000.0, 8000.0, 4), depth_m=(0.0, 0.5, 100), method="zeroth_order")
-    found = of_frf(tip(modes, 1.81 * np.arange(1, 80)), given)
-    depth = [[loss.depth_m for loss in stability_limits(m)] for m in
-             (found.machine(given), machine(modes, given))]  # fmt: skip
-    np.testing.assert_allclose(*depth, rtol=1e-3)
+    check_limits(tip(modes, 1.81 * np.arange(1, 80)), modes, given, 1e-3)
 
 
 def noisy(modes: CutterModes, lines: np.ndarray, share: float, seed: int) -> CutterFrf:
@@ -137,17 +132,15 @@ def noisy(modes: CutterModes, lines: np.ndarray, share: float, seed: int) -> Cut
 def test_lines_in_the_noise_govern_nothing(step_hz: float):
     """0.1 % noise, lines from the first on: divided by ω² these were pure noise."""
     given, modes = cut(spindle_rpm=(5000.0, 20000.0, 8)), two_each_way()
-    found = of_frf(noisy(modes, step_hz * np.arange(1, int(2200 / step_hz)), 1e-3, 3), given)
-    depth = [[loss.depth_m for loss in stability_limits(m)] for m in
-             (found.machine(given), machine(modes, given))]  # fmt: skip
-    np.testing.assert_allclose(*depth, rtol=0.03)
+    frf = noisy(modes, step_hz * np.arange(1, int(2200 / step_hz)), 1e-3, 3)
+    check_limits(frf, modes, given, 0.03)
 
 
 def test_noise_is_sampled_as_wide_as_it_scatters():
     """Limits by other noises lie within the samples of one as often as these say."""
     given = cut(spindle_rpm=(9000.0, 12000.0, 3), method="zeroth_order")
     lines, modes = np.arange(2.0, 2200.0, 2.0), two_each_way()
-    true = np.array([loss.depth_m for loss in stability_limits(machine(modes, given))])
+    true = depths_of(stability_limits(machine(modes, given)))
     inside = []
     for seed in range(8):
         found = of_frf(noisy(modes, lines, 0.003, 10 + seed), given)
@@ -169,7 +162,7 @@ def test_what_lines_and_noise_leave_open_is_said():
     said = {}
     for share in (0.0, 0.01):
         found = of_frf(noisy(modes, np.arange(2.0, 1300.0, 2.0), share, 5), given)
-        depth = np.array([loss.depth_m for loss in stability_limits(found.machine(given))])
+        depth = depths_of(stability_limits(found.machine(given)))
         said[share] = limit_remarks(found, given, depth, depth > 0)
     assert said[0.0] == []
     (text,) = said[0.01]
@@ -222,7 +215,7 @@ def test_robust_depth_is_that_of_the_coefficients_alone():
     exact = cut(spindle_rpm=(9000.0, 12000.0, 3))
     found = stability_limits(structure.machine(exact))
     drawn = sampled_limits(structure.samples(exact, 60), found)
-    depth = np.array([loss.depth_m for loss in found])
+    depth = depths_of(found)
     np.testing.assert_allclose(drawn.robust(), depth * np.exp(-1.645 * 0.1), rtol=0.03)
     assert np.all(drawn.robust_sd() < 0.05)
     both = sampled_limits(structure.samples(given, 40), found)

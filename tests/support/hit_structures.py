@@ -3,7 +3,9 @@
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
+from planner.frf.synthesis import accelerance
 from planner.recording.dof import Dof
+from tests.support.modal_systems import noisy
 from tests.support.structures import Structure
 
 NOISE = 0.01  # of the rms of each FRF
@@ -17,12 +19,8 @@ def hit_frfs(
 ) -> FrfMatrix:
     """A matrix of FRFs of all points hit and felt at `references` (indices), with NOISE."""
     poles, shapes = structure.poles()
-    s = 2j * np.pi * frequency_hz
-    residues = shapes[:, None] * shapes[references]
-    up, down = 1 / (s - poles[:, None]), 1 / (s - poles.conj()[:, None])
-    h = s**2 * (residues @ up + residues.conj() @ down)
-    level = NOISE * np.sqrt(np.mean(np.abs(h) ** 2, axis=-1, keepdims=True))
-    h = h + level * (rng.normal(size=h.shape) + 1j * rng.normal(size=h.shape)) / np.sqrt(2)
+    residues = np.moveaxis(shapes[:, None] * shapes[references], -1, 0)
+    h, _ = noisy(accelerance(frequency_hz, poles, residues), NOISE, rng)
     return FrfMatrix(
         frequency_hz,
         tuple(dof_of(structure, i) for i in range(len(structure.nodes))),

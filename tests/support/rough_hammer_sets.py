@@ -12,12 +12,14 @@ import numpy as np
 import scipy.linalg
 
 from planner.frf.matrix import FrfMatrix
+from planner.frf.synthesis import accelerance
 from planner.modal.mac import mac
 from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 from tests.support.hit_structures import dof_of, unit_mass_shapes
+from tests.support.modal_systems import noisy
 from tests.support.structures import Structure, plate
 
 KINDS = ("panel", "frame", "pieces")
@@ -90,7 +92,6 @@ def _struck(
     rng: np.random.Generator, noise: float, gain: float, drift: float, missing: float,
 ) -> FrfMatrix:  # fmt: skip
     poles, shapes = structure.poles()
-    s = 2j * np.pi * frequency_hz
     nodes = list(dict.fromkeys(structure.nodes))
     # Half of the drift is common to all modes (warmth), half each mode's own (loading, clamps).
     common = drift / np.sqrt(2) * rng.normal(size=(len(nodes), 1))
@@ -98,12 +99,9 @@ def _struck(
     factor = dict(zip(nodes, 1 + common + own, strict=True))
     h = np.zeros((len(structure.nodes), len(references), frequency_hz.size), complex)
     for o, node in enumerate(structure.nodes):
-        p = poles * factor[node]
-        up, down = 1 / (s - p[:, None]), 1 / (s - p.conj()[:, None])
-        r = shapes[o] * shapes[references]
-        h[o] = s**2 * (r @ up + r.conj() @ down) * (1 + gain * rng.normal())
-    level = noise * np.sqrt(np.mean(np.abs(h) ** 2, axis=-1, keepdims=True))
-    h = h + level * (rng.normal(size=h.shape) + 1j * rng.normal(size=h.shape)) / np.sqrt(2)
+        residues = (shapes[o] * shapes[references]).T
+        h[o] = accelerance(frequency_hz, poles * factor[node], residues) * (1 + gain * rng.normal())
+    h, _ = noisy(h, noise, rng)
     gone = rng.random(h.shape[:2]) < missing
     gone[references, np.arange(len(references))] = False
     h[gone] = np.nan

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
+from planner.frf.synthesis import accelerance
 from planner.recording.records import Hit
 
 RATE_HZ = 512.0
@@ -15,11 +16,7 @@ RESIDUES = np.einsum("mi,mj->mij", SHAPES, SHAPES) / (2j * POLES.imag)[:, None, 
 
 def exact_accelerance(frequency_hz: np.ndarray) -> np.ndarray:
     """(3, 3, F) of the structure."""
-    iw = 2j * np.pi * frequency_hz
-    total = np.zeros((3, 3, frequency_hz.size), complex)
-    for pole, residue in zip(POLES, RESIDUES, strict=True):
-        total += residue[..., None] / (iw - pole) + residue.conj()[..., None] / (iw - pole.conj())
-    return iw**2 * total
+    return accelerance(frequency_hz, POLES, RESIDUES)
 
 
 def make_hit(

@@ -6,7 +6,7 @@ import numpy as np
 
 from planner.milling.cut import Cut
 from planner.milling.cutter_frf import of_accelerance
-from planner.milling.lobes import sampled_limits, stability_limits
+from planner.milling.lobes import depths_of, sampled_limits, stability_limits
 from planner.milling.structure import of_frf
 
 
@@ -41,7 +41,7 @@ def limit_pair(
     found = stability_limits(told.machine(cut))
     drawn = sampled_limits(told.samples(cut, samples), found).depth_m
     return LimitPair(
-        np.array([loss.depth_m for loss in found]),
-        np.array([loss.depth_m for loss in stability_limits(known.machine(cut))]),
+        depths_of(found),
+        depths_of(stability_limits(known.machine(cut))),
         np.quantile(drawn, (0.05, 0.95), axis=0),
     )
