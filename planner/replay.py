@@ -85,7 +85,7 @@ def replay(
         cells = _Cells(campaign, stack)
         # A model follows from configuration and measurements: skips and undone acts leave it alone.
         models: dict[tuple[int, tuple[Measurement, ...]], Model] = {}
-        model, kept = None, campaign.recordings
+        model = None
         recalls: dict[int, Recall] = {}
         for entry in entries[:until]:
             before, after = fold(entries[: entry.seq - 1]), fold(entries[: entry.seq])
@@ -96,7 +96,8 @@ def replay(
             key = id(cell), after.used
             recall = recalls.setdefault(id(cell), in_memory())
             if key not in models:
-                models[key] = build(cell, after, kept.frf, kept.hits, recall)
+                kept = store.KeptRecordings.of(campaign.directory, cell)
+                models[key] = build(cell, after, kept.hits, recall)
             model = models[key]
             yield Step(entry, check, detail, after, model, measured, instead)
 

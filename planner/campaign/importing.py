@@ -303,10 +303,6 @@ def import_pose(
     event, told = _event(before, state, pose, known.joints_deg if known else joints_deg, judged)
     campaign.append(event)
     measurement = (campaign.state.held if event.question else campaign.state.measurements)[pose]
-    # Beside new hits earlier ones may look wrong; they stay accepted all the same.
-    agreed = all(verdict.accepted for verdict in measured.verdicts[: len(judged.old)])
-    if measured.frf is not None and agreed:
-        keeps.keep_frf(measured.frf, measurement, table)
     model = campaign.model
     remarks = remarks_on(campaign.cell.robot.joints, state, judged, measurement, joints_deg, told)
     if not event.question and any(hit.accepted for hit in hits):

@@ -1,6 +1,5 @@
 """The model of a campaign: a pure function of its cell and its state."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -9,7 +8,6 @@ import numpy as np
 
 from planner.campaign.acquisition_inputs import acquisition_inputs, poses_at, uncertain_parameters
 from planner.campaign.cell import Cell
-from planner.campaign.config import ModesTable
 from planner.campaign.hit_error_estimates import CampaignHitErrors
 from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.labels import LabelledPose, observations
@@ -33,8 +31,6 @@ from planner.words import counted, listed
 if TYPE_CHECKING:
     from planner.campaign.decision import Decision
     from planner.campaign.frf_model import FrfModel
-
-FrfOf = Callable[[Measurement, ModesTable], Frf]
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
@@ -65,7 +61,7 @@ class Model:
     frf_noise: FrfNoise | None = None  # None: no FRF was looked at
     estimated: CampaignHitErrors | None = None  # None: nothing tells errors of hits
     used: tuple[Measurement, ...] = ()  # of the labelled poses, as they were measured
-    frf_of: FrfOf | None = None
+    frfs: tuple[Frf, ...] = ()  # of their tools, in the band of campaign.toml
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
         """Frequencies and damping at poses q (n, dof) in rad, as a visit there would show them.
@@ -86,14 +82,6 @@ class Model:
         """Sds (n, count) with what the simulation's own parameters leave open, all in Hz."""
         share = self.surrogate.frequency_trust * self.low.frequency_sd(q, simulated)
         return np.hypot(sd, share * f)
-
-    @cached_property
-    def frfs(self) -> tuple[Frf, ...]:
-        """Of the labelled poses; read when asked for."""
-        if self.frf_of is None:
-            return ()
-        table = self.cell.config.modes
-        return tuple(self.frf_of(m, table).within(table.band_hz) for m in self.used)
 
     @cached_property
     def hit_errors(self) -> dict[str, tuple[HitErrorEstimate, ...]]:

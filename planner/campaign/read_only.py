@@ -13,7 +13,6 @@ from planner import content_hash
 from planner.campaign import store
 from planner.campaign.config import (
     CampaignConfig,
-    ModesTable,
     config_from_builtins,
     load_campaign_config,
 )
@@ -174,14 +173,14 @@ class ReadOnlyCampaign:
             return self._kept.result(self._key("fit", tuple(bare), ""), FitRecord, find)
 
         with threadpool_limits(1):
-            model = build(self.cell, state, kept.frf, kept.hits, recall)
+            model = build(self.cell, state, kept.hits, recall)
             _ = model.frequency_sd_percent, model.frf_sd_percent  # kept: every command needs them
         return model
 
     @property
     def recordings(self) -> KeptRecordings:
         """The recordings that were imported, by the points of the robot as configured now."""
-        return KeptRecordings(self.directory, self.cell.robot.points)
+        return KeptRecordings.of(self.directory, self.cell)
 
     def posture(self, pose: str | None) -> np.ndarray:
         """Joint angles (dof,) in rad of a measured or proposed pose; InputError names them."""
@@ -194,9 +193,9 @@ class ReadOnlyCampaign:
             raise InputError(f"{self.directory} {given} one of {some} with --pose.")
         return self.cell.robot.joints.internal(known[pose])
 
-    def frf_of(self, measurement: Measurement, table: ModesTable) -> "Frf":
+    def frf_of(self, measurement: Measurement) -> "Frf":
         """The FRF matrix of a measured pose, estimated again from its recordings if need be."""
-        return self.recordings.frf(measurement, table)
+        return self.recordings.hits(measurement).averaged
 
     def dataset(
         self,

@@ -21,7 +21,6 @@ DEFAULT_BAND_HZ = (4.0, 60.0)  # in which modes of a pose are looked for
 OVER = 7.5  # e^−OVER, 0.06 %, of a decay that does not damp is left where the record ends
 PACKAGES = "recording", "frf", "modal", "dataset", "inference"  # that results here depend on
 
-ACCEPTED = "accepted frf"  # what the store calls the FRF of a pose's accepted files
 NOT_OF_TOOL = (
     "No hit at the tcp was heard by all axes of the sensor there: modes of the tool are not told, "
     "what was measured at other points serves identification and diagnosis."
@@ -251,33 +250,6 @@ def measure(
     found = MeasuredPose(sources, band_hz, estimator, window_rate_1_s, store=store)
     _ = found.decomposed  # so that what is wrong with the files is said here
     return found
-
-
-def frf_of(
-    sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float = 0.0
-) -> Frf:
-    """The tool's FRF of files that were accepted before: the one that `measure` gave then."""
-
-    def make() -> Frf:
-        read = [source.read() for source in sources]
-        hits = tuple(hit for found, _ in read for hit in found)
-        frfs = tuple(record for _, found in read for record in found)
-        return tool_frf(hits, frfs, band_hz, window_rate_1_s)
-
-    return _accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, make)
-
-
-def keep_frf(
-    frf: Frf, sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float
-) -> None:
-    """Keep what `frf_of` will be asked for, now that it is at hand."""
-    _ = _accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, lambda: frf)
-
-
-def _accepted(
-    sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float
-) -> MeasuredPose:
-    return MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
 
 
 def one_hit_frf(

@@ -20,6 +20,7 @@ from planner.campaign.low_fidelity import Recall, in_memory
 from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.straightened import hits_unknown
 from planner.robot.robot import Robot
 from tests.support.counted_modes import NOT_COUNTED, counted, true_modes
 from tests.support.fitted_cases import ARMS, COUNTED, Case, everyday, harder
@@ -49,7 +50,7 @@ def models(case: Case, recall: Recall) -> Iterator[Model]:
     frfs = {m.pose: frf for m, frf in zip(used, case.frfs, strict=True)}
     for n in COUNTS:
         state = CampaignState(measurements={m.pose: m for m in used[:n]})
-        yield build(cell, state, lambda m, _: frfs[m.pose], recall=recall)
+        yield build(cell, state, hits_unknown(frfs), recall)
 
 
 @dataclass(frozen=True, eq=False)

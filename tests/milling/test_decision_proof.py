@@ -24,6 +24,7 @@ from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.straightened import hits_unknown
 from planner.design.space_filling import NESTED
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
@@ -133,7 +134,7 @@ def play(case: DecisionCase, strategy: str, budget: int):
             if i not in seen:
                 seen[i], frfs[f"P{i}"] = case.measured(i)
         state = CampaignState(measurements={seen[i].pose: seen[i] for i in used}, events=case.seed)
-        model = build(cell, state, lambda m, _: frfs[m.pose])
+        model = build(cell, state, hits_unknown(frfs))
         yield model, list(used)
         if len(used) == budget:
             return

@@ -1,6 +1,6 @@
 """Simulated campaigns for studies of acquisitions: true modes (MuJoCo) with noise of EMA's size."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from planner.campaign.measured_modes import from_mode
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.straightened import hits_unknown
 from planner.frf.frf import Frf
 from planner.frf.metrics import agreement
 from planner.modal.modes import Mode
@@ -154,7 +155,7 @@ def campaign(
     cost, candidates = case.cell.cost, case.cell.candidates
     measurements: dict[str, Measurement] = {}
     frfs: dict[str, Frf] = {}
-    frf_of: Callable = lambda m, _: frfs[m.pose]  # noqa: E731
+    hits_of = hits_unknown(frfs)
     minutes, at, model, planned = 0.0, None, None, list(initial)
     if not isinstance(strategy, str):
         planned += [i for i in strategy if i not in initial]
@@ -164,7 +165,7 @@ def campaign(
             q = candidates.q[planned[n - 1]]
         else:
             state = CampaignState(measurements=measurements, events=n)
-            model = model or build(case.cell, state, frf_of)
+            model = model or build(case.cell, state, hits_of)
             (proposal,) = propose(model, state, 1, str(strategy))
             q = np.deg2rad(np.array(proposal.joints_deg))
             axes = tuple("xyz".index(hit) for hit in proposal.hits)
@@ -174,7 +175,7 @@ def campaign(
         measurements = {**measurements, measurement.pose: measurement}
         frfs[measurement.pose] = frf
         state = CampaignState(measurements=measurements, events=n)
-        model = build(case.cell, state, frf_of)
+        model = build(case.cell, state, hits_of)
         found = np.sort(model.predict(case.unused).frequency_hz, axis=1)
         frf, _ = model.frf(case.unused[:OF_FRFS], case.lines_hz)
         frac = float(np.mean(agreement(case.true_frf, frf).global_frac))

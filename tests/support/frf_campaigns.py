@@ -55,19 +55,18 @@ class FrfCase:
     lines_hz: np.ndarray
     true_frf: np.ndarray
 
-    def frf_of(self, measurement: Measurement, _: object) -> Frf:
-        """As a campaign asks for it."""
-        return self.frfs[measurement.pose]
-
-    def hits_of(self, measurement: Measurement, _: object) -> PoseHits:
-        """As a campaign asks for it; nothing of single hits."""
-        return PoseHits(no_columns(), self.one_hit[measurement.pose])
-
     def model(self, n: int, hits: bool = True) -> Model:
         """After the first n poses; without `hits` as of exported FRFs, whose hits nobody knows."""
+        one_hit = self.one_hit if hits else self.frfs
+
+        def hits_of(measurement: Measurement, _: object = None) -> PoseHits:
+            """As a campaign asks for it; nothing of single hits."""
+            pose = measurement.pose
+            return PoseHits(no_columns(), one_hit[pose], self.frfs[pose])
+
         used = {m.pose: m for m in self.measurements[:n]}
         state = CampaignState(measurements=used, events=n)
-        return build(self.cell, state, self.frf_of, self.hits_of if hits else None)
+        return build(self.cell, state, hits_of)
 
     def models(self) -> Iterator[Model]:
         """After each pose."""
