@@ -14,7 +14,6 @@ from planner.campaign import store
 from planner.campaign.build import build
 from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
-from planner.campaign.config import config_from_builtins
 from planner.campaign.events import (
     Configured,
     Entry,
@@ -62,10 +61,9 @@ class _Cells:
     def of(self, configured: Configured) -> Cell:
         key = msgspec.json.encode((configured.config, configured.robot))
         if key not in self._cells:
-            config = config_from_builtins(configured.config)
             root = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
             store.restore_robot(self._campaign.directory, configured.robot, root / store.ROBOT)
-            self._cells[key] = Cell.load(root / config.robot, config)
+            self._cells[key] = Cell.load(root / configured.config.robot, configured.config)
         return self._cells[key]
 
 

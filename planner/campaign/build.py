@@ -48,7 +48,7 @@ def build(cell: Cell, state: CampaignState, hits_of: HitsOf, recall: Recall | No
         if straight is not None and straight.latest:
             hits = straight.latest
         misfit = low.identified.misfit if low.identified else 1.0
-        noise = FrfNoise.of([h.whole for h in hits], table.band_hz, misfit)
+        noise = FrfNoise.of(tuple(h.whole for h in hits), table.band_hz, misfit)
         if low.identified_robot is not None:
             simulation, count = low.identified_robot.identified.simulation, low.count
             seen = tuple(h.averaged.within(table.band_hz) for h in hits)

@@ -11,7 +11,7 @@ import msgspec
 from planner.campaign import events, store
 from planner.campaign.config import load_campaign_config
 from planner.campaign.journal import remove_parts
-from planner.campaign.read_only import ReadOnlyCampaign, as_logged
+from planner.campaign.read_only import ReadOnlyCampaign
 from planner.campaign.undo import last_acts, last_undone, replaced_by
 from planner.errors import InputError
 from planner.progress import ProgressCallback, no_progress
@@ -265,5 +265,5 @@ def _first_entry(directory: Path) -> bytes:
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
     units = cell.robot.joints.declared
-    event = events.Configured(as_logged(config), hashes, __version__, units)
+    event = events.Configured(config, hashes, __version__, units)
     return encode_line("", events.Entry(1, now, event))[0]

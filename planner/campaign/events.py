@@ -2,6 +2,7 @@
 
 import msgspec
 
+from planner.campaign.config import CampaignConfig
 from planner.modal.modes import LEAST_PROBABILITY
 
 REFUSED = "refused by the engineer"  # the reason where none is given
@@ -19,7 +20,7 @@ class Configured(Event, frozen=True, tag="configured"):
     where all are degrees.
     """
 
-    config: dict
+    config: CampaignConfig
     robot: dict[str, str]
     planner: str
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET

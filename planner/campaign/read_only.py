@@ -11,11 +11,7 @@ import numpy as np
 
 from planner import content_hash
 from planner.campaign import store
-from planner.campaign.config import (
-    CampaignConfig,
-    config_from_builtins,
-    load_campaign_config,
-)
+from planner.campaign.config import load_campaign_config
 from planner.campaign.events import Configured, Entry, Imported, Refused
 from planner.campaign.journal import Journal
 from planner.campaign.state import CampaignState, Measurement, fold
@@ -93,8 +89,7 @@ class ReadOnlyCampaign:
         def load() -> "Cell":
             from planner.campaign.cell import Cell
 
-            config = config_from_builtins(configured.config)
-            loaded = Cell.load(self.directory / config.robot, config)
+            loaded = Cell.load(self.directory / configured.config.robot, configured.config)
             if loaded.robot.joints.declared != configured.joint_units:
                 raise InputError(
                     f"{loaded.robot.urdf_path}: other joints slide than when the campaign began, "
@@ -250,7 +245,7 @@ class ReadOnlyCampaign:
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        return Configured(as_logged(config), hashes, __version__, begun.joint_units)
+        return Configured(config, hashes, __version__, begun.joint_units)
 
     # -- what is expected ----------------------------------------------------------------------
 
@@ -322,8 +317,3 @@ class ReadOnlyCampaign:
         from planner.frf.synthesis import frequency_lines
 
         return frequency_lines(self.cell.config.modes.band_hz)
-
-
-def as_logged(config: CampaignConfig) -> dict:
-    """The configuration as it reads back from the log, so that the two can be compared."""
-    return msgspec.json.decode(msgspec.json.encode(config))

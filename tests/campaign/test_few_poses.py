@@ -9,13 +9,14 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.build import build
 from planner.campaign.cell import Cell
-from planner.campaign.config import config_from_builtins
+from planner.campaign.config import CampaignConfig
 from planner.campaign.low_fidelity import Recall, in_memory
 from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
@@ -34,13 +35,14 @@ def models(case: Case, recall: Recall) -> Iterator[Model]:
     """The campaign's model after COUNTS poses."""
     robot = Robot.load(case.toml)
     low, high = np.rad2deg(np.clip(case.box_rad, robot.lower_rad, robot.upper_rad))
-    config = config_from_builtins(
+    config = msgspec.convert(
         {
             "robot": str(case.toml),
             "workspace": {"joints_deg": np.column_stack([low, high]).tolist()},
             "modes": {"count": COUNTED, "band_hz": list(case.band_hz)},
             "acquisition": {"candidates": 50},
-        }
+        },
+        CampaignConfig,
     )
     cell = Cell.load(case.toml, config)
     used = [

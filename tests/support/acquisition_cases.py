@@ -4,11 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from planner.campaign.build import build
 from planner.campaign.cell import Cell
-from planner.campaign.config import config_from_builtins
+from planner.campaign.config import CampaignConfig
 from planner.campaign.measured_modes import from_mode
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
@@ -114,7 +115,7 @@ def make(
         "fidelity": {"simulation": simulation},
         "acquisition": {"candidates": CANDIDATES, "hit_axes": axes},
     }
-    cell = Cell.load(toml, config_from_builtins(table))
+    cell = Cell.load(toml, msgspec.convert(table, CampaignConfig))
     low, high = np.deg2rad(np.array(arm.joints_deg)).T
     unused = np.random.default_rng(10_000 + seed).uniform(low, high, (UNUSED, 6))
     lines_hz = np.linspace(*cell.config.modes.band_hz, LINES)

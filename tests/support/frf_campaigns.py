@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from planner.campaign.build import build
 from planner.campaign.cell import Cell
-from planner.campaign.config import config_from_builtins
+from planner.campaign.config import CampaignConfig
 from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
@@ -99,7 +100,7 @@ def make(
         "fidelity": {"simulation": simulation},
         "acquisition": {"candidates": 50},
     }
-    cell = Cell.load(toml, config_from_builtins(table))
+    cell = Cell.load(toml, msgspec.convert(table, CampaignConfig))
     lines = np.linspace(*arm.band_hz, LINES)
     true = np.array([truth.accelerance(one, lines) for one in other])
     return FrfCase(cell, measurements, frfs, one_hit, other, lines, true)
