@@ -3,7 +3,7 @@
 import msgspec
 
 from planner.campaign.config import CampaignConfig
-from planner.modal.modes import LEAST_PROBABILITY
+from planner.modal.modes import LEAST_PROBABILITY, Homogeneity
 
 REFUSED = "refused by the engineer"  # the reason where none is given
 
@@ -89,26 +89,6 @@ class MeasuredMode(msgspec.Struct, frozen=True):
         return self.probability >= LEAST_PROBABILITY
 
 
-class ForceLevel(msgspec.Struct, frozen=True):
-    """Hits of about one strength, and the pose's modes by them alone (null: not found)."""
-
-    peak_force_n: float
-    hits: int
-    frequency_hz: tuple[float | None, ...]
-    frequency_sd_hz: tuple[float | None, ...]
-    damping_ratio: tuple[float | None, ...]
-    damping_sd: tuple[float | None, ...]
-
-
-class Amplitude(msgspec.Struct, frozen=True):
-    """Whether the response is proportional to the force, over the levels that were hit."""
-
-    levels: tuple[ForceLevel, ...]
-    difference: float  # of the FRFs of two levels beyond their scatter, relative
-    p_value: float
-    homogeneous: bool
-
-
 class Question(msgspec.Struct, frozen=True):
     """What the engineer is asked of hits that are not what is to be expected of a pose.
 
@@ -139,7 +119,7 @@ class Imported(Event, frozen=True, tag="imported"):
     hits: tuple[HitRecord, ...]
     modes: tuple[MeasuredMode, ...]
     remarks: tuple[str, ...] = ()
-    amplitude: Amplitude | None = None  # null: all hits of one strength
+    amplitude: Homogeneity | None = None  # null: all hits of one strength
     question: Question | None = None
     again: str = ""
     replaced: tuple[tuple[str, str], ...] = ()

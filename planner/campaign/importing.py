@@ -34,7 +34,7 @@ from planner.campaign.imported_files import (
     sort_paths,
     superseded,
 )
-from planner.campaign.measured_modes import from_homogeneity, from_modal
+from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.campaign.store import KeptRecordings
@@ -348,7 +348,7 @@ def _event(
         hits=judged.hits,
         modes=from_modal(measured.modal),
         remarks=measured.remarks,
-        amplitude=from_homogeneity(measured.homogeneity),
+        amplitude=measured.homogeneity,
         question=asked,
         again=drift.again if drift else "",
         replaced=tuple((hit.sha256, why) for hit, why in judged.superseded.items()),

@@ -7,7 +7,6 @@ from pathlib import Path
 import msgspec
 
 from planner.campaign.events import (
-    Amplitude,
     AnyEvent,
     Configured,
     Confirmed,
@@ -26,6 +25,7 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
+from planner.modal.modes import Homogeneity
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Measurement:
     hits: tuple[HitRecord, ...]
     modes: tuple[MeasuredMode, ...]
     remarks: tuple[str, ...] = ()
-    amplitude: Amplitude | None = None
+    amplitude: Homogeneity | None = None
     withdrawn: bool = False
     time: str = ""
     question: Question | None = None  # open while it is held, else answered

@@ -12,8 +12,7 @@ from planner.dataset.screened_files import FileVerdict, ScreenedFiles, Source, r
 from planner.dataset.store import Store, user_store
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
-from planner.modal.homogeneity import Homogeneity, homogeneity
-from planner.modal.modes import ModalModel
+from planner.modal.modes import Homogeneity, ModalModel
 from planner.recording.points import SENSOR, TCP, TOOL
 from planner.recording.records import FrfRecord, Hit
 
@@ -193,6 +192,7 @@ class MeasuredPose:
 
     def _decompose(self) -> Decomposed:
         from planner.modal.estimate_modes import estimate_modes
+        from planner.modal.homogeneity import homogeneity
 
         if self.whole is None:
             return Decomposed(None, None, ())
@@ -203,9 +203,9 @@ class MeasuredPose:
         except RefusedError as error:
             return Decomposed(None, None, (str(error),))
         hits = of_tool(self.hits)
-        levels = homogeneity(hits, modal, self.band_hz, self.window_rate_1_s) if hits else None
-        told = (levels.remark,) if levels is not None and levels.remark else ()
-        return Decomposed(modal, levels, (*modal.remarks, *told))
+        found = homogeneity(hits, modal, self.band_hz, self.window_rate_1_s) if hits else None
+        levels, remark = found or (None, "")
+        return Decomposed(modal, levels, (*modal.remarks, *filter(None, (remark,))))
 
 
 def of_tool(hits: tuple[Hit, ...]) -> tuple[Hit, ...]:
