@@ -17,6 +17,8 @@ from planner.design.acquisitions import mixed, parameter_variance, repeat_gain
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.design.parameter_sensitivity import FrfNoise
 from planner.design.stopping import Forecast, forecast
+from planner.dynamics.at_force import with_possible_laws
+from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf.frf import Frf
 from planner.robot.place_names import place_names, with_names
@@ -30,7 +32,7 @@ from planner.words import counted, listed
 
 if TYPE_CHECKING:
     from planner.campaign.decision import Decision
-    from planner.campaign.frf_model import FrfModel
+    from planner.campaign.frf_model import ErrorByZone
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
@@ -234,27 +236,38 @@ class Model:
 
         sd is the root of E|H − mean|².
         """
+        fit = self.low.identified_robot
+        if self.frfs and fit is not None and fit.fits:
+            return fit.posterior.predicted(q, frequency_hz)
+        mean, sd = self._modal_frf(q, frequency_hz)
+        if not self.frfs:
+            return mean, sd
+        from planner.campaign.frf_model import local_size
 
-        def modal() -> tuple[np.ndarray, np.ndarray]:
-            return self._modal_frf(q, frequency_hz)
-
-        if self.frf_model is None:
-            return modal()
-        return self.frf_model.predict(q, frequency_hz, modal)
+        return mean, np.hypot(sd, self.frf_error.at(frequency_hz) * local_size(mean, frequency_hz))
 
     @cached_property
-    def frf_model(self) -> "FrfModel | None":
-        """How FRFs are predicted; None before one was measured. Worked out when asked for."""
-        if not self.frfs:
-            return None
-        from planner.campaign.frf_model import FrfModel
+    def frf_error(self) -> "ErrorByZone":
+        """Of FRFs of the fused modes, beyond their sds. Worked out when asked for."""
+        from planner.campaign.frf_model import ErrorByZone
 
-        return FrfModel.of(self)
+        return ErrorByZone.of(self)
 
     @property
     def knows_frfs(self) -> bool:
-        """Whether `frf_model` was worked out already."""
-        return "frf_model" in vars(self)
+        """Whether what FRFs of the fused modes take was worked out already."""
+        return "with_residues" in vars(self)
+
+    @property
+    def struck(self) -> Simulation | None:
+        """The simulation whose laws say what another force changes; None: nothing does.
+
+        Springs have of the laws what robot.toml says: hits they were identified from, too.
+        """
+        simulation = self.low.simulation
+        if simulation is None or not simulation.robot.config.law:
+            return None
+        return with_possible_laws(simulation)
 
     def _modal_frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """FRFs of the fused modes, and of those above them where a simulation knows them."""

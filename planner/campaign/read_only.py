@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from planner.campaign.cell import Cell
-    from planner.campaign.frf_model import ForceModel
     from planner.campaign.model import Model
     from planner.dataset.dataset import Dataset
     from planner.dataset.visits import Recording
@@ -277,26 +276,22 @@ class ReadOnlyCampaign:
         other._force_n = force_n
         return other
 
-    @property
-    def at_force(self) -> "ForceModel":
-        """What a stated force changes."""
-        from planner.campaign.frf_model import ForceModel
-
-        return ForceModel.of(self.model)
-
     def frf_at(
         self, q: np.ndarray, frequency_hz: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """As `frf`, at poses q (n, dof) in rad; what was worked out for it is kept."""
         lines, model = self.frequency_lines if frequency_hz is None else frequency_hz, self.model
-        known = model.knows_frfs
-        q = np.atleast_2d(q)
+        known, q = model.knows_frfs, np.atleast_2d(q)
         mean, sd = model.frf(q, lines)
-        if not known:
+        if known != model.knows_frfs:
             self._kept.put(self._key("model", self.state.used), model)
-        if self._force_n is None:
-            return mean, sd
-        return mean + self.at_force.frf_change(q, np.full(len(q), self._force_n), lines, False), sd
+        if self._force_n is not None and (struck := model.struck) is not None:
+            from planner.dynamics.at_force import change_at_force
+
+            mean = mean + change_at_force(
+                struck, q, np.full(len(q), self._force_n), lines, in_time=False
+            )
+        return mean, sd
 
     def records(self) -> list[dict[str, Any]]:
         """All measured modes, one row each: what pandas.DataFrame takes."""
