@@ -123,6 +123,7 @@ class Imported(Event, frozen=True, tag="imported"):
     question: Question | None = None
     again: str = ""
     replaced: tuple[tuple[str, str], ...] = ()
+    instead: tuple[int, ...] = ()  # held imports whose place it takes, as long as it holds itself
 
     @property
     def unhit(self) -> bool:
@@ -137,10 +138,14 @@ class Confirmed(Event, frozen=True, tag="confirmed"):
 
 
 class Refused(Event, frozen=True, tag="refused"):
-    """The engineer refused hits that waited at a pose; they are kept, and not offered again."""
+    """The engineer refused hits that waited at a pose; they are kept, and not offered again.
+
+    Or those that were held since the imports of these numbers, as long as it holds itself.
+    """
 
     pose: str
     hits: tuple[HitRecord, ...]
+    instead: tuple[int, ...] = ()
 
 
 class Withdrawn(Event, frozen=True, tag="withdrawn"):
@@ -188,13 +193,12 @@ class Starred(Event, frozen=True, tag="starred"):
 
 
 class Undone(Event, frozen=True, tag="undone"):
-    """The act with sequence number `act` was taken back; of an Undone: it holds again.
+    """The acts with these sequence numbers were taken back.
 
-    It `gives_way` to the act that follows, and holds again once that is taken back.
+    Of an Undone: what that took back holds again.
     """
 
-    act: int
-    gives_way: bool = False
+    acts: tuple[int, ...]
 
 
 AnyEvent = (

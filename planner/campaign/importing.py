@@ -36,7 +36,7 @@ from planner.campaign.imported_files import (
 )
 from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
-from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.state import CampaignState, Measurement, without_entries
 from planner.campaign.store import KeptRecordings
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source, hits_of_files
@@ -269,19 +269,22 @@ def import_paths(
     return tuple(reports)
 
 
-def _taken_back(campaign: "Campaign", delivery: ImportedFiles) -> ImportedFiles:
-    """Take back a held import of which a delivery says something else now; all is judged anew.
+def _held_before(
+    campaign: "Campaign", delivery: ImportedFiles
+) -> tuple[tuple[int, ...], ImportedFiles]:
+    """Held imports of which a delivery says something else now: all is judged anew.
 
-    The delivery with the held files of its pose that it lacks.
+    Their numbers, and the delivery with the held files of its pose that it lacks.
     """
-    for held_at in tuple(campaign.state.held):
+    instead = []
+    for held_at in campaign.state.held:
         entry, event = campaign.held_import(held_at)
         lacks = replaced_hits(delivery, event, campaign.cell.robot.joints)
         if lacks is not None:
-            campaign.append(events.Undone(entry.seq, gives_way=True))
+            instead.append(entry.seq)
             more = tuple(map(campaign.recordings.source, lacks))
             delivery = replaced(delivery, sources=(*delivery.sources, *more))
-    return delivery
+    return tuple(instead), delivery
 
 
 def import_pose(
@@ -289,19 +292,20 @@ def import_pose(
     named: frozenset[Path],
 ) -> ImportReport:  # fmt: skip
     """Judge the files of one pose, ask what is to be asked, write the import and fit again."""
-    started, delivery = time.perf_counter(), _taken_back(campaign, delivery)
-    before, state, pose = campaign.model, campaign.state, delivery.pose
+    started, pose = time.perf_counter(), delivery.pose
+    instead, delivery = _held_before(campaign, delivery)
+    before, state = campaign.model, without_entries(campaign.entries, instead)
     known, keeps, table = state.hit_at(pose), campaign.recordings, campaign.cell.config.modes
     judged = JudgedFiles.of(keeps, delivery, state, named, table)
     hits, measured = judged.hits, judged.measured
     if measured is None:
-        held = state.held.get(pose)
+        held = campaign.state.held.get(pose)
         return ImportReport(
             pose, (), (), judged.already, held or state.measurements.get(pose), None, before,
             before, 0.0, left_out=judged.left_out, question=held.question if held else None,
         )  # fmt: skip
     event, told = _event(before, state, pose, known.joints_deg if known else joints_deg, judged)
-    campaign.append(event)
+    campaign.append(replace(event, instead=instead))
     measurement = (campaign.state.held if event.question else campaign.state.measurements)[pose]
     model = campaign.model
     remarks = remarks_on(campaign.cell.robot.joints, state, judged, measurement, joints_deg, told)

@@ -1,6 +1,6 @@
 """The state of a campaign: a pure fold over its events."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -175,7 +175,7 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
                 state, proposals_made=_made(state, entry.event), proposals=state.proposals | made
             )
         if isinstance(entry.event, Undone):
-            if not state.unchanged_by(_act_of(entries, entry.event)):
+            if not all(map(state.unchanged_by, _acts_of(entries, entry.event))):
                 state = replace(state, model_version=entry.seq)
         elif entry.seq not in undone:
             state = _apply(state, entry.event, entry)
@@ -183,20 +183,32 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
     return state
 
 
+def without_entries(entries: Sequence[Entry], acts: tuple[int, ...]) -> CampaignState:
+    """The state as if the acts of these numbers were taken back."""
+    return fold([*entries, Entry(len(entries) + 1, "", Undone(acts))] if acts else entries)
+
+
 def taken_back(entries: Sequence[Entry]) -> frozenset[int]:
     """Numbers of the entries that do not hold; an Undone that was itself undone takes nothing."""
-    found = set()
+    found: set[int] = set()
     for entry in reversed(entries):
-        if isinstance(entry.event, Undone) and entry.seq not in found:
-            found.add(entry.event.act)
+        event = entry.event
+        if entry.seq in found:
+            continue
+        if isinstance(event, Undone):
+            found.update(event.acts)
+        elif isinstance(event, Imported | Refused):
+            found.update(event.instead)
     return frozenset(found)
 
 
-def _act_of(entries: Sequence[Entry], event: AnyEvent) -> AnyEvent:
+def _acts_of(entries: Sequence[Entry], event: AnyEvent) -> Iterator[AnyEvent]:
     """What an Undone is about in the end, an undo of an undo too."""
-    while isinstance(event, Undone):
-        event = entries[event.act - 1].event
-    return event
+    if not isinstance(event, Undone):
+        yield event
+        return
+    for act in event.acts:
+        yield from _acts_of(entries, entries[act - 1].event)
 
 
 def _made(state: CampaignState, event: Proposed) -> int:

@@ -81,7 +81,7 @@ def hits(pose: str, again: str = "") -> Imported:
 @pytest.mark.parametrize(
     ("act", "left"),
     [(hits("P001"), None), (hits("P004"), ("P001", "P003")), (Skipped("P001"), None),
-     (Withdrawn("P003"), None), (Undone(3), None), (Starred("P001"), ("P001", "P003"))],
+     (Withdrawn("P003"), None), (Undone((3,)), None), (Starred("P001"), ("P001", "P003"))],
 )  # fmt: skip
 def test_drift_is_suspected_until_it_was_looked_at_or_its_hint_is_gone(act, left):
     acts = [hits("P001"), hits("P002"), hits("P003", again="P001"), act]
