@@ -108,8 +108,8 @@ class Campaign(ReadOnlyCampaign):
             self.append(events.Confirmed(pose))
             found = self.state.measurements[pose]
             return ImportReport(
-                pose, found.accepted, (), (), found, None, before, self.model,
-                time.perf_counter() - started, self.model.remarks,
+                pose, found, before, self.model, found.accepted, remarks=self.model.remarks,
+                refit_seconds=time.perf_counter() - started,
             )  # fmt: skip
 
     def move(self, pose: str, other: str) -> "ImportReport":

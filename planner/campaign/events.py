@@ -71,6 +71,11 @@ class HitRecord(msgspec.Struct, frozen=True):
     response: str | None = None  # signed axis of an FRF's response, as the table named it
     from_name: bool = False  # FRFs' places are from the file's name
 
+    @property
+    def whole_name(self) -> str:
+        """The file's name, without which of its hits is meant."""
+        return self.file.rpartition(" (hit ")[0] if self.part else self.file
+
 
 class MeasuredMode(msgspec.Struct, frozen=True):
     """One experimental mode; residues in m/(N·s), row by row (NaN as null), [re, im, sd]."""

@@ -51,13 +51,9 @@ def tuned_frequencies(
         h = h - cut_off(simulation.poles(q), s, measured.tail_s)
     open_ = basis(h, motion, s, tolerances)
     modes = simulation.modes(q, count)
-    told = [_told(_at(modes, i), measured, h[i], open_[i], i) for i in range(len(q))]
+    told = [_told(modes[i], measured, h[i], open_[i], i) for i in range(len(q))]
     hertz, sd = (np.array(values) for values in zip(*told, strict=True))
     return hertz, hertz * sd
-
-
-def _at(modes: SimulatedModes, i: int) -> SimulatedModes:
-    return SimulatedModes(modes.frequency_hz[i], modes.damping_ratio[i], modes.residue[i])
 
 
 def _told(

@@ -1,7 +1,6 @@
 """What an import asks and tells of new hits while the robot still stands there."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -129,24 +128,16 @@ def hit_again(model: Model, known: Measurement, modes: Sequence[MeasuredMode]) -
     return (f"{known.pose} was hit again and is as it was (at most {what}).",)
 
 
-@dataclass(frozen=True)
-class DriftSuspicion:
-    """A hint at drift: the measured pose that is to be hit again, and why, in a sentence."""
-
-    again: str
-    text: str
-
-
 def suspected_drift(
     model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...],
     modes: Sequence[MeasuredMode],
-) -> DriftSuspicion | None:  # fmt: skip
-    """Whether hits at a new pose hint at drift, and which early pose then tells.
+) -> tuple[str, str]:  # fmt: skip
+    """Which early pose tells whether there is drift that a new pose hints at, and why; else ""s.
 
     `model` and `state` are those before the import; it is a hint only where they expect enough.
     """
     if len(model.labelled) < LEAST_POSES or state.hit_at(pose) is not None:
-        return None
+        return "", ""
     joints = model.cell.robot.joints
     hz, sd = (row[0].tolist() for row in model.frequencies(joints.internal([joints_deg])))
     expected = [(f, s / f) for f, s in zip(hz, sd, strict=True)]
@@ -154,10 +145,10 @@ def suspected_drift(
     off, in_sd = found[:, 1], np.abs(found[:, 1]) / found[:, 2]
     one_sided = abs(np.sum(np.sign(off))) == len(off) >= LEAST_MODES
     if not one_sided or np.any(in_sd < SUSPECT_SD) or np.mean(np.abs(off)) < SMALLEST:
-        return None
+        return "", ""
     early = _telling(state)
     which = "the first pose" if early is state.used[0] else "an early pose"
-    return DriftSuspicion(
+    return (
         early.pose,
         f"All modes at {pose} lie to one side of what is expected, by {100 * np.mean(off):+.2f} % "
         f"on average: the robot may have drifted (warmth, load, clamping). Hit {early.pose}, "
@@ -235,7 +226,7 @@ def alerts(
     event: Imported,
     measured: MeasuredPose,
     modes: Sequence[MeasuredMode],
-    suspicion: DriftSuspicion | None,
+    drift: str,
 ) -> tuple[str, ...]:
     """Remarks on new hits, their channels, reciprocity and drift.
 
@@ -245,7 +236,7 @@ def alerts(
         event: The import.
         measured: All hits of the pose, the new ones last.
         modes: By the new hits alone.
-        suspicion: Of drift, where they hint at it.
+        drift: What is said of it, where they hint at it.
     """
     verdicts = measured.verdicts[-len(event.hits) :]
     told = tuple(dict.fromkeys(text for one in verdicts for text in one.remarks))
@@ -258,4 +249,4 @@ def alerts(
         # Modes of fewer axes are others: what was lacking of a visit is no second one.
         whole = _axes(event.hits) >= _axes(known.hits)
         return told + (hit_again(model, known, modes) if whole else ())
-    return told if suspicion is None else (*told, suspicion.text)
+    return (*told, drift) if drift else told

@@ -208,7 +208,7 @@ def superseded(before: Sequence[HitRecord], sources: Sequence[Source]) -> dict[H
     """
     found = {}
     for hit in before:
-        name = hit.file.rpartition(" (hit ")[0] if hit.part else hit.file
+        name = hit.whole_name
         for source in sources:
             same = Path(source.whole_name).name == Path(name).name
             if source.hit is None or source.repeat is None:

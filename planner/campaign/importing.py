@@ -56,18 +56,30 @@ class ImportReport:
     """
 
     pose: str
-    accepted: tuple[HitRecord, ...]
-    refused: tuple[HitRecord, ...]
-    already: tuple[KnownFile, ...]  # files that were imported before
     measurement: Measurement | None
-    measured: MeasuredPose | None
     model_before: Model
     model: Model
-    refit_seconds: float
-    remarks: tuple[str, ...] = ()
-    left_out: tuple[HitRecord, ...] = ()  # not imported: the engineer refused them, or must answer
+    hits: tuple[HitRecord, ...] = ()  # new ones
     question: Question | None = None
+    already: tuple[KnownFile, ...] = ()  # files that were imported before
+    left_out: tuple[HitRecord, ...] = ()  # not imported: the engineer refused them, or must answer
+    measured: MeasuredPose | None = None
+    remarks: tuple[str, ...] = ()
     alerts: tuple[str, ...] = ()  # of the remarks, those to be acted upon while the robot stands
+    refit_seconds: float = 0.0
+
+    @property
+    def accepted(self) -> tuple[HitRecord, ...]:
+        """New hits that the model uses."""
+        return () if self.question else tuple(hit for hit in self.hits if hit.accepted)
+
+    @property
+    def refused(self) -> tuple[HitRecord, ...]:
+        """Those that it does not: refused ones, or all while the question is open."""
+        asked = self.question
+        if asked is None:
+            return tuple(hit for hit in self.hits if not hit.accepted)
+        return tuple(replace(h, accepted=False, reason=h.reason or asked.text) for h in self.hits)
 
     def hit_errors(self, model: Model | None = None) -> tuple[HitErrorEstimate, ...]:
         """Of each accepted hit, as far as they are known, by this import's model or a later one."""
@@ -119,13 +131,6 @@ def refusals(
         source = replaced(stated.get(path, Source(path, "")), name=str(path))
         found.append(record_of(source, digest, suffix, said.get(path, REFUSED)))
     return tuple(found)
-
-
-def left_out_hits(hits: tuple[HitRecord, ...], asked: Question | None) -> tuple[HitRecord, ...]:
-    """Those of new hits that the model does not use: refused ones, or all while it is `asked`."""
-    if asked is None:
-        return tuple(hit for hit in hits if not hit.accepted)
-    return tuple(replace(h, accepted=False, reason=h.reason or asked.text) for h in hits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,8 +306,8 @@ def import_pose(
     if measured is None:
         held = campaign.state.held.get(pose)
         return ImportReport(
-            pose, (), (), judged.already, held or state.measurements.get(pose), None, before,
-            before, 0.0, left_out=judged.left_out, question=held.question if held else None,
+            pose, held or state.measurements.get(pose), before, before, (),
+            held.question if held else None, judged.already, judged.left_out,
         )  # fmt: skip
     event, told = _event(before, state, pose, known.joints_deg if known else joints_deg, judged)
     campaign.append(replace(event, instead=instead))
@@ -312,20 +317,9 @@ def import_pose(
     if not event.question and any(hit.accepted for hit in hits):
         remarks += (*unexpected_modes(before, model, pose), *model.remarks)
     return ImportReport(
-        pose=pose,
-        accepted=tuple(hit for hit in hits if hit.accepted and not event.question),
-        refused=left_out_hits(hits, event.question),
-        already=judged.already,
-        measurement=measurement,
-        measured=measured,
-        model_before=before,
-        model=model,
-        refit_seconds=time.perf_counter() - started,
-        remarks=remarks,
-        left_out=judged.left_out,
-        question=event.question,
-        alerts=told,
-    )
+        pose, measurement, before, model, hits, event.question, judged.already, judged.left_out,
+        measured, remarks, alerts=told, refit_seconds=time.perf_counter() - started,
+    )  # fmt: skip
 
 
 def _event(
@@ -345,7 +339,9 @@ def _event(
     new_modes = from_modal(alone.modal)
     asked = contradiction(pose, measured, len(judged.old))
     asked = asked or question_about(before, state, pose, joints_deg, alone)
-    drift = None if asked else suspected_drift(before, state, pose, joints_deg, new_modes)
+    again, drift = "", ""
+    if asked is None:
+        again, drift = suspected_drift(before, state, pose, joints_deg, new_modes)
     event = events.Imported(
         pose=pose,
         joints_deg=joints_deg,
@@ -354,7 +350,7 @@ def _event(
         remarks=measured.remarks,
         amplitude=measured.homogeneity,
         question=asked,
-        again=drift.again if drift else "",
+        again=again,
         replaced=tuple((hit.sha256, why) for hit, why in judged.superseded.items()),
     )
     return event, alerts(before, state, event, measured, new_modes, drift)

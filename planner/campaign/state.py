@@ -131,10 +131,7 @@ class CampaignState:
     @property
     def first_files(self) -> dict[str, str]:
         """Names under which these were imported, by sha256."""
-        return {
-            hit.sha256: hit.file.rpartition(" (hit ")[0] if hit.part else hit.file
-            for _, hit in self._known_hits()
-        }
+        return {hit.sha256: hit.whole_name for _, hit in self._known_hits()}
 
     def _known_hits(self) -> list[tuple[str, HitRecord]]:
         held = [(pose, hit) for pose, m in self.held.items() for hit in m.hits]

@@ -247,11 +247,17 @@ def _default(directory: Path, robot_file: str) -> str:
 
     robot = Robot.load(directory / robot_file)
     limits = ranges_inside(robot, robot.lower_rad, robot.upper_rad)
+    said = "Whole range of every joint: narrow it to where the tool works."
+    return campaign_text(said, robot_file, limits, {"band_hz": list(robot.config.band_hz)})
+
+
+def campaign_text(said: str, robot: str, joints_deg: list[list[float]], modes: dict) -> str:
+    """A campaign.toml for a workspace of which something is `said` in a comment."""
     document = tomlkit.document()
-    document.add(tomlkit.comment("Whole range of every joint: narrow it to where the tool works."))
-    document.add("robot", tomlkit.item(robot_file))
-    document.add("workspace", tomlkit.item({"joints_deg": limits}))
-    document.add("modes", tomlkit.item({"band_hz": list(robot.config.band_hz)}))
+    document.add(tomlkit.comment(said))
+    document.add("robot", tomlkit.item(robot))
+    document.add("workspace", tomlkit.item({"joints_deg": joints_deg}))
+    document.add("modes", tomlkit.item(modes))
     return tomlkit.dumps(document)
 
 
