@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.campaign.events import HitRecord, Imported, MeasuredMode, Question
+from planner.campaign.labels import found_modes
 from planner.campaign.model import FEW_POSES, Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose
@@ -162,18 +163,15 @@ def unexpected_modes(before: Model, model: Model, pose: str) -> tuple[str, ...]:
 
     `before` expected them, `model` says which they are.
     """
-    labelled = next((one for one in model.labelled if one.pose == pose), None)
-    if labelled is None or not before.labelled:
+    if not before.labelled:
         return ()
-    said = before.predict(labelled.q[None])
-    told = []
-    for k, mode in enumerate(labelled.modes):
-        hz, sd = float(said.frequency_hz[0, k]), float(said.frequency_sd_hz[0, k])
-        off = abs(mode.frequency_hz - hz) if mode else 0.0
-        width = float(np.hypot(sd, mode.frequency_sd_hz)) if mode else 1.0
-        if mode and off > max(DIFFERS_SD * width, SMALLEST * hz):
-            at = f"mode {k + 1} at {mode.frequency_hz:.2f} Hz, expected at {with_sd(hz, sd)} Hz"
-            told.append(f"{at} ({off / width:.0f} sd off)")
+    told = [
+        f"mode {one.label} at {one.mode.frequency_hz:.2f} Hz, expected at "
+        f"{with_sd(one.expected_hz, one.sd_hz)} Hz ({abs(one.off):.0f} sd off)"
+        for one in found_modes(pose, model, before)
+        if one.mode is not None and abs(one.off) > DIFFERS_SD
+        and abs(one.mode.frequency_hz - one.expected_hz) > SMALLEST * one.expected_hz
+    ]  # fmt: skip
     if not told:
         return ()
     return (

@@ -1,6 +1,7 @@
 """Which measured mode is which: labels 1…count over all measured poses."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from planner.dynamics.vibration import SimulatedModes
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
 from planner.surrogate.modal_surrogate import ModalObservations
+
+if TYPE_CHECKING:
+    from planner.campaign.model import Model
 
 # Simulated modes above those modelled that a measured mode may be instead: where one of the
 # modelled ones cannot be seen (nodal point), the next one must not take its label.
@@ -92,3 +96,41 @@ def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObserva
         simulated = SimulatedModes.joined([p.simulated for p in labelled])
     x = cell.features(q) if n else np.zeros((0, len(cell.workspace.feature_names)))
     return ModalObservations(x, **values, simulated=simulated)
+
+
+@dataclass(frozen=True, eq=False)
+class FoundMode:
+    """A label's mode at a pose, None where it was not found, beside what was expected (Hz, sd).
+
+    NaN where that is not known; `probability` that it is this mode.
+    """
+
+    label: int
+    mode: Mode | None
+    probability: float
+    expected_hz: float = float("nan")
+    sd_hz: float = float("nan")
+
+    @property
+    def off(self) -> float:
+        """By how many sds it is off what was expected; NaN where either is not known."""
+        if self.mode is None:
+            return float("nan")
+        sd = np.hypot(self.sd_hz, self.mode.frequency_sd_hz)
+        return float((self.mode.frequency_hz - self.expected_hz) / sd)
+
+
+def found_modes(pose: str, model: "Model", before: "Model | None") -> list[FoundMode]:
+    """Of a pose, and what a model expected `before` it was hit; none where nothing was found."""
+    labelled = next((p for p in model.labelled if p.pose == pose), None)
+    if labelled is None:
+        return []
+    labels = enumerate(zip(labelled.modes, labelled.probability.tolist(), strict=True), 1)
+    found = [FoundMode(k, mode, certain) for k, (mode, certain) in labels]
+    if before is None:
+        return found
+    expected = before.predict(labelled.q[None])
+    each = expected.frequency_hz[0].tolist(), expected.frequency_sd_hz[0].tolist()
+    return [
+        replace(one, expected_hz=hz, sd_hz=sd) for one, hz, sd in zip(found, *each, strict=True)
+    ]
