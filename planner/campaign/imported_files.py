@@ -70,7 +70,7 @@ def sort_paths(
         else:
             raise InputError(f"{path} does not exist; name recordings or a recordings folder.")
     if bare:
-        stated = StatedPoints() if points == PointNames() else StatedPoints(names=points)
+        stated = StatedPoints(names=points)
         sources = tuple(Source(path, str(path), stated=stated) for path in bare)
         name = pose or default_pose or ""
         deliveries.append(ImportedFiles(name, None, sources, said=pose is not None))

@@ -4,7 +4,7 @@ import copy
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
 import msgspec
 import numpy as np
@@ -109,10 +109,7 @@ class ReadOnlyCampaign:
         state, configured = self.state, content_hash.of(self._configured())
 
         def find() -> "Model":
-            found = self.kept_model(state)
-            if found is None:
-                found = self._fitted(state)
-                self._kept.put(self._key("model", state.used), found)
+            found = self.kept_model(state) or self._fitted(state)
             # With the candidates that were worked out for it.
             self._memory["cell"] = configured, found.cell
             return found
@@ -121,12 +118,8 @@ class ReadOnlyCampaign:
 
     def kept_model(self, state: CampaignState) -> "Model | None":
         """The model of an earlier state of this configuration, where it is kept on disk."""
-        key = self._key("model", state.used)
-        if not self._kept.has(key):
-            return None  # without the libraries that a model takes
-        from planner.campaign.model import Model
-
-        return self._kept.get(key, Model)
+        # Of whichever class: it is not imported, with all that it takes, where nothing is kept.
+        return cast("Model | None", self._kept.get(self._key("model", state.used), object))
 
     def _key(self, what: str, used: tuple[Measurement, ...], where: str | None = None) -> str:
         """Name in the store of what is a function of configuration and measurements in use.
@@ -169,6 +162,7 @@ class ReadOnlyCampaign:
         with threadpool_limits(1):
             model = build(self.cell, state, kept.hits, recall)
             _ = model.frequency_sd_percent, model.frf_sd_percent  # kept: every command needs them
+        self._kept.put(self._key("model", state.used), model)
         return model
 
     @property

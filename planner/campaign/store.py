@@ -299,12 +299,9 @@ class KeptRecordings:
     def source(self, hit: HitRecord) -> Source:
         """The kept copy of a recording; InputError where it is not what was imported."""
         path = self._checked(hit)
-        said = hit.hit_point or hit.response_points or self.names != PointNames()
         stated = StatedPoints(hit.hit_point, hit.response_points, names=self.names)
-        return Source(
-            path, hit.file, hit.hit, hit.repeat, stated if said else StatedPoints(), hit.part,
-            hit.response, hit.from_name,
-        )  # fmt: skip
+        own = hit.part, hit.response, hit.from_name
+        return Source(path, hit.file, hit.hit, hit.repeat, stated, *own)
 
     def _checked(self, hit: HitRecord) -> Path:
         path = recording_path(self.directory, hit.sha256, hit.suffix)

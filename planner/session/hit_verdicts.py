@@ -58,7 +58,7 @@ class Verdicts:
         self, band_hz: tuple[float, float], points: PointNames, table: FolderTable | None = None
     ):
         self._band = band_hz
-        self._stated = StatedPoints() if points == PointNames() else StatedPoints(names=points)
+        self._stated = StatedPoints(names=points)
         self.table = table or FolderTable()
         self._read: dict[tuple, list[tuple[FileVerdict, tuple[Hit, ...]]]] = {}
 
