@@ -1,11 +1,14 @@
 """What can happen in a campaign: one immutable record per line of the log."""
 
+from pathlib import Path
+
 import msgspec
 
 from planner.campaign.config import CampaignConfig
 from planner.modal.modes import LEAST_PROBABILITY, Homogeneity
 
 REFUSED = "refused by the engineer"  # the reason where none is given
+REPLACED = "replaced by a newer"
 
 
 class Event(msgspec.Struct, frozen=True, tag_field="kind"):
@@ -76,6 +79,11 @@ class HitRecord(msgspec.Struct, frozen=True):
         """The file's name, without which of its hits is meant."""
         return self.file.rpartition(" (hit ")[0] if self.part else self.file
 
+    @property
+    def replaced(self) -> str:
+        """What is said of it where a newer file takes its place."""
+        return f"{REPLACED} {Path(self.whole_name).name}"
+
 
 class MeasuredMode(msgspec.Struct, frozen=True):
     """One experimental mode; residues in m/(N·s), row by row (NaN as null), [re, im, sd]."""
@@ -116,7 +124,7 @@ class Imported(Event, frozen=True, tag="imported"):
 
     With a `question` they are held: not used until a Confirmed follows. `again` names the measured
     pose that is to be hit again, where these hits hint at drift. `replaced` are earlier files of
-    the pose (sha256) that newer ones of these take the place of, and why.
+    the pose (sha256) that newer ones of these take the place of.
     """
 
     pose: str
@@ -127,7 +135,7 @@ class Imported(Event, frozen=True, tag="imported"):
     amplitude: Homogeneity | None = None  # null: all hits of one strength
     question: Question | None = None
     again: str = ""
-    replaced: tuple[tuple[str, str], ...] = ()
+    replaced: tuple[str, ...] = ()
     instead: tuple[int, ...] = ()  # held imports whose place it takes, as long as it holds itself
 
     @property

@@ -4,7 +4,7 @@ import itertools
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from dataclasses import replace as replaced
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -147,7 +147,7 @@ class JudgedFiles:
     sources: tuple[Source, ...] = ()
     measured: MeasuredPose | None = None  # None: there is nothing new
     old: tuple[Source, ...] = ()
-    superseded: dict[HitRecord, str] = field(default_factory=dict)
+    superseded: tuple[HitRecord, ...] = ()
 
     @classmethod
     def of(
@@ -208,7 +208,7 @@ def remarks_on(
         *hits_of_files(judged.measured.verdicts[len(judged.old) :]),
         *judged.measured.remarks,
         *told,
-        *(f"{hit.file} is set aside, {why}." for hit, why in judged.superseded.items()),
+        *(f"{hit.file} is set aside, {hit.replaced}." for hit in judged.superseded),
         *(
             f"{hit.file} was {REFUSED} at {state.refused[hit.sha256][0]} before; it is imported "
             f"now because it was named."
@@ -351,6 +351,6 @@ def _event(
         amplitude=measured.homogeneity,
         question=asked,
         again=again,
-        replaced=tuple((hit.sha256, why) for hit, why in judged.superseded.items()),
+        replaced=tuple(hit.sha256 for hit in judged.superseded),
     )
     return event, alerts(before, state, event, measured, new_modes, drift)

@@ -124,19 +124,12 @@ class CampaignState:
         return self.guessed.get(digest, known) if known == pose else known
 
     @property
-    def owners(self) -> dict[str, str]:
-        """Poses of all hits that are in use, or held, by sha256."""
-        return {hit.sha256: pose for pose, hit in self._known_hits()}
-
-    @property
-    def first_files(self) -> dict[str, str]:
-        """Names under which these were imported, by sha256."""
-        return {hit.sha256: hit.whole_name for _, hit in self._known_hits()}
-
-    def _known_hits(self) -> list[tuple[str, HitRecord]]:
+    def in_use(self) -> dict[str, tuple[str, HitRecord]]:
+        """All hits that are in use, or held, by sha256: pose, hit."""
         held = [(pose, hit) for pose, m in self.held.items() for hit in m.hits]
         used = (m for m in self.measurements.values() if not m.withdrawn)
-        return held + [(m.pose, hit) for m in used for hit in m.accepted]
+        every = held + [(m.pose, hit) for m in used for hit in m.accepted]
+        return {hit.sha256: (pose, hit) for pose, hit in every}
 
     def unchanged_by(self, event: AnyEvent) -> bool:
         """Whether an act changes neither the model nor what is proposed."""
@@ -293,14 +286,13 @@ def _imported(
     )
 
 
-def without(known: Measurement | None, replaced: Sequence[tuple[str, str]]) -> Measurement | None:
-    """A measurement without files that newer ones take the place of: by sha256, and why."""
+def without(known: Measurement | None, replaced: Sequence[str]) -> Measurement | None:
+    """A measurement without files (sha256) that newer ones take the place of."""
     if known is None or not replaced:
         return known
-    why = dict(replaced)
     hits = tuple(
-        hit if hit.sha256 not in why
-        else msgspec.structs.replace(hit, accepted=False, reason=why[hit.sha256])
+        hit if hit.sha256 not in replaced
+        else msgspec.structs.replace(hit, accepted=False, reason=hit.replaced)
         for hit in known.hits
     )  # fmt: skip
     return replace(known, hits=hits)
