@@ -178,13 +178,7 @@ def new_files(
             continue
         at, hit = in_use.get(digest, (pose, None))
         if hit is not None and at != pose:
-            back = command("planner", "withdraw", directory, at)
-            reason = (
-                f"it has the same data as {hit.whole_name}, imported as a recording of pose "
-                f"{at}, and cannot belong to {pose} too; put the right file here, or, "
-                f"if it is right here, take back what was imported there ({back}) and import both "
-                f"again"
-            )
+            reason = _of_another(directory, hit, at, pose)
             if len(delivery.sources) == 1 + len(elsewhere):
                 raise InputError(f"{source.path}: {reason}.")
             elsewhere.append(record_of(source, digest, "", reason))
@@ -198,6 +192,16 @@ def new_files(
             kept = replace(source, path=store.recording_path(directory, digest, suffix))
             fresh += [(part, record_of(part, digest, suffix, "")) for part in kept.parts()]
     return tuple(fresh), tuple(already), (*left_out, *elsewhere)
+
+
+def _of_another(directory: Path, hit: HitRecord, at: str, pose: str) -> str:
+    """Why a recording that is in use at one pose cannot belong to another."""
+    back = command("planner", "withdraw", directory, at)
+    return (
+        f"it has the same data as {hit.whole_name}, imported as a recording of pose {at}, and "
+        f"cannot belong to {pose} too; put the right file here, or, if it is right here, take back "
+        f"what was imported there ({back}) and import both again"
+    )
 
 
 def superseded(before: Sequence[HitRecord], sources: Sequence[Source]) -> tuple[HitRecord, ...]:

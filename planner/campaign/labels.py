@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.campaign.cell import Cell
 from planner.campaign.low_fidelity import LowFidelity
-from planner.campaign.measured_modes import to_mode
+from planner.campaign.measured_modes import NUMBERS, to_mode
 from planner.campaign.state import Measurement
 from planner.dynamics.vibration import SimulatedModes
 from planner.modal.modes import Mode
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 # Simulated modes above those modelled that a measured mode may be instead: where one of the
 # modelled ones cannot be seen (nodal point), the next one must not take its label.
 ABOVE = 2
-MODAL = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"  # of a mode
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +81,7 @@ def frequencies(labelled: tuple[LabelledPose, ...]) -> np.ndarray:
 def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObservations:
     """The labelled modes as arrays, NaN where a mode was not found or a column not hit."""
     count, n = cell.config.modes.count, len(labelled)
-    values = {name: np.full((n, count), np.nan) for name in MODAL}
+    values = {name: np.full((n, count), np.nan) for name in NUMBERS}
     values |= {"residue": np.full((n, count, 3, 3), np.nan + 1j * np.nan)}
     values |= {"residue_sd": np.full((n, count, 3, 3), np.nan)}
     for i, pose in enumerate(labelled):

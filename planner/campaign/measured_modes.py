@@ -59,7 +59,7 @@ def from_modal(modal: ModalModel | None) -> tuple[MeasuredMode, ...]:
     return tuple(from_mode(mode) for mode in every)
 
 
-NUMBERS = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"
+NUMBERS = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"  # of a mode
 
 
 def measured_records(
