@@ -128,8 +128,7 @@ def found_modes(pose: str, model: "Model", before: "Model | None") -> list[Found
     found = [FoundMode(k, mode, certain) for k, (mode, certain) in labels]
     if before is None:
         return found
-    expected = before.predict(labelled.q[None])
-    each = expected.frequency_hz[0].tolist(), expected.frequency_sd_hz[0].tolist()
+    each = (row[0].tolist() for row in before.frequencies(labelled.q[None]))
     return [
         replace(one, expected_hz=hz, sd_hz=sd) for one, hz, sd in zip(found, *each, strict=True)
     ]

@@ -114,13 +114,6 @@ class Model:
         said = self.simulated_candidates
         return self._predict(candidates.q, candidates.features, said, visit=False)
 
-    def expected(self, index: int) -> ModalPrediction:
-        """Modes (1, count) at the candidate of that index."""
-        one = slice(index, index + 1)
-        candidates = self.cell.candidates
-        simulated = self.simulated_candidates[one]
-        return self._predict(candidates.q[one], candidates.features[one], simulated)
-
     @cached_property
     def simulated_candidates(self) -> SimulatedModes:
         """What the low fidelity says at the candidates; without residues."""
