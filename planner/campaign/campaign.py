@@ -13,13 +13,13 @@ from planner.campaign.config import load_campaign_config
 from planner.campaign.journal import remove_parts
 from planner.campaign.read_only import ReadOnlyCampaign
 from planner.campaign.undo import last_acts, last_undone
+from planner.dataset.screened_files import Source
 from planner.errors import InputError
 from planner.progress import ProgressCallback, no_progress
 from planner.version import __version__
 
 if TYPE_CHECKING:
     from planner.campaign.importing import ImportReport
-    from planner.dataset.screened_files import Source
 
 
 class Campaign(ReadOnlyCampaign):
@@ -82,7 +82,7 @@ class Campaign(ReadOnlyCampaign):
         pose: str,
         paths: tuple[Path, ...],
         reasons: Mapping[Path, str] | None = None,
-        stated: "Mapping[Path, Source] | None" = None,
+        stated: Mapping[Path, Source] | None = None,
     ) -> None:
         """Refuse files that wait at a pose: they are kept, and not imported unless named.
 

@@ -143,11 +143,6 @@ class CampaignState:
         return any(m.simulated for m in self.recorded)
 
     @property
-    def questions(self) -> tuple[Question, ...]:
-        """What is asked of hits that are held."""
-        return tuple(m.question for m in self.held.values() if m.question)
-
-    @property
     def recorded(self) -> tuple[Measurement, ...]:
         """All that was imported, used or not, and what is held."""
         return (*self.measurements.values(), *self.held.values())

@@ -148,10 +148,10 @@ def _level(
     return ForceLevel(
         force,
         len(hits),
-        tuple(m and m.frequency_hz for m in own),
-        tuple(m and m.frequency_sd_hz for m in own),
-        tuple(m and m.damping_ratio for m in own),
-        tuple(m and m.damping_sd for m in own),
+        tuple(m.frequency_hz if m else None for m in own),
+        tuple(m.frequency_sd_hz if m else None for m in own),
+        tuple(m.damping_ratio if m else None for m in own),
+        tuple(m.damping_sd if m else None for m in own),
     )
 
 
