@@ -6,13 +6,15 @@ import numpy as np
 
 from planner.campaign.cell import Cell
 from planner.campaign.frequencies_by_simulation import tuned_frequencies
-from planner.campaign.hit_error_estimates import Visited, estimate
+from planner.campaign.hit_error_estimates import CampaignHitErrors, Visited, estimate
 from planner.campaign.labels import LabelledPose, label, observations
 from planner.campaign.low_fidelity import LowFidelity, Recall, identify_low_fidelity, in_memory
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.campaign.straightened import HitsOf, StraightenedHits
+from planner.dataset.hit_columns import PoseHits
 from planner.design.parameter_sensitivity import FrfNoise
+from planner.fit.identified_robot import IdentifiedRobot
 from planner.surrogate.average import Average
 from planner.surrogate.frequency_models import MODELS
 from planner.surrogate.gp import STAGES
@@ -50,14 +52,7 @@ def build(cell: Cell, state: CampaignState, hits_of: HitsOf, recall: Recall | No
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(tuple(h.whole for h in hits), table.band_hz, misfit)
         if low.identified_robot is not None:
-            simulation, count = low.identified_robot.identified.simulation, low.count
-            seen = tuple(h.averaged.within(table.band_hz) for h in hits)
-            tuned = tuned_frequencies(simulation, seen, q, table.band_hz, cell.tolerances, count)
-            visits = [
-                Visited(one, h.columns, m.pose, tuple(hit.file for hit in m.accepted), h.averaged)
-                for one, m, h in zip(q, used, hits, strict=True)
-            ]
-            errors = estimate(visits, low.identified_robot, cell.tolerances, table.band_hz)
+            tuned, errors = _told_by(low.identified_robot, cell, used, hits, q)
     best = _best_guided(cell, used, low, tuned)
     surrogate = fit_surrogate(
         best.seen,
@@ -68,6 +63,25 @@ def build(cell: Cell, state: CampaignState, hits_of: HitsOf, recall: Recall | No
     )
     frfs = tuple(h.of_tool.within(table.band_hz) for h in hits)
     return Model(cell, best.labelled, best.low, best.seen, surrogate, noise, errors, used, frfs)
+
+
+def _told_by(
+    fit: IdentifiedRobot,
+    cell: Cell,
+    used: tuple[Measurement, ...],
+    hits: tuple[PoseHits, ...],
+    q: np.ndarray,
+) -> tuple[tuple[np.ndarray, np.ndarray], CampaignHitErrors]:
+    """Frequencies with their sds, and errors of hits, by a robot that was identified from them."""
+    band, count = cell.config.modes.band_hz, cell.config.modes.count
+    seen = tuple(h.averaged.within(band) for h in hits)
+    simulation = fit.identified.simulation
+    tuned = tuned_frequencies(simulation, seen, q, band, cell.tolerances, count)
+    visits = [
+        Visited(one, h.columns, m.pose, tuple(hit.file for hit in m.accepted), h.averaged)
+        for one, m, h in zip(q, used, hits, strict=True)
+    ]
+    return tuned, estimate(visits, fit, cell.tolerances, band)
 
 
 def _best_guided(
