@@ -41,11 +41,11 @@ class LeftOutModel:
 
 
 def compared_models(
-    model: Model, names: Sequence[str] = (), progress: ProgressCallback = no_progress
+    model: Model, progress: ProgressCallback = no_progress
 ) -> tuple[LeftOutModel, ...]:
     """All usable ones, the likeliest for poses left out first; () with fewer than two poses."""
     n, config = len(model.seen.x), model.cell.config
-    usable = [m for m in names or MODELS if model.low.simulation or not MODELS[m].simulation]
+    usable = [m for m in MODELS if model.low.simulation or not MODELS[m].simulation]
     if n < 2:
         return ()
     items = [(name, left) for name in usable for left in range(-1, n)]
