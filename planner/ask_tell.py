@@ -28,6 +28,7 @@ from planner.campaign.measured_modes import (
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.straightened import hits_unknown
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
@@ -147,9 +148,8 @@ class AskTell:
         """What is believed after all that was told."""
         if self._model is None:
             with threadpool_limits(1):
-                self._model = build(
-                    self._cell, self._state, lambda m, _: self._frfs[m.pose], recall=self._recall
-                )
+                hits_of = hits_unknown(self._frfs)
+                self._model = build(self._cell, self._state, hits_of, self._recall)
         return self._model
 
     @property

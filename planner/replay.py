@@ -14,7 +14,6 @@ from planner.campaign import store
 from planner.campaign.build import build
 from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
-from planner.campaign.config import config_from_builtins
 from planner.campaign.events import (
     Configured,
     Entry,
@@ -62,10 +61,9 @@ class _Cells:
     def of(self, configured: Configured) -> Cell:
         key = msgspec.json.encode((configured.config, configured.robot))
         if key not in self._cells:
-            config = config_from_builtins(configured.config)
             root = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
             store.restore_robot(self._campaign.directory, configured.robot, root / store.ROBOT)
-            self._cells[key] = Cell.load(root / config.robot, config)
+            self._cells[key] = Cell.load(root / configured.config.robot, configured.config)
         return self._cells[key]
 
 
@@ -85,7 +83,7 @@ def replay(
         cells = _Cells(campaign, stack)
         # A model follows from configuration and measurements: skips and undone acts leave it alone.
         models: dict[tuple[int, tuple[Measurement, ...]], Model] = {}
-        model, kept = None, campaign.recordings
+        model = None
         recalls: dict[int, Recall] = {}
         for entry in entries[:until]:
             before, after = fold(entries[: entry.seq - 1]), fold(entries[: entry.seq])
@@ -96,7 +94,8 @@ def replay(
             key = id(cell), after.used
             recall = recalls.setdefault(id(cell), in_memory())
             if key not in models:
-                models[key] = build(cell, after, kept.frf, kept.hits, recall)
+                kept = store.KeptRecordings.of(campaign.directory, cell)
+                models[key] = build(cell, after, kept.hits, recall)
             model = models[key]
             yield Step(entry, check, detail, after, model, measured, instead)
 

@@ -80,7 +80,9 @@ class StatedHits:
 
     def agree(self, likely: Sequence[Alternative] = ()) -> bool:
         """Whether nothing is to be asked: no mistake, of those `likely` beforehand none at all."""
-        far = [readback_errors(self.expected, self.q)] if self.placed else []
+        far_off = replace(self.expected, joint_times=MUCH)
+        # Joints that stand far beside their readback: which one does is worth a search.
+        far = [Alternative(self.q, "", rival=True, expected=far_off)] if self.placed else []
         return not self.doubted and self.best_alternative([*likely, *far]) is None
 
     def best_alternative(self, mistakes: Sequence[Alternative]) -> Alternative | None:
@@ -165,11 +167,6 @@ def far_off_hits(expected: ExpectedFrfs, q: np.ndarray) -> Alternative:
     return Alternative(
         q, FAR_OFF_HITS, about="chain", rival=True, expected=replace(expected, times=MUCH)
     )
-
-
-def readback_errors(expected: ExpectedFrfs, q: np.ndarray) -> Alternative:
-    """The joints stand far beside their readback: which one does is worth a search."""
-    return Alternative(q, "", rival=True, expected=replace(expected, joint_times=MUCH))
 
 
 def _best(less: Callable[[float], float]) -> float:

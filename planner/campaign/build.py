@@ -5,16 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.campaign.cell import Cell
-from planner.campaign.config import ModesTable
 from planner.campaign.frequencies_by_simulation import tuned_frequencies
-from planner.campaign.hit_error_estimates import Visited, estimate
+from planner.campaign.hit_error_estimates import CampaignHitErrors, Visited, estimate
 from planner.campaign.labels import LabelledPose, label, observations
 from planner.campaign.low_fidelity import LowFidelity, Recall, identify_low_fidelity, in_memory
-from planner.campaign.model import FrfOf, Model
+from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.campaign.straightened import HitsOf, StraightenedHits
+from planner.dataset.hit_columns import PoseHits
 from planner.design.parameter_sensitivity import FrfNoise
-from planner.frf.frf import Frf
+from planner.fit.identified_robot import IdentifiedRobot
 from planner.surrogate.average import Average
 from planner.surrogate.frequency_models import MODELS
 from planner.surrogate.gp import STAGES
@@ -26,64 +26,34 @@ SIMULATED_AT = 200  # candidates, where a model learns the simulation
 MISSING_MODE, UNLABELLED_MODE = float(np.log(0.1)), float(np.log(0.01))
 
 
-def build(
-    cell: Cell,
-    state: CampaignState,
-    frf_of: FrfOf,
-    hits_of: HitsOf | None = None,
-    recall: Recall | None = None,
-) -> Model:
+def build(cell: Cell, state: CampaignState, hits_of: HitsOf, recall: Recall | None = None) -> Model:
     """Label and fit everything that the state's measurements hold.
 
-    `frf_of` gives the tool's FRFs of a measurement, `hits_of` what its hits say at all points,
-    which is asked only where the simulation learns. Without it nothing is told of single hits.
-    `recall` says what was found of the first measurements, so that nothing is found twice. Where
-    robot.toml states laws of joints, hits are taken as they would be without these.
+    `hits_of` gives what a measurement's hits say at all points. `recall` says what was found of the
+    first measurements, so that nothing is found twice. Where robot.toml states laws of joints, hits
+    are taken as they would be without these.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
-    noise, errors, tuned, learns = None, None, None, cell.config.fidelity.simulation == "updated"
-    if learns and used:
-        frfs = tuple(frf_of(m, table) for m in used)
-        hits = tuple(hits_of(m, table) for m in used) if hits_of else None
-        whole = tuple(h.whole for h in hits) if hits is not None else frfs
-        joints = cell.robot.joints
-        q = joints.internal([m.joints_deg for m in used])
-        laws = cell.robot.config.law
-        straight = StraightenedHits(hits_of, used, q, table) if hits_of and laws else None
+    hits = tuple(map(hits_of, used))
+    noise, errors, tuned = None, None, None
+    if cell.config.fidelity.simulation == "updated" and used:
+        q = cell.robot.joints.internal([m.joints_deg for m in used])
+        straight = None
+        if cell.robot.config.law and any(len(h.columns.axis) for h in hits):
+            straight = StraightenedHits(hits_of, used, q, table)
         if straight is not None and low.nominal is not None:
             low = replace(low, nominal=straight.referred(low.nominal))
         straighten = None if straight is None else straight.frfs
-        known = recall or in_memory()
+        known, whole = recall or in_memory(), tuple(h.whole for h in hits)
         low = identify_low_fidelity(low, whole, q, table.band_hz, used, known, straighten)
         q = low.stood(q)
         if straight is not None and straight.latest:
-            hits, hits_of = straight.latest, straight.at_hand
-            frfs = tuple(h.averaged or f for h, f in zip(hits, frfs, strict=True))
-            whole = tuple(h.whole for h in hits)
+            hits = straight.latest
         misfit = low.identified.misfit if low.identified else 1.0
-        noise = FrfNoise.of(whole, table.band_hz, misfit)
+        noise = FrfNoise.of(tuple(h.whole for h in hits), table.band_hz, misfit)
         if low.identified_robot is not None:
-            simulation, count = low.identified_robot.identified.simulation, low.count
-            seen = tuple(f.within(table.band_hz) for f in frfs)
-            tuned = tuned_frequencies(simulation, seen, q, table.band_hz, cell.tolerances, count)
-        if hits is not None and low.identified_robot is not None:
-            visits = [
-                Visited(one, h.columns, m.pose, tuple(hit.file for hit in m.accepted), f)
-                for one, m, h, f in zip(q, used, hits, frfs, strict=True)
-            ]
-            errors = estimate(visits, low.identified_robot, cell.tolerances, table.band_hz)
-    fits = low.identified_robot is None or low.identified_robot.fits
-    candidates = [_Guided.by(cell, used, low, tuned if fits else None)]
-    if not fits:
-        # What lacks physics is bent by fitting it: as it stands it may be a better
-        # guide, or none.
-        stated = replace(cell.frozen, rejected=low.identified_robot)
-        candidates += [
-            _Guided.by(cell, used, one) for one in (stated, replace(stated, nominal=None))
-        ]
-    best = max(candidates, key=lambda guided: guided.log_evidence)
-    if not fits and best.low.identified_robot is not None:
-        best = _Guided.by(cell, used, low, tuned)
+            tuned, errors = _told_by(low.identified_robot, cell, used, hits, q)
+    best = _best_guided(cell, used, low, tuned)
     surrogate = fit_surrogate(
         best.seen,
         primary=best.primary,
@@ -91,28 +61,43 @@ def build(
         identified=best.low.is_identified,
         kernel=cell.config.surrogate.kernel,
     )
-    if hits_of is not None:
-        frf_of = _OfOneHit(frf_of, hits_of)
-    model = Model(cell, best.labelled, best.low, best.seen, surrogate, noise, errors, used, frf_of)
-    if learns:
-        _ = model.frfs  # which are at hand, and kept with the model
-    return model
+    frfs = tuple(h.of_tool.within(table.band_hz) for h in hits)
+    return Model(cell, best.labelled, best.low, best.seen, surrogate, noise, errors, used, frfs)
 
 
-@dataclass(frozen=True)
-class _OfOneHit:
-    """The tool's FRFs of a measurement as one hit in the middle of all would show them.
+def _told_by(
+    fit: IdentifiedRobot,
+    cell: Cell,
+    used: tuple[Measurement, ...],
+    hits: tuple[PoseHits, ...],
+    q: np.ndarray,
+) -> tuple[tuple[np.ndarray, np.ndarray], CampaignHitErrors]:
+    """Frequencies with their sds, and errors of hits, by a robot that was identified from them."""
+    band, count = cell.config.modes.band_hz, cell.config.modes.count
+    seen = tuple(h.averaged.within(band) for h in hits)
+    simulation = fit.identified.simulation
+    tuned = tuned_frequencies(simulation, seen, q, band, cell.tolerances, count)
+    visits = [
+        Visited(one, h.columns, m.pose, tuple(hit.file for hit in m.accepted), h.averaged)
+        for one, m, h in zip(q, used, hits, strict=True)
+    ]
+    return tuned, estimate(visits, fit, cell.tolerances, band)
 
-    Their variance is that of the noise alone: how hits scatter is part of how they miss, which is
-    integrated out, and would count twice.
-    """
 
-    frf_of: FrfOf
-    hits_of: HitsOf
-
-    def __call__(self, measurement: Measurement, table: ModesTable) -> Frf:
-        found = self.hits_of(measurement, table).whole.of_tool
-        return found or self.frf_of(measurement, table)
+def _best_guided(
+    cell: Cell,
+    used: tuple[Measurement, ...],
+    low: LowFidelity,
+    tuned: tuple[np.ndarray, np.ndarray] | None,
+) -> "_Guided":
+    """By the simulation as identified or, where that does not fit, as stated or by none."""
+    if low.identified_robot is None or low.identified_robot.fits:
+        return _Guided.by(cell, used, low, tuned)
+    # What lacks physics is bent by fitting it: as it stands it may be a better guide, or none.
+    stated = replace(cell.frozen, rejected=low.identified_robot)
+    tried = low, stated, replace(stated, nominal=None)
+    best = max((_Guided.by(cell, used, one) for one in tried), key=lambda one: one.log_evidence)
+    return best if best.low.identified_robot is None else _Guided.by(cell, used, low, tuned)
 
 
 def simulated_elsewhere(

@@ -11,15 +11,15 @@ import msgspec
 from planner.campaign import events, store
 from planner.campaign.config import load_campaign_config
 from planner.campaign.journal import remove_parts
-from planner.campaign.read_only import ReadOnlyCampaign, as_logged
-from planner.campaign.undo import last_acts, last_undone, replaced_by
+from planner.campaign.read_only import ReadOnlyCampaign
+from planner.campaign.undo import last_acts, last_undone
+from planner.dataset.screened_files import Source
 from planner.errors import InputError
 from planner.progress import ProgressCallback, no_progress
 from planner.version import __version__
 
 if TYPE_CHECKING:
     from planner.campaign.importing import ImportReport
-    from planner.dataset.screened_files import Source
 
 
 class Campaign(ReadOnlyCampaign):
@@ -82,7 +82,7 @@ class Campaign(ReadOnlyCampaign):
         pose: str,
         paths: tuple[Path, ...],
         reasons: Mapping[Path, str] | None = None,
-        stated: "Mapping[Path, Source] | None" = None,
+        stated: Mapping[Path, Source] | None = None,
     ) -> None:
         """Refuse files that wait at a pose: they are kept, and not imported unless named.
 
@@ -108,8 +108,8 @@ class Campaign(ReadOnlyCampaign):
             self.append(events.Confirmed(pose))
             found = self.state.measurements[pose]
             return ImportReport(
-                pose, found.accepted, (), (), found, None, before, self.model,
-                time.perf_counter() - started, self.model.remarks,
+                pose, found, before, self.model, found.accepted, remarks=self.model.remarks,
+                refit_seconds=time.perf_counter() - started,
             )  # fmt: skip
 
     def move(self, pose: str, other: str) -> "ImportReport":
@@ -118,26 +118,25 @@ class Campaign(ReadOnlyCampaign):
         from planner.campaign.importing import import_pose, readback_of
 
         with self._acting():
-            entry, event = self.held_import(pose)
+            _, event = self.held_import(pose)
             sources = tuple(self.recordings.source(hit) for hit in event.hits)
             delivery = ImportedFiles(other, None, sources)
             joints_deg = readback_of(self.cell, self.state, delivery)
             if other in self.state.held:
                 raise InputError(f"Hits of {other} wait for an answer too; answer that first.")
-            self.append(events.Undone(entry.seq, gives_way=True))
             return import_pose(self, delivery, joints_deg, frozenset(s.path for s in sources))
 
     def refuse_held(self, pose: str, reason: str = events.REFUSED) -> None:
         """The held hits of a pose are set aside, as if they had been refused when they came."""
         with self._acting():
             entry, event = self.held_import(pose)
-            # In this order: stopped in between, the hits are asked for again.
-            self.append(events.Undone(entry.seq, gives_way=True))
-            refused = (msgspec.structs.replace(h, accepted=False) for h in event.hits)
             asked = event.question
             why = f"{reason}; held before: {asked.text}" if asked else reason
-            hits = (msgspec.structs.replace(h, reason=h.reason or why) for h in refused)
-            self.append(events.Refused(pose, tuple(hits)))
+            hits = (
+                msgspec.structs.replace(h, accepted=False, reason=h.reason or why)
+                for h in event.hits
+            )
+            self.append(events.Refused(pose, tuple(hits), instead=(entry.seq,)))
 
     def withdraw(self, pose: str, reason: str = "") -> None:
         """Set a measured pose aside, or held hits; the recordings stay."""
@@ -173,10 +172,7 @@ class Campaign(ReadOnlyCampaign):
             acts = last_acts(self.entries, decisions_only)
             if not acts:
                 raise InputError(f"{self.directory} holds no act that could be taken back.")
-            for entry in acts:
-                self.append(events.Undone(entry.seq))
-                for gave_way in replaced_by(self.entries, entry):
-                    self.append(events.Undone(gave_way.seq))
+            self.append(events.Undone(tuple(entry.seq for entry in acts)))
             return acts
 
     def redo(self) -> tuple[events.Entry, ...]:
@@ -186,15 +182,14 @@ class Campaign(ReadOnlyCampaign):
         """
         with self._acting():
             undone, since = last_undone(self.entries)
-            if not undone:
+            if undone is None:
                 raise InputError(
                     f"{self.directory} holds no act that was taken back last; only what no other "
                     f"act followed can be done again."
                 )
-            for entry in (*since, *undone):
-                self.append(events.Undone(entry.seq))
-            acts = (e.event.act for e in undone if isinstance(e.event, events.Undone))
-            return tuple(self.entries[act - 1] for act in acts)
+            assert isinstance(undone.event, events.Undone)
+            self.append(events.Undone(tuple(entry.seq for entry in (*since, undone))))
+            return tuple(self.entries[act - 1] for act in undone.event.acts)
 
     def show(self, pose: str, files: Sequence[str], at: str = "") -> None:
         """Files (sha256) are of a pose, as they were shown there: they never move on by themselves.
@@ -265,5 +260,5 @@ def _first_entry(directory: Path) -> bytes:
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
     units = cell.robot.joints.declared
-    event = events.Configured(as_logged(config), hashes, __version__, units)
+    event = events.Configured(config, hashes, __version__, units)
     return encode_line("", events.Entry(1, now, event))[0]

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 
@@ -149,17 +149,6 @@ def load_campaign_config(path: Path) -> CampaignConfig:
     config = load_toml(path, CampaignConfig, "campaign.toml")
     check_config(config, path)
     return config
-
-
-def config_from_builtins(data: Any) -> CampaignConfig:
-    """The configuration as it stands in the log; InputError where it cannot be one."""
-    try:
-        return msgspec.convert(data, type=CampaignConfig)
-    except msgspec.ValidationError as error:
-        raise InputError(
-            f"The log holds a configuration that no campaign.toml can state ({error}); start the "
-            f"campaign again with planner new, and import its recordings."
-        ) from None
 
 
 def check_config(config: CampaignConfig, path: Path) -> None:

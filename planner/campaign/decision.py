@@ -37,15 +37,10 @@ class Decision:
         """(u,) of being stable."""
         return np.array([pose.probability for pose in self.poses])
 
-    @property
-    def certainty(self) -> np.ndarray:
-        """(u,) probability of the likelier answer."""
-        p = self.probability
-        return np.maximum(p, 1 - p)
-
     def sure(self, probability: float) -> bool:
         """Whether each pose's answer is right with at least this probability."""
-        return bool(np.all(self.certainty >= probability))
+        p = self.probability
+        return bool(np.all(np.maximum(p, 1 - p) >= probability))
 
     def shrunk(self, share: np.ndarray, probability: float) -> bool:
         """Whether it were sure if of the margins' variances these shares (u,) were left."""

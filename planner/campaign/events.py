@@ -1,10 +1,14 @@
 """What can happen in a campaign: one immutable record per line of the log."""
 
+from pathlib import Path
+
 import msgspec
 
-from planner.modal.modes import LEAST_PROBABILITY
+from planner.campaign.config import CampaignConfig
+from planner.modal.modes import LEAST_PROBABILITY, Homogeneity
 
 REFUSED = "refused by the engineer"  # the reason where none is given
+REPLACED = "replaced by a newer"
 
 
 class Event(msgspec.Struct, frozen=True, tag_field="kind"):
@@ -19,7 +23,7 @@ class Configured(Event, frozen=True, tag="configured"):
     where all are degrees.
     """
 
-    config: dict
+    config: CampaignConfig
     robot: dict[str, str]
     planner: str
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
@@ -70,6 +74,16 @@ class HitRecord(msgspec.Struct, frozen=True):
     response: str | None = None  # signed axis of an FRF's response, as the table named it
     from_name: bool = False  # FRFs' places are from the file's name
 
+    @property
+    def whole_name(self) -> str:
+        """The file's name, without which of its hits is meant."""
+        return self.file.rpartition(" (hit ")[0] if self.part else self.file
+
+    @property
+    def replaced(self) -> str:
+        """What is said of it where a newer file takes its place."""
+        return f"{REPLACED} {Path(self.whole_name).name}"
+
 
 class MeasuredMode(msgspec.Struct, frozen=True):
     """One experimental mode; residues in m/(N·s), row by row (NaN as null), [re, im, sd]."""
@@ -86,26 +100,6 @@ class MeasuredMode(msgspec.Struct, frozen=True):
     def likely(self) -> bool:
         """Whether it is a mode by its own pose's recordings, not only where others vouch."""
         return self.probability >= LEAST_PROBABILITY
-
-
-class ForceLevel(msgspec.Struct, frozen=True):
-    """Hits of about one strength, and the pose's modes by them alone (null: not found)."""
-
-    peak_force_n: float
-    hits: int
-    frequency_hz: tuple[float | None, ...]
-    frequency_sd_hz: tuple[float | None, ...]
-    damping_ratio: tuple[float | None, ...]
-    damping_sd: tuple[float | None, ...]
-
-
-class Amplitude(msgspec.Struct, frozen=True):
-    """Whether the response is proportional to the force, over the levels that were hit."""
-
-    levels: tuple[ForceLevel, ...]
-    difference: float  # of the FRFs of two levels beyond their scatter, relative
-    p_value: float
-    homogeneous: bool
 
 
 class Question(msgspec.Struct, frozen=True):
@@ -130,7 +124,7 @@ class Imported(Event, frozen=True, tag="imported"):
 
     With a `question` they are held: not used until a Confirmed follows. `again` names the measured
     pose that is to be hit again, where these hits hint at drift. `replaced` are earlier files of
-    the pose (sha256) that newer ones of these take the place of, and why.
+    the pose (sha256) that newer ones of these take the place of.
     """
 
     pose: str
@@ -138,10 +132,11 @@ class Imported(Event, frozen=True, tag="imported"):
     hits: tuple[HitRecord, ...]
     modes: tuple[MeasuredMode, ...]
     remarks: tuple[str, ...] = ()
-    amplitude: Amplitude | None = None  # null: all hits of one strength
+    amplitude: Homogeneity | None = None  # null: all hits of one strength
     question: Question | None = None
     again: str = ""
-    replaced: tuple[tuple[str, str], ...] = ()
+    replaced: tuple[str, ...] = ()
+    instead: tuple[int, ...] = ()  # held imports whose place it takes, as long as it holds itself
 
     @property
     def unhit(self) -> bool:
@@ -156,10 +151,14 @@ class Confirmed(Event, frozen=True, tag="confirmed"):
 
 
 class Refused(Event, frozen=True, tag="refused"):
-    """The engineer refused hits that waited at a pose; they are kept, and not offered again."""
+    """The engineer refused hits that waited at a pose; they are kept, and not offered again.
+
+    Or those that were held since the imports of these numbers, as long as it holds itself.
+    """
 
     pose: str
     hits: tuple[HitRecord, ...]
+    instead: tuple[int, ...] = ()
 
 
 class Withdrawn(Event, frozen=True, tag="withdrawn"):
@@ -207,13 +206,12 @@ class Starred(Event, frozen=True, tag="starred"):
 
 
 class Undone(Event, frozen=True, tag="undone"):
-    """The act with sequence number `act` was taken back; of an Undone: it holds again.
+    """The acts with these sequence numbers were taken back.
 
-    It `gives_way` to the act that follows, and holds again once that is taken back.
+    Of an Undone: what that took back holds again.
     """
 
-    act: int
-    gives_way: bool = False
+    acts: tuple[int, ...]
 
 
 AnyEvent = (

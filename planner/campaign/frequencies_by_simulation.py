@@ -51,13 +51,9 @@ def tuned_frequencies(
         h = h - cut_off(simulation.poles(q), s, measured.tail_s)
     open_ = basis(h, motion, s, tolerances)
     modes = simulation.modes(q, count)
-    told = [_told(_at(modes, i), measured, h[i], open_[i], i) for i in range(len(q))]
+    told = [_told(modes[i], measured, h[i], open_[i], i) for i in range(len(q))]
     hertz, sd = (np.array(values) for values in zip(*told, strict=True))
     return hertz, hertz * sd
-
-
-def _at(modes: SimulatedModes, i: int) -> SimulatedModes:
-    return SimulatedModes(modes.frequency_hz[i], modes.damping_ratio[i], modes.residue[i])
 
 
 def _told(
@@ -101,24 +97,19 @@ def _change(
     off = np.where(used, measured.accelerance[i] - rest - _sum_of(modes, measured.s[i]), 0.0)
     tuning, size = _by_modes(modes, measured.s[i])
     weight = np.sqrt(2) / sd
-    columns = real_rows(weight * tuning)
-    others = real_rows(weight * np.concatenate([open_, size]))
+    rows = real_rows(weight * np.concatenate([tuning, open_, size]))
     r = real_rows((weight * off)[None])[0]
-    factor = np.linalg.cholesky(np.eye(len(others)) + others @ others.T)
-    own = np.linalg.solve(factor, others)
-    across, along = own @ columns.T, own @ r
-    covariance = np.linalg.inv(np.eye(len(columns)) + columns @ columns.T - across.T @ across)
-    change = covariance @ (columns @ r - across.T @ along)
-    # What is left once all that is open is at its best.
-    eta = np.linalg.solve(factor.T, along - across @ change)
-    left = r - columns.T @ change - others.T @ eta
+    covariance = np.linalg.inv(np.eye(len(rows)) + rows @ rows.T)
+    best = covariance @ (rows @ r)
+    left = r - best @ rows  # once all that is open is at its best
     misfit = float(left @ left) / max(2 * np.count_nonzero(used), 1)
     spread = np.sqrt(np.diagonal(covariance) * max(misfit, 1.0))
     noise = np.where(used, sd, 0.0) ** 2
     square = np.abs(np.where(used, measured.accelerance[i], 0.0)) ** 2
     residual = np.abs(left.view(complex).reshape(off.shape) / np.where(used, weight, 1.0)) ** 2
     wrong = np.sum(np.where(used, residual - noise, 0.0)) > TOO_WRONG**2 * np.sum(square)
-    return change.reshape(2, -1), spread[: len(spread) // 2], bool(wrong)
+    change, count = best[: len(tuning)].reshape(2, -1), len(tuning) // 2
+    return change, spread[:count], bool(wrong)
 
 
 def _by_modes(modes: SimulatedModes, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

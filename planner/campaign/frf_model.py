@@ -1,23 +1,21 @@
-"""FRFs anywhere: the simulation's own where it explains the recordings, else the fused modes'."""
+"""How far off FRFs of the fused modes are, where no simulation explains the recordings."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from planner.dynamics.at_force import change_at_force, modes_at_force, with_possible_laws
+from planner.dynamics.at_force import modes_at_force
 from planner.dynamics.simulation import Simulation
-from planner.fit.posterior import RobotPosterior
-from planner.measurement.measured_frfs import Measured, common_band, stack
+from planner.measurement.measured_frfs import common_band, stack
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
 from planner.surrogate.leave_one_out import left_out_modes
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
 
-Moments = tuple[np.ndarray, np.ndarray]  # mean and sd (n, 3, 3, F) of FRFs in m/s²/N
 ZONES = 5  # of the band, evenly on a logarithmic scale: they differ in what is left out
 LINES, LEAST, MOST = 300, 20, 80  # of all poses together, and of one at least and at most
 MODEL_ERROR = 0.01  # relative sd of what no modes follow
@@ -63,11 +61,12 @@ class ErrorByZone:
     relative: np.ndarray
 
     @classmethod
-    def of(cls, found: Sequence[LeftOut], band_hz: tuple[float, float]) -> "ErrorByZone":
-        """From all poses that were left out, weighed together; of none: what is expected before."""
-        edges = np.geomspace(max(band_hz[0], 0.1), band_hz[1], ZONES + 1)
+    def of(cls, model: "Model") -> "ErrorByZone":
+        """From all poses, each left out, weighed together; of one: what is expected before."""
+        low, high = model.cell.config.modes.band_hz
+        edges = np.geomspace(max(low, 0.1), high, ZONES + 1)
         log_likelihood = np.zeros((ZONES, len(SIZES)))
-        for pose in found:
+        for pose in _left_out(model) if len(model.frfs) > 1 else ():
             log_likelihood += _log_likelihood(pose, edges)
         return cls(edges, np.sqrt(_posterior(log_likelihood) @ SIZES**2))
 
@@ -118,40 +117,13 @@ def local_size(h: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
     return np.sqrt(OWN * square + (1 - OWN) * square.mean(axis=(-3, -2), keepdims=True))
 
 
-@dataclass(frozen=True, eq=False)
-class FrfModel:
-    """The simulation that explains the recordings, or None and the error of fused modes."""
-
-    simulated: RobotPosterior | None
-    modal_error: ErrorByZone
-
-    @classmethod
-    def of(cls, model: "Model") -> "FrfModel":
-        """From the FRFs of a model's poses and, where there is one, from what was identified."""
-        band, fit = model.cell.config.modes.band_hz, model.low.identified_robot
-        simulated = fit.posterior if fit is not None and fit.fits else None
-        found: tuple[LeftOut, ...] = ()
-        if simulated is None and len(model.frfs) > 1:
-            lines = int(np.clip(LINES // len(model.frfs), LEAST, MOST))
-            with threadpool_limits(1):
-                measured = stack(model.frfs, common_band(model.frfs, band), lines, MODEL_ERROR)
-                found = tuple(_left_out(model, measured))
-        return cls(simulated, ErrorByZone.of(found, band))
-
-    def predict(
-        self, q: np.ndarray, frequency_hz: np.ndarray, modal: Callable[[], Moments]
-    ) -> Moments:
-        """FRFs at q (n, dof) in rad; `modal` gives those of the fused modes there, where needed."""
-        if self.simulated is not None:
-            return self.simulated.predicted(q, frequency_hz)
-        mean, sd = modal()
-        relative = self.modal_error.at(frequency_hz)
-        return mean, np.hypot(sd, relative * local_size(mean, frequency_hz))
-
-
-def _left_out(model: "Model", measured: Measured) -> Iterator[LeftOut]:
+def _left_out(model: "Model") -> Iterator[LeftOut]:
     """Each pose's FRFs from the fused modes of the others, and the modes above them."""
-    fused = left_out_modes(model.with_residues, model.seen_exactly)
+    frfs, band = model.frfs, model.cell.config.modes.band_hz
+    lines = int(np.clip(LINES // len(frfs), LEAST, MOST))
+    with threadpool_limits(1):
+        measured = stack(frfs, common_band(frfs, band), lines, MODEL_ERROR)
+        fused = left_out_modes(model.with_residues, model.seen_exactly)
     for i, (hertz, s) in enumerate(zip(measured.frequency_hz, measured.s, strict=True)):
         one = ModalPrediction(*(values[i : i + 1] for values in vars(fused).values()))
         mean, sd = frf_moments(_windowed(one, float(s.real[0])), hertz)
@@ -173,41 +145,19 @@ def _windowed(modes: ModalPrediction, rate_1_s: float) -> ModalPrediction:
     return replace(modes, frequency_hz=size / (2 * np.pi), damping_ratio=real / size)
 
 
-@dataclass(frozen=True, eq=False)
-class ForceModel:
-    """The `simulation` whose laws say what another force changes; None: nothing does."""
-
-    simulation: Simulation | None
-
-    @classmethod
-    def of(cls, model: "Model") -> "ForceModel":
-        """Springs have of the laws what robot.toml says: hits they were identified from, too."""
-        simulation = model.low.simulation
-        if simulation is None or not simulation.robot.config.law:
-            return cls(None)
-        return cls(with_possible_laws(simulation))
-
-    def frf_change(
-        self, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray, in_time: bool = True
-    ) -> np.ndarray:
-        """(n, 3, 3, F) in m/s²/N, as of `change_at_force`; 0 where no force is stated."""
-        if self.simulation is None:
-            return np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
-        return change_at_force(self.simulation, q, force_n, frequency_hz, in_time)
-
-    def modes(
-        self, predicted: ModalPrediction, q: np.ndarray, force_n: np.ndarray
-    ) -> ModalPrediction:
-        """Frequencies and damping moved as the simulation's are; as they were where NaN."""
-        known = np.flatnonzero(np.isfinite(force_n))
-        if self.simulation is None or not known.size:
-            return predicted
-        count = predicted.frequency_hz.shape[1]
-        there = modes_at_force(self.simulation, q[known], force_n[known], count)
-        stated = self.simulation.frequencies(q[known], count)
-        moved = {}
-        for name in ("frequency_hz", "damping_ratio"):
-            ratio = getattr(there, name) / getattr(stated, name)
-            moved[name] = getattr(predicted, name).copy()
-            moved[name][known] *= np.where(np.isfinite(ratio), ratio, 1.0)
-        return replace(predicted, **moved)
+def struck_modes(
+    struck: Simulation, predicted: ModalPrediction, q: np.ndarray, force_n: np.ndarray
+) -> ModalPrediction:
+    """Frequencies and damping moved as those of a simulation with laws; as they were where NaN."""
+    known = np.flatnonzero(np.isfinite(force_n))
+    if not known.size:
+        return predicted
+    count = predicted.frequency_hz.shape[1]
+    there = modes_at_force(struck, q[known], force_n[known], count)
+    stated = struck.frequencies(q[known], count)
+    moved = {}
+    for name in ("frequency_hz", "damping_ratio"):
+        ratio = getattr(there, name) / getattr(stated, name)
+        moved[name] = getattr(predicted, name).copy()
+        moved[name][known] *= np.where(np.isfinite(ratio), ratio, 1.0)
+    return replace(predicted, **moved)

@@ -11,7 +11,7 @@ import tomlkit
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.stated_masses import links_kg, mass_conflict
-from planner.campaign.store import CONFIG, ROBOT
+from planner.campaign.store import CONFIG, ROBOT, campaign_text
 from planner.check.examine import spread_poses
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
@@ -86,7 +86,10 @@ def new_from_urdf(
         robot_toml.write_text(_robot_text(guessed), encoding="utf-8")
         own = robot_toml.parents[1] / CONFIG
         if campaign_toml is None:
-            own.write_text(_campaign_text(guessed), encoding="utf-8")
+            said = "In front of the arm, guessed: put it where the tool works."
+            modes = {"count": guessed.modes, "band_hz": list(guessed.band_hz)}
+            text = campaign_text(said, f"{ROBOT}/robot.toml", guessed.joints_deg, modes)
+            own.write_text(text, encoding="utf-8")
         try:
             campaign = Campaign.new(directory, robot_toml, campaign_toml or own)
         except InputError as error:
@@ -268,13 +271,3 @@ def _entries(block: Compliance | LinkTable | Payload | Obstacle) -> dict:
         told["stiffness_n_m"] = told.pop("stiffness")
         told["damping_n_s_m"] = told.pop("damping")
     return {k: list(v) if isinstance(v, tuple) else v for k, v in told.items()}
-
-
-def _campaign_text(guessed: Guessed) -> str:
-    document = tomlkit.document()
-    document.add(tomlkit.comment("In front of the arm, guessed: put it where the tool works."))
-    document.add("robot", tomlkit.item("robot/robot.toml"))
-    document.add("workspace", tomlkit.item({"joints_deg": guessed.joints_deg}))
-    modes = {"count": guessed.modes, "band_hz": list(guessed.band_hz)}
-    document.add("modes", tomlkit.item(modes))
-    return tomlkit.dumps(document)

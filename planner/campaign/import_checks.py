@@ -1,12 +1,12 @@
 """What an import asks and tells of new hits while the robot still stands there."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from planner.campaign.events import HitRecord, Imported, MeasuredMode, Question
+from planner.campaign.labels import found_modes
 from planner.campaign.model import FEW_POSES, Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose
@@ -129,24 +129,16 @@ def hit_again(model: Model, known: Measurement, modes: Sequence[MeasuredMode]) -
     return (f"{known.pose} was hit again and is as it was (at most {what}).",)
 
 
-@dataclass(frozen=True)
-class DriftSuspicion:
-    """A hint at drift: the measured pose that is to be hit again, and why, in a sentence."""
-
-    again: str
-    text: str
-
-
 def suspected_drift(
     model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...],
     modes: Sequence[MeasuredMode],
-) -> DriftSuspicion | None:  # fmt: skip
-    """Whether hits at a new pose hint at drift, and which early pose then tells.
+) -> tuple[str, str]:  # fmt: skip
+    """Which early pose tells whether there is drift that a new pose hints at, and why; else ""s.
 
     `model` and `state` are those before the import; it is a hint only where they expect enough.
     """
     if len(model.labelled) < LEAST_POSES or state.hit_at(pose) is not None:
-        return None
+        return "", ""
     joints = model.cell.robot.joints
     hz, sd = (row[0].tolist() for row in model.frequencies(joints.internal([joints_deg])))
     expected = [(f, s / f) for f, s in zip(hz, sd, strict=True)]
@@ -154,10 +146,10 @@ def suspected_drift(
     off, in_sd = found[:, 1], np.abs(found[:, 1]) / found[:, 2]
     one_sided = abs(np.sum(np.sign(off))) == len(off) >= LEAST_MODES
     if not one_sided or np.any(in_sd < SUSPECT_SD) or np.mean(np.abs(off)) < SMALLEST:
-        return None
+        return "", ""
     early = _telling(state)
     which = "the first pose" if early is state.used[0] else "an early pose"
-    return DriftSuspicion(
+    return (
         early.pose,
         f"All modes at {pose} lie to one side of what is expected, by {100 * np.mean(off):+.2f} % "
         f"on average: the robot may have drifted (warmth, load, clamping). Hit {early.pose}, "
@@ -171,18 +163,15 @@ def unexpected_modes(before: Model, model: Model, pose: str) -> tuple[str, ...]:
 
     `before` expected them, `model` says which they are.
     """
-    labelled = next((one for one in model.labelled if one.pose == pose), None)
-    if labelled is None or not before.labelled:
+    if not before.labelled:
         return ()
-    said = before.predict(labelled.q[None])
-    told = []
-    for k, mode in enumerate(labelled.modes):
-        hz, sd = float(said.frequency_hz[0, k]), float(said.frequency_sd_hz[0, k])
-        off = abs(mode.frequency_hz - hz) if mode else 0.0
-        width = float(np.hypot(sd, mode.frequency_sd_hz)) if mode else 1.0
-        if mode and off > max(DIFFERS_SD * width, SMALLEST * hz):
-            at = f"mode {k + 1} at {mode.frequency_hz:.2f} Hz, expected at {with_sd(hz, sd)} Hz"
-            told.append(f"{at} ({off / width:.0f} sd off)")
+    told = [
+        f"mode {one.label} at {one.mode.frequency_hz:.2f} Hz, expected at "
+        f"{with_sd(one.expected_hz, one.sd_hz)} Hz ({abs(one.off):.0f} sd off)"
+        for one in found_modes(pose, model, before)
+        if one.mode is not None and abs(one.off) > DIFFERS_SD
+        and abs(one.mode.frequency_hz - one.expected_hz) > SMALLEST * one.expected_hz
+    ]  # fmt: skip
     if not told:
         return ()
     return (
@@ -235,7 +224,7 @@ def alerts(
     event: Imported,
     measured: MeasuredPose,
     modes: Sequence[MeasuredMode],
-    suspicion: DriftSuspicion | None,
+    drift: str,
 ) -> tuple[str, ...]:
     """Remarks on new hits, their channels, reciprocity and drift.
 
@@ -245,7 +234,7 @@ def alerts(
         event: The import.
         measured: All hits of the pose, the new ones last.
         modes: By the new hits alone.
-        suspicion: Of drift, where they hint at it.
+        drift: What is said of it, where they hint at it.
     """
     verdicts = measured.verdicts[-len(event.hits) :]
     told = tuple(dict.fromkeys(text for one in verdicts for text in one.remarks))
@@ -258,4 +247,4 @@ def alerts(
         # Modes of fewer axes are others: what was lacking of a visit is no second one.
         whole = _axes(event.hits) >= _axes(known.hits)
         return told + (hit_again(model, known, modes) if whole else ())
-    return told if suspicion is None else (*told, suspicion.text)
+    return (*told, drift) if drift else told

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from planner.campaign import store
-from planner.campaign.events import REFUSED, HitRecord, Imported
+from planner.campaign.events import REFUSED, REPLACED, HitRecord, Imported
 from planner.campaign.state import CampaignState
 from planner.dataset.screened_files import Source
 from planner.dataset.visits import table_folders
@@ -114,7 +114,6 @@ def _from_table(folder: Path, joints: JointUnits, points: PointNames) -> list[Im
     ]
 
 
-REPLACED = "replaced by a newer"
 Fresh = tuple[Source, HitRecord]  # a new hit's kept file, and its record before it is judged
 
 
@@ -134,7 +133,7 @@ def at_their_poses(
 
     Raises InputError where it is not clear at which pose the others were recorded.
     """
-    owner = state.owners
+    known = state.in_use
     found: list[ImportedFiles] = []
     for delivery in deliveries:
         if delivery.said:
@@ -142,7 +141,8 @@ def at_their_poses(
             continue
         poses: dict[str, list[Source]] = {}
         for source in delivery.sources:
-            poses.setdefault(owner.get(_digest(source), delivery.pose), []).append(source)
+            at, _ = known.get(_digest(source), (delivery.pose, None))
+            poses.setdefault(at, []).append(source)
         if "" in poses:
             raise InputError(
                 f"{poses[''][0].path}: it is not clear at which pose it was recorded; say "
@@ -161,7 +161,7 @@ def new_files(
     itself among the `named` paths or its table says so; one that cannot be read is left out, as is
     a recording that is in use at another pose. Raises InputError where all are.
     """
-    owner, pose, known = state.owners, delivery.pose, state.measurements.get(delivery.pose)
+    pose, known, in_use = delivery.pose, state.measurements.get(delivery.pose), state.in_use
     withdrawn = ""
     if known is not None and known.withdrawn:
         again = command("planner", "confirm", directory, pose)
@@ -169,56 +169,52 @@ def new_files(
         withdrawn += "new measurement another pose name, in recordings.csv or by --pose"
     fresh: list[Fresh] = []
     already, left_out, elsewhere = [], [], []
-    first = state.first_files
-    seen: set[str] = set()
+    seen: dict[str, str] = {}
     for source in delivery.sources:
         try:
             digest = store.recording_hash(source.path)
         except InputError as error:  # one bad file does not keep the others out
             left_out.append(record_of(source, "", "", str(error)))
             continue
-        if owner.get(digest, pose) != pose:
-            back = command("planner", "withdraw", directory, owner[digest])
-            reason = (
-                f"it has the same data as {first[digest]}, imported as a recording of pose "
-                f"{owner[digest]}, and cannot belong to {pose} too; put the right file here, or, "
-                f"if it is right here, take back what was imported there ({back}) and import both "
-                f"again"
-            )
+        at, hit = in_use.get(digest, (pose, None))
+        if hit is not None and at != pose:
+            reason = _of_another(directory, hit, at, pose)
             if len(delivery.sources) == 1 + len(elsewhere):
                 raise InputError(f"{source.path}: {reason}.")
             elsewhere.append(record_of(source, digest, "", reason))
         elif reason := withdrawn or _reason_against(delivery, source, digest, named, state):
             left_out.append(record_of(source, digest, "", reason))
-        elif digest in owner or (digest in seen and not source.part):
-            already.append(KnownFile(source.name, first[digest]))
+        elif hit is not None or (digest in seen and not source.part):
+            already.append(KnownFile(source.name, hit.whole_name if hit else seen[digest]))
         else:
-            seen.add(digest)
-            first.setdefault(digest, source.name)
+            seen.setdefault(digest, source.name)
             _, suffix = store.store_recording(directory, source.path)
             kept = replace(source, path=store.recording_path(directory, digest, suffix))
             fresh += [(part, record_of(part, digest, suffix, "")) for part in kept.parts()]
     return tuple(fresh), tuple(already), (*left_out, *elsewhere)
 
 
-def superseded(before: Sequence[HitRecord], sources: Sequence[Source]) -> dict[HitRecord, str]:
-    """Which hits of a pose newer files take the place of, and why.
+def _of_another(directory: Path, hit: HitRecord, at: str, pose: str) -> str:
+    """Why a recording that is in use at one pose cannot belong to another."""
+    back = command("planner", "withdraw", directory, at)
+    return (
+        f"it has the same data as {hit.whole_name}, imported as a recording of pose {at}, and "
+        f"cannot belong to {pose} too; put the right file here, or, if it is right here, take back "
+        f"what was imported there ({back}) and import both again"
+    )
 
-    Those written over, and those of the same name for the same axis and repeat of a table.
-    """
-    found = {}
-    for hit in before:
-        name = hit.file.rpartition(" (hit ")[0] if hit.part else hit.file
-        for source in sources:
-            same = Path(source.whole_name).name == Path(name).name
-            if source.hit is None or source.repeat is None:
-                same = source.whole_name == name
-            elif (source.hit, source.repeat) != (hit.hit, hit.repeat):
-                same = False
-            if same:
-                found[hit] = f"{REPLACED} {Path(name).name}"
-                break
-    return found
+
+def superseded(before: Sequence[HitRecord], sources: Sequence[Source]) -> tuple[HitRecord, ...]:
+    """Which hits of a pose newer files take the place of."""
+    return tuple(hit for hit in before if any(_replaces(source, hit) for source in sources))
+
+
+def _replaces(source: Source, hit: HitRecord) -> bool:
+    """Whether it is written over, or of the same name for the same axis and repeat of a table."""
+    if source.hit is None or source.repeat is None:
+        return source.whole_name == hit.whole_name
+    same = (source.hit, source.repeat) == (hit.hit, hit.repeat)
+    return same and Path(source.whole_name).name == Path(hit.whole_name).name
 
 
 def differs_from_table(source: Source, record: HitRecord) -> bool:

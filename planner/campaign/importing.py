@@ -4,7 +4,7 @@ import itertools
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from dataclasses import replace as replaced
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,9 +34,9 @@ from planner.campaign.imported_files import (
     sort_paths,
     superseded,
 )
-from planner.campaign.measured_modes import from_homogeneity, from_modal
+from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
-from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.state import CampaignState, Measurement, without_entries
 from planner.campaign.store import KeptRecordings
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source, hits_of_files
@@ -56,18 +56,30 @@ class ImportReport:
     """
 
     pose: str
-    accepted: tuple[HitRecord, ...]
-    refused: tuple[HitRecord, ...]
-    already: tuple[KnownFile, ...]  # files that were imported before
     measurement: Measurement | None
-    measured: MeasuredPose | None
     model_before: Model
     model: Model
-    refit_seconds: float
-    remarks: tuple[str, ...] = ()
-    left_out: tuple[HitRecord, ...] = ()  # not imported: the engineer refused them, or must answer
+    hits: tuple[HitRecord, ...] = ()  # new ones
     question: Question | None = None
+    already: tuple[KnownFile, ...] = ()  # files that were imported before
+    left_out: tuple[HitRecord, ...] = ()  # not imported: the engineer refused them, or must answer
+    measured: MeasuredPose | None = None
+    remarks: tuple[str, ...] = ()
     alerts: tuple[str, ...] = ()  # of the remarks, those to be acted upon while the robot stands
+    refit_seconds: float = 0.0
+
+    @property
+    def accepted(self) -> tuple[HitRecord, ...]:
+        """New hits that the model uses."""
+        return () if self.question else tuple(hit for hit in self.hits if hit.accepted)
+
+    @property
+    def refused(self) -> tuple[HitRecord, ...]:
+        """Those that it does not: refused ones, or all while the question is open."""
+        asked = self.question
+        if asked is None:
+            return tuple(hit for hit in self.hits if not hit.accepted)
+        return tuple(replace(h, accepted=False, reason=h.reason or asked.text) for h in self.hits)
 
     def hit_errors(self, model: Model | None = None) -> tuple[HitErrorEstimate, ...]:
         """Of each accepted hit, as far as they are known, by this import's model or a later one."""
@@ -121,13 +133,6 @@ def refusals(
     return tuple(found)
 
 
-def left_out_hits(hits: tuple[HitRecord, ...], asked: Question | None) -> tuple[HitRecord, ...]:
-    """Those of new hits that the model does not use: refused ones, or all while it is `asked`."""
-    if asked is None:
-        return tuple(hit for hit in hits if not hit.accepted)
-    return tuple(replace(h, accepted=False, reason=h.reason or asked.text) for h in hits)
-
-
 @dataclass(frozen=True, eq=False)
 class JudgedFiles:
     """Files of a delivery: new ones, judged, those in use `already`, and those left out.
@@ -142,7 +147,7 @@ class JudgedFiles:
     sources: tuple[Source, ...] = ()
     measured: MeasuredPose | None = None  # None: there is nothing new
     old: tuple[Source, ...] = ()
-    superseded: dict[HitRecord, str] = field(default_factory=dict)
+    superseded: tuple[HitRecord, ...] = ()
 
     @classmethod
     def of(
@@ -203,7 +208,7 @@ def remarks_on(
         *hits_of_files(judged.measured.verdicts[len(judged.old) :]),
         *judged.measured.remarks,
         *told,
-        *(f"{hit.file} is set aside, {why}." for hit, why in judged.superseded.items()),
+        *(f"{hit.file} is set aside, {hit.replaced}." for hit in judged.superseded),
         *(
             f"{hit.file} was {REFUSED} at {state.refused[hit.sha256][0]} before; it is imported "
             f"now because it was named."
@@ -269,19 +274,22 @@ def import_paths(
     return tuple(reports)
 
 
-def _taken_back(campaign: "Campaign", delivery: ImportedFiles) -> ImportedFiles:
-    """Take back a held import of which a delivery says something else now; all is judged anew.
+def _held_before(
+    campaign: "Campaign", delivery: ImportedFiles
+) -> tuple[tuple[int, ...], ImportedFiles]:
+    """Held imports of which a delivery says something else now: all is judged anew.
 
-    The delivery with the held files of its pose that it lacks.
+    Their numbers, and the delivery with the held files of its pose that it lacks.
     """
-    for held_at in tuple(campaign.state.held):
+    instead = []
+    for held_at in campaign.state.held:
         entry, event = campaign.held_import(held_at)
         lacks = replaced_hits(delivery, event, campaign.cell.robot.joints)
         if lacks is not None:
-            campaign.append(events.Undone(entry.seq, gives_way=True))
+            instead.append(entry.seq)
             more = tuple(map(campaign.recordings.source, lacks))
             delivery = replaced(delivery, sources=(*delivery.sources, *more))
-    return delivery
+    return tuple(instead), delivery
 
 
 def import_pose(
@@ -289,43 +297,29 @@ def import_pose(
     named: frozenset[Path],
 ) -> ImportReport:  # fmt: skip
     """Judge the files of one pose, ask what is to be asked, write the import and fit again."""
-    started, delivery = time.perf_counter(), _taken_back(campaign, delivery)
-    before, state, pose = campaign.model, campaign.state, delivery.pose
+    started, pose = time.perf_counter(), delivery.pose
+    instead, delivery = _held_before(campaign, delivery)
+    before, state = campaign.model, without_entries(campaign.entries, instead)
     known, keeps, table = state.hit_at(pose), campaign.recordings, campaign.cell.config.modes
     judged = JudgedFiles.of(keeps, delivery, state, named, table)
     hits, measured = judged.hits, judged.measured
     if measured is None:
-        held = state.held.get(pose)
+        held = campaign.state.held.get(pose)
         return ImportReport(
-            pose, (), (), judged.already, held or state.measurements.get(pose), None, before,
-            before, 0.0, left_out=judged.left_out, question=held.question if held else None,
+            pose, held or state.measurements.get(pose), before, before, (),
+            held.question if held else None, judged.already, judged.left_out,
         )  # fmt: skip
     event, told = _event(before, state, pose, known.joints_deg if known else joints_deg, judged)
-    campaign.append(event)
+    campaign.append(replace(event, instead=instead))
     measurement = (campaign.state.held if event.question else campaign.state.measurements)[pose]
-    # Beside new hits earlier ones may look wrong; they stay accepted all the same.
-    agreed = all(verdict.accepted for verdict in measured.verdicts[: len(judged.old)])
-    if measured.frf is not None and agreed:
-        keeps.keep_frf(measured.frf, measurement, table)
     model = campaign.model
     remarks = remarks_on(campaign.cell.robot.joints, state, judged, measurement, joints_deg, told)
     if not event.question and any(hit.accepted for hit in hits):
         remarks += (*unexpected_modes(before, model, pose), *model.remarks)
     return ImportReport(
-        pose=pose,
-        accepted=tuple(hit for hit in hits if hit.accepted and not event.question),
-        refused=left_out_hits(hits, event.question),
-        already=judged.already,
-        measurement=measurement,
-        measured=measured,
-        model_before=before,
-        model=model,
-        refit_seconds=time.perf_counter() - started,
-        remarks=remarks,
-        left_out=judged.left_out,
-        question=event.question,
-        alerts=told,
-    )
+        pose, measurement, before, model, hits, event.question, judged.already, judged.left_out,
+        measured, remarks, alerts=told, refit_seconds=time.perf_counter() - started,
+    )  # fmt: skip
 
 
 def _event(
@@ -345,16 +339,18 @@ def _event(
     new_modes = from_modal(alone.modal)
     asked = contradiction(pose, measured, len(judged.old))
     asked = asked or question_about(before, state, pose, joints_deg, alone)
-    drift = None if asked else suspected_drift(before, state, pose, joints_deg, new_modes)
+    again, drift = "", ""
+    if asked is None:
+        again, drift = suspected_drift(before, state, pose, joints_deg, new_modes)
     event = events.Imported(
         pose=pose,
         joints_deg=joints_deg,
         hits=judged.hits,
         modes=from_modal(measured.modal),
         remarks=measured.remarks,
-        amplitude=from_homogeneity(measured.homogeneity),
+        amplitude=measured.homogeneity,
         question=asked,
-        again=drift.again if drift else "",
-        replaced=tuple((hit.sha256, why) for hit, why in judged.superseded.items()),
+        again=again,
+        replaced=tuple(hit.sha256 for hit in judged.superseded),
     )
     return event, alerts(before, state, event, measured, new_modes, drift)

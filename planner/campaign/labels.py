@@ -1,22 +1,25 @@
 """Which measured mode is which: labels 1…count over all measured poses."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.campaign.cell import Cell
 from planner.campaign.low_fidelity import LowFidelity
-from planner.campaign.measured_modes import to_mode
+from planner.campaign.measured_modes import NUMBERS, to_mode
 from planner.campaign.state import Measurement
 from planner.dynamics.vibration import SimulatedModes
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
 from planner.surrogate.modal_surrogate import ModalObservations
 
+if TYPE_CHECKING:
+    from planner.campaign.model import Model
+
 # Simulated modes above those modelled that a measured mode may be instead: where one of the
 # modelled ones cannot be seen (nodal point), the next one must not take its label.
 ABOVE = 2
-MODAL = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"  # of a mode
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +81,7 @@ def frequencies(labelled: tuple[LabelledPose, ...]) -> np.ndarray:
 def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObservations:
     """The labelled modes as arrays, NaN where a mode was not found or a column not hit."""
     count, n = cell.config.modes.count, len(labelled)
-    values = {name: np.full((n, count), np.nan) for name in MODAL}
+    values = {name: np.full((n, count), np.nan) for name in NUMBERS}
     values |= {"residue": np.full((n, count, 3, 3), np.nan + 1j * np.nan)}
     values |= {"residue_sd": np.full((n, count, 3, 3), np.nan)}
     for i, pose in enumerate(labelled):
@@ -92,3 +95,40 @@ def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObserva
         simulated = SimulatedModes.joined([p.simulated for p in labelled])
     x = cell.features(q) if n else np.zeros((0, len(cell.workspace.feature_names)))
     return ModalObservations(x, **values, simulated=simulated)
+
+
+@dataclass(frozen=True, eq=False)
+class FoundMode:
+    """A label's mode at a pose, None where it was not found, beside what was expected (Hz, sd).
+
+    NaN where that is not known; `probability` that it is this mode.
+    """
+
+    label: int
+    mode: Mode | None
+    probability: float
+    expected_hz: float = float("nan")
+    sd_hz: float = float("nan")
+
+    @property
+    def off(self) -> float:
+        """By how many sds it is off what was expected; NaN where either is not known."""
+        if self.mode is None:
+            return float("nan")
+        sd = np.hypot(self.sd_hz, self.mode.frequency_sd_hz)
+        return float((self.mode.frequency_hz - self.expected_hz) / sd)
+
+
+def found_modes(pose: str, model: "Model", before: "Model | None") -> list[FoundMode]:
+    """Of a pose, and what a model expected `before` it was hit; none where nothing was found."""
+    labelled = next((p for p in model.labelled if p.pose == pose), None)
+    if labelled is None:
+        return []
+    labels = enumerate(zip(labelled.modes, labelled.probability.tolist(), strict=True), 1)
+    found = [FoundMode(k, mode, certain) for k, (mode, certain) in labels]
+    if before is None:
+        return found
+    each = (row[0].tolist() for row in before.frequencies(labelled.q[None]))
+    return [
+        replace(one, expected_hz=hz, sd_hz=sd) for one, hz, sd in zip(found, *each, strict=True)
+    ]

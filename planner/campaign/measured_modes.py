@@ -1,13 +1,12 @@
-"""Measured modes and force levels: from and to the log, and as rows for pandas.DataFrame."""
+"""Measured modes: from and to the log, and as rows for pandas.DataFrame."""
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planner.campaign.events import Amplitude, ForceLevel, MeasuredMode
+from planner.campaign.events import MeasuredMode
 from planner.campaign.state import Measurement
-from planner.modal.homogeneity import Homogeneity
 from planner.modal.modes import ModalModel, Mode
 from planner.recording.joints import JointUnits
 
@@ -60,29 +59,7 @@ def from_modal(modal: ModalModel | None) -> tuple[MeasuredMode, ...]:
     return tuple(from_mode(mode) for mode in every)
 
 
-def from_homogeneity(found: Homogeneity | None) -> Amplitude | None:
-    """The comparison of force levels as the log keeps it."""
-    if found is None:
-        return None
-
-    def numbers(values: np.ndarray) -> tuple[float | None, ...]:
-        return tuple(float(v) if np.isfinite(v) else None for v in values)
-
-    levels = tuple(
-        ForceLevel(
-            level.peak_force_n,
-            level.hits,
-            numbers(level.frequency_hz),
-            numbers(level.frequency_sd_hz),
-            numbers(level.damping_ratio),
-            numbers(level.damping_sd),
-        )
-        for level in found.levels
-    )
-    return Amplitude(levels, found.difference, found.p_value, found.homogeneous)
-
-
-NUMBERS = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"
+NUMBERS = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"  # of a mode
 
 
 def measured_records(

@@ -10,7 +10,7 @@ from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import oscillatory
 from planner.frf.frf import Frf
-from planner.modal.mac import mac_matrix
+from planner.modal.mac import mac
 from planner.modal.residues import lsfd, rank_one, realign
 from planner.recording.points import TCP, Layout
 from planner.robot.link_bodies import Skeleton, placements
@@ -120,7 +120,7 @@ def agreement(measured: PointShapes, simulated: PointShapes) -> np.ndarray:
     for k, j in np.ndindex(out.shape):
         known = np.isfinite(a[k]) & np.isfinite(b[j])
         if np.any(known):
-            out[k, j] = mac_matrix(a[k, known][None], b[j, known][None])[0, 0]
+            out[k, j] = mac(a[k, known], b[j, known])
     return out
 
 

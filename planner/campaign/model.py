@@ -1,6 +1,5 @@
 """The model of a campaign: a pure function of its cell and its state."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -9,7 +8,6 @@ import numpy as np
 
 from planner.campaign.acquisition_inputs import acquisition_inputs, poses_at, uncertain_parameters
 from planner.campaign.cell import Cell
-from planner.campaign.config import ModesTable
 from planner.campaign.hit_error_estimates import CampaignHitErrors
 from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.labels import LabelledPose, observations
@@ -19,6 +17,8 @@ from planner.design.acquisitions import mixed, parameter_variance, repeat_gain
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.design.parameter_sensitivity import FrfNoise
 from planner.design.stopping import Forecast, forecast
+from planner.dynamics.at_force import with_possible_laws
+from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf.frf import Frf
 from planner.robot.place_names import place_names, with_names
@@ -32,9 +32,7 @@ from planner.words import counted, listed
 
 if TYPE_CHECKING:
     from planner.campaign.decision import Decision
-    from planner.campaign.frf_model import FrfModel
-
-FrfOf = Callable[[Measurement, ModesTable], Frf]
+    from planner.campaign.frf_model import ErrorByZone
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
@@ -65,7 +63,7 @@ class Model:
     frf_noise: FrfNoise | None = None  # None: no FRF was looked at
     estimated: CampaignHitErrors | None = None  # None: nothing tells errors of hits
     used: tuple[Measurement, ...] = ()  # of the labelled poses, as they were measured
-    frf_of: FrfOf | None = None
+    frfs: tuple[Frf, ...] = ()  # of their tools, in the band of campaign.toml
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
         """Frequencies and damping at poses q (n, dof) in rad, as a visit there would show them.
@@ -86,14 +84,6 @@ class Model:
         """Sds (n, count) with what the simulation's own parameters leave open, all in Hz."""
         share = self.surrogate.frequency_trust * self.low.frequency_sd(q, simulated)
         return np.hypot(sd, share * f)
-
-    @cached_property
-    def frfs(self) -> tuple[Frf, ...]:
-        """Of the labelled poses; read when asked for."""
-        if self.frf_of is None:
-            return ()
-        table = self.cell.config.modes
-        return tuple(self.frf_of(m, table).within(table.band_hz) for m in self.used)
 
     @cached_property
     def hit_errors(self) -> dict[str, tuple[HitErrorEstimate, ...]]:
@@ -123,13 +113,6 @@ class Model:
         candidates = self.cell.candidates
         said = self.simulated_candidates
         return self._predict(candidates.q, candidates.features, said, visit=False)
-
-    def expected(self, index: int) -> ModalPrediction:
-        """Modes (1, count) at the candidate of that index."""
-        one = slice(index, index + 1)
-        candidates = self.cell.candidates
-        simulated = self.simulated_candidates[one]
-        return self._predict(candidates.q[one], candidates.features[one], simulated)
 
     @cached_property
     def simulated_candidates(self) -> SimulatedModes:
@@ -246,27 +229,38 @@ class Model:
 
         sd is the root of E|H − mean|².
         """
+        fit = self.low.identified_robot
+        if self.frfs and fit is not None and fit.fits:
+            return fit.posterior.predicted(q, frequency_hz)
+        mean, sd = self._modal_frf(q, frequency_hz)
+        if not self.frfs:
+            return mean, sd
+        from planner.campaign.frf_model import local_size
 
-        def modal() -> tuple[np.ndarray, np.ndarray]:
-            return self._modal_frf(q, frequency_hz)
-
-        if self.frf_model is None:
-            return modal()
-        return self.frf_model.predict(q, frequency_hz, modal)
+        return mean, np.hypot(sd, self.frf_error.at(frequency_hz) * local_size(mean, frequency_hz))
 
     @cached_property
-    def frf_model(self) -> "FrfModel | None":
-        """How FRFs are predicted; None before one was measured. Worked out when asked for."""
-        if not self.frfs:
-            return None
-        from planner.campaign.frf_model import FrfModel
+    def frf_error(self) -> "ErrorByZone":
+        """Of FRFs of the fused modes, beyond their sds. Worked out when asked for."""
+        from planner.campaign.frf_model import ErrorByZone
 
-        return FrfModel.of(self)
+        return ErrorByZone.of(self)
 
     @property
     def knows_frfs(self) -> bool:
-        """Whether `frf_model` was worked out already."""
-        return "frf_model" in vars(self)
+        """Whether what FRFs of the fused modes take was worked out already."""
+        return "with_residues" in vars(self)
+
+    @property
+    def struck(self) -> Simulation | None:
+        """The simulation whose laws say what another force changes; None: nothing does.
+
+        Springs have of the laws what robot.toml says: hits they were identified from, too.
+        """
+        simulation = self.low.simulation
+        if simulation is None or not simulation.robot.config.law:
+            return None
+        return with_possible_laws(simulation)
 
     def _modal_frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """FRFs of the fused modes, and of those above them where a simulation knows them."""

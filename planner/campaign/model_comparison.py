@@ -8,19 +8,16 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planner.campaign.build import simulated_elsewhere
+from planner.campaign.model import Model
 from planner.inference.parallel import parallel_map
 from planner.progress import ProgressCallback, no_progress
 from planner.surrogate.average import Average
 from planner.surrogate.frequency_models import MODELS
 from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, simulated_log
-
-if TYPE_CHECKING:
-    from planner.campaign.model import Model
 
 INSIDE = 1.96  # sds of the interval that holds 95 %
 
@@ -44,11 +41,11 @@ class LeftOutModel:
 
 
 def compared_models(
-    model: "Model", names: Sequence[str] = (), progress: ProgressCallback = no_progress
+    model: Model, progress: ProgressCallback = no_progress
 ) -> tuple[LeftOutModel, ...]:
     """All usable ones, the likeliest for poses left out first; () with fewer than two poses."""
     n, config = len(model.seen.x), model.cell.config
-    usable = [m for m in names or MODELS if model.low.simulation or not MODELS[m].simulation]
+    usable = [m for m in MODELS if model.low.simulation or not MODELS[m].simulation]
     if n < 2:
         return ()
     items = [(name, left) for name in usable for left in range(-1, n)]

@@ -147,10 +147,10 @@ def _xyz(position_m: np.ndarray) -> tuple[float, float, float]:
 
 
 def _reason(model: Model, index: int, acquisition: str) -> str:
-    p = model.expected(index)
-    sd = 100 * p.frequency_sd_hz[0] / p.frequency_hz[0]
-    k = int(np.argmax(sd))
-    text = f"mode {k + 1} is expected at {p.frequency_hz[0, k]:.2f} Hz ± {small(sd[k], '.1f')} %"
+    hz, sd = (row[0] for row in model.frequencies(model.cell.candidates.q[[index]]))
+    k = int(np.argmax(sd / hz))
+    percent = small(100 * sd[k] / hz[k], ".1f")
+    text = f"mode {k + 1} is expected at {hz[k]:.2f} Hz ± {percent} %"
     if model.labelled:
         x = model.cell.features(np.array([pose.q for pose in model.labelled]))
         distance = np.linalg.norm(x - model.cell.candidates.features[index], axis=1)

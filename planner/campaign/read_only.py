@@ -4,19 +4,14 @@ import copy
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
 import msgspec
 import numpy as np
 
 from planner import content_hash
 from planner.campaign import store
-from planner.campaign.config import (
-    CampaignConfig,
-    ModesTable,
-    config_from_builtins,
-    load_campaign_config,
-)
+from planner.campaign.config import load_campaign_config
 from planner.campaign.events import Configured, Entry, Imported, Refused
 from planner.campaign.journal import Journal
 from planner.campaign.state import CampaignState, Measurement, fold
@@ -31,7 +26,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from planner.campaign.cell import Cell
-    from planner.campaign.frf_model import ForceModel
     from planner.campaign.model import Model
     from planner.dataset.dataset import Dataset
     from planner.dataset.visits import Recording
@@ -94,8 +88,7 @@ class ReadOnlyCampaign:
         def load() -> "Cell":
             from planner.campaign.cell import Cell
 
-            config = config_from_builtins(configured.config)
-            loaded = Cell.load(self.directory / config.robot, config)
+            loaded = Cell.load(self.directory / configured.config.robot, configured.config)
             if loaded.robot.joints.declared != configured.joint_units:
                 raise InputError(
                     f"{loaded.robot.urdf_path}: other joints slide than when the campaign began, "
@@ -116,10 +109,7 @@ class ReadOnlyCampaign:
         state, configured = self.state, content_hash.of(self._configured())
 
         def find() -> "Model":
-            found = self.kept_model(state)
-            if found is None:
-                found = self._fitted(state)
-                self._kept.put(self._key("model", state.used), found)
+            found = self.kept_model(state) or self._fitted(state)
             # With the candidates that were worked out for it.
             self._memory["cell"] = configured, found.cell
             return found
@@ -128,12 +118,8 @@ class ReadOnlyCampaign:
 
     def kept_model(self, state: CampaignState) -> "Model | None":
         """The model of an earlier state of this configuration, where it is kept on disk."""
-        key = self._key("model", state.used)
-        if not self._kept.has(key):
-            return None  # without the libraries that a model takes
-        from planner.campaign.model import Model
-
-        return self._kept.get(key, Model)
+        # Of whichever class: it is not imported, with all that it takes, where nothing is kept.
+        return cast("Model | None", self._kept.get(self._key("model", state.used), object))
 
     def _key(self, what: str, used: tuple[Measurement, ...], where: str | None = None) -> str:
         """Name in the store of what is a function of configuration and measurements in use.
@@ -174,14 +160,15 @@ class ReadOnlyCampaign:
             return self._kept.result(self._key("fit", tuple(bare), ""), FitRecord, find)
 
         with threadpool_limits(1):
-            model = build(self.cell, state, kept.frf, kept.hits, recall)
+            model = build(self.cell, state, kept.hits, recall)
             _ = model.frequency_sd_percent, model.frf_sd_percent  # kept: every command needs them
+        self._kept.put(self._key("model", state.used), model)
         return model
 
     @property
     def recordings(self) -> KeptRecordings:
         """The recordings that were imported, by the points of the robot as configured now."""
-        return KeptRecordings(self.directory, self.cell.robot.points)
+        return KeptRecordings.of(self.directory, self.cell)
 
     def posture(self, pose: str | None) -> np.ndarray:
         """Joint angles (dof,) in rad of a measured or proposed pose; InputError names them."""
@@ -194,9 +181,9 @@ class ReadOnlyCampaign:
             raise InputError(f"{self.directory} {given} one of {some} with --pose.")
         return self.cell.robot.joints.internal(known[pose])
 
-    def frf_of(self, measurement: Measurement, table: ModesTable) -> "Frf":
+    def frf_of(self, measurement: Measurement) -> "Frf":
         """The FRF matrix of a measured pose, estimated again from its recordings if need be."""
-        return self.recordings.frf(measurement, table)
+        return self.recordings.hits(measurement).averaged
 
     def dataset(
         self,
@@ -251,7 +238,7 @@ class ReadOnlyCampaign:
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        return Configured(as_logged(config), hashes, __version__, begun.joint_units)
+        return Configured(config, hashes, __version__, begun.joint_units)
 
     # -- what is expected ----------------------------------------------------------------------
 
@@ -283,26 +270,22 @@ class ReadOnlyCampaign:
         other._force_n = force_n
         return other
 
-    @property
-    def at_force(self) -> "ForceModel":
-        """What a stated force changes."""
-        from planner.campaign.frf_model import ForceModel
-
-        return ForceModel.of(self.model)
-
     def frf_at(
         self, q: np.ndarray, frequency_hz: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """As `frf`, at poses q (n, dof) in rad; what was worked out for it is kept."""
         lines, model = self.frequency_lines if frequency_hz is None else frequency_hz, self.model
-        known = model.knows_frfs
-        q = np.atleast_2d(q)
+        known, q = model.knows_frfs, np.atleast_2d(q)
         mean, sd = model.frf(q, lines)
-        if not known:
+        if known != model.knows_frfs:
             self._kept.put(self._key("model", self.state.used), model)
-        if self._force_n is None:
-            return mean, sd
-        return mean + self.at_force.frf_change(q, np.full(len(q), self._force_n), lines, False), sd
+        if self._force_n is not None and (struck := model.struck) is not None:
+            from planner.dynamics.at_force import change_at_force
+
+            mean = mean + change_at_force(
+                struck, q, np.full(len(q), self._force_n), lines, in_time=False
+            )
+        return mean, sd
 
     def records(self) -> list[dict[str, Any]]:
         """All measured modes, one row each: what pandas.DataFrame takes."""
@@ -323,8 +306,3 @@ class ReadOnlyCampaign:
         from planner.frf.synthesis import frequency_lines
 
         return frequency_lines(self.cell.config.modes.band_hz)
-
-
-def as_logged(config: CampaignConfig) -> dict:
-    """The configuration as it reads back from the log, so that the two can be compared."""
-    return msgspec.json.decode(msgspec.json.encode(config))

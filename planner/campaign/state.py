@@ -1,13 +1,12 @@
 """The state of a campaign: a pure fold over its events."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import msgspec
 
 from planner.campaign.events import (
-    Amplitude,
     AnyEvent,
     Configured,
     Confirmed,
@@ -26,6 +25,7 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
+from planner.modal.modes import Homogeneity
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Measurement:
     hits: tuple[HitRecord, ...]
     modes: tuple[MeasuredMode, ...]
     remarks: tuple[str, ...] = ()
-    amplitude: Amplitude | None = None
+    amplitude: Homogeneity | None = None
     withdrawn: bool = False
     time: str = ""
     question: Question | None = None  # open while it is held, else answered
@@ -124,22 +124,12 @@ class CampaignState:
         return self.guessed.get(digest, known) if known == pose else known
 
     @property
-    def owners(self) -> dict[str, str]:
-        """Poses of all hits that are in use, or held, by sha256."""
-        return {hit.sha256: pose for pose, hit in self._known_hits()}
-
-    @property
-    def first_files(self) -> dict[str, str]:
-        """Names under which these were imported, by sha256."""
-        return {
-            hit.sha256: hit.file.rpartition(" (hit ")[0] if hit.part else hit.file
-            for _, hit in self._known_hits()
-        }
-
-    def _known_hits(self) -> list[tuple[str, HitRecord]]:
+    def in_use(self) -> dict[str, tuple[str, HitRecord]]:
+        """All hits that are in use, or held, by sha256: pose, hit."""
         held = [(pose, hit) for pose, m in self.held.items() for hit in m.hits]
         used = (m for m in self.measurements.values() if not m.withdrawn)
-        return held + [(m.pose, hit) for m in used for hit in m.accepted]
+        every = held + [(m.pose, hit) for m in used for hit in m.accepted]
+        return {hit.sha256: (pose, hit) for pose, hit in every}
 
     def unchanged_by(self, event: AnyEvent) -> bool:
         """Whether an act changes neither the model nor what is proposed."""
@@ -151,11 +141,6 @@ class CampaignState:
     def simulated(self) -> bool:
         """Whether any recording is labelled as simulated."""
         return any(m.simulated for m in self.recorded)
-
-    @property
-    def questions(self) -> tuple[Question, ...]:
-        """What is asked of hits that are held."""
-        return tuple(m.question for m in self.held.values() if m.question)
 
     @property
     def recorded(self) -> tuple[Measurement, ...]:
@@ -175,7 +160,7 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
                 state, proposals_made=_made(state, entry.event), proposals=state.proposals | made
             )
         if isinstance(entry.event, Undone):
-            if not state.unchanged_by(_act_of(entries, entry.event)):
+            if not all(map(state.unchanged_by, _acts_of(entries, entry.event))):
                 state = replace(state, model_version=entry.seq)
         elif entry.seq not in undone:
             state = _apply(state, entry.event, entry)
@@ -183,20 +168,32 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
     return state
 
 
+def without_entries(entries: Sequence[Entry], acts: tuple[int, ...]) -> CampaignState:
+    """The state as if the acts of these numbers were taken back."""
+    return fold([*entries, Entry(len(entries) + 1, "", Undone(acts))] if acts else entries)
+
+
 def taken_back(entries: Sequence[Entry]) -> frozenset[int]:
     """Numbers of the entries that do not hold; an Undone that was itself undone takes nothing."""
-    found = set()
+    found: set[int] = set()
     for entry in reversed(entries):
-        if isinstance(entry.event, Undone) and entry.seq not in found:
-            found.add(entry.event.act)
+        event = entry.event
+        if entry.seq in found:
+            continue
+        if isinstance(event, Undone):
+            found.update(event.acts)
+        elif isinstance(event, Imported | Refused):
+            found.update(event.instead)
     return frozenset(found)
 
 
-def _act_of(entries: Sequence[Entry], event: AnyEvent) -> AnyEvent:
+def _acts_of(entries: Sequence[Entry], event: AnyEvent) -> Iterator[AnyEvent]:
     """What an Undone is about in the end, an undo of an undo too."""
-    while isinstance(event, Undone):
-        event = entries[event.act - 1].event
-    return event
+    if not isinstance(event, Undone):
+        yield event
+        return
+    for act in event.acts:
+        yield from _acts_of(entries, entries[act - 1].event)
 
 
 def _made(state: CampaignState, event: Proposed) -> int:
@@ -284,14 +281,13 @@ def _imported(
     )
 
 
-def without(known: Measurement | None, replaced: Sequence[tuple[str, str]]) -> Measurement | None:
-    """A measurement without files that newer ones take the place of: by sha256, and why."""
+def without(known: Measurement | None, replaced: Sequence[str]) -> Measurement | None:
+    """A measurement without files (sha256) that newer ones take the place of."""
     if known is None or not replaced:
         return known
-    why = dict(replaced)
     hits = tuple(
-        hit if hit.sha256 not in why
-        else msgspec.structs.replace(hit, accepted=False, reason=why[hit.sha256])
+        hit if hit.sha256 not in replaced
+        else msgspec.structs.replace(hit, accepted=False, reason=hit.replaced)
         for hit in known.hits
     )  # fmt: skip
     return replace(known, hits=hits)

@@ -24,8 +24,8 @@ from planner.robot.mesh_files import urdf_source
 from planner.toml_file import read_toml_text
 
 if TYPE_CHECKING:
+    from planner.campaign.cell import Cell
     from planner.dataset.hit_columns import Correction, PoseHits
-    from planner.frf.frf import Frf
 
 LOG = "log.jsonl"
 CONFIG = "campaign.toml"
@@ -247,11 +247,17 @@ def _default(directory: Path, robot_file: str) -> str:
 
     robot = Robot.load(directory / robot_file)
     limits = ranges_inside(robot, robot.lower_rad, robot.upper_rad)
+    said = "Whole range of every joint: narrow it to where the tool works."
+    return campaign_text(said, robot_file, limits, {"band_hz": list(robot.config.band_hz)})
+
+
+def campaign_text(said: str, robot: str, joints_deg: list[list[float]], modes: dict) -> str:
+    """A campaign.toml for a workspace of which something is `said` in a comment."""
     document = tomlkit.document()
-    document.add(tomlkit.comment("Whole range of every joint: narrow it to where the tool works."))
-    document.add("robot", tomlkit.item(robot_file))
-    document.add("workspace", tomlkit.item({"joints_deg": limits}))
-    document.add("modes", tomlkit.item({"band_hz": list(robot.config.band_hz)}))
+    document.add(tomlkit.comment(said))
+    document.add("robot", tomlkit.item(robot))
+    document.add("workspace", tomlkit.item({"joints_deg": joints_deg}))
+    document.add("modes", tomlkit.item(modes))
     return tomlkit.dumps(document)
 
 
@@ -279,21 +285,23 @@ def write_example(directory: Path) -> tuple[str, str, str, tuple[str, ...]]:
 
 @dataclass(frozen=True, eq=False)
 class KeptRecordings:
-    """Recordings by content hash in a campaign's folder, whose robot has points of these names.
-
-    A model carries it, so that FRFs are estimated only where they are asked for.
-    """
+    """Recordings by content hash in a campaign's folder, whose robot has points of these names."""
 
     directory: Path
     names: PointNames
+    table: ModesTable
+
+    @classmethod
+    def of(cls, directory: Path, cell: "Cell") -> "KeptRecordings":
+        """As a cell has them."""
+        return cls(directory, cell.robot.points, cell.config.modes)
 
     def source(self, hit: HitRecord) -> Source:
         """The kept copy of a recording; InputError where it is not what was imported."""
         path = self._checked(hit)
         stated = StatedPoints(hit.hit_point, hit.response_points, names=self.names)
-        return Source(
-            path, hit.file, hit.hit, hit.repeat, stated, hit.part, hit.response, hit.from_name,
-        )  # fmt: skip
+        own = hit.part, hit.response, hit.from_name
+        return Source(path, hit.file, hit.hit, hit.repeat, stated, *own)
 
     def _checked(self, hit: HitRecord) -> Path:
         path = recording_path(self.directory, hit.sha256, hit.suffix)
@@ -318,22 +326,9 @@ class KeptRecordings:
         """Of the accepted hits of a measured pose."""
         return tuple(self.source(hit) for hit in measurement.accepted)
 
-    def frf(self, measurement: Measurement, table: ModesTable) -> "Frf":
-        """The FRF matrix of a measured pose, estimated again from its recordings if need be."""
-        from planner.dataset.measure import frf_of
-
-        return frf_of(self.sources(measurement), table.band_hz, table.window_rate_1_s)
-
-    def keep_frf(self, frf: "Frf", measurement: Measurement, table: ModesTable) -> None:
-        """Keep the FRF matrix of a pose that was measured just now."""
-        from planner.dataset.measure import keep_frf
-
-        keep_frf(frf, self.sources(measurement), table.band_hz, table.window_rate_1_s)
-
-    def hits(
-        self, measurement: Measurement, table: ModesTable, corrected: "Correction | None" = None
-    ) -> "PoseHits":
+    def hits(self, measurement: Measurement, corrected: "Correction | None" = None) -> "PoseHits":
         """What the accepted hits of a measured pose say, each by itself and at all points."""
         from planner.dataset.hit_columns import hits_of
 
-        return hits_of(self.sources(measurement), table.band_hz, table.window_rate_1_s, corrected)
+        how = self.table.band_hz, self.table.window_rate_1_s
+        return hits_of(self.sources(measurement), *how, corrected)

@@ -1,13 +1,13 @@
 """Hits of a campaign whose robot.toml states laws of joints, as springs alone would answer them."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
 
 from planner.campaign.config import ModesTable
 from planner.campaign.state import Measurement
-from planner.dataset.hit_columns import Correction, PoseHits
+from planner.dataset.hit_columns import Correction, PoseHits, no_columns
 from planner.dynamics.at_force import with_average, with_possible_laws
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
@@ -20,8 +20,18 @@ class HitsOf(Protocol):
     """What the hits of a measurement say, if need be once they are corrected."""
 
     def __call__(
-        self, measurement: Measurement, table: ModesTable, corrected: Correction | None = None, /
+        self, measurement: Measurement, corrected: Correction | None = None, /
     ) -> PoseHits: ...
+
+
+def hits_unknown(frfs: Mapping[str, Frf]) -> HitsOf:
+    """Of poses by name of which nothing is known but the tool's FRF."""
+
+    def hits_of(measurement: Measurement, _: Correction | None = None, /) -> PoseHits:
+        frf = frfs[measurement.pose]
+        return PoseHits(no_columns(), frf, frf)
+
+    return hits_of
 
 
 class StraightenedHits:
@@ -31,20 +41,17 @@ class StraightenedHits:
         self, hits_of: HitsOf, used: tuple[Measurement, ...], q: np.ndarray, table: ModesTable
     ):
         self.latest: tuple[PoseHits, ...] = ()
-        self._hits_of, self._table = hits_of, table
+        self._hits_of, self._how = hits_of, (table.band_hz[1], table.window_rate_1_s)
         self._used = tuple(zip(used, q, strict=True))
 
     def frfs(self, simulation: Simulation, count: int) -> tuple[Frf, ...]:
         """At all points, of the first so many, without what the laws of a simulation do."""
-        how = self._table.band_hz[1], self._table.window_rate_1_s
         simulation = with_possible_laws(simulation)
 
         def corrected(q: np.ndarray) -> Correction:
-            return lambda hits: straightened_hits(hits, q, simulation, *how)
+            return lambda hits: straightened_hits(hits, q, simulation, *self._how)
 
-        self.latest = tuple(
-            self._hits_of(m, self._table, corrected(q)) for m, q in self._used[:count]
-        )
+        self.latest = tuple(self._hits_of(m, corrected(q)) for m, q in self._used[:count])
         return tuple(hits.whole for hits in self.latest)
 
     def referred(self, simulation: Simulation) -> Simulation:
@@ -56,26 +63,8 @@ class StraightenedHits:
             return hits
 
         (measurement, q), *_ = self._used
-        self._hits_of(measurement, self._table, seen)
+        self._hits_of(measurement, seen)
         if not struck:
             return simulation
         axes = np.array([hit.axis_index for hit in struck])
         return with_average(simulation, q, axes, struck_n(simulation, struck))
-
-    @property
-    def at_hand(self) -> "HitsAtHand":
-        """`latest` by pose."""
-        pairs = zip(self._used, self.latest, strict=True)
-        return HitsAtHand({m.pose: hits for (m, _), hits in pairs})
-
-
-@dataclass(frozen=True)
-class HitsAtHand:
-    """What hits say of poses, by name: `HitsOf` that reads no file."""
-
-    poses: dict[str, PoseHits]
-
-    def __call__(
-        self, measurement: Measurement, table: ModesTable, corrected: Correction | None = None, /
-    ) -> PoseHits:
-        return self.poses[measurement.pose]

@@ -103,6 +103,7 @@ class PathPoses:
         """
         robot = self.campaign.cell.robot
         collisions, here = Collisions(robot), self.q[pose]
+        (rotation, position), axis = robot.forward(here), np.array(self.cut.axis)
         found = {0.0: here}
         for sense in (1.0, -1.0):
             near = here
@@ -110,7 +111,8 @@ class PathPoses:
                 angle = float(sense * turn) % 360
                 if angle in found:
                     break
-                q = _turned(robot, here, np.array(self.cut.axis), angle, near, collisions)
+                turned = rotation @ about(axis, angle)
+                q = solve(robot, turned, position, near, collisions, 0).q
                 if q is None:
                     break
                 near = found[angle] = q
@@ -119,22 +121,25 @@ class PathPoses:
     def standing(self, found: list[tuple[int, float, np.ndarray]]) -> "PathPoses":
         """Other angles q at some of the poses, with the feeds there."""
         names = tuple(f"{self.names[i]}, turned {turn:g}°" for i, turn, _ in found)
-        feeds = np.array([self._feed(i) for i, _, _ in found])
+        feeds = self._in_base[[i for i, _, _ in found]]
         return replace(self, names=names, q=np.array([q for _, _, q in found]), feeds=feeds)
 
-    def _feed(self, pose: int) -> np.ndarray:
-        """(3,) in the base frame, as the cut or the path has it."""
+    @property
+    def _in_base(self) -> np.ndarray:
+        """Feeds (p, 3) in the base frame, as the cut or the path has them."""
         rotation, position = self.campaign.cell.robot.forward_batch(self.q)
         feed = np.array(self.cut.feed)
         if self.cut.feed_in != "path":
-            return feed if self.cut.feed_in == "base" else rotation[pose] @ feed
-        return np.gradient(position, axis=0)[pose] if self.feeds is None else self.feeds[pose]
+            return (
+                np.tile(feed, (len(rotation), 1)) if self.cut.feed_in == "base" else rotation @ feed
+            )
+        return np.gradient(position, axis=0) if self.feeds is None else self.feeds
 
     def feed_in_base(self, turn_deg: float) -> tuple[float, float, float] | None:
         """The feed turned about the tool's axis, in the base frame; None if poses differ in it."""
         rotation, _ = self.campaign.cell.robot.forward_batch(self.q)
         axis = rotation @ (np.array(self.cut.axis) / np.linalg.norm(self.cut.axis))
-        feed = np.array([self._feed(i) for i in range(len(self.q))])
+        feed = self._in_base
         feed = feed - axis * np.sum(feed * axis, axis=1, keepdims=True)
         feed /= np.linalg.norm(feed, axis=1, keepdims=True)
         turn = np.deg2rad(turn_deg)
@@ -146,15 +151,6 @@ class PathPoses:
 
 
 SAME = 0.02  # by which unit vectors that are the same may differ
-
-
-def _turned(
-    robot: Robot, q: np.ndarray, axis: np.ndarray, turn_deg: float, near: np.ndarray,
-    collisions: Collisions,
-) -> np.ndarray | None:  # fmt: skip
-    """q (dof,) turned about the tool's axis through the tcp, near `near`; None: it cannot be."""
-    rotation, position = robot.forward(q)
-    return solve(robot, rotation @ about(axis, turn_deg), position, near, collisions, 0).q
 
 
 def about(axis: np.ndarray, turn_deg: float) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Entries of the log in words; what `undo` takes back, and what `redo` lets hold again."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import takewhile
 
 import msgspec
@@ -20,18 +20,17 @@ from planner.campaign.events import (
     Withdrawn,
 )
 from planner.campaign.state import fold, taken_back
-from planner.words import counted
+from planner.words import counted, listed
 
 ACTS = (Proposed, Imported, Confirmed, Refused, Withdrawn, Skipped, FilesPlaced, Starred)
 
 
-def last_acts(entries: Iterable[Entry], decisions_only: bool = False) -> tuple[Entry, ...]:
+def last_acts(entries: Sequence[Entry], decisions_only: bool = False) -> tuple[Entry, ...]:
     """What `undo` would take back: the last act; a proposal is one, too.
 
     With `decisions_only` the last decision, and the proposals that followed it: in a session they
     follow of themselves, also after an act that was interrupted.
     """
-    entries = tuple(entries)
     undone = taken_back(entries)
     acts = [e for e in entries if isinstance(e.event, ACTS) and e.seq not in undone]
     if not decisions_only:
@@ -44,46 +43,25 @@ def last_acts(entries: Iterable[Entry], decisions_only: bool = False) -> tuple[E
     return (decision, *(() if before.unchanged_by(decision.event) else proposals))
 
 
-def replaced_by(entries: Sequence[Entry], act: Entry) -> tuple[Entry, ...]:
-    """The Undone entries of what an act took the place of, the last one first."""
-    undone, before = taken_back(entries), reversed(entries[: act.seq - 1])
-    gave_way = takewhile(lambda e: isinstance(e.event, Undone) and e.event.gives_way, before)
-    return tuple(e for e in gave_way if e.seq not in undone)
-
-
-def last_undone(entries: Iterable[Entry]) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
+def last_undone(entries: Sequence[Entry]) -> tuple[Entry | None, tuple[Entry, ...]]:
     """What `redo` would let hold again, and the proposals made since, which it takes back.
 
-    These are the Undone entries of the last `undo`, one right after the other: each takes a later
-    act than the one before, the proposals that followed. Nothing where a decision was made since.
+    That is the last `undo`, or the one before where that was done again; None where a decision was
+    made since.
     """
-    entries = tuple(entries)
     undone = taken_back(entries)
-    group: list[Entry] = []
     since: list[Entry] = []
-    redone = 0
     for entry in reversed(entries):
         event = entry.event
         if entry.seq in undone or not isinstance(event, (*ACTS, Undone)):
             continue
-        if not isinstance(event, Undone):
-            if group or not isinstance(event, Proposed):
-                break
+        if isinstance(event, Proposed):
             since.append(entry)
-        elif isinstance(entries[event.act - 1].event, Undone) or entry.seq == redone - 1:
-            if group:
-                break
-            redone = entry.seq  # a redo, and right before it what that took back itself
-        elif not group or (entry.seq == group[0].seq - 1 and event.act < _act(group[0])):
-            group.insert(0, entry)
-        else:
+        elif not isinstance(event, Undone):
             break
-    return tuple(group), (tuple(since) if group else ())
-
-
-def _act(entry: Entry) -> int:
-    assert isinstance(entry.event, Undone)
-    return entry.event.act
+        elif not any(isinstance(entries[act - 1].event, Undone) for act in event.acts):
+            return entry, tuple(since)
+    return None, ()
 
 
 def in_words(entry: Entry) -> str:
@@ -105,7 +83,8 @@ def in_words(entry: Entry) -> str:
     if isinstance(event, Refused):
         return f"refused {counted(len(event.hits), 'hit')} at {event.pose}"
     if isinstance(event, Undone):
-        return f"took back entry {event.act}"
+        which = "entry" if len(event.acts) == 1 else "entries"
+        return f"took back {which} {listed([str(act) for act in event.acts])}"
     if isinstance(event, FilesShown | FilesPlaced):
         if isinstance(event, FilesPlaced):
             return f"{counted(len(event.files), 'file')} said to be of {event.pose}"

@@ -76,8 +76,7 @@ def _bench(campaign: Campaign) -> Bench | None:
     cell, used = campaign.cell, campaign.state.used
     if len(used) < LEAST_POSES:
         return None
-    table = cell.config.modes
-    poses = [PoolPose(m, campaign.frf_of(m, table), (), "", m.simulated) for m in used]
+    poses = [PoolPose(m, campaign.frf_of(m), (), "", m.simulated) for m in used]
     try:
         bench, _ = assemble(cell.robot, cell.config, poses)
     except InputError:

@@ -14,6 +14,7 @@ from planner.campaign.low_fidelity import Recall, in_memory
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
+from planner.campaign.straightened import hits_unknown
 from planner.compare.bench import Bench, PoolCell, cell_of
 from planner.compare.score import Score, score
 from planner.compare.tasks import Run, Task
@@ -99,7 +100,7 @@ def _fitted(
     measured = [bench.measurements[i] for i in used]
     frfs = {bench.measurements[i].pose: bench.frfs[i] for i in used}
     state = CampaignState(measurements={m.pose: m for m in measured}, events=seed)
-    return build(cell, state, lambda m, _: frfs[m.pose], recall=recall), state
+    return build(cell, state, hits_unknown(frfs), recall), state
 
 
 def _judged(bench: Bench, model: Model, used: list[int]) -> Score:

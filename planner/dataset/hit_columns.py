@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dataset.dataset import LAID
-from planner.dataset.measure import accepted, of_tool, one_hit_frf, read_accepted, tool_frf
+from planner.dataset.measure import MeasuredPose, of_tool, one_hit_frf, tool_frf
 from planner.dataset.screened_files import Source
+from planner.dataset.store import user_store
 from planner.frf.frf import Frf
 from planner.frf.spectra import Windows, transform
+from planner.recording.channel_faults import by_good_sensors
 from planner.recording.records import Hit
 
 LINES = 48  # of each hit, at most: four numbers a hit are told from 144 complex values
@@ -49,12 +51,21 @@ class PoseHits:
     """The accepted hits of a pose one by one, and `whole`, their FRFs at all points.
 
     These are of one hit in the middle of all, see `MeasuredPose.one_hit_frf`; `averaged` is the
-    tool's FRF of all, where hits were `corrected`.
+    tool's FRF as the average of all, the one that `measure` gave.
     """
 
     columns: HitColumns
     whole: Frf
-    averaged: Frf | None = None
+    averaged: Frf
+
+    @property
+    def of_tool(self) -> Frf:
+        """The tool's FRF as one hit in the middle of all would show it.
+
+        Its variance is that of the noise alone: how hits scatter is part of how they miss, which is
+        integrated out, and would count twice.
+        """
+        return self.whole.of_tool or self.averaged
 
 
 def hit_columns(
@@ -105,20 +116,22 @@ def hits_of(
     corrected: Correction | None = None,
 ) -> PoseHits:
     """Those of files that were accepted before, kept like FRFs unless they are `corrected`."""
-    pose, how = accepted(sources, band_hz, window_rate_1_s), (band_hz, window_rate_1_s)
+    pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
+    how = band_hz, window_rate_1_s
 
     def make() -> PoseHits:
-        read, records = read_accepted(sources)
-        every = tuple(hit for _, hit in read)
+        read = [source.read() for source in sources]
+        records = tuple(record for _, found in read for record in found)
+        files = [number for number, (found, _) in enumerate(read) for _ in found]
+        every = tuple(by_good_sensors(hit)[0] for found, _ in read for hit in found)
         every = every if corrected is None else corrected(every)
-        both = zip(read, every, strict=True)
-        at_tool = [(number, one) for (number, _), hit in both for one in of_tool((hit,))]
+        at_tool = [(n, one) for n, hit in zip(files, every, strict=True) for one in of_tool((hit,))]
         columns = no_columns()
         if at_tool:
             file, hits = zip(*at_tool, strict=True)
             columns = hit_columns(hits, file, *how)
-        averaged = None if corrected is None else tool_frf(every, records, *how)
-        return PoseHits(columns, one_hit_frf(every, records, *how), averaged)
+        whole, averaged = one_hit_frf(every, records, *how), tool_frf(every, records, *how)
+        return PoseHits(columns, whole, averaged)
 
     return pose.kept("hits", PoseHits, make) if corrected is None else make()
 

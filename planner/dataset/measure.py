@@ -1,6 +1,6 @@
 """From the files of one pose to its modes: read, screen, average, identify; each step once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
@@ -12,8 +12,7 @@ from planner.dataset.screened_files import FileVerdict, ScreenedFiles, Source, r
 from planner.dataset.store import Store, user_store
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
-from planner.modal.homogeneity import Homogeneity, homogeneity
-from planner.modal.modes import ModalModel
+from planner.modal.modes import Homogeneity, ModalModel
 from planner.recording.points import SENSOR, TCP, TOOL
 from planner.recording.records import FrfRecord, Hit
 
@@ -21,7 +20,6 @@ DEFAULT_BAND_HZ = (4.0, 60.0)  # in which modes of a pose are looked for
 OVER = 7.5  # e^−OVER, 0.06 %, of a decay that does not damp is left where the record ends
 PACKAGES = "recording", "frf", "modal", "dataset", "inference"  # that results here depend on
 
-ACCEPTED = "accepted frf"  # what the store calls the FRF of a pose's accepted files
 NOT_OF_TOOL = (
     "No hit at the tcp was heard by all axes of the sensor there: modes of the tool are not told, "
     "what was measured at other points serves identification and diagnosis."
@@ -194,6 +192,7 @@ class MeasuredPose:
 
     def _decompose(self) -> Decomposed:
         from planner.modal.estimate_modes import estimate_modes
+        from planner.modal.homogeneity import homogeneity
 
         if self.whole is None:
             return Decomposed(None, None, ())
@@ -204,9 +203,9 @@ class MeasuredPose:
         except RefusedError as error:
             return Decomposed(None, None, (str(error),))
         hits = of_tool(self.hits)
-        levels = homogeneity(hits, modal, self.band_hz, self.window_rate_1_s) if hits else None
-        told = (levels.remark,) if levels is not None and levels.remark else ()
-        return Decomposed(modal, levels, (*modal.remarks, *told))
+        found = homogeneity(hits, modal, self.band_hz, self.window_rate_1_s) if hits else None
+        levels, remark = found or (None, "")
+        return Decomposed(modal, levels, (*modal.remarks, *filter(None, (remark,))))
 
 
 def of_tool(hits: tuple[Hit, ...]) -> tuple[Hit, ...]:
@@ -251,42 +250,6 @@ def measure(
     found = MeasuredPose(sources, band_hz, estimator, window_rate_1_s, store=store)
     _ = found.decomposed  # so that what is wrong with the files is said here
     return found
-
-
-def frf_of(
-    sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float = 0.0
-) -> Frf:
-    """The tool's FRF of files that were accepted before: the one that `measure` gave then."""
-
-    def make() -> Frf:
-        hits, records = read_accepted(sources)
-        every = tuple(hit for _, hit in hits)
-        return tool_frf(every, records, band_hz, window_rate_1_s)
-
-    return accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, make)
-
-
-def keep_frf(
-    frf: Frf, sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float
-) -> None:
-    """Keep what `frf_of` will be asked for, now that it is at hand."""
-    _ = accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, lambda: frf)
-
-
-def accepted(
-    sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float
-) -> MeasuredPose:
-    """Files that were accepted before, where what follows from them is kept."""
-    return MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
-
-
-def read_accepted(
-    sources: Sequence[Source],
-) -> tuple[list[tuple[int, Hit]], tuple[FrfRecord, ...]]:
-    """Their hits, each with its file's number, and exported FRFs."""
-    read = [source.read() for source in sources]
-    hits = [(number, hit) for number, (found, _) in enumerate(read) for hit in found]
-    return hits, tuple(record for _, found in read for record in found)
 
 
 def one_hit_frf(

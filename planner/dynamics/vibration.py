@@ -45,7 +45,7 @@ class SimulatedModes:
     damping_ratio: np.ndarray
     residue: np.ndarray
 
-    def __getitem__(self, poses: np.ndarray | slice) -> "SimulatedModes":
+    def __getitem__(self, poses: np.ndarray | slice | int) -> "SimulatedModes":
         return SimulatedModes(*(values[poses] for values in vars(self).values()))
 
     @classmethod

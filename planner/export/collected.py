@@ -67,7 +67,7 @@ def export_data(
         modes = ModalPrediction(none, none, none, none, np.empty((*none.shape, 3, 3)), none)
     measured = (
         MeasuredPoseData(
-            m.pose, m.joints_deg, campaign.frf_of(m, cell.config.modes),
+            m.pose, m.joints_deg, campaign.frf_of(m),
             tuple(mode for mode in m.modes if mode.likely),
         )
         for m in used

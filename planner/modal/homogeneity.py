@@ -9,7 +9,6 @@ to level as much as they really do (Anderson 2001, PERMANOVA): nothing is assume
 scatter is.
 """
 
-from dataclasses import dataclass
 from math import factorial, prod
 
 import numpy as np
@@ -20,7 +19,7 @@ from planner.frf.frf import Frf
 from planner.frf.spectra import Windows, transform
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac
-from planner.modal.modes import ModalModel, Mode
+from planner.modal.modes import ForceLevel, Homogeneity, ModalModel, Mode
 from planner.recording.force_levels import by_level
 from planner.recording.records import Hit
 from planner.recording.repeats import untilted
@@ -30,80 +29,16 @@ SHARE, CHANCE = 0.03, 1e-3
 SHARED_OUT = 4000  # times that hits are shared out among the levels at random
 
 
-@dataclass(frozen=True, eq=False)
-class Level:
-    """Hits of about one strength; k modes, those of the whole pose, by frequency.
-
-    NaN where a mode cannot be told at this level.
-    """
-
-    peak_force_n: float  # mean of the hits' peaks
-    hits: int
-    frequency_hz: np.ndarray  # (k,)
-    frequency_sd_hz: np.ndarray
-    damping_ratio: np.ndarray
-    damping_sd: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Homogeneity:
-    """Comparison of the levels of one pose, weakest first.
-
-    `difference` is the largest relative difference ‖ΔH‖/‖H‖ between the FRFs of two levels in the
-    band beyond what their scatter explains; `p_value` the chance of so much scatter alone. Where
-    hits were not repeated it can't be told (`significant` is False): no two hits miss alike.
-    """
-
-    levels: tuple[Level, ...]
-    difference: float
-    p_value: float
-    significant: bool = True
-
-    @property
-    def homogeneous(self) -> bool:
-        """Whether nothing worth telling depends on the level."""
-        return self.difference < SHARE or self.p_value > CHANCE
-
-    @property
-    def remark(self) -> str:
-        """One sentence for the engineer; empty where the structure answers in proportion."""
-        low, high = self.levels[0], self.levels[-1]
-        if not self.significant and self.difference >= SHARE:
-            return (
-                f"FRFs at {low.peak_force_n:.0f} N and {high.peak_force_n:.0f} N differ by "
-                f"{100 * self.difference:.0f} %. Either the response is not proportional to the "
-                "force, or hits missed the point or the axis; hit twice at each level to see which."
-            )
-        if self.homogeneous:
-            return ""
-        text = (
-            f"The response is not proportional to the force: FRFs at {low.peak_force_n:.0f} N and "
-            f"{high.peak_force_n:.0f} N differ by {100 * self.difference:.0f} %"
-        )
-        change = np.log(high.frequency_hz / low.frequency_hz)
-        sd = np.hypot(
-            low.frequency_sd_hz / low.frequency_hz, high.frequency_sd_hz / high.frequency_hz
-        )
-        clear = np.flatnonzero(np.abs(change) > 3 * sd)
-        if clear.size:
-            k = clear[np.argmax(np.abs(change[clear]) / sd[clear])]
-            text += (
-                f"; mode {k + 1} moves from {low.frequency_hz[k]:.2f} to "
-                f"{high.frequency_hz[k]:.2f} Hz and its damping from "
-                f"{100 * low.damping_ratio[k]:.1f} to {100 * high.damping_ratio[k]:.1f} %"
-            )
-        return text + "."
-
-
 def homogeneity(
     hits: tuple[Hit, ...],
     modal: ModalModel,
     band_hz: tuple[float, float],
     window_rate_1_s: float = 0.0,
-) -> Homogeneity | None:
+) -> tuple[Homogeneity, str] | None:
     """Compare the force levels among the hits of one pose; None if there is only one level.
 
-    `window_rate_1_s` is that of an exponential window that the records carry.
+    What the engineer has to know of it, "" where that is nothing, follows. `window_rate_1_s` is
+    that of an exponential window that the records carry.
     """
     groups = by_level(hits)
     if len(groups) < 2:
@@ -118,7 +53,45 @@ def homogeneity(
     pairs = [(a, b) for a in range(len(frfs)) for b in range(a)]
     worst = max(_difference(frfs[a], frfs[b], band_hz) for a, b in pairs)
     p = _chance(groups, band_hz, window_rate_1_s)
-    return Homogeneity(levels, worst, 1.0 if p is None else p, p is not None)
+    same = worst < SHARE or p is None or p > CHANCE
+    found = Homogeneity(levels, worst, 1.0 if p is None else p, same)
+    return found, _missed(found) if p is None else _remark(found)
+
+
+def _missed(found: Homogeneity) -> str:
+    """What to say where hits were not repeated, so that chance cannot be told."""
+    low, high = found.levels[0], found.levels[-1]
+    if found.difference < SHARE:
+        return ""
+    return (
+        f"FRFs at {low.peak_force_n:.0f} N and {high.peak_force_n:.0f} N differ by "
+        f"{100 * found.difference:.0f} %. Either the response is not proportional to the "
+        "force, or hits missed the point or the axis; hit twice at each level to see which."
+    )
+
+
+def _remark(found: Homogeneity) -> str:
+    """One sentence for the engineer; empty where the structure answers in proportion."""
+    if found.homogeneous:
+        return ""
+    low, high = found.levels[0], found.levels[-1]
+    text = (
+        f"The response is not proportional to the force: FRFs at {low.peak_force_n:.0f} N and "
+        f"{high.peak_force_n:.0f} N differ by {100 * found.difference:.0f} %"
+    )
+    (f0, sd0, zeta0), (f1, sd1, zeta1) = (
+        np.array([at.frequency_hz, at.frequency_sd_hz, at.damping_ratio], dtype=float)
+        for at in (low, high)
+    )
+    change, sd = np.log(f1 / f0), np.hypot(sd0 / f0, sd1 / f1)
+    clear = np.flatnonzero(np.abs(change) > 3 * sd)
+    if clear.size:
+        k = clear[np.argmax(np.abs(change[clear]) / sd[clear])]
+        text += (
+            f"; mode {k + 1} moves from {f0[k]:.2f} to {f1[k]:.2f} Hz and its damping from "
+            f"{100 * zeta0[k]:.1f} to {100 * zeta1[k]:.1f} %"
+        )
+    return text + "."
 
 
 def _difference(a: Frf, b: Frf, band_hz: tuple[float, float]) -> float:
@@ -164,17 +137,22 @@ def _chance(
 
 def _level(
     hits: tuple[Hit, ...], frf: Frf, modal: ModalModel, band_hz: tuple[float, float]
-) -> Level:
+) -> ForceLevel:
     """The pose's modes refined on one level's FRF."""
     force = float(np.mean([hit.pulse.peak_n for hit in hits]))
     try:
         found = estimate_modes(frf, band_hz).modes
     except RefusedError:
         found = ()
-    near = [_same(mode, found) for mode in modal.modes]
-    names = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"
-    values = (np.array([getattr(mode, name, np.nan) for mode in near]) for name in names)
-    return Level(force, len(hits), *values)
+    own = [_same(mode, found) for mode in modal.modes]
+    return ForceLevel(
+        force,
+        len(hits),
+        tuple(m.frequency_hz if m else None for m in own),
+        tuple(m.frequency_sd_hz if m else None for m in own),
+        tuple(m.damping_ratio if m else None for m in own),
+        tuple(m.damping_sd if m else None for m in own),
+    )
 
 
 def _same(mode: Mode, found: tuple[Mode, ...]) -> Mode | None:

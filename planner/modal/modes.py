@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from planner.frf.synthesis import pole
@@ -122,6 +123,32 @@ class ModalModel:
     order: int  # model order from which the poles were taken
     remarks: tuple[str, ...] = ()
     doubtful: tuple[Mode, ...] = ()
+
+
+class ForceLevel(msgspec.Struct, frozen=True):
+    """Hits of about one strength, and the pose's modes by them alone (None: not found)."""
+
+    peak_force_n: float  # mean of the hits' peaks
+    hits: int
+    frequency_hz: tuple[float | None, ...]
+    frequency_sd_hz: tuple[float | None, ...]
+    damping_ratio: tuple[float | None, ...]
+    damping_sd: tuple[float | None, ...]
+
+
+class Homogeneity(msgspec.Struct, frozen=True):
+    """Whether the response is proportional to the force, over the levels of one pose.
+
+    Weakest first. `difference` is the largest relative difference ‖ΔH‖/‖H‖ between the FRFs of two
+    levels in the band beyond what their scatter explains; `p_value` the chance of so much scatter
+    alone, 1 where hits were not repeated: no two miss alike. `homogeneous`: nothing worth telling
+    depends on the level.
+    """
+
+    levels: tuple[ForceLevel, ...]
+    difference: float
+    p_value: float
+    homogeneous: bool
 
 
 LARGEST = 0.12  # of the structure's size: how far the point moves that moves most

@@ -247,13 +247,13 @@ def frf_pictures(campaign: Campaign, worst: Sequence[str]) -> dict[str, Any]:
     shown = [m for m in used if m.pose in list(names)[:SHOWN_FRFS]]
     if not shown:
         return {"frfs": [], "frfs_left": 0}
-    lines, modes = campaign.frequency_lines, campaign.cell.config.modes
+    lines = campaign.frequency_lines
     q = campaign.cell.robot.joints.internal([m.joints_deg for m in shown])
     mean, sd = campaign.frf_at(q, lines)
     expected = campaign.model.predict(q)
     drawn = []
     for i, m in enumerate(shown):
-        frf = campaign.frf_of(m, modes)
+        frf = campaign.frf_of(m)
         figure = frf_sheet(lines, mean[i], sd[i], frf, expected.frequency_hz[i])
         drawn.append((m.pose, figure, not np.any(np.isfinite(frf.coherence))))
     return {"frfs": drawn, "frfs_left": len(used) - len(shown)}

@@ -8,8 +8,9 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planner.campaign.events import Amplitude, Question
+from planner.campaign.events import Question
 from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
+from planner.modal.modes import Homogeneity
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.modes import ModeAnswer
 from planner.report.predictions import ExpectedMode
@@ -57,7 +58,7 @@ class PoseImport(Answer):
     frequency_sd_percent_before: np.ndarray
     frequency_sd_percent: np.ndarray
     remarks: tuple[str, ...]
-    amplitude: Amplitude | None
+    amplitude: Homogeneity | None
     simulated: bool
     hit_errors: tuple[HitErrorEstimate, ...] = ()
     question: Question | None = None

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from msgspec import UNSET
 
-from planner.campaign.measured_modes import from_homogeneity
 from planner.dataset.frf_set import FrfSet
 from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import Source, in_parts, told_of_files
@@ -120,7 +119,7 @@ def modal_report(
         hits=frf.hits,
         usable_band_hz=frf.usable_band_hz,
         remarks=(*told_of_files(verdicts), *measured.remarks),
-        amplitude=from_homogeneity(measured.homogeneity),
+        amplitude=measured.homogeneity,
         simulated=any(v.simulated for v in verdicts),
     )
     return _drawn(answer, pictures, frf, lambda: identification(frf, band), modal)

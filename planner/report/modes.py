@@ -10,10 +10,10 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.campaign.events import Amplitude, MeasuredMode
+from planner.campaign.events import MeasuredMode
 from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.errors import RefusedFile
-from planner.modal.modes import Mode
+from planner.modal.modes import Homogeneity, Mode
 from planner.recording.dof import Dof
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.predictions import ExpectedMode
@@ -162,7 +162,7 @@ class ModesReport(Answer):
     hits: tuple[int, int, int] | Unset = UNSET
     usable_band_hz: tuple[float, float] | Unset = UNSET
     remarks: tuple[str, ...] = ()
-    amplitude: Amplitude | Unset | None = UNSET
+    amplitude: Homogeneity | Unset | None = UNSET
     simulated: bool
     exports: tuple[str, ...] | Unset = UNSET
     plots: tuple[str, ...] = ()

@@ -126,16 +126,19 @@ def predictions(
 
     Raises InputError where that cannot be written.
     """
-    from planner.campaign.frf_model import UNCHANGED  # status needs none of what that imports
+    # status needs none of what these import
+    from planner.campaign.frf_model import UNCHANGED, struck_modes
+    from planner.dynamics.at_force import change_at_force
 
     angles, lines = np.array(q), campaign.frequency_lines
     prediction, (mean, sd) = campaign.model.predict(angles), campaign.frf_at(angles)
     said, asked = (), force_n is not None and bool(np.any(np.isfinite(force_n)))
     if force_n is not None and asked:
-        there = campaign.at_force
-        prediction = there.modes(prediction, angles, force_n)
-        mean = mean + there.frf_change(angles, force_n, lines)
-        said = () if there.simulation else (UNCHANGED,)
+        struck = campaign.model.struck
+        said = () if struck else (UNCHANGED,)
+        if struck is not None:
+            prediction = struck_modes(struck, prediction, angles, force_n)
+            mean = mean + change_at_force(struck, angles, force_n, lines)
     outside, joints = ~campaign.cell.inside(angles), campaign.cell.robot.joints
     save_frfs(npz, lines, mean, sd, names, joints, angles, outside, force_n if asked else None)
     forces = np.full(len(names), np.nan) if force_n is None else force_n

@@ -60,7 +60,9 @@ class ProposalsReport(Answer):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Of the robot, and what waits for an answer."""
-        waiting = (unanswered(one.text) for one in self.campaign.state.questions)
+        waiting = (
+            unanswered(m.question.text) for m in self.campaign.state.held.values() if m.question
+        )
         return *self.campaign.cell.remarks, *waiting
 
     def to_json(self) -> dict[str, Any]:

@@ -48,12 +48,7 @@ class HitVerdict:
         return f"hit {self.number} ({self.path.name}{when(self.at_s)})"
 
 
-@dataclass(frozen=True, eq=False)
-class PoseBefore:
-    """The pose hit last before this one, and its hits; "" before the first."""
-
-    pose: str = ""
-    hits: tuple[Hit, ...] = ()
+Before = Mapping[str, tuple[Hit, ...]]  # hits of the pose hit last before this one, if any
 
 
 class Verdicts:
@@ -84,7 +79,7 @@ class Verdicts:
     def of(
         self,
         files: Sequence[Path],
-        before: PoseBefore | None = None,
+        before: Before | None = None,
         here: frozenset[Path] = frozenset(),
         numbers: Mapping[Part, int] | None = None,
         shown: Mapping[Path, str] | None = None,
@@ -96,7 +91,7 @@ class Verdicts:
         those of the pose `before`, or like late ones. Hits that contradict others are unsure unless
         their files are said to be right, of `here`. What is late stands beside no other hit.
         """
-        numbers, before = self.numbered(files, numbers), before or PoseBefore()
+        numbers, before = self.numbered(files, numbers), before or {}
         found = [
             (_alone(path, *one, numbers[path, part]), len(parts))
             for path in files for parts in (self._hits_of(path),)
@@ -107,8 +102,9 @@ class Verdicts:
         found = [one for one in found if one[0].path not in {v.path for v in late}]
         judged = self._beside_repeats([verdict for verdict, _ in found])
         usable = [hit for verdict in judged if verdict.kind == "good" for hit in verdict.hits]
+        others = [hit for hits in before.values() for hit in hits]
         judged = [
-            _weak(verdict, usable, before.hits) if count == 1 else verdict
+            _weak(verdict, [*usable, *others]) if count == 1 else verdict
             for verdict, (_, count) in zip(judged, found, strict=True)
         ]
         asked = self._unsure(judged, here)
@@ -130,12 +126,11 @@ class Verdicts:
         return out
 
     def _late(
-        self, every: list[HitVerdict], before: PoseBefore, shown: Mapping[Path, str], pose: str
+        self, every: list[HitVerdict], before: Before, shown: Mapping[Path, str], pose: str
     ) -> list[HitVerdict]:
         """The hits in files that are of another pose: shown there, or, where new, answered so."""
-        hits = {before.pose: before.hits} if before.pose else {}
         came = {path: at for path, at in shown.items() if at != pose}
-        waiting = dict(hits)
+        waiting = dict(before)
         for verdict in every:
             if at := came.get(verdict.path):
                 waiting[at] = (*waiting.get(at, ()), *verdict.hits)
@@ -143,7 +138,7 @@ class Verdicts:
             if verdict.path not in shown and (at := self._alike(verdict, waiting)):
                 came[verdict.path] = at
         late = [(v, at) for v in every if (at := came.get(v.path))]
-        alike = [bool(self._alike(v, {at: hits.get(at, ())})) for v, at in late]
+        alike = [bool(self._alike(v, {at: before.get(at, ())})) for v, at in late]
         kinds = ["elsewhere" if self.table.row(v.path) else "late" for v, _ in late]
         return [
             replace(v, kind=kind, text="", came=at, alike=like)
@@ -208,12 +203,12 @@ def _alone(path: Path, found: FileVerdict, own: tuple[Hit, ...], number: int) ->
     return HitVerdict(path, found.axis or "", kind, text, own, number, at_s=found.source.at_s)
 
 
-def _weak(verdict: HitVerdict, usable: list[Hit], before: tuple[Hit, ...]) -> HitVerdict:
+def _weak(verdict: HitVerdict, usable: list[Hit]) -> HitVerdict:
     """The verdict on a good hit, where it is far weaker than the others of its axis."""
     if verdict.kind != "good" or not verdict.hits:
         return verdict
     own = verdict.hits[0]
-    usual = far_below(own, [hit for hit in (*usable, *before) if hit is not own])
+    usual = far_below(own, [hit for hit in usable if hit is not own])
     if usual is None:
         return verdict
     text = (

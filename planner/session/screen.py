@@ -7,7 +7,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
 
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
@@ -161,52 +160,41 @@ def _height(form: Text | None, width: int) -> int:
     return 0 if form is None else len(_RULER.render_lines(form, options))
 
 
-class Keys(Protocol):
-    """Where keys come from."""
-
-    def get(self, timeout_s: float) -> str | None:
-        """The next key, or None if none came in time."""
-        ...
+Keys = Callable[[float], str | None]  # the next key, or None if none came in so many seconds
 
 
-class NoKeys:
-    """Nobody is at the keyboard."""
+def no_keys(timeout_s: float) -> str | None:
+    """Nobody is at the keyboard: never a key; takes the time all the same."""
+    time.sleep(timeout_s)
+    return None
 
-    def get(self, timeout_s: float) -> str | None:
-        """Never a key; takes the time all the same."""
-        time.sleep(timeout_s)
+
+def _of_terminal(timeout_s: float) -> str | None:
+    """Of a POSIX terminal in cbreak mode."""
+    import select
+
+    ready, _, _ = select.select([sys.stdin], [], [], timeout_s)
+    if not ready:
         return None
-
-
-class TerminalKeys:
-    """Keys of a POSIX terminal in cbreak mode."""
-
-    def get(self, timeout_s: float) -> str | None:
-        """The next key, or None."""
-        import select
-
-        ready, _, _ = select.select([sys.stdin], [], [], timeout_s)
-        if not ready:
-            return None
-        return os.read(sys.stdin.fileno(), 1).decode("utf-8", "ignore") or "q"
+    return os.read(sys.stdin.fileno(), 1).decode("utf-8", "ignore") or "q"
 
 
 @contextmanager
 def terminal_keys() -> Iterator[Keys]:
-    """Keys of this terminal, restored whatever happens; NoKeys where there is no terminal."""
+    """Keys of this terminal, restored whatever happens; `no_keys` where there is no terminal."""
     if not sys.stdin.isatty():
-        yield NoKeys()
+        yield no_keys
         return
     try:
         import termios
         import tty
     except ImportError:  # not a POSIX system
-        yield NoKeys()
+        yield no_keys
         return
     handle = sys.stdin.fileno()
     before = termios.tcgetattr(handle)
     try:
         tty.setcbreak(handle)
-        yield TerminalKeys()
+        yield _of_terminal
     finally:
         termios.tcsetattr(handle, termios.TCSADRAIN, before)

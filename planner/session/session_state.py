@@ -31,7 +31,7 @@ from planner.dataset.screened_files import Source, read_one
 from planner.report.rerun.event_logger import EventLogger
 from planner.session import session_text
 from planner.session.diagnosis_process import DiagnosisProcess
-from planner.session.hit_verdicts import BAD, HitVerdict, Part, PoseBefore, Verdicts
+from planner.session.hit_verdicts import BAD, Before, HitVerdict, Part, Verdicts
 from planner.session.inbox import Inbox
 from planner.session.pose_screen import PosePage
 from planner.session.screen import Keys, Screen
@@ -51,7 +51,7 @@ class PoseInProgress:
     proposal: Proposal
     page: PosePage
     since: float
-    before: PoseBefore = field(default_factory=PoseBefore)
+    before: Before = field(default_factory=dict)
     whole: tuple[Path, ...] = ()
     verdicts: tuple[HitVerdict, ...] = ()
     shown: tuple | None = None
@@ -216,7 +216,7 @@ class Session:
             return bool(hits)
         return any(not differs_from_table(Source.of(row), hit) for hit in hits)
 
-    def pose_before(self, pose: str) -> PoseBefore:
+    def pose_before(self, pose: str) -> Before:
         """Where the robot was before this pose, and the usable hits there, refused or not."""
         entries, state = self.campaign.entries, self.campaign.state
         undone = taken_back(entries)
@@ -230,8 +230,8 @@ class Session:
             if records and event.pose != pose:
                 kept, band = self.campaign.recordings, self.campaign.cell.config.modes.band_hz
                 read = (read_one(kept.source(record), band)[1] for record in records)
-                return PoseBefore(event.pose, tuple(hit for hits in read for hit in hits))
-        return PoseBefore()
+                return {event.pose: tuple(hit for hits in read for hit in hits)}
+        return {}
 
     @property
     def can_take_back(self) -> tuple[bool, bool]:
@@ -241,7 +241,7 @@ class Session:
 
     def key(self) -> str | None:
         """The next key, or None after a moment."""
-        return self.keys.get(timeout_s=0.2)
+        return self.keys(0.2)
 
     @property
     def late(self) -> bool:

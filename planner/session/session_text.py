@@ -1,7 +1,5 @@
 """What the session shows, as rich renderables; units in every column."""
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.panel import Panel
@@ -10,8 +8,8 @@ from rich.text import Text
 from planner.campaign.events import HitRecord, Question
 from planner.campaign.hit_errors import systematic_errors
 from planner.campaign.importing import ImportReport
+from planner.campaign.labels import found_modes
 from planner.campaign.model import Model
-from planner.modal.modes import Mode
 from planner.report.text import SIMULATED, plain_table, with_sd
 from planner.session.pose_screen import PosePage, remedy_first
 from planner.words import counted, short_name, significant
@@ -27,44 +25,6 @@ NONE_BAD = "No hit is to be repeated: press r again, or R, to set all that wait 
 NOTHING_NEW = "Nothing to import yet: no new recording is whole and usable."
 FULLY, SHORTLY = 2, 4  # refusals that are said in full, and those of which is said what to do
 LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it may be followed
-
-
-@dataclass(frozen=True, eq=False)
-class FoundMode:
-    """A label's mode at a pose, None where it was not found, beside what was expected (Hz, sd).
-
-    NaN where that is not known; `probability` that it is this mode.
-    """
-
-    label: int
-    mode: Mode | None
-    probability: float
-    expected_hz: float = float("nan")
-    sd_hz: float = float("nan")
-
-    @property
-    def off(self) -> float:
-        """By how many sds it is off what was expected; NaN where either is not known."""
-        if self.mode is None:
-            return float("nan")
-        sd = np.hypot(self.sd_hz, self.mode.frequency_sd_hz)
-        return float((self.mode.frequency_hz - self.expected_hz) / sd)
-
-
-def found_modes(pose: str, model: Model, before: Model | None) -> list[FoundMode]:
-    """Of a pose, and what a model expected `before` it was hit; none where nothing was found."""
-    labelled = next((p for p in model.labelled if p.pose == pose), None)
-    if labelled is None:
-        return []
-    labels = enumerate(zip(labelled.modes, labelled.probability.tolist(), strict=True), 1)
-    found = [FoundMode(k, mode, certain) for k, (mode, certain) in labels]
-    if before is None:
-        return found
-    expected = before.predict(labelled.q[None])
-    each = expected.frequency_hz[0].tolist(), expected.frequency_sd_hz[0].tolist()
-    return [
-        replace(one, expected_hz=hz, sd_hz=sd) for one, hz, sd in zip(found, *each, strict=True)
-    ]
 
 
 def import_panel(report: ImportReport, simulated: bool) -> RenderableType:

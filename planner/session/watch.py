@@ -27,7 +27,7 @@ from planner.session.key_commands import (
     say_last_import,
 )
 from planner.session.pose_screen import page_with_hits
-from planner.session.screen import Keys, NoKeys, Screen, terminal_keys
+from planner.session.screen import Keys, Screen, no_keys, terminal_keys
 from planner.session.session_state import PoseInProgress, RerunQueue, Session, SessionState
 from planner.words import short_name
 
@@ -85,7 +85,7 @@ def watch(
         inbox = Inbox(folder, quiet_s, verdicts.unfit)
         return _run(Session(
             campaign, inbox, Screen(console), source, RerunQueue(campaign, story), verdicts,
-            auto or isinstance(source, NoKeys), hits_per_pose, explaining, started,
+            auto or source is no_keys, hits_per_pose, explaining, started,
             None if limit_s is None else started + limit_s,
         ))  # fmt: skip
 

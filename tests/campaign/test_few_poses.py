@@ -9,17 +9,19 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.build import build
 from planner.campaign.cell import Cell
-from planner.campaign.config import config_from_builtins
+from planner.campaign.config import CampaignConfig
 from planner.campaign.low_fidelity import Recall, in_memory
 from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.straightened import hits_unknown
 from planner.robot.robot import Robot
 from tests.support.counted_modes import NOT_COUNTED, counted, true_modes
 from tests.support.fitted_cases import ARMS, COUNTED, Case, everyday, harder
@@ -33,13 +35,14 @@ def models(case: Case, recall: Recall) -> Iterator[Model]:
     """The campaign's model after COUNTS poses."""
     robot = Robot.load(case.toml)
     low, high = np.rad2deg(np.clip(case.box_rad, robot.lower_rad, robot.upper_rad))
-    config = config_from_builtins(
+    config = msgspec.convert(
         {
             "robot": str(case.toml),
             "workspace": {"joints_deg": np.column_stack([low, high]).tolist()},
             "modes": {"count": COUNTED, "band_hz": list(case.band_hz)},
             "acquisition": {"candidates": 50},
-        }
+        },
+        CampaignConfig,
     )
     cell = Cell.load(case.toml, config)
     used = [
@@ -49,7 +52,7 @@ def models(case: Case, recall: Recall) -> Iterator[Model]:
     frfs = {m.pose: frf for m, frf in zip(used, case.frfs, strict=True)}
     for n in COUNTS:
         state = CampaignState(measurements={m.pose: m for m in used[:n]})
-        yield build(cell, state, lambda m, _: frfs[m.pose], recall=recall)
+        yield build(cell, state, hits_unknown(frfs), recall)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.frf_model import FrfModel
+from planner.campaign.frf_model import ErrorByZone
 from planner.dataset.store import Store
 from planner.demo import NAME, shipped
 from planner.frf.metrics import agreement, direct_mean
@@ -71,8 +71,8 @@ def test_without_a_simulation_frfs_are_those_of_fused_modes_and_less_sure(tmp_pa
 
 def test_before_any_measurement_the_simulation_as_stated_says_what_to_expect(base):
     model = base.model(0)
-    assert model.frf_model is None
     mean, sd = model.frf(base.unseen[:1], base.lines_hz)
+    assert "frf_error" not in vars(model)
     stated = base.cell.simulation.accelerance(base.unseen[:1], base.lines_hz)
     low = base.lines_hz < 20
     assert direct_mean(agreement(stated[..., low], mean[..., low]).global_frac) > 0.6
@@ -92,7 +92,7 @@ def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
     def refused(*given):
         raise AssertionError("worked out again")
 
-    monkeypatch.setattr(FrfModel, "of", refused)
+    monkeypatch.setattr(ErrorByZone, "of", refused)
     again = Campaign(tmp_path / "c", store).frf_at(q)
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
 

@@ -59,7 +59,7 @@ def test_every_accepted_hit_is_told(cell):
 def test_residues_are_those_of_hits_without_a_miss(cell):
     made, campaign, _ = cell
     frozen = replace(campaign.cell.config, fidelity=FidelityTable("frozen"))
-    raw = build(changed(campaign.cell, config=frozen), campaign.state, campaign.frf_of)
+    raw = build(changed(campaign.cell, config=frozen), campaign.state, campaign.recordings.hits)
     before, after = made.residue_errors(raw), made.residue_errors(campaign.model)
     assert np.sqrt(np.mean(after**2)) < 0.6 * np.sqrt(np.mean(before**2))
     counted = campaign.cell.config.modes.count

@@ -22,11 +22,10 @@ def modes(*hertz: float):
 
 @pytest.mark.parametrize(("found", "said"), [(14.66, 0), (9.99, 1)])
 def test_a_mode_far_from_where_it_was_expected_is_said(found, said):
-    expected = SimpleNamespace(
-        frequency_hz=np.array([[9.23, 14.65]]), frequency_sd_hz=np.array([[0.02, 0.06]])
-    )
-    before = SimpleNamespace(labelled=("P001",), predict=lambda q: expected)
-    here = SimpleNamespace(pose="P002", q=np.zeros(6), modes=modes(9.24, found))
+    expected = np.array([[9.23, 14.65]]), np.array([[0.02, 0.06]])
+    before = SimpleNamespace(labelled=("P001",), frequencies=lambda q: expected)
+    sure, own = np.ones(2), modes(9.24, found)
+    here = SimpleNamespace(pose="P002", q=np.zeros(6), modes=own, probability=sure)
     told = unexpected_modes(before, SimpleNamespace(labelled=(here,)), "P002")
     assert len(told) == said
     assert all("mode 2 at 9.99 Hz, expected at 14.650 ± 0.060 Hz (78 sd off)" in t for t in told)

@@ -19,7 +19,7 @@ EVENTS = [
     Starred("P001"),
     Skipped("P002", "the table is in the way, 3 mm — near"),
     Withdrawn("P001", ""),
-    Undone(3),
+    Undone((3,)),
 ]
 
 

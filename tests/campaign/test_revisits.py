@@ -67,11 +67,9 @@ def test_a_second_visit_is_held_against_the_scatter_of_visits(hertz, scatter, po
 )  # fmt: skip
 def test_modes_to_one_side_ask_for_the_first_pose_again(hertz, hinted):
     state = CampaignState(measurements={"P001": KNOWN})
-    found = suspected_drift(model(1e-3), state, "P004", (1.0, 1.0), modes(*hertz))
-    assert (found is not None) == hinted
-    if found is not None:
-        assert found.again == "P001"
-        assert "Hit P001, the first pose, again (0.000, 0.000°)" in found.text
+    again, text = suspected_drift(model(1e-3), state, "P004", (1.0, 1.0), modes(*hertz))
+    assert again == ("P001" if hinted else "")
+    assert ("Hit P001, the first pose, again (0.000, 0.000°)" in text) == hinted
 
 
 def hits(pose: str, again: str = "") -> Imported:
@@ -81,7 +79,7 @@ def hits(pose: str, again: str = "") -> Imported:
 @pytest.mark.parametrize(
     ("act", "left"),
     [(hits("P001"), None), (hits("P004"), ("P001", "P003")), (Skipped("P001"), None),
-     (Withdrawn("P003"), None), (Undone(3), None), (Starred("P001"), ("P001", "P003"))],
+     (Withdrawn("P003"), None), (Undone((3,)), None), (Starred("P001"), ("P001", "P003"))],
 )  # fmt: skip
 def test_drift_is_suspected_until_it_was_looked_at_or_its_hint_is_gone(act, left):
     acts = [hits("P001"), hits("P002"), hits("P003", again="P001"), act]

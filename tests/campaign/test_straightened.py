@@ -5,6 +5,7 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.dataset.store import Store
+from planner.dynamics.at_force import change_at_force
 from planner.truth.deviation import Deviation
 from planner.truth.fault_injection import HitVisit, InjectedFaults, frfs, hit_poses, once
 from planner.truth.hits import Hammer, stated, write_recordings
@@ -54,7 +55,7 @@ def test_each_level_is_predicted_and_nothing_swings_instead(struck):
     for q in (MEASURED, UNSEEN):
         for force_n in (5.0, 50.0, 200.0):
             lines, true = frfs(truth, injected, [once(q, force_n)], HAMMER, BAND_HZ)
-            change = campaign.at_force.frf_change(q[None], np.array([force_n]), lines)
+            change = change_at_force(campaign.model.struck, q[None], np.array([force_n]), lines)
             off = campaign.frf_at(q, lines)[0] + change - true
             assert np.linalg.norm(off) < 0.075 * np.linalg.norm(true)
     assert campaign.model.remarks == ()

@@ -11,7 +11,7 @@ from rich.console import Console
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposed
 from planner.design.propose import ACQUISITIONS, DESIGNS
-from planner.session.screen import NoKeys
+from planner.session.screen import no_keys
 from planner.session.watch import watch
 from tests.support.cuts import SLOT
 from tests.support.outside import said, told
@@ -89,7 +89,7 @@ def test_a_session_tells_of_it_once_at_its_beginning(robot, tmp_path):
     (tmp_path / "inbox").mkdir()
     console = Console(width=100, file=io.StringIO())
     campaign = Campaign(begun(tmp_path, robot))
-    watch(campaign, tmp_path / "inbox", console=console, keys=NoKeys(), limit_s=0.0)
+    watch(campaign, tmp_path / "inbox", console=console, keys=no_keys, limit_s=0.0)
     text = " ".join(console.file.getvalue().split())
     assert text.count(UNCHECKED) == 1
     assert text.index(UNCHECKED) < text.index("P001")

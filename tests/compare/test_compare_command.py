@@ -13,6 +13,7 @@ import pytest
 from planner.campaign.build import build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
+from planner.campaign.straightened import hits_unknown
 from planner.compare.bench import assemble, cell_of, comparison_config
 from planner.compare.resume import recorded
 from planner.compare.run import run
@@ -155,7 +156,7 @@ def test_a_run_is_the_campaign_s(bench):
     frfs = {m.pose: f for m, f in zip(bench.measurements, bench.frfs, strict=True)}
     for n in (2, 3):
         state = CampaignState(measurements={p: by_name[p] for p in found.poses[:n]}, events=1)
-        model = build(cell_of(bench), state, lambda m, _: frfs[m.pose])
+        model = build(cell_of(bench), state, hits_unknown(frfs))
         (proposal,) = propose(model, state, 1, "variance")
         chosen = by_name[found.poses[n]].joints_deg
         assert np.allclose(proposal.joints_deg, chosen, atol=1e-3)

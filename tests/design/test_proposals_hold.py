@@ -3,11 +3,12 @@
 `pytest -m slow -s tests/design/test_proposals_hold.py` prints the counts.
 """
 
+import msgspec
 import numpy as np
 import pytest
 
 from planner.campaign.cell import Cell
-from planner.campaign.config import config_from_builtins
+from planner.campaign.config import CampaignConfig
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import solve
 from planner.truth.arms import IRB6640, KR10, KR210
@@ -101,7 +102,7 @@ def cell_of(name, directory):
     write, workspace = ROBOTS[name]
     toml = write(directory / "robot")
     table = {"robot": str(toml), "workspace": workspace, "acquisition": {"candidates": PROPOSALS}}
-    return Cell.load(toml, config_from_builtins(table))
+    return Cell.load(toml, msgspec.convert(table, CampaignConfig))
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -14,16 +14,18 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 from planner.campaign.build import build
 from planner.campaign.cell import Cell
-from planner.campaign.config import config_from_builtins
+from planner.campaign.config import CampaignConfig
 from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.straightened import hits_unknown
 from planner.design.space_filling import NESTED
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
@@ -106,14 +108,14 @@ def make_case(folder: Path, seed: int, simulation: str) -> DecisionCase:
     gap = int(np.argmax(ordered[1:] / ordered[:-1]))
     depth = float(np.sqrt(ordered[gap] * ordered[gap + 1]))
     own = np.rad2deg(path).tolist()
-    config = config_from_builtins({
+    config = msgspec.convert({
         "robot": str(toml),
         "workspace": {"joints_deg": [list(r) for r in JOINTS_DEG]},
         "modes": {"count": 3, "band_hz": list(BAND_HZ)},
         "fidelity": {"simulation": simulation},
         "acquisition": {"name": "stability", "candidates": CANDIDATES},
         "cut": {"speed_rpm": float(SPEEDS[at]), "depth_m": depth, "joints_deg": own},
-    })  # fmt: skip
+    }, CampaignConfig)  # fmt: skip
     return DecisionCase(Cell.load(toml, config), truth, path, of_speed, depth, seed)
 
 
@@ -133,7 +135,7 @@ def play(case: DecisionCase, strategy: str, budget: int):
             if i not in seen:
                 seen[i], frfs[f"P{i}"] = case.measured(i)
         state = CampaignState(measurements={seen[i].pose: seen[i] for i in used}, events=case.seed)
-        model = build(cell, state, lambda m, _: frfs[m.pose])
+        model = build(cell, state, hits_unknown(frfs))
         yield model, list(used)
         if len(used) == budget:
             return

@@ -32,12 +32,11 @@ def frfs_of(files: tuple[str, ...], kind: str) -> dict[str, FrfRecord]:
 
 def test_universal_files_read_back_as_they_were(named, tmp_path):
     found = export(named, "uff", tmp_path, None)
-    table = named.cell.config.modes
     measured = frfs_of(found.files, "measured")
     assert len(measured) == 2
     for record, m in zip(measured.values(), named.state.used, strict=True):
         assert isinstance(record, FrfRecord)
-        frf = named.frf_of(m, table)
+        frf = named.frf_of(m)
         assert (record.quantity, record.unit, record.simulated) == ("accelerance", "m/s^2/N", True)
         for k, ((_, i), (_, j)) in enumerate(record.places):
             np.testing.assert_allclose(record.values[k], frf.accelerance[i - 1, j - 1], rtol=1e-9)

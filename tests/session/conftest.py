@@ -19,7 +19,7 @@ class Script:
     def __init__(self, console, presses):
         self.console, self.presses = console, list(presses)
 
-    def get(self, timeout_s):
+    def __call__(self, timeout_s):
         time.sleep(min(timeout_s, 0.05))
         if not self.presses:
             return None

@@ -11,7 +11,7 @@ import pytest
 from planner.dataset.screened_files import Source, read_files
 from planner.frf.estimator import estimate
 from planner.recording.points import PointNames
-from planner.session.hit_verdicts import PoseBefore, Verdicts
+from planner.session.hit_verdicts import Before, Verdicts
 from planner.session.inbox import Inbox
 from planner.truth.hits import simulate_hit, write_uff
 from tests.support.hit_csv import write_csv
@@ -48,7 +48,7 @@ class Bench:
         self.files.append(path)
         return path
 
-    def of(self, before: PoseBefore | None = None, here: frozenset[Path] = frozenset()):
+    def of(self, before: Before | None = None, here: frozenset[Path] = frozenset()):
         self.numbers = self.verdicts.numbered(self.files, self.numbers)
         return {v.path.stem: v for v in self.verdicts.of(self.files, before, here, self.numbers)}
 
@@ -115,11 +115,11 @@ def test_a_hit_far_below_the_others_is_to_be_repeated(bench):
     assert verdict.text.startswith("2.")
     assert " N (median) along x; hit harder" in verdict.text
     # As the pose before tells too; and twice as soft is a level of its own.
-    before = PoseBefore("P001", tuple(h for v in bench.of().values() for h in v.hits[:1]))
+    before = tuple(h for v in bench.of().values() for h in v.hits[:1])
     alone = Bench(bench.truth, bench.folder)
     alone.hit("first", "+x", size=0.04)
     assert alone.of()["first"].kind == "good"
-    assert alone.of(PoseBefore("P001", before.hits[:2]))["first"].kind != "good"
+    assert alone.of({"P001": before[:2]})["first"].kind != "good"
     bench.hit("soft2", "+x", size=0.045)
     assert set(kinds(bench.of()).values()) == {"good"}
 

@@ -1,18 +1,20 @@
 """Simulated campaigns for studies of acquisitions: true modes (MuJoCo) with noise of EMA's size."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from planner.campaign.build import build
 from planner.campaign.cell import Cell
-from planner.campaign.config import config_from_builtins
+from planner.campaign.config import CampaignConfig
 from planner.campaign.measured_modes import from_mode
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.straightened import hits_unknown
 from planner.frf.frf import Frf
 from planner.frf.metrics import agreement
 from planner.modal.modes import Mode
@@ -113,7 +115,7 @@ def make(
         "fidelity": {"simulation": simulation},
         "acquisition": {"candidates": CANDIDATES, "hit_axes": axes},
     }
-    cell = Cell.load(toml, config_from_builtins(table))
+    cell = Cell.load(toml, msgspec.convert(table, CampaignConfig))
     low, high = np.deg2rad(np.array(arm.joints_deg)).T
     unused = np.random.default_rng(10_000 + seed).uniform(low, high, (UNUSED, 6))
     lines_hz = np.linspace(*cell.config.modes.band_hz, LINES)
@@ -154,7 +156,7 @@ def campaign(
     cost, candidates = case.cell.cost, case.cell.candidates
     measurements: dict[str, Measurement] = {}
     frfs: dict[str, Frf] = {}
-    frf_of: Callable = lambda m, _: frfs[m.pose]  # noqa: E731
+    hits_of = hits_unknown(frfs)
     minutes, at, model, planned = 0.0, None, None, list(initial)
     if not isinstance(strategy, str):
         planned += [i for i in strategy if i not in initial]
@@ -164,7 +166,7 @@ def campaign(
             q = candidates.q[planned[n - 1]]
         else:
             state = CampaignState(measurements=measurements, events=n)
-            model = model or build(case.cell, state, frf_of)
+            model = model or build(case.cell, state, hits_of)
             (proposal,) = propose(model, state, 1, str(strategy))
             q = np.deg2rad(np.array(proposal.joints_deg))
             axes = tuple("xyz".index(hit) for hit in proposal.hits)
@@ -174,7 +176,7 @@ def campaign(
         measurements = {**measurements, measurement.pose: measurement}
         frfs[measurement.pose] = frf
         state = CampaignState(measurements=measurements, events=n)
-        model = build(case.cell, state, frf_of)
+        model = build(case.cell, state, hits_of)
         found = np.sort(model.predict(case.unused).frequency_hz, axis=1)
         frf, _ = model.frf(case.unused[:OF_FRFS], case.lines_hz)
         frac = float(np.mean(agreement(case.true_frf, frf).global_frac))

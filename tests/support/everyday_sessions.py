@@ -95,7 +95,7 @@ class Engineer:
 
     # -- keys ----------------------------------------------------------------------------------
 
-    def get(self, timeout_s: float) -> str | None:
+    def __call__(self, timeout_s: float) -> str | None:
         """The next key, after what happens at the robot meanwhile."""
         self.check()
         self.keys += 1

@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from planner.campaign.build import build
 from planner.campaign.cell import Cell
-from planner.campaign.config import config_from_builtins
+from planner.campaign.config import CampaignConfig
 from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
@@ -55,19 +56,18 @@ class FrfCase:
     lines_hz: np.ndarray
     true_frf: np.ndarray
 
-    def frf_of(self, measurement: Measurement, _: object) -> Frf:
-        """As a campaign asks for it."""
-        return self.frfs[measurement.pose]
-
-    def hits_of(self, measurement: Measurement, _: object) -> PoseHits:
-        """As a campaign asks for it; nothing of single hits."""
-        return PoseHits(no_columns(), self.one_hit[measurement.pose])
-
     def model(self, n: int, hits: bool = True) -> Model:
         """After the first n poses; without `hits` as of exported FRFs, whose hits nobody knows."""
+        one_hit = self.one_hit if hits else self.frfs
+
+        def hits_of(measurement: Measurement, _: object = None) -> PoseHits:
+            """As a campaign asks for it; nothing of single hits."""
+            pose = measurement.pose
+            return PoseHits(no_columns(), one_hit[pose], self.frfs[pose])
+
         used = {m.pose: m for m in self.measurements[:n]}
         state = CampaignState(measurements=used, events=n)
-        return build(self.cell, state, self.frf_of, self.hits_of if hits else None)
+        return build(self.cell, state, hits_of)
 
     def models(self) -> Iterator[Model]:
         """After each pose."""
@@ -100,7 +100,7 @@ def make(
         "fidelity": {"simulation": simulation},
         "acquisition": {"candidates": 50},
     }
-    cell = Cell.load(toml, config_from_builtins(table))
+    cell = Cell.load(toml, msgspec.convert(table, CampaignConfig))
     lines = np.linspace(*arm.band_hz, LINES)
     true = np.array([truth.accelerance(one, lines) for one in other])
     return FrfCase(cell, measurements, frfs, one_hit, other, lines, true)

@@ -17,6 +17,7 @@ from planner.campaign.events import (
     Withdrawn,
 )
 from planner.campaign.model import Model
+from planner.campaign.undo import in_words
 from planner.dataset.measure import MeasuredPose
 
 
@@ -65,7 +66,7 @@ class EventLogger:
             case Starred():
                 view.text(number, f"Starred {event.pose}", "INFO")
             case Undone():
-                view.text(number, f"Took back entry {event.act} of the log", "WARN")
+                view.text(number, f"{in_words(entry).capitalize()} of the log", "WARN")
             case FilesShown() | FilesPlaced():
                 return
             case _:
