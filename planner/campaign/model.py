@@ -208,7 +208,7 @@ class Model:
         if gain[best] <= new:
             return None
         pose = self.labelled[best].pose
-        text = f"Hit {pose} again, with as many hits as before: that tells more than a new pose."
+        text = f"First hit {pose} again, as often as before: that tells more than a new pose."
         return RepeatedPose(pose, float(gain[best]), new, text)
 
     def _predict(
