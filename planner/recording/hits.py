@@ -62,7 +62,7 @@ def _completed(record: FrfRecord, own: list[End], axis: str | None, what: str) -
     other = next((d for _, d in own if d and said and abs(d) != abs(said)), None)
     if other is not None and (what == "hit" or len(own) == 1):
         raise InputError(
-            f"{record.source} says that its {what} is along {_name(other)}, the table says "
+            f"{record.source} says that its {what} is {_way(other)}, the table says "
             f"{axis}; correct the one that is wrong."
         )
     return [end._replace(direction=end.direction or said) for end in own]
@@ -73,14 +73,24 @@ def _along(direction: int) -> str:
     return AXES[abs(direction) - 1] if 1 <= abs(direction) <= len(AXES) else ""
 
 
+def _way(direction: int) -> str:
+    """ "along +z"; directions beyond 3 turn about the axes, as universal files have them."""
+    if not direction:
+        return "along an axis that is not stated"
+    if _along(direction):
+        return f"along {_name(direction)}"
+    return f"about {_name(direction - int(np.sign(direction)) * len(AXES))}"
+
+
 def _axis_there(source: object, stated: StatedPoints, node: str, direction: int) -> str:
     """The point at a node, whose sensor has an axis along a direction (±1, ±2, ±3; 0 unknown)."""
     point = stated.response_at(source, node)
     axes = stated.names.axes_of(point)
     along = _along(direction)
     if along not in axes:
+        way = f"along {along}" if along else _way(direction)
         raise InputError(
-            f"{source}{stated.where} has a response along {along} at {point}, whose sensor has "
+            f"{source}{stated.where} has a response {way} at {point}, whose sensor has "
             f"{', '.join(axes)} only; correct its direction, or the axes in robot.toml."
         )
     return point
