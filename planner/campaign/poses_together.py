@@ -57,13 +57,13 @@ class PosesTogether:
         if not any(i < new for i, _ in found):
             return None
         (stated, _), *each = parallel_map(self._evidence, [None, *found])
-        (most, all_of_it, (i, angle)), *others = sorted(
+        (most, explains, (i, angle)), *others = sorted(
             ((*one, which) for one, which in zip(each, found, strict=True)),
             key=lambda one: one[0],
             reverse=True,
         )
         least = max([stated, *(value for value, _, (k, _) in others if k == new)])
-        return (i, angle) if i < new and all_of_it and most > least + LOG_ODDS else None
+        return (i, angle) if i < new and explains and most > least + LOG_ODDS else None
 
     def _fit(self, q: np.ndarray, poses: Sequence[int]) -> StructureFit:
         """Of some of the poses, at q (n, dof)."""

@@ -15,7 +15,7 @@ from planner.words import counted, significant
 
 BEYOND = 2.0  # sds of the gains, from which their deviation is told
 KNOWN = 0.3  # sd of ln k to which a spring not stated is known when it is told of
-# PosedBodies from which a place is told as found: from one, neighbours imitate each other.
+# Poses from which a place is told as found: from one, neighbours imitate each other.
 PLACED = 3
 ABOVE, NOT_THERE = 2, 1.0  # modes that a wider structure may have beside; ln f of one that is none
 

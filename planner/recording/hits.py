@@ -74,23 +74,18 @@ def _along(direction: int) -> str:
 
 
 def _way(direction: int) -> str:
-    """ "along +z"; directions beyond 3 turn about the axes, as universal files have them."""
-    if not direction:
-        return "along an axis that is not stated"
-    if _along(direction):
-        return f"along {_name(direction)}"
-    return f"about {_name(direction - int(np.sign(direction)) * len(AXES))}"
+    """ "along z"; directions beyond 3 turn about the axes, as universal files have them."""
+    turns, axis = divmod(abs(direction) - 1, len(AXES))
+    return f"{'about' if turns else 'along'} {AXES[axis]}"
 
 
 def _axis_there(source: object, stated: StatedPoints, node: str, direction: int) -> str:
     """The point at a node, whose sensor has an axis along a direction (±1, ±2, ±3; 0 unknown)."""
     point = stated.response_at(source, node)
     axes = stated.names.axes_of(point)
-    along = _along(direction)
-    if along not in axes:
-        way = f"along {along}" if along else _way(direction)
+    if abs(direction) > len(AXES) or _along(direction) not in axes:
         raise InputError(
-            f"{source}{stated.where} has a response {way} at {point}, whose sensor has "
+            f"{source}{stated.where} has a response {_way(direction)} at {point}, whose sensor has "
             f"{', '.join(axes)} only; correct its direction, or the axes in robot.toml."
         )
     return point

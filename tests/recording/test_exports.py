@@ -266,13 +266,18 @@ def test_a_sensor_that_roves_through_one_universal_file(tmp_path, force_first):
     assert len(odd.channels) == 5
 
 
-def test_a_moment_is_no_hit_along_an_axis(tmp_path):
-    moment = [dataset_58(4, FRF, (12, "A", "m/s^2"), (13, "F", "N"), (1, felt), (1, -6), step=0.25)
-              for felt in (1, 2, 3)]  # fmt: skip
-    write(tmp_path / "m.uff", *moment)
+@pytest.mark.parametrize(
+    ("felt", "hit", "said"),
+    [((1, 2, 3), -6, r"its hit is about z, the table says \+z"),
+     ((1, 2, 6), 3, "a response about z at")],
+)  # fmt: skip
+def test_what_turns_is_along_no_axis(tmp_path, felt, hit, said):
+    sets = [dataset_58(4, FRF, (12, "A", "m/s^2"), (13, "F", "N"), (1, k), (1, hit), step=0.25)
+            for k in felt]  # fmt: skip
+    write(tmp_path / "m.uff", *sets)
     (tmp_path / "recordings.csv").write_text("pose,joint_1_deg,hit,file\nP1,5,+z,m.uff\n")
     (row,) = read_recordings(tmp_path, ["joint_1"])
-    with pytest.raises(InputError, match=r"its hit is about -z, the table says \+z"):
+    with pytest.raises(InputError, match=said):
         Source.of(row).read()
 
 
