@@ -53,7 +53,6 @@ def found_without(model: "Model") -> "tuple[LeaveOneOut, tuple[str, ...]]":
 
 def left_out(model: "Model") -> LeftOutValues:
     """Of a campaign's model."""
-    from planner.campaign.labels import frequencies
     from planner.surrogate.leave_one_out import LEVELS, report
 
     found, poses = found_without(model)
@@ -64,7 +63,7 @@ def left_out(model: "Model") -> LeftOutValues:
         return LeftOutValues(0, None, (), (), said)
     coverage = dict(zip(map(str, LEVELS), found.coverage().tolist(), strict=True))
     worst = tuple(poses[i] for i in found.worst().tolist())
-    measured_hz = frequencies(model.labelled)
+    measured_hz = model.seen.frequency_hz  # by modal analysis, or by the simulation's own shapes
     predicted = measured_hz * np.exp(-found.error)
     numbers = measured_hz, predicted, predicted * found.sd, found.rank
     rows = tuple(

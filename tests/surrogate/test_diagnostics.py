@@ -1,7 +1,11 @@
 """Leave-one-out against refits, calibration, and a measurement gone wrong."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 
+from planner.campaign.model_status import left_out
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
 from planner.surrogate.leave_one_out import leave_one_out, report
 from planner.surrogate.training_data import TrainingData
@@ -53,3 +57,18 @@ def test_gaps_and_nothing_at_all():
     assert np.isfinite(np.delete(found.sd, 2, axis=0)).all()
     none = TrainingData(*(a[:0] for a in vars(training).values()))
     assert "too few" in report(leave_one_out(fit(none).outputs, 0), (), ("mode 1",))[0]
+
+
+def test_frequencies_told_by_the_simulations_shapes_stand_beside_their_own_predictions():
+    """No modal analysis found the mode, which the model has nonetheless."""
+    training = data(9)
+    outputs = fit(training).outputs
+    average = SimpleNamespace(most_probable=SimpleNamespace(outputs=outputs))
+    model: Any = SimpleNamespace(
+        surrogate=SimpleNamespace(primary=average, count=1),
+        labelled=tuple(SimpleNamespace(pose=f"P{i}", modes=(None,)) for i in range(9)),
+        seen=SimpleNamespace(frequency_hz=np.exp(training.y)),
+    )
+    rows, error = left_out(model).frequencies, leave_one_out(outputs, 9).error
+    np.testing.assert_allclose([r.measured_hz for r in rows], np.exp(training.y[:, 0]))
+    np.testing.assert_allclose([r.predicted_hz for r in rows], np.exp((training.y - error)[:, 0]))
