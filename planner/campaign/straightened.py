@@ -49,7 +49,9 @@ class StraightenedHits:
         simulation = with_possible_laws(simulation)
 
         def corrected(q: np.ndarray) -> Correction:
-            return lambda hits: straightened_hits(hits, q, simulation, *self._how)
+            return lambda hits: straightened_hits(
+                hits, np.tile(q, (len(hits), 1)), simulation, *self._how
+            )
 
         self.latest = tuple(self._hits_of(m, corrected(q)) for m, q in self._used[:count])
         return tuple(hits.whole for hits in self.latest)

@@ -213,22 +213,26 @@ def _explored(
     what a law has on average, from pose to pose, by effects that are not there.
     """
 
-    def explored(known: StructureFit | None = None) -> ExploredStructures:
-        steps = replace(search, on_step=lambda text: progress(f"fitting: {text}", 0.5))
-        return steps.explored(known)
+    def told(search: Search) -> Search:
+        return replace(search, on_step=lambda text: progress(f"fitting: {text}", 0.5))
 
-    found, levels, straight = explored(), None, recorded
-    for _ in range(ROUNDS if recorded.visits else 0):
+    search = told(search)
+    begun, straight, matters = [search.plain()], recorded, simulation.robot.config.diagnose.matters
+    levels = level_laws(recorded, begun[0], 0) if recorded.visits else None
+    # A joint's law, where hits of different force differ, comes first: it bends what is linear.
+    for _ in range(ROUNDS if levels and levels.seen.size >= matters else 0):
+        found = replace(search, thorough=False).explored(begun)
+        best, begun = most_probable(found.settled), found.settled
         progress("comparing hits of different force", 0.85)
-        best = most_probable(found.settled)
-        told = level_laws(recorded, best)
-        levels = told if levels is None or told.laws else levels
-        if not told.laws or recorded.most_heard is not recorded:
+        seen = level_laws(recorded, best)
+        levels = seen if seen.laws or not levels.laws else levels
+        if not seen.laws or recorded.most_heard is not recorded:
             break
         there = RobotPosterior.of(best).simulation
-        straight = straightened(recorded, with_laws(there, told.laws, recorded))
-        search = searching(straight.ended_frfs, straight.q, simulation, _order(straight))
-        found = explored(best)
+        straight = straightened(recorded, with_laws(there, seen.laws, recorded))
+        search = told(searching(straight.ended_frfs, straight.q, simulation, _order(straight)))
+        begun = search.plain(), search.recovered(best.tried.record)
+    found = search.explored(begun)
     return straight, search, found, levels
 
 

@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
 from planner.dataset.dataset import Dataset
-from planner.dataset.visits import Visit
 from planner.diagnosis.levels import LevelLaw
 from planner.dynamics.simulation import Simulation
-from planner.inference.parallel import parallel_map
 from planner.measurement.straightened_hits import straightened_hits
 from planner.recording.force_levels import pulse_s
 from planner.robot.config import HammerTable
@@ -37,9 +36,9 @@ def with_laws(simulation: Simulation, found: Sequence[LevelLaw], recorded: Datas
 
 def straightened(recorded: Dataset, simulation: Simulation) -> Dataset:
     """Recordings as springs alone would answer, what is beyond them taken out."""
-    how = recorded.band_hz[1], recorded.window_rate_1_s
-
-    def one(visit: Visit) -> Visit:
-        return replace(visit, hits=straightened_hits(visit.hits, visit.q, simulation, *how))
-
-    return recorded.corrected(parallel_map(one, recorded.visits))
+    visits = recorded.visits
+    counts = [len(visit.hits) for visit in visits]
+    q, hits = np.repeat([v.q for v in visits], counts, axis=0), [h for v in visits for h in v.hits]
+    how = simulation, recorded.band_hz[1], recorded.window_rate_1_s
+    found = iter(straightened_hits(hits, q, *how))
+    return recorded.corrected([replace(v, hits=tuple(islice(found, len(v.hits)))) for v in visits])

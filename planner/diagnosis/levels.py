@@ -86,17 +86,19 @@ class Levels:
         return 1 - (self.left.size / self.seen.size) ** 2 if self.seen.size else 0.0
 
 
-def level_laws(recorded: Dataset, found: StructureFit) -> Levels:
-    """Of hits and the linear fit of their averages.
+def level_laws(recorded: Dataset, found: StructureFit, most: int = MOST) -> Levels:
+    """Of hits and the linear fit of their averages; laws of so many joints, at most.
 
     Of several sensors and hit points, the ones most heard tell.
     """
     config = found.structure.prior.effect_library.simulation.robot.config
     groups, ports = hit_groups(recorded.most_heard, found), own_ports(found)
-    return laws_of(groups, ports, config.diagnose.matters)
+    return laws_of(groups, ports, config.diagnose.matters, most)
 
 
-def laws_of(groups: Sequence[HitGroup], ports: Sequence[JointPort], matters: float) -> Levels:
+def laws_of(
+    groups: Sequence[HitGroup], ports: Sequence[JointPort], matters: float, most: int = MOST
+) -> Levels:
     """The same of groups of hits; what changes less than `matters` of |H| is no law."""
     if not groups or not ports:
         return Levels(Differences(0.0, 1.0), Differences(0.0, 1.0))
@@ -106,7 +108,7 @@ def laws_of(groups: Sequence[HitGroup], ports: Sequence[JointPort], matters: flo
     seen = differences(search.at(rho), left)
     found = Levels(seen, seen)
     joints = {p.at: (p, JointMotions.of(groups, j, p.stiffness)) for j, p in enumerate(ports)}
-    while len(found.laws) < MOST and found.left.size >= matters and joints:
+    while len(found.laws) < most and found.left.size >= matters and joints:
         columns = {at: _columns(motions) for at, (_, motions) in joints.items()}
         gains = {at: gain(search.at(rho), c, left) for at, c in columns.items()}
         at = max(gains, key=lambda at: gains[at])

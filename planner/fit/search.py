@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.effects.effect import Operator, gain_of
+from planner.effects.effect import Operator, Start, gain_of
 from planner.fit.explanations import (
     RARE,
     ExploredStructures,
@@ -60,11 +60,9 @@ class Search(Trials):
     widen: bool = False  # whether `StructureFit.wider` is asked for
     thorough: bool = False  # whether what explains them is compared with all that is beside it
 
-    def explored(self, known: StructureFit | None = None) -> ExploredStructures:
-        """From the robot as it is known to be built on, and from what explained such FRFs."""
-        plain = self._plain()
-        begun = [plain] if known is None else [plain, self._recovered(known.tried.record)]
-        return ExploredStructures(plain, self._explore(begun))
+    def explored(self, begun: Sequence[StructureFit]) -> ExploredStructures:
+        """From the robot as it is known to be built on, the first, and from what else was found."""
+        return ExploredStructures(begun[0], self._explore(begun, warm=True))
 
     def found(self, warm: FitRecord | None = None) -> StructureFit:
         """The effects that explain them best; from what was found before, if that is given.
@@ -83,7 +81,7 @@ class Search(Trials):
         if self._cut_off:
             known = best.tried.record
             begun = self._completed(known)
-            best = begun._recovered(known)
+            best = begun.recovered(known)
         return begun._ended(best)
 
     @property
@@ -92,10 +90,10 @@ class Search(Trials):
 
     def _found(self, warm: FitRecord | None) -> StructureFit:
         if not self.extend:
-            return self._plain()
-        known = [] if warm is None else [self._recovered(warm)]
+            return self.plain()
+        known = [] if warm is None else [self.recovered(warm)]
         if not known or self.widen or not explained(known[0]):
-            known.append(self._plain())
+            known.append(self.plain())
         # What stands in for what fewer poses could not tell may hide it: from both, apart.
         best = most_probable(one for k in known for one in self._explore([k], warm is not None))
         # All springs may give at once, which none of them shows alone; but what did not explain
@@ -116,7 +114,7 @@ class Search(Trials):
         return self._pruned(fewer) if log_probability(fewer) > log_probability(found) else found
 
     def _gone_on(self, known: FitRecord) -> StructureFit:
-        best = self._recovered(known)
+        best = self.recovered(known)
         return most_probable(self._explore([best], True)) if self.extend else best
 
     def _completed(self, known: FitRecord) -> "Search":
@@ -141,13 +139,13 @@ class Search(Trials):
         fewer = without(best, read)
         return best if fewer is None else converged(settled(fewer.misfit, fewer.at))
 
-    def _plain(self) -> StructureFit:
+    def plain(self) -> StructureFit:
         """With nothing that robots need not have."""
         self.on_step("as stated")
         data = self.data(SEARCHED)
         return converged(self.begun(data, self.prior.as_built(data.sensors)))
 
-    def _recovered(self, known: FitRecord) -> StructureFit:
+    def recovered(self, known: FitRecord) -> StructureFit:
         """What was found of other data, of these."""
         misfit, x = self.again(known, self.data(SEARCHED), max(known.size, AGAIN))
         return converged(settled(misfit, minimised(misfit, x, 4, 1.0)))
@@ -209,19 +207,15 @@ class Search(Trials):
         for effect in sorted(effects, key=lambda e: costs[e]):
             if _less(best, effect) not in pool and not (near and costs[effect] > FAR):
                 yield [self._fewer(best, effect, near)]
-        if key_of(best) not in extended:
+        more, first = list[StructureFit](), key_of(best) not in extended
+        if first:
             extended.add(key_of(best))
             more = self._further(best)
-            if all(size_of(one) > FAR_OFF for one in (best, *more)):
-                more += self._from_afar(best)
             yield more
         for effect in effects:
-            yield self.displaced(best, effect)
-        for effect in effects if len(effects) > 1 and not near else ():
-            fewer = pool.get(_less(best, effect)) or self._fewer(best, effect, near)
-            if key_of(fewer) not in extended:
-                extended.add(key_of(fewer))
-                yield [fewer, *self._exchanged(fewer, best, pool)]
+            yield self._exchanged(best, effect, near, pool, extended)
+        if first and all(size_of(one) > FAR_OFF for one in (best, *more)):
+            yield self._from_afar(best)
 
     def _fewer(self, best: StructureFit, effect: Operator, near: bool) -> StructureFit:
         """Without an effect: from where it is, and, where much is left then and not only what is
@@ -248,11 +242,26 @@ class Search(Trials):
         starts = self.starts(base, SCREENED, RARE if near else 0.0)
         return self.compete(base, starts, count=SETTLED, behind=0.0 if near else FAR)
 
-    def _exchanged(self, fewer: StructureFit, best: StructureFit, pool: Pool) -> list[StructureFit]:
-        """With another effect in place of the one that the likeliest has more."""
-        starts = self.starts(fewer, SCREENED)
-        new = [s for s in starts if key((*added(fewer), s.effect)) not in pool]
-        return self.compete(fewer, new, count=SETTLED, against=best)
+    def _exchanged(
+        self, best: StructureFit, effect: Operator, near: bool, pool: Pool, extended: set[Key]
+    ) -> list[StructureFit]:
+        """Without an effect; with it elsewhere, or with another in its place, likeliest first.
+
+        Where only what is `near` is wanted, or what without it may be there was looked at,
+        elsewhere alone. In the place of what is too small to be named nothing is looked for.
+        """
+        held = effect.springs or effect.stated
+        if near and held:
+            return []
+        fewer = pool.get(_less(best, effect)) or self._fewer(best, effect, near)
+        if not self.telling(fewer, best, effect):
+            return [fewer]
+        starts = [] if held else self._moved(fewer, best, effect)
+        if not near and key_of(fewer) not in extended:
+            extended.add(key_of(fewer))
+            new = self.starts(fewer, SCREENED)
+            starts += [s for s in new if key((*added(fewer), s.effect)) not in pool]
+        return [fewer, *self.compete(fewer, starts, count=SETTLED, against=best)]
 
     def _from_afar(self, base: StructureFit) -> list[StructureFit]:
         """The same, all from what is stated: what is missing may be hidden by what it bent."""
@@ -262,25 +271,17 @@ class Search(Trials):
         ends = parallel_map(lambda at: converged(self.begun_with(base, *at)).tried, nearest)
         return [self._from(tried, base.misfit.data) for tried in ends]
 
-    def displaced(self, best: StructureFit, effect: Operator) -> list[StructureFit]:
-        """With an operator at other places than where it is, likeliest first.
-
-        Of many places those that the first order ranks first.
-        """
-        held = effect.springs or effect.stated
-        base = None if held else without(best, [effect], steps=0)
-        if base is None:
-            return []
-        motions, gain = base.misfit.first_order(base.at.x, base.at.own)
+    def _moved(self, fewer: StructureFit, best: StructureFit, effect: Operator) -> list[Start]:
+        """An operator that the likeliest has more, at other places: what the first order ranks
+        first of many."""
+        motions, gain = fewer.misfit.first_order(fewer.at.x, fewer.at.own)
         psi = best.at.x[best.structure.own[best.structure.effects.index(effect)]]
         others = [
-            e for e in self.free(base.structure)
+            e for e in self.free(fewer.structure)
             if type(e) is type(effect) and e.at != effect.at.split("#")[0]
         ]  # fmt: skip
-        starts = [e.moved_to(effect, psi, motions, gain) for e in others]
-        starts = sorted(starts, key=gain_of, reverse=True)[:FOLLOWED]
-        ends = self.compete(base, starts, against=best)
-        return [*map(converged, ends[:1]), *ends[1:]]
+        starts = (e.moved_to(effect, psi, motions, gain) for e in others)
+        return sorted(starts, key=gain_of, reverse=True)[:FOLLOWED]
 
     def _last(self, best: StructureFit) -> StructureFit:
         """On all lines, and at last along what the data leave open."""

@@ -42,6 +42,7 @@ LOG_STEPS, NEARER, FEW, OF_ONE, FURTHER = 60, 24, 6, 12, 4  # steps: until near,
 HOPELESS = 4.0  # nats, below which a further step is not worth it while many are tried
 FAR = 100.0  # nats below which nothing is followed
 WON_BACK = 0.5  # share of what an effect is worth, below which another does not take its place
+TOO_SMALL = 0.5  # of what matters: an effect that changes FRFs by less will hardly be named
 FAR_OFF = 0.03  # of |H|, not explained: few steps may not lead home
 FOLLOWED, SETTLED, FARTHEST = 6, 3, 3  # how many are followed, settled, come from afar
 
@@ -138,7 +139,8 @@ class Trials:
         """Starts beside it: a few steps each, the best farther, `count` settled.
 
         None is followed that by then is so many nats `behind` the base, or has won back less than
-        a share of what that is `against` what it shall replace.
+        a share of what that is `against` what it shall replace; what could not be named is left
+        out.
         """
         data = base.misfit.data
         lines = self.data(ROUGH) if size_of(base) > FAR_OFF else data
@@ -153,7 +155,15 @@ class Trials:
         won = near[0].evidence - base.evidence if near else 0.0
         near = [p for p in near if p.evidence - base.evidence >= min(WON_BACK * won, won)][:count]
         ends = parallel_map(lambda p: self._settled(p, data), near)
-        return sorted((self._from(p, data) for p in ends), key=evidence_of, reverse=True)
+        found = (self._from(p, data) for p in ends)
+        told = (f for f in found if self.telling(base, f, f.structure.effects[-1]))
+        return sorted(told, key=evidence_of, reverse=True)
+
+    def telling(self, fewer: StructureFit, found: StructureFit, effect: Operator) -> bool:
+        """Whether an effect that is there beside `fewer` may be named."""
+        h, other = found.at.motion.accelerance, fewer.at.motion.accelerance
+        changed = float(np.linalg.norm(other - h) / np.linalg.norm(h))
+        return effect.absorbed or changed >= TOO_SMALL * self.floor
 
     def _stepped(self, tried: Tried, data: FrfData) -> Tried:
         misfit, x = self.again(tried.record, data, tried.record.size)
