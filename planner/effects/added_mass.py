@@ -67,11 +67,11 @@ class AddedMass(Operator):
             np.einsum("nae,kab,nbf->nefk", j, inertia_basis(), j, optimize=True).reshape(-1, 10)
             for j in (here[..., both], there[..., both])
         )
-        same = self._numbers(np.linalg.lstsq(columns, felt @ matter[1], rcond=None)[0])
+        same = self.of_matter(np.linalg.lstsq(columns, felt @ matter[1], rcond=None)[0])
         return self.starts(motions, gain)[0] if same is None else Start(self, same, 0.0)
 
-    def _numbers(self, inertia: np.ndarray) -> np.ndarray | None:
-        """ψ at which `_body` has this inertia, if matter can have it."""
+    def of_matter(self, inertia: np.ndarray) -> np.ndarray | None:
+        """See `Operator.of_matter`: with moments that matter can have."""
         if abs(inertia[0]) < LEAST * self.mass_kg:
             return None
         mass, place = inertia[0], inertia[1:4] / inertia[0]
@@ -79,9 +79,10 @@ class AddedMass(Operator):
         for value, (i, j) in zip(inertia[4:] / mass, MOMENTS, strict=True):
             moments[i, j] = moments[j, i] = value
         second = 0.5 * np.trace(moments) * np.eye(3) - moments - np.outer(place, place)
-        if np.linalg.eigvalsh(second)[0] <= 0:
-            return None
-        root = np.linalg.cholesky(second)
+        # As flat as the prior has it, at least.
+        least = np.exp(2 * float(np.min(self.mean[4:7] - 2 * self.sd[4:7])))
+        square, along = np.linalg.eigh(second)
+        root = np.linalg.cholesky((along * np.maximum(square, least)) @ along.T)
         d = np.diag(root)
         place = (place - self.centre_m) / self.size_m
         return np.array([mass / self.mass_kg, *place, *np.log(d), *(root / d[:, None])[BELOW]])

@@ -201,6 +201,10 @@ class Operator(ABC):
         """Where it begins, as `found`, one like it at another place, has ψ."""
         return self.starts(motions, gain)[0]
 
+    def of_matter(self, inertia: np.ndarray) -> np.ndarray | None:
+        """ψ at which it adds this inertia (10,) to its body; None where it can't."""
+        return None
+
     def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
         """Where fits may begin as well as at ψ."""
         return ()

@@ -14,10 +14,10 @@ STRAYED = 1.5  # prior sds softer than stated
 
 
 def in_place_of(base: StructureFit, structure: RobotStructure) -> list[np.ndarray]:
-    """Where a fit with one effect's springs more may begin: in place of stated ones that strayed.
+    """Where a fit with one effect more may begin: in place of what is stated and strayed.
 
-    Those that are far softer may stand in for the new ones: back to what is stated, the new ones
-    as soft as they were.
+    Springs that are far softer may stand in for the effect's: back to what is stated, the new ones
+    as soft as they were. A body may stand in for a mass that it carries.
     """
     x, known = structure.carried(base.structure, base.at.x), set(base.structure.names)
     stiffnesses = range(structure.stiffnesses)
@@ -25,12 +25,30 @@ def in_place_of(base: StructureFit, structure: RobotStructure) -> list[np.ndarra
     away = (x - structure.mean) / structure.sd
     far = [i for i in stiffnesses if structure.parameters[i].stated and away[i] < -STRAYED]
     if not (new and far):
-        return []
+        return _carried_by(structure, x)
     softest = x[far].min()
     x[far] = structure.mean[far]
     low, high = structure.mean[new] - 3 * structure.sd[new], structure.mean[new]
     x[new] = np.clip(softest, low, high)
     return [x]
+
+
+def _carried_by(structure: RobotStructure, x: np.ndarray) -> list[np.ndarray]:
+    """x with what the last effect's body has beside what is stated in that effect, as far as such a
+    mass can be; FRFs are the same."""
+    effect, own, bodies = structure.effects[-1], structure.own[-1], structure.bodies
+    carried = effect.inertia(x[own])
+    if carried is None:
+        return []
+    body, out = bodies.bodies.index(carried[0]), x.copy()
+    strayed = bodies.difference(x[structure.inertial])[body]
+    psi = effect.of_matter(strayed)
+    if psi is None:
+        return []
+    out[own], mine = psi, bodies.mine[body]
+    left = strayed - effect.inertia(psi)[1]
+    out[structure.inertial][mine] = np.linalg.lstsq(bodies.change[body, mine].T, left)[0]
+    return [out]
 
 
 def from_stated(structure: RobotStructure, start: Start) -> Iterable[np.ndarray]:

@@ -17,6 +17,7 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotBelief, RobotPosterior
 from planner.fit.result import as_identification
 from planner.fit.search import Search
+from planner.fit.starts import in_place_of
 from planner.fit.structure import RobotPrior, RobotStructure, exported
 from planner.fit.trials import explained
 from planner.measurement.nuisances import Tolerances
@@ -148,6 +149,23 @@ def test_the_same_matter_on_another_link_gives_the_same_frfs(case, prior):
     size = np.linalg.norm(with_5)
     assert np.linalg.norm(with_6 - with_5) < 0.01 * size
     assert np.linalg.norm(without - with_5) > 0.3 * size
+
+
+def test_a_fit_begins_with_a_mass_that_a_body_stands_for_and_gives_the_same_frfs(prior, few):
+    """40 kg that a fit had put into a link's own body, with moments that no matter has."""
+    plain = RobotStructure(prior)
+    x, wider = plain.mean.copy(), structure_of(prior, "added_mass at link_5")
+    body = plain.bodies.mine[plain.bodies.bodies.index("joint_5")]
+    x[plain.inertial][body] = 6.0, 1.0, -1.0, 0.5, 2.0, 0.0, -2.0, 0.0, 1.0, 0.0
+    misfit = FrfMisfit(plain, few, Tolerances(), 0.1)
+    found = StructureFit(misfit, misfit(x), 0.0)
+    (begun,) = in_place_of(found, wider)
+    before, after = found.at.motion, replace(misfit, structure=wider).motion(begun, None)
+    size = np.linalg.norm(before.accelerance)
+    assert np.linalg.norm(after.accelerance - before.accelerance) < 1e-6 * size
+    far, near = ((z - s.mean) / s.sd for z, s in ((x, plain), (begun, wider)))
+    assert np.sum(near**2) < 0.5 * np.sum(far**2)
+    assert wider.massive(begun)
 
 
 def test_a_step_never_leads_uphill_nor_to_what_no_body_can_be(prior, few):
