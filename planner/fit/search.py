@@ -2,8 +2,8 @@
 
 Beside a set of effects are those with one more, one less, one elsewhere, and one exchanged for any
 other. Operators are ranked by their first-order columns and tried with all else linear (`OneMore`);
-where that leaves much, all are fitted from what is stated too, by logarithms first, lest what is
-missing be hidden by what it bent. The best are settled, and what is settled is kept.
+where nothing of that leaves little, all are fitted from what is stated too, by logarithms first,
+lest what is missing be hidden by what it bent. The best are settled, and what is settled is kept.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -200,8 +200,8 @@ class Search(Trials):
     ) -> Iterator[list[StructureFit]]:
         """Sets beside the likeliest that were not looked at, as they are asked for.
 
-        One effect less, one more, each elsewhere; and of each set with one less those with one
-        more, which are exchanges: not where only what is `near` is wanted.
+        One effect less, one more, each elsewhere or another in its place; and from afar what none
+        of these explains.
         """
         effects, costs = added(best), removal_costs(best)
         for effect in sorted(effects, key=lambda e: costs[e]):
@@ -254,7 +254,7 @@ class Search(Trials):
         if near and held:
             return []
         fewer = pool.get(_less(best, effect)) or self._fewer(best, effect, near)
-        if not self.telling(fewer, best, effect):
+        if not self.may_be_named(fewer, best, effect):
             return [fewer]
         starts = [] if held else self._moved(fewer, best, effect)
         if not near and key_of(fewer) not in extended:

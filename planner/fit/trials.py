@@ -156,11 +156,11 @@ class Trials:
         near = [p for p in near if p.evidence - base.evidence >= min(WON_BACK * won, won)][:count]
         ends = parallel_map(lambda p: self._settled(p, data), near)
         found = (self._from(p, data) for p in ends)
-        told = (f for f in found if self.telling(base, f, f.structure.effects[-1]))
+        told = (f for f in found if self.may_be_named(base, f, f.structure.effects[-1]))
         return sorted(told, key=evidence_of, reverse=True)
 
-    def telling(self, fewer: StructureFit, found: StructureFit, effect: Operator) -> bool:
-        """Whether an effect that is there beside `fewer` may be named."""
+    def may_be_named(self, fewer: StructureFit, found: StructureFit, effect: Operator) -> bool:
+        """Whether an effect that is there beside `fewer` changes FRFs enough, or counts anyway."""
         h, other = found.at.motion.accelerance, fewer.at.motion.accelerance
         changed = float(np.linalg.norm(other - h) / np.linalg.norm(h))
         return effect.absorbed or changed >= TOO_SMALL * self.floor
