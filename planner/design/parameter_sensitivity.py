@@ -144,7 +144,7 @@ class UncertainParameters:
         t, s = self.belief.tolerances, misfit.data.measured.s
         numbers = NuisanceCounts.of(motion.accelerance)
         every = basis(motion.accelerance, motion, s, t)
-        common = np.concatenate([every[:, numbers.known :], visits * t.visit_stiffness], axis=1)
+        common = np.concatenate([every[:, numbers.known :], visits], axis=1)
         return np.concatenate([every[:, : numbers.hits], np.sqrt(AXES) * common], axis=1)
 
     def _channels(self, layout: Layout) -> list[int]:

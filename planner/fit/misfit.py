@@ -2,8 +2,9 @@
 
 Two residuals: logarithms of ratios lead home from afar, plain ones in units of what is not
 explained end there. That is noise, and a discrepancy proportional to |H| that neighbouring lines
-share (`ρ`). Hits, readback and the scatter of springs from visit to visit are eliminated pose by
-pose (Woodbury), linearised about where they were last; the chain is common to all poses.
+share (`ρ`). Hits, readback and the scatter of springs and dampers from visit to visit are
+eliminated pose by pose (Woodbury), linearised about where they were last; the chain is common to
+all poses.
 """
 
 from collections.abc import Sequence
@@ -145,7 +146,8 @@ class FrfMisfit:
         out: np.ndarray | None = None,
         added: Sequence[Impedance | None] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives (n, D − chain, r, c, F) by x, and (n, e, r, c, F) by ln k of each spring.
+        """Derivatives (n, D − chain, r, c, F) by x, and (n, 2e, r, c, F) by what e springs and
+        their dampers scatter from visit to visit, in sds.
 
         The former into `out`, where it is given; `added` are the impedances at x, if they are
         known.
@@ -172,7 +174,11 @@ class FrfMisfit:
             count = own.stop - own.start if impedance else 0
             out[:, own] = raw[:, at : at + count] if count else 0.0
             at += count
-        visits = by_block[:, :e] + by_block[:, e : 2 * e]  # dampers scatter with their springs
+        t, stiffer, damped = self.tolerances, by_block[:, :e], by_block[:, e:]
+        visits = np.empty((n, 2 * e, *shape), dtype=complex)
+        # Dampers scatter with their springs, and far more by themselves.
+        np.multiply(stiffer + damped[:, :e], t.visit_stiffness, out=visits[:, :e])
+        np.multiply(damped.reshape(n, -1, e, *shape).sum(1), t.visit_damping, out=visits[:, e:])
         return out, visits
 
     def spring_slopes(self, motion: Motion, x: np.ndarray) -> np.ndarray:
@@ -195,7 +201,7 @@ class FrfMisfit:
         open_ = basis(h, motion, self.data.measured.s, self.tolerances)
         numbers, joints = self.nuisance_counts
         own = s.size + numbers.hits + joints
-        out = np.empty((len(h), own + len(s.springs) + 1, *h.shape[1:]), dtype=complex)
+        out = np.empty((len(h), own + 2 * len(s.springs) + 1, *h.shape[1:]), dtype=complex)
         _, visits = self.slopes(motion, x, out[:, : s.chain.start], added)
         out[:, s.chain] = open_[:, numbers.hits : numbers.known]
         out[:, s.size : s.size + numbers.hits] = open_[:, : numbers.hits]
@@ -204,7 +210,7 @@ class FrfMisfit:
             off = effect.stood_off(self.data.q, np.ones(1))
             if off is not None and motion.by_angle is not None:
                 out[:, at.start] = np.einsum("nj,nj...->n...", off, motion.by_angle)
-        np.multiply(visits, self.tolerances.visit_stiffness, out=out[:, own:-1])
+        out[:, own:-1] = visits
         return self.through_chain(x, h, out[:, :-1]), out, motion
 
     def through_chain(
@@ -235,7 +241,8 @@ class FrfMisfit:
     def zero_nuisances(self) -> np.ndarray:
         """(n, l): own numbers, all 0."""
         numbers, joints = self.nuisance_counts
-        return np.zeros((len(self.data.q), numbers.hits + joints + len(self.structure.springs)))
+        scatter = 2 * len(self.structure.springs)
+        return np.zeros((len(self.data.q), numbers.hits + joints + scatter))
 
     def about(self, own: np.ndarray, x: np.ndarray) -> np.ndarray:
         """(n, hits + chain + joints), from own numbers and the chain as x has it."""

@@ -32,7 +32,8 @@ class Tolerances:
     `angle_rad`, `offset_m`: of each of two directions of a hit; `gain`, `cross_axis`,
     `mounting_rad`, `position_m`: of the sensor; `force_gain` of the hammer; `delay_s`; `joint_rad`:
     of each joint's readback, (dof,) where some are of joints that slide (m); `visit_stiffness` of
-    ln k of each spring from visit to visit, as temperature and preload go.
+    ln k of each spring from visit to visit, as temperature and preload go, `visit_damping` of ln c
+    beside it: damping ratios of robots scatter by some ten percent.
     """
 
     angle_rad: float = np.deg2rad(_HITS.angle_sd_deg)
@@ -45,6 +46,7 @@ class Tolerances:
     delay_s: float = 6e-5
     joint_rad: float | tuple[float, ...] = np.deg2rad(ReadbackTable().joint_sd_deg)
     visit_stiffness: float = 0.004
+    visit_damping: float = 0.1
 
     @classmethod
     def of(cls, config: RobotConfig, slides: Sequence[bool] = ()) -> "Tolerances":
@@ -65,7 +67,7 @@ class Tolerances:
 
 
 # Of FRFs that are computed, or taken for exact.
-EXACT_HITS = Tolerances(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+EXACT_HITS = Tolerances(*(0.0,) * 11)
 
 OF_HIT, OF_SENSOR, OF_HAMMER = 4, 12, 2  # numbers of each hit axis, each sensor, and of all
 

@@ -10,7 +10,7 @@ from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import EffectLibrary
 from planner.fit.data import FrfData
 from planner.fit.departures import departures_text, masses_text, refitted_masses
-from planner.fit.fitted import SIZES, StructureFit
+from planner.fit.fitted import SIZES, StructureFit, settled, size_of
 from planner.fit.frequency_uncertainty import log_frequency_slope
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
@@ -149,6 +149,24 @@ def test_the_same_matter_on_another_link_gives_the_same_frfs(case, prior):
     size = np.linalg.norm(with_5)
     assert np.linalg.norm(with_6 - with_5) < 0.01 * size
     assert np.linalg.norm(without - with_5) > 0.3 * size
+
+
+def test_damping_that_scatters_from_visit_to_visit_is_no_discrepancy(prior, few):
+    structure, rng = RobotStructure(prior), np.random.default_rng(3)
+    x, dampers = structure.mean, [p.kind == "damping" for p in structure.parameters]
+    misfit = FrfMisfit(structure, few, Tolerances(), 0.06)
+    visits = []
+    for pose in range(len(few.q)):
+        there = x.copy()
+        there[: len(dampers)][dampers] += 0.1 * rng.standard_normal(sum(dampers))
+        visits.append(misfit.motion(there, None).accelerance[pose])
+    data = replace(few, measured=replace(few.measured, accelerance=np.array(visits)))
+    sizes = {}
+    for sd in (Tolerances().visit_damping, 0.0):
+        one = replace(misfit, data=data, tolerances=replace(Tolerances(), visit_damping=sd))
+        sizes[sd] = size_of(settled(one, one(x), rounds=3))
+    assert sizes[0.0] > SIZES[0]
+    assert sizes[Tolerances().visit_damping] == SIZES[0]
 
 
 def test_a_fit_begins_with_a_mass_that_a_body_stands_for_and_gives_the_same_frfs(prior, few):
