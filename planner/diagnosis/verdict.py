@@ -94,8 +94,8 @@ def judged(
     `levels`.
 
     Sizes are told at q (n, dof) in rad, poses that were not measured. Averages over levels are bent
-    by a joint's law: beside one only what changes FRFs by more than levels do is told. What
-    predicts poses set aside `worse` than the robot as stated explains nothing.
+    by a joint's law: beside one only what changes FRFs by more than levels do is told. What is
+    named and predicts poses set aside `worse` than the refitted robot explains nothing.
     """
     weights, best = probabilities(explored.settled), most_probable(explored.settled)
     effects = _weighed(explored, best, weights, matters, q)
@@ -109,7 +109,8 @@ def judged(
         effects = [replace(e, counts=e.counts and apart) for e, apart in pairs]
     named = [e for e in effects if e.counts]
     nameless = any(e.operator.general for e in named)
-    left = (size_of(best) > EXPLAINS * matters or nameless or worse) and not laws
+    wrong = nameless or (worse and named)
+    left = (size_of(best) > EXPLAINS * matters or wrong) and not laws
     unknown = left or bool(levels and levels.unexplained) or UNKNOWN in from_signals
     there = named or from_signals or laws
     verdict = "unexplained" if unknown else "explained" if there else "consistent"
