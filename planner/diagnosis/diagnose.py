@@ -149,10 +149,11 @@ class Diagnosis:
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
-        """What is there and too small to matter, in words."""
+        """What is there and too small to matter, or not sure enough, in words."""
         told = [e for e in self.verdict.effects if not e.counts and e.gain_nats > LEAST]
+        why = {True: "Too small to matter", False: "Not sure enough to be a finding"}
         return tuple(
-            f"Too small to matter ({significant(100 * e.change)} % of |H|): "
+            f"{why[e.change < self.search.floor]} ({significant(100 * e.change)} % of |H|): "
             f"{self._established(e, e.probability).text}"
             for e in told
         )
@@ -233,6 +234,8 @@ def _explored(
         search = told(searching(straight.ended_frfs, straight.q, simulation, _order(straight)))
         begun = search.plain(), search.recovered(best.tried.record)
     found = search.explored(begun)
+    if levels and levels.laws:
+        levels = replace(levels, left=level_laws(straight, most_probable(found.settled), 0).seen)
     return straight, search, found, levels
 
 

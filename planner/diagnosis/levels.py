@@ -65,7 +65,8 @@ class LevelLaw:
 
 @dataclass(frozen=True)
 class Levels:
-    """How hits of different force differ (`seen`), by which laws, and what these leave (`left`).
+    """How hits of different force differ (`seen`), by which laws, and what these `left` in the
+    recordings that are searched.
 
     `free` are the nats of a stiffness that goes freely with its swing, by joint; `candidates`
     (effect, joint, probability) are all that were weighed for the first law, "unknown" where it is

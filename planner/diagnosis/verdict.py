@@ -34,7 +34,7 @@ EXPLAINS = 2.0  # times what matters: a discrepancy up to which nothing else is 
 # Effects without a name of their own imitate what a named one's shape lacks: they count from so
 # many times what matters on, and so much of all that is gained.
 GENERAL, OF_ALL = 3.0, 0.05
-BENT = 2.0  # times what levels differ by, from which a linear effect beside a law is told
+BENT = 2.0  # times what levels still differ by, from which a linear effect beside a law is told
 LINES = 40  # of the band, on which sizes are told
 Place = tuple[str, str | None]
 UNKNOWN, NONE = ("unknown", None), ("none", None)
@@ -94,14 +94,14 @@ def judged(
     `levels`.
 
     Sizes are told at q (n, dof) in rad, poses that were not measured. Averages over levels are bent
-    by a joint's law: beside one only what changes FRFs by more than levels do is told. What is
+    by what is left of a joint's law: beside one only what changes FRFs by more is told. What is
     named and predicts poses set aside `worse` than the refitted robot explains nothing.
     """
     weights, best = probabilities(explored.settled), most_probable(explored.settled)
     effects = _weighed(explored, best, weights, matters, q)
     laws = levels.laws if levels else ()
     if levels and laws:
-        bent = BENT * levels.seen.size
+        bent = BENT * levels.left.size
         bends = {law.at for law in laws}
         beside = [e.operator.artefact or (e.change > bent and e.place[1] not in bends)
                   for e in effects]  # fmt: skip
