@@ -41,6 +41,5 @@ def test_no_fewer_true_poles_than_the_peer_with_a_user(share):
         found = np.array([(m.frequency_hz, m.damping_ratio) for m in model.modes])
         ours += good(found[:, 0], found[:, 1], system)
         total += 6
-    print(f"noise {share}: ours {ours}, peer {theirs} of {total}")
     assert ours >= theirs
     assert ours >= 0.97 * total

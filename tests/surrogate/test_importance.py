@@ -46,18 +46,3 @@ def test_a_start_where_the_likelihood_lies_is_used():
         start,
     )
     assert np.abs(z - centre[:, None, :]).max() < 6 * width
-
-
-def test_outputs_do_not_touch_each_other():
-    both, evidence = sample(score, points(64, 2), 2, 16)
-    for j in range(2):
-        alone, own = sample(
-            lambda z, j=j: score(np.repeat(z, 2, axis=0))[[j]], points(64, 2), 1, 16
-        )
-        np.testing.assert_allclose(both[j], alone[0])
-        np.testing.assert_allclose(evidence[j], own[0])
-
-
-def test_where_nothing_is_possible_is_said():
-    with pytest.raises(np.linalg.LinAlgError):
-        sample(lambda z: np.full(z.shape[:2], -np.inf), points(64, 2), 2, 16)
