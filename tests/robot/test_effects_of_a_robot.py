@@ -97,19 +97,16 @@ def test_harmonic_stiffness_goes_with_the_angle(tmp_path):
         )
 
 
-def test_effect_of_a_joint_that_does_not_exist_is_named(tmp_path):
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("joint_3", "elbow", "elbow"),
+        ("0.0, 0.6, 0.8", "0.0, 0.0, 0.0", "direction of the resonator at joint_3 has length 0"),
+    ],
+)
+def test_an_effect_that_cannot_be_is_refused_by_name(tmp_path, old, new, words):
     path = ARMS["kr210"].write(tmp_path)
-    block = SMALL.replace("joint_3", "elbow")
-    path.write_text(path.read_text() + f'\n[[effects]]\neffect = "x"\nat = ""\n{block}')
-    with pytest.raises(InputError, match="elbow"):
-        Robot.load(path)
-
-
-def test_a_resonator_without_a_direction_is_refused(tmp_path):
-    path = ARMS["kr210"].write(tmp_path)
-    block = SMALL.replace("effects.resonator", "resonator").replace(
-        "0.0, 0.6, 0.8", "0.0, 0.0, 0.0"
-    )
+    block = SMALL.replace("effects.resonator", "resonator").replace(old, new)
     path.write_text(f"{path.read_text()}\n{block}")
-    with pytest.raises(InputError, match="direction of the resonator at joint_3 has length 0"):
+    with pytest.raises(InputError, match=words):
         Robot.load(path)
