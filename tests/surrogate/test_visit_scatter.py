@@ -119,7 +119,7 @@ def scatter_percent(fitted):
 def test_intervals_hold_new_visits_beside_an_identified_simulation(n, scatter):
     inside = []
     for robot in ROBOTS:
-        for seed in range(4):
+        for seed in range(2):
             case = visited(robot, "identified", n, scatter, seed)
             mean, sd = fit_primary(case.seen, *KNOWN).predict(case.x, case.simulated, nugget=True)
             inside.append(np.mean(np.abs(mean - case.shown) < 1.96 * sd))
