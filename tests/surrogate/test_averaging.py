@@ -161,7 +161,8 @@ def test_peak_of_a_gaussian_within_bounds_of_each_entry():
     peak = maximise(density, [np.zeros(3)], -np.ones(3), high)
     np.testing.assert_allclose(peak.x, [0.5, 1.0, 3.0], atol=1e-4)
     assert peak.log_density == pytest.approx(-0.5 * 20**2, rel=1e-6)
-    assert maximise(density, [np.zeros(3)], -np.ones(3), high, most_steps=1).log_density < -201
+    few = maximise(density, [np.zeros(3)], -np.ones(3), high, most_steps=1)
+    assert few.log_density < peak.log_density - 0.1
 
 
 def test_the_higher_of_two_peaks_is_taken():
