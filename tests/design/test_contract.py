@@ -16,7 +16,7 @@ from planner.design.acquisitions import (
     repeat_gain,
 )
 from planner.design.cost import Cost, axis_shares, best_axes, shortest_tour
-from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
+from planner.design.frequency_posterior import FrequencyOutputs, Target
 from planner.design.parameter_sensitivity import FrfNoise, UncertainParameters
 from planner.design.propose import ACQUISITIONS, Travel, propose
 from planner.design.stopping import forecast, left_out, mean_squares
@@ -30,7 +30,7 @@ from planner.measurement.nuisances import EXACT_HITS, Tolerances
 from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
-from tests.support.scored_poses import X, conditioned_variance, over, with_parameters
+from tests.support.scored_poses import X, over, with_parameters
 from tests.support.surrogates import observed, simulated
 
 
@@ -115,18 +115,6 @@ def test_a_goal_draws_the_proposal_to_itself(surrogate):
     at_goal = FrequencyOutputs.of(surrogate, outputs.workspace, there)
     best = int(np.argmax(goal(at_goal, poses)))
     assert np.linalg.norm(X[best] - X[77]) < 0.15
-
-
-def test_weights_say_which_mode_counts(surrogate):
-    low = surrogate.frequency_inputs(simulated(X))
-    poses = Poses.plain(X, low)
-    only = Target.evenly(poses[:30], np.array([0, 0, 1.0, 0]))
-    outputs = FrequencyOutputs.of(surrogate, only)
-    score = ACQUISITIONS["integrated_variance"](outputs, poses[:3])
-    for i in range(3):
-        _, _, before = outputs.covariance(2, poses[:1], only.poses)
-        drop = np.mean(before) - conditioned_variance(outputs, 2, X[i], low[i, 2])
-        assert score[i] == pytest.approx(drop, rel=1e-6)
 
 
 def test_mutual_information_is_a_difference_of_entropies(surrogate):

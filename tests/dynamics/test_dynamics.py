@@ -35,18 +35,23 @@ def test_modal_sum_is_the_direct_solution(overdamped, proportional):
     assert np.abs(ours - direct).max() < 1e-9 * np.abs(direct).max()
 
 
-def test_one_oscillator_in_closed_form():
-    m, k, c = 2.5, 4.0e4, 25.0
+@pytest.mark.parametrize(("c", "eta"), [(25.0, 0.0), (0.0, 0.08)])
+def test_one_oscillator_in_closed_form(c, eta):
+    m, k = 2.5, 4.0e4
     j = np.array([[[0.3], [0.0], [-0.2]]])
-    solved = vibration.solve_poles(np.array([[[m]]]), np.array([[c]]), np.array([[k]]), j, j)
+    stiffness = np.array([[k * (1 + 1j * eta) if eta else k]])
+    solved = vibration.solve_poles(np.array([[[m]]]), np.array([[c]]), stiffness, j, j)
     modes = vibration.oscillatory(solved, 2)
-    w = np.sqrt(k / m)
-    assert modes.frequency_hz[0, 0] == pytest.approx(w / (2 * np.pi), rel=1e-12)
-    assert modes.damping_ratio[0, 0] == pytest.approx(c / (2 * np.sqrt(k * m)), rel=1e-12)
+    pole = 1j * np.sqrt(k / m * (1 + 1j * eta) - (c / m / 2) ** 2) - c / m / 2
+    assert modes.frequency_hz[0, 0] == pytest.approx(abs(pole) / (2 * np.pi), rel=1e-12)
+    assert modes.damping_ratio[0, 0] == pytest.approx(-pole.real / abs(pole), rel=1e-10)
     assert np.isnan(modes.frequency_hz[0, 1])
-    omega = 2 * np.pi * LINES
-    exact = -(omega**2) * 0.3**2 / (k - m * omega**2 + 1j * omega * c)
-    np.testing.assert_allclose(vibration.accelerance(solved, LINES)[0, 0, 0], exact, rtol=1e-10)
+    if not eta:
+        omega = 2 * np.pi * LINES
+        exact = -(omega**2) * 0.3**2 / (k - m * omega**2 + 1j * omega * c)
+        np.testing.assert_allclose(vibration.accelerance(solved, LINES)[0, 0, 0], exact, rtol=1e-10)
+    overdamped = vibration.solve_poles(np.array([[[m]]]), np.array([[2e3]]), stiffness, j, j)
+    assert np.isnan(vibration.oscillatory(overdamped, 2).frequency_hz).all()
 
 
 @pytest.mark.parametrize("eta", [0.0, 0.05])

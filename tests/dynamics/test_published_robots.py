@@ -1,8 +1,6 @@
 """The papers' robots: figures as printed, and the published frequencies of Busch et al. 2020."""
 
 import json
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +10,6 @@ from planner.campaign.config import load_campaign_config
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
 from planner.frf.metrics import agreement
-from planner.report.frf_plots import frf_map
-from planner.report.pictures import save
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
 from planner.truth.load import load_truth
@@ -147,10 +143,10 @@ def test_first_frequency_falls_away_from_the_base_and_2022_is_nearly_2020():
     )
 
 
-def driving_point(name: str, joint_3_deg: np.ndarray, lines_hz: np.ndarray, joints=None):
+def driving_point(joint_3_deg: np.ndarray, lines_hz: np.ndarray) -> np.ndarray:
     """Horizontal driving-point accelerance (n, F), across the arm's plane, in m/s²/N."""
-    robot = load("kr240_busch2020", name)
-    q2, *rest = OTHER_JOINTS_DEG if joints is None else joints
+    robot = load("kr240_busch2020", "robot")
+    q2, *rest = OTHER_JOINTS_DEG
     q = np.deg2rad([(0.0, q2, q3, *rest) for q3 in joint_3_deg])
     across = robot.forward_batch(q)[0][:, 1]  # the world's y axis in the tcp frame
     frf = Simulation(robot).accelerance(q, lines_hz)
@@ -167,35 +163,7 @@ def resonances(frf: np.ndarray, lines_hz: np.ndarray) -> np.ndarray:
 
 def test_the_horizontal_frf_has_the_published_resonances():
     lines = np.arange(5.0, 35.0, 0.01)
-    found = resonances(driving_point("robot", np.arange(70, 121, 2.0), lines), lines)
+    found = resonances(driving_point(np.arange(70, 121, 2.0), lines), lines)
     assert np.all(np.diff(found[:, 0]) > 0)
     assert np.all(np.diff(found[:, 1]) < 0)
     assert np.all(np.abs(found[[0, -1]] / PUBLISHED - 1) < 0.15)
-
-
-@pytest.mark.slow
-def test_busch_2020_figure_3_again(tmp_path):
-    """The paper's grid (0.1°, 0.01 Hz); PLANNER_PLOTS names a folder for the plot."""
-    lines, angles = np.arange(5.0, 35.0, 0.01), np.linspace(70, 120, 501)
-    frf = driving_point("robot", angles, lines)
-    print("\nhorizontal driving-point FRF, joint 3 at 70° and 120°, paper 7 → 11 and 28 → 20 Hz")
-    ends = angles[[0, -1]]
-    cases = {"reading A": ("robot", OTHER_JOINTS_DEG), "reading B": ("robot_b", OTHER_JOINTS_DEG)}
-    for q2, q5, q6 in ((-60, 45, 90), (-90, 45, 90), (-75, 0, 90), (-75, -45, 90), (-75, 45, 0)):
-        cases[f"A, q2 {q2}°, q5 {q5}°, q6 {q6}°"] = ("robot", (q2, 0, q5, q6))
-    for case, (name, joints) in cases.items():
-        found = resonances(driving_point(name, ends, lines, joints), lines)
-        worst = 100 * np.max(np.abs(found / PUBLISHED - 1))
-        (a, b), (c, d) = found
-        print(f"{case:27} {a:5.2f} → {c:5.2f}   {b:5.2f} → {d:5.2f} Hz   off by {worst:4.1f} %")
-    found = resonances(frf, lines)
-    assert np.all(np.diff(found[:, 0]) >= 0)  # on a grid of 0.01 Hz
-    assert np.all(np.diff(found[:, 1]) <= 0)
-    assert np.all(np.abs(found[[0, -1]] / PUBLISHED - 1) < 0.15)
-    folder = Path(os.environ.get("PLANNER_PLOTS", tmp_path))
-    folder.mkdir(parents=True, exist_ok=True)
-    figure = frf_map(angles, None, frf, lines, "joint 3 (°)", "KR240, horizontal FRF")
-    path = folder / "busch2020_figure3.png"
-    save(figure, path)
-    print(f"plot: {path}")
-    assert path.stat().st_size > 10_000

@@ -134,6 +134,11 @@ def test_directions_in_words(simulation):
     assert texts[1].startswith("The stiffness of joint_4 about z is not determined: 95 %")
     swapped = undetermined(p, ratio * np.outer(sd, sd))[0]
     assert swapped.startswith("The ratio of stiffness of joint_")
+    many = _words(
+        [f"stiffness {i}" for i in range(20)], np.tile([1.0, -1.0], 10) / np.sqrt(20), 0.9
+    )
+    assert many.startswith("The ratio of stiffness ")
+    assert "90 % of the prior's spread is left" in many
 
 
 def hits(truth: Truth, q: np.ndarray, record_s: float) -> tuple[Hit, ...]:
@@ -259,23 +264,18 @@ def test_a_robot_toml_takes_the_springs_and_keeps_its_words(found, folder, tmp_p
     np.testing.assert_allclose(written.damping, expected.damping, rtol=1e-5)
 
 
-def test_bad_input_in_one_sentence(frfs, simulation):
-    with pytest.raises(InputError, match="do not fit together"):
-        identify(frfs, POSES[:2], simulation)
-    with pytest.raises(InputError, match="leaves nothing to fit"):
-        identify(frfs, POSES, simulation, band_hz=(300.0, 400.0))
-    with pytest.raises(InputError, match="'stiffness of joint_9'"):
-        identify(frfs, POSES, simulation, Priors(bounds={"stiffness of joint_9": (1.0, 2.0)}))
-    falling = Priors(bounds={"stiffness of joint_1 about z": (2.0, 1.0)})
-    with pytest.raises(InputError, match="must rise"):
-        identify(frfs, POSES, simulation, falling)
-
-
-def test_a_direction_in_which_many_parameters_share_still_has_words():
-    vector = np.array([1.0, -1.0] * 10) / np.sqrt(20)
-    text = _words([f"stiffness {i}" for i in range(20)], vector, 0.9)
-    assert text.startswith("The ratio of stiffness ")
-    assert "90 % of the prior's spread is left" in text
+@pytest.mark.parametrize(
+    ("poses", "bounds", "options", "words"),
+    [
+        (2, {}, {}, "do not fit together"),
+        (4, {}, {"band_hz": (300.0, 400.0)}, "leaves nothing to fit"),
+        (4, {"stiffness of joint_9": (1.0, 2.0)}, {}, "'stiffness of joint_9'"),
+        (4, {"stiffness of joint_1 about z": (2.0, 1.0)}, {}, "must rise"),
+    ],
+)
+def test_bad_input_in_one_sentence(frfs, simulation, poses, bounds, options, words):
+    with pytest.raises(InputError, match=words):
+        identify(frfs, POSES[:poses], simulation, Priors(bounds=bounds), **options)
 
 
 def test_springs_that_could_never_carry_the_robot_are_said(tmp_path, frfs):

@@ -5,6 +5,8 @@ positions in 3 directions with 3 % noise; known are the bounds of their Table 2,
 not even hold the truth. Masses are those of the R1100-2 with a spindle.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -17,13 +19,55 @@ from planner.robot.robot import Robot
 from planner.truth.arms import KR10
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
-from tests.support.measured_frfs import birk_bounds, birk_folder, measured_frfs
+from tests.support.measured_frfs import measured_frfs
+from tests.support.studied import part
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
-
+FITS = part("birk2025", "fits")
 LINES = np.arange(5.0, 200.0, 1 / 0.64)  # records of 0.64 s
 OTHERS = KR10.poses(30, seed=900)
 SEEDS = 10
+DEGREE = FITS.DEGREE
+# Birk et al. 2025, Table 7: N·m/°, N·m/(°/s).
+TORSION = (881.7, 1503.8, 896.7, 600.8, 208.8, 409.6)
+TORSION_DAMPING = (0.316, 0.457, 0.468, 0.045, 0.01, 0.233)
+TRANSVERSE = (5500.9, 22403.9, 10884.6, 10358.5, 6176.4, 5528.6)
+TRANSVERSE_DAMPING = (0.204, 0.029, 0.235, 0.118, 0.154, 0.178)
+
+
+def birk_folder(folder: Path, transverse: bool = True) -> Path:
+    """robot.toml with 24 parameters (both transverse rotations of a joint tied), or 12."""
+    path = KR10.write(folder)
+    lines = [
+        'name = "KR10, Birk et al. 2025"\nurdf = "robot.urdf"\nband_hz = [5.0, 200.0]',
+        'tcp_frame = "tcp"\nsensor_frame = "sensor"',
+    ]
+    for i in range(6):
+        lines.append(_block(i, (0, 0, 1), TORSION[i], TORSION_DAMPING[i]))
+        for axis in ((1, 0, 0), (0, 1, 0)) if transverse else ():
+            block = _block(i, axis, TRANSVERSE[i], TRANSVERSE_DAMPING[i])
+            lines.append(f'{block}tie = "transverse_{i + 1}"\n')
+    path.write_text("\n".join(lines))
+    return path
+
+
+def _block(i: int, axis: tuple[int, int, int], stiffness: float, damping: float) -> str:
+    return (
+        f'[[compliance]]\njoint = "joint_{i + 1}"\naxis = {list(axis)}\n'
+        f"stiffness = {stiffness * DEGREE}\ndamping = {damping * DEGREE}\n"
+    )
+
+
+def birk_bounds(transverse: bool = True) -> dict[str, tuple[float, float]]:
+    """Table 2 in N·m/rad and N·m·s/rad, by parameter."""
+    bounds = {}
+    for i in range(6):
+        places = [(f"joint_{i + 1} about z", FITS.TORSION_BOUNDS[i])]
+        places += [(f"transverse_{i + 1}", FITS.TRANSVERSE_BOUNDS[i])] if transverse else []
+        for place, (low, high) in places:
+            bounds[f"stiffness of {place}"] = (low * DEGREE, high * DEGREE)
+            bounds[f"damping of {place}"] = tuple(DEGREE * b for b in FITS.DAMPING_BOUNDS)
+    return bounds
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +78,7 @@ def folders(tmp_path_factory):
 
 def run(folder, truth_folder, priors, deviation, seed):
     """Result, errors of the logarithms, similarity at other positions."""
-    simulation = Simulation(Robot.load(folder))
-    truth = load_truth(truth_folder, deviation)
+    simulation, truth = Simulation(Robot.load(folder)), load_truth(truth_folder, deviation)
     q = KR10.poses(9, seed=seed)
     frfs = measured_frfs(truth, q, LINES, 0.03, seed)
     told = identify(frfs, q, simulation, priors, tolerances=EXACT_HITS, extend=False)
@@ -47,28 +90,8 @@ def run(folder, truth_folder, priors, deviation, seed):
     return result, error, fit_similarity(result.simulation, silent, OTHERS)
 
 
-def report(title, runs):
-    print(f"\n{title}\nseed misfit  elsewhere: FRAC %  Frob. %")
-    for seed, (result, _, other) in enumerate(runs):
-        print(
-            f"{seed:4d} {result.misfit:6.2f} {100 * other.frac:18.3f} {100 * other.frobenius:8.2f}"
-        )
-
-
 def in_sds(runs):
     return np.array([error / [e.log_sd for e in result.estimates] for result, error, _ in runs])
-
-
-def say_parameters(runs):
-    result, error, _ = runs[0]
-    for e, off in zip(result.estimates, error, strict=True):
-        said = "" if e.identifiable else "  not identifiable"
-        print(
-            f"  {e.name:30s} {e.value:10.4g}  error {100 * np.expm1(off):8.2f} %  "
-            f"sd {100 * e.log_sd:7.2f} %{said}"
-        )
-    for text in result.undetermined:
-        print(f"  {text}")
 
 
 def check_verdicts(runs):
@@ -76,11 +99,6 @@ def check_verdicts(runs):
     told = np.array([[e.identifiable for e in result.estimates] for result, _, _ in runs])
     prior = np.array([[e.prior_log_sd for e in result.estimates] for result, _, _ in runs])
     share = np.abs([error for _, error, _ in runs]) / prior
-    print(
-        f"called identifiable: {told.sum(axis=1).tolist()} of {told.shape[1]}; rms error in prior "
-        f"sds {np.sqrt(np.mean(share[told] ** 2)):.3f}, of the others "
-        f"{np.sqrt(np.mean(share[~told] ** 2)):.3f}"
-    )
     assert np.sqrt(np.mean(share[told] ** 2)) < 0.15
     assert np.sqrt(np.mean(share[~told] ** 2)) > 0.4
     for result, _, _ in runs:
@@ -89,38 +107,26 @@ def check_verdicts(runs):
             assert named or e.identifiable
 
 
-def test_24_parameters_from_the_middle_of_their_bounds(folders):
-    priors = Priors(bounds=birk_bounds())
+@pytest.mark.parametrize("inertias_off", [False, True])
+def test_24_parameters_from_the_middle_of_their_bounds(folders, inertias_off):
+    """With inertias known; and where each link's mass, inertia and centre (1 cm) are 5 % off."""
+    off = {"inertia": 0.05, "com_m": 0.01} if inertias_off else {}
+    priors = Priors(bounds=birk_bounds(), **(off | {"mass": 0.05} if off else {}))
     assert len(priors.bounds) == 24
-    runs = [run(folders[0], folders[0], priors, Deviation(), seed) for seed in range(SEEDS)]
-    report("24 parameters, inertias known", runs)
-    say_parameters(runs)
-    assert sum(result.misfit < 1.05 for result, _, _ in runs) >= 9
-    assert min(other.frac for _, _, other in runs) >= 0.99
-    covered = np.abs(in_sds(runs)) < 1.96
-    print(f"95 % intervals that hold the truth: {100 * np.mean(covered):.1f} %")
+    deviations = [Deviation(seed=seed, **off) for seed in range(SEEDS)]
+    runs = [run(folders[0], folders[0], priors, d, seed) for seed, d in enumerate(deviations)]
+    good = [each for each in runs if each[0].misfit < 1.05]
+    covered = np.abs(in_sds(good)) < 1.96
+    print(f"{len(good)} of {SEEDS} fit; 95 % intervals hold {100 * np.mean(covered):.1f} %")
+    assert len(good) >= 9
+    assert min(other.frac for _, _, other in good) >= 0.99
     assert np.mean(covered) >= 0.90
-    check_verdicts(runs)
+    if not inertias_off:
+        check_verdicts(runs)
 
 
 def test_12_parameters_on_the_same_data_are_clearly_worse(folders):
     priors = Priors(bounds=birk_bounds(transverse=False))
     runs = [run(folders[1], folders[0], priors, Deviation(), seed) for seed in range(3)]
-    report("12 parameters, inertias known", runs)
     assert min(result.misfit for result, _, _ in runs) > 20
     assert max(other.frac for _, _, other in runs) < 0.9
-
-
-def test_24_parameters_where_inertias_are_five_percent_off(folders):
-    """Each link's mass, inertia and centre of mass (1 cm) deviate; they are nuisances."""
-    priors = Priors(bounds=birk_bounds(), mass=0.05, inertia=0.05, com_m=0.01)
-    deviations = [Deviation(seed=seed, inertia=0.05, com_m=0.01) for seed in range(SEEDS)]
-    runs = [run(folders[0], folders[0], priors, d, seed) for seed, d in enumerate(deviations)]
-    report("24 parameters and 60 inertial ones, inertias off by 5 % and 1 cm", runs)
-    say_parameters(runs)
-    assert sum(result.misfit < 1.05 for result, _, _ in runs) >= 9
-    good = [r for r in runs if r[0].misfit < 1.05]
-    assert min(other.frac for _, _, other in good) >= 0.99
-    covered = np.abs(in_sds(good)) < 1.96
-    print(f"95 % intervals that hold the truth: {100 * np.mean(covered):.1f} %")
-    assert np.mean(covered) >= 0.90

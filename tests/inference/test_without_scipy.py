@@ -1,12 +1,17 @@
-"""Small functions that are SciPy's too, and that the commands between two hits do without it."""
+"""Small functions that are SciPy's or NumPy's too; commands between two hits do without SciPy."""
 
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from scipy.optimize import linear_sum_assignment
 from scipy.special import logsumexp, softmax
+from scipy.stats import ortho_group
 
+from planner.inference import triangular
+from planner.inference.assignment import least_cost
+from planner.inference.covariance import inverse
 from planner.inference.log_space import log_sum, shares
 
 
@@ -20,17 +25,66 @@ def test_they_give_what_scipy_gives():
     assert shares(finite, 1) == pytest.approx(softmax(finite, axis=1), rel=1e-12)
 
 
-def test_commands_between_hits_do_not_import_it():
-    modules = "planner.cli.app, planner.campaign.importing, planner.campaign.build"
-    code = f"import sys, {modules}, planner.report.status, planner.report.imports\n"
-    code += "import planner.campaign.proposals, planner.modal.estimate_modes\n"
-    code += "print([m for m in sys.modules if m.startswith(('scipy', 'jax', 'matplotlib'))])"
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert said.stdout.strip() == "[]"
+@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (2, 6), (4, 4), (6, 3)])
+def test_pairs_are_those_of_scipy(rows, columns):
+    rng = np.random.default_rng(rows + 10 * columns)
+    for cost in rng.standard_normal((50, rows, columns)):
+        np.testing.assert_array_equal(least_cost(cost), linear_sum_assignment(cost))
 
 
-def test_status_of_what_is_kept_does_not_load_the_robot():
-    code = "import sys, planner.cli.app, planner.campaign.campaign, planner.report.status\n"
-    code += "print([m for m in sys.modules if m.startswith(('scipy', 'jax', 'pinocchio'))])"
+def test_ties_are_left_to_scipy():
+    tied = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [2.0, 2.0, 2.0]])
+    np.testing.assert_array_equal(least_cost(tied), linear_sum_assignment(tied))
+
+
+def test_without_columns_nothing_is_paired():
+    assert [len(part) for part in least_cost(np.zeros((3, 0)))] == [0, 0]
+
+
+def test_inverse_of_a_precision():
+    rng = np.random.default_rng(0)
+    root = rng.standard_normal((12, 12))
+    precision = root @ root.T + np.eye(12)
+    np.testing.assert_allclose(inverse(precision) @ precision, np.eye(12), atol=1e-12)
+
+
+def test_no_variance_is_negative_where_a_barrier_stands_close():
+    size = 60
+    vectors = ortho_group.rvs(size, random_state=1)
+    values = np.logspace(0, 22, size)
+    precision = (vectors * values) @ vectors.T
+    precision = (precision + precision.T) / 2
+    covariance = inverse(precision)
+    assert (np.diagonal(covariance) > 0).all()
+    assert np.linalg.eigvalsh(covariance).min() > -1e-9 * np.abs(covariance).max()
+    # A plain inverse fails here, which is why there is another.
+    assert (np.diagonal(np.linalg.inv(precision)) < 0).any()
+
+
+@pytest.mark.parametrize("size", [3, triangular.BLOCK, 4 * triangular.BLOCK + 7])
+def test_inverse_of_a_triangle(size):
+    half = np.random.default_rng(1).standard_normal((size, size))
+    lower = np.linalg.cholesky(half @ half.T + size * np.eye(size))
+    assert lower @ triangular.inverse(lower) == pytest.approx(np.eye(size))
+
+
+@pytest.mark.parametrize(
+    ("does", "without"),
+    [
+        (
+            "planner.cli.app, planner.campaign.importing, planner.campaign.build, "
+            "planner.report.status, planner.report.imports, planner.campaign.proposals, "
+            "planner.modal.estimate_modes",
+            ("scipy", "jax", "matplotlib"),
+        ),
+        (
+            "planner.cli.app, planner.campaign.campaign, planner.report.status",
+            ("scipy", "jax", "pinocchio"),
+        ),
+    ],
+    ids=["commands between hits", "status of what is kept"],
+)
+def test_commands_do_not_load_what_takes_seconds(does, without):
+    code = f"import sys, {does}\nprint([m for m in sys.modules if m.startswith({without})])"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"

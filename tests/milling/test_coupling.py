@@ -52,12 +52,11 @@ def machine(split: float = 1.15, cross: float = 0.3, seed: int = 0) -> Machine:
 def frf(
     base: Machine, pieces: list[tuple[float, float, int]], frequency_hz: np.ndarray,
     contact: tuple[float, float, float, float] | None = None, points: tuple[int, ...] = (-1,),
-    masses: dict[int, float] | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Receptances (F, 4p, 4p) at nodes of a rod, numbered from its seat, of the whole assembly.
 
     `pieces` are (length, diameter, elements) from the seat; `contact` stiffness and damping across
-    and turning, rigid where None; `masses` by node in kg.
+    and turning, rigid where None.
     """
     nodes = 1 + sum(n for _, _, n in pieces)
     m, k = np.zeros((2, 4 * nodes, 4 * nodes))
@@ -71,9 +70,6 @@ def frf(
                 k[np.ix_(i, i)] += stiff * np.outer(flip, flip)
                 m[np.ix_(i, i)] += inert * np.outer(flip, flip)
             at += 1
-    for node, mass in (masses or {}).items():
-        for plane in (0, 2):
-            m[4 * node + plane, 4 * node + plane] += mass
     size = len(base.mass)
     out = []
     rows = np.concatenate([4 * (p % nodes) + np.arange(4) for p in points])

@@ -82,10 +82,6 @@ def test_all_sixteen_of_twenty_noises(distance, place, least):
         worst.append(at_peaks(found, truth))
         sure.append(scatter(found, truth))
     motions, whole = (np.max(np.array(worst)[:, :n, :n], axis=(1, 2)) for n in (2, 4))
-    print(
-        f"worst motions {np.sort(100 * motions).round(2)} %, all {np.sort(100 * whole).round(1)} %"
-    )
-    print(f"errors in sds {np.sort(sure).round(2)}")
     assert np.max(motions) < 0.05
     assert np.count_nonzero(whole < 0.05) >= least
     assert 0.6 < np.median(sure) < 1.4

@@ -38,15 +38,10 @@ def test_answer_is_one_json_document(files, capsys):
     assert said["depth_limit_m_at_95"] == said["depth_limit_m"]
     assert said["chatter_hz"] == pytest.approx([930.3, 1000.0], abs=0.1)
     assert said["multiplier"] == pytest.approx(1.406474, abs=1e-6)
-
-
-def test_stable_up_to_the_largest_depth_is_null(files, capsys):
-    modes, cut = files
-    cut.write_text(CUT.replace("[0.0, 0.01, 400]", "[0.0, 1e-4, 10]"))
+    cut.write_text(CUT.replace("[0.0, 0.01, 400]", "[0.0, 1e-4, 10]"))  # stable to the deepest
     assert run(["stability", str(modes), "--cut", str(cut), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
-    assert said["depth_limit_m"] == [None, None]
-    assert said["kind"] == [None, None]
+    assert said["depth_limit_m"] == said["kind"] == [None, None]
 
 
 def test_frfs_of_predict_and_the_picture(files, tmp_path, capsys):
@@ -129,21 +124,21 @@ def test_wrong_cuts_and_modes_are_refused_in_a_sentence(files, capsys, what: str
     refused(["stability", str(modes), "--cut", str(cut), "--json"], capsys)
 
 
+POINTS = ("5000", "5000,-0.001", "0,0.001", "a,b", "5000,0.001,1", "nan,nan")
+
+
 @pytest.mark.parametrize(
-    "point", ["5000", "5000,-0.001", "0,0.001", "a,b", "5000,0.001,1", "nan,nan"]
+    ("source", "more"),
+    [
+        *(("modes.toml", ("--point", point)) for point in POINTS),
+        *((name, ()) for name in ("missing.npz", "missing.toml", "junk.npz", "junk.uff")),
+    ],
 )
-def test_wrong_points_are_refused_in_a_sentence(files, capsys, point: str):
-    modes, cut = files
-    refused(["stability", str(modes), "--cut", str(cut), "--point", point], capsys)
-
-
-@pytest.mark.parametrize("name", ["missing.npz", "missing.toml", "junk.npz", "junk.uff"])
-def test_wrong_sources_are_refused_in_a_sentence(files, capsys, name: str):
+def test_wrong_points_and_sources_are_refused_in_a_sentence(files, capsys, source: str, more):
     _, cut = files
-    source = cut.parent / name
-    if name.startswith("junk"):
-        source.write_bytes(bytes(range(256)) * 8)
-    refused(["stability", str(source), "--cut", str(cut)], capsys)
+    if source.startswith("junk"):
+        (cut.parent / source).write_bytes(bytes(range(256)) * 8)
+    refused(["stability", str(cut.parent / source), "--cut", str(cut), *more], capsys)
 
 
 def test_one_wrong_line_of_exact_frfs_is_no_crash(files, tmp_path, capsys):

@@ -62,7 +62,6 @@ HUNDRED = [
 )
 def test_intervals_from_hits_cover_the_truth(seeds, settings):
     of_poles, of_residues, lost = scores(seeds, **settings)
-    print(f"{settings}: cover {covered(of_poles)} of poles, {covered(of_residues)} of residues")
     assert lost <= len(seeds) / 35
     assert 0.90 < covered(of_poles) < 0.985
     assert (0.91 if len(seeds) < 100 else 0.90) < covered(of_residues) < 0.98

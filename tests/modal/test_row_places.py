@@ -7,7 +7,7 @@ import pytest
 
 from planner.modal.consistency import check
 from planner.modal.matrix_modes import modes_of_matrix
-from planner.modal.motion_fields import turned_rows
+from planner.modal.motion_fields import expected, turned_rows
 from planner.modal.node_exchange import exchanged_nodes
 from planner.recording.geometry import Geometry
 from tests.support.hit_structures import dof_of, unit_mass_shapes
@@ -26,6 +26,17 @@ def sheet():
     lines = tuple((str(a), str(b)) for a, b in structure.lines)
     place = Geometry(names, np.array(list(structure.position_m.values())), lines)
     return [dof_of(structure, k) for k in range(len(shapes))], shapes, place
+
+
+def test_an_unknown_point_moves_as_its_neighbours_let_expect(sheet):
+    dofs, shapes, place = sheet
+    rows = [10, 22, 31]
+    known, sds = shapes.copy(), np.full(shapes.shape, 0.01 * np.max(np.abs(shapes)))
+    known[rows], sds[rows] = 0.0, 100.0 * np.max(np.abs(shapes))
+    mean, variance = expected(dofs, known, sds, place)
+    off, power = np.abs(mean - shapes)[rows], np.mean(np.abs(shapes) ** 2, axis=0)
+    assert np.mean(off**2 / power) < 0.03
+    assert 0.1 < np.mean(off**2 / variance[rows]) < 3.0
 
 
 @pytest.mark.parametrize("lines", [True, False])

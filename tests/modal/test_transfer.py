@@ -68,12 +68,6 @@ def test_ruler_grid_against_peaks_picked_by_eye(shared_data):
     found = np.array([m.frequency_hz for m in modal.modes])
     peaks = np.array(BY_EYE_HZ)
     seen = np.abs(found / peaks[:, None] - 1) < 0.015
-    print("\nby eye (Hz): " + ", ".join(f"{p:g}" for p in peaks))
-    print(
-        "found: "
-        + ", ".join(f"{m.frequency_hz:.1f} ± {m.frequency_sd_hz:.1f}" for m in modal.modes)
-    )
-    print(f"{np.sum(seen.any(axis=1))} of {len(peaks)} peaks, {np.sum(~seen.any(axis=0))} others")
     assert np.all(seen[:7].any(axis=1))
     assert np.sum(seen.any(axis=1)) >= 10
     assert np.sum(~seen.any(axis=0)) <= 2

@@ -99,13 +99,16 @@ def checked(robot: Path, *options: object) -> tuple[int, dict, str]:
     return code, json.loads(out), err
 
 
-def test_nothing_is_wrong_with_the_example():
-    code, answer, err = checked(EXAMPLE / ROBOT, "--campaign", EXAMPLE / PLAN)
+def test_nothing_is_wrong_with_the_example(tmp_path):
+    options = "--campaign", EXAMPLE / PLAN, "--plot", tmp_path / "pictures"
+    code, answer, err = checked(EXAMPLE / ROBOT, *options)
     assert (code, err, answer["ok"]) == (0, "", True)
     assert {f["severity"] for f in answer["findings"]} <= {"note"}
     assert answer["moving_mass_kg"] == pytest.approx(255)
     masses = {link["link"]: link["mass_kg"] for link in answer["links"]}
     assert (masses["spindle"], masses["tcp"]) == (14, 0)
+    (picture,) = answer["plots"]
+    assert Path(picture).stat().st_size > 20_000
     home = answer["poses"][0]
     assert home["pose"] == "home"
     assert 5 < home["frequency_hz"][0] < 15
@@ -113,6 +116,9 @@ def test_nothing_is_wrong_with_the_example():
     assert (answer["joints"][1]["lower_deg"], answer["joints"][1]["upper_deg"]) == (
         pytest.approx(-70, abs=0.01), pytest.approx(90, abs=0.01),
     )  # fmt: skip
+    screen = " ".join(re.sub("[│┃]", " ", said("check", EXAMPLE / ROBOT)).split())
+    assert "home: 0°, 0°" in screen
+    assert "…" not in screen
 
 
 @pytest.mark.parametrize("robot", sorted(Path("campaigns").glob("*/robot/robot*.toml")), ids=str)
@@ -152,12 +158,6 @@ def test_the_cause_is_told_first_and_each_error_once(tmp_path):
     assert (code, "error: robot.urdf, joint" in out) == (2, True)
 
 
-def test_modes_are_told_with_where_the_robot_stands():
-    screen = " ".join(re.sub("[│┃]", " ", said("check", EXAMPLE / ROBOT)).split())
-    assert "home: 0°, 0°" in screen
-    assert "…" not in screen
-
-
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_would_crash_later_is_refused_and_leaves_nothing(name, tmp_path):
     file, pattern, text, words = REFUSED[name]
@@ -189,13 +189,6 @@ def test_a_change_by_hand_that_cannot_be_is_refused_and_not_believed(tmp_path):
     code, _, err = call("next", cell)
     assert (code, "falls over" in err) == (2, True)
     assert (cell / "log.jsonl").read_bytes() == log
-
-
-def test_the_robot_is_drawn(tmp_path):
-    code, answer, _ = checked(EXAMPLE / ROBOT, "--plot", tmp_path / "pictures")
-    (picture,) = answer["plots"]
-    assert code == 0
-    assert Path(picture).stat().st_size > 20_000
 
 
 def test_notes_are_counted_where_nothing_looks_wrong():

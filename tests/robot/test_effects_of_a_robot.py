@@ -12,7 +12,9 @@ from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, 
 from planner.truth.load import load_truth
 
 LINES = np.linspace(4.0, 60.0, 40)
-LUMP = '[[effects.payload]]\nlink = "link_4"\nmass = 30.0\ncom_m = [0.1, 0.05, -0.2]\n'
+BALL = "inertia_kg_m2 = [3e-3, 0, 0, 3e-3, 0, 3e-3]\n"
+TILT = '[[compliance]]\njoint = "base"\naxis = {}\nstiffness = 2e6\ndamping = 600.0\n'
+MASS = '[[effects.payload]]\nlink = "link_4"\nmass = 30.0\ncom_m = [0.1, 0.05, -0.2]\n'
 SMALL = (
     '[[effects.resonator]]\njoint = "joint_3"\nposition_m = [0.1, 0.0, 0.2]\n'
     "direction = [0.0, 0.6, 0.8]\nmass = 14.0\nfrequency_hz = 17.0\ndamping_ratio = 0.03\n"
@@ -25,22 +27,24 @@ BEND = (
     '[[effects.compliance]]\njoint = "link_2"\naxis = [0, 0, 1]\nstiffness = 4.0e6\n'
     "damping = 2.0e3\n"
 )
+EFFECT = '[[effects]]\neffect = "x"\nat = ""\n'
+LUMP = (AttachedMass("link_4", (0.1, 0.05, -0.2), 30.0),)
+POINT = (AttachedResonator("link_3", (0.1, 0, 0.2), (0, 0.6, 0.8), 14.0, 17.0, 0.03),)
+AXES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
+# The other engine's lump has a gyration radius of 1 cm; the halves of a link are cut otherwise.
 SAME = {
-    # Lumps are small spheres there (1e-4 m² times their mass), points here.
-    "added_mass": (LUMP, {"added": (AttachedMass("link_4", (0.1, 0.05, -0.2), 30.0),)}, 5e-4),
-    "local_resonator": (
-        SMALL,
-        {
-            "resonators": (
-                AttachedResonator("link_3", (0.1, 0, 0.2), (0, 0.6, 0.8), 14.0, 17.0, 0.03),
-            )
-        },
-        5e-4,
+    "a mass": (EFFECT + MASS, {"added": LUMP}, 5e-4),
+    "a payload": (MASS.replace("effects.", "") + BALL, {"added": LUMP}, 1e-6),
+    "a resonator": (EFFECT + SMALL, {"resonators": POINT}, 5e-4),
+    "a sliding base": (
+        EFFECT + SHIFT, {"extra": (Spring("base", (0, 0, 1.0), 3e6, 1e3, True),)}, 1e-6
     ),
-    "base_compliance": (SHIFT, {"extra": (Spring("base", (0, 0, 1.0), 3e6, 1e3, True),)}, 1e-6),
-    # The halves of a link that bends are cut a little otherwise there.
-    "link_flexibility": (BEND, {"extra": (Spring("link_2", (0, 0, 1.0), 4e6, 2e3),)}, 0.02),
-}
+    "a tilting base": (
+        "".join(TILT.format(list(axis)) for axis in AXES),
+        {"extra": tuple(Spring("base", axis, 2e6, 600.0) for axis in AXES)}, 1e-6,
+    ),
+    "a bending link": (EFFECT + BEND, {"extra": (Spring("link_2", (0, 0, 1.0), 4e6, 2e3),)}, 0.02),
+}  # fmt: skip
 
 
 def test_resonators_on_several_links_couple_with_the_robot_in_any_order(tmp_path):
@@ -73,7 +77,7 @@ def test_simulation_has_the_physics_that_the_effect_states(effect, tmp_path):
     path, q = ARMS["kr210"].write(tmp_path), ARMS["kr210"].poses(1, 3)[0]
     expected = load_truth(path, Deviation(**deviation)).accelerance(q, LINES)
     plain = Simulation(Robot.load(path)).accelerance(q, LINES)[0]
-    path.write_text(path.read_text() + f'\n[[effects]]\neffect = "{effect}"\nat = ""\n{block}')
+    path.write_text(f"{path.read_text()}\n{block}")
     made = Simulation(Robot.load(path)).accelerance(q, LINES)[0]
     assert np.linalg.norm(made - expected) <= tolerance * np.linalg.norm(expected)
     assert np.linalg.norm(plain - expected) > 0.05 * np.linalg.norm(expected)
@@ -97,19 +101,16 @@ def test_harmonic_stiffness_goes_with_the_angle(tmp_path):
         )
 
 
-def test_effect_of_a_joint_that_does_not_exist_is_named(tmp_path):
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("joint_3", "elbow", "elbow"),
+        ("0.0, 0.6, 0.8", "0.0, 0.0, 0.0", "direction of the resonator at joint_3 has length 0"),
+    ],
+)
+def test_an_effect_that_cannot_be_is_refused_by_name(tmp_path, old, new, words):
     path = ARMS["kr210"].write(tmp_path)
-    block = SMALL.replace("joint_3", "elbow")
-    path.write_text(path.read_text() + f'\n[[effects]]\neffect = "x"\nat = ""\n{block}')
-    with pytest.raises(InputError, match="elbow"):
-        Robot.load(path)
-
-
-def test_a_resonator_without_a_direction_is_refused(tmp_path):
-    path = ARMS["kr210"].write(tmp_path)
-    block = SMALL.replace("effects.resonator", "resonator").replace(
-        "0.0, 0.6, 0.8", "0.0, 0.0, 0.0"
-    )
+    block = SMALL.replace("effects.resonator", "resonator").replace(old, new)
     path.write_text(f"{path.read_text()}\n{block}")
-    with pytest.raises(InputError, match="direction of the resonator at joint_3 has length 0"):
+    with pytest.raises(InputError, match=words):
         Robot.load(path)

@@ -116,12 +116,3 @@ def test_a_target_beyond_a_limit_names_that_joint_and_limit(tmp_path, above):
     assert result.q is None
     limit = "above its limit of 20.0°" if above else "below its limit of -20.0°"
     assert result.reason == f"joint_a1 at {45.0 if above else -45.0}° is {limit}"
-
-
-def test_contact_is_the_reason_where_only_contact_forbids(arm):
-    low = np.deg2rad([0, 45, 40, 0, 0, 0])
-    rotation, position = arm.forward(low)
-    assert solve(arm, rotation, position, low, restarts=0).q is not None
-    result = solve(arm, rotation, position, low, Collisions(arm), restarts=6)
-    assert result.q is None
-    assert " touches " in result.reason

@@ -2,11 +2,16 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from planner.campaign.cell import Cell
+from planner.campaign.config import load_campaign_config
 from planner.errors import InputError
+from planner.measurement.nuisances import Tolerances
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
+from planner.truth.arms import KR10
 from tests.support.robots import make_arm
 
 LIMIT = '<limit lower="0.5" upper="0.5" velocity="1" effort="0"/>'
@@ -169,13 +174,14 @@ def test_wrong_robot_toml(arm, case):
 
 
 @pytest.mark.parametrize("case", WRONG_URDF)
-def test_wrong_urdf(arm, case):
+def test_wrong_urdf(arm, case, capfd):
     old, new, words = WRONG_URDF[case]
     urdf = arm.with_name("arm.urdf")
     text = urdf.read_text()
     urdf.write_text(new if old is None else text.replace(old, new, 1))
     arm.write_text(arm.read_text().split("[[compliance]]")[0])
     said = refusal(arm)
+    assert capfd.readouterr() == ("", "")  # nothing by the reader itself
     assert "\n" not in said.strip()
     assert [w for w in words if w not in said] == []
 
@@ -200,10 +206,30 @@ def test_elastic_joints_are_needed_for_a_simulation_only(arm):
     assert "[[compliance]]" in str(caught.value)
 
 
-def test_nothing_is_printed_by_the_urdf_reader(arm, capfd):
-    urdf = arm.with_name("arm.urdf")
-    urdf.write_text(urdf.read_text().replace('lower="', 'lower="about ', 1))
-    refusal(arm)
-    out, err = capfd.readouterr()
-    assert out == ""
-    assert err == ""
+MEASUREMENT = {  # of robot.toml or campaign.toml, with what it sets and the words of a wrong one
+    "[hits]\nangle_sd_deg = {}": lambda config: np.rad2deg(Tolerances.of(config).angle_rad),
+    "[hits]\noffset_sd_mm = {}": lambda config: 1e3 * Tolerances.of(config).offset_m,
+    "[sensor]\nposition_sd_mm = {}": lambda config: 1e3 * Tolerances.of(config).position_m,
+    "[sensor]\ngain_sd_percent = {}": lambda config: 100 * Tolerances.of(config).gain,
+    "[readback]\njoint_sd_deg = {}": lambda config: config.readback.joint_sd_deg,
+}
+
+
+@pytest.mark.parametrize("entry", MEASUREMENT)
+def test_what_a_measurement_errs_by_is_stated_and_a_campaign_goes_before_its_robot(tmp_path, entry):
+    path, campaign = KR10.write(tmp_path / "robot"), tmp_path / "campaign.toml"
+    plain, stated = path.read_text(), MEASUREMENT[entry]
+    assert stated(Robot.load(path).config) > 0.01  # what is usual
+    path.write_text(f"{plain}\n{entry.format(0.3)}\n")
+    assert stated(Robot.load(path).config) == pytest.approx(0.3)
+    campaign.write_text(f"{KR10.campaign()}\n{entry.format(0.7)}\n")
+    cell = Cell.load(path, load_campaign_config(campaign))
+    assert stated(cell.robot.config) == pytest.approx(0.7)
+    words = r"\[{}\] {}".format(*entry[1:].replace("]\n", " ").split()[:2])
+    for value in ("-1.0", "nan", "1000.0"):
+        path.write_text(f"{plain}\n{entry.format(value)}\n")
+        with pytest.raises(InputError, match=words):
+            Robot.load(path)
+        campaign.write_text(f"{KR10.campaign()}\n{entry.format(value)}\n")
+        with pytest.raises(InputError, match="campaign.toml: " + words):
+            load_campaign_config(campaign)

@@ -10,7 +10,6 @@ from planner.errors import InputError
 from planner.recording.folder import read_poses
 from planner.recording.joints import JointUnits
 from planner.robot.collision import Collisions
-from planner.robot.elastic_model import ElasticModel
 from planner.robot.inverse_kinematics import solve
 from planner.robot.robot import Robot
 from planner.truth.load import load_truth
@@ -54,21 +53,6 @@ def test_simulation_agrees_with_an_independent_engine(kind, tmp_path):
         real = truth.accelerance(one, LINES)
         assert np.max(np.abs(frfs[i] - real)) < 1e-6 * np.max(np.abs(real))
         assert robot.forward(one)[1] == pytest.approx(truth.position(one), abs=1e-9)
-
-
-def test_slopes_by_where_joints_stand(tmp_path):
-    """A slide in the middle of a chain moves what hangs on it; checked by differences."""
-    axes, box, tip = KINDS["gantry"]
-    robot = Robot.load(make_sliding(tmp_path, axes, tip, said="geometric_stiffness = false"))
-    q, model = some_poses(robot, box, 1), ElasticModel(robot)
-    told = model.with_slopes(q).by_angle
-    assert told is not None
-    for joint in range(len(axes)):
-        step = 1e-5 * np.eye(len(axes))[joint]
-        ahead, back = model.matrices(q + step), model.matrices(q - step)
-        for name in ("mass", "hit"):
-            slope = (getattr(ahead, name) - getattr(back, name)) / 2e-5
-            assert getattr(told, name)[:, joint] == pytest.approx(slope, abs=1e-8)
 
 
 def test_inverse_kinematics_and_limits_speak_of_millimetres(tmp_path):

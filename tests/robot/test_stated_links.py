@@ -77,14 +77,9 @@ def test_the_stated_sd_is_the_prior_of_that_link_alone(tmp_path):
     payload = '[[payload]]\nlink = "link_2"\nmass = 58.5\ncom_m = [0.0, 0.0, 0.1]\n'
     both = sds(load(tmp_path / "c", payload + LINK, inertias=True), CAD_INERTIAS)
     assert both["joint_2"] == pytest.approx(np.hypot(0.3 * 41.5, 0.08 * 58.5))
-    assert (
-        parametrise(Simulation(load(tmp_path / "d", LINK, inertias=True)), Priors()).nuisances == ()
-    )
-
-
-def test_an_sd_may_be_stated_alone(tmp_path):
-    alone = '[[link]]\nlink = "link_2"\nsd_percent = 50.0\n'
-    robot = load(tmp_path, alone, inertias=True)
+    known = Simulation(load(tmp_path / "d", LINK, inertias=True))
+    assert parametrise(known, Priors()).nuisances == ()
+    robot = load(tmp_path / "e", '[[link]]\nlink = "link_2"\nsd_percent = 50.0\n', inertias=True)
     mass = robot.model.inertias[2].mass
     assert mass == pytest.approx(DENSITY * 0.2 * 0.2 * 0.72)
     assert sds(robot, CAD_INERTIAS)["joint_2"] == pytest.approx(0.5 * mass)

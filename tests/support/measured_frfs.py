@@ -1,57 +1,9 @@
-"""FRFs that the other engine (MuJoCo) would measure, and the KR10 of Birk et al. 2025."""
-
-from pathlib import Path
+"""FRFs that the other engine (MuJoCo) would measure."""
 
 import numpy as np
 
 from planner.frf.frf import Frf
-from planner.truth.arms import KR10
 from planner.truth.model import Truth
-from tests.support.studied import part
-
-FITS = part("birk2025", "fits")
-DEGREE = FITS.DEGREE
-
-# Birk et al. 2025, Table 7: N·m/°, N·m/(°/s).
-TORSION = (881.7, 1503.8, 896.7, 600.8, 208.8, 409.6)
-TORSION_DAMPING = (0.316, 0.457, 0.468, 0.045, 0.01, 0.233)
-TRANSVERSE = (5500.9, 22403.9, 10884.6, 10358.5, 6176.4, 5528.6)
-TRANSVERSE_DAMPING = (0.204, 0.029, 0.235, 0.118, 0.154, 0.178)
-
-
-def birk_folder(folder: Path, transverse: bool = True) -> Path:
-    """robot.toml with 24 parameters (both transverse rotations of a joint tied), or 12."""
-    path = KR10.write(folder)
-    lines = [
-        'name = "KR10, Birk et al. 2025"\nurdf = "robot.urdf"\nband_hz = [5.0, 200.0]',
-        'tcp_frame = "tcp"\nsensor_frame = "sensor"',
-    ]
-    for i in range(6):
-        lines.append(_block(i, (0, 0, 1), TORSION[i], TORSION_DAMPING[i]))
-        for axis in ((1, 0, 0), (0, 1, 0)) if transverse else ():
-            block = _block(i, axis, TRANSVERSE[i], TRANSVERSE_DAMPING[i])
-            lines.append(f'{block}tie = "transverse_{i + 1}"\n')
-    path.write_text("\n".join(lines))
-    return path
-
-
-def _block(i: int, axis: tuple[int, int, int], stiffness: float, damping: float) -> str:
-    return (
-        f'[[compliance]]\njoint = "joint_{i + 1}"\naxis = {list(axis)}\n'
-        f"stiffness = {stiffness * DEGREE}\ndamping = {damping * DEGREE}\n"
-    )
-
-
-def birk_bounds(transverse: bool = True) -> dict[str, tuple[float, float]]:
-    """Table 2 in N·m/rad and N·m·s/rad, by parameter."""
-    bounds = {}
-    for i in range(6):
-        places = [(f"joint_{i + 1} about z", FITS.TORSION_BOUNDS[i])]
-        places += [(f"transverse_{i + 1}", FITS.TRANSVERSE_BOUNDS[i])] if transverse else []
-        for place, (low, high) in places:
-            bounds[f"stiffness of {place}"] = (low * DEGREE, high * DEGREE)
-            bounds[f"damping of {place}"] = tuple(DEGREE * b for b in FITS.DAMPING_BOUNDS)
-    return bounds
 
 
 def measured_frfs(

@@ -1,15 +1,17 @@
-"""Hyperparameters are averaged: the few samples kept stand for the whole posterior.
+"""Hyperparameters are averaged and climbed: few samples stand for the posterior; peaks are found.
 
 `pytest -m slow tests/surrogate/test_averaging.py` takes more points.
 """
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import multivariate_normal, norm
 
 from planner.errors import InputError
 from planner.surrogate import gp
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
+from planner.surrogate.importance import normal_points, sample
+from planner.surrogate.likelihood import maximise
 from planner.surrogate.training_data import Padded, Prior, TrainingData
 
 PRIOR = OutputPrior(bias_sd=0.15, slope_sd=0.2, amplitude=0.03, nugget=0.002)
@@ -101,3 +103,96 @@ def test_what_no_jitter_mends_is_said_in_words():
     x = np.where(np.arange(3)[:, None] == 1, np.nan, broken.x)  # a pose without coordinates
     with pytest.raises(InputError, match="withdraw"):
         fit_ar1(TrainingData(x, broken.y, broken.sd, broken.low), (PRIOR,), (PRIOR,), np.zeros(1))
+
+
+CENTRES = np.array([[0.5, -0.3, 0.2], [-1.0, 1.5, 0.8]])
+WIDTHS = np.array([[0.5, 0.7, 2.0], [0.15, 0.3, 0.6]])
+
+
+def points(samples, count):
+    return [normal_points(samples, 3, seed) for seed in range(1, 1 + count)]
+
+
+def score(z):
+    return -0.5 * np.sum(((z - CENTRES[:, None, :]) / WIDTHS[:, None, :]) ** 2, axis=2)
+
+
+@pytest.mark.parametrize("rounds", [1, 2])
+def test_evidence_and_posterior_of_gaussians(rounds):
+    z, evidence = sample(score, points(512, 1 + rounds), 2, 128)
+    for j in range(2):
+        total = np.diag(1 + WIDTHS[j] ** 2)
+        constant = np.sum(np.log(WIDTHS[j])) + 1.5 * np.log(2 * np.pi)
+        exact = multivariate_normal.logpdf(CENTRES[j], np.zeros(3), total) + constant
+        assert evidence[j] == pytest.approx(exact, abs=0.1)
+        precision = 1 + WIDTHS[j] ** -2
+        sd = precision**-0.5
+        mean = CENTRES[j] / WIDTHS[j] ** 2 / precision
+        np.testing.assert_allclose(z[j].mean(axis=0), mean, atol=0.35 * sd.max())
+        np.testing.assert_allclose(z[j].std(axis=0), sd, rtol=0.35)
+
+
+def test_a_start_where_the_likelihood_lies_is_used():
+    # A likelihood so narrow that no point of the prior comes near it.
+    centre, width = np.array([[2.0, -2.5, 2.0]]), 0.01
+    start = centre, width * np.eye(3)[None]
+    normal = points(64, 2)
+    z, _ = sample(
+        lambda z: -0.5 * np.sum(((z - centre[:, None, :]) / width) ** 2, axis=2),
+        normal,
+        1,
+        32,
+        start,
+    )
+    assert np.abs(z - centre[:, None, :]).max() < 6 * width
+
+
+def gaussian(middle: np.ndarray, sd: np.ndarray):
+    def log_density(x: np.ndarray) -> tuple[float, np.ndarray]:
+        off = (x - middle) / sd
+        return -0.5 * float(off @ off), -off / sd
+
+    return log_density
+
+
+def test_peak_of_a_gaussian_within_bounds_of_each_entry():
+    density = gaussian(np.array([0.5, 3.0, 3.0]), np.array([1.0, 0.1, 3.0]))
+    high = np.array([4.0, 1.0, 9.0])
+    peak = maximise(density, [np.zeros(3)], -np.ones(3), high)
+    np.testing.assert_allclose(peak.x, [0.5, 1.0, 3.0], atol=1e-4)
+    assert peak.log_density == pytest.approx(-0.5 * 20**2, rel=1e-6)
+    few = maximise(density, [np.zeros(3)], -np.ones(3), high, most_steps=1)
+    assert few.log_density < peak.log_density - 0.1
+
+
+def test_the_higher_of_two_peaks_is_taken():
+    left, right = gaussian(np.array([-2.0]), np.ones(1)), gaussian(np.array([2.0]), np.ones(1))
+
+    def log_density(x: np.ndarray) -> tuple[float, np.ndarray]:
+        if x[0] < 0:
+            return left(x)
+        value, slope = right(x)
+        return value + 1.0, slope
+
+    for starts in ([-3.0, 3.0], [3.0, -3.0]):
+        peak = maximise(log_density, [np.array([s]) for s in starts], -4.0, 4.0)
+        assert peak.x[0] == pytest.approx(2.0, abs=1e-4)
+        assert peak.log_density == pytest.approx(1.0)
+
+
+def test_infeasible_points_are_stepped_back_from():
+    def log_density(x: np.ndarray) -> tuple[float, np.ndarray]:
+        # x − log x: its first long step from 5 leads below zero, where there is no logarithm.
+        if x[0] <= 0:
+            return np.nan, np.array([np.nan])
+        return 20 * (np.log(x[0]) - x[0]), 20 * (1 / x - 1)
+
+    peak = maximise(log_density, [np.array([5.0])], -100.0, 100.0)
+    assert peak.x[0] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_nothing_finite_gives_the_first_start():
+    starts = [np.array([1.0]), np.array([2.0])]
+    peak = maximise(lambda x: (-np.inf, np.zeros(1)), starts, -4.0, 4.0)
+    assert peak.x[0] == 1.0
+    assert peak.log_density == -np.inf

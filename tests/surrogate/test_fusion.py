@@ -1,4 +1,6 @@
-"""Gaussian processes and the surrogate: textbook, limits, missing data, no recompilation."""
+"""Gaussian processes: textbook, limits, missing data, no recompilation, many poses in stages."""
+
+import pickle
 
 import numpy as np
 import pytest
@@ -7,25 +9,28 @@ from planner.surrogate import gp
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
 from planner.surrogate.kernels import KERNELS
 from planner.surrogate.modal_surrogate import fit_surrogate
-from planner.surrogate.training_data import TrainingData
+from planner.surrogate.training_data import TrainingData, pad, thinned
 from tests.support.compilations import compilations
 from tests.support.surrogates import observed, simulated
 
 PRIOR = OutputPrior(bias_sd=0.2, slope_sd=0.3, amplitude=0.1, nugget=0.01)
 
 
-def data(n, d=2, m=3, seed=0, missing=0.0):
+def low_of(x, m=3):
+    return np.stack([np.sin((k + 1) * x[:, 0]) + x.sum(axis=1) for k in range(m)], axis=1)
+
+
+def data(n, m=3, seed=0, noise=0.002):
     rng = np.random.default_rng(seed)
-    x = rng.random((n, d))
-    low = np.stack([np.sin((k + 1) * x[:, 0]) + x.sum(axis=1) for k in range(m)], axis=1)
-    y = 1.1 * low + 0.05 * np.cos(5 * x[:, :1]) + 0.002 * rng.standard_normal((n, m))
-    y[rng.random((n, m)) < missing] = np.nan
-    return TrainingData(x, y, np.full((n, m), 0.002), low)
+    x = rng.random((n, 2))
+    low = low_of(x, m)
+    y = 1.1 * low + 0.05 * np.cos(5 * x[:, :1]) + noise * rng.standard_normal((n, m))
+    return TrainingData(x, y, np.full((n, m), noise), low)
 
 
-def fit(training, **options):
+def fit(training, samples=64, kept=8, **options):
     m = training.y.shape[1]
-    return fit_ar1(training, (PRIOR,) * m, (PRIOR,) * m, np.zeros(m), 64, 8, **options)
+    return fit_ar1(training, (PRIOR,) * m, (PRIOR,) * m, np.zeros(m), samples, kept, **options)
 
 
 @pytest.mark.parametrize("kernel", ["rbf", "matern52"])
@@ -94,3 +99,37 @@ def test_frequencies_and_damping_stay_positive():
     )
     assert (p.frequency_hz > 0).all()
     assert (p.damping_ratio > 0).all()
+
+
+def test_stages_say_what_all_points_at_once_say(monkeypatch):
+    """Differences are of the size of those between two sets of samples of all points."""
+    training, x = data(90, 1, 1, 0.01), np.random.default_rng(2).random((60, 2))
+    staged = fit(training, 256, 32)
+    monkeypatch.setattr(gp, "AT_ONCE", len(training.x) * 10)
+    whole = fit(training, 256, 32)
+    (mean, sd), (other, other_sd) = (f.predict(x, low_of(x, 1)) for f in (staged, whole))
+    assert np.sqrt(np.mean(((mean - other) / other_sd) ** 2)) < 0.2
+    assert abs(np.mean(np.log(sd / other_sd))) < 0.15
+    assert abs(staged.log_evidence - whole.log_evidence).item() < 1.0
+
+
+def test_an_output_measured_at_few_poses_keeps_them_all():
+    training = data(200, 2, 5, 0.01)
+    rare = np.arange(0, 200, 10)
+    y = training.y.copy()
+    y[np.setdiff1d(np.arange(200), rare), 1] = np.nan
+    padded = pad(TrainingData(training.x, y, training.sd, training.low), np.ones(2, bool))
+    part = thinned(padded, 32)
+    assert part.mask.sum(axis=1).tolist() == [32, len(rare)]
+    kept = part.x[1][part.mask[1] > 0]
+    np.testing.assert_array_equal(kept, training.x[rare])
+    assert np.ptp([np.flatnonzero((training.x == row).all(axis=1))[0] for row in part.x[0]]) == 199
+
+
+def test_large_matrices_are_worked_out_again_with_the_same_digits():
+    fitted, x = fit(data(150, 1, 6, 0.01), 256, 32), np.random.default_rng(7).random((20, 2))
+    said = fitted.predict(x, low_of(x, 1))
+    kept = pickle.dumps(fitted)
+    assert len(kept) < 1_000_000
+    for a, b in zip(said, pickle.loads(kept).predict(x, low_of(x, 1)), strict=True):
+        np.testing.assert_array_equal(a, b)

@@ -33,9 +33,9 @@ def test_the_likelihood_is_that_of_one_normal_distribution():
 
 def test_many_points_are_fitted_as_likely_as_if_all_were_climbed_from_afar():
     rng = np.random.default_rng(4)
-    x = rng.random((150, 2))
-    s = Samples.of(x, np.sin(9 * x[:, 0]) * x[:, 1] + 0.05 * rng.standard_normal(150))
-    grown, whole = fit_growing(s, (30, 70)), fit_likelihood(s)
+    x = rng.random((90, 2))
+    s = Samples.of(x, np.sin(9 * x[:, 0]) * x[:, 1] + 0.05 * rng.standard_normal(90))
+    grown, whole = fit_growing(s, (30, 60)), fit_likelihood(s)
     assert grown.log_likelihood > whole.log_likelihood - 0.1
     # The peak of a few points is not theirs.
     few = fit_likelihood(Samples.of(x[:30], s.y[:30]))
