@@ -4,7 +4,7 @@ Tool tip on a grid of 200 mm, seven turns about the tool's axis (the paper's sec
 is the KR240 with spindle in MuJoCo, with stiffnesses, damping and inertias of its own. Each posture
 is hit at two points of the tool along two axes, at three levels, and heard at both points along
 both axes. Hits miss axis and point, channels have gains and feel each other, joints stand beside
-their readback, brakes engage anew at each posture (`planner.truth.measurement_errors.EVERYDAY`).
+their readback, brakes engage anew at each posture (`planner.proof.measurement_errors.EVERYDAY`).
 FRFs are H1, modes come from modal analysis and are tracked over the postures without any
 simulation.
 """
@@ -20,13 +20,13 @@ from planner.modal.modes import LEAST_PROBABILITY, Mode
 from planner.modal.residues import rank_one
 from planner.modal.tracking import Guide, track
 from planner.progress import ProgressCallback
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import DampingScatter
+from planner.proof.hits import Hammer, SimulatedHit, noisy, pulse, sampled
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY
+from planner.proof.model import Truth, driven
 from planner.studies.hits import upright_poses
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import DampingScatter
-from planner.truth.hits import Hammer, SimulatedHit, noisy, pulse, sampled
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY
-from planner.truth.model import Truth, driven
 
 X_M, Y_M, Z_M = np.linspace(1.3, 1.9, 4), np.linspace(-0.3, 0.3, 4), 0.8
 TURN_DEG = np.linspace(-60, 60, 7)

@@ -2,7 +2,7 @@
 
 Three axes, three force levels each; hits miss axis and point, the chain is within its tolerances,
 joints stand beside their readback, the floor rumbles
-(`planner.truth.measurement_errors.EVERYDAY`). Joints rub, so that damping depends on the force,
+(`planner.proof.measurement_errors.EVERYDAY`). Joints rub, so that damping depends on the force,
 and their damping is another one at every visit.
 """
 
@@ -20,15 +20,15 @@ from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import Mode
 from planner.progress import ProgressCallback
+from planner.proof import inverse
+from planner.proof.cases import Visits
+from planner.proof.fault_injection import DampingScatter, HitVisit, InjectedFaults, quiet_hits
+from planner.proof.hits import Hammer, SimulatedHit, noisy
+from planner.proof.laws import BoucWen
+from planner.proof.measurement_errors import EVERYDAY, MeasurementErrors
+from planner.proof.model import Truth
+from planner.proof.nonlinear import Port
 from planner.recording.records import Hit
-from planner.truth import inverse
-from planner.truth.cases import Visits
-from planner.truth.fault_injection import DampingScatter, HitVisit, InjectedFaults, quiet_hits
-from planner.truth.hits import Hammer, SimulatedHit, noisy
-from planner.truth.laws import BoucWen
-from planner.truth.measurement_errors import EVERYDAY, MeasurementErrors
-from planner.truth.model import Truth
-from planner.truth.nonlinear import Port
 
 AT_ONCE = 12  # poses that are integrated together: what memory holds
 # Chosen: friction's stiffness over a joint's own, the angle (rad) at which it slides, and the

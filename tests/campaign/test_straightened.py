@@ -6,12 +6,12 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.dataset.store import Store
 from planner.dynamics.at_force import change_at_force
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import HitVisit, InjectedFaults, frfs, hit_poses, once
-from planner.truth.hits import Hammer, stated, write_recordings
-from planner.truth.laws import Hardening
-from planner.truth.load import load_truth
-from planner.truth.nonlinear import Port
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import HitVisit, InjectedFaults, frfs, hit_poses, once
+from planner.proof.hits import Hammer, stated, write_recordings
+from planner.proof.laws import Hardening
+from planner.proof.load import load_truth
+from planner.proof.nonlinear import Port
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 BAND_HZ = (3.0, 60.0)

@@ -9,10 +9,10 @@ import pytest
 
 from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
+from planner.proof.hits import AXES, simulate_hit
+from planner.proof.load import load_truth
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from planner.truth.hits import AXES, simulate_hit
-from planner.truth.load import load_truth
 from tests.support.fitted_cases import drawn_arm, limits
 
 POSES = 2

@@ -21,9 +21,9 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.search import SEARCHED, Search
 from planner.fit.structure import RobotStructure
 from planner.frf.frf import Frf
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.load import load_truth
 from tests.support.arm_with_points import poses, write_arm
 
 LINES = np.linspace(5.0, 80.0, 64)

@@ -12,14 +12,14 @@ import pytest
 from planner import diagnose
 from planner.dynamics.at_force import change_at_force
 from planner.dynamics.simulation import Simulation
+from planner.proof.arms import ARMS
+from planner.proof.cases import DAMPING_S, PEAK_N
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import InjectedFaults, frfs, once
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.nonlinear import Port
 from planner.robot.robot import Robot
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import InjectedFaults, frfs, once
-from planner.truth.hits import Hammer
-from planner.truth.load import load_truth
-from planner.truth.nonlinear import Port
 from tests.diagnosis.test_levels import made
 
 LEVELS = (0.25, 4.0)  # of the middling force; recorded were 0.4, 1 and 2.5

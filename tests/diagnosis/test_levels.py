@@ -22,18 +22,18 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior, RobotStructure
 from planner.measurement.nuisances import Tolerances
+from planner.proof.arms import ARMS
+from planner.proof.cases import DAMPING_S, PEAK_N
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses
+from planner.proof.hits import AXES, Hammer
+from planner.proof.laws import Backlash, Friction, Hardening, JointLaw, QuadraticDamping
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY
+from planner.proof.nonlinear import Port
+from planner.proof.scene import Scene
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import AXES, Hammer
-from planner.truth.laws import Backlash, Friction, Hardening, JointLaw, QuadraticDamping
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY
-from planner.truth.nonlinear import Port
-from planner.truth.scene import Scene
 
 Made = tuple[Robot, Dataset, JointLaw | None]
 POSES, LEVELS = 4, (0.4, 1.0, 2.5)

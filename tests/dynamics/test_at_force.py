@@ -14,14 +14,14 @@ from planner.dynamics.at_force import (
     modes_at_force,
 )
 from planner.dynamics.simulation import Simulation
+from planner.proof.arms import ARMS
+from planner.proof.cases import DAMPING_S, PEAK_N
+from planner.proof.deviation import Deviation
+from planner.proof.laws import Backlash, Friction, Hardening, JointLaw
+from planner.proof.load import load_truth
+from planner.proof.nonlinear import HitPose, Port, respond
+from planner.proof.scene import Scene
 from planner.robot.robot import Robot
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N
-from planner.truth.deviation import Deviation
-from planner.truth.laws import Backlash, Friction, Hardening, JointLaw
-from planner.truth.load import load_truth
-from planner.truth.nonlinear import HitPose, Port, respond
-from planner.truth.scene import Scene
 
 JOINT, PEAK, RATE_HZ, RECORD_S = "joint_2", PEAK_N["kr10"], 6400.0, 5.12
 EXACT = Deviation(0, stiffness=0, damping=0, inertia=0, com_m=0)

@@ -11,10 +11,10 @@ import pytest
 from planner.dynamics import vibration
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
+from planner.proof.arms import KR10
+from planner.proof.deviation import AttachedMass, Deviation, Spring
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
-from planner.truth.deviation import AttachedMass, Deviation, Spring
-from planner.truth.load import load_truth
 from tests.support.direct_solution import direct_accelerance
 from tests.support.pendulums import pendulum_urdf
 

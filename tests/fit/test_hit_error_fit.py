@@ -11,8 +11,8 @@ from planner.fit.identify import identify
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances, basis
 from planner.modal.residues import Residues, laplace, residue_changes, synthesize
+from planner.proof.arms import KR10
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
 
 HZ, RATE = np.linspace(6.0, 60.0, 40), 2.0
 NOISE = 1e-3  # of the largest response

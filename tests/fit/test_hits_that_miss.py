@@ -10,11 +10,11 @@ from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.fit.identify import identify
 from planner.measurement.nuisances import EXACT_HITS, NuisanceCounts, Tolerances, actual_ports
+from planner.proof.arms import KR10
+from planner.proof.deviation import Deviation
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import HitError, MeasurementErrors
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
-from planner.truth.deviation import Deviation
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import HitError, MeasurementErrors
 from tests.support.measured_frfs import measured_frfs
 
 LINES = np.linspace(6.0, 60.0, 48)

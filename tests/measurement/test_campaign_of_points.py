@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.fault_injection import InjectedFaults
-from planner.truth.measurement_errors import EVERYDAY
-from planner.truth.model import Truth
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.measurement_errors import EVERYDAY
+from planner.proof.model import Truth
 from tests.support.arm_with_points import poses, record, write_arm
 
 PLAN = "[workspace]\njoints_deg = [[-60, 60], [-40, 30], [20, 100], [-50, 50]]\n"

@@ -10,7 +10,7 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.demo import play
 from planner.progress import no_progress
-from planner.truth.load import load_truth
+from planner.proof.load import load_truth
 from tests.support.milling_cases import cut
 from tests.support.true_limits import limit_pair
 

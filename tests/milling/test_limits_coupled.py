@@ -20,13 +20,13 @@ from planner.campaign.cut_source import tip_at
 from planner.measurement.nuisances import Tolerances
 from planner.milling.coupling import TipReceptance, couple
 from planner.milling.tool import load_tool
-from planner.truth.arms import KR210
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import Hammer, write_recordings
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import MeasurementErrors
-from planner.truth.model import Truth
+from planner.proof.arms import KR210
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses
+from planner.proof.hits import Hammer, write_recordings
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import MeasurementErrors
+from planner.proof.model import Truth
 from tests.support.milling_cases import cut
 from tests.support.true_limits import LimitPair, limit_pair
 

@@ -7,9 +7,9 @@ import pinocchio as pin
 import pytest
 
 from planner.errors import InputError
+from planner.proof.arms import ARMS
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import _halves, virtual_model
-from planner.truth.arms import ARMS
 
 LENGTH, WIDTH, HEIGHT, MASS = 1.2, 0.5, 0.3, 90.0
 

@@ -7,8 +7,8 @@ from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
 from planner.errors import InputError
 from planner.measurement.nuisances import Tolerances
+from planner.proof.arms import KR10
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
 
 
 def test_a_steady_hand_and_a_good_sensor_are_stated_in_robot_toml(tmp_path):

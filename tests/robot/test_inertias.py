@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
+from planner.proof.arms import ARMS
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
 from planner.robot.urdf_inertias import urdf_with_inertias
-from planner.truth.arms import ARMS
 from tests.support.plain_arm import make_plain_arm
 
 

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planner.proof.arms import KR10
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.place_names import axes_in_the_room
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
 from tests.support.plain_arm import make_plain_arm
 from tests.support.robots import LIMITS_DEG, make_arm
 

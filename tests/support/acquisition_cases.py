@@ -18,10 +18,10 @@ from planner.campaign.straightened import hits_unknown
 from planner.frf.frf import Frf
 from planner.frf.metrics import agreement
 from planner.modal.modes import Mode
-from planner.truth.arms import IRB6640, KR10, KR210
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
+from planner.proof.arms import IRB6640, KR10, KR210
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
 
 ROBOTS = {"KR10": KR10, "IRB 6640": IRB6640, "KR210": KR210}
 # Robot and what its simulation lacks: the floor's tilts, or transverse tilts of the joints too.

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import Hammer, write_recordings
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import LABORATORY, MeasurementErrors
-from planner.truth.model import Truth
+from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses
+from planner.proof.hits import Hammer, write_recordings
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import LABORATORY, MeasurementErrors
+from planner.proof.model import Truth
 
 NODES = {"foot": 11, "shoulder": 12, "elbow": 13, "sensor": 16}
 POINTS = (

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import scipy.io
 
-from planner.truth.hits import SimulatedHit
+from planner.proof.hits import SimulatedHit
 from tests.support.outside import HAMMER
 
 CUTS = tuple(np.random.default_rng(7).uniform(size=10))  # where a file ends, of its length

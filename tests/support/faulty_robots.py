@@ -10,14 +10,14 @@ from shutil import copytree
 import numpy as np
 
 from planner.demo import shipped
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N, SCATTER
-from planner.truth.deviation import AttachedResonator, BentLink, Spring
-from planner.truth.fault_injection import InjectedFaults
-from planner.truth.hits import Hammer
-from planner.truth.load import load_truth
-from planner.truth.scene import PULSE_S, deviate, log_uniform, some_direction, triple
-from planner.truth.springs import beam_end
+from planner.proof.arms import ARMS
+from planner.proof.cases import DAMPING_S, PEAK_N, SCATTER
+from planner.proof.deviation import AttachedResonator, BentLink, Spring
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.scene import PULSE_S, deviate, log_uniform, some_direction, triple
+from planner.proof.springs import beam_end
 from tests.support import generated_arms
 from tests.support.arm_with_points import NODES, write_arm
 

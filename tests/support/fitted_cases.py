@@ -17,16 +17,16 @@ from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
+from planner.proof.cases import SCATTER
+from planner.proof.deviation import AttachedMass, Spring
+from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses
+from planner.proof.hits import AXES
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY, MeasurementErrors
+from planner.proof.model import Truth
+from planner.proof.scene import deviate, log_uniform, some_direction, triple
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from planner.truth.cases import SCATTER
-from planner.truth.deviation import AttachedMass, Spring
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import AXES
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY, MeasurementErrors
-from planner.truth.model import Truth
-from planner.truth.scene import deviate, log_uniform, some_direction, triple
 from tests.support.counted_modes import true_modes
 from tests.support.faulty_robots import ROBOTS, added, known, links_moved, mass_that_moves
 from tests.support.faulty_robots import Robot as Arm

@@ -20,17 +20,17 @@ from planner.errors import RefusedError
 from planner.frf import metrics
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
+from planner.proof.arms import ARMS
+from planner.proof.cases import DAMPING_S, PEAK_N
+from planner.proof.deviation import Deviation
+from planner.proof.effects import EFFECTS
+from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses
+from planner.proof.hits import AXES, Hammer
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY
+from planner.proof.model import Truth
+from planner.proof.scene import PULSE_S, Scene
 from planner.recording.records import Hit
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N
-from planner.truth.deviation import Deviation
-from planner.truth.effects import EFFECTS
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import AXES, Hammer
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY
-from planner.truth.model import Truth
-from planner.truth.scene import PULSE_S, Scene
 
 SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do
 

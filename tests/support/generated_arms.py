@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer, record_poses
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer, record_poses
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
 
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)
 BAND_HZ = (3.0, 60.0)

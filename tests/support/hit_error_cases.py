@@ -7,15 +7,15 @@ import numpy as np
 
 from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.model import Model
-from planner.truth.arms import ARMS
-from planner.truth.cases import PEAK_N
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import AXES, Hammer, write_recordings
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY, HitError, MeasuringChain
-from planner.truth.model import Truth
-from planner.truth.scene import PULSE_S
+from planner.proof.arms import ARMS
+from planner.proof.cases import PEAK_N
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses
+from planner.proof.hits import AXES, Hammer, write_recordings
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY, HitError, MeasuringChain
+from planner.proof.model import Truth
+from planner.proof.scene import PULSE_S
 
 SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do
 

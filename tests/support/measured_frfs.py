@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from planner.frf.frf import Frf
-from planner.truth.arms import KR10
-from planner.truth.model import Truth
+from planner.proof.arms import KR10
+from planner.proof.model import Truth
 from tests.support.studied import part
 
 FITS = part("birk2025", "fits")

@@ -17,24 +17,24 @@ import numpy as np
 
 from planner.api import diagnose
 from planner.dataset.dataset import Dataset
-from planner.proof.refit import detectability
-from planner.recording.points import SENSOR
-from planner.report.diagnosis import DiagnosisReport
-from planner.robot.robot import Robot
-from planner.truth.cases import SCATTER
-from planner.truth.detectability import ScoredCase, detection_problem
-from planner.truth.deviation import (
+from planner.proof.cases import SCATTER
+from planner.proof.detectability import ScoredCase, detection_problem
+from planner.proof.deviation import (
     AttachedResonator,
     BentLink,
     Deviation,
     Spring,
     StiffnessRipple,
 )
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses, quiet_hits
-from planner.truth.hits import Hammer, write_recordings
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY
-from planner.truth.scene import log_uniform, some_direction, triple
+from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses, quiet_hits
+from planner.proof.hits import Hammer, write_recordings
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY
+from planner.proof.refit import detectability
+from planner.proof.scene import log_uniform, some_direction, triple
+from planner.recording.points import SENSOR
+from planner.report.diagnosis import DiagnosisReport
+from planner.robot.robot import Robot
 from tests.support.arm_with_points import (
     AXES,
     BAND_HZ,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from planner.truth.deviation import (
+from planner.proof.deviation import (
     AttachedMass,
     AttachedResonator,
     BentLink,
@@ -16,10 +16,10 @@ from planner.truth.deviation import (
     Spring,
     StiffnessRipple,
 )
-from planner.truth.fault_injection import Artefact, HitVisit, InjectedFaults, JointDrift, hit_poses
-from planner.truth.hits import Hammer, write_predict, write_recordings
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import LABORATORY, MeasurementErrors
+from planner.proof.fault_injection import Artefact, HitVisit, InjectedFaults, JointDrift, hit_poses
+from planner.proof.hits import Hammer, write_predict, write_recordings
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import LABORATORY, MeasurementErrors
 from tests.support.arm_with_points import NODES, poses, write_arm
 
 # Springs, dampers and bodies never are as stated; nobody is to call that a finding.

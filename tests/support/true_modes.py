@@ -15,9 +15,9 @@ from planner.frf.estimator import estimate
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac_matrix
 from planner.modal.modes import Mode
+from planner.proof.hits import Hammer, simulate_hit
+from planner.proof.model import Truth
 from planner.recording.records import Hit
-from planner.truth.hits import Hammer, simulate_hit
-from planner.truth.model import Truth
 
 AXES = ("+x", "+x", "+x", "+x", "+y", "+y", "+y", "+y", "+z", "+z", "+z", "+z")
 

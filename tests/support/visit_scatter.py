@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
+from planner.proof.arms import ARMS
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.load import load_truth
 from planner.surrogate.modal_surrogate import ModalObservations
-from planner.truth.arms import ARMS
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.load import load_truth
 
 MODES, POOL, NEW_VISITS = 4, 150, 100
 EMA_SD = 1e-3  # of ln f

@@ -1,6 +1,6 @@
 """Cases of real cells: imperfections are small, and every effect can have any size.
 
-`pytest -m slow tests/truth/test_everyday.py` draws the other effects.
+`pytest -m slow tests/proof/test_everyday.py` draws the other effects.
 """
 
 import json
@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.truth import cases
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, OUT_OF_LIBRARY_KINDS, PEAK_N, SCATTER, TABLE, make_case
-from planner.truth.detectability import without_effect
-from planner.truth.fault_injection import InjectedFaults
-from planner.truth.imperfections import imperfect
-from planner.truth.load import load_truth
-from planner.truth.nonlinear import HitPose, respond
-from planner.truth.scene import Scene
+from planner.proof import cases
+from planner.proof.arms import ARMS
+from planner.proof.cases import DAMPING_S, OUT_OF_LIBRARY_KINDS, PEAK_N, SCATTER, TABLE, make_case
+from planner.proof.detectability import without_effect
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.imperfections import imperfect
+from planner.proof.load import load_truth
+from planner.proof.nonlinear import HitPose, respond
+from planner.proof.scene import Scene
 from tests.support.wrenches import along
 
 STEP_S, N = 1 / 3200, 240

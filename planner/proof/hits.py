@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from planner.truth.model import Truth
+from planner.proof.model import Truth
 
 OVERSAMPLING = 16  # time steps of the solution per sample of the analyser
 AXES = ("x", "y", "z")

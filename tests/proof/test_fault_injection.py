@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.truth.arms import KR10, KR210
-from planner.truth.deviation import (
+from planner.proof.arms import KR10, KR210
+from planner.proof.deviation import (
     AttachedResonator,
     Deviation,
     Feedback,
@@ -14,7 +14,7 @@ from planner.truth.deviation import (
     Spring,
     StiffnessRipple,
 )
-from planner.truth.fault_injection import (
+from planner.proof.fault_injection import (
     Artefact,
     HitVisit,
     InjectedFaults,
@@ -24,11 +24,11 @@ from planner.truth.fault_injection import (
     hit_poses,
     once,
 )
-from planner.truth.hits import Hammer
-from planner.truth.laws import Contact
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
-from planner.truth.nonlinear import Port
+from planner.proof.hits import Hammer
+from planner.proof.laws import Contact
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
+from planner.proof.nonlinear import Port
 
 Q = KR210.poses(1)[0]
 QUIET = Hammer(noise=0.0, force_noise=0.0, record_s=2.56)

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.truth import deviation, laws
-from planner.truth.fault_injection import InjectedFaults, JointDrift, LoadChange
-from planner.truth.imperfections import gas_spring
-from planner.truth.nonlinear import Port
-from planner.truth.scene import (
+from planner.proof import deviation, laws
+from planner.proof.fault_injection import InjectedFaults, JointDrift, LoadChange
+from planner.proof.imperfections import gas_spring
+from planner.proof.nonlinear import Port
+from planner.proof.scene import (
     REFERENCE_HZ,
     Draw,
     DrawnEffect,

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from planner.truth.arms import Arm
-from planner.truth.deviation import Spring, triple
-from planner.truth.fault_injection import InjectedFaults
-from planner.truth.model import Truth
+from planner.proof.arms import Arm
+from planner.proof.deviation import Spring, triple
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.model import Truth
 
 PULSE_S = 0.008  # duration of a middling hit
 REFERENCE_HZ = 15.0  # at which speeds of joints are estimated: the middle of the bands

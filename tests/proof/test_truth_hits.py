@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import pyuff
 
+from planner.proof.arms import KR10, KR210
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer, record_poses, simulate_hit, write_predict
+from planner.proof.load import load_truth
 from planner.recording.folder import read_recordings
-from planner.truth.arms import KR10, KR210
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer, record_poses, simulate_hit, write_predict
-from planner.truth.load import load_truth
 
 QUIET = Hammer(noise=0.0, force_noise=0.0, record_s=10.0, readback_deg=0.0)
 SMALL = Hammer(peak_n=80.0, duration_s=0.004, sampling_rate_hz=640.0, record_s=1.6)

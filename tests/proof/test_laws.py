@@ -1,6 +1,6 @@
 """Nonlinear joints: an ODE solver, the linear limit, laws of energy, and what textbooks say.
 
-`pytest -m slow tests/truth/test_laws.py` integrates the other laws as well.
+`pytest -m slow tests/proof/test_laws.py` integrates the other laws as well.
 """
 
 import itertools
@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from planner.errors import InputError
-from planner.truth.arms import KR10
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import InjectedFaults, frfs, once
-from planner.truth.hits import Hammer
-from planner.truth.laws import Backlash, Contact, Friction, Hardening, JointLaw
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
-from planner.truth.nonlinear import HitPose, Port, respond
+from planner.proof.arms import KR10
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import InjectedFaults, frfs, once
+from planner.proof.hits import Hammer
+from planner.proof.laws import Backlash, Contact, Friction, Hardening, JointLaw
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
+from planner.proof.nonlinear import HitPose, Port, respond
 from tests.support.wrenches import along
 
 STEP, N = 1 / 6400, 3200

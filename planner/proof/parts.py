@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from planner.truth.deviation import BentLink, Deviation, Spring
-from planner.truth.mechanics import Hinge, Part
-from planner.truth.springs import beam_end
+from planner.proof.deviation import BentLink, Deviation, Spring
+from planner.proof.mechanics import Hinge, Part
+from planner.proof.springs import beam_end
 
 MOST_SLENDER, LEAST_SLENDER = 0.6, 0.01  # of a bending link's mass, that is spread along it
 THICK = 0.05  # radius of a beam over its length, for the inertia of its pieces

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from planner.truth.arms import Arm, Body, Joint
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
-from planner.truth.scene import log_uniform
+from planner.proof.arms import Arm, Body, Joint
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
+from planner.proof.scene import log_uniform
 
 X, Y, Z = np.eye(3)
 LADDER_HZ = ((7, 17), (8, 19), (13, 30), (20, 55), (30, 70), (35, 85))  # of single joints

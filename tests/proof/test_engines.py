@@ -1,6 +1,6 @@
 """Two engines that share no formula are one robot; robots drawn at random are sound.
 
-`pytest -m slow tests/truth/test_engines.py` makes a whole case twice.
+`pytest -m slow tests/proof/test_engines.py` makes a whole case twice.
 """
 
 from dataclasses import replace
@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.truth import cases
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, RANDOM, SCATTER, TABLE, make_case
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.fault_injection import InjectedFaults
-from planner.truth.imperfections import imperfect
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
-from planner.truth.random_arms import BAND_HZ, LAYOUTS, draw_arm, standing
-from planner.truth.scene import Scene
+from planner.proof import cases
+from planner.proof.arms import ARMS
+from planner.proof.cases import DAMPING_S, RANDOM, SCATTER, TABLE, make_case
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.imperfections import imperfect
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
+from planner.proof.random_arms import BAND_HZ, LAYOUTS, draw_arm, standing
+from planner.proof.scene import Scene
 
 
 def same(one: Truth, other: Truth, q: np.ndarray) -> None:

@@ -13,9 +13,9 @@ import numpy as np
 import scipy.linalg
 from scipy import signal
 
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.mechanics import Frame, Mechanics
-from planner.truth.springs import branches, compensation
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.mechanics import Frame, Mechanics
+from planner.proof.springs import branches, compensation
 
 SAG_STEPS = 30  # at most; each gains a digit or more where springs carry the weight at all
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.truth.arms import KR10, KR210
-from planner.truth.deviation import (
+from planner.proof.arms import KR10, KR210
+from planner.proof.deviation import (
     BentLink,
     Bridge,
     Compensator,
@@ -14,8 +14,8 @@ from planner.truth.deviation import (
     Spring,
     StiffnessRipple,
 )
-from planner.truth.load import load_truth
-from planner.truth.springs import LOSS_BAND_HZ, branches, compensation
+from planner.proof.load import load_truth
+from planner.proof.springs import LOSS_BAND_HZ, branches, compensation
 
 Q = KR210.poses(1)[0]
 

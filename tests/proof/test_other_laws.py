@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from planner.truth.laws import (
+from planner.proof.laws import (
     AmplitudeSoftening,
     Backlash,
     BoucWen,

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
+from planner.proof import cases
+from planner.proof.arms import ARMS
+from planner.proof.cases import DRIVES, KINDS, TABLE, ConcealedCase, make_case
+from planner.proof.deviation import Deviation, ScaledJoint, StiffnessRipple
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.laws import HarmonicDrive
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import LABORATORY
+from planner.proof.scene import Scene
 from planner.recording.folder import read_poses, read_recordings
 from planner.recording.read import read
 from planner.robot.robot import Robot
-from planner.truth import cases
-from planner.truth.arms import ARMS
-from planner.truth.cases import DRIVES, KINDS, TABLE, ConcealedCase, make_case
-from planner.truth.deviation import Deviation, ScaledJoint, StiffnessRipple
-from planner.truth.fault_injection import InjectedFaults
-from planner.truth.laws import HarmonicDrive
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import LABORATORY
-from planner.truth.scene import Scene
 
 PLACES = {
     "joint_stiffness": "joint_", "transverse_compliance": "joint_", "friction": "joint_",

@@ -9,10 +9,10 @@ import pytest
 import pyuff
 
 from planner.demo import shipped
+from planner.proof.hits import Hammer, simulate_hit
+from planner.proof.load import load_truth
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
-from planner.truth.hits import Hammer, simulate_hit
-from planner.truth.load import load_truth
 
 FOLDER = shipped("kr240_plane")
 # Table A1 of Busch et al. 2022, whose 35 positions are the whole grid.

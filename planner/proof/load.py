@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.truth.deviation import Deviation
-from planner.truth.mechanics import ENGINES
-from planner.truth.model import Truth
-from planner.truth.parts import Builder
-from planner.truth.springs import check, springs
+from planner.proof.deviation import Deviation
+from planner.proof.mechanics import ENGINES
+from planner.proof.model import Truth
+from planner.proof.parts import Builder
+from planner.proof.springs import check, springs
 
 
 def load_truth(

@@ -14,21 +14,21 @@ from typing import Any
 import numpy as np
 
 from planner.errors import InputError
+from planner.proof.arms import ARMS, Arm
+from planner.proof.detectability import ScoredCase, detection_problem, without_effect
+from planner.proof.deviation import Deviation
+from planner.proof.effects import EFFECTS, LINEAR, NONLINEAR
+from planner.proof.fault_injection import HitVisit, InjectedFaults, frfs, once, quiet_hits, windowed
+from planner.proof.hits import AXES, Hammer, SimulatedHit, noisy, write_predict, write_recordings
+from planner.proof.imperfections import imperfect
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY, MeasurementErrors
+from planner.proof.model import Truth
+from planner.proof.out_of_library import ARTEFACTS
+from planner.proof.out_of_library import OUT_OF_LIBRARY as UNKNOWN
+from planner.proof.random_arms import draw_arm, standing
 from planner.proof.refit import DetectionProblem
-from planner.truth.arms import ARMS, Arm
-from planner.truth.detectability import ScoredCase, detection_problem, without_effect
-from planner.truth.deviation import Deviation
-from planner.truth.effects import EFFECTS, LINEAR, NONLINEAR
-from planner.truth.fault_injection import HitVisit, InjectedFaults, frfs, once, quiet_hits, windowed
-from planner.truth.hits import AXES, Hammer, SimulatedHit, noisy, write_predict, write_recordings
-from planner.truth.imperfections import imperfect
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY, MeasurementErrors
-from planner.truth.model import Truth
-from planner.truth.out_of_library import ARTEFACTS
-from planner.truth.out_of_library import OUT_OF_LIBRARY as UNKNOWN
-from planner.truth.random_arms import draw_arm, standing
-from planner.truth.scene import PULSE_S, Draw, DrawnEffect, Scene, log_uniform
+from planner.proof.scene import PULSE_S, Draw, DrawnEffect, Scene, log_uniform
 
 TABLE: dict[str, Draw] = {**EFFECTS, **ARTEFACTS, **UNKNOWN}
 SINGLES, OUT_OF_LIBRARY_KINDS = (*EFFECTS, *ARTEFACTS), tuple(UNKNOWN)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planner.truth.model import Truth
+from planner.proof.model import Truth
 
 STEPS, TOLERANCE = 300, 1e-11
 LONGEST_STEP_RAD = 0.2

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from planner.proof import refit
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import HitVisit, InjectedFaults, quiet_hits
-from planner.truth.hits import AXES, Hammer, SimulatedHit, noise_power
-from planner.truth.model import Truth
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import HitVisit, InjectedFaults, quiet_hits
+from planner.proof.hits import AXES, Hammer, SimulatedHit, noise_power
+from planner.proof.model import Truth
 
 LINES = 100  # about so many are looked at
 FALL = 4.0  # of the window under which hits with a law are compared: e^-4 is left at its end

@@ -9,12 +9,12 @@ from scipy.integrate import solve_ivp
 
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
+from planner.proof import inverse
+from planner.proof.arms import ARMS, KR10
+from planner.proof.deviation import AttachedMass, Deviation, Spring
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
-from planner.truth import inverse
-from planner.truth.arms import ARMS, KR10
-from planner.truth.deviation import AttachedMass, Deviation, Spring
-from planner.truth.load import load_truth
 from tests.support.pendulums import pendulum_urdf
 
 MASS, RADIUS, MOMENT, STIFFNESS, DAMPING = 3.0, 0.4, 0.05, 2.0e4, 12.0

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import ndimage
 
-from planner.truth.deviation import Deviation
-from planner.truth.hits import AXES, Hammer, SimulatedHit, noisy, pulse, sampled
-from planner.truth.measurement_errors import HitError, MeasuringChain
-from planner.truth.model import Truth
-from planner.truth.nonlinear import HitPose, Port, respond
+from planner.proof.deviation import Deviation
+from planner.proof.hits import AXES, Hammer, SimulatedHit, noisy, pulse, sampled
+from planner.proof.measurement_errors import HitError, MeasuringChain
+from planner.proof.model import Truth
+from planner.proof.nonlinear import HitPose, Port, respond
 
 # How far a drift has come, of progress 0 to 1 over the campaign.
 COURSES: dict[str, Callable[[float], float]] = {

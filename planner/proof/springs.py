@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.truth.deviation import BentLink, Compensator, Deviation, Spring, triple
+from planner.proof.deviation import BentLink, Compensator, Deviation, Spring, triple
 
 STATED = ("stiffness", "n_m"), ("damping", "n_s_m")  # entries of a shift, with their units
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.truth.deviation import AttachedResonator, BentLink, Compensator, StiffnessRipple
-from planner.truth.fault_injection import InjectedFaults, JointDrift
-from planner.truth.laws import AmplitudeSoftening, Friction, Iwan, JointLaw
-from planner.truth.nonlinear import Port
-from planner.truth.scene import Scene, deviate, log_uniform, some_direction, triple
-from planner.truth.springs import across
+from planner.proof.deviation import AttachedResonator, BentLink, Compensator, StiffnessRipple
+from planner.proof.fault_injection import InjectedFaults, JointDrift
+from planner.proof.laws import AmplitudeSoftening, Friction, Iwan, JointLaw
+from planner.proof.nonlinear import Port
+from planner.proof.scene import Scene, deviate, log_uniform, some_direction, triple
+from planner.proof.springs import across
 
 # All chosen, so that FRFs change by some percent together: what an engineer would let pass.
 SOFT_SHARE, SOFT = 0.4, (0.5, 1.3)  # of the cases: all stated stiffnesses times such a factor

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from planner.truth.deviation import triple
-from planner.truth.hits import Hammer, SimulatedHit, largest_rms
+from planner.proof.deviation import triple
+from planner.proof.hits import Hammer, SimulatedHit, largest_rms
 
 RUMBLE_HZ = 2.0, 8.0  # where a workshop's floor vibrates most; chosen
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.errors import InputError
-from planner.truth.laws import JointLaw, stacked
-from planner.truth.model import Truth, driven, weights
+from planner.proof.laws import JointLaw, stacked
+from planner.proof.model import Truth, driven, weights
 
 MOST_CONTRACTION = 0.5  # of the fixed-point iteration within a step
 TORQUE_ACCURACY = 1e-7  # relative to a step's change of torque

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from planner.truth import deviation
-from planner.truth.fault_injection import InjectedFaults, Tone
-from planner.truth.laws import Backlash, Contact, QuadraticDamping, Stops
-from planner.truth.nonlinear import Port
-from planner.truth.scene import (
+from planner.proof import deviation
+from planner.proof.fault_injection import InjectedFaults, Tone
+from planner.proof.laws import Backlash, Contact, QuadraticDamping, Stops
+from planner.proof.nonlinear import Port
+from planner.proof.scene import (
     REFERENCE_HZ,
     Draw,
     DrawnEffect,
