@@ -124,7 +124,7 @@ def measured(
     found = []
     for i, posture in enumerate(q):
         progress(f"hits at posture {i + 1} of {len(q)}", i / len(q))
-        there = posture + np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(len(posture))
+        there = EVERYDAY.beside(posture, rng)
         found.append(_analysed(brakes.applied(truth, i / len(q)), there, gains, rng))
     carried = [[_mode(one) for one in modes] for modes in found]
     tracks = track(carried, Guide.by_example(carried, MODES), x, ordered=True)

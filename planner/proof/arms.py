@@ -7,12 +7,15 @@ but for the KR10's stiffnesses, which have the size of those that Birk et al. 20
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-Numbers = Sequence[float] | np.ndarray
+from planner.proof import descriptions
+from planner.proof.descriptions import Numbers
+
+ZERO = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,7 @@ class Arm:
     joints_deg: tuple[tuple[float, float], ...]  # a workspace
     band_hz: tuple[float, float]
     gravity_m_s2: float = -9.81  # upwards
+    peak_n: float = 0.0  # of a middling hit: a tenth of a millimetre or two at the tool
     payload_kg: float = 0.0  # of robots that are drawn
     reach_m: float = 0.0
 
@@ -72,14 +76,18 @@ class Arm:
         """URDF with visual and collision boxes, frames tcp and sensor."""
         links = [f"link_{i}" for i in range(1, len(self.joints) + 1)]
         names = ["base_link", *links, "spindle"]
-        text = [f'<robot name="{self.name.replace(" ", "_").lower()}">']
-        text += [_link(name, body) for name, body in zip(names, self.bodies, strict=True)]
+        parts = [_link(name, body) for name, body in zip(names, self.bodies, strict=True)]
         for i, joint in enumerate(self.joints, 1):
-            text.append(_joint(f"joint_{i}", names[i - 1], names[i], joint))
-        text.append(_fixed("spindle", links[-1], (0, 0, 0), (0, 0, 0)))
+            low, high = (float(v) for v in np.deg2rad(joint.limits_deg))
+            parts.append(descriptions.joint(
+                f"joint_{i}", names[i - 1], names[i], _floats(joint.xyz), _floats(joint.axis),
+                (low, high), joint.velocity, _turn(joint.quarters),
+            ))  # fmt: skip
+        parts.append(descriptions.fixed("spindle", links[-1], ZERO, ZERO))
         for name, place in (("tcp", self.tcp), ("sensor", self.sensor)):
-            text += [f'<link name="{name}"/>', _fixed(name, links[-1], place, _turn(self.quarters))]
-        return "\n".join([*text, "</robot>", ""])
+            turned = _turn(self.quarters)
+            parts.append(descriptions.frame(name, links[-1], _floats(place), turned))
+        return descriptions.urdf(self.name.replace(" ", "_").lower(), parts)
 
     def toml(self, per_joint: int) -> str:
         """robot.toml; the first elastic rotation of a joint is about its own axis."""
@@ -92,68 +100,42 @@ class Arm:
             own = int(np.argmax(np.abs(joint.axis)))
             across = [np.eye(3)[k] for k in range(3) if k != own]
             for axis in [np.array(joint.axis, dtype=float), *across][:per_joint]:
-                k = self.torsion[i] if axis[own] else self.bending[i]
-                lines.append(f'\n[[compliance]]\njoint = "joint_{i + 1}"\naxis = {axis.tolist()}')
-                lines.append(f"stiffness = {k}\ndamping = {self.damping_s * k}")
+                k, name = self.torsion[i] if axis[own] else self.bending[i], f"joint_{i + 1}"
+                lines.append(descriptions.compliance(name, axis.tolist(), k, self.damping_s))
         lines.append('\n[[obstacle]]\nname = "floor"')
         lines.append("center_m = [0.0, 0.0, -0.06]\nsize_m = [8.0, 8.0, 0.1]\n")
         return "\n".join(lines)
 
     def campaign(self, robot: str = "../robot/robot.toml", count: int = 4) -> str:
         """campaign.toml over the joint box."""
-        box = [list(limits) for limits in self.joints_deg]
-        return (
-            f'robot = "{robot}"\n[workspace]\njoints_deg = {box}\n'
-            f"[modes]\ncount = {count}\nband_hz = {list(self.band_hz)}\n"
-            '[acquisition]\nname = "integrated_variance"\n'
-        )
+        more = 'name = "integrated_variance"\n'
+        text = descriptions.campaign(self.joints_deg, count, self.band_hz, more)
+        return f'robot = "{robot}"\n{text}'
 
     def poses(self, n: int, seed: int = 0) -> np.ndarray:
         """Angles (n, joints) in rad, uniform in the workspace."""
+        return self.drawn(n, np.random.default_rng(seed))
+
+    def drawn(self, n: int, rng: np.random.Generator) -> np.ndarray:
+        """The same by a generator that others draw from, too."""
         low, high = np.deg2rad(np.array(self.joints_deg)).T
-        return np.random.default_rng(seed).uniform(low, high, (n, len(low)))
+        return rng.uniform(low, high, (n, len(low)))
 
 
-def _text(values: Numbers) -> str:
-    return " ".join(repr(float(v)) for v in values)
+def _floats(values: Numbers) -> list[float]:
+    return [float(v) for v in values]
 
 
 def _turn(quarters: Numbers) -> list[float]:
     return [float(k) * np.pi / 2 for k in quarters]
 
 
-def _origin(xyz: Numbers, rpy: Numbers) -> str:
-    return f'<origin xyz="{_text(xyz)}" rpy="{_text(rpy)}"/>'
-
-
 def _link(name: str, body: Body) -> str:
-    xx, yy, zz = body.moments
-    shape = ""
+    com, rpy = _floats(body.com), _floats(body.rpy)
+    inside = [descriptions.inertial(body.mass, com, body.moments, rpy)]
     if body.box:
-        box = f'<geometry><box size="{_text(body.box)}"/></geometry>'
-        shape = _origin(body.box_at, (0, 0, 0)) + box
-        shape = f"<visual>{shape}</visual><collision>{shape}</collision>"
-    return (
-        f'<link name="{name}"><inertial>{_origin(body.com, body.rpy)}<mass value="{body.mass}"/>'
-        f'<inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/></inertial>'
-        f"{shape}</link>"
-    )
-
-
-def _joint(name: str, parent: str, child: str, joint: Joint) -> str:
-    low, high = (float(v) for v in np.deg2rad(joint.limits_deg))
-    return (
-        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
-        f'{_origin(joint.xyz, _turn(joint.quarters))}<axis xyz="{_text(joint.axis)}"/>'
-        f'<limit lower="{low!r}" upper="{high!r}" velocity="{joint.velocity}" effort="0"/></joint>'
-    )
-
-
-def _fixed(child: str, parent: str, xyz: Numbers, rpy: Numbers) -> str:
-    return (
-        f'<joint name="{child}_fixed" type="fixed"><parent link="{parent}"/>'
-        f'<child link="{child}"/>{_origin(xyz, rpy)}</joint>'
-    )
+        inside.append(descriptions.box(_floats(body.box), _floats(body.box_at), ZERO))
+    return descriptions.link(name, *inside)
 
 
 KR10 = Arm(
@@ -190,6 +172,7 @@ KR10 = Arm(
     damping_s=3.0e-4,
     joints_deg=((-60, 60), (-110, -40), (40, 120), (-60, 60), (20, 80), (-90, 90)),
     band_hz=(5.0, 150.0),
+    peak_n=150.0,
 )  # fmt: skip
 
 KR210 = Arm(
@@ -226,6 +209,7 @@ KR210 = Arm(
     damping_s=6.0e-4,
     joints_deg=((-60, 60), (-110, -50), (50, 120), (-60, 60), (-100, -30), (-90, 90)),
     band_hz=(4.0, 60.0),
+    peak_n=1200.0,
 )  # fmt: skip
 
 IRB6640 = Arm(
@@ -254,6 +238,13 @@ IRB6640 = Arm(
     damping_s=5.0e-4,
     joints_deg=((-60, 60), (-30, 40), (-30, 40), (-60, 60), (20, 90), (-90, 90)),
     band_hz=(4.0, 60.0),
+    peak_n=1200.0,
 )  # fmt: skip
 
 ARMS = {"kr10": KR10, "kr210": KR210, "irb6640": IRB6640}
+DAMPING_S = 9.5e-4  # C = s K: 3 % at 10 Hz, as robots in milling cells have
+
+
+def in_a_cell(name: str) -> Arm:
+    """One of ARMS, damped as it is where it works."""
+    return replace(ARMS[name], damping_s=DAMPING_S)

@@ -31,6 +31,12 @@ class Spring:
     loss: float = 0.0
 
 
+def soft_floor(about_x: float, about_y: float, damping_s: float = 3e-4) -> tuple[Spring, ...]:
+    """The base on a floor that gives way: two tilts, of so many N·m/rad."""
+    tilts: tuple[tuple[Vector, float], ...] = ((1.0, 0.0, 0.0), about_x), ((0.0, 1.0, 0.0), about_y)
+    return tuple(Spring("base", axis, k, damping_s * k) for axis, k in tilts)
+
+
 @dataclass(frozen=True)
 class BentLink:
     """A link as a beam of `elements` lumped elements: it bends about two axes and twists.

@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from planner.proof.deviation import Deviation
 from planner.proof.hits import AXES, Hammer, SimulatedHit, noisy, pulse, sampled
-from planner.proof.measurement_errors import HitError, MeasuringChain
+from planner.proof.measurement_errors import EXACT, HitError, MeasurementErrors, MeasuringChain
 from planner.proof.model import Truth
 from planner.proof.nonlinear import HitPose, Port, respond
 
@@ -132,6 +132,25 @@ class HitVisit:
     aims: Sequence[HitError] = ()
     hit_point: str = "tcp"
     sensors: tuple[str, ...] = ("sensor",)
+
+
+def hand_visits(
+    errors: MeasurementErrors,
+    q: np.ndarray,
+    shots: Sequence[tuple[str, float]],
+    rng: np.random.Generator,
+    common: Sequence[HitError] = EXACT,
+) -> list[HitVisit]:
+    """Visits of poses whose readback is q (n, dof) in rad, the same shots at each.
+
+    The robot stands beside its readback, each hit misses by itself and by what is in common.
+    """
+    axes = [AXES.index(axis[1]) for axis, _ in shots]
+    found = []
+    for number, one in enumerate(q):
+        there = errors.beside(one, rng)
+        found.append(HitVisit(there, shots, number / len(q), errors.aims(axes, rng, common)))
+    return found
 
 
 def hit_poses(

@@ -2,6 +2,7 @@
 
 import csv
 import warnings
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -218,17 +219,14 @@ def record_poses(
     Angles in recordings.csv are the readback, and it is there that the truth is evaluated.
     """
     hammer = hammer or Hammer()
-    rows, slides = [], truth.slides
+    rows, slides, shift = [], truth.slides, np.array(truth.slides or False)
     for number, (pose, q) in enumerate(poses):
         rng = np.random.default_rng([seed, number])
-        scatter = np.where(np.array(slides or False), hammer.readback_mm, hammer.readback_deg)
-        readback = stated(q, slides) + scatter * rng.uniform(-1, 1, len(q))
-        readback = np.round(readback, 4)
-        there = np.where(np.array(slides or False), 1e-3 * readback, np.deg2rad(readback))
-        for axis in hits:
-            for repeat in range(1, repeats + 1):
-                hit = simulate_hit(truth, there, axis, hammer, rng)
-                rows.append((pose, readback, repeat, hit))
+        scatter = np.where(shift, hammer.readback_mm, hammer.readback_deg)
+        readback = np.round(stated(q, slides) + scatter * rng.uniform(-1, 1, len(q)), 4)
+        there = np.where(shift, 1e-3 * readback, np.deg2rad(readback))
+        shots = [axis for axis in hits for _ in range(repeats)]
+        rows.append((pose, readback, [simulate_hit(truth, there, a, hammer, rng) for a in shots]))
     return write_recordings(
         folder, truth.joint_names, rows, hammer, truth.description, slides=slides
     )
@@ -247,34 +245,39 @@ def _columns(joint_names: Sequence[str], slides: Sequence[bool]) -> list[str]:
 def write_recordings(
     folder: Path,
     joint_names: Sequence[str],
-    hits: Sequence[tuple[str, np.ndarray, int, SimulatedHit]],
+    visits: Sequence[tuple[str, np.ndarray, Sequence[SimulatedHit]]],
     hammer: Hammer,
     description: str,
     nodes: Mapping[str, int] | None = None,
     slides: Sequence[bool] = (),
 ) -> Path:
-    """recordings.csv and one UFF file a hit: pose, readback (dof,) in ° (mm), repeat, hit.
+    """recordings.csv and one UFF file a hit of visits: pose, readback (dof,) in ° (mm), hits.
 
     Where other points than the tool's are hit or heard, the table names them.
     """
     (folder / "data").mkdir(parents=True, exist_ok=True)
-    elsewhere = any((h.hit_point, h.sensors) != ("tcp", ("sensor",)) for *_, h in hits)
-    rows = []
-    for pose, readback, repeat, hit in hits:
+    made = [(pose, readback, hit) for pose, readback, hits in visits for hit in hits]
+    elsewhere = any((h.hit_point, h.sensors) != ("tcp", ("sensor",)) for *_, h in made)
+    rows, repeats = [], Counter[tuple]()
+    for pose, readback, hit in made:
         sign = "m" if hit.axis[0] == "-" else "p"
         at = f"_{hit.hit_point}_{'_'.join(hit.sensors)}" if elsewhere else ""
+        repeats[pose, hit.axis, at] += 1
+        repeat = repeats[pose, hit.axis, at]
         name = f"data/{pose}_{sign}{hit.axis[1]}_{repeat}{at}.uff"
         what = f"pose {pose}, hit {hit.axis}, repeat {repeat}"
         write_uff(folder / name, hit, hammer, description, what, nodes=nodes)
         points = [hit.hit_point, " ".join(hit.sensors)] if elsewhere else []
         rows.append([pose, *(f"{v:.4f}" for v in readback), hit.axis, repeat, name, *points])
-    with open(folder / "recordings.csv", "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        joints = _columns(joint_names, slides)
-        points = ["hit_point", "response_points"] if elsewhere else []
-        writer.writerow(["pose", *joints, "hit", "repeat", "file", *points])
-        writer.writerows(rows)
+    points = ["hit_point", "response_points"] if elsewhere else []
+    head = ["pose", *_columns(joint_names, slides), "hit", "repeat", "file", *points]
+    _write_table(folder / "recordings.csv", head, rows)
     return folder
+
+
+def _write_table(path: Path, head: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([head, *rows])
 
 
 def write_predict(
@@ -287,10 +290,7 @@ def write_predict(
     """`predict.csv`: poses (name, q in rad) of which the FRF is wanted."""
     path = folder / "predict.csv"
     force = [] if peak_force_n is None else [f"{peak_force_n:g}"]
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        joints = _columns(joint_names, slides)
-        writer.writerow(["pose", *joints, *(["peak_force_n"] if force else [])])
-        for pose, q in poses:
-            writer.writerow([pose, *(f"{v:.4f}" for v in stated(q, slides)), *force])
+    head = ["pose", *_columns(joint_names, slides), *(["peak_force_n"] if force else [])]
+    rows = [[pose, *(f"{v:.4f}" for v in stated(q, slides)), *force] for pose, q in poses]
+    _write_table(path, head, rows)
     return path

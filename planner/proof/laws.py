@@ -8,7 +8,7 @@ may then be arrays too, which `stacked` makes of several laws of a kind.
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -17,30 +17,33 @@ SLIDERS = 8  # of an Iwan joint
 Pair = tuple[np.ndarray, np.ndarray]  # torque and new state
 
 
-class JointLaw(Protocol):
+class JointLaw(ABC):
     """A torque added to the linear spring's, with an internal state (0 at rest)."""
 
+    @abstractmethod
     def slope(self, step_s: float) -> float:
         """The largest |dτ/dθ| within a time step."""
-        ...
 
     def at_rest(self, shape: tuple[int, ...]) -> np.ndarray:
         """State of as many joints and hits."""
-        ...
-
-    def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
-        """Torque and new state after θ went from `before` to `now` within a time step."""
-        ...
-
-
-class OneState:
-    """A law whose state is one number."""
-
-    def at_rest(self, shape: tuple[int, ...]) -> np.ndarray:
         return np.zeros(shape)
 
+    @abstractmethod
+    def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
+        """Torque and new state after θ went from `before` to `now` within a time step."""
 
-class Elastic(OneState, ABC):
+
+@dataclass(frozen=True)
+class Stiff(JointLaw):
+    """A law with a stiffness, which nowhere is larger unless it says so."""
+
+    stiffness: float
+
+    def slope(self, step_s: float) -> float:
+        return abs(self.stiffness)
+
+
+class Elastic(Stiff):
     """A law without a state: torque(θ) is a function of the angle."""
 
     @abstractmethod
@@ -71,7 +74,6 @@ class Hardening(Elastic):
     τ = k θ³ / (θ² + a²), a smooth form of a gear's stiffness in steps; `angle` is a.
     """
 
-    stiffness: float
     angle: float
 
     def slope(self, step_s: float) -> float:
@@ -89,26 +91,20 @@ class Backlash(Elastic):
     τ = -k clip(θ, -g, g): beyond the gap the full stiffness K, shifted by the gap.
     """
 
-    stiffness: float
     gap: float
-
-    def slope(self, step_s: float) -> float:
-        """k, within the gap."""
-        return self.stiffness
 
     def at(self, angle: np.ndarray) -> np.ndarray:
         return -self.stiffness * np.clip(angle, -self.gap, self.gap)
 
 
 @dataclass(frozen=True)
-class Friction(OneState):
+class Friction(Stiff):
     """Presliding friction of Dahl (Bouc–Wen with exponent 1) up to a Coulomb torque.
 
     dz/dθ = 1 - sgn(dθ) z/z_c, τ = `stiffness` z, z_c = `coulomb` / `stiffness`. The state is z; a
     step is exact for an angle that does not turn back within it, and cannot become unstable.
     """
 
-    stiffness: float
     coulomb: float
 
     def slope(self, step_s: float) -> float:
@@ -124,12 +120,7 @@ class Friction(OneState):
 class Contact(Elastic):
     """A spring that something else presses on: it lets go beyond its `preload` (m)."""
 
-    stiffness: float
     preload: float
-
-    def slope(self, step_s: float) -> float:
-        """k, while it touches."""
-        return self.stiffness
 
     def at(self, angle: np.ndarray) -> np.ndarray:
         return self.stiffness * np.maximum(angle, -self.preload)
@@ -142,7 +133,6 @@ class HarmonicDrive(Elastic):
     As catalogues state it. τ = k [|θ| - θ₁]₊ + k [|θ| - θ₂]₊ with θ's sign.
     """
 
-    stiffness: float
     first: float
     second: float
 
@@ -163,30 +153,20 @@ class AmplitudeSoftening(Elastic):
     τ = -k (θ - a asinh(θ/a)); `angle` is a. Negative k hardens.
     """
 
-    stiffness: float
     angle: float
-
-    def slope(self, step_s: float) -> float:
-        """k, far out."""
-        return abs(self.stiffness)
 
     def at(self, angle: np.ndarray) -> np.ndarray:
         return -self.stiffness * (angle - self.angle * np.arcsinh(angle / self.angle))
 
 
 @dataclass(frozen=True)
-class BoucWen(OneState):
+class BoucWen(Stiff):
     """Hysteresis dz/dθ = 1 - |z/z_c|² (1 + sgn(z dθ)) / 2, τ = `stiffness` z, up to `coulomb`.
 
     Straight while it unloads, tanh while it loads. The state is z.
     """
 
-    stiffness: float
     coulomb: float
-
-    def slope(self, step_s: float) -> float:
-        """k, while it unloads."""
-        return self.stiffness
 
     def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
         limit = self.coulomb / self.stiffness
@@ -201,19 +181,14 @@ class BoucWen(OneState):
 
 
 @dataclass(frozen=True)
-class Iwan(OneState):
+class Iwan(Stiff):
     """Masing's hysteresis: sliders in parallel, of limits spread evenly from 0 to 2 z_c.
 
     All slide at `coulomb`; at rest they have `stiffness` together. States (sliders, ...) are their
     springs' deflections.
     """
 
-    stiffness: float
     coulomb: float
-
-    def slope(self, step_s: float) -> float:
-        """k, while all stick."""
-        return self.stiffness
 
     def at_rest(self, shape: tuple[int, ...]) -> np.ndarray:
         return np.zeros((SLIDERS, *shape))
@@ -232,13 +207,12 @@ class Iwan(OneState):
 
 
 @dataclass(frozen=True)
-class LuGre(OneState):
+class LuGre(Stiff):
     """Bristles of `stiffness`: `stiction` at rest falls to `coulomb` with speed (Stribeck).
 
     dz/dt = v - σ₀ |v| z / g(v), g = F_c + (F_s - F_c) exp(-(v/v_s)²), τ = σ₀ z + `viscous` v.
     """
 
-    stiffness: float
     coulomb: float
     stiction: float
     stribeck: float  # v_s, rad/s
@@ -257,13 +231,12 @@ class LuGre(OneState):
 
 
 @dataclass(frozen=True)
-class ImpactDamping(OneState):
+class ImpactDamping(Stiff):
     """Play with teeth that dissipate as they meet: a dead zone, and beyond it c · depth · speed.
 
     τ = -k clip(θ, -g, g) + c [|θ| - g]₊ v, after Hunt and Crossley.
     """
 
-    stiffness: float
     gap: float
     damping: float  # c, N·m·s/rad²
 
@@ -278,7 +251,7 @@ class ImpactDamping(OneState):
 
 
 @dataclass(frozen=True)
-class QuadraticDamping(OneState):
+class QuadraticDamping(JointLaw):
     """Torque with the square of the speed, as of oil that is pressed through a gap: τ = c v |v|."""
 
     damping: float  # N·m·s²/rad²
@@ -297,12 +270,7 @@ class QuadraticDamping(OneState):
 class Stops(Elastic):
     """A loose part's stops: nothing within ± `gap`, `stiffness` beyond."""
 
-    stiffness: float
     gap: float
-
-    def slope(self, step_s: float) -> float:
-        """k, beyond the gap."""
-        return self.stiffness
 
     def at(self, angle: np.ndarray) -> np.ndarray:
         return self.stiffness * (angle - np.clip(angle, -self.gap, self.gap))

@@ -35,6 +35,9 @@ class HitError:
         return np.concatenate([force, np.cross(self.offset_m, np.eye(3)[axis])])
 
 
+EXACT = (HitError(),) * 3  # what hits along x, y and z have in common: nothing
+
+
 @dataclass(frozen=True)
 class MeasurementErrors:
     """Root mean squares of what varies; angles and offsets are those of each of two directions.
@@ -62,10 +65,7 @@ class MeasurementErrors:
     heavy: bool = False
 
     def aims(
-        self,
-        axes: Sequence[int],
-        rng: np.random.Generator,
-        common: Sequence[HitError] = (HitError(),) * 3,
+        self, axes: Sequence[int], rng: np.random.Generator, common: Sequence[HitError] = EXACT
     ) -> list[HitError]:
         """Of hits along axes 0..2, beside what those along an axis have in common."""
         return [common[a] + self._one(a, self.angle_deg, self.offset_m, rng) for a in axes]
@@ -73,6 +73,10 @@ class MeasurementErrors:
     def common(self, rng: np.random.Generator) -> list[HitError]:
         """What all hits along x, y and z of a campaign have in common, three aims."""
         return [self._one(axis, self.aim_deg, self.aim_m, rng) for axis in range(3)]
+
+    def beside(self, q: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Where a robot stands (dof,) in rad whose readback is q."""
+        return q + np.deg2rad(self.readback_deg) * rng.standard_normal(len(q))
 
     def _one(
         self, axis: int, angle_deg: float, offset_m: float, rng: np.random.Generator

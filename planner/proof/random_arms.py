@@ -131,7 +131,7 @@ def _shape(rng: np.random.Generator, kind: str) -> Arm:
         f"{kind}-{payload_kg:.0f}", _joints(places, frames, layout), (base, *links, spindle),
         tuple(inverse @ (tip - places[-1])), tuple(inverse @ (sensor - places[-1])),
         _quarters(tool), (1.0,) * len(links), (1.0,) * len(links), 0.0, ranges, BAND_HZ,
-        9.81 if rng.random() < 0.1 else -9.81, payload_kg, float(reach),
+        9.81 if rng.random() < 0.1 else -9.81, 0.0, payload_kg, float(reach),
     )  # fmt: skip
 
 

@@ -7,21 +7,20 @@ from typing import Any
 import numpy as np
 
 from planner.proof.arms import Arm
-from planner.proof.deviation import Spring, triple
+from planner.proof.deviation import Spring, Vector, triple
 from planner.proof.fault_injection import InjectedFaults
 from planner.proof.model import Truth
 
 PULSE_S = 0.008  # duration of a middling hit
 REFERENCE_HZ = 15.0  # at which speeds of joints are estimated: the middle of the bands
 
-Parameters = dict[str, float | str | list[float]]
-
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What the sizes of effects are drawn from; `truth` is the robot without them.
+    """A robot and what is concealed in it so far; more is drawn by `rng`.
 
-    `size`: every effect's strength relative to a large one (1), down to nothing (0).
+    `truth` is the robot without any effect. `size`: an effect's strength relative to a large one
+    (1), down to nothing (0).
     """
 
     arm: Arm
@@ -29,6 +28,8 @@ class Scene:
     per_joint: int
     poses: np.ndarray  # (n, 6) rad
     peak_n: float
+    injected: InjectedFaults
+    rng: np.random.Generator
     size: float = 1.0
 
     @property
@@ -51,15 +52,6 @@ class Scene:
         """A joint's axis (3,) in its own frame."""
         return np.array(self.arm.joints[int(joint[-1]) - 1].axis, dtype=float)
 
-    def some_link(self, rng: np.random.Generator, first: int = 2) -> int:
-        """Number of one of the links from `first` on."""
-        return int(rng.integers(first, len(self.arm.joints) + 1))
-
-    def ripple(self, rng: np.random.Generator) -> tuple[float, float]:
-        """Cosine and sine, at any phase, of a stiffness that goes with an angle."""
-        size, phase = self.size * rng.uniform(0.3, 0.6), rng.uniform(0, 2 * np.pi)
-        return float(size * np.cos(phase)), float(size * np.sin(phase))
-
     def compliance(self, port: np.ndarray) -> float:
         """How far a unit force on a port (e,) moves it at the first pose."""
         return float(port @ np.linalg.solve(self.truth.matrices(self.poses[0])[2], port))
@@ -70,7 +62,14 @@ class Scene:
 
     def angle(self, joint: str) -> float:
         """A joint's largest elastic angle (rad) under a middling hit; median over some poses."""
-        return float(np.median([_swing(self, joint, q) for q in self.poses[:4]]))
+        return float(np.median([self._swing(joint, q) for q in self.poses[:4]]))
+
+    def _swing(self, joint: str, q: np.ndarray) -> float:
+        """An impulse (2/3 of peak × duration) on every mode, amplitudes added up; largest axis."""
+        poles, shapes, entry, hit, _ = self.truth.modal(q)
+        residues = (self.truth.own(joint) @ shapes)[:, None] * (entry @ hit.T)
+        impulse = 0.6 * self.peak_n * PULSE_S
+        return float(np.max(np.sum(np.abs(residues[poles.imag > 0]), axis=0)) * 2 * impulse)
 
     def length(self, number: int) -> np.ndarray:
         """From link `number`'s origin to the next joint's, or the tcp (3,), in m."""
@@ -82,30 +81,45 @@ class Scene:
         damping = self.arm.damping_s * stiffness
         return Spring(joint, triple(axis), float(stiffness), float(damping), slide)
 
+    def changed(self, **changes: Any) -> "Scene":
+        """With other parts of what is concealed."""
+        return replace(self, injected=replace(self.injected, **changes))
 
-@dataclass(frozen=True)
-class DrawnEffect:
-    """An effect of a case: name and place as a diagnosis states them, true parameters in SI.
+    def deviating(self, **changes: Any) -> "Scene":
+        """With other parts of the robot's deviation."""
+        return self.changed(deviation=replace(self.injected.deviation, **changes))
 
-    `injected` holds it and all that was there before; `size` as in `Scene`.
-    """
+    def adding(self, **items: Iterable) -> "Scene":
+        """With more items in the robot's deviation, by the name of the field."""
+        return replace(self, injected=deviate(self.injected, **items))
 
-    effect: str
-    at: str | None
-    parameters: Parameters
-    injected: InjectedFaults
-    size: float = 1.0
+    def log_uniform(self, low: float, high: float) -> float:
+        """Log-uniform between two bounds."""
+        return log_uniform(self.rng, low, high)
+
+    def direction(self) -> Vector:
+        """A unit vector, uniform on the sphere."""
+        return triple(some_direction(self.rng))
+
+    def some_joint(self, last: int = 5) -> str:
+        """Name of one of the first joints."""
+        return f"joint_{self.rng.integers(1, min(last, len(self.arm.joints)) + 1)}"
+
+    def some_link(self, first: int = 2) -> int:
+        """Number of one of the links from `first` on."""
+        return int(self.rng.integers(first, len(self.arm.joints) + 1))
+
+    def ripple(self) -> tuple[float, float]:
+        """Cosine and sine, at any phase, of a stiffness that goes with an angle."""
+        size, phase = self.size * self.rng.uniform(0.3, 0.6), self.rng.uniform(0, 2 * np.pi)
+        return float(size * np.cos(phase)), float(size * np.sin(phase))
 
 
-Draw = Callable[[Scene, InjectedFaults, np.random.Generator], DrawnEffect]
-
-
-def _swing(scene: Scene, joint: str, q: np.ndarray) -> float:
-    """Impulse (2/3 of peak × duration) on every mode, amplitudes added up; largest of the axes."""
-    poles, shapes, entry, hit, _ = scene.truth.modal(q)
-    residues = (scene.truth.own(joint) @ shapes)[:, None] * (entry @ hit.T)
-    impulse = 0.6 * scene.peak_n * PULSE_S
-    return float(np.max(np.sum(np.abs(residues[poles.imag > 0]), axis=0)) * 2 * impulse)
+Parameters = dict[str, float | str | list[float]]
+# Place as a diagnosis states it (none, where the library has no name), true parameters in SI,
+# and the scene with the effect.
+Drawn = tuple[str | None, Parameters, Scene]
+Draw = Callable[[Scene], Drawn]
 
 
 def some_direction(rng: np.random.Generator) -> np.ndarray:
@@ -117,11 +131,6 @@ def some_direction(rng: np.random.Generator) -> np.ndarray:
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     """Log-uniform between two bounds."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
-def some_joint(scene: Scene, rng: np.random.Generator, last: int = 5) -> str:
-    """Name of one of the first joints."""
-    return f"joint_{rng.integers(1, min(last, len(scene.arm.joints)) + 1)}"
 
 
 def deviate(injected: InjectedFaults, **changes: Iterable) -> InjectedFaults:

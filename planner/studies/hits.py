@@ -138,7 +138,7 @@ def simulate_hits(
         quiet = quiet_hits(truth, injected, planned[first : first + AT_ONCE], hammer, rng)
         if floor is None:
             floor = errors.floor(hammer, [hit for hits in quiet for hit in hits], own)
-        hits += [_recorded([noisy(h, floor, rng) for h in each], hammer) for each in quiet]
+        hits += [as_read([noisy(h, floor, rng) for h in each], hammer) for each in quiet]
     frfs = tuple(estimate(each, band_hz) for each in hits)
     return HitPoses(readback, frfs, tuple(hits))
 
@@ -150,7 +150,8 @@ def _along(visit: HitVisit, axes: str) -> HitVisit:
     return replace(visit, shots=shots, aims=aims)
 
 
-def _recorded(hits: Sequence[SimulatedHit], hammer: Hammer) -> tuple[Hit, ...]:
+def as_read(hits: Sequence[SimulatedHit], hammer: Hammer) -> tuple[Hit, ...]:
+    """Hits as the program would read them from files."""
     rate, source = hammer.sampling_rate_hz, Path("simulated")
     return tuple(
         Hit(source, h.axis, rate, h.force_n, h.acceleration_m_s2, simulated=True) for h in hits

@@ -40,7 +40,7 @@ def struck(tmp_path_factory):
     injected = InjectedFaults(deviation, (Port(LAW, joint="joint_2"),))
     shots = [(f"+{axis}", level) for axis in "xyz" for level in LEVELS]
     (hits,) = hit_poses(truth, injected, [HitVisit(MEASURED, shots)], HAMMER, rng)
-    rows = [("P0", stated(MEASURED, ()), k, hit) for k, hit in enumerate(hits)]
+    rows = [("P0", stated(MEASURED, ()), hits)]
     write_recordings(root / "hits", truth.joint_names, rows, HAMMER, "SIMULATED")
     robot.write_text(robot.read_text() + TABLE)
     Campaign.new(root / "cell", robot, plain_campaign(root / "plan" / "campaign.toml"))

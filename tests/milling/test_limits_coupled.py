@@ -21,8 +21,8 @@ from planner.measurement.nuisances import Tolerances
 from planner.milling.coupling import TipReceptance, couple
 from planner.milling.tool import load_tool
 from planner.proof.arms import KR210
-from planner.proof.deviation import Deviation, Spring
-from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses
+from planner.proof.deviation import Deviation, soft_floor
+from planner.proof.fault_injection import InjectedFaults, hand_visits, hit_poses
 from planner.proof.hits import Hammer, write_recordings
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import MeasurementErrors
@@ -77,26 +77,17 @@ def concealed(folder: Path, seed: int) -> tuple[Path, Deviation]:
     """robot.toml with two springs a joint; the truth is off in all numbers, on a soft floor."""
     robot = KR210.write(folder / "robot", 2)
     stiffness = 25 * max(KR210.torsion)
-    floor = tuple(
-        Spring("base", axis, stiffness, 3e-4 * stiffness) for axis in ((1.0, 0, 0), (0, 1.0, 0))
-    )
+    floor = soft_floor(stiffness, stiffness)
     return robot, Deviation(seed, 0.2, 0.2, 0.05, 0.005, extra=floor)
 
 
 def hit(truth: Truth, deviation: Deviation, q: np.ndarray, folder: Path, seed: int) -> None:
     """Recordings of REPEATS hits an axis at poses P0, P1, … (n, 6)."""
-    rng, axes = np.random.default_rng(seed), [axis for axis in range(3) for _ in range(REPEATS)]
+    rng = np.random.default_rng(seed)
     injected = InjectedFaults(deviation, chain=AS_STATED.chain(rng))
-    shots = [(f"+{'xyz'[axis]}", HAMMER.peak_n) for axis in axes]
-    visits = []
-    for one in q:
-        there = one + np.deg2rad(AS_STATED.readback_deg) * rng.standard_normal(len(one))
-        visits.append(HitVisit(there, shots, aims=AS_STATED.aims(axes, rng)))
-    found = hit_poses(truth, injected, visits, HAMMER, rng)
-    rows = [
-        (f"P{i}", np.rad2deg(q[i]), 1 + number % REPEATS, one)
-        for i, hits in enumerate(found) for number, one in enumerate(hits)
-    ]  # fmt: skip
+    shots = [(f"+{axis}", HAMMER.peak_n) for axis in "xyz" for _ in range(REPEATS)]
+    found = hit_poses(truth, injected, hand_visits(AS_STATED, q, shots, rng), HAMMER, rng)
+    rows = [(f"P{i}", np.rad2deg(q[i]), hits) for i, hits in enumerate(found)]
     write_recordings(folder, truth.joint_names, rows, HAMMER, truth.description)
 
 

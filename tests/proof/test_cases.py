@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,14 @@ import pytest
 from planner.errors import InputError
 from planner.proof import cases
 from planner.proof.arms import ARMS
-from planner.proof.cases import DRIVES, KINDS, TABLE, ConcealedCase, make_case
+from planner.proof.cases import ConcealedCase, make_case
 from planner.proof.deviation import Deviation, ScaledJoint, StiffnessRipple
 from planner.proof.fault_injection import InjectedFaults
 from planner.proof.laws import HarmonicDrive
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import LABORATORY
 from planner.proof.scene import Scene
+from planner.proof.table import DRIVES, KINDS, TABLE, drawn
 from planner.recording.folder import read_poses, read_recordings
 from planner.recording.read import read
 from planner.robot.robot import Robot
@@ -50,39 +52,41 @@ def few_poses(monkeypatch):
 
 def test_every_effect_can_be_concealed(tmp_path):
     arm = ARMS["kr210"]
-    truth = load_truth(arm.write(tmp_path))
-    scene = Scene(arm, truth, 1, arm.poses(4), 1000.0)
-    for name, draw in TABLE.items():
+    plain, rng = InjectedFaults(Deviation()), np.random.default_rng(0)
+    scene = Scene(arm, load_truth(arm.write(tmp_path)), 1, arm.poses(4), 1000.0, plain, rng)
+    for name in TABLE:
         for seed in range(5):
-            drawn = draw(scene, InjectedFaults(Deviation()), np.random.default_rng(seed))
-            load_truth(tmp_path / "robot.toml", drawn.injected.deviation)  # its places exist
+            one = drawn(name, replace(scene, rng=np.random.default_rng(seed)))
+            load_truth(tmp_path / "robot.toml", one.injected.deviation)  # its places exist
             if name in PLACES:
-                assert drawn.effect == name
-                assert drawn.at is not None
-                assert drawn.at.startswith(PLACES[name])
+                assert one.effect == name
+                assert one.at is not None
+                assert one.at.startswith(PLACES[name])
             else:
-                assert (drawn.effect, drawn.at) == ("unknown", None)
-            json.dumps(drawn.parameters)
+                assert (one.effect, one.at) == ("unknown", None)
+            json.dumps(one.parameters)
     assert PLACES.keys() <= TABLE.keys()
 
 
 @pytest.mark.parametrize("law", ["backlash", "nonlinear_stiffness"])
 def test_a_law_leaves_stiffness_in_a_joint_that_an_earlier_effect_made_soft(law, tmp_path):
     arm = ARMS["kr210"]
-    scene = Scene(arm, load_truth(arm.write(tmp_path)), 1, arm.poses(2), 1000.0)
+    path = arm.write(tmp_path)
     joints = [f"joint_{n}" for n in range(1, 7)]
     soft = Deviation(
         scaled=tuple(ScaledJoint(j, 0.4) for j in joints),
         harmonics=tuple(StiffnessRipple(j, 1, 0.3, 0.4) for j in joints),
     )
     for seed in range(20):
-        drawn = TABLE[law](scene, InjectedFaults(soft), np.random.default_rng(seed))
-        at_rest: Any = drawn.injected.ports[0].law
+        rng, truth = np.random.default_rng(seed), load_truth(path)
+        scene = Scene(arm, truth, 1, arm.poses(2), 1000.0, InjectedFaults(soft), rng)
+        one = drawn(law, scene)
+        at_rest: Any = one.injected.ports[0].law
         taken = abs(at_rest.stiffness) * (2 if isinstance(at_rest, HarmonicDrive) else 1)
         if law == "nonlinear_stiffness" and float(at_rest.at(np.array(1.0))) > 0:
             continue  # it hardens
         # 0.4 of the stated stiffness, and half of that where the harmonic is at its least.
-        assert taken < 0.2 * scene.stiffness(str(drawn.at))
+        assert taken < 0.2 * scene.stiffness(str(one.at))
 
 
 def test_the_folder_has_what_a_diagnosis_needs(case, folder):

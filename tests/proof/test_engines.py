@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from planner.proof import cases
-from planner.proof.arms import ARMS
-from planner.proof.cases import DAMPING_S, RANDOM, SCATTER, TABLE, make_case
+from planner.proof.arms import ARMS, in_a_cell
+from planner.proof.cases import RANDOM, SCATTER, make_case
 from planner.proof.deviation import Deviation, Spring
 from planner.proof.fault_injection import InjectedFaults
 from planner.proof.imperfections import imperfect
@@ -18,6 +18,7 @@ from planner.proof.load import load_truth
 from planner.proof.model import Truth
 from planner.proof.random_arms import BAND_HZ, LAYOUTS, draw_arm, standing
 from planner.proof.scene import Scene
+from planner.proof.table import drawn
 
 
 def same(one: Truth, other: Truth, q: np.ndarray) -> None:
@@ -48,11 +49,11 @@ LACKING = (
 
 @pytest.mark.parametrize("name", LACKING)
 def test_both_engines_are_one_robot_whatever_it_lacks(tmp_path, name):
-    arm = replace(ARMS["irb6640"], damping_s=DAMPING_S)
+    arm, rng = in_a_cell("irb6640"), np.random.default_rng(2)
     path, plain = arm.write(tmp_path), InjectedFaults(replace(SCATTER, seed=4))
-    scene, rng = Scene(arm, load_truth(path), 1, arm.poses(2), 1e3), np.random.default_rng(2)
-    injected = TABLE[name](scene, imperfect(scene, plain, rng)[0], rng).injected
-    one, other = (load_truth(path, injected.deviation, engine) for engine in ("mujoco", "tree"))
+    scene = Scene(arm, load_truth(path), 1, arm.poses(2), 1e3, plain, rng)
+    deviation = drawn(name, replace(scene, injected=imperfect(scene)[0])).injected.deviation
+    one, other = (load_truth(path, deviation, engine) for engine in ("mujoco", "tree"))
     same(one, other, scene.poses[1])
     same(one.loaded("spindle", 1.4), other.loaded("spindle", 1.4), scene.poses[1])
 

@@ -10,26 +10,33 @@ import numpy as np
 import pytest
 
 from planner.proof import cases
-from planner.proof.arms import ARMS
-from planner.proof.cases import DAMPING_S, OUT_OF_LIBRARY_KINDS, PEAK_N, SCATTER, TABLE, make_case
+from planner.proof.arms import ARMS, in_a_cell
+from planner.proof.cases import SCATTER, make_case
 from planner.proof.detectability import without_effect
 from planner.proof.fault_injection import InjectedFaults
 from planner.proof.imperfections import imperfect
 from planner.proof.load import load_truth
 from planner.proof.nonlinear import HitPose, respond
 from planner.proof.scene import Scene
+from planner.proof.table import OUT_OF_LIBRARY_KINDS, TABLE, drawn
 from tests.support.wrenches import along
 
 STEP_S, N = 1 / 3200, 240
 
 
 def scene_of(robot: str, folder, seed: int = 1):
-    """A scene with an imperfect robot, its secret, and where its robot.toml is."""
-    arm = replace(ARMS[robot], damping_s=DAMPING_S)
+    """A scene with an imperfect robot, and where its robot.toml is."""
+    arm, rng = in_a_cell(robot), np.random.default_rng(seed)
     path, plain = arm.write(folder), InjectedFaults(replace(SCATTER, seed=seed))
-    scene = Scene(arm, load_truth(path, plain.deviation), 1, arm.poses(3), PEAK_N[robot])
-    injected, _ = imperfect(scene, plain, np.random.default_rng(seed))
-    return replace(scene, truth=load_truth(path, injected.deviation)), injected, path
+    truth = load_truth(path, plain.deviation)
+    scene = Scene(arm, truth, 1, arm.poses(3), arm.peak_n, plain, rng)
+    injected, _ = imperfect(scene)
+    return replace(scene, truth=load_truth(path, injected.deviation), injected=injected), path
+
+
+def drawn_in(scene: Scene, name: str, size: float = 1.0, seed: int = 3):
+    """An effect of some size beside what is concealed in a scene."""
+    return drawn(name, replace(scene, size=size, rng=np.random.default_rng(seed)))
 
 
 def heard(scene: Scene, injected: InjectedFaults, path, progress: float = 1.0) -> np.ndarray:
@@ -48,7 +55,8 @@ def test_there_are_outsiders_of_many_kinds_and_mixed_damping_is_no_effect():
 
 @pytest.mark.parametrize("robot", sorted(ARMS))
 def test_imperfections_are_everywhere_and_small(robot, tmp_path):
-    scene, injected, path = scene_of(robot, tmp_path)
+    scene, path = scene_of(robot, tmp_path)
+    injected = scene.injected
     assert {port.joint for port in injected.ports} == {f"joint_{n}" for n in range(1, 7)}
     plain = replace(injected.deviation, beams=(), compensators=(), harmonics=(), extra=())
     ours = scene.truth.modes(scene.poses[0], 2)[0]
@@ -69,22 +77,20 @@ QUICK = *CHANNELS, "added_mass", "base_compliance", "friction", "drift", "rattli
     "name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in TABLE]
 )
 def test_every_effect_does_something_and_goes_with_its_size(name, tmp_path):
-    scene, injected, path = scene_of("kr210", tmp_path)
+    scene, path = scene_of("kr210", tmp_path)
+    injected = scene.injected
     if name in CHANNELS:
-        small, large = (
-            TABLE[name](replace(scene, size=s), injected, np.random.default_rng(3)).injected
-            for s in (0.01, 1.0)
-        )
+        small, large = (drawn_in(scene, name, size).injected for size in (0.01, 1.0))
         assert small != injected
         assert small != large or name == "polarity"
         return
     plain = heard(scene, injected, path)
     changes = []
     for size in (0.01, 1.0):
-        drawn = TABLE[name](replace(scene, size=size), injected, np.random.default_rng(3))
-        json.dumps(drawn.parameters)
-        changes.append(np.linalg.norm(heard(scene, drawn.injected, path) - plain))
-        left = without_effect(drawn.injected, injected, drawn.injected)
+        one = drawn_in(scene, name, size)
+        json.dumps(one.parameters)
+        changes.append(np.linalg.norm(heard(scene, one.injected, path) - plain))
+        left = without_effect(one.injected, injected, one.injected)
         assert np.linalg.norm(heard(scene, left, path) - plain) < 1e-6 * changes[0]
     assert 0 < changes[0] < 0.2 * changes[1]
     assert changes[0] < 0.15 * np.linalg.norm(plain)  # a base's long lever is the most
@@ -92,13 +98,14 @@ def test_every_effect_does_something_and_goes_with_its_size(name, tmp_path):
 
 def test_what_changes_with_time_is_what_gives_or_what_is_carried(tmp_path):
     """A joint that grows softer, or another tool: half-way through both differ from before."""
-    scene, injected, path = scene_of("kr210", tmp_path)
-    drawn = [TABLE["drift"](scene, injected, np.random.default_rng(n)) for n in range(12)]
-    assert {(d.effect, d.at) for d in drawn} == {("drift", "campaign")}
-    tools = [d for d in drawn if d.injected.load is not None]
-    assert 0 < len(tools) < len(drawn)
+    scene, path = scene_of("kr210", tmp_path)
+    injected = scene.injected
+    drifts = [drawn_in(scene, "drift", seed=n) for n in range(12)]
+    assert {(d.effect, d.at) for d in drifts} == {("drift", "campaign")}
+    tools = [d for d in drifts if d.injected.load is not None]
+    assert 0 < len(tools) < len(drifts)
     assert all("load_factor" in d.parameters for d in tools)
-    for one in (tools[0], next(d for d in drawn if d.injected.load is None)):
+    for one in (tools[0], next(d for d in drifts if d.injected.load is None)):
         early, late = (heard(scene, one.injected, path, progress) for progress in (0.0, 1.0))
         assert np.linalg.norm(late - early) > 1e-4 * np.linalg.norm(early)
     [without] = {without_effect(d.injected, injected, d.injected).load for d in tools}

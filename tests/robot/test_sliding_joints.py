@@ -16,8 +16,8 @@ from planner.robot.inverse_kinematics import solve
 from planner.robot.robot import Robot
 from tests.support.rails import GANTRY, GANTRY_BOX, RAIL_ARM, RAIL_BOX, make_sliding
 
-TIP = "0 0.03 -0.25"
-KINDS = {"rail": (RAIL_ARM, RAIL_BOX, "0.4 0.04 0.05"), "gantry": (GANTRY, GANTRY_BOX, TIP)}
+TIP = (0, 0.03, -0.25)
+KINDS = {"rail": (RAIL_ARM, RAIL_BOX, (0.4, 0.04, 0.05)), "gantry": (GANTRY, GANTRY_BOX, TIP)}
 LINES = np.linspace(3.0, 60.0, 40)
 
 

@@ -63,16 +63,12 @@ class Cell:
         rng = self.rng
         axes = [axis for axis in range(3) for _ in range(REPEATS)]
         aims = EVERYDAY.aims(axes, rng, self.habits)
-        off = np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(len(joints_deg))
-        there = np.deg2rad(joints_deg) + off
+        there = EVERYDAY.beside(np.deg2rad(joints_deg), rng)
         shots = [(f"+{AXES[axis]}", self.hammer.peak_n) for axis in axes]
         [quiet] = quiet_hits(
             self.truth, self.injected, [HitVisit(there, shots, aims=aims)], self.hammer, rng
         )
-        rows = [
-            (pose, np.array(joints_deg), 1 + number % REPEATS, noisy(hit, self.hammer, rng))
-            for number, hit in enumerate(quiet)
-        ]
+        rows = [(pose, np.array(joints_deg), [noisy(hit, self.hammer, rng) for hit in quiet])]
         names, said = self.truth.joint_names, self.truth.description
         return write_recordings(folder, names, rows, self.hammer, said, self.robot.nodes)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
 from planner.proof.arms import ARMS
-from planner.proof.deviation import Deviation, Spring
+from planner.proof.deviation import Deviation, soft_floor
 from planner.proof.load import load_truth
 from planner.surrogate.modal_surrogate import ModalObservations
 
@@ -41,10 +41,7 @@ def true_robot(name: str) -> TrueRobot:
     seed, arm = ROBOTS.index(name), ARMS[name]
     toml = arm.write(Path(tempfile.mkdtemp()), 2)
     stiffness = FLOOR_STIFFNESS * max(*arm.torsion, *arm.bending)
-    floor = tuple(
-        Spring("base", axis, stiffness, 3e-4 * stiffness)
-        for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    )
+    floor = soft_floor(stiffness, stiffness)
     true = load_truth(toml, Deviation(seed + 1, 0.15, 0.15, 0.05, 0.005, extra=floor))
     rng = np.random.default_rng(seed)
     low, high = np.deg2rad(np.transpose(arm.joints_deg))
