@@ -1,14 +1,10 @@
-"""Nonlinear joints: an ODE solver, the linear limit, laws of energy, and what textbooks say.
+"""Robots with nonlinear joints: an ODE solver, the linear limit, and what textbooks say.
 
 `pytest -m slow tests/proof/test_laws.py` integrates the other laws as well.
 """
 
-import itertools
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from planner.errors import InputError
@@ -45,15 +41,6 @@ def pulses(peaks: list[float]) -> np.ndarray:
     return np.outer(peaks, np.sin(np.pi * np.clip((t - 0.01) / 0.006, 0, 1)) ** 2)
 
 
-def loop(law: JointLaw, angles: np.ndarray) -> np.ndarray:
-    """Torques along a path of angles (n,)."""
-    state, torques = law.at_rest((1,)), [0.0]
-    for before, now in itertools.pairwise(angles):
-        torque, state = law.torque(state, np.array([before]), np.array([now]), STEP)
-        torques.append(float(torque[0]))
-    return np.array(torques)
-
-
 def test_without_laws_it_is_the_linear_truth(truth):
     forces, axes = pulses([100.0, 30.0, 60.0]), [0, 1, 2]
     ours = respond([HitPose(truth, Q, forces, along(axes))], (), STEP)[0]
@@ -65,18 +52,20 @@ QUICK = "hardening", "friction"  # of an elastic law and of one with a memory
 EACH = [pytest.param(v, marks=() if k in QUICK else pytest.mark.slow) for k, v in LAWS.items()]
 
 
-@pytest.mark.parametrize("law", EACH, ids=LAWS)
+@pytest.mark.parametrize("law", [None, *EACH], ids=["linear", *LAWS])
 def test_response_is_that_of_an_ode_solver(truth, law):
     force = pulses([300.0])
-    port = Port(law, joint="joint_2")
-    response = respond([HitPose(truth, Q, force, along([1]))], [port], STEP)[0][0]
     linear = truth.respond(Q, force[0], 1, STEP)
+    pose, ports = HitPose(truth, Q, force, along([1])), [Port(law, joint="joint_2")]
+    response = linear if law is None else respond([pose], ports, STEP)[0][0]
     mass, damping, stiffness, hit, sensor = truth.matrices(Q)
     own, e, t = truth.own("joint_2"), len(mass), np.arange(N) * STEP
 
     def torque(angle: float, z: float) -> float:
         if isinstance(law, Friction):
             return law.stiffness * z
+        if law is None:
+            return 0.0
         return float(law.torque(np.zeros(1), np.array([angle]), np.array([angle]), STEP)[0][0])
 
     def acceleration(y, f):
@@ -95,8 +84,11 @@ def test_response_is_that_of_an_ode_solver(truth, law):
         [sensor @ acceleration(y, f) for y, f in zip(found.y.T, force[0, ::20], strict=True)]
     )
     error = np.max(np.abs(response[:, ::20] - expected))
-    assert error < 3e-3 * np.max(np.abs(expected))
-    assert np.std(response - linear) > 0.05 * np.std(linear)  # it does something
+    if law is None:
+        assert error < 1e-4 * np.max(np.abs(expected))
+    else:
+        assert error < 3e-3 * np.max(np.abs(expected))
+        assert np.std(response - linear) > 0.05 * np.std(linear)  # it does something
 
 
 @pytest.mark.parametrize("law", EACH, ids=LAWS)
@@ -152,42 +144,6 @@ def test_friction_stiffens_a_joint_at_low_level_only(truth):
     low, high = resonance(truth, law, 0.5), resonance(truth, law, 2000.0)
     assert low > high + 0.5
     assert high == pytest.approx(truth.modes(Q, 1)[0][0], abs=0.5)
-
-
-@settings(max_examples=20, deadline=None)
-@given(
-    st.sampled_from(sorted(LAWS)),
-    st.floats(0.05, 20.0),
-    st.integers(0, 2**31),
-)
-def test_no_law_gives_energy_over_a_closed_path(name, size, seed):
-    rng = np.random.default_rng(seed)
-    t = np.linspace(0, 2 * np.pi, 1500)
-    path = sum(rng.standard_normal() * np.sin(k * t) / k for k in (1, 2, 3))
-    angles = size * ANGLE * np.tile(path, 3)  # the same way three times
-    torques = loop(LAWS[name], angles)
-    middles = (torques[1:] + torques[:-1]) / 2
-    work = float(np.sum((middles * np.diff(angles))[1500:]))
-    scale = float(np.sum(np.abs(middles * np.diff(angles))))
-    assert work > -1e-3 * scale
-    if name != "friction":
-        assert work == pytest.approx(0, abs=1e-3 * scale)
-
-
-def test_friction_stays_below_its_coulomb_torque_and_repeats_itself():
-    law = LAWS["friction"]
-    angles = 5 * ANGLE * np.sin(np.linspace(0, 6 * np.pi, 3001))
-    torques = loop(law, angles)
-    assert np.max(np.abs(torques)) < law.coulomb * (1 + 1e-12)
-    assert np.max(np.abs(torques)) > 0.99 * law.coulomb
-    assert torques[1000:2000] == pytest.approx(torques[2000:3000], abs=1e-3 * law.coulomb)
-
-
-def test_slopes_are_bounds():
-    angles = 4 * ANGLE * np.sin(np.linspace(0, 4 * np.pi, 20001))
-    for law in LAWS.values():
-        steps = np.abs(np.diff(loop(law, angles))[1:])
-        assert np.all(steps <= law.slope(STEP) * np.abs(np.diff(angles)[1:]) * (1 + 1e-6) + 1e-12)
 
 
 def test_a_step_too_long_is_refused(truth):

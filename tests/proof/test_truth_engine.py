@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
@@ -62,29 +61,6 @@ def test_one_degree_of_freedom_is_the_textbook_oscillator(pendulum):
     assert accelerance[1, 1] == pytest.approx(yy, rel=1e-9)
     others = accelerance[[0, 0, 0, 1, 1, 2, 2, 2], [0, 1, 2, 0, 2, 0, 1, 2]]
     assert np.max(np.abs(others)) < 1e-12 * np.max(np.abs(yy))
-
-
-def test_response_is_that_of_an_ode_solver(tmp_path):
-    truth = load_truth(folder(tmp_path, "kr10", 1))
-    q, step, n, axis = KR10.poses(1)[0], 1 / 8000, 800, 1
-    t = np.arange(n) * step
-    force = 80 * np.sin(np.pi * np.clip((t - 0.01) / 0.006, 0, 1)) ** 2
-    mass, damping, stiffness, hit, sensor = truth.matrices(q)
-    e = len(mass)
-
-    def acceleration(y, f):
-        return np.linalg.solve(mass, hit[axis] * f - damping @ y[e:] - stiffness @ y[:e])
-
-    def slope(time, y):
-        return np.concatenate([y[e:], acceleration(y, np.interp(time, t, force))])
-
-    found = solve_ivp(slope, (0, t[-1]), np.zeros(2 * e), "Radau", t[::20],
-                      rtol=1e-8, atol=1e-12, max_step=2e-4)  # fmt: skip
-    expected = [sensor @ acceleration(y, f) for y, f in zip(found.y.T, force[::20], strict=True)]
-    response = truth.respond(q, force, axis, step)
-    assert response.shape == (3, n)
-    error = np.max(np.abs(response[:, ::20] - np.transpose(expected)))
-    assert error < 1e-4 * np.max(np.abs(response))
 
 
 @pytest.mark.parametrize("per_joint", [1, 2, 3])
