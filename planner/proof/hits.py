@@ -3,9 +3,10 @@
 import csv
 import warnings
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import signal
@@ -161,48 +162,50 @@ def write_uff(
 
     `nodes` are those of the points by name, 1 where there is none.
     """
+    direction = (AXES.index(hit.axis[1]) + 1) * (-1 if hit.axis[0] == "-" else 1)
+    at = dict(nodes or {})
+    struck = at.get(hit.hit_point, 1), direction
+    rate, said = (
+        hammer.sampling_rate_hz,
+        {f"id{k}": line[:80] for k, line in enumerate(text[:4], 2)},
+    )
+    sets = [uff_channel(hit.force_n, rate, struck, struck, True, rsp_ent_name="hammer", **said)]
+    for i, samples in enumerate(hit.acceleration_m_s2):
+        sensor, axis = hit.sensors[i // 3], i % 3
+        felt, name = (at.get(sensor, 1), axis + 1), f"{sensor} {AXES[axis]}".replace(" ", "_")
+        sets.append(uff_channel(samples, rate, felt, struck, rsp_ent_name=name, **said))
+    write_sets(path, sets)
+
+
+def uff_channel(
+    samples: np.ndarray, rate_hz: float, felt: tuple[int, int], hit: tuple[int, int],
+    force: bool = False, **more: Any,
+) -> dict[str, Any]:  # fmt: skip
+    """Dataset 58b of a channel: force in N or acceleration in m/s² at a node in a direction."""
+    kind, unit = (13, "N") if force else (12, "m/s^2")
+    return {
+        "type": 58, "binary": 1, "func_type": 1, "id1": "SIMULATED, not measured",
+        "rsp_node": felt[0], "rsp_dir": felt[1], "ref_node": hit[0], "ref_dir": hit[1],
+        "ord_data_type": 4, "num_pts": samples.size, "abscissa_spacing": 1, "abscissa_min": 0.0,
+        "abscissa_inc": 1 / rate_hz, "abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s",
+        "ordinate_spec_data_type": kind, "ordinate_axis_units_lab": unit,
+        "orddenom_spec_data_type": 0, "z_axis_spec_data_type": 0,
+        "data": np.asarray(samples, dtype=float), "x": np.arange(samples.size) / rate_hz, **more,
+    }  # fmt: skip
+
+
+def write_sets(path: Path, sets: Iterable[dict[str, Any]]) -> Path:
+    """A universal file of these alone."""
     import pyuff
 
     path.unlink(missing_ok=True)  # and "add": pyuff's "overwrite" loses sets before the last
     file = pyuff.UFF(str(path))
-    direction = (AXES.index(hit.axis[1]) + 1) * (-1 if hit.axis[0] == "-" else 1)
-    at = dict(nodes or {})
-    channels = [(hit.force_n, 13, "N", direction, "hammer", at.get(hit.hit_point, 1))]
-    channels += [
-        (samples, 12, "m/s^2", i % 3 + 1, f"{hit.sensors[i // 3]} {AXES[i % 3]}",
-         at.get(hit.sensors[i // 3], 1))
-        for i, samples in enumerate(hit.acceleration_m_s2)
-    ]  # fmt: skip
-    for samples, kind, unit, response, name, node in channels:
-        entry = {
-            "type": 58,
-            "binary": 1,
-            "func_type": 1,
-            "id1": "SIMULATED, not measured",
-            **{f"id{k}": line[:80] for k, line in enumerate(text[:4], 2)},
-            "rsp_node": node,
-            "rsp_dir": response,
-            "rsp_ent_name": name.replace(" ", "_"),
-            "ref_node": at.get(hit.hit_point, 1),
-            "ref_dir": direction,
-            "ord_data_type": 4,
-            "num_pts": samples.size,
-            "abscissa_spacing": 1,
-            "abscissa_min": 0.0,
-            "abscissa_inc": 1 / hammer.sampling_rate_hz,
-            "abscissa_spec_data_type": 17,
-            "abscissa_axis_units_lab": "s",
-            "ordinate_spec_data_type": kind,
-            "ordinate_axis_units_lab": unit,
-            "orddenom_spec_data_type": 0,
-            "z_axis_spec_data_type": 0,
-            "data": np.asarray(samples, dtype=float),
-            "x": np.arange(samples.size) / hammer.sampling_rate_hz,
-        }
+    for one in sets:
         with warnings.catch_warnings():
             # pyuff leaves closing the file to the garbage collector, which does so right here.
             warnings.simplefilter("ignore", ResourceWarning)
-            file.write_sets(entry, "add")
+            file.write_sets(one, "add")
+    return path
 
 
 def record_poses(
