@@ -9,7 +9,7 @@ FRFs are H1, modes come from modal analysis and are tracked over the postures wi
 simulation.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -40,9 +40,7 @@ LEFT, RIGHT = slice(2, 8), slice(8, 16)  # of the parameters: L and R; 0 is f, 1
 def true_robot(seed: int) -> Truth:
     """The robot that is measured, each seed another one."""
     robot_toml = Path(__file__).parents[1] / "kr240_plane" / "robot" / "robot.toml"
-    truth = load_truth(robot_toml, Deviation(seed, 0.12, 0.15, 0.04, 0.005))
-    lighter = tuple(replace(s, damping=LIGHT * s.damping) for s in truth.springs)
-    return replace(truth, springs=lighter)
+    return load_truth(robot_toml, Deviation(seed, 0.12, 0.15, 0.04, 0.005)).changed(damping=LIGHT)
 
 
 def postures(truth: Truth) -> tuple[np.ndarray, np.ndarray]:

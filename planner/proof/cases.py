@@ -124,20 +124,20 @@ def _recorded(
     rng, truth = scene.rng, load(injected.deviation)
     measured = replace(injected, chain=errors.chain(own))
     wanted = scene.poses[POSES:]
-    visits = Visits.planned(scene.poses[:POSES], hammer, errors, rng, own)
-    again = copy.deepcopy(rng)
-    quiet = quiet_hits(truth, measured, visits.visits, hammer, rng)
+    stops = planned(scene.poses[:POSES], hammer, errors, rng, own)
+    visits, again = [visit for *_, visit in stops], copy.deepcopy(rng)
+    quiet = quiet_hits(truth, measured, visits, hammer, rng)
     hammer = errors.floor(hammer, [hit for hits in quiet for hit in hits], own)
     rows = [
         (f"P{index + 1:02d}", readback,
          [windowed(measured.artefact, noisy(hit, hammer, rng), hammer) for hit in hits])
-        for index, readback, hits in zip(visits.poses, visits.readbacks_deg, quiet, strict=True)
+        for (index, readback, _), hits in zip(stops, quiet, strict=True)
     ]  # fmt: skip
     write_recordings(folder, truth.joint_names, rows, hammer, "concealed case")
     write_predict(folder, truth.joint_names, _named(wanted), hammer.peak_n)
     reach_m = sum(float(np.linalg.norm(joint.xyz)) for joint in scene.arm.joints)
     return ScoredCase(
-        load, scene.arm.band_hz, reach_m, measured, visits.visits, wanted, hammer, quiet, again
+        load, scene.arm.band_hz, reach_m, measured, visits, wanted, hammer, quiet, again
     )
 
 
@@ -159,35 +159,25 @@ def _held_out(injected: InjectedFaults, case: ScoredCase) -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True, eq=False)
-class Visits:
-    """What is done, and what recordings.csv says of it: pose's number and angles (dof,) in °."""
+def planned(
+    poses: np.ndarray,
+    hammer: Hammer,
+    errors: MeasurementErrors,
+    rng: np.random.Generator,
+    own: np.random.Generator,
+) -> list[tuple[int, np.ndarray, HitVisit]]:
+    """Three axes and three force levels at each pose (n, dof) in rad: number, readback in °, visit.
 
-    visits: Sequence[HitVisit]
-    poses: Sequence[int]
-    readbacks_deg: Sequence[np.ndarray]
-
-    @classmethod
-    def planned(
-        cls,
-        poses: np.ndarray,
-        hammer: Hammer,
-        errors: MeasurementErrors,
-        rng: np.random.Generator,
-        own: np.random.Generator,
-    ) -> "Visits":
-        """Three axes and three force levels at each pose (n, dof) in rad.
-
-        `own` draws what `errors` leaves open, so that all else is the same in the laboratory.
-        """
-        numbers = list(range(len(poses))) + ([0] if rng.random() < TWICE else [])
-        shots = [(f"{rng.choice(['+', '-'])}{a}", hammer.peak_n * k) for a in "xyz" for k in LEVELS]
-        planned, readbacks = [], []
-        common, axes = errors.common(own), [AXES.index(axis[1]) for axis, _ in shots]
-        for number, index in enumerate(numbers):
-            scatter = hammer.readback_deg * rng.uniform(-1, 1, len(poses[index]))
-            readbacks.append(np.round(np.rad2deg(poses[index]) + scatter, 4))
-            there = errors.beside(np.deg2rad(readbacks[-1]), own)
-            aims = errors.aims(axes, own, common)
-            planned.append(HitVisit(there, shots, number / max(len(numbers) - 1, 1), aims))
-        return cls(planned, numbers, readbacks)
+    `own` draws what `errors` leaves open, so that all else is the same in the laboratory.
+    """
+    numbers = list(range(len(poses))) + ([0] if rng.random() < TWICE else [])
+    shots = [(f"{rng.choice(['+', '-'])}{a}", hammer.peak_n * k) for a in "xyz" for k in LEVELS]
+    common, axes = errors.common(own), [AXES.index(axis[1]) for axis, _ in shots]
+    found = []
+    for number, index in enumerate(numbers):
+        scatter = hammer.readback_deg * rng.uniform(-1, 1, len(poses[index]))
+        readback_deg = np.round(np.rad2deg(poses[index]) + scatter, 4)
+        there = errors.beside(np.deg2rad(readback_deg), own)
+        aims, progress = errors.aims(axes, own, common), number / max(len(numbers) - 1, 1)
+        found.append((index, readback_deg, HitVisit(there, shots, progress, aims)))
+    return found

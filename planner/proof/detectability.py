@@ -10,7 +10,7 @@ import numpy as np
 from planner.proof import refit
 from planner.proof.deviation import Deviation
 from planner.proof.fault_injection import HitVisit, InjectedFaults, quiet_hits
-from planner.proof.hits import AXES, Hammer, SimulatedHit, noise_power
+from planner.proof.hits import AXES, Hammer, SimulatedHit, noise_power, signed
 from planner.proof.model import Truth
 
 LINES = 100  # about so many are looked at
@@ -133,7 +133,7 @@ def _by_levels(
         some = [i for i, peak in enumerate(peaks) if (peak >= middle) == strong]
         counts, total = np.maximum(_counts([hits[i] for i in some]), 1), h.copy()
         for i in some:
-            axis, sense = AXES.index(hits[i].axis[1]), -1.0 if hits[i].axis[0] == "-" else 1.0
+            axis, sense = signed(hits[i].axis)
             extra = hits[i].acceleration_m_s2 - plain[i].acceleration_m_s2
             ratio = _transform(extra, s, hammer) / _transform(hits[i].force_n, s, hammer)
             total[:, :, axis] += sense * ratio.T / counts[axis]

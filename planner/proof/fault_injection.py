@@ -7,7 +7,7 @@ import numpy as np
 from scipy import ndimage
 
 from planner.proof.deviation import Deviation
-from planner.proof.hits import AXES, Hammer, SimulatedHit, noisy, pulse, sampled
+from planner.proof.hits import AXES, Hammer, SimulatedHit, noisy, pulse, sampled, signed
 from planner.proof.measurement_errors import EXACT, HitError, MeasurementErrors, MeasuringChain
 from planner.proof.model import Truth
 from planner.proof.nonlinear import HitPose, Port, respond
@@ -53,11 +53,7 @@ class DampingScatter:
         rng = np.random.default_rng([self.seed, round(1e6 * progress)])
         names = dict.fromkeys(spring.joint for spring in truth.springs)
         factors = {name: float(np.exp(self.sd * rng.standard_normal())) for name in names}
-        springs = tuple(
-            replace(s, damping=factors[s.joint] * s.damping, loss=factors[s.joint] * s.loss)
-            for s in truth.springs
-        )
-        return replace(truth, springs=springs)
+        return truth.changed(damping=np.array([factors[s.joint] for s in truth.springs]))
 
 
 @dataclass(frozen=True)
@@ -210,11 +206,10 @@ def _responses(
     for visit, forces in zip(visits, pulses, strict=True):
         now = injected.at(truth, visit.progress)
         now = replace(now, hit_point=visit.hit_point, sensors=visit.sensors)
-        senses = np.array([-1.0 if axis[0] == "-" else 1.0 for axis, _ in visit.shots])
-        axes = [AXES.index(axis[1]) for axis, _ in visit.shots]
+        axes, senses = zip(*(signed(axis) for axis, _ in visit.shots), strict=True)
         aims = visit.aims or [HitError()] * len(axes)
         wrench = np.array([a.wrench(axis) for a, axis in zip(aims, axes, strict=True)])
-        poses.append(HitPose(now, visit.q, senses[:, None] * forces, wrench))
+        poses.append(HitPose(now, visit.q, np.array(senses)[:, None] * forces, wrench))
     responses = respond(poses, injected.ports, step_s)
     if injected.tone is None:
         return responses

@@ -20,6 +20,11 @@ FULL_SCALE = 4.0  # of a converter over what comes
 FLOOR_DAMPING = 0.3  # ratio, of a floor's first mode with machines on it; chosen
 
 
+def signed(axis: str) -> tuple[int, float]:
+    """Number and sense of an axis such as "-y": 1, -1.0."""
+    return AXES.index(axis[1]), -1.0 if axis[0] == "-" else 1.0
+
+
 @dataclass(frozen=True)
 class Hammer:
     """What the person, the hammer, the analyser and the floor are like.
@@ -66,7 +71,7 @@ def simulate_hit(
 ) -> SimulatedHit:
     """One hit at pose q (rad) along a signed axis of the tcp frame ("+x")."""
     force = pulse(hammer, rng)
-    sense, index = (-1.0 if axis[0] == "-" else 1.0), AXES.index(axis[1])
+    index, sense = signed(axis)
     response = truth.respond(q, sense * force, index, hammer.step_s)
     return noisy(sampled(axis, force, response, hammer), hammer, rng)
 
@@ -162,7 +167,8 @@ def write_uff(
 
     `nodes` are those of the points by name, 1 where there is none.
     """
-    direction = (AXES.index(hit.axis[1]) + 1) * (-1 if hit.axis[0] == "-" else 1)
+    axis, sense = signed(hit.axis)
+    direction = int(sense) * (axis + 1)
     at = dict(nodes or {})
     struck = at.get(hit.hit_point, 1), direction
     rate, said = (

@@ -173,13 +173,16 @@ class Truth:
                 found.setdefault(part.name.split()[0], []).append(number)
         return found
 
-    def changed(self, factor: float | np.ndarray) -> "Truth":
-        """The same robot with the stiffness of every spring multiplied by a factor, or (e,)."""
-        each = np.broadcast_to(factor, len(self.springs))
+    def changed(
+        self, stiffness: float | np.ndarray = 1.0, damping: float | np.ndarray = 1.0
+    ) -> "Truth":
+        """The same robot with every spring's stiffness and damping times a factor, or (e,)."""
+        each = (np.broadcast_to(factor, len(self.springs)) for factor in (stiffness, damping))
         springs = tuple(
-            replace(s, stiffness=float(f) * s.stiffness)
-            for s, f in zip(self.springs, each, strict=True)
-        )
+            replace(s, stiffness=float(k) * s.stiffness, damping=float(c) * s.damping,
+                    loss=float(c) * s.loss)
+            for s, k, c in zip(self.springs, *each, strict=True)
+        )  # fmt: skip
         return replace(self, springs=springs)
 
     def loaded(self, link: str, factor: float) -> "Truth":

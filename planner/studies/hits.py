@@ -21,7 +21,7 @@ from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import Mode
 from planner.progress import ProgressCallback
 from planner.proof import inverse
-from planner.proof.cases import Visits
+from planner.proof.cases import planned
 from planner.proof.fault_injection import DampingScatter, HitVisit, InjectedFaults, quiet_hits
 from planner.proof.hits import Hammer, SimulatedHit, noisy
 from planner.proof.laws import BoucWen
@@ -126,16 +126,14 @@ def simulate_hits(
 ) -> HitPoses:
     """Hit a robot at poses q (n, dof) in rad, each once visited, along `axes` at three levels."""
     rng, own = np.random.default_rng([seed, 4]), np.random.default_rng([seed, 5])
-    visits = Visits.planned(q, hammer, errors, rng, own)
-    planned = [
-        _along(v, axes) for v in visits.visits[: len(q)]
-    ]  # without the first pose visited again
-    readback = np.deg2rad(np.array(visits.readbacks_deg[: len(q)]))
+    stops = planned(q, hammer, errors, rng, own)[: len(q)]  # the first pose is not visited again
+    visits = [_along(visit, axes) for *_, visit in stops]
+    readback = np.deg2rad([readback_deg for _, readback_deg, _ in stops])
     floor: Hammer | None = None
     hits: list[tuple[Hit, ...]] = []
     for first in range(0, len(q), AT_ONCE):
         progress(f"hits at pose {first + 1} of {len(q)}", first / len(q))
-        quiet = quiet_hits(truth, injected, planned[first : first + AT_ONCE], hammer, rng)
+        quiet = quiet_hits(truth, injected, visits[first : first + AT_ONCE], hammer, rng)
         if floor is None:
             floor = errors.floor(hammer, [hit for hits in quiet for hit in hits], own)
         hits += [as_read([noisy(h, floor, rng) for h in each], hammer) for each in quiet]

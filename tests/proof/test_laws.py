@@ -16,9 +16,9 @@ from planner.proof.laws import Backlash, Contact, Friction, Hardening, JointLaw
 from planner.proof.load import load_truth
 from planner.proof.model import Truth
 from planner.proof.nonlinear import HitPose, Port, respond
-from tests.support.wrenches import along
 
 STEP, N = 1 / 6400, 3200
+EXACTLY = np.eye(6)  # wrenches of hits exactly along an axis of the tcp, and at it
 Q = KR10.poses(1)[0]
 ANGLE = 3e-4
 QUIET = Hammer(80.0, 0.004, record_s=2.56, noise=0.0, force_noise=0.0)
@@ -43,7 +43,7 @@ def pulses(peaks: list[float]) -> np.ndarray:
 
 def test_without_laws_it_is_the_linear_truth(truth):
     forces, axes = pulses([100.0, 30.0, 60.0]), [0, 1, 2]
-    ours = respond([HitPose(truth, Q, forces, along(axes))], (), STEP)[0]
+    ours = respond([HitPose(truth, Q, forces, EXACTLY[axes])], (), STEP)[0]
     theirs = [truth.respond(Q, f, a, STEP) for f, a in zip(forces, axes, strict=True)]
     assert np.max(np.abs(ours - theirs)) < 1e-9 * np.max(np.abs(ours))
 
@@ -56,7 +56,7 @@ EACH = [pytest.param(v, marks=() if k in QUICK else pytest.mark.slow) for k, v i
 def test_response_is_that_of_an_ode_solver(truth, law):
     force = pulses([300.0])
     linear = truth.respond(Q, force[0], 1, STEP)
-    pose, ports = HitPose(truth, Q, force, along([1])), [Port(law, joint="joint_2")]
+    pose, ports = HitPose(truth, Q, force, EXACTLY[[1]]), [Port(law, joint="joint_2")]
     response = linear if law is None else respond([pose], ports, STEP)[0][0]
     mass, damping, stiffness, hit, sensor = truth.matrices(Q)
     own, e, t = truth.own("joint_2"), len(mass), np.arange(N) * STEP
@@ -94,9 +94,9 @@ def test_response_is_that_of_an_ode_solver(truth, law):
 @pytest.mark.parametrize("law", EACH, ids=LAWS)
 def test_hits_die_out(truth, law):
     force = np.pad(pulses([300.0]), ((0, 0), (0, 5 * N)))
-    response = respond([HitPose(truth, Q, force, along([0]))], [Port(law, joint="joint_1")], STEP)[
-        0
-    ][0]
+    response = respond(
+        [HitPose(truth, Q, force, EXACTLY[[0]])], [Port(law, joint="joint_1")], STEP
+    )[0][0]
     blocks = np.sqrt(np.mean(response[:, N:].reshape(3, 5, -1) ** 2, axis=(0, 2)))
     assert np.all(blocks[1:] < blocks[:-1])
 
@@ -104,8 +104,8 @@ def test_hits_die_out(truth, law):
 def test_poses_integrated_together_do_not_meet(truth):
     port, other = Port(LAWS["friction"], joint="joint_2"), KR10.poses(2, seed=3)[1]
     poses = [
-        HitPose(truth, Q, pulses([300.0, 40.0]), along([0, 2])),
-        HitPose(truth, other, pulses([99.0]), along([1])),
+        HitPose(truth, Q, pulses([300.0, 40.0]), EXACTLY[[0, 2]]),
+        HitPose(truth, other, pulses([99.0]), EXACTLY[[1]]),
     ]
     together = respond(poses, [port], STEP)
     alone = [respond([pose], [port], STEP)[0] for pose in poses]
@@ -149,4 +149,4 @@ def test_friction_stiffens_a_joint_at_low_level_only(truth):
 def test_a_step_too_long_is_refused(truth):
     port = Port(Hardening(1e9, ANGLE), joint="joint_6")
     with pytest.raises(InputError, match="shorten the step"):
-        respond([HitPose(truth, Q, pulses([1.0]), along([0]))], [port], STEP)
+        respond([HitPose(truth, Q, pulses([1.0]), EXACTLY[[0]])], [port], STEP)

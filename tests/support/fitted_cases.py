@@ -50,11 +50,7 @@ class VisitScatter:
         """The robot at a time of the campaign."""
         rng = np.random.default_rng([self.seed, round(1e6 * progress)])
         factors = np.exp(self.sd * rng.standard_normal(len(truth.springs)))
-        springs = tuple(
-            replace(s, stiffness=f * s.stiffness, damping=f * s.damping)
-            for s, f in zip(truth.springs, factors, strict=True)
-        )
-        return replace(truth, springs=springs)
+        return truth.changed(factors, factors)
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,6 +32,7 @@ from planner.proof.load import load_truth
 from planner.proof.measurement_errors import EVERYDAY
 from planner.proof.refit import detectability
 from planner.proof.scene import log_uniform, some_direction, triple
+from planner.proof.score import Scored, score
 from planner.recording.points import SENSOR
 from planner.report.diagnosis import DiagnosisReport
 from planner.robot.robot import Robot
@@ -202,23 +203,18 @@ def said(case: str, place: Place, folder: Path, sensors: int, count: int) -> Sai
     """Of one case, by so many sensors at so many poses."""
     started = time.process_time()
     report, some = told(folder, sensors, count)
-    named = _named(report)
-    sets = [{(e.effect, e.at) for e in members} for members in report.sets]
-    alike = {p for s in sets if place in s and len(s) <= 2 for p in s}
+    found = judged(case, place, report)
     return Said(
-        case, sensors, sum(len(v.hits) for v in some.visits), place in named,
-        place in named or bool(alike & set(named)), sum(p != place for p in named),
-        report.verdict, named, round(time.process_time() - started, 1),
+        case, sensors, sum(len(v.hits) for v in some.visits), found.shown[0].named,
+        found.shown[0].in_set, sum(p != place for p in found.named), found.verdict, found.named,
+        round(time.process_time() - started, 1),
     )  # fmt: skip
 
 
-def _named(report: DiagnosisReport) -> tuple[Place, ...]:
-    """What an engineer reads as being there."""
-    if report.verdict == "consistent":
-        return ()
-    first = report.candidates[0].effects if report.verdict == "explained" else ()
-    both = [(e.effect, e.at) for e in (*first, *report.findings)]
-    return tuple(dict.fromkeys(p for p in both if p[0] not in ("none", "unknown")))
+def judged(case: str, place: Place, report: DiagnosisReport) -> Scored:
+    """As a proof scores what was said of one effect at its place."""
+    effect = {"effect": place[0], "at": place[1], "parameters": {}, "nats": 0.0, "size": 0.0}
+    return score(case, {"robot": "arm", "effects": [effect]}, report.to_json())
 
 
 def answers(
