@@ -17,8 +17,16 @@ from planner.errors import InputError
 from planner.proof.arms import ARMS, Arm, in_a_cell
 from planner.proof.detectability import ScoredCase, detection_problem, without_effect
 from planner.proof.deviation import Deviation
-from planner.proof.fault_injection import HitVisit, InjectedFaults, frfs, once, quiet_hits, windowed
-from planner.proof.hits import AXES, Hammer, noisy, write_predict, write_recordings
+from planner.proof.fault_injection import (
+    HitVisit,
+    InjectedFaults,
+    frfs,
+    hand_visits,
+    once,
+    quiet_hits,
+    windowed,
+)
+from planner.proof.hits import Hammer, noisy, write_predict, write_recordings
 from planner.proof.imperfections import imperfect
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import EVERYDAY, MeasurementErrors
@@ -172,12 +180,12 @@ def planned(
     """
     numbers = list(range(len(poses))) + ([0] if rng.random() < TWICE else [])
     shots = [(f"{rng.choice(['+', '-'])}{a}", hammer.peak_n * k) for a in "xyz" for k in LEVELS]
-    common, axes = errors.common(own), [AXES.index(axis[1]) for axis, _ in shots]
-    found = []
-    for number, index in enumerate(numbers):
-        scatter = hammer.readback_deg * rng.uniform(-1, 1, len(poses[index]))
-        readback_deg = np.round(np.rad2deg(poses[index]) + scatter, 4)
-        there = errors.beside(np.deg2rad(readback_deg), own)
-        aims, progress = errors.aims(axes, own, common), number / max(len(numbers) - 1, 1)
-        found.append((index, readback_deg, HitVisit(there, shots, progress, aims)))
-    return found
+    common = errors.common(own)
+    readbacks_deg = [
+        np.round(np.rad2deg(q) + hammer.readback_deg * rng.uniform(-1, 1, len(q)), 4)
+        for q in poses[numbers]
+    ]
+    visits = hand_visits(errors, np.deg2rad(readbacks_deg), shots, own, common)
+    last = max(len(numbers) - 1, 1)
+    visits = [replace(visit, progress=k / last) for k, visit in enumerate(visits)]
+    return list(zip(numbers, readbacks_deg, visits, strict=True))
