@@ -50,7 +50,7 @@ def base_compliance(scene: Scene) -> Drawn:
     """The floor gives way: two tilts, or sometimes all six."""
     tilt = scene.stiffness("joint_2") * scene.log_uniform(0.7, 4.0) / scene.size
     tilts = [tilt, tilt * scene.log_uniform(0.7, 1.4)]
-    springs = [*deviation.soft_floor(*tilts, scene.arm.damping_s)]
+    springs = [*deviation.soft_floor(tilts[0], tilts[1], scene.arm.damping_s)]
     parameters: Parameters = {"stiffness": tilts, "freedoms": 2.0}
     if scene.rng.random() < 0.35:
         reach = float(np.linalg.norm(scene.length(2)))

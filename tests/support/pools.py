@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.proof import descriptions
 from planner.proof.deviation import Deviation
 from planner.proof.hits import Hammer, record_poses
 from planner.proof.load import load_truth
@@ -22,9 +23,5 @@ def make_pool(root: Path, poses: int, seed: int) -> tuple[Path, Path, Path]:
     named = [(f"P{i:03d}", row) for i, row in enumerate(q)]
     recordings = record_poses(truth, named, root / "hits", repeats=1, hammer=HAMMER, seed=seed)
     campaign = root / "campaign.toml"
-    campaign.write_text(
-        f"[workspace]\njoints_deg = {[list(r) for r in JOINTS_DEG]}\n"
-        f"[modes]\ncount = 3\nband_hz = {list(BAND_HZ)}\n"
-        '[acquisition]\nname = "variance"\n'
-    )
+    campaign.write_text(descriptions.campaign(JOINTS_DEG, 3, BAND_HZ, 'name = "variance"\n'))
     return recordings, robot, campaign
