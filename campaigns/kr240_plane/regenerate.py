@@ -14,9 +14,9 @@ import numpy as np
 
 from planner.proof import inverse
 from planner.proof.deviation import Deviation, Spring
-from planner.proof.hits import record_poses
 from planner.proof.load import load_truth
 from planner.proof.model import Truth
+from planner.proof.recordings import record_poses
 
 HERE = Path(__file__).parent
 # Table A1 of Busch et al. 2022, mended: see NOTES.md.

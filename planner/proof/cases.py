@@ -26,11 +26,12 @@ from planner.proof.fault_injection import (
     quiet_hits,
     windowed,
 )
-from planner.proof.hits import Hammer, noisy, write_predict, write_recordings
+from planner.proof.hits import Hammer, noisy
 from planner.proof.imperfections import imperfect
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import EVERYDAY, MeasurementErrors
 from planner.proof.random_arms import draw_arm, standing
+from planner.proof.recordings import write_predict, write_recordings
 from planner.proof.refit import DetectionProblem
 from planner.proof.scene import PULSE_S, Scene
 from planner.proof.table import KINDS, DrawnEffect, Load, concealed

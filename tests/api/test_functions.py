@@ -9,7 +9,7 @@ from planner import Dataset, Frf, Hit, Robot, analyse, identify
 from planner.cli.run import run
 from planner.errors import InputError, RefusedError
 from planner.modal.modes import ModalModel
-from planner.proof.hits import record_poses
+from planner.proof.recordings import record_poses
 from planner.recording.hits import hits_from
 from planner.recording.read import read
 from planner.report.pictures import Pictures

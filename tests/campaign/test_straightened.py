@@ -8,10 +8,11 @@ from planner.dataset.store import Store
 from planner.dynamics.at_force import change_at_force
 from planner.proof.deviation import Deviation
 from planner.proof.fault_injection import HitVisit, InjectedFaults, frfs, hit_poses, once
-from planner.proof.hits import Hammer, stated, write_recordings
+from planner.proof.hits import Hammer
 from planner.proof.laws import Hardening
 from planner.proof.load import load_truth
 from planner.proof.nonlinear import Port
+from planner.proof.recordings import stated, write_recordings
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 BAND_HZ = (3.0, 60.0)

@@ -11,8 +11,8 @@ from planner.dataset.dataset import Dataset
 from planner.dynamics.simulation import Simulation
 from planner.measurement.agreement import fit_similarity
 from planner.proof.deviation import Deviation
-from planner.proof.hits import record_poses
 from planner.proof.load import load_truth
+from planner.proof.recordings import record_poses
 from planner.robot.robot import Robot
 from tests.support.outside import HAMMER, call, told
 from tests.support.rerun_columns import columns_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.modal.mac import mac
-from planner.proof.hits import uff_channel, write_sets
+from planner.proof.recordings import uff_channel, write_sets
 from tests.support.outside import call
 from tests.support.rerun_columns import lines_of
 from tests.support.running import response

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from planner.proof.deviation import Deviation
-from planner.proof.hits import Hammer, record_poses, write_predict
+from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
+from planner.proof.recordings import record_poses, write_predict
 from tests.support.outside import call, said, told
 from tests.support.rails import RAIL_BOX, make_sliding, sliding_campaign
 

@@ -23,10 +23,11 @@ from planner.milling.tool import load_tool
 from planner.proof.arms import KR210
 from planner.proof.deviation import Deviation, soft_floor
 from planner.proof.fault_injection import InjectedFaults, hand_visits, hit_poses
-from planner.proof.hits import Hammer, write_recordings
+from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import MeasurementErrors
 from planner.proof.model import Truth
+from planner.proof.recordings import write_recordings
 from tests.support.milling_cases import cut
 from tests.support.true_limits import LimitPair, limit_pair
 

@@ -8,8 +8,9 @@ import pyuff
 
 from planner.proof.arms import KR10, KR210
 from planner.proof.deviation import Deviation
-from planner.proof.hits import Hammer, record_poses, simulate_hit, write_predict
+from planner.proof.hits import Hammer, simulate_hit
 from planner.proof.load import load_truth
+from planner.proof.recordings import record_poses, write_predict
 from planner.recording.folder import read_recordings
 
 QUIET = Hammer(noise=0.0, force_noise=0.0, record_s=10.0, readback_deg=0.0)

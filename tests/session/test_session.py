@@ -13,7 +13,8 @@ from rerun.chunk import RrdReader
 
 from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
-from planner.proof.hits import simulate_hit, write_uff
+from planner.proof.hits import simulate_hit
+from planner.proof.recordings import write_uff
 from planner.recording.folder import TABLE
 from planner.replay import replay
 from planner.report.rerun.event_logger import EventLogger

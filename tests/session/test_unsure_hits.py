@@ -10,7 +10,8 @@ import pytest
 
 from planner.dataset.screened_files import Source, read_files
 from planner.frf.estimator import estimate
-from planner.proof.hits import simulate_hit, write_uff
+from planner.proof.hits import simulate_hit
+from planner.proof.recordings import write_uff
 from planner.recording.points import PointNames
 from planner.session.hit_verdicts import Before, Verdicts
 from planner.session.inbox import Inbox

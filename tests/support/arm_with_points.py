@@ -7,10 +7,11 @@ import numpy as np
 
 from planner.proof import descriptions
 from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.proof.hits import Hammer, write_recordings
+from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import LABORATORY, MeasurementErrors
 from planner.proof.model import Truth
+from planner.proof.recordings import write_recordings
 
 NODES = {"foot": 11, "shoulder": 12, "elbow": 13, "sensor": 16}
 POINTS = (

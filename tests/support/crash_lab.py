@@ -26,8 +26,9 @@ from planner.campaign.store import check_kept, recording_path
 from planner.cli.run import STOPPED, run
 from planner.errors import PlannerError
 from planner.proof.deviation import Deviation
-from planner.proof.hits import Hammer, record_poses
+from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
+from planner.proof.recordings import record_poses
 from tests.support.forked import Outcome, forked, preload
 from tests.support.plain_arm import JOINTS_DEG, make_plain_arm, plain_campaign
 

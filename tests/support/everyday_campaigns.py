@@ -19,10 +19,11 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.model import Model
 from planner.dataset.store import Store
 from planner.proof.fault_injection import HitVisit, InjectedFaults, quiet_hits
-from planner.proof.hits import AXES, Hammer, noisy, write_recordings
+from planner.proof.hits import AXES, Hammer, noisy
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import EVERYDAY, HitError
 from planner.proof.model import Truth
+from planner.proof.recordings import write_recordings
 from tests.support.counted_modes import NOT_COUNTED, counted, own_of_hose, true_modes
 from tests.support.faulty_robots import KINDS, MOST_MODES, ROBOTS, Robot, lacking
 

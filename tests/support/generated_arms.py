@@ -8,9 +8,10 @@ import numpy as np
 
 from planner.proof import descriptions
 from planner.proof.deviation import Deviation
-from planner.proof.hits import Hammer, record_poses
+from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.model import Truth
+from planner.proof.recordings import record_poses
 from planner.proof.scene import log_uniform
 
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)

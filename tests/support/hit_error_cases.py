@@ -10,10 +10,11 @@ from planner.campaign.model import Model
 from planner.proof.arms import ARMS
 from planner.proof.deviation import Deviation
 from planner.proof.fault_injection import InjectedFaults, hand_visits, hit_poses
-from planner.proof.hits import AXES, Hammer, write_recordings
+from planner.proof.hits import AXES, Hammer
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import EVERYDAY, HitError, MeasuringChain
 from planner.proof.model import Truth
+from planner.proof.recordings import write_recordings
 from planner.proof.scene import PULSE_S
 
 SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do

@@ -6,8 +6,9 @@ import numpy as np
 
 from planner.proof import descriptions
 from planner.proof.deviation import Deviation
-from planner.proof.hits import Hammer, record_poses
+from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
+from planner.proof.recordings import record_poses
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
 
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)

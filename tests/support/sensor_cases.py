@@ -27,9 +27,10 @@ from planner.proof.deviation import (
     StiffnessRipple,
 )
 from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses, quiet_hits
-from planner.proof.hits import Hammer, write_recordings
+from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import EVERYDAY
+from planner.proof.recordings import write_recordings
 from planner.proof.refit import detectability
 from planner.proof.scene import log_uniform, some_direction, triple
 from planner.proof.score import Scored, score

@@ -23,9 +23,10 @@ from planner.proof.fault_injection import (
     hand_visits,
     hit_poses,
 )
-from planner.proof.hits import Hammer, write_predict, write_recordings
+from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import LABORATORY, MeasurementErrors
+from planner.proof.recordings import write_predict, write_recordings
 from tests.support.arm_with_points import NODES, poses, write_arm
 
 # Springs, dampers and bodies never are as stated; nobody is to call that a finding.

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.io
 from scipy import signal
 
-from planner.proof.hits import uff_channel, write_sets
+from planner.proof.recordings import uff_channel, write_sets
 from planner.recording.hits import hits_from
 from planner.recording.read import read
 from tests.support import bad_input

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.proof.hits import uff_channel, write_sets
+from planner.proof.recordings import uff_channel, write_sets
 from tests.support.structures import Structure
 
 RATE_HZ, SAMPLES, LONG = 1024.0, 1024, 16
