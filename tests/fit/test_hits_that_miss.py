@@ -34,10 +34,10 @@ class Handled:
         self.truth = replace(truth, sensor_offset_m=self.chain.offset_m)
 
     def accelerance(self, q, hz):
-        off = np.deg2rad(self.handling.readback_deg) * self.rng.standard_normal(len(q))
+        there = self.handling.beside(q, self.rng)
         aims = self.handling.aims([0, 1, 2], self.rng)
         h = np.stack(
-            [struck(self.truth, q + off, a.wrench(k), hz) for k, a in enumerate(aims)], axis=1
+            [struck(self.truth, there, a.wrench(k), hz) for k, a in enumerate(aims)], axis=1
         )
         late = np.exp(-2j * np.pi * hz * self.chain.delay_s)
         return np.einsum("ij,jkf->ikf", self.chain.matrix, h) * late / self.chain.force_gain
