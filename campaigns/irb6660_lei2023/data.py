@@ -4,12 +4,12 @@ Tool tip on a grid of 200 mm, seven turns about the tool's axis (the paper's sec
 is the KR240 with spindle in MuJoCo, with stiffnesses, damping and inertias of its own. Each posture
 is hit at two points of the tool along two axes, at three levels, and heard at both points along
 both axes. Hits miss axis and point, channels have gains and feel each other, joints stand beside
-their readback, brakes engage anew at each posture (`planner.truth.measurement_errors.EVERYDAY`).
+their readback, brakes engage anew at each posture (`planner.proof.measurement_errors.EVERYDAY`).
 FRFs are H1, modes come from modal analysis and are tracked over the postures without any
 simulation.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,13 +20,13 @@ from planner.modal.modes import LEAST_PROBABILITY, Mode
 from planner.modal.residues import rank_one
 from planner.modal.tracking import Guide, track
 from planner.progress import ProgressCallback
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import DampingScatter
+from planner.proof.hits import Hammer, SimulatedHit, noisy, pulse, sampled
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY
+from planner.proof.model import Truth, driven
 from planner.studies.hits import upright_poses
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import DampingScatter
-from planner.truth.hits import Hammer, SimulatedHit, noisy, pulse, sampled
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY
-from planner.truth.model import Truth, driven
 
 X_M, Y_M, Z_M = np.linspace(1.3, 1.9, 4), np.linspace(-0.3, 0.3, 4), 0.8
 TURN_DEG = np.linspace(-60, 60, 7)
@@ -40,9 +40,7 @@ LEFT, RIGHT = slice(2, 8), slice(8, 16)  # of the parameters: L and R; 0 is f, 1
 def true_robot(seed: int) -> Truth:
     """The robot that is measured, each seed another one."""
     robot_toml = Path(__file__).parents[1] / "kr240_plane" / "robot" / "robot.toml"
-    truth = load_truth(robot_toml, Deviation(seed, 0.12, 0.15, 0.04, 0.005))
-    lighter = tuple(replace(s, damping=LIGHT * s.damping) for s in truth.springs)
-    return replace(truth, springs=lighter)
+    return load_truth(robot_toml, Deviation(seed, 0.12, 0.15, 0.04, 0.005)).changed(damping=LIGHT)
 
 
 def postures(truth: Truth) -> tuple[np.ndarray, np.ndarray]:
@@ -124,7 +122,7 @@ def measured(
     found = []
     for i, posture in enumerate(q):
         progress(f"hits at posture {i + 1} of {len(q)}", i / len(q))
-        there = posture + np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(len(posture))
+        there = EVERYDAY.beside(posture, rng)
         found.append(_analysed(brakes.applied(truth, i / len(q)), there, gains, rng))
     carried = [[_mode(one) for one in modes] for modes in found]
     tracks = track(carried, Guide.by_example(carried, MODES), x, ordered=True)

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from planner.progress import ProgressCallback
+from planner.proof.deviation import AttachedResonator, BentLink, Deviation, Spring, StiffnessRipple
+from planner.proof.hits import Hammer
+from planner.proof.laws import HarmonicDrive
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
+from planner.proof.nonlinear import Port
 from planner.studies.hits import HitPoses, everyday_faults, simulate_hits, upright_poses
-from planner.truth.deviation import AttachedResonator, BentLink, Deviation, Spring, StiffnessRipple
-from planner.truth.hits import Hammer
-from planner.truth.laws import HarmonicDrive
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
-from planner.truth.nonlinear import Port
 
 PATHS = ("S1", "S2", "S3")
 POINTS, FEW_POINTS = 40, 4  # of a path; of the small version

@@ -16,13 +16,13 @@ from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
 from planner.progress import ProgressCallback, part_of
+from planner.proof.arms import KR210
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
 from planner.robot.robot import Robot
 from planner.studies.hits import everyday_faults, simulate_hits, upright_poses
-from planner.truth.arms import KR210
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
 
 from .four_steps import Checked, check
 

@@ -15,12 +15,12 @@ import numpy as np
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.progress import ProgressCallback, no_progress
+from planner.proof.deviation import AttachedResonator, Deviation
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
 from planner.robot.robot import Robot
 from planner.studies.hits import HitPoses, everyday_faults, simulate_hits
-from planner.truth.deviation import AttachedResonator, Deviation
-from planner.truth.hits import Hammer
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
 
 BAND_HZ = (5.0, 30.0)
 SWEEP_DEG = (70.0, 120.0)

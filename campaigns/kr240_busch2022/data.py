@@ -20,12 +20,12 @@ from planner.campaign.state import Measurement
 from planner.demo import NAME, shipped
 from planner.frf.frf import Frf
 from planner.progress import ProgressCallback, part_of
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
 from planner.studies.hits import HitPoses, everyday_faults, simulate_hits
 from planner.surrogate.modal_surrogate import ModalObservations
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.hits import Hammer
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
 
 KERNELS = ("bias", "linear", "quadratic", "cubic", "rbf")
 FUSIONS = ("rbf", "AR1", "NARGP")  # as published

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.truth import inverse
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.hits import record_poses
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
+from planner.proof import inverse
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
+from planner.proof.recordings import record_poses
 
 HERE = Path(__file__).parent
 # Table A1 of Busch et al. 2022, mended: see NOTES.md.

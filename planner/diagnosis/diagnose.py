@@ -226,7 +226,7 @@ def _explored(
         best, begun = most_probable(found.settled), found.settled
         progress("comparing hits of different force", 0.85)
         seen = level_laws(recorded, best)
-        levels = seen if seen.laws or not levels.laws else levels
+        levels = seen if levels is None or seen.laws or not levels.laws else levels
         if not seen.laws or recorded.most_heard is not recorded:
             break
         there = RobotPosterior.of(best).simulation

@@ -43,10 +43,10 @@ def _carried_by(structure: RobotStructure, x: np.ndarray) -> list[np.ndarray]:
     body, out = bodies.bodies.index(carried[0]), x.copy()
     strayed = bodies.difference(x[structure.inertial])[body]
     psi = effect.of_matter(strayed)
-    if psi is None:
+    there = None if psi is None else effect.inertia(psi)
+    if psi is None or there is None:
         return []
-    out[own], mine = psi, bodies.mine[body]
-    left = strayed - effect.inertia(psi)[1]
+    out[own], mine, left = psi, bodies.mine[body], strayed - there[1]
     out[structure.inertial][mine] = np.linalg.lstsq(bodies.change[body, mine].T, left)[0]
     return [out]
 

@@ -16,17 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from planner.proof.arms import ARMS
+from planner.proof.cases import RANDOM, ConcealedCase, make_case
+from planner.proof.measurement_errors import EVERYDAY, LABORATORY, ROUGH
 from planner.proof.refit import detectability
-from planner.truth.arms import ARMS
-from planner.truth.cases import (
-    OUT_OF_LIBRARY_KINDS,
-    RANDOM,
-    SINGLES,
-    ConcealedCase,
-    NothingDetectableError,
-    make_case,
-)
-from planner.truth.measurement_errors import EVERYDAY, LABORATORY, ROUGH
+from planner.proof.table import OUT_OF_LIBRARY_KINDS, SINGLES, NothingDetectableError
 
 ENGINES = "arms", "tree"  # known arms by MuJoCo, robots drawn at random by a tree of frames
 NULL_SHARE, OUT_OF_LIBRARY_SHARE, PAIR_SHARE = 0.15, 0.15, 0.2  # shares of the cases

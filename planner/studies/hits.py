@@ -2,7 +2,7 @@
 
 Three axes, three force levels each; hits miss axis and point, the chain is within its tolerances,
 joints stand beside their readback, the floor rumbles
-(`planner.truth.measurement_errors.EVERYDAY`). Joints rub, so that damping depends on the force,
+(`planner.proof.measurement_errors.EVERYDAY`). Joints rub, so that damping depends on the force,
 and their damping is another one at every visit.
 """
 
@@ -20,15 +20,15 @@ from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import Mode
 from planner.progress import ProgressCallback
+from planner.proof import inverse
+from planner.proof.cases import planned
+from planner.proof.fault_injection import DampingScatter, HitVisit, InjectedFaults, quiet_hits
+from planner.proof.hits import Hammer, SimulatedHit, noisy
+from planner.proof.laws import BoucWen
+from planner.proof.measurement_errors import EVERYDAY, MeasurementErrors
+from planner.proof.model import Truth
+from planner.proof.nonlinear import Port
 from planner.recording.records import Hit
-from planner.truth import inverse
-from planner.truth.cases import Visits
-from planner.truth.fault_injection import DampingScatter, HitVisit, InjectedFaults, quiet_hits
-from planner.truth.hits import Hammer, SimulatedHit, noisy
-from planner.truth.laws import BoucWen
-from planner.truth.measurement_errors import EVERYDAY, MeasurementErrors
-from planner.truth.model import Truth
-from planner.truth.nonlinear import Port
 
 AT_ONCE = 12  # poses that are integrated together: what memory holds
 # Chosen: friction's stiffness over a joint's own, the angle (rad) at which it slides, and the
@@ -126,19 +126,17 @@ def simulate_hits(
 ) -> HitPoses:
     """Hit a robot at poses q (n, dof) in rad, each once visited, along `axes` at three levels."""
     rng, own = np.random.default_rng([seed, 4]), np.random.default_rng([seed, 5])
-    visits = Visits.planned(q, hammer, errors, rng, own)
-    planned = [
-        _along(v, axes) for v in visits.visits[: len(q)]
-    ]  # without the first pose visited again
-    readback = np.deg2rad(np.array(visits.readbacks_deg[: len(q)]))
+    stops = planned(q, hammer, errors, rng, own)[: len(q)]  # the first pose is not visited again
+    visits = [_along(visit, axes) for *_, visit in stops]
+    readback = np.deg2rad([readback_deg for _, readback_deg, _ in stops])
     floor: Hammer | None = None
     hits: list[tuple[Hit, ...]] = []
     for first in range(0, len(q), AT_ONCE):
         progress(f"hits at pose {first + 1} of {len(q)}", first / len(q))
-        quiet = quiet_hits(truth, injected, planned[first : first + AT_ONCE], hammer, rng)
+        quiet = quiet_hits(truth, injected, visits[first : first + AT_ONCE], hammer, rng)
         if floor is None:
             floor = errors.floor(hammer, [hit for hits in quiet for hit in hits], own)
-        hits += [_recorded([noisy(h, floor, rng) for h in each], hammer) for each in quiet]
+        hits += [as_read([noisy(h, floor, rng) for h in each], hammer) for each in quiet]
     frfs = tuple(estimate(each, band_hz) for each in hits)
     return HitPoses(readback, frfs, tuple(hits))
 
@@ -150,7 +148,8 @@ def _along(visit: HitVisit, axes: str) -> HitVisit:
     return replace(visit, shots=shots, aims=aims)
 
 
-def _recorded(hits: Sequence[SimulatedHit], hammer: Hammer) -> tuple[Hit, ...]:
+def as_read(hits: Sequence[SimulatedHit], hammer: Hammer) -> tuple[Hit, ...]:
+    """Hits as the program would read them from files."""
     rate, source = hammer.sampling_rate_hz, Path("simulated")
     return tuple(
         Hit(source, h.axis, rate, h.force_n, h.acceleration_m_s2, simulated=True) for h in hits

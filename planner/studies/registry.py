@@ -21,7 +21,7 @@ NAMES = tuple(FOLDERS)
 PACKAGE = "planner_study_"  # and the name, as which a study's files are loaded
 ALL = "all"
 ALIASES = {f"seed-00{i}": name for i, name in enumerate(NAMES)}  # what they were called before
-NEEDED = "mujoco"  # makes the recordings, as `planner.truth` has it
+NEEDED = "mujoco"  # makes the recordings, as `planner.proof` has it
 
 
 def named(name: str) -> str:

@@ -9,10 +9,10 @@ from planner import Dataset, Frf, Hit, Robot, analyse, identify
 from planner.cli.run import run
 from planner.errors import InputError, RefusedError
 from planner.modal.modes import ModalModel
+from planner.proof.recordings import record_poses
 from planner.recording.hits import hits_from
 from planner.recording.read import read
 from planner.report.pictures import Pictures
-from planner.truth.hits import record_poses
 from tests.support.outside import HAMMER, make_cell
 
 

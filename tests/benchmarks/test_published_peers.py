@@ -19,6 +19,8 @@ import pytest
 
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
+from planner.proof.deviation import Deviation
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
 from planner.surrogate.models.likelihood_gp import (
     NARGP,
@@ -28,8 +30,6 @@ from planner.surrogate.models.likelihood_gp import (
     fit_nargp,
     perdikaris,
 )
-from planner.truth.deviation import Deviation
-from planner.truth.load import load_truth
 from tests.support import published_peers
 from tests.support.fusion_problems import PROBLEMS, Design, Problem, design
 from tests.support.nargp_levels import fit_low

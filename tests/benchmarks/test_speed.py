@@ -8,9 +8,9 @@ from planner.campaign.config import load_campaign_config
 from planner.demo import shipped
 from planner.dynamics.gradient import Inertias, laplace, motion_slopes, moved, response
 from planner.dynamics.simulation import Elasticity, Simulation
+from planner.proof.arms import KR10
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import inertia_basis
-from planner.truth.arms import KR10
 from tests.support.direct_solution import direct_accelerance
 from tests.support.timing import seconds
 

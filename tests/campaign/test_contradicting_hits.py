@@ -9,9 +9,10 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.design.stopping import Forecast
+from planner.proof.hits import simulate_hit
+from planner.proof.recordings import record_poses, write_uff
 from planner.recording.read import read
 from planner.recording.records import TimeRecord
-from planner.truth.hits import record_poses, simulate_hit, write_uff
 from tests.support.outside import HAMMER, call, make_cell, told
 
 

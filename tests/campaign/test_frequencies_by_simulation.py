@@ -7,10 +7,10 @@ from planner.campaign.frequencies_by_simulation import tuned_frequencies
 from planner.dynamics.simulation import Simulation
 from planner.frf.estimator import estimate
 from planner.measurement.nuisances import Tolerances
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer
-from planner.truth.load import load_truth
 from tests.support.arm_with_points import poses, write_arm
 from tests.support.true_modes import hits_at
 

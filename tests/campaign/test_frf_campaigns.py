@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.truth.arms import ARMS
+from planner.proof.arms import ARMS
 from tests.support.frf_campaigns import LACKING, FrfScore, make
 
 CAMPAIGNS, POSES = int(os.environ.get("CAMPAIGNS", "50")), 5

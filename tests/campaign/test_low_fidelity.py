@@ -17,11 +17,11 @@ from planner.fit.structure import exported
 from planner.fit.write_robot import updated_toml
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
+from planner.proof.deviation import AttachedResonator, Deviation
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from planner.truth.deviation import AttachedResonator, Deviation
-from planner.truth.hits import Hammer
-from planner.truth.load import load_truth
 from tests.support.arm_with_points import poses, write_arm
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
 from tests.support.true_modes import hits_at

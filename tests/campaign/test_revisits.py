@@ -18,9 +18,9 @@ from planner.campaign.events import (
 )
 from planner.campaign.import_checks import hit_again, suspected_drift
 from planner.campaign.state import CampaignState, Measurement, fold
+from planner.proof.deviation import Deviation
+from planner.proof.load import load_truth
 from planner.recording.joints import JointUnits
-from planner.truth.deviation import Deviation
-from planner.truth.load import load_truth
 from tests.support.outside import record, told
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 

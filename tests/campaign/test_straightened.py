@@ -6,12 +6,13 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.dataset.store import Store
 from planner.dynamics.at_force import change_at_force
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import HitVisit, InjectedFaults, frfs, hit_poses, once
-from planner.truth.hits import Hammer, stated, write_recordings
-from planner.truth.laws import Hardening
-from planner.truth.load import load_truth
-from planner.truth.nonlinear import Port
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import HitVisit, InjectedFaults, frfs, hit_poses, once
+from planner.proof.hits import Hammer
+from planner.proof.laws import Hardening
+from planner.proof.load import load_truth
+from planner.proof.nonlinear import Port
+from planner.proof.recordings import stated, write_recordings
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 BAND_HZ = (3.0, 60.0)
@@ -40,7 +41,7 @@ def struck(tmp_path_factory):
     injected = InjectedFaults(deviation, (Port(LAW, joint="joint_2"),))
     shots = [(f"+{axis}", level) for axis in "xyz" for level in LEVELS]
     (hits,) = hit_poses(truth, injected, [HitVisit(MEASURED, shots)], HAMMER, rng)
-    rows = [("P0", stated(MEASURED, ()), k, hit) for k, hit in enumerate(hits)]
+    rows = [("P0", stated(MEASURED, ()), hits)]
     write_recordings(root / "hits", truth.joint_names, rows, HAMMER, "SIMULATED")
     robot.write_text(robot.read_text() + TABLE)
     Campaign.new(root / "cell", robot, plain_campaign(root / "plan" / "campaign.toml"))

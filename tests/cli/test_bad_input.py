@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
-from planner.truth.hits import simulate_hit
+from planner.proof.hits import simulate_hit
 from tests.support.bad_input import (
     WRITERS,
     bad_columns,

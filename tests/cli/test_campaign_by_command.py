@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
 from planner.report.springs import with_exponent
 from planner.surrogate.frequency_models import MODELS
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
 from tests.support.outside import call, make_cell, record, told
 from tests.support.robots import JOINTS_DEG
 

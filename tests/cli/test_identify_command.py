@@ -10,10 +10,10 @@ import pytest
 from planner.dataset.dataset import Dataset
 from planner.dynamics.simulation import Simulation
 from planner.measurement.agreement import fit_similarity
+from planner.proof.deviation import Deviation
+from planner.proof.load import load_truth
+from planner.proof.recordings import record_poses
 from planner.robot.robot import Robot
-from planner.truth.deviation import Deviation
-from planner.truth.hits import record_poses
-from planner.truth.load import load_truth
 from tests.support.outside import HAMMER, call, told
 from tests.support.rerun_columns import columns_of
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm

@@ -4,9 +4,9 @@ import json
 
 import numpy as np
 import pytest
-import pyuff
 
 from planner.modal.mac import mac
+from planner.proof.recordings import uff_channel, write_sets
 from tests.support.outside import call
 from tests.support.rerun_columns import lines_of
 from tests.support.running import response
@@ -28,21 +28,11 @@ def record(structure, tmp_path_factory):
     t = np.arange(values.shape[1]) / RATE_HZ
     values += np.std(values, axis=1, keepdims=True) * np.sin(2 * np.pi * TONE_HZ * t)
     path = tmp_path_factory.mktemp("operating") / "running.uff"
-    for number, (point, samples) in enumerate(zip(POINTS, values, strict=True)):
-        turned = -1 if number == 2 else 1
-        pyuff.UFF(str(path)).write_sets(
-            [
-                {
-                    "type": 58, "binary": 1, "func_type": 1, "id1": "simulated",
-                    "rsp_node": structure.nodes[point], "rsp_dir": 3 * turned, "ref_node": 0,
-                    "ref_dir": 0, "data": turned * samples, "x": t, "abscissa_spacing": 1,
-                    "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 12,
-                    "ordinate_axis_units_lab": "m/s^2", "orddenom_spec_data_type": 0,
-                }
-            ],
-            "add",
-        )  # fmt: skip
-    return path
+    signs = (1, 1, -1, *[1] * len(POINTS))
+    return write_sets(path, (
+        uff_channel(sign * samples, RATE_HZ, (structure.nodes[point], 3 * sign), (0, 0))
+        for sign, point, samples in zip(signs, POINTS, values, strict=False)
+    ))  # fmt: skip
 
 
 def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path):

@@ -7,9 +7,10 @@ import shutil
 import numpy as np
 import pytest
 
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer, record_poses, write_predict
-from planner.truth.load import load_truth
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.recordings import record_poses, write_predict
 from tests.support.outside import call, said, told
 from tests.support.rails import RAIL_BOX, make_sliding, sliding_campaign
 

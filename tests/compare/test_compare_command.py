@@ -168,8 +168,8 @@ def test_a_run_is_the_campaign_s(bench):
 
 
 def test_the_pool_is_judged_by_its_own_modes(bench, pool):
-    from planner.truth.deviation import Deviation
-    from planner.truth.load import load_truth
+    from planner.proof.deviation import Deviation
+    from planner.proof.load import load_truth
 
     truth = load_truth(pool[1], Deviation(4, 0.15, 0.1, 0.04, 0.003))
     right = np.array([truth.modes(q, 3)[0] for q in bench.q])

@@ -11,10 +11,11 @@ import os
 import numpy as np
 import pytest
 
-from planner.truth.arms import KR10
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer, record_poses
-from planner.truth.load import load_truth
+from planner.proof.arms import KR10
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.recordings import record_poses
 from tests.support.outside import planner
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(7200)]

@@ -2,17 +2,16 @@
 the end of each record cuts off, which fits have in their model."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
-from planner.recording.records import Hit
+from planner.proof.hits import AXES, simulate_hit
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
-from planner.truth.hits import AXES, simulate_hit
-from planner.truth.load import load_truth
+from planner.studies.hits import as_read
 from tests.support.fitted_cases import drawn_arm, limits
 
 POSES = 2
@@ -25,12 +24,8 @@ def test_perfect_hits_give_the_true_frfs(name, tmp_path):
     low, high = limits(arm, Simulation(Robot.load(arm.toml)))
     hammer = replace(arm.hammer, noise=0.0, force_noise=0.0)
     for q in rng.uniform(low, high, (POSES, len(low))):
-        hits = tuple(
-            Hit(Path("hit"), h.axis, hammer.sampling_rate_hz, h.force_n, h.acceleration_m_s2,
-                simulated=True)
-            for h in (simulate_hit(truth, q, f"+{axis}", hammer, rng) for axis in AXES)
-        )  # fmt: skip
-        frf = MeasuredPose((), arm.band_hz, given=hits).frf.within(arm.band_hz)
+        hits = [simulate_hit(truth, q, f"+{axis}", hammer, rng) for axis in AXES]
+        frf = MeasuredPose((), arm.band_hz, given=as_read(hits, hammer)).frf.within(arm.band_hz)
         s = 2j * np.pi * frf.frequency_hz + frf.exponential_rate_1_s
         poles, residues, _ = truth.poles(q)
         each = 1 / (s - poles[:, None])

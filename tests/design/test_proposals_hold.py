@@ -9,11 +9,11 @@ import pytest
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import CampaignConfig
+from planner.proof.arms import IRB6640, KR10, KR210
+from planner.proof.inverse import joint_angles, tool_rotation
+from planner.proof.load import load_truth
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import solve
-from planner.truth.arms import IRB6640, KR10, KR210
-from planner.truth.inverse import joint_angles, tool_rotation
-from planner.truth.load import load_truth
 from tests.support.robots import JOINTS_DEG, make_arm
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1500)]

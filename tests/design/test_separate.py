@@ -21,13 +21,13 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.search import SEARCHED, Search
 from planner.fit.structure import RobotStructure
 from planner.frf.frf import Frf
+from planner.proof.deviation import Deviation, soft_floor
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.load import load_truth
 from tests.support.arm_with_points import poses, write_arm
 
 LINES = np.linspace(5.0, 80.0, 64)
-SOFT = tuple(Spring("base", axis, 6e6, 2e3) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+SOFT = soft_floor(6e6, 6e6, 2e3 / 6e6)
 PLACES = {"soft_base at base": ("base_compliance", "base"),
           "transverse_compliance at joint_1": ("transverse_compliance", "joint_1")}  # fmt: skip
 

@@ -15,9 +15,9 @@ import pytest
 
 from planner import Dataset, Robot, diagnose
 from planner.fit.search import MOST
-from planner.truth.deviation import Deviation
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY, LABORATORY
+from planner.proof.deviation import Deviation
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY, LABORATORY
 from tests.support import small_cases as cases
 from tests.support.outside import call, told
 from tests.support.small_cases import CONCEALED, SCATTER, SmallCase, small_case

@@ -3,7 +3,6 @@
 `pytest -m slow tests/diagnosis/test_found_laws.py` takes two more robots.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +11,13 @@ import pytest
 from planner import diagnose
 from planner.dynamics.at_force import change_at_force
 from planner.dynamics.simulation import Simulation
+from planner.proof.arms import in_a_cell
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import InjectedFaults, frfs, once
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.nonlinear import Port
 from planner.robot.robot import Robot
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import InjectedFaults, frfs, once
-from planner.truth.hits import Hammer
-from planner.truth.load import load_truth
-from planner.truth.nonlinear import Port
 from tests.diagnosis.test_levels import made
 
 LEVELS = (0.25, 4.0)  # of the middling force; recorded were 0.4, 1 and 2.5
@@ -40,11 +38,10 @@ def test_a_law_is_written_and_predicts_other_poses_and_forces(tmp_path: Path, se
         load_truth(robot.path, deviation),
         InjectedFaults(deviation, (Port(law, "joint_2"),)),
     )
-    arm = replace(ARMS["kr10"], damping_s=DAMPING_S)
-    low, high = np.deg2rad(np.array(arm.joints_deg)).T
-    q = np.random.default_rng([seed, 99]).uniform(low, high, (2, 6))
+    arm = in_a_cell("kr10")
+    q = arm.drawn(2, np.random.default_rng([seed, 99]))
     for level in LEVELS:
-        peak = level * PEAK_N["kr10"]
+        peak = level * arm.peak_n
         hammer = Hammer(peak, 0.008, noise=0, force_noise=0, record_s=5.12)
         hertz, true = frfs(truth, injected, [once(row, peak) for row in q], hammer, arm.band_hz)
         linear = read.accelerance(q, hertz)

@@ -22,18 +22,17 @@ from planner.fit.misfit import FrfMisfit
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior, RobotStructure
 from planner.measurement.nuisances import Tolerances
-from planner.recording.records import Hit
+from planner.proof.arms import in_a_cell
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses
+from planner.proof.hits import AXES, Hammer
+from planner.proof.laws import Backlash, Friction, Hardening, JointLaw, QuadraticDamping
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY
+from planner.proof.nonlinear import Port
+from planner.proof.scene import Scene
 from planner.robot.robot import Robot
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import AXES, Hammer
-from planner.truth.laws import Backlash, Friction, Hardening, JointLaw, QuadraticDamping
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY
-from planner.truth.nonlinear import Port
-from planner.truth.scene import Scene
+from planner.studies.hits import as_read
 
 Made = tuple[Robot, Dataset, JointLaw | None]
 POSES, LEVELS = 4, (0.4, 1.0, 2.5)
@@ -56,13 +55,12 @@ def made(
     count: int = POSES,
 ) -> Made:
     """A robot whose springs and bodies are not quite as stated, hit by hand; its law, if any."""
-    rng, peak_n = np.random.default_rng(seed), PEAK_N["kr10"]
-    arm = replace(ARMS["kr10"], damping_s=DAMPING_S)
+    rng, arm = np.random.default_rng(seed), in_a_cell("kr10")
     toml = arm.write(folder / "robot", 1)
     deviation = Deviation(seed, stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)
-    truth, (low, high) = load_truth(toml, deviation), np.deg2rad(np.array(arm.joints_deg)).T
-    poses, hammer = rng.uniform(low, high, (count, 6)), Hammer(peak_n, 0.008, noise=0.01)
-    scene = Scene(arm, truth, 1, poses, peak_n)
+    truth, peak_n = load_truth(toml, deviation), arm.peak_n
+    poses, hammer = arm.drawn(count, rng), Hammer(peak_n, 0.008, noise=0.01)
+    scene = Scene(arm, truth, 1, poses, peak_n, InjectedFaults(deviation), rng)
     bends = LAWS[law](scene.stiffness(joint), scene.angle(joint)) if law else None
     ports = (Port(bends, joint=joint),) if bends else ()
     injected = InjectedFaults(deviation, ports, chain=EVERYDAY.chain(rng))
@@ -70,15 +68,11 @@ def made(
     axes = [AXES.index(axis[1]) for axis, _ in shots]
     planned = [HitVisit(q, shots, i / count, EVERYDAY.aims(axes, rng)) for i, q in enumerate(poses)]
     visits = [
-        Visit(
-            f"P{i}", q, i / count,
-            tuple(Hit(Path("hit"), h.axis, hammer.sampling_rate_hz, h.force_n, h.acceleration_m_s2)
-                  for h in hits),
-        )
+        Visit(f"P{i}", q, i / count, as_read(hits, hammer))
         for i, (q, hits) in enumerate(
             zip(poses, hit_poses(truth, injected, planned, hammer, rng), strict=True)
         )
-    ]  # fmt: skip
+    ]
     robot = Robot.load(toml)
     return robot, Dataset.of_visits(visits, robot.config.band_hz), bends
 

@@ -1,7 +1,7 @@
 """Joints that are not linear, against their time integration by an independent engine."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +14,16 @@ from planner.dynamics.at_force import (
     modes_at_force,
 )
 from planner.dynamics.simulation import Simulation
+from planner.proof.arms import KR10, in_a_cell
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.laws import Backlash, Friction, Hardening, JointLaw
+from planner.proof.load import load_truth
+from planner.proof.nonlinear import HitPose, Port, respond
+from planner.proof.scene import Scene
 from planner.robot.robot import Robot
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N
-from planner.truth.deviation import Deviation
-from planner.truth.laws import Backlash, Friction, Hardening, JointLaw
-from planner.truth.load import load_truth
-from planner.truth.nonlinear import HitPose, Port, respond
-from planner.truth.scene import Scene
 
-JOINT, PEAK, RATE_HZ, RECORD_S = "joint_2", PEAK_N["kr10"], 6400.0, 5.12
+JOINT, PEAK, RATE_HZ, RECORD_S = "joint_2", KR10.peak_n, 6400.0, 5.12
 EXACT = Deviation(0, stiffness=0, damping=0, inertia=0, com_m=0)
 # Of a joint's stiffness and its angle under a middling hit.
 LAWS: dict[str, Callable[[float, float], JointLaw]] = {
@@ -45,12 +45,10 @@ class Bent:
 
     @classmethod
     def of(cls, kind: str, folder: Path) -> "Bent":
-        arm = replace(ARMS["kr10"], damping_s=DAMPING_S)
-        toml = arm.write(folder, 1)
-        low, high = np.deg2rad(np.array(arm.joints_deg)).T
-        q = np.random.default_rng(3).uniform(low, high, (1, 6))
+        arm, rng = in_a_cell("kr10"), np.random.default_rng(3)
+        toml, q = arm.write(folder, 1), arm.drawn(1, rng)
         truth = load_truth(toml, EXACT)
-        scene = Scene(arm, truth, 1, q, PEAK)
+        scene = Scene(arm, truth, 1, q, PEAK, InjectedFaults(EXACT), rng)
         law = LAWS[kind](scene.stiffness(JOINT), scene.angle(JOINT))
         size, second = (abs(v) for v in vars(law).values())
         bend = "coulomb_torque_n_m" if kind == "friction" else "angle_rad"

@@ -7,8 +7,8 @@ import pytest
 
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
+from planner.proof.arms import KR10
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
 from tests.support.direct_solution import direct_accelerance
 from tests.support.pendulums import pendulum_urdf
 

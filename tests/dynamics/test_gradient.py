@@ -13,9 +13,9 @@ from planner.dynamics.gradient import (
     response,
 )
 from planner.dynamics.simulation import Simulation
+from planner.proof.arms import KR10
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import inertia_basis
-from planner.truth.arms import KR10
 
 LINES = np.linspace(6, 180, 25)
 STEP = 1e-5

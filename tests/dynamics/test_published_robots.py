@@ -10,9 +10,9 @@ from planner.campaign.config import load_campaign_config
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
 from planner.frf.metrics import agreement
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
-from planner.truth.load import load_truth
 
 ROBOTS = [
     ("kr240_busch2020", "robot"), ("kr240_busch2020", "robot_b"), ("kr240_busch2022", "robot"),

@@ -8,8 +8,8 @@ from planner.effects.parameters import Priors
 from planner.effects.table import EffectLibrary
 from planner.fit.inertias import BodyNumbers, pseudo_inertia
 from planner.fit.structure import RobotPrior, RobotStructure
+from planner.proof.arms import KR10
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
 
 
 @pytest.fixture(scope="module")

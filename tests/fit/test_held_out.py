@@ -13,10 +13,10 @@ from planner.effects.parameters import Priors
 from planner.errors import InputError
 from planner.fit.held_out import identify_judged, set_aside
 from planner.measurement.agreement import fit_similarity
+from planner.proof.arms import KR10
+from planner.proof.deviation import Deviation
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
-from planner.truth.deviation import Deviation
-from planner.truth.load import load_truth
 from tests.support.measured_frfs import measured_frfs
 
 

@@ -20,11 +20,11 @@ from planner.measurement.nuisances import (
     basis,
 )
 from planner.modal.residues import Residues, laplace, residue_changes, synthesize
+from planner.proof.arms import KR10
+from planner.proof.deviation import Deviation
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import HitError, MeasurementErrors
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
-from planner.truth.deviation import Deviation
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import HitError, MeasurementErrors
 from tests.support.measured_frfs import measured_frfs
 
 LINES = np.linspace(6.0, 60.0, 48)
@@ -44,10 +44,10 @@ class Handled:
         self.truth = replace(truth, sensor_offset_m=self.chain.offset_m)
 
     def accelerance(self, q, hz):
-        off = np.deg2rad(self.handling.readback_deg) * self.rng.standard_normal(len(q))
+        there = self.handling.beside(q, self.rng)
         aims = self.handling.aims([0, 1, 2], self.rng)
         h = np.stack(
-            [struck(self.truth, q + off, a.wrench(k), hz) for k, a in enumerate(aims)], axis=1
+            [struck(self.truth, there, a.wrench(k), hz) for k, a in enumerate(aims)], axis=1
         )
         late = np.exp(-2j * np.pi * hz * self.chain.delay_s)
         return np.einsum("ij,jkf->ikf", self.chain.matrix, h) * late / self.chain.force_gain

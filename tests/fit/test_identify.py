@@ -16,13 +16,13 @@ from planner.fit.write_robot import updated_toml
 from planner.frf.estimator import estimate
 from planner.measurement.agreement import fit_similarity
 from planner.measurement.nuisances import EXACT_HITS, Tolerances
+from planner.proof.arms import KR10
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer, simulate_hit
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer, simulate_hit
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
 from tests.support.measured_frfs import measured_frfs
 from tests.support.plain_arm import make_plain_arm
 

@@ -8,9 +8,9 @@ from planner.effects.parameters import Priors, parametrise
 from planner.errors import InputError
 from planner.fit.identify import identify
 from planner.measurement.nuisances import EXACT_HITS
+from planner.proof.arms import KR10
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
-from planner.truth.load import load_truth
 from tests.support.measured_frfs import measured_frfs
 
 

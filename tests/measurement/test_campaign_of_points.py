@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.fault_injection import InjectedFaults
-from planner.truth.measurement_errors import EVERYDAY
-from planner.truth.model import Truth
+from planner.proof.deviation import Deviation, soft_floor
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.measurement_errors import EVERYDAY
+from planner.proof.model import Truth
 from tests.support.arm_with_points import poses, record, write_arm
 
 PLAN = "[workspace]\njoints_deg = [[-60, 60], [-40, 30], [20, 100], [-50, 50]]\n"
 PLAN += "[modes]\ncount = 3\nband_hz = [4.0, 80.0]\n"
-SOFT_FLOOR = tuple(Spring("base", axis, 1.1e6, 330.0) for axis in ((1.0, 0, 0), (0, 1.0, 0)))
+SOFT_FLOOR = soft_floor(1.1e6, 1.1e6)
 
 
 def measured(folder: Path) -> tuple[Campaign, Truth]:

@@ -14,11 +14,11 @@ from planner.fit.identify import identify
 from planner.frf.frf import Frf
 from planner.measurement.measured_frfs import matrices_at
 from planner.measurement.nuisances import Tolerances
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.load import load_truth
 from planner.recording.points import Layout
 from planner.robot.robot import Robot
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.fault_injection import InjectedFaults
-from planner.truth.load import load_truth
 from tests.support.arm_with_points import poses, record, write_arm
 
 HZ = np.linspace(6.0, 80.0, 30)

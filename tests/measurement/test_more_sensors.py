@@ -22,23 +22,24 @@ from planner.dataset.dataset import Dataset
 from planner.diagnosis.diagnose import PRIORS
 from planner.dynamics.simulation import Simulation
 from planner.effects.table import EffectLibrary, diagnosed
-from planner.proof.refit import detectability
-from planner.recording.points import SENSOR
-from planner.robot.robot import Robot
-from planner.truth.cases import SCATTER
-from planner.truth.detectability import ScoredCase, detection_problem
-from planner.truth.deviation import (
+from planner.proof.cases import SCATTER
+from planner.proof.detectability import ScoredCase, detection_problem
+from planner.proof.deviation import (
     AttachedResonator,
     BentLink,
     Deviation,
     Spring,
     StiffnessRipple,
 )
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses, quiet_hits
-from planner.truth.hits import Hammer, write_recordings
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY
-from planner.truth.scene import log_uniform, some_direction, triple
+from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses, quiet_hits
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY
+from planner.proof.recordings import write_recordings
+from planner.proof.refit import detectability
+from planner.proof.scene import log_uniform, some_direction, triple
+from planner.recording.points import SENSOR
+from planner.robot.robot import Robot
 from tests.support.arm_with_points import (
     AXES,
     BAND_HZ,
@@ -118,7 +119,7 @@ def _with(
         beam = BentLink(f"l{number + 1}", _pair(rng, 0.5 * k, 25 * k), 15 * k, DAMPING_S)
         return ("link_flexibility", f"link_{number + 1}"), replace(robot, beams=(beam,))
     moving = sum(mass for mass, *_ in MASSES)
-    at = rng.uniform(0.3, 1.0) * np.array(STEPS[number + 1].split(), dtype=float)
+    at = rng.uniform(0.3, 1.0) * np.array(STEPS[number + 1], dtype=float)
     hose = AttachedResonator(
         f"l{number + 1}", triple(at), triple(some_direction(rng)),
         moving * log_uniform(rng, 0.005, 0.08), log_uniform(rng, 10.0, 50.0),
@@ -144,17 +145,14 @@ def make(kind: str, seed: int, folder: Path) -> tuple[Place, float]:
     stated, visits = poses(POSES, int(rng.integers(2**31))), []
     for number, q in enumerate(stated):
         aims = EVERYDAY.aims([0, 1, 2], rng, common)
-        there = q + np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(4)
+        there = EVERYDAY.beside(q, rng)
         visits.append(HitVisit(there, shots, number / POSES, aims, "tcp", SENSORS))
     hammer = Hammer(peak_n=250.0, noise=float(rng.uniform(0.004, 0.02)))
     quiet = quiet_hits(truth, injected, visits, hammer, np.random.default_rng(seed))
     hammer = EVERYDAY.floor(hammer, [hit for hits in quiet for hit in hits], rng)
     found = hit_poses(truth, injected, visits, hammer, np.random.default_rng(seed))
-    rows = [
-        (f"P{i}", np.rad2deg(q), 1, hit)
-        for i, (q, hits) in enumerate(zip(stated, found, strict=True), 1)
-        for hit in hits
-    ]
+    pairs = enumerate(zip(stated, found, strict=True), 1)
+    rows = [(f"P{i}", np.rad2deg(q), hits) for i, (q, hits) in pairs]
     write_recordings(folder / "hits", truth.joint_names, rows, hammer, truth.description, NODES)
     return drawn.place, _told_by_the_tool(toml, (injected, plain), visits, hammer)
 

@@ -8,9 +8,9 @@ import pytest
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.measurement.point_places import misplaced, misplaced_questions
+from planner.proof.load import load_truth
 from planner.recording.points import Layout
 from planner.robot.robot import Robot
-from planner.truth.load import load_truth
 from tests.support.arm_with_points import poses, write_arm
 
 HZ, BAND = np.linspace(6.0, 80.0, 150), (6.0, 80.0)

@@ -9,10 +9,10 @@ import pytest
 from planner.dynamics.simulation import Simulation
 from planner.measurement.sensor_loading import unloaded
 from planner.modal.modes import Mode
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import InjectedFaults
-from planner.truth.load import load_truth
 from tests.support.arm_with_points import poses, record, write_arm
 from tests.support.outside import told
 

@@ -30,10 +30,10 @@ from planner.milling.cutter_frf import of_accelerance
 from planner.milling.lobes import depths_of, stability_limits
 from planner.milling.structure import of_frf
 from planner.modal.estimate_modes import estimate_modes
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
 from tests.support.plain_arm import JOINTS_DEG, make_plain_arm
 from tests.support.true_modes import hits_at
 

@@ -22,13 +22,14 @@ from planner.milling.cutter_frf import of_accelerance
 from planner.milling.lobes import depths_of, sampled_limits, stability_limits
 from planner.milling.structure import of_frf
 from planner.milling.tool import load_tool
-from planner.truth.arms import KR210
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import Hammer, write_recordings
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import MeasurementErrors
-from planner.truth.model import Truth
+from planner.proof.arms import KR210
+from planner.proof.deviation import Deviation, soft_floor
+from planner.proof.fault_injection import InjectedFaults, hand_visits, hit_poses
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import MeasurementErrors
+from planner.proof.model import Truth
+from planner.proof.recordings import write_recordings
 from tests.support.milling_cases import cut
 
 SEED, ROBOTS = 401, 10
@@ -83,26 +84,17 @@ def concealed(folder: Path, seed: int) -> tuple[Path, Deviation]:
     """robot.toml with two springs a joint; the truth is off in all numbers, on a soft floor."""
     robot = KR210.write(folder / "robot", 2)
     stiffness = 25 * max(KR210.torsion)
-    floor = tuple(
-        Spring("base", axis, stiffness, 3e-4 * stiffness) for axis in ((1.0, 0, 0), (0, 1.0, 0))
-    )
+    floor = soft_floor(stiffness, stiffness)
     return robot, Deviation(seed, 0.2, 0.2, 0.05, 0.005, extra=floor)
 
 
 def hit(truth: Truth, deviation: Deviation, q: np.ndarray, folder: Path, seed: int) -> None:
     """Recordings of REPEATS hits an axis at poses P0, P1, … (n, 6)."""
-    rng, axes = np.random.default_rng(seed), [axis for axis in range(3) for _ in range(REPEATS)]
+    rng = np.random.default_rng(seed)
     injected = InjectedFaults(deviation, chain=AS_STATED.chain(rng))
-    shots = [(f"+{'xyz'[axis]}", HAMMER.peak_n) for axis in axes]
-    visits = []
-    for one in q:
-        there = one + np.deg2rad(AS_STATED.readback_deg) * rng.standard_normal(len(one))
-        visits.append(HitVisit(there, shots, aims=AS_STATED.aims(axes, rng)))
-    found = hit_poses(truth, injected, visits, HAMMER, rng)
-    rows = [
-        (f"P{i}", np.rad2deg(q[i]), 1 + number % REPEATS, one)
-        for i, hits in enumerate(found) for number, one in enumerate(hits)
-    ]  # fmt: skip
+    shots = [(f"+{axis}", HAMMER.peak_n) for axis in "xyz" for _ in range(REPEATS)]
+    found = hit_poses(truth, injected, hand_visits(AS_STATED, q, shots, rng), HAMMER, rng)
+    rows = [(f"P{i}", np.rad2deg(q[i]), hits) for i, hits in enumerate(found)]
     write_recordings(folder, truth.joint_names, rows, HAMMER, truth.description)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planner.cli.run import run
-from planner.truth.arms import KR10
+from planner.proof.arms import KR10
 from tests.support.rerun_columns import lines_of
 
 CUT = """

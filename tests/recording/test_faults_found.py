@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.proof.deviation import Deviation
+from planner.proof.hits import AXES, Hammer, largest_rms, noisy, pulse, sampled
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
 from planner.recording.records import Hit
 from planner.recording.repeats import screen_repeats
 from planner.recording.screening import screen
-from planner.truth.deviation import Deviation
-from planner.truth.hits import AXES, Hammer, largest_rms, noisy, pulse, sampled
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
 from tests.support.robots import JOINTS_DEG, make_arm
 
 REPEATS = 4

@@ -17,9 +17,10 @@ from planner.campaign.journal import Journal
 from planner.dataset.screened_files import Source, read_files
 from planner.errors import PlannerError, RefusedError
 from planner.frf.exported import from_records
+from planner.proof.hits import Hammer, SimulatedHit
+from planner.proof.recordings import write_uff
 from planner.recording.folder import read_poses, read_recordings
 from planner.robot.robot import Robot
-from planner.truth.hits import Hammer, SimulatedHit, write_uff
 from tests.support.bad_input import columns, write_csv, write_h5, write_mat, write_tdms
 from tests.support.containers import MANY_HITS, ONE_HIT
 from tests.support.outside import call, make_cell

@@ -23,7 +23,7 @@ from tests.support.rails import GANTRY, GANTRY_BOX, make_sliding, sliding_campai
 from tests.support.rerun_frames import Frames
 
 STANDS = (1200.0, 30.0, -10.0)
-TIP = "0 0.03 -0.25"
+TIP = (0, 0.03, -0.25)
 
 
 def test_the_screen_shows_the_place_on_the_rail(tmp_path):

@@ -5,11 +5,11 @@ import pytest
 
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
+from planner.proof.arms import ARMS
+from planner.proof.deviation import AttachedMass, AttachedResonator, Deviation, Spring
+from planner.proof.load import load_truth
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import inertia_basis
-from planner.truth.arms import ARMS
-from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, Spring
-from planner.truth.load import load_truth
 
 LINES = np.linspace(4.0, 60.0, 40)
 BALL = "inertia_kg_m2 = [3e-3, 0, 0, 3e-3, 0, 3e-3]\n"

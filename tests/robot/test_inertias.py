@@ -8,11 +8,11 @@ import pinocchio as pin
 import pytest
 
 from planner.errors import InputError
+from planner.proof.arms import ARMS
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
 from planner.robot.urdf_inertias import urdf_with_inertias
 from planner.robot.virtual_joints import _halves, virtual_model
-from planner.truth.arms import ARMS
 from tests.support.plain_arm import make_plain_arm
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from planner.proof.arms import ARMS
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import solve
 from planner.robot.robot import Robot
-from planner.truth.arms import ARMS
 from tests.support.robots import make_arm
 
 TARGETS = 60

@@ -6,10 +6,10 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from planner.proof.arms import KR10
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.place_names import axes_in_the_room
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
 from tests.support.plain_arm import make_plain_arm
 
 

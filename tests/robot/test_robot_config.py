@@ -9,9 +9,9 @@ from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
 from planner.errors import InputError
 from planner.measurement.nuisances import Tolerances
+from planner.proof.arms import KR10
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
-from planner.truth.arms import KR10
 from tests.support.robots import make_arm
 
 LIMIT = '<limit lower="0.5" upper="0.5" velocity="1" effort="0"/>'

@@ -7,16 +7,16 @@ import pytest
 
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
+from planner.proof.load import load_truth
 from planner.recording.folder import read_poses
 from planner.recording.joints import JointUnits
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import solve
 from planner.robot.robot import Robot
-from planner.truth.load import load_truth
 from tests.support.rails import GANTRY, GANTRY_BOX, RAIL_ARM, RAIL_BOX, make_sliding
 
-TIP = "0 0.03 -0.25"
-KINDS = {"rail": (RAIL_ARM, RAIL_BOX, "0.4 0.04 0.05"), "gantry": (GANTRY, GANTRY_BOX, TIP)}
+TIP = (0, 0.03, -0.25)
+KINDS = {"rail": (RAIL_ARM, RAIL_BOX, (0.4, 0.04, 0.05)), "gantry": (GANTRY, GANTRY_BOX, TIP)}
 LINES = np.linspace(3.0, 60.0, 40)
 
 

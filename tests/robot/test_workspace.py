@@ -6,10 +6,10 @@ from scipy.stats import qmc
 
 from planner.campaign.config import WorkspaceTable
 from planner.errors import InputError, NoPoseLeftError
+from planner.proof.arms import KR10, KR210
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
-from planner.truth.arms import KR10, KR210
 from tests.support.robots import JOINTS_DEG, make_arm
 
 DOWN = (0.0, 0.0, -1.0)

@@ -13,12 +13,13 @@ from rerun.chunk import RrdReader
 
 from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
+from planner.proof.hits import simulate_hit
+from planner.proof.recordings import write_uff
 from planner.recording.folder import TABLE
 from planner.replay import replay
 from planner.report.rerun.event_logger import EventLogger
 from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
 from planner.session.session_state import RerunQueue
-from planner.truth.hits import simulate_hit, write_uff
 from tests.support.hit_csv import write_csv
 from tests.support.outside import FROZEN, HAMMER, record
 

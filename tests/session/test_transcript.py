@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from planner.campaign.campaign import Campaign
-from planner.truth.hits import AXES, SimulatedHit, noisy, pulse, sampled, simulate_hit, write_uff
-from planner.truth.model import Truth
+from planner.proof.hits import AXES, SimulatedHit, noisy, pulse, sampled, simulate_hit
+from planner.proof.model import Truth
+from planner.proof.recordings import write_uff
 from tests.support.outside import HAMMER, PLANNER
 
 ROWS, COLUMNS = 24, 80

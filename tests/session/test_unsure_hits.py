@@ -10,10 +10,11 @@ import pytest
 
 from planner.dataset.screened_files import Source, read_files
 from planner.frf.estimator import estimate
+from planner.proof.hits import simulate_hit
+from planner.proof.recordings import write_uff
 from planner.recording.points import PointNames
 from planner.session.hit_verdicts import Before, Verdicts
 from planner.session.inbox import Inbox
-from planner.truth.hits import simulate_hit, write_uff
 from tests.support.hit_csv import write_csv
 from tests.support.outside import HAMMER, make_cell
 from tests.support.robots import BAND_HZ

@@ -12,10 +12,10 @@ import pytest
 from planner.effects.parameters import parametrise
 from planner.errors import InputError
 from planner.progress import no_progress
+from planner.proof.arms import KR210
+from planner.proof.load import load_truth
 from planner.studies import registry
 from planner.studies.run import run_study
-from planner.truth.arms import KR210
-from planner.truth.load import load_truth
 from tests.support.studied import part
 
 busch2022, busch2020, seyed, lei, birk = (part(name, "data") for name in registry.NAMES)

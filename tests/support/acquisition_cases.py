@@ -18,10 +18,10 @@ from planner.campaign.straightened import hits_unknown
 from planner.frf.frf import Frf
 from planner.frf.metrics import agreement
 from planner.modal.modes import Mode
-from planner.truth.arms import IRB6640, KR10, KR210
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
+from planner.proof.arms import IRB6640, KR10, KR210
+from planner.proof.deviation import Deviation, soft_floor
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
 
 ROBOTS = {"KR10": KR10, "IRB 6640": IRB6640, "KR210": KR210}
 # Robot and what its simulation lacks: the floor's tilts, or transverse tilts of the joints too.
@@ -105,8 +105,7 @@ def make(
     full = arm.write(directory / "full", 2)
     toml = arm.write(directory / "robot", 1) if lacking == "tilts" else full
     soft = 25 * max(arm.torsion)
-    floor = tuple(Spring("base", axis, soft, 3e-4 * soft) for axis in ((1.0, 0, 0), (0, 1.0, 0)))
-    off = Deviation(seed, 0.15, 0.15, 0.04, 0.005, extra=floor if lacking else ())
+    off = Deviation(seed, 0.15, 0.15, 0.04, 0.005, extra=soft_floor(soft, soft) if lacking else ())
     truth = load_truth(full, off)
     table = {
         "robot": str(toml),
@@ -116,8 +115,7 @@ def make(
         "acquisition": {"candidates": CANDIDATES, "hit_axes": axes},
     }
     cell = Cell.load(toml, msgspec.convert(table, CampaignConfig))
-    low, high = np.deg2rad(np.array(arm.joints_deg)).T
-    unused = np.random.default_rng(10_000 + seed).uniform(low, high, (UNUSED, 6))
+    unused = arm.poses(UNUSED, 10_000 + seed)
     lines_hz = np.linspace(*cell.config.modes.band_hz, LINES)
     true_hz = np.array([truth.modes(q, MODES)[0] for q in unused])
     true_frf = np.array([truth.accelerance(q, lines_hz) for q in unused[:OF_FRFS]])

@@ -5,11 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import Hammer, write_recordings
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import LABORATORY, MeasurementErrors
-from planner.truth.model import Truth
+from planner.proof import descriptions
+from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import LABORATORY, MeasurementErrors
+from planner.proof.model import Truth
+from planner.proof.recordings import write_recordings
 
 NODES = {"foot": 11, "shoulder": 12, "elbow": 13, "sensor": 16}
 POINTS = (
@@ -17,52 +19,41 @@ POINTS = (
     ("shoulder", "l1", (0.15, 0.1, 0.15), (0.0, 90.0, 0.0)),
     ("elbow", "l2", (0.0, 0.12, 0.65), (20.0, 0.0, 10.0)),
 )
-AXES, STEPS = ("z", "y", "y", "x"), ("0 0 .3", "0.12 0 .2", "0 0 .7", "0.1 0 .1")
-MASSES = ((60, "0 0 .1", (2, 2, 1.5)), (45, "0 .05 .35", (2.2, 2.2, 0.3)),
-          (30, "0.08 0 .05", (0.5, 0.6, 0.5)), (12, "0.25 0 0", (0.1, 0.5, 0.5)))  # fmt: skip
+AXES = ("z", "y", "y", "x")
+STEPS = ((0, 0, 0.3), (0.12, 0, 0.2), (0, 0, 0.7), (0.1, 0, 0.1))
+MASSES = ((60, (0, 0, 0.1), (2, 2, 1.5)), (45, (0, 0.05, 0.35), (2.2, 2.2, 0.3)),
+          (30, (0.08, 0, 0.05), (0.5, 0.6, 0.5)), (12, (0.25, 0, 0), (0.1, 0.5, 0.5)))  # fmt: skip
 STIFFNESS = (9e5, 7e5, 4e5, 9e4)
 BAND_HZ = 4.0, 90.0
 
 
-def _link(name: str, mass: float, centre: str, moments: tuple[float, ...]) -> str:
-    values = " ".join(f'i{a}{a}="{v}"' for a, v in zip("xyz", moments, strict=True))
-    return (
-        f'<link name="{name}"><inertial><origin xyz="{centre}"/><mass value="{mass}"/>'
-        f'<inertia {values} ixy="0" ixz="0" iyz="0"/></inertial></link>'
-    )
+def _urdf() -> str:
+    parts = [descriptions.link("floor", descriptions.inertial(120, (0, 0, 0.1), (4, 4, 4)))]
+    parent = "floor"
+    for i, (body, axis, step) in enumerate(zip(MASSES, AXES, STEPS, strict=True), 1):
+        parts.append(descriptions.link(f"l{i}", descriptions.inertial(*body)))
+        along = [int(axis == a) for a in "xyz"]
+        parts.append(descriptions.joint(f"a{i}", parent, f"l{i}", step, along, (-2.5, 2.5)))
+        parent = f"l{i}"
+    parts += [descriptions.frame("tcp", parent, (0.5, 0, 0))]
+    parts += [descriptions.frame("sensor", parent, (0.5, 0.03, 0.02))]
+    return descriptions.urdf("arm", parts)
 
 
 def write_arm(folder: Path, more: str = "") -> Path:
     """robot.toml of the arm, beside its URDF; `more` is added to its points."""
-    urdf, parent = _link("floor", 120, "0 0 .1", (4, 4, 4)), "floor"
-    for i, ((mass, centre, moments), axis) in enumerate(zip(MASSES, AXES, strict=True), 1):
-        xyz = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}[axis]
-        urdf += _link(f"l{i}", mass, centre, moments)
-        urdf += (
-            f'<joint name="a{i}" type="revolute"><parent link="{parent}"/><child link="l{i}"/>'
-            f'<origin xyz="{STEPS[i - 1]}"/><axis xyz="{xyz}"/>'
-            f'<limit lower="-2.5" upper="2.5" effort="1" velocity="2"/></joint>'
-        )
-        parent = f"l{i}"
-    for name, xyz in (("tcp", ".5 0 0"), ("sensor", ".5 .03 .02")):
-        urdf += (
-            f'<link name="{name}"/><joint name="{name}_f" type="fixed"><parent link="l4"/>'
-            f'<child link="{name}"/><origin xyz="{xyz}"/></joint>'
-        )
     folder.mkdir(parents=True, exist_ok=True)
-    folder.joinpath("arm.urdf").write_text(f'<robot name="arm">{urdf}</robot>')
-    text = 'name = "arm"\nurdf = "arm.urdf"\ntcp_frame = "tcp"\nsensor_frame = "sensor"\n'
-    text += f"band_hz = {list(BAND_HZ)}\n"
+    folder.joinpath("arm.urdf").write_text(_urdf())
+    lines = descriptions.head("arm", "arm.urdf", "tcp", "sensor", BAND_HZ)
     for i, (axis, k) in enumerate(zip(AXES, STIFFNESS, strict=True), 1):
-        unit = [float(axis == a) for a in "xyz"]
-        text += f'[[compliance]]\njoint = "a{i}"\naxis = {unit}\nstiffness = {k}\n'
-        text += f"damping = {3e-4 * k}\n"
+        along = [float(axis == a) for a in "xyz"]
+        lines.append(descriptions.compliance(f"a{i}", along, k, 3e-4))
     for name, link, place, turned in POINTS:
-        text += f'[[point]]\nname = "{name}"\nlink = "{link}"\nposition_m = {list(place)}\n'
-        text += f"rpy_deg = {list(turned)}\nnode = {NODES[name]}\n"
-    text += f'[[point]]\nname = "sensor"\nnode = {NODES["sensor"]}\n'
+        lines.append(f'[[point]]\nname = "{name}"\nlink = "{link}"\nposition_m = {list(place)}')
+        lines.append(f"rpy_deg = {list(turned)}\nnode = {NODES[name]}")
+    lines.append(f'[[point]]\nname = "sensor"\nnode = {NODES["sensor"]}\n')
     path = folder / "robot.toml"
-    path.write_text(text + more)
+    path.write_text("\n".join(lines) + more)
     return path
 
 
@@ -97,10 +88,6 @@ def record(
     for (name, *_), hits in zip(stays, found, strict=True):
         for hit in hits if dead and name in dead else ():
             hit.acceleration_m_s2[dead[name]] = 0.0
-    rows = [
-        (name, np.rad2deg(q), 1, hit)
-        for (name, q, *_), hits in zip(stays, found, strict=True)
-        for hit in hits
-    ]
+    rows = [(name, np.rad2deg(q), hits) for (name, q, *_), hits in zip(stays, found, strict=True)]
     write_recordings(folder, truth.joint_names, rows, hammer, truth.description, NODES)
     return truth

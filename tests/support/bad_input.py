@@ -1,12 +1,13 @@
 """Ways to get tables and recordings wrong, by name."""
 
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import scipy.io
 
-from planner.truth.hits import SimulatedHit
+from planner.proof.hits import SimulatedHit
 from tests.support.outside import HAMMER
 
 CUTS = tuple(np.random.default_rng(7).uniform(size=10))  # where a file ends, of its length
@@ -129,28 +130,34 @@ def bad_columns(good: dict[str, np.ndarray]) -> dict[str, dict[str, np.ndarray]]
     }
 
 
-def write_csv(path: Path, table: dict[str, np.ndarray]) -> None:
+def write_csv(path: Path, table: dict[str, np.ndarray], hit: str = "+x") -> None:
     rows = [",".join(repr(float(v)) for v in row) for row in zip(*table.values(), strict=True)]
-    path.write_text("\n".join(["hit = +x", ",".join(table), *rows]) + "\n")
+    path.write_text("\n".join([f"hit = {hit}", ",".join(table), *rows]) + "\n")
 
 
-def write_mat(path: Path, table: dict[str, np.ndarray]) -> None:
-    scipy.io.savemat(path, {**table, "hit": "+x"})
+def write_mat(path: Path, table: dict[str, np.ndarray], hit: str = "+x", **more: Any) -> None:
+    scipy.io.savemat(path, {**table, "hit": hit, **more})
 
 
-def write_h5(path: Path, table: dict[str, np.ndarray]) -> None:
+def write_h5(path: Path, table: dict[str, np.ndarray], hit: str = "+x", **more: Any) -> None:
     with h5py.File(path, "w") as file:
-        file.attrs["hit"] = "+x"
+        file.attrs.update({"hit": hit, **more})
         for name, values in table.items():
             file[name] = values
 
 
-def write_tdms(path: Path, table: dict[str, np.ndarray]) -> None:
+def write_tdms(path: Path, table: dict[str, np.ndarray], hit: str = "+x", **more: Any) -> None:
+    """With properties of channels as LabVIEW has them; `force_…` are the force's alone."""
     from nptdms import ChannelObject, RootObject, TdmsWriter
 
+    own = {k.removeprefix("force_"): v for k, v in more.items() if k.startswith("force_")}
+    common = {k: v for k, v in more.items() if not k.startswith("force_")}
+    made = [
+        ChannelObject("hit", name, values, {**common, **(own if name == "force_n" else {})})
+        for name, values in table.items()
+    ]
     with TdmsWriter(str(path)) as writer:
-        root = RootObject(properties={"hit": "+x"})
-        writer.write_segment([root, *(ChannelObject("hit", n, v) for n, v in table.items())])
+        writer.write_segment([RootObject({"hit": hit}), *made])
 
 
 WRITERS = {".csv": write_csv, ".mat": write_mat, ".h5": write_h5, ".tdms": write_tdms}

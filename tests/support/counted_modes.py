@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 
-from planner.truth.model import Truth
+from planner.proof.model import Truth
 
 VISIBLE = 0.1  # of all else in the nine FRFs, at a mode's own frequency: less is no peak to anybody
 NOT_COUNTED = 2  # modes that nobody sees, at most, below the highest that is counted

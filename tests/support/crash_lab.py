@@ -25,9 +25,10 @@ from planner.campaign.state import CampaignState, fold
 from planner.campaign.store import check_kept, recording_path
 from planner.cli.run import STOPPED, run
 from planner.errors import PlannerError
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer, record_poses
-from planner.truth.load import load_truth
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.recordings import record_poses
 from tests.support.forked import Outcome, forked, preload
 from tests.support.plain_arm import JOINTS_DEG, make_plain_arm, plain_campaign
 

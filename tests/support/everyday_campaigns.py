@@ -18,11 +18,12 @@ import numpy as np
 from planner.campaign.campaign import Campaign
 from planner.campaign.model import Model
 from planner.dataset.store import Store
-from planner.truth.fault_injection import HitVisit, InjectedFaults, quiet_hits
-from planner.truth.hits import AXES, Hammer, noisy, write_recordings
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY, HitError
-from planner.truth.model import Truth
+from planner.proof.fault_injection import HitVisit, InjectedFaults, quiet_hits
+from planner.proof.hits import AXES, Hammer, noisy
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY, HitError
+from planner.proof.model import Truth
+from planner.proof.recordings import write_recordings
 from tests.support.counted_modes import NOT_COUNTED, counted, own_of_hose, true_modes
 from tests.support.faulty_robots import KINDS, MOST_MODES, ROBOTS, Robot, lacking
 
@@ -63,16 +64,12 @@ class Cell:
         rng = self.rng
         axes = [axis for axis in range(3) for _ in range(REPEATS)]
         aims = EVERYDAY.aims(axes, rng, self.habits)
-        off = np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(len(joints_deg))
-        there = np.deg2rad(joints_deg) + off
+        there = EVERYDAY.beside(np.deg2rad(joints_deg), rng)
         shots = [(f"+{AXES[axis]}", self.hammer.peak_n) for axis in axes]
         [quiet] = quiet_hits(
             self.truth, self.injected, [HitVisit(there, shots, aims=aims)], self.hammer, rng
         )
-        rows = [
-            (pose, np.array(joints_deg), 1 + number % REPEATS, noisy(hit, self.hammer, rng))
-            for number, hit in enumerate(quiet)
-        ]
+        rows = [(pose, np.array(joints_deg), [noisy(hit, self.hammer, rng) for hit in quiet])]
         names, said = self.truth.joint_names, self.truth.description
         return write_recordings(folder, names, rows, self.hammer, said, self.robot.nodes)
 

@@ -19,11 +19,12 @@ from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
 from planner.errors import PlannerError
 from planner.file_content import sha256
+from planner.proof.deviation import Deviation
+from planner.proof.hits import AXES, Hammer, SimulatedHit, simulate_hit
+from planner.proof.load import load_truth
+from planner.proof.recordings import write_uff
 from planner.replay import replay
 from planner.session.watch import watch
-from planner.truth.deviation import Deviation
-from planner.truth.hits import AXES, Hammer, SimulatedHit, simulate_hit, write_uff
-from planner.truth.load import load_truth
 from tests.support.hit_csv import write_csv
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 

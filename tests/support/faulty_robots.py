@@ -10,14 +10,14 @@ from shutil import copytree
 import numpy as np
 
 from planner.demo import shipped
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N, SCATTER
-from planner.truth.deviation import AttachedResonator, BentLink, Spring
-from planner.truth.fault_injection import InjectedFaults
-from planner.truth.hits import Hammer
-from planner.truth.load import load_truth
-from planner.truth.scene import PULSE_S, deviate, log_uniform, some_direction, triple
-from planner.truth.springs import beam_end
+from planner.proof.arms import in_a_cell
+from planner.proof.cases import SCATTER
+from planner.proof.deviation import AttachedResonator, BentLink, soft_floor
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.scene import PULSE_S, deviate, log_uniform, some_direction, triple
+from planner.proof.springs import beam_end
 from tests.support import generated_arms
 from tests.support.arm_with_points import NODES, write_arm
 
@@ -43,10 +43,10 @@ class Robot:
 
 
 def known(name: str, folder: Path, rng: np.random.Generator) -> Robot:
-    arm = replace(ARMS[name], damping_s=DAMPING_S)
+    arm = in_a_cell(name)
     toml = arm.write(folder / "robot", int(rng.choice([1, 3])))
     rate = 1000.0 if name == "kr10" else 400.0
-    hammer = Hammer(PEAK_N[name], PULSE_S * 400 / rate, rate, record_s=1024 / rate)
+    hammer = Hammer(arm.peak_n, PULSE_S * 400 / rate, rate, record_s=1024 / rate)
     return Robot(toml, f"joints_deg = {[list(r) for r in arm.joints_deg]}", arm.band_hz, hammer)
 
 
@@ -105,11 +105,7 @@ def added(
     if kind == "soft base":
         first = own[truth.joint_names[1]] * log_uniform(rng, 0.7, 4.0) / size
         tilts = first, first * log_uniform(rng, 0.7, 1.4)
-        springs = [
-            Spring("base", triple(a), t, damping_s * t)
-            for a, t in zip(np.eye(3)[:2], tilts, strict=True)
-        ]
-        injected = deviate(injected, extra=springs)
+        injected = deviate(injected, extra=soft_floor(*tilts, damping_s))
     elif kind == "bending link":
         able = [n for n, link in links.items() if np.linalg.norm(beam_end(link, root)) > BENDS_M]
         joint = str(rng.choice(able[: len(able) - 1] or able))

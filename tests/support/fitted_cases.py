@@ -17,21 +17,20 @@ from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
-from planner.recording.records import Hit
+from planner.proof.cases import SCATTER
+from planner.proof.deviation import AttachedMass, Spring
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY, MeasurementErrors
+from planner.proof.model import Truth
+from planner.proof.scene import deviate, log_uniform, some_direction, triple
 from planner.robot.robot import Robot
-from planner.truth.cases import SCATTER
-from planner.truth.deviation import AttachedMass, Spring
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import AXES
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY, MeasurementErrors
-from planner.truth.model import Truth
-from planner.truth.scene import deviate, log_uniform, some_direction, triple
 from tests.support.counted_modes import true_modes
 from tests.support.faulty_robots import ROBOTS, added, known, links_moved, mass_that_moves
 from tests.support.faulty_robots import Robot as Arm
+from tests.support.struck_poses import struck_poses
 
-POSES, UNSEEN, REPEATS, LINES = 6, 8, 3, 300
+POSES, UNSEEN, LINES = 6, 8, 300
 ROUGH = replace(EVERYDAY, angle_deg=3.0, offset_m=0.005)
 ARMS = {
     **{name: ROBOTS[name] for name in ("kr10", "irb6640", "arm of four", "kr240 plane")},
@@ -51,11 +50,7 @@ class VisitScatter:
         """The robot at a time of the campaign."""
         rng = np.random.default_rng([self.seed, round(1e6 * progress)])
         factors = np.exp(self.sd * rng.standard_normal(len(truth.springs)))
-        springs = tuple(
-            replace(s, stiffness=f * s.stiffness, damping=f * s.damping)
-            for s, f in zip(truth.springs, factors, strict=True)
-        )
-        return replace(truth, springs=springs)
+        return truth.changed(factors, factors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,29 +158,14 @@ def _measured(
     q = rng.uniform(low, high, (POSES, len(low)))
     unseen = rng.uniform(low, high, (UNSEEN, len(low)))
     hammer = replace(arm.hammer, noise=float(rng.uniform(0.005, 0.03)))
-    injected, common = replace(injected, chain=errors.chain(rng)), errors.common(rng)
-    axes = [axis for axis in range(3) for _ in range(REPEATS)]
-    shots = [(f"+{AXES[axis]}", hammer.peak_n) for axis in axes]
-    visits = []
-    for number, one in enumerate(q):
-        there = one + np.deg2rad(errors.readback_deg) * rng.standard_normal(len(one))
-        aims = errors.aims(axes, rng, common)
-        visits.append(HitVisit(there, shots, number / POSES, aims=aims))
-    measured = []
-    for recorded in hit_poses(truth, injected, visits, hammer, rng):
-        hits = tuple(
-            Hit(Path("hit"), h.axis, hammer.sampling_rate_hz, h.force_n, h.acceleration_m_s2,
-                simulated=True)
-            for h in recorded
-        )  # fmt: skip
-        measured.append(MeasuredPose((), arm.band_hz, given=hits))
+    measured = struck_poses(truth, injected, q, hammer, arm.band_hz, errors, rng)
     lines = np.linspace(*arm.band_hz, LINES)
     true = np.array([truth.accelerance(one, lines) for one in unseen])
     modes = [true_modes(truth, one, 12, True) for one in unseen]
     seen = tuple(hz[np.asarray(shown)][:COUNTED] for hz, shown in modes)
     frfs = tuple(pose.one_hit_frf for pose in measured)
     return Case(
-        arm.toml, arm.band_hz, q, frfs, unseen, lines, true, seen, concealed, tuple(measured),
+        arm.toml, arm.band_hz, q, frfs, unseen, lines, true, seen, concealed, measured,
         truth, np.array([low, high]), sum(m.mass_kg for m in injected.deviation.added),
     )  # fmt: skip
 

@@ -15,22 +15,20 @@ from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.hit_columns import PoseHits, no_columns
-from planner.dataset.measure import MeasuredPose
 from planner.errors import RefusedError
 from planner.frf import metrics
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
-from planner.recording.records import Hit
-from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N
-from planner.truth.deviation import Deviation
-from planner.truth.effects import EFFECTS
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import AXES, Hammer
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY
-from planner.truth.model import Truth
-from planner.truth.scene import PULSE_S, Scene
+from planner.proof.arms import in_a_cell
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import InjectedFaults
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY
+from planner.proof.model import Truth
+from planner.proof.scene import PULSE_S, Scene
+from planner.proof.table import drawn
+from tests.support.struck_poses import struck_poses
 
 SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do
 
@@ -41,7 +39,7 @@ LACKING = {
     "bending link": "link_flexibility",
     "hose": "local_resonator",
 }
-MODES, LINES, REPEATS = 4, 300, 3
+MODES, LINES = 4, 300
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,18 +78,17 @@ def make(
 ) -> FrfCase:  # fmt: skip
     """A robot of ARMS whose simulation lacks one of LACKING, hit at `poses` random poses."""
     rng = np.random.default_rng([seed, zlib.crc32(f"{robot} {lacking}".encode())])
-    arm = replace(ARMS[robot], damping_s=DAMPING_S)
+    arm = in_a_cell(robot)
     per_joint = int(rng.choice([1, 3]))
     toml = arm.write(folder / "robot", per_joint)
-    low, high = np.deg2rad(np.array(arm.joints_deg)).T
-    q = rng.uniform(low, high, (poses, 6))
-    other = rng.uniform(low, high, (unseen, 6))
+    q, other = arm.drawn(poses, rng), arm.drawn(unseen, rng)
     injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
     if LACKING[lacking]:
-        scene = Scene(arm, load_truth(toml, injected.deviation), per_joint, q, PEAK_N[robot])
-        injected = EFFECTS[LACKING[lacking]](scene, injected, rng).injected
+        plain = load_truth(toml, injected.deviation)
+        scene = Scene(arm, plain, per_joint, q, arm.peak_n, injected, rng)
+        injected = drawn(LACKING[lacking], scene).injected
     truth = load_truth(toml, injected.deviation)
-    hammer = Hammer(PEAK_N[robot], PULSE_S, noise=float(rng.uniform(0.005, 0.03)))
+    hammer = Hammer(arm.peak_n, PULSE_S, noise=float(rng.uniform(0.005, 0.03)))
     measurements, frfs, one_hit = _measured(truth, injected, q, hammer, arm.band_hz, rng)
     table = {
         "robot": str(toml),
@@ -114,22 +111,10 @@ def _measured(
     band_hz: tuple[float, float],
     rng: np.random.Generator,
 ) -> tuple[tuple[Measurement, ...], dict[str, Frf], dict[str, Frf]]:
-    """REPEATS hits an axis at each pose (n, 6), with errors of hand and chain."""
-    injected, common = replace(injected, chain=EVERYDAY.chain(rng)), EVERYDAY.common(rng)
-    axes = [axis for axis in range(3) for _ in range(REPEATS)]
-    shots = [(f"+{AXES[axis]}", hammer.peak_n) for axis in axes]
-    visits = []
-    for one in q:
-        there = one + np.deg2rad(EVERYDAY.readback_deg) * rng.standard_normal(6)
-        visits.append(HitVisit(there, shots, aims=EVERYDAY.aims(axes, rng, common)))
+    """Modes and FRFs of all poses (n, 6), those of every hit and of one hit."""
     measurements, frfs, one_hit = [], {}, {}
-    for number, recorded in enumerate(hit_poses(truth, injected, visits, hammer, rng)):
-        rate = hammer.sampling_rate_hz
-        hits = tuple(
-            Hit(Path("hit"), h.axis, rate, h.force_n, h.acceleration_m_s2, simulated=True)
-            for h in recorded
-        )
-        pose = MeasuredPose((), band_hz, given=hits)
+    poses = struck_poses(truth, injected, q, hammer, band_hz, EVERYDAY, rng)
+    for number, pose in enumerate(poses):
         name, frf = f"P{number + 1}", pose.frf
         try:
             modes = from_modal(estimate_modes(frf, band_hz))

@@ -6,14 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer, record_poses
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
+from planner.proof import descriptions
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
+from planner.proof.recordings import record_poses
+from planner.proof.scene import log_uniform
 
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)
 BAND_HZ = (3.0, 60.0)
-AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")
+AXES = ((0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0))
 BOX_DEG = ((-60, 60), (-80, -10), (10, 90), (-90, 90), (-60, 60), (-90, 90))
 TILT_RAD = np.deg2rad(2.0)  # sd of a hit's direction about each of two axes across it
 
@@ -70,25 +73,14 @@ def make_generated_arm(folder: Path, seed: int, joints: int, modes: int) -> Arm:
     rng = np.random.default_rng(seed)
     (folder / "robot").mkdir(parents=True)
     (folder / "robot" / "arm.urdf").write_text(_urdf(rng, joints))
-    lines = [
-        'name = "generated"', 'urdf = "arm.urdf"', 'tcp_frame = "tcp"', 'sensor_frame = "tcp"',
-        f"band_hz = {list(BAND_HZ)}",
-    ]  # fmt: skip
+    lines = descriptions.head("generated", "arm.urdf", "tcp", "tcp", BAND_HZ)
     for number, axis in enumerate(AXES[:joints], 1):
-        stiffness = float(np.exp(rng.uniform(np.log(2e4), np.log(8e4)))) / (5 if number > 3 else 1)
-        lines += [
-            "[[compliance]]",
-            f'joint = "joint_{number}"',
-            f"axis = [{', '.join(axis.split())}]",
-        ]
-        lines += [f"stiffness = {stiffness}", f"damping = {4e-4 * stiffness}"]
-    robot = folder / "robot" / "robot.toml"
+        stiffness = log_uniform(rng, 2e4, 8e4) / (5 if number > 3 else 1)
+        lines.append(descriptions.compliance(f"joint_{number}", axis, stiffness, 4e-4))
+    robot, campaign = folder / "robot" / "robot.toml", folder / "campaign.toml"
     robot.write_text("\n".join(lines) + "\n")
-    campaign = folder / "campaign.toml"
-    campaign.write_text(
-        f"[workspace]\njoints_deg = {[list(pair) for pair in BOX_DEG[:joints]]}\n"
-        f"[modes]\ncount = {modes}\nband_hz = {list(BAND_HZ)}\n[acquisition]\ncandidates = 60\n"
-    )
+    more = "candidates = 60\n"
+    campaign.write_text(descriptions.campaign(BOX_DEG[:joints], modes, BAND_HZ, more))
     off = Deviation(seed=seed + 1, stiffness=0.15, damping=0.1, inertia=0.04, com_m=0.003)
     truth = Tilting(load_truth(robot, off), np.random.default_rng(seed))
     return Arm(robot, campaign, truth, seed)
@@ -96,24 +88,16 @@ def make_generated_arm(folder: Path, seed: int, joints: int, modes: int) -> Arm:
 
 def _urdf(rng: np.random.Generator, joints: int) -> str:
     masses = np.sort(rng.uniform(1.5, 12.0, joints))[::-1]
-    text = ['<robot name="generated"><link name="link_0"/>']
-    for i in range(1, joints + 1):
+    parts = [descriptions.link("link_0")]
+    for i, (mass, axis) in enumerate(zip(masses, AXES, strict=False), 1):
         x, z = (0.0, 0.25) if i == 1 else (rng.uniform(0, 0.12), rng.uniform(0.05, 0.2))
         if i > 2:
             x, z = rng.uniform(0.25, 0.5), rng.uniform(-0.03, 0.03)
-        mass = masses[i - 1]
         centre = np.round([rng.uniform(0.08, 0.2), *rng.uniform(-0.03, 0.03, 2)], 3)
-        at = " ".join(map(str, centre))
-        text.append(
-            f'<link name="link_{i}"><inertial><origin xyz="{at}"/>'
-            f'<mass value="{mass:.3f}"/><inertia ixx="{0.008 * mass:.5f}" iyy="{0.02 * mass:.5f}" '
-            f'izz="{0.02 * mass:.5f}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-            f'<joint name="joint_{i}" type="revolute"><parent link="link_{i - 1}"/>'
-            f'<child link="link_{i}"/><origin xyz="{x:.3f} 0 {z:.3f}"/><axis xyz="{AXES[i - 1]}"/>'
-            f'<limit lower="-2.9" upper="2.9" velocity="2" effort="0"/></joint>'
-        )
-    text.append(
-        f'<link name="tcp"/><joint name="end" type="fixed"><parent link="link_{joints}"/>'
-        f'<child link="tcp"/><origin xyz="0.18 0.03 0.05"/></joint></robot>'
-    )
-    return "\n".join(text)
+        moments = np.round(mass * np.array([0.008, 0.02, 0.02]), 5)
+        names, place = (f"joint_{i}", f"link_{i - 1}", f"link_{i}"), np.round((x, 0, z), 3)
+        inertial = descriptions.inertial(np.round(mass, 3), centre, moments)
+        parts.append(descriptions.link(f"link_{i}", inertial))
+        parts.append(descriptions.joint(*names, place, axis, (-2.9, 2.9)))
+    parts.append(descriptions.frame("tcp", f"link_{joints}", (0.18, 0.03, 0.05)))
+    return descriptions.urdf("generated", parts)

@@ -7,15 +7,15 @@ import numpy as np
 
 from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.model import Model
-from planner.truth.arms import ARMS
-from planner.truth.cases import PEAK_N
-from planner.truth.deviation import Deviation
-from planner.truth.fault_injection import HitVisit, InjectedFaults, hit_poses
-from planner.truth.hits import AXES, Hammer, write_recordings
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import EVERYDAY, HitError, MeasuringChain
-from planner.truth.model import Truth
-from planner.truth.scene import PULSE_S
+from planner.proof.arms import ARMS
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import InjectedFaults, hand_visits, hit_poses
+from planner.proof.hits import AXES, Hammer
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import EVERYDAY, HitError, MeasuringChain
+from planner.proof.model import Truth
+from planner.proof.recordings import write_recordings
+from planner.proof.scene import PULSE_S
 
 SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do
 
@@ -73,25 +73,16 @@ def missed_cell(folder: Path, robot: str, poses: int, repeats: int, seed: int) -
     arm = ARMS[robot]
     robot_toml = arm.write(folder / "robot", 1)
     deviation = replace(SCATTER, seed=seed)
-    truth, hammer = load_truth(robot_toml, deviation), Hammer(PEAK_N[robot], PULSE_S, noise=NOISE)
+    truth, hammer = load_truth(robot_toml, deviation), Hammer(arm.peak_n, PULSE_S, noise=NOISE)
     chain, common = HAND.chain(rng), HAND.common(rng)
     shots = [(f"{'+-'[k % 2]}{a}", hammer.peak_n) for a in AXES for k in range(repeats)]
-    axes = [AXES.index(hit[1]) for hit, _ in shots]
-    visits, stood, aimed, readback = [], {}, {}, {}
-    for i, q in enumerate(arm.poses(poses, seed)):
-        name = f"P{i + 1:02d}"
-        readback[name] = np.round(np.rad2deg(q), 4)
-        off = np.deg2rad(HAND.readback_deg) * rng.standard_normal(len(q))
-        stood[name] = np.deg2rad(readback[name]) + off
-        aimed[name] = HAND.aims(axes, rng, common)
-        visits.append(HitVisit(stood[name], shots, i / poses, aimed[name]))
+    readback = np.round(np.rad2deg(arm.poses(poses, seed)), 4)
+    visits = hand_visits(HAND, np.deg2rad(readback), shots, rng, common)
     found = hit_poses(truth, InjectedFaults(deviation, chain=chain), visits, hammer, noise)
-    rows = [
-        (name, readback[name], k % repeats + 1, hit)
-        for name, hits in zip(readback, found, strict=True)
-        for k, hit in enumerate(hits)
-    ]
-    # Files of a pose are named by hit and repeat, all different.
+    names = [f"P{i + 1:02d}" for i in range(poses)]
+    rows = list(zip(names, readback, found, strict=True))
+    stood = {name: visit.q for name, visit in zip(names, visits, strict=True)}
+    aimed = {name: [*visit.aims] for name, visit in zip(names, visits, strict=True)}
     write_recordings(folder / "recordings", truth.joint_names, rows, hammer, "missed hits")
     campaign_toml = folder / "campaign.toml"
     campaign_toml.write_text(arm.campaign())

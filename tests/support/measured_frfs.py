@@ -3,7 +3,7 @@
 import numpy as np
 
 from planner.frf.frf import Frf
-from planner.truth.model import Truth
+from planner.proof.model import Truth
 
 
 def measured_frfs(

@@ -12,27 +12,13 @@ import h5py
 import numpy as np
 import scipy.io
 
-from tests.support.bad_input import write_h5, write_mat
+from tests.support.bad_input import write_h5, write_mat, write_tdms
 
 Columns = dict[str, np.ndarray]
 
 
 def _without_time(columns: Columns) -> Columns:
     return {name: values for name, values in columns.items() if name != "time_s"}
-
-
-def write_waveforms(path: Path, columns: Columns, **properties: Any) -> None:
-    """TDMS as LabVIEW writes waveforms; `force_…` properties are the force's alone."""
-    from nptdms import ChannelObject, RootObject, TdmsWriter
-
-    own = {k.removeprefix("force_"): v for k, v in properties.items() if k.startswith("force_")}
-    common = {k: v for k, v in properties.items() if not k.startswith("force_")}
-    made = [
-        ChannelObject("hit", name, values, {**common, **(own if name == "force_n" else {})})
-        for name, values in columns.items()
-    ]
-    with TdmsWriter(str(path)) as writer:
-        writer.write_segment([RootObject({"hit": "+x"}), *made])
 
 
 def _bomb_h5(path: Path, columns: Columns) -> None:
@@ -107,11 +93,11 @@ def one_sample(values: np.ndarray) -> np.ndarray:
 
 
 ODD: dict[str, tuple[str, Callable[[Path, Columns], None]]] = {
-    "rates that differ": ("rates.tdms", lambda path, c: write_waveforms(
+    "rates that differ": ("rates.tdms", lambda path, c: write_tdms(
         path, _without_time(c), wf_increment=1 / 1280, force_wf_increment=1 / 640)),
-    "a rate that its times contradict": ("contradicts.tdms", lambda path, c: write_waveforms(
+    "a rate that its times contradict": ("contradicts.tdms", lambda path, c: write_tdms(
         path, c, wf_increment=1 / 1280)),
-    "an increment of 1e-300": ("tiny.tdms", lambda path, c: write_waveforms(
+    "an increment of 1e-300": ("tiny.tdms", lambda path, c: write_tdms(
         path, _without_time(c), wf_increment=1e-300)),
     "unfolds to 16 GiB": ("bomb.h5", _bomb_h5),
     "an external link": ("link.h5", _elsewhere("link")),

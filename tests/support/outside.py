@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from planner.cli.run import run
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer, record_poses
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
+from planner.proof.recordings import record_poses
 from tests.support.robots import campaign_text, make_arm
 
 PLANNER = (sys.executable, "-c", "from planner.cli import main; main()")

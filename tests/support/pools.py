@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.truth.deviation import Deviation
-from planner.truth.hits import Hammer, record_poses
-from planner.truth.load import load_truth
+from planner.proof import descriptions
+from planner.proof.deviation import Deviation
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.recordings import record_poses
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
 
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)
@@ -22,9 +24,5 @@ def make_pool(root: Path, poses: int, seed: int) -> tuple[Path, Path, Path]:
     named = [(f"P{i:03d}", row) for i, row in enumerate(q)]
     recordings = record_poses(truth, named, root / "hits", repeats=1, hammer=HAMMER, seed=seed)
     campaign = root / "campaign.toml"
-    campaign.write_text(
-        f"[workspace]\njoints_deg = {[list(r) for r in JOINTS_DEG]}\n"
-        f"[modes]\ncount = 3\nband_hz = {list(BAND_HZ)}\n"
-        '[acquisition]\nname = "variance"\n'
-    )
+    campaign.write_text(descriptions.campaign(JOINTS_DEG, 3, BAND_HZ, 'name = "variance"\n'))
     return recordings, robot, campaign

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.proof import descriptions
+
 PACKAGE = "arm_description"
 # Per link: corners of the box that its mesh is, in the link's frame, in m; the base first.
 BOXES = [
@@ -52,50 +54,37 @@ def inertial(box: tuple[Sequence[float], Sequence[float]]) -> str:
     low, high = map(np.array, box)
     size, centre = high - low, (low + high) / 2
     mass = DENSITY * float(np.prod(size))
-    xx, yy, zz = mass / 12 * (size @ size - size**2)
-    return (
-        f'<inertial><origin xyz="{" ".join(map(str, centre))}"/><mass value="{mass}"/><inertia '
-        f'ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/></inertial>'
-    )
+    return descriptions.inertial(mass, centre, mass / 12 * (size @ size - size**2))
 
 
 def published(
     folder: Path, *, inertias: bool = False, package: str = PACKAGE, more: str = ""
 ) -> Path:
     """Write folder/package/{urdf,meshes}; returns the URDF's path. `more` is further XML."""
-    text, root = ['<robot name="published">'], folder / package
+    parts, root = [], folder / package
     for number, box in enumerate(BOXES):
         name = f"link_{number}" if number else "base_link"
         write_box(root / "meshes" / f"{name}.stl", *box)
         mesh = f'<geometry><mesh filename="package://{PACKAGE}/meshes/{name}.stl"/></geometry>'
         shapes = f"<visual>{mesh}</visual><collision>{mesh}</collision>"
-        text.append(f'<link name="{name}">{inertial(box) if inertias else ""}{shapes}</link>')
+        parts.append(descriptions.link(name, inertial(box) if inertias else "", shapes))
     rows = zip(PLACES, AXES, LIMITS, strict=True)
-    for number, (place, axis, (low, high)) in enumerate(rows, 1):
+    for number, (place, axis, limits) in enumerate(rows, 1):
         parent = f"link_{number - 1}" if number > 1 else "base_link"
-        text.append(
-            f'<joint name="joint_{number}" type="revolute"><parent link="{parent}"/>'
-            f'<child link="link_{number}"/><origin xyz="{" ".join(map(str, place))}"/>'
-            f'<axis xyz="{" ".join(map(str, axis))}"/>'
-            f'<limit lower="{low}" upper="{high}" velocity="2" effort="0"/></joint>'
-        )
-    text.append(
-        '<link name="tool0"/><joint name="flange" type="fixed"><parent link="link_6"/>'
-        '<child link="tool0"/><origin xyz="0.03 0 0" rpy="0 1.5707963 0"/></joint>'
-    )
+        names = f"joint_{number}", parent, f"link_{number}"
+        parts.append(descriptions.joint(*names, place, axis, limits))
+    parts.append(descriptions.frame("tool0", "link_6", (0.03, 0, 0), (0, 1.5707963, 0)))
     urdf = root / "urdf" / "arm.urdf"
     urdf.parent.mkdir(parents=True, exist_ok=True)
-    urdf.write_text("\n".join([*text, more, "</robot>"]))
+    urdf.write_text(descriptions.urdf("published", [*parts, more]))
     return urdf
 
 
 def robot_toml(path: Path, urdf: Path, more: str = "") -> Path:
     """A robot.toml with a spring a joint for a URDF of `published`; returns its path."""
-    lines = ['name = "p"', f'urdf = "{urdf}"', 'tcp_frame = "tool0"', 'sensor_frame = "tool0"']
-    lines += ["band_hz = [5.0, 90.0]"]
-    for number, axis in enumerate(AXES, 1):
-        k = [1e6, 1e6, 4e5, 5e4, 5e4, 2e4][number - 1]
-        lines += ["[[compliance]]", f'joint = "joint_{number}"', f"axis = {list(axis)}"]
-        lines += [f"stiffness = {k}", f"damping = {2e-4 * k}"]
+    lines = descriptions.head("p", str(urdf), "tool0", "tool0", (5.0, 90.0))
+    springs = zip(AXES, [1e6, 1e6, 4e5, 5e4, 5e4, 2e4], strict=True)
+    for number, (axis, k) in enumerate(springs, 1):
+        lines.append(descriptions.compliance(f"joint_{number}", axis, k, 2e-4))
     path.write_text("\n".join([*lines, more]))
     return path

@@ -12,10 +12,10 @@ from planner.campaign.config import load_campaign_config
 from planner.dynamics.mode_families import Families
 from planner.modal.modes import Mode
 from planner.modal.tracking import Tracks
-from planner.truth.arms import KR10
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.load import load_truth
-from planner.truth.model import Truth
+from planner.proof.arms import KR10
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.load import load_truth
+from planner.proof.model import Truth
 from tests.support.true_modes import Measured, undamped
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "kr240_plane"

@@ -7,19 +7,26 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from planner.truth.deviation import (
+from planner.proof.deviation import (
     AttachedMass,
     AttachedResonator,
     BentLink,
     Deviation,
     Feedback,
-    Spring,
     StiffnessRipple,
+    soft_floor,
 )
-from planner.truth.fault_injection import Artefact, HitVisit, InjectedFaults, JointDrift, hit_poses
-from planner.truth.hits import Hammer, write_predict, write_recordings
-from planner.truth.load import load_truth
-from planner.truth.measurement_errors import LABORATORY, MeasurementErrors
+from planner.proof.fault_injection import (
+    Artefact,
+    InjectedFaults,
+    JointDrift,
+    hand_visits,
+    hit_poses,
+)
+from planner.proof.hits import Hammer
+from planner.proof.load import load_truth
+from planner.proof.measurement_errors import LABORATORY, MeasurementErrors
+from planner.proof.recordings import write_predict, write_recordings
 from tests.support.arm_with_points import NODES, poses, write_arm
 
 # Springs, dampers and bodies never are as stated; nobody is to call that a finding.
@@ -27,10 +34,7 @@ SCATTER = Deviation(5, stiffness=0.1, damping=0.15, inertia=0.03, com_m=0.003)
 POSES, SEED, TCP_NODE = 5, 1, 17
 HAMMER = Hammer(peak_n=250.0, noise=0.004)
 BASE = {"x": 1.4e6, "y": 1.1e6}  # N·m/rad
-SOFT = tuple(
-    Spring("base", (float(axis == "x"), float(axis == "y"), 0.0), k, 3e-4 * k)
-    for axis, k in BASE.items()
-)
+SOFT = soft_floor(*BASE.values())
 TURNED = Rotation.from_euler("zyx", [15.0, -10.0, 5.0], degrees=True).as_matrix()
 GAIN, WINDOW_S, HOSE_HZ, HOSE_KG, MASS_KG = 0.7, 0.5, 21.0, 3.0, 25.0
 DRIFT = JointDrift((("", -0.15, "linear"),))
@@ -105,16 +109,10 @@ def small_case(
     own = np.random.default_rng(SEED)
     injected = InjectedFaults(replace(SCATTER, **of.change), chain=errors.chain(own), **of.rest)
     truth, shots = load_truth(robot_toml, injected.deviation), [(f"+{a}", 250.0) for a in "xyz"]
-    visits = []
-    for i, row in enumerate(q[:count]):
-        off = np.deg2rad(errors.readback_deg) * own.standard_normal(len(row))
-        visits.append(HitVisit(row + off, shots, i / count, errors.aims([0, 1, 2], own)))
+    visits = hand_visits(errors, q[:count], shots, own)
     found = hit_poses(truth, injected, visits, HAMMER, np.random.default_rng(SEED))
-    rows = [
-        (f"P{i + 1}", np.rad2deg(row), 1, hit)
-        for i, (row, hits) in enumerate(zip(q, found, strict=False))
-        for hit in hits
-    ]
+    pairs = enumerate(zip(q, found, strict=False), 1)
+    rows = [(f"P{i}", np.rad2deg(row), hits) for i, (row, hits) in pairs]
     folder /= "recordings"
     write_recordings(
         folder, truth.joint_names, rows, HAMMER, "small case", NODES | {"tcp": TCP_NODE}

@@ -1,19 +1,17 @@
 """Records of a recorder that ran on while one hit again and again, in every format there is."""
 
 import struct
-import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import h5py
 import numpy as np
-import pyuff
 import scipy.io
-from nptdms import ChannelObject, RootObject, TdmsWriter
 from scipy import signal
 
+from planner.proof.recordings import uff_channel, write_sets
 from planner.recording.hits import hits_from
 from planner.recording.read import read
+from tests.support import bad_input
 
 RATE_HZ, FINER = 1024, 8
 MODES = (12.0, 0.03), (23.0, 0.025), (41.0, 0.02)  # Hz, damping ratio
@@ -68,52 +66,31 @@ def _table(samples: np.ndarray) -> dict[str, np.ndarray]:
 
 def write_csv(path: Path, samples: np.ndarray, axis: str) -> None:
     time_s = np.arange(samples.shape[1]) / RATE_HZ
-    header = f"# hit: {axis}\n" + ",".join(("time_s", *NAMES))
-    rows = np.column_stack([time_s, samples.T])
-    np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.7g")
+    bad_input.write_csv(path, {"time_s": time_s, **_table(samples)}, axis)
 
 
 def write_mat(path: Path, samples: np.ndarray, axis: str) -> None:
-    more = {"sampling_rate_hz": float(RATE_HZ), "hit": axis}
-    scipy.io.savemat(path, {**_table(samples), **more})
+    bad_input.write_mat(path, _table(samples), axis, sampling_rate_hz=float(RATE_HZ))
 
 
 def write_h5(path: Path, samples: np.ndarray, axis: str) -> None:
-    with h5py.File(path, "w") as file:
-        for name, values in _table(samples).items():
-            file[name] = values
-        file.attrs["sampling_rate_hz"], file.attrs["hit"] = float(RATE_HZ), axis
+    bad_input.write_h5(path, _table(samples), axis, sampling_rate_hz=float(RATE_HZ))
 
 
 def write_tdms(path: Path, samples: np.ndarray, axis: str) -> None:
-    step = {"wf_increment": 1 / RATE_HZ}
-    made = [ChannelObject("all", n, x, properties=step) for n, x in _table(samples).items()]
-    with TdmsWriter(str(path)) as writer:
-        writer.write_segment([RootObject({"hit": axis}), *made])
+    bad_input.write_tdms(path, _table(samples), axis, wf_increment=1 / RATE_HZ)
 
 
 def write_uff(path: Path, samples: np.ndarray, axis: str) -> None:
     along = ("xyz".index(axis[1]) + 1) * (-1 if axis[0] == "-" else 1)
-    time_s = np.arange(samples.shape[1]) / RATE_HZ
-    sets = [
-        {
-            "type": 58, "binary": 1, "func_type": 1, "rsp_node": 1, "rsp_dir": direction,
-            "ref_node": 1, "ref_dir": along, "data": values, "x": time_s, "num_pts": len(values),
-            "abscissa_spacing": 1, "abscissa_min": 0.0, "abscissa_inc": 1 / RATE_HZ,
-            "abscissa_spec_data_type": 17, "ord_data_type": 4, "ordinate_spec_data_type": kind,
-            "ordinate_axis_units_lab": unit, "orddenom_spec_data_type": 0,
-            "z_axis_axis_lab": "NONE", "id1": "a stream", "rsp_ent_name": "NONE",
-            "ref_ent_name": "NONE",
-        }
-        for values, direction, kind, unit in zip(
-            samples, (along, 1, 2, 3), (13, 12, 12, 12), ("N", *3 * ("m/s^2",)), strict=True
-        )
-    ]  # fmt: skip
-    file = pyuff.UFF(str(path))
-    for one in sets:
-        with warnings.catch_warnings():  # pyuff leaves closing the file to the garbage collector
-            warnings.simplefilter("ignore", ResourceWarning)
-            file.write_sets(one, "add")
+    felt = zip((along, 1, 2, 3), samples, strict=True)
+    write_sets(
+        path,
+        [
+            uff_channel(values, RATE_HZ, (1, direction), (1, along), force=number == 0)
+            for number, (direction, values) in enumerate(felt)
+        ],
+    )
 
 
 def write_wav(

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import scipy.linalg
@@ -15,9 +14,10 @@ from planner.frf.estimator import estimate
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac_matrix
 from planner.modal.modes import Mode
+from planner.proof.hits import Hammer, simulate_hit
+from planner.proof.model import Truth
 from planner.recording.records import Hit
-from planner.truth.hits import Hammer, simulate_hit
-from planner.truth.model import Truth
+from planner.studies.hits import as_read
 
 AXES = ("+x", "+x", "+x", "+x", "+y", "+y", "+y", "+y", "+z", "+z", "+z", "+z")
 
@@ -36,11 +36,7 @@ def hits_at(
     truth: Truth, q: np.ndarray, hammer: Hammer, rng: np.random.Generator
 ) -> tuple[Hit, ...]:
     """Twelve hits as the program would read them from files."""
-    hits = [simulate_hit(truth, q, axis, hammer, rng) for axis in AXES]
-    rate = hammer.sampling_rate_hz
-    return tuple(
-        Hit(Path("hit"), h.axis, rate, h.force_n, h.acceleration_m_s2, simulated=True) for h in hits
-    )
+    return as_read([simulate_hit(truth, q, axis, hammer, rng) for axis in AXES], hammer)
 
 
 def measure_all(

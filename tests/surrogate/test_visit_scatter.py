@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from planner.dynamics.vibration import SimulatedModes
+from planner.proof.arms import ARMS
+from planner.proof.deviation import Deviation, Spring
+from planner.proof.load import load_truth
 from planner.surrogate.importance import normal_points, sample
 from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, fit_surrogate
-from planner.truth.arms import ARMS
-from planner.truth.deviation import Deviation, Spring
-from planner.truth.load import load_truth
 from tests.support.surrogates import observed, simulated, true_hz
 
 MODES, POOL, NEW_VISITS = 4, 150, 100
