@@ -8,14 +8,13 @@ import pytest
 
 from planner.truth.hits import simulate_hit
 from tests.support.bad_input import (
-    WRITERS,
     bad_columns,
-    columns,
     hit_file_mutations,
     recording_mutations,
     table_mutations,
 )
-from tests.support.outside import HAMMER, call, make_cell, record
+from tests.support.hit_files import NAMES, WRITERS, columns
+from tests.support.outside import HAMMER, call
 from tests.support.robots import JOINTS_DEG
 
 MIDDLE = [round((a + b) / 2, 3) for a, b in JOINTS_DEG]
@@ -24,22 +23,21 @@ ROW = ",".join(map(str, MIDDLE))
 POSES = [f"pose,{JOINTS}", f"H1,{ROW}", f"H2,{ROW}"]
 # Only the names of mutations are taken from these, before there is a recording.
 LIKE_RECORDINGS = [f"pose,{JOINTS},hit,repeat,file", *[f"G1,{ROW},+x,1,data/G1_px_1.uff"] * 2]
-LIKE_COLUMNS = {name: np.arange(99.0) for name in (
-    "time_s", "force_n", "acceleration_x_m_s2", "acceleration_y_m_s2", "acceleration_z_m_s2",
-)}  # fmt: skip
+LIKE_COLUMNS = {name: np.arange(99.0) for name in ("time_s", *NAMES)}
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory):
-    """A campaign, a good recordings folder for it, and a table of poses."""
-    root = tmp_path_factory.mktemp("bench")
-    robot, campaign_toml, truth = make_cell(root, learns=False)
-    assert call("new", root / "cell", "--robot", robot, "--campaign", campaign_toml)[0] == 0
-    good = record(truth, root / "good", "G1", MIDDLE)
-    poses = root / "predict.csv"
-    poses.write_text("\n".join(POSES) + "\n")
-    hit = simulate_hit(truth, np.deg2rad(MIDDLE), "+x", HAMMER, np.random.default_rng(0))
-    return root, good, poses, hit
+def bench(first_pose_once, tmp_path_factory):
+    """A campaign with a good recordings folder for it."""
+    return first_pose_once.copied(tmp_path_factory.mktemp("bench"))
+
+
+@pytest.fixture(scope="module")
+def hit(bench):
+    """A hit as named columns."""
+    rng = np.random.default_rng(0)
+    made = simulate_hit(bench.truth, np.deg2rad(MIDDLE), "+x", HAMMER, rng)
+    return columns(made, HAMMER.sampling_rate_hz)
 
 
 def expect_one_sentence(code: int, out: str, err: str, *names: str) -> None:
@@ -57,40 +55,36 @@ def expect_one_sentence(code: int, out: str, err: str, *names: str) -> None:
 
 @pytest.mark.parametrize("what", table_mutations(POSES))
 def test_tables(bench, tmp_path, what):
-    root, *_ = bench
     bad = tmp_path / "bad.csv"
     bad.write_bytes(table_mutations(POSES)[what])
-    expect_one_sentence(*call("predict", root / "cell", bad, "--json"), "bad.csv")
+    expect_one_sentence(*call("predict", bench.cell, bad, "--json"), "bad.csv")
 
 
 @pytest.mark.parametrize(
     "what", table_mutations(LIKE_RECORDINGS) | recording_mutations(LIKE_RECORDINGS)
 )
 def test_tables_of_recordings(bench, tmp_path, what):
-    root, good, *_ = bench
-    lines = (good / "recordings.csv").read_text().splitlines()
-    folder = shutil.copytree(good, tmp_path / "mutated")
+    lines = (bench.made / "recordings.csv").read_text().splitlines()
+    folder = shutil.copytree(bench.made, tmp_path / "mutated")
     mutations = table_mutations(lines) | recording_mutations(lines)
     (folder / "recordings.csv").write_bytes(mutations[what])
-    before = (root / "cell" / "log.jsonl").read_bytes()
-    expect_one_sentence(*call("import", root / "cell", folder, "--json"), "recordings.csv")
-    assert (root / "cell" / "log.jsonl").read_bytes() == before
+    before = (bench.cell / "log.jsonl").read_bytes()
+    expect_one_sentence(*call("import", bench.cell, folder, "--json"), "recordings.csv")
+    assert (bench.cell / "log.jsonl").read_bytes() == before
 
 
 @pytest.mark.parametrize("what", hit_file_mutations(b"like a file"))
 def test_universal_files(bench, tmp_path, what):
-    _, good, *_ = bench
-    data = next((good / "data").glob("*px_1.uff")).read_bytes()
+    data = next((bench.made / "data").glob("*px_1.uff")).read_bytes()
     bad = tmp_path / "bad_hit.uff"
     bad.write_bytes(hit_file_mutations(data)[what])
     expect_one_sentence(*call("modes", bad, "--json"), "bad_hit.uff", "No modes")
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
-def test_named_columns(bench, tmp_path, suffix):
-    *_, hit = bench
+def test_named_columns(hit, tmp_path, suffix):
     good = tmp_path / f"good_hit{suffix}"
-    WRITERS[suffix](good, columns(hit))
+    WRITERS[suffix](good, hit)
     code, out, err = call("modes", good, "--json", "--band-hz", 5, 110)
     assert code == 0, err
     assert len(json.loads(out)["modes"]) >= 2
@@ -102,10 +96,9 @@ BAD_COLUMNS += [(what, s) for what in ("no time_s", "nan") for s in WRITERS if s
 
 
 @pytest.mark.parametrize(("what", "suffix"), BAD_COLUMNS)
-def test_bad_named_columns(bench, tmp_path, suffix, what):
-    *_, hit = bench
+def test_bad_named_columns(hit, tmp_path, suffix, what):
     bad = tmp_path / f"bad_hit{suffix}"
-    WRITERS[suffix](bad, bad_columns(columns(hit))[what])
+    WRITERS[suffix](bad, bad_columns(hit)[what])
     answer = call("modes", bad, "--json", "--band-hz", 5, 110)
     if what.startswith("no acceleration"):  # two sensors are no pose, but a matrix
         assert answer[0] == 0
@@ -116,10 +109,9 @@ def test_bad_named_columns(bench, tmp_path, suffix, what):
 
 @pytest.mark.parametrize("suffix", WRITERS)
 @pytest.mark.parametrize("cut", ["100 bytes", "half"])
-def test_named_columns_cut_short(bench, tmp_path, suffix, cut):
-    *_, hit = bench
+def test_named_columns_cut_short(hit, tmp_path, suffix, cut):
     bad = tmp_path / f"bad_hit{suffix}"
-    WRITERS[suffix](bad, columns(hit))
+    WRITERS[suffix](bad, hit)
     whole = bad.read_bytes()
     kept = whole[: 100 if cut == "100 bytes" else len(whole) // 2]
     if suffix == ".csv":
@@ -199,9 +191,8 @@ CONFIGURATIONS = {
     ("file", "what"), [(file, what) for file, each in CONFIGURATIONS.items() for what in each]
 )
 def test_configurations(bench, tmp_path, file, what):
-    root, *_ = bench
-    for folder in ("robot", "plan"):
-        shutil.copytree(root / folder, tmp_path / folder)
+    for folder in (bench.robot.parent, bench.plan.parent):
+        shutil.copytree(folder, tmp_path / folder.name)
     text, (change, words) = (tmp_path / file).read_text(), CONFIGURATIONS[file][what]
     (tmp_path / file).write_text(change(text))
     assert (tmp_path / file).read_text() != text
@@ -212,10 +203,16 @@ def test_configurations(bench, tmp_path, file, what):
 
 
 def test_a_folder_instead_of_its_robot(bench, tmp_path):
-    robot = bench[0] / "robot" / "robot.toml"
-    for folder in (robot.parent, robot.parent.parent):
-        expect_one_sentence(*call("check", folder), f"is a folder; name {robot}.")
-    expect_one_sentence(*call("check", bench[0] / "plan"), "name a robot.toml in it")
+    for folder in bench.robot.parents[:2]:
+        expect_one_sentence(*call("check", folder), f"is a folder; name {bench.robot}.")
+    expect_one_sentence(*call("check", bench.plan.parent), "name a robot.toml in it")
+
+
+SAID = {
+    "new": "--example",
+    "study seed-9": "choose one of busch2022",
+    "study seyedhosseini2025 --out POSES": "name another folder",
+}
 
 
 @pytest.mark.parametrize(
@@ -238,41 +235,40 @@ def test_a_folder_instead_of_its_robot(bench, tmp_path):
         "new CELL --robot ROOT/robot/robot.toml",
         "frobnicate",
         *("new", "import", "check"),
+        "study seed-9",
+        "study seyedhosseini2025 --out POSES",
     ],
 )
-def test_usage(bench, command):
-    root, good, poses, _ = bench
-    places = {"ROOT": root, "GOOD": good, "CELL": root / "cell", "POSES": poses}
+def test_usage(bench, tmp_path, command):
+    poses = tmp_path / "predict.csv"
+    poses.write_text("\n".join(POSES) + "\n")
+    root, good, cell = bench.robot.parents[1], bench.made, bench.cell
+    places = {"ROOT": root, "GOOD": good, "CELL": cell, "POSES": poses}
     words = command.split()
     for name, place in places.items():
         words = [word.replace(name, str(place)) for word in words]
     # A missing argument points to the command's own help.
     helped = f"see planner {command} --help." if command in ("import", "check") else ""
-    expect_one_sentence(*call(*words), helped)
+    expect_one_sentence(*call(*words), SAID.get(command, helped))
 
 
 @pytest.mark.parametrize("suffix", ["uff", "mat", "csv"])
 def test_huge_files_are_refused_without_reading_them(bench, tmp_path, suffix):
-    root, *_ = bench
     huge = tmp_path / f"huge.{suffix}"
     with open(huge, "wb") as file:
         file.truncate(2**30)
     expect_one_sentence(*call("modes", huge, "--json"), huge.name, "No modes")
-    expect_one_sentence(*call("import", root / "cell", huge, "--pose", "G1"))
+    expect_one_sentence(*call("import", bench.cell, huge, "--pose", bench.pose))
     if suffix == "csv":
-        expect_one_sentence(*call("predict", root / "cell", huge, "--json"))
-    assert sum(p.stat().st_size for p in (root / "cell").rglob("*") if p.is_file()) < 10**8
+        expect_one_sentence(*call("predict", bench.cell, huge, "--json"))
+    assert sum(p.stat().st_size for p in bench.cell.rglob("*") if p.is_file()) < 10**8
     huge.unlink()
 
 
-def test_damaged_log_exits_5(bench):
-    root, *_ = bench
-    cell = root / "damaged"
-    shutil.copytree(root / "cell", cell)
-    call("next", cell)
-    log = cell / "log.jsonl"
+def test_damaged_log_exits_5(first_pose):
+    log = first_pose.cell / "log.jsonl"
     data = log.read_bytes()
     log.write_bytes(data[:40] + b"#" + data[41:])
-    code, out, err = call("status", cell, "--json")
+    code, out, err = call("status", first_pose.cell, "--json")
     assert (code, out) == (5, "")
     assert "line 1" in err

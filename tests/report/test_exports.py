@@ -16,7 +16,6 @@ from planner.recording.folder import read_poses
 from planner.recording.records import FrfRecord
 from planner.recording.uff import read_uff
 from planner.report.exports import KINDS, export
-from planner.report.predictions import predictions
 from planner.robot.controller_program import PoseToDrive, program
 from planner.robot.robot import Robot
 from tests.support.named_campaign import SCRIPT
@@ -200,16 +199,3 @@ def test_open_proposals_are_driven_to(named, tmp_path, capsys):
     assert run(["export", str(named.directory), "docx"]) == 2
     said = capsys.readouterr().err
     assert all(kind in said for kind in KINDS)
-
-
-def test_poses_outside_the_workspace_are_marked(named, tmp_path):
-    """Readbacks a little beside the workspace are inside; a turned first joint is not."""
-    inside = np.deg2rad(named.state.used[0].joints_deg)
-    beside, outside = inside.copy(), inside.copy()
-    beside[0] += np.deg2rad(0.02)
-    outside[0] += np.deg2rad(60)
-    q = [inside, beside, outside]
-    report = predictions(named, ["in", "beside", "out"], q, tmp_path / "p.npz")
-    assert [pose.outside for pose in report.poses] == [False, False, True]
-    text = str(report.text().renderables[1])
-    assert text.startswith("out lies outside the workspace of campaign.toml")

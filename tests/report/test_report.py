@@ -98,13 +98,8 @@ def test_it_says_what_was_asked_measured_refused_and_how_good_it_is(report):
 def test_a_browser_shows_it_and_prints_it(report, tmp_path):
     file = tmp_path / "report.html"
     file.write_text(report[2])
-    call = [
-        "chromium",
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        f"--user-data-dir={tmp_path}",
-    ]
+    call = ["chromium", "--headless", "--no-sandbox", "--disable-gpu"]
+    call.append(f"--user-data-dir={tmp_path}")
     shown = subprocess.run([*call, "--dump-dom", file.as_uri()], capture_output=True, text=True,
                            check=True, timeout=120).stdout  # fmt: skip
     assert shown.count("<section") == report[2].count("<section")

@@ -14,7 +14,7 @@ from planner.recording.points import PointNames
 from planner.session.hit_verdicts import Before, Verdicts
 from planner.session.inbox import Inbox
 from planner.truth.hits import simulate_hit, write_uff
-from tests.support.hit_csv import write_csv
+from tests.support.hit_files import write_hit
 from tests.support.outside import HAMMER, make_cell
 from tests.support.robots import BAND_HZ
 
@@ -187,7 +187,7 @@ def test_a_hit_sampled_at_another_rate_alone_is_not_taken(bench):
 def at_rate(path: Path, name: str, rate_hz: float) -> Path:
     """The same hit as a file of another sampling rate."""
     (hit,), _ = Source(path, path.name).read()
-    return write_csv(path.with_name(f"{name}.csv"), hit, rate_hz)
+    return write_hit(path.with_name(f"{name}.csv"), hit, rate_hz)
 
 
 def test_a_foreign_file_of_long_ago_is_not_said_to_be_written(tmp_path):

@@ -1,10 +1,11 @@
 """Does choosing where to measure pay? Strategies × a simulation that learns, or stays, or both.
 
 `pytest -m slow tests/studies/test_acquisitions.py -s` prints the tables. STUDY_CELLS (all five,
-names separated by ";"), STUDY_SEEDS (2), STUDY_FIRST (101), STUDY_ONLY (some strategies, by ";")
-make it larger or smaller; STUDY_KEPT names a folder that keeps finished runs, so that it can be
-stopped, and several processes can share it. Truths are MuJoCo models with ± 15 % springs, 4 %
-inertias and noise of EMA's size; errors are those at 60 poses never measured, FRFs' at ten of them.
+names separated by ";"), STUDY_SEEDS (2), STUDY_FIRST (101) and STUDY_STRATEGIES (by ";", beside
+those that are compared) make it larger or smaller; STUDY_KEPT names a folder that keeps finished
+runs, so that it can be stopped, and several processes can share it. Truths are MuJoCo models with
+± 15 % springs, 4 % inertias and noise of EMA's size; errors are those at 60 poses never measured,
+FRFs' at ten of them.
 Seeds 1-20 were used in development.
 """
 
@@ -25,19 +26,7 @@ NAMES = os.environ.get("STUDY_CELLS", ";".join(CELLS)).split(";")
 SEEDS = int(os.environ.get("STUDY_SEEDS", "2"))
 FIRST = int(os.environ.get("STUDY_FIRST", "101"))
 BASELINE, DEFAULT = "maximin_lhs", "integrated_variance"
-STRATEGIES = {
-    "updated": (
-        BASELINE, "integrated_variance", "parameter_information", "mixed",
-        "parameter_information best", "mixed best", "random", "sobol", "variance", "d_information",
-        "mutual_information",
-    ),
-    "frozen": (
-        BASELINE, "integrated_variance", "integrated_variance best", "variance", "random", "sobol",
-        "mutual_information",
-    ),
-}  # "best": along the axes that tell most per minute, not along all  # fmt: skip
-ONLY = os.environ.get("STUDY_ONLY", "")
-AXES = ("all", "best")
+MORE = tuple(filter(None, os.environ.get("STUDY_STRATEGIES", "").split(";")))
 BUDGET = {
     "updated": int(os.environ.get("STUDY_BUDGET", "5")),
     "frozen": int(os.environ.get("STUDY_FROZEN", "12")),
@@ -103,17 +92,21 @@ def kept(name: str, make_it: Callable[[], Curve]) -> Curve:
     return Curve(*np.load(path))
 
 
-def played(
-    simulation: str, folder: Path, strategies: tuple[str, ...] = ()
-) -> dict[str, list[Curve]]:
-    """Curves by strategy, cell by cell and seed by seed."""
-    if not strategies:
-        strategies = tuple(s for s in STRATEGIES[simulation] if not ONLY or s in ONLY.split(";"))
+def played(simulation: str, folder: Path, strategies: tuple[str, ...]) -> dict[str, list[Curve]]:
+    """Curves by strategy, cell by cell and seed by seed.
+
+    "mixed best": along the axes that tell most per minute, not along all.
+    """
     found: dict[str, list[Curve]] = {s: [] for s in strategies}
     budget, initial = BUDGET[simulation], INITIAL[simulation]
     for name, seed in ((n, s) for s in range(FIRST, FIRST + SEEDS) for n in NAMES):
         robot, lacking = CELLS[name]
-        case = lru_cache(partial(_case, robot, seed, simulation, folder, lacking))
+
+        @lru_cache
+        def case(axes: str, robot=robot, seed=seed, lacking=lacking):
+            own = folder / f"{robot}{seed}{lacking}{axes}"
+            return make(robot, seed, simulation, own, lacking, axes)
+
         for strategy, curves in found.items():
             plain, _, axes = strategy.partition(" ")
             run = f"{simulation} {lacking} {robot} {seed} {strategy} {budget} {initial}"
@@ -122,17 +115,14 @@ def played(
     return found
 
 
-def _case(robot: str, seed: int, simulation: str, folder: Path, lacking: str, axes: str):
-    return make(robot, seed, simulation, folder / f"{robot}{seed}{lacking}{axes}", lacking, axes)
-
-
 def _curve_of(case: Callable, axes: str, strategy: str, budget: int, initial: int) -> Curve:
     return curve(case(axes), strategy, budget, initial)
 
 
 @pytest.fixture(scope="module", params=["updated", "frozen"])
 def runs(request, tmp_path_factory) -> tuple[str, dict[str, list[Curve]]]:
-    return request.param, played(request.param, tmp_path_factory.mktemp("cases"))
+    strategies = (BASELINE, DEFAULT, *MORE)
+    return request.param, played(request.param, tmp_path_factory.mktemp("cases"), strategies)
 
 
 def saving(ours: np.ndarray, theirs: np.ndarray) -> str:

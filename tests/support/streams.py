@@ -1,24 +1,21 @@
 """Records of a recorder that ran on while one hit again and again, in every format there is."""
 
 import struct
-import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import h5py
 import numpy as np
-import pyuff
 import scipy.io
-from nptdms import ChannelObject, RootObject, TdmsWriter
 from scipy import signal
 
 from planner.recording.hits import hits_from
 from planner.recording.read import read
+from tests.support import hit_files
+from tests.support.hit_files import NAMES, history, write_sets
 
 RATE_HZ, FINER = 1024, 8
 MODES = (12.0, 0.03), (23.0, 0.025), (41.0, 0.02)  # Hz, damping ratio
 SHAPES = np.array([[0.94, 0.31, 0.16], [0.27, 0.89, 0.36], [0.17, -0.34, 0.93]])
-NAMES = ("force_n", *(f"acceleration_{axis}_m_s2" for axis in "xyz"))
 CLEAN = ((1.0, 700.0), (5.0, 900.0), (9.2, 600.0)), 13.0  # hits (s, N), length (s)
 # The third rebounds, the fourth is soft, the last is cut off.
 MIXED = (
@@ -62,58 +59,16 @@ def joined(folder: Path, axis: str) -> np.ndarray:
     return np.hstack(parts)
 
 
-def _table(samples: np.ndarray) -> dict[str, np.ndarray]:
-    return dict(zip(NAMES, samples, strict=True))
-
-
-def write_csv(path: Path, samples: np.ndarray, axis: str) -> None:
+def columns(samples: np.ndarray) -> dict[str, np.ndarray]:
     time_s = np.arange(samples.shape[1]) / RATE_HZ
-    header = f"# hit: {axis}\n" + ",".join(("time_s", *NAMES))
-    rows = np.column_stack([time_s, samples.T])
-    np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.7g")
-
-
-def write_mat(path: Path, samples: np.ndarray, axis: str) -> None:
-    more = {"sampling_rate_hz": float(RATE_HZ), "hit": axis}
-    scipy.io.savemat(path, {**_table(samples), **more})
-
-
-def write_h5(path: Path, samples: np.ndarray, axis: str) -> None:
-    with h5py.File(path, "w") as file:
-        for name, values in _table(samples).items():
-            file[name] = values
-        file.attrs["sampling_rate_hz"], file.attrs["hit"] = float(RATE_HZ), axis
-
-
-def write_tdms(path: Path, samples: np.ndarray, axis: str) -> None:
-    step = {"wf_increment": 1 / RATE_HZ}
-    made = [ChannelObject("all", n, x, properties=step) for n, x in _table(samples).items()]
-    with TdmsWriter(str(path)) as writer:
-        writer.write_segment([RootObject({"hit": axis}), *made])
+    return {"time_s": time_s, **dict(zip(NAMES, samples, strict=True))}
 
 
 def write_uff(path: Path, samples: np.ndarray, axis: str) -> None:
     along = ("xyz".index(axis[1]) + 1) * (-1 if axis[0] == "-" else 1)
-    time_s = np.arange(samples.shape[1]) / RATE_HZ
-    sets = [
-        {
-            "type": 58, "binary": 1, "func_type": 1, "rsp_node": 1, "rsp_dir": direction,
-            "ref_node": 1, "ref_dir": along, "data": values, "x": time_s, "num_pts": len(values),
-            "abscissa_spacing": 1, "abscissa_min": 0.0, "abscissa_inc": 1 / RATE_HZ,
-            "abscissa_spec_data_type": 17, "ord_data_type": 4, "ordinate_spec_data_type": kind,
-            "ordinate_axis_units_lab": unit, "orddenom_spec_data_type": 0,
-            "z_axis_axis_lab": "NONE", "id1": "a stream", "rsp_ent_name": "NONE",
-            "ref_ent_name": "NONE",
-        }
-        for values, direction, kind, unit in zip(
-            samples, (along, 1, 2, 3), (13, 12, 12, 12), ("N", *3 * ("m/s^2",)), strict=True
-        )
-    ]  # fmt: skip
-    file = pyuff.UFF(str(path))
-    for one in sets:
-        with warnings.catch_warnings():  # pyuff leaves closing the file to the garbage collector
-            warnings.simplefilter("ignore", ResourceWarning)
-            file.write_sets(one, "add")
+    kinds = zip(samples, (along, 1, 2, 3), ("force", *3 * ("acceleration",)), strict=True)
+    write_sets(path, (history(values, RATE_HZ, what, (1, direction), (1, along), "a stream")
+                      for values, direction, what in kinds))  # fmt: skip
 
 
 def write_wav(
@@ -145,7 +100,7 @@ def write_scales(path: Path, axis: str) -> None:
             file.write(f"{path.name},{number},{name},{unit},{scale},{axis}\n")
 
 
-WRITERS: dict[str, Callable[[Path, np.ndarray, str], None]] = {
-    ".csv": write_csv, ".mat": write_mat, ".h5": write_h5, ".tdms": write_tdms,
-    ".uff": write_uff, ".wav": write_wav,
-}  # fmt: skip
+WRITERS: dict[str, Callable[[Path, np.ndarray, str], object]] = {
+    suffix: lambda path, samples, axis, write=write: write(path, columns(samples), axis)
+    for suffix, write in hit_files.WRITERS.items()
+} | {".uff": write_uff, ".wav": write_wav}

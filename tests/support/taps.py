@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyuff
 
+from tests.support.hit_files import history, write_sets, write_table
 from tests.support.structures import Structure
 
 RATE_HZ, SAMPLES, LONG = 1024.0, 1024, 16
@@ -53,35 +53,20 @@ def tap(
 
 def write_uff(path: Path, taps: list[Tap], turned: bool = False) -> Path:
     """One hit after the other, labelled as simulated; responses along −z where `turned`."""
-    sets = []
+    sets, sign = [], -1 if turned else 1
     for one in taps:
         nodes = one.structure.nodes
-        ends = [(nodes[one.hit], 3, 13, "N", one.force_n)]
-        sign = -1 if turned else 1
-        heard = zip(one.felt, one.acceleration_m_s2, strict=True)
-        ends += [(nodes[k], 3 * sign, 12, "m/s^2", sign * own) for k, own in heard]
-        sets += [
-            {
-                "type": 58, "binary": 1, "func_type": 1, "id1": "simulated", "rsp_node": node,
-                "rsp_dir": direction, "ref_node": nodes[one.hit], "ref_dir": 3, "data": samples,
-                "x": np.arange(samples.size) / RATE_HZ, "abscissa_spacing": 1,
-                "abscissa_spec_data_type": 17, "ordinate_spec_data_type": kind,
-                "ordinate_axis_units_lab": unit, "orddenom_spec_data_type": 0,
-            }
-            for node, direction, kind, unit, samples in ends
-        ]  # fmt: skip
-    path.unlink(missing_ok=True)
-    pyuff.UFF(str(path)).write_sets(sets, "add")
-    return path
+        hit = nodes[one.hit], 3
+        sets.append(history(one.force_n, RATE_HZ, "force", hit, hit))
+        for k, own in zip(one.felt, one.acceleration_m_s2, strict=True):
+            sets.append(history(sign * own, RATE_HZ, "acceleration", (nodes[k], 3 * sign), hit))
+    return write_sets(path, sets)
 
 
 def write_csv(path: Path, one: Tap, columns: str, *attributes: str) -> Path:
     """Named columns, {} where the node goes, below lines of attributes ("hit: +z")."""
     nodes = [f"n{one.structure.nodes[k]}" for k in one.felt]
-    head = [f"# {text}" for text in attributes]
     names = ["time_s", "force_n", *(columns.format(node) for node in nodes)]
-    t = np.arange(one.force_n.size) / RATE_HZ
-    table = np.column_stack([t, one.force_n, one.acceleration_m_s2.T])
-    text = "\n".join([*head, ",".join(names)])
-    np.savetxt(path, table, delimiter=",", header=text, comments="", fmt="%.9g")
-    return path
+    rows = [np.arange(one.force_n.size) / RATE_HZ, one.force_n, *one.acceleration_m_s2]
+    head = (f"# {text}" for text in attributes)
+    return write_table(path, dict(zip(names, rows, strict=True)), *head)
