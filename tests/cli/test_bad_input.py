@@ -209,7 +209,7 @@ def test_a_folder_instead_of_its_robot(bench, tmp_path):
 
 
 SAID = {
-    "new": "--example",
+    "new ROOT/fresh": "--example",
     "study seed-9": "choose one of busch2022",
     "study seyedhosseini2025 --out POSES": "name another folder",
 }
@@ -233,6 +233,7 @@ SAID = {
         "modes ROOT/nowhere.uff",
         "modes POSES",
         "new CELL --robot ROOT/robot/robot.toml",
+        "new ROOT/fresh",
         "frobnicate",
         *("new", "import", "check"),
         "study seed-9",
@@ -258,7 +259,7 @@ def test_huge_files_are_refused_without_reading_them(bench, tmp_path, suffix):
     with open(huge, "wb") as file:
         file.truncate(2**30)
     expect_one_sentence(*call("modes", huge, "--json"), huge.name, "No modes")
-    expect_one_sentence(*call("import", bench.cell, huge, "--pose", bench.pose))
+    expect_one_sentence(*call("import", bench.cell, huge, "--pose", "G1"))
     if suffix == "csv":
         expect_one_sentence(*call("predict", bench.cell, huge, "--json"))
     assert sum(p.stat().st_size for p in bench.cell.rglob("*") if p.is_file()) < 10**8

@@ -1,7 +1,6 @@
 """Recordings as one data set: poses, visits, levels; from a folder, from files, from hits."""
 
 import csv
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -197,24 +196,3 @@ def test_folders_whose_recordings_no_table_names_are_told_of(tmp_path):
     (said,) = unlisted_folders(tmp_path, found)
     assert "P2 is left out: no recordings.csv says" in said
     assert "name the campaign" in said
-
-
-def test_a_stream_is_a_file_of_several_hits_and_its_bad_ones_are_named(tmp_path):
-    rng, rows = np.random.default_rng(6), ["pose,a_deg,hit,repeat,file"]
-    for axis in "xyz":
-        hits = [make_hit(rng, f"+{axis}", second=0.5 * (axis + str(k) == "y1")) for k in range(3)]
-        whole = replace(
-            hits[0],
-            force_n=np.concatenate([hit.force_n for hit in hits]),
-            acceleration_m_s2=np.hstack([hit.acceleration_m_s2 for hit in hits]),
-        )
-        write_hit(tmp_path / f"{axis}.csv", whole, stated=False)
-        rows.append(f"A,0,+{axis},1,{axis}.csv")
-    (tmp_path / "recordings.csv").write_text("\n".join(rows))
-    found = Dataset.read(tmp_path, joints("a"), BAND_HZ, store=NOTHING_KEPT)
-    assert Counter(h.axis_index for h in found.visits[0].hits) == {0: 3, 1: 2, 2: 3}
-    ((name, reason),) = found.refused
-    assert "y.csv (hit 2 at 4.0" in name
-    assert "second pulse" in reason
-    alone = estimate(found.visits[0].hits, BAND_HZ)
-    np.testing.assert_array_equal(found.frfs[0].accelerance, alone.accelerance)

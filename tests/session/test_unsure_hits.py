@@ -79,15 +79,6 @@ def test_a_hit_along_another_axis_than_said_is_held(bench):
     assert found["z1"].kind == found["z3"].kind == "good"
 
 
-def test_two_that_disagree_are_both_held_where_nothing_tells(bench):
-    bench.hit("z1", "+z")
-    bench.hit("z2", "-z", said="+z")
-    found = bench.of()
-    assert kinds(found) == {"z1": "unsure", "z2": "unsure"}
-    assert "hit 2 (z2.uff)" in found["z1"].text
-    assert "hit 1 (z1.uff)" in found["z2"].text
-
-
 def test_the_first_hit_along_an_axis_may_be_one_of_another(bench):
     bench.hit("y1", "+y")
     bench.hit("y2", "+y")

@@ -16,7 +16,7 @@ from planner.studies import registry
 from planner.studies.run import run_study
 from tests.support.studied import part
 
-busch2022, busch2020, lei = (part(name, "data") for name in ("busch2022", "busch2020", "lei2023"))
+busch2022, busch2020, _, lei, birk = (part(name, "data") for name in registry.NAMES)
 FITS, SCORES = part("birk2025", "fits"), part("lei2023", "scores")
 
 
@@ -69,6 +69,15 @@ def test_hits_tell_the_parameters_of_the_plane(truth):
     assert np.nanmedian(off) < 0.3
 
 
+def test_missing_parameters_are_filled_from_neighbours():
+    x = np.linspace(0, 1, 9)[:, None]
+    y = np.column_stack([np.arange(9.0), np.arange(9.0)])
+    y[4, 1] = np.nan
+    filled = registry.load("lei2023")._filled(x, y)
+    assert filled[4, 1] == 4.0  # the mean of 2, 3, 5, 6
+    assert np.array_equal(np.delete(filled, 4, 0), np.delete(y, 4, 0))
+
+
 def test_splits_are_nested_spread_and_complete():
     grid = np.stack(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 7)), axis=-1).reshape(-1, 2)
     train, test = busch2022.split(grid, 3)
@@ -89,6 +98,25 @@ def test_bad_input_is_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setattr(registry, "NEEDED", "no_such_module")
     with pytest.raises(InputError, match=r"pip install 'planner\[truth\]'"):
         registry.named("birk2025")
+
+
+def test_the_truth_of_birk_is_of_another_class():
+    truth = birk.true_robot(11)
+    assert len(truth.deviation.beams) == 3
+    assert len(birk.gears(truth)) == 6
+    stated = FITS.stated("24P").elasticity.stiffness
+    own = np.array([spring.stiffness for spring in truth.springs[: len(stated)]])
+    assert np.std(np.log(own / stated)) > 0.1
+
+
+def test_saltellis_points_are_two_halves_of_one_sequence():
+    points = part("busch2022", "pictures").saltelli(3, 1000)
+    assert points.shape == (1000, 3)
+    assert points.min() > 0
+    assert points.max() < 1
+    # Far more even than random numbers: their mean errs by 1/√12,000 = 0.009.
+    np.testing.assert_allclose(points.mean(axis=0), 0.5, atol=0.003)
+    assert abs(np.corrcoef(points[:500, 0], points[500:, 0])[0, 1]) < 0.1
 
 
 def test_studies_are_found_by_their_former_names_too():
