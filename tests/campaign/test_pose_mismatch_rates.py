@@ -6,7 +6,8 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import pytest
@@ -78,51 +79,72 @@ def flipped(q: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.where(np.arange(len(q)) == int(rng.integers(1, len(q))), -q, q)
 
 
-def answers(
-    campaign: CaseCampaign, rng: np.random.Generator, mistaken: bool
-) -> list[dict[str, tuple[str, str]]]:
-    """Of each pose, by what is wrong: what is asked, and what is so; of the first its chain."""
+Told = dict[str, tuple[str, str]]  # what is asked, and what is so, by what is wrong
+
+
+@dataclass(frozen=True, eq=False)
+class Asker:
+    """What is asked after the poses of a state."""
+
+    campaign: CaseCampaign
+    state: CampaignState
+
+    @cached_property
+    def model(self) -> Model:
+        return self.campaign.model(self.state)
+
+    def asked(
+        self, pose: int, q: np.ndarray, change: Change | None = None,
+        state: CampaignState | None = None,
+    ) -> str:  # fmt: skip
+        """Of a pose's hits, said to be at q, by a chain that changes them: a pose, "readback",
+        "earlier" and a pose, "chain", "?" where nothing fits; "" where nothing is asked."""
+        case = self.campaign.case
+        hits = case.measured[pose].hits
+        hits = tuple(map(change, hits)) if change else hits
+        measured = MeasuredPose((), case.band_hz, given=hits)
+        angles = self.campaign.angles(q)
+        told = question_about(self.model, state or self.state, "X", angles, measured)
+        if told is None:
+            return ""
+        return f"earlier {told.fits}" if told.about == "earlier" else told.fits or told.about or "?"
+
+
+def answers(campaign: CaseCampaign, rng: np.random.Generator, mistaken: bool) -> list[Told]:
+    """Of each pose; where `mistaken`, of all that may be wrong with its hits, too."""
     case, out = campaign.case, []
     wrong_q = case.q.copy()
     wrong_q[0] = off(case.q[0], EARLIER_DEG, rng)
     for n, q in enumerate(case.q):
-        state = campaign.state(n, unlisted=[n])
-        model = campaign.model(state)
-
-        def asked(
-            q: np.ndarray = q, pose: int = n, change: Change | None = None,
-            state: CampaignState = state, model: Model = model,
-        ) -> str:  # fmt: skip
-            hits = case.measured[pose].hits
-            hits = tuple(map(change, hits)) if change else hits
-            measured = MeasuredPose((), case.band_hz, given=hits)
-            told = question_about(model, state, "X", campaign.angles(q), measured)
-            if told is None:
-                return ""
-            named = f"earlier {told.fits}" if told.about == "earlier" else told.fits or told.about
-            return named or "?"
-
-        one = {"right": (asked(), "")}
+        ask = Asker(campaign, campaign.state(n, unlisted=[n]))
+        one = {"right": (ask.asked(n, q), "")}
         if mistaken:
-            one |= {k: (asked(change=shown(fault(k, rng))), "chain") for k in CHAINS}
-        if n and mistaken:
-            other = (n + 1) % len(case.q)
-            one |= {
-                "another pose": (asked(pose=other), f"P{other}"),
-                "sign of an angle": (asked(flipped(q, rng)), "readback"),
-                "an angle 3° off": (asked(off(q, MISREAD_DEG, rng)), "readback"),
-                "x hit from behind": (asked(change=from_behind), "chain"),
-                "x listed as y": (asked(change=exchanged), "chain"),
-            }
-            if other > n:
-                own = campaign.state(n, unlisted=[n, other])
-                one["unlisted pose"] = (asked(pose=other, state=own), "?")
-        if n >= SURE and mistaken:
-            bent = campaign.state(n, wrong_q, [n])
-            one[FIRST] = (asked(state=bent, model=campaign.model(bent)), "earlier P0")
-            one |= {name: (asked(change=how), "chain") for name, how in FILTERED.items()}
+            one |= {k: (ask.asked(n, q, shown(fault(k, rng))), "chain") for k in CHAINS}
+        if mistaken and n:
+            one |= mistakes(ask, n, rng)
+        if mistaken and n >= SURE:
+            bent = Asker(campaign, campaign.state(n, wrong_q, [n]))
+            one[FIRST] = (bent.asked(n, q), "earlier P0")
+            one |= {name: (ask.asked(n, q, how), "chain") for name, how in FILTERED.items()}
         out.append(one)
     return out
+
+
+def mistakes(ask: Asker, n: int, rng: np.random.Generator) -> Told:
+    """Another pose, angles read wrongly, hits along another axis or direction than is said."""
+    q = ask.campaign.case.q[n]
+    other = (n + 1) % len(ask.campaign.case.q)
+    found = {
+        "another pose": (ask.asked(other, q), f"P{other}"),
+        "sign of an angle": (ask.asked(n, flipped(q, rng)), "readback"),
+        "an angle 3° off": (ask.asked(n, off(q, MISREAD_DEG, rng)), "readback"),
+        "x hit from behind": (ask.asked(n, q, from_behind), "chain"),
+        "x listed as y": (ask.asked(n, q, exchanged), "chain"),
+    }
+    if other > n:
+        unlisted = ask.campaign.state(n, unlisted=[n, other])
+        found["unlisted pose"] = (ask.asked(other, q, state=unlisted), "?")
+    return found
 
 
 @pytest.mark.slow
