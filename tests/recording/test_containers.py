@@ -166,6 +166,8 @@ REFUSED = {
         "sample 11 is not a finite"),
     "HDF5: a damaged heap of texts": (".h5", damaged_heap, "damaged where its texts lie"),
     "LVM: spectra": (".lvm", changed("X_Dimension\tTime", "X_Dimension\tFrequency"), "over Hz"),
+    "LVM: a step of a word": (
+        ".lvm", changed("Delta_X\t0.001953", "Delta_X\tabout"), "Delta_X about is no number"),
     "LVM: a word": (".lvm", changed(*WORD), f"row {WORD_ROW}: Hammer is x"),
     "LVM: fewer rows than stated": (".lvm", changed("Samples\t512", "Samples\t513"), "cut off"),
     "LVM: two rates": (".lvm", changed("\t0.001953\t", "\t0.000977\t", x="No"), "different rates"),
@@ -190,8 +192,9 @@ def test_what_is_not_understood_is_said(tmp_path, what):
         read(path)
 
 
-def test_a_date_that_is_none_is_no_date(tmp_path):
-    (tmp_path / "zone.lvm").write_text(lvm(HITS[:1]).replace("08:00:30.25", "08:00:30-25"))
+@pytest.mark.parametrize("clock", ["08:00:30-25", "88:00:30.25"])
+def test_a_date_that_is_none_is_no_date(tmp_path, clock):
+    (tmp_path / "zone.lvm").write_text(lvm(HITS[:1]).replace("08:00:30.25", clock))
     (hit,) = hits_from(read(tmp_path / "zone.lvm"))
     same(hit, HITS[0])
 
