@@ -31,6 +31,20 @@ def no_more_processes_than_cores():
 
 
 @pytest.fixture(scope="session")
+def first_pose_once(tmp_path_factory):
+    """A campaign with a proposal and its recordings: not to be changed."""
+    from tests.support.first_pose import FirstPose  # most tests need no simulated robot
+
+    return FirstPose.begun(tmp_path_factory.mktemp("first"))
+
+
+@pytest.fixture
+def first_pose(first_pose_once, tmp_path):
+    """A copy of it."""
+    return first_pose_once.copied(tmp_path)
+
+
+@pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of real recordings; the test is skipped where it is missing."""
     if not SHARED_DATA.is_dir():

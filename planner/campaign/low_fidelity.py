@@ -31,7 +31,7 @@ BELIEVED = 0.99  # in a simulation that fits the recordings
 RIGHT, DAMPING = 0.001, 0.05
 # The same after one pose, when no other has shown yet whether the structure is the right one: 95 %
 # intervals held 0.87 of the truths with RIGHT and hold 0.93 with this, on 30 robots of another
-# engine (`tests/campaign/test_few_poses.py`).
+# engine (`tests/campaign/test_everyday_campaigns.py`).
 UNCHECKED = 0.012
 # Fewer poses tell neither the structure for sure, nor the scatter from visit to visit, nor, left
 # out one by one, how far a simulation is off that lacks physics.

@@ -1,7 +1,9 @@
 """Ask and tell: poses proposed and learned from without any file."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 from planner import AskTell, Robot, Simulation
 from planner.campaign.campaign import Campaign
 from planner.campaign.store import EXAMPLE, write_example
+from planner.demo import NAME, shipped
 from planner.dynamics.simulation import Elasticity
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
@@ -135,12 +138,27 @@ def test_a_campaign_has_rows_too(tmp_path):
     assert rows[4]["joint_1_deg"] == pytest.approx(-30)
 
 
-def test_the_shipped_script_runs_where_it_is_written(tmp_path):
-    write_example(tmp_path / "own")
-    done = subprocess.run([sys.executable, str(tmp_path / "own" / "ask_tell.py")],
-                          capture_output=True, text=True, check=False, timeout=280)  # fmt: skip
+def ran(script: Path, folder: Path) -> str:
+    """What a script prints."""
+    done = subprocess.run(
+        [sys.executable, str(script)], cwd=folder, env={**os.environ, "MPLBACKEND": "Agg"},
+        capture_output=True, text=True, check=False, timeout=280,
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    *rows, real = done.stdout.splitlines()
+    return done.stdout
+
+
+def test_the_script_of_the_example_runs_where_it_is_written(tmp_path):
+    write_example(tmp_path / "own")
+    *rows, real = ran(tmp_path / "own" / "ask_tell.py", tmp_path).splitlines()
     said = [float(row.split()[2]) for row in rows[1:]]
     true = [float(v) for v in real.removeprefix("real:").strip(" []").split()]
     np.testing.assert_allclose(said, true, rtol=0.01)
+
+
+def test_the_script_of_the_shipped_campaign_proposes_predicts_and_draws(tmp_path):
+    script = shipped(NAME) / "example.py"
+    assert len(script.read_text(encoding="utf-8").splitlines()) <= 20
+    assert ran(script, tmp_path).startswith("P001")
+    assert (tmp_path / "frf_xx.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "cell" / "campaign.toml").is_file()

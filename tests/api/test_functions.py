@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from planner import Dataset, Frf, Hit, Robot, analyse, identify
-from planner.cli.run import run
 from planner.errors import InputError, RefusedError
 from planner.modal.modes import ModalModel
 from planner.proof.recordings import record_poses
 from planner.recording.hits import hits_from
 from planner.recording.read import read
 from planner.report.pictures import Pictures
-from tests.support.outside import HAMMER, make_cell
+from tests.support.outside import HAMMER, make_cell, told
 
 
 @pytest.fixture(scope="module")
@@ -77,16 +76,14 @@ def test_what_cannot_be_analysed_is_said(recorded, dataset, tmp_path):
         analyse(tmp_path / "torn.uff")
 
 
-def test_identify_says_what_the_command_says_and_more(recorded, dataset, capsys):
+def test_identify_says_what_the_command_says_and_more(recorded, dataset):
     folder, robot_toml, robot = recorded
     found = identify(dataset, robot)
-    command = ["identify", str(folder), "--robot", str(robot_toml), "--json"]
-    assert run(command) == 0
-    told = json.loads(capsys.readouterr().out)
+    answer = told("identify", folder, "--robot", robot_toml)
     mine = json.loads(json.dumps(found.to_json()))
-    assert list(mine) == list(told)
-    assert mine | {"seconds": 0} == told | {"seconds": 0}
-    assert found.parameters[0].stiffness == told["parameters"][0]["stiffness"]
+    assert list(mine) == list(answer)
+    assert mine | {"seconds": 0} == answer | {"seconds": 0}
+    assert found.parameters[0].stiffness == answer["parameters"][0]["stiffness"]
     h = found.simulation.accelerance(dataset.q[:1], np.array([5.0, 10.0]))
     assert h.shape == (1, 3, 3, 2)
     assert found.with_pictures(Pictures()) is found

@@ -1,6 +1,5 @@
 """Hits of an axis that contradict each other are held and asked about, and no limit is claimed."""
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,58 +9,46 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.design.stopping import Forecast
 from planner.proof.hits import simulate_hit
-from planner.proof.recordings import record_poses, write_uff
-from planner.recording.read import read
-from planner.recording.records import TimeRecord
-from tests.support.outside import HAMMER, call, make_cell, told
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """A new campaign with a proposal, and two hits an axis there; one z hit was along y."""
-    root = tmp_path_factory.mktemp("contradicting")
-    robot, plan, truth = make_cell(root, learns=False)
-    assert call("new", root / "cell", "--robot", robot, "--campaign", plan)[0] == 0
-    pose = told("next", root / "cell")["proposals"][0]
-    q = np.deg2rad(pose["joints_deg"])
-    folder = record_poses(truth, [(pose["pose"], q)], root / "good", repeats=2, hammer=HAMMER)
-    rng = np.random.default_rng(1)
-    odd = simulate_hit(truth, q, "+y", HAMMER, rng)
-    third = simulate_hit(truth, q, "+z", HAMMER, rng)
-    fourth = simulate_hit(truth, q, "+y", HAMMER, rng)
-    hits = root / "hits"
-    shutil.copytree(folder / "data", hits)
-    wrong = next(hits.glob("*pz_2.uff"))
-    write_uff(wrong, type(odd)("+z", odd.force_n, odd.acceleration_m_s2), HAMMER)
-    write_uff(root / "third.uff", third, HAMMER)
-    as_z = type(odd)("+z", fourth.force_n, fourth.acceleration_m_s2)
-    write_uff(root / "fourth.uff", as_z, HAMMER)
-    assert all(isinstance(r, TimeRecord) for r in read(wrong))
-    return root / "cell", pose["pose"], hits, wrong, root / "third.uff"
+from planner.proof.recordings import write_uff
+from tests.support.outside import HAMMER, call, told
 
 
 @pytest.fixture
-def cell(made, tmp_path) -> Path:
-    return shutil.copytree(made[0], tmp_path / "cell")
+def struck(first_pose):
+    """A campaign, and hits at its pose: two an axis, of z the second was along y.
+
+    Aside: a third along z, and a fourth that was along y, too.
+    """
+    rng, q = np.random.default_rng(1), np.deg2rad(first_pose.joints_deg)
+    hits = first_pose.made / "data"
+    for path in hits.glob("*_3.uff"):
+        path.unlink()
+    wrong = next(hits.glob("*pz_2.uff"))
+    third, fourth = (first_pose.made / name for name in ("third.uff", "fourth.uff"))
+    for path, axis in ((wrong, "+y"), (third, "+z"), (fourth, "+y")):
+        hit = simulate_hit(first_pose.truth, q, axis, HAMMER, rng)
+        write_uff(path, replace(hit, axis="+z"), HAMMER)
+    return first_pose, hits, wrong, third, fourth
 
 
-def test_the_import_is_held_and_names_the_files(cell, made):
-    _, pose, hits, wrong, _ = made
+def names(paths) -> set[str]:
+    return {Path(path).name for path in paths}
+
+
+def test_the_import_is_held_and_names_the_files(struck):
+    first, hits, wrong, *_ = struck
+    cell = first.cell
     code, _, err = call("import", cell, hits)
     said = " ".join(err.split())
-    assert code == 3
-    assert wrong.name in said
-    assert wrong.name.replace("_2", "_1") in said
-    assert f"planner undo {cell}" in said
-    assert f"planner confirm {cell} {pose}" in said
+    two = [wrong.name, wrong.name.replace("_2", "_1")]
+    wanted = (*two, f"planner undo {cell}", f"planner confirm {cell} {first.pose}")
+    assert (code, [words for words in wanted if words not in said]) == (3, [])
     found = told("status", cell)
     assert found["used"] == 0
     question = found["held"][0]["question"]
-    assert [Path(name).name for name in question["disagree"]] == [
-        wrong.name, wrong.name.replace("_2", "_1"),
-    ]  # fmt: skip
+    assert [Path(name).name for name in question["disagree"]] == two
     # Confirmed, all are used; the log is reproduced.
-    told("confirm", cell, pose)
+    told("confirm", cell, first.pose)
     assert told("status", cell)["used"] == 1
     assert told("replay", cell)["reproduced"]
     page = Path(told("report", cell)["report"]).read_text()
@@ -70,28 +57,26 @@ def test_the_import_is_held_and_names_the_files(cell, made):
     assert (code, "make that folder" in err, (cell / "none").exists()) == (2, True, False)
 
 
-def test_two_and_two_are_held_too(cell, made):
-    _, pose, hits, wrong, third = made
-    fourth = third.with_name("fourth.uff")
-    code, _, err = call("import", cell, hits, third, fourth, "--pose", pose)
+def test_two_and_two_are_held_too(struck):
+    first, hits, wrong, third, fourth = struck
+    code, _, err = call("import", first.cell, hits, third, fourth, "--pose", first.pose)
     assert code == 3
     assert all(name in " ".join(err.split()) for name in (wrong.name, fourth.name))
-    question = told("status", cell)["held"][0]["question"]
-    assert {Path(name).name for name in question["disagree"]} == {
-        wrong.name, wrong.name.replace("_2", "_1"), third.name, fourth.name,
-    }  # fmt: skip
+    question = told("status", first.cell)["held"][0]["question"]
+    every = {wrong.name, wrong.name.replace("_2", "_1"), third.name, fourth.name}
+    assert names(question["disagree"]) == every
 
 
-def test_a_third_hit_tells_which_was_right(cell, made):
-    _, pose, hits, wrong, third = made
-    assert call("import", cell, hits)[0] == 3
-    told("undo", cell)
-    code, _, err = call("import", cell, hits, third, "--pose", pose)
+def test_a_third_hit_tells_which_was_right(struck):
+    first, hits, wrong, third, _ = struck
+    assert call("import", first.cell, hits)[0] == 3
+    told("undo", first.cell)
+    code, _, err = call("import", first.cell, hits, third, "--pose", first.pose)
     assert code == 3
     assert "held" not in err
-    state = Campaign(cell).state
-    assert [Path(h.file).name for m in state.used for h in m.hits if not h.accepted] == [wrong.name]
-    assert len(state.used[0].accepted) == 6
+    (used,) = Campaign(first.cell).state.used
+    assert names(h.file for h in used.hits if not h.accepted) == {wrong.name}
+    assert len(used.accepted) == 6
 
 
 def test_where_the_simulation_misses_no_limit_is_told():

@@ -13,21 +13,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.proof.arms import ARMS
-from tests.support.frf_campaigns import LACKING, FrfScore, make
+from tests.support.case_campaigns import FrfScore, lacking
+from tests.support.faulty_robots import KINDS
+from tests.support.fitted_cases import ARMS
 
 CAMPAIGNS, POSES = int(os.environ.get("CAMPAIGNS", "50")), 5
 FIRST_SEED = int(os.environ.get("SEED", "300"))
-CASES = list(product(LACKING, ARMS))
+CASES = list(product(KINDS, ARMS))
 
 
 def scores_of(number: int, folder: Path) -> list[FrfScore]:
     """Of one campaign after each pose; kept in the folder."""
     kept = folder / f"{FIRST_SEED}_{number}.json"
     if not kept.exists():
-        lacking, robot = CASES[number % len(CASES)]
-        case = make(robot, lacking, FIRST_SEED + number, folder / str(number), poses=POSES)
-        found = [asdict(FrfScore.of(case, model)) for model in case.models()]
+        kind, robot = CASES[number % len(CASES)]
+        campaign = lacking(robot, kind, FIRST_SEED + number, folder / str(number))
+        models = map(campaign.after, range(1, POSES + 1))
+        found = [asdict(FrfScore.of(campaign.case, model)) for model in models]
         kept.write_text(json.dumps(found))
     return [FrfScore(**score) for score in json.loads(kept.read_text())]
 

@@ -1,6 +1,6 @@
 """FRFs of a campaign: what is left out says what to trust, and how far off FRFs are elsewhere.
 
-`pytest -m slow tests/campaign/test_frf_model.py` takes a robot that other springs nearly fit.
+How good they are on fifty robots: test_frf_campaigns.py.
 """
 
 from dataclasses import replace
@@ -15,7 +15,7 @@ from planner.demo import NAME, shipped
 from planner.frf.metrics import agreement, direct_mean
 from planner.surrogate.leave_one_out import left_out_modes
 from planner.surrogate.modal_surrogate import fit_surrogate
-from tests.support.frf_campaigns import FrfScore, make
+from tests.support.case_campaigns import CaseCampaign, FrfScore, lacking
 from tests.support.surrogates import observed
 
 
@@ -45,12 +45,12 @@ def test_missing_modes_are_predicted_where_they_are_left_out():
 
 @pytest.fixture(scope="module")
 def base(tmp_path_factory):
-    """A robot on a soft base that nobody knows of, hit as people hit; two poses."""
-    return make("kr210", "soft base", 1, tmp_path_factory.mktemp("base"), poses=2, unseen=4)
+    """A robot on a soft base that nobody knows of, hit as people hit."""
+    return lacking("kr210", "soft base", 1, tmp_path_factory.mktemp("base"))
 
 
-def test_frfs_of_a_soft_base_get_better_with_the_second_pose(base):
-    first, second = (FrfScore.of(base, base.model(n)) for n in (1, 2))
+def test_frfs_of_a_soft_base_get_better_with_the_second_pose(base: CaseCampaign):
+    first, second = (FrfScore.of(base.case, base.after(n)) for n in (1, 2))
     print(first, second)
     assert second.frac > 0.995
     assert second.frac > first.frac - 0.002
@@ -60,8 +60,8 @@ def test_frfs_of_a_soft_base_get_better_with_the_second_pose(base):
 
 
 def test_without_a_simulation_frfs_are_those_of_fused_modes_and_less_sure(tmp_path):
-    case = make("kr210", "nothing", 2, tmp_path, poses=3, unseen=3, simulation="none")
-    model = case.model(2)
+    campaign = lacking("kr210", "nothing", 2, tmp_path, simulation="none")
+    case, model = campaign.case, campaign.after(2)
     mean, sd = model.frf(case.unseen, case.lines_hz)
     fused, fused_sd = model._modal_frf(case.unseen, case.lines_hz)
     np.testing.assert_allclose(mean, fused)
@@ -70,11 +70,11 @@ def test_without_a_simulation_frfs_are_those_of_fused_modes_and_less_sure(tmp_pa
 
 
 def test_before_any_measurement_the_simulation_as_stated_says_what_to_expect(base):
-    model = base.model(0)
-    mean, sd = model.frf(base.unseen[:1], base.lines_hz)
+    model, q, lines = base.after(0), base.case.unseen[:1], base.case.lines_hz
+    mean, sd = model.frf(q, lines)
     assert "frf_error" not in vars(model)
-    stated = base.cell.simulation.accelerance(base.unseen[:1], base.lines_hz)
-    low = base.lines_hz < 20
+    stated = base.cell.simulation.accelerance(q, lines)
+    low = lines < 20
     assert direct_mean(agreement(stated[..., low], mean[..., low]).global_frac) > 0.6
     assert np.all(sd > 0)
 
@@ -95,14 +95,3 @@ def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
     monkeypatch.setattr(ErrorByZone, "of", refused)
     again = Campaign(tmp_path / "c", store).frf_at(q)
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
-
-
-@pytest.mark.slow
-def test_a_link_that_bends_is_found_though_other_springs_nearly_fit(tmp_path):
-    case = make("irb6640", "bending link", 7308, tmp_path, poses=5)
-    model = case.model(2)
-    assert model.low.identified_robot is not None
-    assert model.low.identified_robot.fits
-    score = FrfScore.of(case, model)
-    assert score.frac > 0.998
-    assert score.covered > 0.85

@@ -6,10 +6,9 @@ import os
 import subprocess
 import sys
 import time
+from itertools import permutations
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from planner.campaign.events import Entry, Skipped, Starred, Undone, Withdrawn
 from planner.campaign.journal import Journal, encode_line, parse
@@ -46,28 +45,13 @@ def test_every_truncation_keeps_every_whole_line_and_no_half_one():
         assert len(content.torn) == cut - content.whole_bytes
 
 
-def test_a_newline_lost_before_the_last_line_is_damage_not_a_torn_line():
+def test_a_changed_byte_is_found_wherever_it_is():
+    """A newline that became a blank, too: a line that was cut short has none."""
     log = log_of(EVENTS)
-    at = log[:-1].rfind(b"\n")
-    with pytest.raises(JournalError, match="damaged"):
-        parse(log[:at] + b"\0" + log[at + 1 :])
-
-
-@pytest.mark.parametrize("blank", [b" ", b"\t", b"\r"])
-def test_a_blank_in_the_stead_of_the_last_newline_is_damage(blank):
-    with pytest.raises(JournalError, match="damaged"):
-        parse(log_of(EVENTS)[:-1] + blank)
-
-
-@settings(deadline=None)
-@given(st.data())
-def test_a_changed_byte_is_found(data):
-    log = log_of(EVENTS)
-    at = data.draw(st.integers(0, len(log) - 1))
-    byte = data.draw(st.integers(0, 255).filter(lambda b: b != log[at]))
-    changed = log[:at] + bytes([byte]) + log[at + 1 :]
-    with pytest.raises(JournalError, match="damaged"):  # a line that was cut short has no newline
-        parse(changed)
+    for at, byte in enumerate(log):
+        for other in {0, 9, 10, 13, 32, 255, byte ^ 1} - {byte}:
+            with pytest.raises(JournalError, match="damaged"):
+                parse(log[:at] + bytes([other]) + log[at + 1 :])
 
 
 def test_what_a_newer_planner_wrote_is_not_called_damaged():
@@ -80,14 +64,12 @@ def test_what_a_newer_planner_wrote_is_not_called_damaged():
         parse(log + line)
 
 
-@settings(deadline=None)
-@given(st.permutations(range(len(EVENTS))))
-def test_reordered_lines_are_found(order):
-    lines = log_of(EVENTS).splitlines(keepends=True)
-    if list(order) == list(range(len(EVENTS))):
-        return
-    with pytest.raises(JournalError, match="damaged"):
-        parse(b"".join(lines[i] for i in order))
+def test_reordered_lines_are_found():
+    right, *others = permutations(log_of(EVENTS).splitlines(keepends=True))
+    assert b"".join(right) == log_of(EVENTS)
+    for lines in others:
+        with pytest.raises(JournalError, match="damaged"):
+            parse(b"".join(lines))
 
 
 def test_torn_tail_is_set_aside_before_appending(tmp_path):

@@ -48,6 +48,15 @@ def measured(path, n: int = 4, resonators: tuple[AttachedResonator, ...] = ()):
     return frfs, q, other, np.array([truth.modes(p, COUNT)[0] for p in other])
 
 
+def learned(path, deviation: Deviation, n: int):
+    """The simulation of an arm before and after it has learned from n poses, and the true arm."""
+    band, truth, rng = (4.0, 90.0), load_truth(path, deviation), np.random.default_rng(3)
+    hammer = Hammer(peak_n=250.0, duration_s=0.005, sampling_rate_hz=512.0, record_s=2.0)
+    frfs = [ended(hits_at(truth, one, hammer, rng), band) for one in poses(n)]
+    before = LowFidelity(COUNT, Simulation(Robot.load(path)), Tolerances())
+    return before, identify_low_fidelity(before, frfs, poses(n), band), truth
+
+
 @pytest.fixture(scope="module")
 def right(tmp_path_factory):
     """A simulation with all the physics, before and after it has learned."""
@@ -114,17 +123,11 @@ def test_a_resonator_that_is_stated_is_refitted_and_not_found_again(tmp_path):
 
 def test_damping_that_is_partly_a_loss_factor_is_no_lack_of_compliance(tmp_path):
     """Nothing is wrong but how gears dissipate: no spring is made up for it."""
-    path, band = write_arm(tmp_path), (4.0, 90.0)
+    path = write_arm(tmp_path)
     stated = path.read_text()
     damped = re.sub(r"damping = ([\d.e+]+)", lambda m: f"damping = {4 * float(m[1])}", stated)
     path.write_text(damped)
-    truth = load_truth(path, Deviation(8, 0.15, 0.15, 0.03, 0.003, mixed=1.0))
-    hammer = Hammer(peak_n=250.0, duration_s=0.005, sampling_rate_hz=512.0, record_s=2.0)
-    q, rng = poses(3), np.random.default_rng(3)
-    frfs = [ended(hits_at(truth, one, hammer, rng), band) for one in q]
-    after = identify_low_fidelity(
-        LowFidelity(COUNT, Simulation(Robot.load(path)), Tolerances()), frfs, q, band
-    )
+    _, after, _ = learned(path, Deviation(8, 0.15, 0.15, 0.03, 0.003, mixed=1.0), 3)
     assert after.is_identified
     assert after.identified_robot is not None
     assert after.identified_robot.added == 0
@@ -134,16 +137,11 @@ def test_damping_that_is_partly_a_loss_factor_is_no_lack_of_compliance(tmp_path)
 
 def test_a_mass_that_swings_on_a_link_is_found_and_named(tmp_path):
     hose = AttachedResonator("l4", (0.15, 0.01, 0.0), (-0.8, 0.3, 0.5), 2.3, 59.8, 0.03)
-    path, band, count = write_arm(tmp_path), (4.0, 90.0), 4
-    truth = load_truth(path, Deviation(7, 0.15, 0.15, 0.03, 0.003, resonators=(hose,)))
-    q, other = poses(2), poses(12, seed=2)
-    hammer = Hammer(peak_n=250.0, duration_s=0.005, sampling_rate_hz=512.0, record_s=2.0)
-    rng = np.random.default_rng(3)
-    frfs = [ended(hits_at(truth, one, hammer, rng), band) for one in q]
-    before = LowFidelity(count, Simulation(Robot.load(path)), Tolerances())
-    after = identify_low_fidelity(before, frfs, q, band)
+    deviation = Deviation(7, 0.15, 0.15, 0.03, 0.003, resonators=(hose,))
+    before, after, truth = learned(write_arm(tmp_path), deviation, 2)
     assert after.is_identified
-    true_hz = np.array([truth.modes(one, count)[0] for one in other])
+    other = poses(12, seed=2)
+    true_hz = np.array([truth.modes(one, COUNT)[0] for one in other])
     assert rmse(after, other, true_hz) < 0.01 < 0.1 < rmse(before, other, true_hz)
     assert "on link_4 swings on its own at 59.8 Hz" in after.remark
 

@@ -83,20 +83,16 @@ def test_every_answer_marks_them(tmp_path):
     robot = source / "robot" / "robot.toml"
     campaign = Campaign.new(tmp_path / "cell", robot, source / "campaign.toml")
     here = campaign.cell.candidates.q[0]
-    tilted = here + np.deg2rad([0, 0, 0, 0, 3, 0])
-    report = predictions(campaign, ["here", "tilted"], [here, tilted], tmp_path / "p.npz")
-    assert [pose.outside for pose in report.poses] == [False, True]
-    assert np.load(tmp_path / "p.npz")["outside"].tolist() == [False, True]
-    rows = report.text().renderables[0]
-    assert "tilted (outside)" in list(rows.columns[0].cells)
-    assert "here" in list(rows.columns[0].cells)
-    marks = {
-        row["pose"]: row["outside"]
-        for row in campaign.predict_records(joints_deg=np.rad2deg([here, tilted]))
-        for row in campaign.predict_records(joints_deg=np.rad2deg([here, tilted]))
-    }
-    assert marks == {1: False, 2: True}
-    assert str(report.text().renderables[1]) == outside_remark(["tilted"])
+    off_deg = {"here": [0.0] * 6, "read back": [0.02, *[0.0] * 5], "tilted": [0, 0, 0, 0, 3, 0]}
+    q = [here + np.deg2rad(off) for off in off_deg.values()]
+    report = predictions(campaign, list(off_deg), q, tmp_path / "p.npz")
+    assert [pose.outside for pose in report.poses] == [False, False, True]
+    assert np.load(tmp_path / "p.npz")["outside"].tolist() == [False, False, True]
+    rows, remark, *_ = report.text().renderables
+    assert {"here", "tilted (outside)"} <= set(rows.columns[0].cells)
+    assert str(remark) == outside_remark(["tilted"])
+    records = campaign.predict_records(joints_deg=np.rad2deg(q))
+    assert {row["pose"]: row["outside"] for row in records} == {1: False, 2: False, 3: True}
 
 
 def test_the_sentence_stays_short():

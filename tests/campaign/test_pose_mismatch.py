@@ -1,7 +1,6 @@
 """Refused hits, and hits of another pose than stated: in the log, asked about, not used.
 
-`pytest -m slow tests/campaign/test_pose_mismatch.py` imports hits of a wrong sensitivity, too, and
-moves those of a pose that the robot had not left.
+`pytest -m slow tests/campaign/test_pose_mismatch.py` imports hits of a wrong sensitivity, too.
 """
 
 import csv
@@ -10,19 +9,16 @@ import shutil
 from contextlib import contextmanager
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Proposed
 from planner.campaign.import_checks import question_about
 from planner.campaign.state import fold
 from planner.campaign.store import CONFIG
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.demo import NAME, Pool, shipped
-from planner.errors import InputError
 from planner.recording.folder import TABLE
 from planner.replay import replay
 from planner.report.status import status
@@ -71,17 +67,8 @@ def campaign(three, tmp_path):
     return Campaign(tmp_path / "campaign")
 
 
-def claim(
-    folder,
-    pool,
-    pose=WRONG,
-    at=CLAIMED,
-    name="X1",
-    off_deg=(0.0,) * 6,
-    other_way="",
-    louder=1.0,
-):
-    """A recordings folder whose table says that the hits of `pose` were made at `at`.
+def claim(folder, pool, at=CLAIMED, off_deg=(0.0,) * 6, other_way="", louder=1.0):
+    """A recordings folder whose table says that the hits of WRONG, called X1, were made at `at`.
 
     `off_deg` is added to its angles; hits along `other_way` are said to have the other direction;
     accelerations are `louder` times as large.
@@ -91,12 +78,12 @@ def claim(
         table = csv.writer(file)
         joints = [f"joint_{i}_deg" for i in range(1, 7)]
         table.writerow(["pose", *joints, "hit", "repeat", "file"])
-        for row in pool.rows[pose]:
+        for row in pool.rows[WRONG]:
             scaled(row, folder / "data", louder)
             angles = np.add(pool.rows[at][0].joints_deg, off_deg)
             sign, axis = row.hit
             hit = f"{'-' if sign == '+' else '+'}{axis}" if axis == other_way else row.hit
-            table.writerow([name, *angles, hit, row.repeat, f"data/{row.file.name}"])
+            table.writerow(["X1", *angles, hit, row.repeat, f"data/{row.file.name}"])
     return folder
 
 
@@ -195,7 +182,7 @@ def test_hits_listed_along_wrong_axes_are_asked_about(campaign, pool):
 def test_misread_angles_and_hits_from_behind_are_asked_about(
     campaign, pool, tmp_path, wrong, about, said
 ):
-    folder = claim(tmp_path / "wrong", pool, WRONG, WRONG, **wrong)
+    folder = claim(tmp_path / "wrong", pool, WRONG, **wrong)
     (report,) = campaign.import_paths((folder,))
     assert report.question is not None
     assert report.question.about == about
@@ -204,52 +191,6 @@ def test_misread_angles_and_hits_from_behind_are_asked_about(
         read = float(report.question.text.split(said)[1].split("°")[0])
         stated = np.array(pool.rows[WRONG][0].joints_deg)
         assert abs(read - stated[int(said[-1]) - 1]) < 0.5
-
-
-@pytest.mark.slow
-def test_hits_of_a_pose_left_unmoved_are_told_and_moved(campaign, pool, tmp_path):
-    """The robot still stands where an open proposal says: the question names it."""
-    proposals = campaign.next(3)
-    hits = {p.pose: _nearest(campaign, pool, p) for p in proposals}
-    stated, true = proposals[0].pose, proposals[1].pose
-    joints = {p.pose: p.joints_deg for p in proposals}
-    _put(campaign, {true: pool.rows[hits[true]][0].joints_deg})
-    folder = claim(tmp_path / "wrong", pool, hits[true], hits[stated], stated)
-    (report,) = campaign.import_paths((folder,))
-    assert report.question is not None
-    assert report.question.fits == true
-    assert stated not in campaign.state.open
-    with pytest.raises(InputError, match="No joint angles"):
-        campaign.move(stated, "nowhere")
-    assert stated in campaign.state.held
-    moved = campaign.move(stated, true)
-    assert moved.question is None
-    assert len(moved.accepted) == 12
-    assert not campaign.state.held
-    assert true in campaign.state.measurements
-    assert joints[stated] == campaign.state.proposals[stated].joints_deg
-    campaign.undo()
-    assert campaign.state.held[stated].question == report.question
-    assert true not in campaign.state.measurements
-    campaign.withdraw(stated)
-    assert not campaign.state.held
-    campaign.undo()
-    assert campaign.state.held[stated].question == report.question
-
-
-def _nearest(campaign, pool, proposal):
-    return pool.nearest(campaign.cell, proposal, list(MEASURED))
-
-
-def _put(campaign, joints):
-    """Let open proposals be exactly where recorded poses are."""
-    (last,) = [e for e in campaign.entries[-1:] if isinstance(e.event, Proposed)]
-    changed = tuple(
-        msgspec.structs.replace(p, joints_deg=tuple(joints.get(p.pose, p.joints_deg)))
-        for p in last.event.proposals
-    )
-    with campaign._acting():
-        campaign.append(msgspec.structs.replace(last.event, proposals=changed))
 
 
 @pytest.mark.slow

@@ -5,40 +5,24 @@
 """
 
 import os
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
 from threadpoolctl import threadpool_limits
 
-from planner.campaign.alternatives import (
-    Alternative,
-    StatedHits,
-    chain_faults,
-    far_off_hits,
-    flipped_signs,
-    joint_offsets,
-)
-from planner.campaign.chain_mismatch import SpringDraws
-from planner.campaign.poses_together import SURE, PosesTogether
+from planner.campaign.import_checks import question_about
+from planner.campaign.model import Model
+from planner.campaign.poses_together import SURE
+from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
-from planner.dynamics.simulation import Simulation
-from planner.effects.parameters import CAD_INERTIAS
-from planner.effects.table import EffectLibrary
-from planner.fit.expected import ExpectedFrfs
-from planner.fit.fitted import FitRecord
-from planner.fit.identified_robot import PLACED
-from planner.fit.posterior import RobotPosterior
-from planner.fit.search import Search
-from planner.fit.structure import RobotPrior
-from planner.frf.frf import Frf
-from planner.measurement.nuisances import Tolerances
-from planner.recording.joints import JointUnits
 from planner.recording.records import Hit
-from planner.robot.robot import Robot
-from tests.support.chain_cases import fault, judged
-from tests.support.fitted_cases import ARMS, POSES, Case, everyday, harder
+from tests.support.case_campaigns import CaseCampaign
+from tests.support.chain_cases import fault
+from tests.support.fitted_cases import ARMS, POSES, everyday, harder
 
 CASES, SEED = int(os.environ.get("QUESTIONED", "100")), int(os.environ.get("QUESTION_SEED", "3000"))
 MISREAD_DEG, EARLIER_DEG = 3.0, 5.0
@@ -48,171 +32,148 @@ CHAINS = (
     "turned by 90°",
 )  # fmt: skip
 FIRST = "first pose 5° off"
-FILTERED = "2 ms late", "AC-coupled", "windowed"
+Change = Callable[[Hit], Hit]
 
 
-def shown(frf: Frf, matrix: np.ndarray) -> Frf:
+def shown(matrix: np.ndarray) -> Change:
     """By a chain that is wrong by a matrix (3, 3)."""
-    accelerance = np.einsum("ij,jcf->icf", matrix, frf.accelerance)
+    return lambda hit: replace(hit, acceleration_m_s2=matrix @ hit.acceleration_m_s2)
+
+
+def late(hit: Hit) -> Hit:
+    a, by = hit.acceleration_m_s2, round(2e-3 * hit.sampling_rate_hz)
+    return replace(hit, acceleration_m_s2=np.pad(a, ((0, 0), (by, 0)))[:, : a.shape[1]])
+
+
+def coupled(hit: Hit) -> Hit:
+    b, c = butter(1, 2.0, "high", fs=hit.sampling_rate_hz)
+    return replace(hit, acceleration_m_s2=lfilter(b, c, hit.acceleration_m_s2, axis=1))
+
+
+def windowed(hit: Hit) -> Hit:
+    after = np.maximum(np.arange(hit.force_n.size) - np.argmax(np.abs(hit.force_n)), 0)
+    fading = np.exp(-3.0 * after / hit.sampling_rate_hz)
     return replace(
-        frf, accelerance=accelerance, variance=np.einsum("ij,jcf->icf", matrix**2, frf.variance)
+        hit, acceleration_m_s2=hit.acceleration_m_s2 * fading, force_n=hit.force_n * fading
     )
 
 
-def filtered(name: str, pose: MeasuredPose) -> Frf:
-    """Of a pose's hits by a chain that does this to their records."""
-    assert pose.one_hit_frf is not None
-    return MeasuredPose(
-        (), pose.band_hz, given=tuple(_filtered(name, h) for h in pose.hits)
-    ).one_hit_frf
+FILTERED: dict[str, Change] = {"2 ms late": late, "AC-coupled": coupled, "windowed": windowed}
 
 
-def _filtered(name: str, hit: Hit) -> Hit:
-    a, rate = hit.acceleration_m_s2, hit.sampling_rate_hz
-    if name == "2 ms late":
-        late = round(2e-3 * rate)
-        return replace(hit, acceleration_m_s2=np.pad(a, ((0, 0), (late, 0)))[:, : a.shape[1]])
-    if name == "AC-coupled":
-        b, c = butter(1, 2.0, "high", fs=rate)
-        return replace(hit, acceleration_m_s2=lfilter(b, c, a, axis=1))
-    after = np.maximum(np.arange(a.shape[1]) - np.argmax(np.abs(hit.force_n)), 0) / rate
-    fading = np.exp(-3.0 * after)
-    return replace(hit, acceleration_m_s2=a * fading, force_n=hit.force_n * fading)
+def from_behind(hit: Hit) -> Hit:
+    return replace(hit, axis=hit.axis.translate({ord("+"): "-"} if hit.axis[1] == "x" else {}))
 
 
-def flipped(q: np.ndarray, joint: int) -> np.ndarray:
-    """With the other sign of an angle."""
-    return np.where(np.arange(len(q)) == joint, -q, q)
+def exchanged(hit: Hit) -> Hit:
+    return replace(hit, axis=hit.axis.translate({ord("x"): "y", ord("y"): "x"}))
+
+
+def off(q: np.ndarray, degrees: float, rng: np.random.Generator) -> np.ndarray:
+    """With one angle, not the first, that is wrong by so much."""
+    return q + np.deg2rad(degrees) * np.eye(len(q))[int(rng.integers(1, len(q)))]
+
+
+def flipped(q: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """With the other sign of one angle."""
+    return np.where(np.arange(len(q)) == int(rng.integers(1, len(q))), -q, q)
+
+
+Told = dict[str, tuple[str, str]]  # what is asked, and what is so, by what is wrong
 
 
 @dataclass(frozen=True, eq=False)
 class Asker:
-    """What is asked about, as the campaign does after some poses (0, 1, ...)."""
+    """What is asked after the poses of a state."""
 
-    draws: SpringDraws
-    band_hz: tuple[float, float]
-    poses: int
-    joints: JointUnits
-    expected: ExpectedFrfs | None = None
-    known_q: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    known_frfs: tuple[Frf, ...] = ()
+    campaign: CaseCampaign
+    state: CampaignState
 
-    def of_chain(self, q: np.ndarray, frf: Frf) -> str:
-        """By the simulation alone."""
-        sums = self.draws.sums(q, frf.within(self.band_hz))
-        return "" if sums is None or judged(sums) is None else "chain"
+    @cached_property
+    def model(self) -> Model:
+        return self.campaign.model(self.state)
 
-    def asked(self, q: np.ndarray, frf: Frf, others: dict[str, np.ndarray]) -> str:
-        """A pose, "readback", "earlier" and its number, "chain", "?" where nothing fits; "" where
-        nothing is asked."""
-        if self.expected is None:
-            return self.of_chain(q, frf)
-        frf = frf.within(self.band_hz)
-        sure, placed = self.poses >= SURE, self.poses >= PLACED
-        stated = StatedHits(self.expected, q, frf, placed)
-        likely = [far_off_hits(self.expected, q)] if sure else []
-        if stated.agree(likely):
+    def asked(
+        self, pose: int, q: np.ndarray, change: Change | None = None,
+        state: CampaignState | None = None,
+    ) -> str:  # fmt: skip
+        """Of a pose's hits, said to be at q, by a chain that changes them: a pose, "readback",
+        "earlier" and a pose, "chain", "?" where nothing fits; "" where nothing is asked."""
+        case = self.campaign.case
+        hits = case.measured[pose].hits
+        hits = tuple(map(change, hits)) if change else hits
+        measured = MeasuredPose((), case.band_hz, given=hits)
+        angles = self.campaign.angles(q)
+        told = question_about(self.model, state or self.state, "X", angles, measured)
+        if told is None:
             return ""
-        mistakes = likely + [Alternative(there, "", name) for name, there in others.items()]
-        if sure:
-            angles = tuple(self.joints.shown(q))
-            mistakes += flipped_signs(self.joints, angles)
-            mistakes += joint_offsets(self.joints, self.expected, frf, angles)
-        mistakes += chain_faults(self.expected, q, frf, sure)
-        found = stated.best_alternative(mistakes)
-        if found is None or found.about == "readback":
-            every, frfs = np.vstack([self.known_q, q]), (*self.known_frfs, frf)
-            posterior, none = self.expected.posterior, [()] * len(every)
-            together = PosesTogether(posterior, self.band_hz, self.joints, every, frfs)
-            wrong = together.wrong(none)
-            if wrong is not None:
-                return f"earlier {wrong[0]}"
-        if found is not None:
-            return found.pose or found.about
-        if not stated.impossible:
-            return ""
-        return "?" if sure else self.of_chain(q, frf)
+        return f"earlier {told.fits}" if told.about == "earlier" else told.fits or told.about or "?"
 
 
-def answers(
-    case: Case, rng: np.random.Generator, mistaken: bool
-) -> list[dict[str, tuple[str, str]]]:
-    """Of each pose, by what is wrong: what is asked, and what is so; of the first its chain."""
-    simulation = Simulation(Robot.load(case.toml))
-    tolerances = Tolerances.of(simulation.robot.config, simulation.robot.joints.slides)
-    prior, warm = RobotPrior(EffectLibrary.of(simulation, CAD_INERTIAS)), None
-    first = Asker(SpringDraws(simulation, tolerances), case.band_hz, 0, simulation.robot.joints)
-    poses, out = {f"P{k}": q for k, q in enumerate(case.q)}, []
-
-    def after(q: np.ndarray, warm: FitRecord | None) -> tuple[Asker, FitRecord]:
-        n, frfs = len(q), tuple(f.within(case.band_hz) for f in case.frfs[: len(q)])
-        fit = Search(prior, case.frfs[:n], q, case.band_hz, tolerances).found(warm)
-        expected = ExpectedFrfs(RobotPosterior.of(fit), case.band_hz)
-        known = replace(first, poses=n, expected=expected, known_q=q, known_frfs=frfs)
-        return known, fit.remembered
-
-    wrong, bent = case.q.copy(), None
-    wrong[0] += np.deg2rad(EARLIER_DEG) * np.eye(wrong.shape[1])[rng.integers(1, wrong.shape[1])]
-    for n, (q, frf) in enumerate(zip(case.q, case.frfs, strict=True)):
-        ask, true = first, f"P{(n + 1) % len(case.q)}"
-        others = {name: there for name, there in poses.items() if name != f"P{n}"}
-        one, chains = {}, CHAINS if mistaken else ()
-        if n:
-            ask, warm = after(case.q[:n], warm)
-        if n and mistaken:
-            strange = case.frfs[(n + 1) % len(case.q)]
-            unlisted = {name: there for name, there in others.items() if name != true}
-            typed = flipped(q, int(rng.integers(1, len(q))))
-            misread = q + np.deg2rad(MISREAD_DEG) * np.eye(len(q))[int(rng.integers(1, len(q)))]
-            against = replace(frf, accelerance=frf.accelerance * np.array([-1, 1, 1])[:, None])
-            exchanged = [1, 0, 2]
-            listed = replace(
-                frf, accelerance=frf.accelerance[:, exchanged],
-                variance=frf.variance[:, exchanged],
-            )  # fmt: skip
-            one = {
-                "another pose": (ask.asked(q, strange, others), true),
-                "unlisted pose": (ask.asked(q, strange, unlisted), "?"),
-                "sign of an angle": (ask.asked(typed, frf, others), "readback"),
-                "an angle 3° off": (ask.asked(misread, frf, others), "readback"),
-                "x hit from behind": (ask.asked(q, against, others), "chain"),
-                "x listed as y": (ask.asked(q, listed, others), "chain"),
-            }
-            bending, bent = after(wrong[:n], bent)
-            if n >= SURE:
-                one[FIRST] = (bending.asked(q, frf, others), "earlier 0")
-                wrong_chain = {name: filtered(name, case.measured[n]) for name in FILTERED}
-                one |= {name: (ask.asked(q, f, others), "chain") for name, f in wrong_chain.items()}
-        one |= {
-            name: (ask.asked(q, shown(frf, fault(name, rng)), others), "chain") for name in chains
-        }
-        out.append(one | {"right": (ask.asked(q, frf, others), "")})
+def answers(campaign: CaseCampaign, rng: np.random.Generator, mistaken: bool) -> list[Told]:
+    """Of each pose; where `mistaken`, of all that may be wrong with its hits, too."""
+    case, out = campaign.case, []
+    wrong_q = case.q.copy()
+    wrong_q[0] = off(case.q[0], EARLIER_DEG, rng)
+    for n, q in enumerate(case.q):
+        ask = Asker(campaign, campaign.state(n, unlisted=[n]))
+        one = {"right": (ask.asked(n, q), "")}
+        if mistaken:
+            one |= {k: (ask.asked(n, q, shown(fault(k, rng))), "chain") for k in CHAINS}
+        if mistaken and n:
+            one |= mistakes(ask, n, rng)
+        if mistaken and n >= SURE:
+            bent = Asker(campaign, campaign.state(n, wrong_q, [n]))
+            one[FIRST] = (bent.asked(n, q), "earlier P0")
+            one |= {name: (ask.asked(n, q, how), "chain") for name, how in FILTERED.items()}
+        out.append(one)
     return out
+
+
+def mistakes(ask: Asker, n: int, rng: np.random.Generator) -> Told:
+    """Another pose, angles read wrongly, hits along another axis or direction than is said."""
+    q = ask.campaign.case.q[n]
+    other = (n + 1) % len(ask.campaign.case.q)
+    found = {
+        "another pose": (ask.asked(other, q), f"P{other}"),
+        "sign of an angle": (ask.asked(n, flipped(q, rng)), "readback"),
+        "an angle 3° off": (ask.asked(n, off(q, MISREAD_DEG, rng)), "readback"),
+        "x hit from behind": (ask.asked(n, q, from_behind), "chain"),
+        "x listed as y": (ask.asked(n, q, exchanged), "chain"),
+    }
+    if other > n:
+        unlisted = ask.campaign.state(n, unlisted=[n, other])
+        found["unlisted pose"] = (ask.asked(other, q, state=unlisted), "?")
+    return found
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(8 * 3600)
 def test_how_often_is_asked(tmp_path):
-    found: dict[str, list[list[tuple[str, str]]]] = {}
+    found: dict[str, dict[int, list[tuple[str, str]]]] = {}
     for k in range(CASES):
         arm, make = [*ARMS][k % len(ARMS)], (everyday, harder)[k // len(ARMS) % 2]
         case, mistaken = make(arm, SEED + k, tmp_path / str(k)), (k // len(ARMS) + 1) % EACH == 0
         with threadpool_limits(1):
-            told = answers(case, np.random.default_rng(SEED + k), mistaken)
-        for name in told[-1]:
+            told = answers(CaseCampaign.of(case), np.random.default_rng(SEED + k), mistaken)
+        for n, one in enumerate(told):
             # From one pose another structure may explain what fits nothing that is known.
-            first = SURE if name in ("unlisted pose", FIRST, *FILTERED) else 0
-            each = [one[name] for one in told[first:] if name in one]
-            found.setdefault(name, []).append(each)
-            print(k, arm, make.__name__, name, [answer for answer, _ in each], flush=True)
+            kept = {name: one[name] for name in one if name != "unlisted pose" or n >= SURE}
+            for name, answer in kept.items():
+                found.setdefault(name, {}).setdefault(n, []).append(answer)
+            print(
+                k, arm, make.__name__, f"P{n}", {name: kept[name][0] for name in kept}, flush=True
+            )
     print(f"\n{CASES} robots; asked of (named rightly) at poses ..., {POSES - 1}, {POSES}")
     rate = {}
-    for name, robots in found.items():
-        rate[name] = np.mean([[bool(told) for told, _ in robot] for robot in robots], axis=0)
-        right = np.mean([[told == true for told, true in robot] for robot in robots], axis=0)
-        both = zip(100 * rate[name], 100 * right, strict=True)
+    for name, poses in found.items():
+        rate[name] = np.array(
+            [np.mean([bool(told) for told, _ in each]) for each in poses.values()]
+        )
+        right = [np.mean([told == true for told, true in each]) for each in poses.values()]
+        both = zip(100 * rate[name], 100 * np.array(right), strict=True)
         cells = "".join(f"{a:7.1f} % ({b:5.1f} %)" for a, b in both)
-        print(f"{name:>17}{cells:>{19 * POSES}}  of {len(robots)}")
+        print(f"{name:>17}{cells:>{19 * POSES}}")
     assert rate["right"].mean() <= 0.01
     assert all(rate[name].mean() >= 0.95 for name in ("another pose", "unlisted pose", *FILTERED))
     assert all(rate[name].min() >= 0.95 for name in CHAINS)

@@ -1,132 +1,123 @@
-"""Ways to get the input wrong, a test each: one plain sentence, exit 2 or 3, no traceback."""
+"""Ways to get the input wrong, by tables: one plain sentence, exit 2 or 3, no traceback."""
 
-import json
 import shutil
+from collections.abc import Callable, Mapping
+from typing import TypeVar
 
 import numpy as np
 import pytest
 
 from planner.proof.hits import simulate_hit
 from tests.support.bad_input import (
-    WRITERS,
     bad_columns,
-    columns,
     hit_file_mutations,
     recording_mutations,
     table_mutations,
 )
-from tests.support.outside import HAMMER, call, make_cell, record
+from tests.support.hit_files import WRITERS, columns
+from tests.support.outside import HAMMER, call, told
 from tests.support.robots import JOINTS_DEG
 
 MIDDLE = [round((a + b) / 2, 3) for a, b in JOINTS_DEG]
 JOINTS = ",".join(f"joint_a{i}_deg" for i in range(1, 7))
 ROW = ",".join(map(str, MIDDLE))
 POSES = [f"pose,{JOINTS}", f"H1,{ROW}", f"H2,{ROW}"]
-# Only the names of mutations are taken from these, before there is a recording.
-LIKE_RECORDINGS = [f"pose,{JOINTS},hit,repeat,file", *[f"G1,{ROW},+x,1,data/G1_px_1.uff"] * 2]
-LIKE_COLUMNS = {name: np.arange(99.0) for name in (
-    "time_s", "force_n", "acceleration_x_m_s2", "acceleration_y_m_s2", "acceleration_z_m_s2",
-)}  # fmt: skip
+IN_BAND = "--band-hz", 5, 110
+Case = TypeVar("Case")
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory):
-    """A campaign, a good recordings folder for it, and a table of poses."""
-    root = tmp_path_factory.mktemp("bench")
-    robot, campaign_toml, truth = make_cell(root, learns=False)
-    assert call("new", root / "cell", "--robot", robot, "--campaign", campaign_toml)[0] == 0
-    good = record(truth, root / "good", "G1", MIDDLE)
-    poses = root / "predict.csv"
-    poses.write_text("\n".join(POSES) + "\n")
-    hit = simulate_hit(truth, np.deg2rad(MIDDLE), "+x", HAMMER, np.random.default_rng(0))
-    return root, good, poses, hit
+def bench(first_pose_once, tmp_path_factory):
+    """A campaign with a good recordings folder for it."""
+    return first_pose_once.copied(tmp_path_factory.mktemp("bench"))
 
 
-def expect_one_sentence(code: int, out: str, err: str, *names: str) -> None:
-    assert code in (2, 3), f"exit {code}\n{out}\n{err}"
-    assert "Traceback" not in err + out
-    assert out == ""
+@pytest.fixture(scope="module")
+def hit(bench):
+    """A hit as named columns."""
+    rng = np.random.default_rng(0)
+    made = simulate_hit(bench.truth, np.deg2rad(MIDDLE), "+x", HAMMER, rng)
+    return columns(made, HAMMER.sampling_rate_hz)
+
+
+def fault(answer: tuple[int, str, str], *names: str) -> str:
+    """What is wrong with the answer to bad input, which has one of the names; "": nothing."""
+    code, out, err = answer
     lines = [line for line in err.splitlines() if line.strip()]
-    assert lines
-    if code == 2:
-        assert len(lines) == 1, err
-    assert all(line.endswith((".", "help", "]", "TOML")) or "; " in line for line in lines), err
-    if names:
-        assert any(name in err for name in names), err
+    right = [
+        code in (2, 3),
+        out == "",
+        "Traceback" not in err,
+        len(lines) == 1 or (lines and code == 3),
+        all(line.endswith((".", "help", "]", "TOML")) or "; " in line for line in lines),
+        not names or any(name in err for name in names),
+    ]
+    return "" if all(right) else f"exit {code}\n{out}\n{err}"
 
 
-@pytest.mark.parametrize("what", table_mutations(POSES))
-def test_tables(bench, tmp_path, what):
-    root, *_ = bench
+def faults(cases: Mapping[str, Case], judge: Callable[[Case], str]) -> dict[str, str]:
+    """Of all cases those with a fault, and which."""
+    return {name: found for name, case in cases.items() if (found := judge(case))}
+
+
+def test_tables_of_poses(bench, tmp_path):
     bad = tmp_path / "bad.csv"
-    bad.write_bytes(table_mutations(POSES)[what])
-    expect_one_sentence(*call("predict", root / "cell", bad, "--json"), "bad.csv")
+
+    def judge(content: bytes) -> str:
+        bad.write_bytes(content)
+        return fault(call("predict", bench.cell, bad, "--json"), bad.name)
+
+    assert faults(table_mutations(POSES), judge) == {}
 
 
-@pytest.mark.parametrize(
-    "what", table_mutations(LIKE_RECORDINGS) | recording_mutations(LIKE_RECORDINGS)
-)
-def test_tables_of_recordings(bench, tmp_path, what):
-    root, good, *_ = bench
-    lines = (good / "recordings.csv").read_text().splitlines()
-    folder = shutil.copytree(good, tmp_path / "mutated")
-    mutations = table_mutations(lines) | recording_mutations(lines)
-    (folder / "recordings.csv").write_bytes(mutations[what])
-    before = (root / "cell" / "log.jsonl").read_bytes()
-    expect_one_sentence(*call("import", root / "cell", folder, "--json"), "recordings.csv")
-    assert (root / "cell" / "log.jsonl").read_bytes() == before
+def test_tables_of_recordings(bench, tmp_path):
+    folder = shutil.copytree(bench.made, tmp_path / "mutated")
+    table, log = folder / "recordings.csv", bench.cell / "log.jsonl"
+    # Of no proposed pose, whose joints would be known without a table.
+    lines = table.read_text().replace(f"{bench.pose},", "G1,").splitlines()
+    before = log.read_bytes()
+
+    def judge(content: bytes) -> str:
+        table.write_bytes(content)
+        return fault(call("import", bench.cell, folder, "--json"), table.name)
+
+    assert faults(table_mutations(lines) | recording_mutations(lines), judge) == {}
+    assert log.read_bytes() == before
 
 
-@pytest.mark.parametrize("what", hit_file_mutations(b"like a file"))
-def test_universal_files(bench, tmp_path, what):
-    _, good, *_ = bench
-    data = next((good / "data").glob("*px_1.uff")).read_bytes()
-    bad = tmp_path / "bad_hit.uff"
-    bad.write_bytes(hit_file_mutations(data)[what])
-    expect_one_sentence(*call("modes", bad, "--json"), "bad_hit.uff", "No modes")
+def test_universal_files(bench, tmp_path):
+    bad, data = tmp_path / "bad_hit.uff", bench.files[0].read_bytes()
 
+    def judge(content: bytes) -> str:
+        bad.write_bytes(content)
+        return fault(call("modes", bad, "--json"), bad.name, "No modes")
 
-@pytest.mark.parametrize("suffix", WRITERS)
-def test_named_columns(bench, tmp_path, suffix):
-    *_, hit = bench
-    good = tmp_path / f"good_hit{suffix}"
-    WRITERS[suffix](good, columns(hit))
-    code, out, err = call("modes", good, "--json", "--band-hz", 5, 110)
-    assert code == 0, err
-    assert len(json.loads(out)["modes"]) >= 2
-
-
-# All that may be wrong in one format, and in the others what their readers look for themselves.
-BAD_COLUMNS = [(what, ".csv") for what in bad_columns(LIKE_COLUMNS)]
-BAD_COLUMNS += [(what, s) for what in ("no time_s", "nan") for s in WRITERS if s != ".csv"]
-
-
-@pytest.mark.parametrize(("what", "suffix"), BAD_COLUMNS)
-def test_bad_named_columns(bench, tmp_path, suffix, what):
-    *_, hit = bench
-    bad = tmp_path / f"bad_hit{suffix}"
-    WRITERS[suffix](bad, bad_columns(columns(hit))[what])
-    answer = call("modes", bad, "--json", "--band-hz", 5, 110)
-    if what.startswith("no acceleration"):  # two sensors are no pose, but a matrix
-        assert answer[0] == 0
-        assert len(json.loads(answer[1])["dofs"]) == 2
-        return
-    expect_one_sentence(*answer, bad.name, "No modes")
+    assert faults(hit_file_mutations(data), judge) == {}
 
 
 @pytest.mark.parametrize("suffix", WRITERS)
-@pytest.mark.parametrize("cut", ["100 bytes", "half"])
-def test_named_columns_cut_short(bench, tmp_path, suffix, cut):
-    *_, hit = bench
+def test_named_columns(hit, tmp_path, suffix):
     bad = tmp_path / f"bad_hit{suffix}"
-    WRITERS[suffix](bad, columns(hit))
+    WRITERS[suffix](bad, hit)
+    assert len(told("modes", bad, *IN_BAND)["modes"]) >= 2
     whole = bad.read_bytes()
-    kept = whole[: 100 if cut == "100 bytes" else len(whole) // 2]
-    if suffix == ".csv":
+    for end in (100, len(whole) // 2):
         # A text table cut between two rows is a whole, shorter record: it is cut in a row.
-        kept = kept.rsplit(b",", 1)[0]
-    bad.write_bytes(kept)
-    expect_one_sentence(*call("modes", bad, "--json", "--band-hz", 5, 110), bad.name)
+        bad.write_bytes(whole[:end].rsplit(b",", 1)[0] if suffix == ".csv" else whole[:end])
+        assert fault(call("modes", bad, "--json", *IN_BAND), bad.name) == ""
+
+    def judge(table: dict[str, np.ndarray]) -> str:
+        WRITERS[suffix](bad, table)
+        return fault(call("modes", bad, "--json", *IN_BAND), bad.name, "No modes")
+
+    every = bad_columns(hit)
+    matrices = [every.pop(f"no acceleration_{axis}_m_s2") for axis in "xyz"]
+    if suffix != ".csv":  # all may be wrong in one format, in others what their readers look for
+        every = {what: every[what] for what in ("no time_s", "nan")}
+    assert faults(every, judge) == {}
+    for table in matrices if suffix == ".csv" else ():  # two sensors are no pose, but a matrix
+        WRITERS[suffix](bad, table)
+        assert len(told("modes", bad, *IN_BAND)["dofs"]) == 2
 
 
 def replaced(old: str, new: str, count: int = -1):
@@ -195,84 +186,89 @@ CONFIGURATIONS = {
 }
 
 
-@pytest.mark.parametrize(
-    ("file", "what"), [(file, what) for file, each in CONFIGURATIONS.items() for what in each]
-)
-def test_configurations(bench, tmp_path, file, what):
-    root, *_ = bench
-    for folder in ("robot", "plan"):
-        shutil.copytree(root / folder, tmp_path / folder)
-    text, (change, words) = (tmp_path / file).read_text(), CONFIGURATIONS[file][what]
-    (tmp_path / file).write_text(change(text))
-    assert (tmp_path / file).read_text() != text
-    robot, plan = tmp_path / "robot" / "robot.toml", tmp_path / "plan" / "campaign.toml"
-    answer = call("new", tmp_path / "bad", "--robot", robot, "--campaign", plan, "--json")
-    expect_one_sentence(*answer, words)
+@pytest.mark.parametrize("file", CONFIGURATIONS)
+def test_configurations(bench, tmp_path, file):
+    robot, plan = (
+        shutil.copytree(path.parent, tmp_path / path.parent.name) / path.name
+        for path in (bench.robot, bench.plan)
+    )
+    text = (tmp_path / file).read_text()
+
+    def judge(case: tuple[Callable[[str], str], str]) -> str:
+        change, words = case
+        (tmp_path / file).write_text(change(text))
+        assert (tmp_path / file).read_text() != text
+        answer = call("new", tmp_path / "bad", "--robot", robot, "--campaign", plan, "--json")
+        return fault(answer, words)
+
+    assert faults(CONFIGURATIONS[file], judge) == {}
     assert not (tmp_path / "bad").exists()
 
 
-def test_a_folder_instead_of_its_robot(bench, tmp_path):
-    robot = bench[0] / "robot" / "robot.toml"
-    for folder in (robot.parent, robot.parent.parent):
-        expect_one_sentence(*call("check", folder), f"is a folder; name {robot}.")
-    expect_one_sentence(*call("check", bench[0] / "plan"), "name a robot.toml in it")
+def test_a_folder_instead_of_its_robot(bench):
+    said = {folder: f"is a folder; name {bench.robot}." for folder in bench.robot.parents[:2]}
+    said[bench.plan.parent] = "name a robot.toml in it"
+    for folder, words in said.items():
+        assert fault(call("check", folder), words) == ""
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        "next ROOT/nowhere",
-        "status GOOD",
-        "next CELL --count 0",
-        "next CELL --acquisition crystal_ball",
-        "import CELL ROOT/nowhere",
-        "import CELL GOOD/data --pose never_proposed",
-        "import CELL GOOD --pose G9 --json --nonsense",
-        "withdraw CELL P999",
-        "skip CELL P999",
-        "predict CELL ROOT/nowhere.csv",
-        "predict CELL POSES --out GOOD/recordings.csv/x.npz",
-        "replay CELL --until 0",
-        "modes ROOT/nowhere.uff",
-        "modes POSES",
-        "new CELL --robot ROOT/robot/robot.toml",
-        "frobnicate",
-        *("new", "import", "check"),
-    ],
-)
-def test_usage(bench, command):
-    root, good, poses, _ = bench
-    places = {"ROOT": root, "GOOD": good, "CELL": root / "cell", "POSES": poses}
-    words = command.split()
-    for name, place in places.items():
-        words = [word.replace(name, str(place)) for word in words]
-    # A missing argument points to the command's own help.
-    helped = f"see planner {command} --help." if command in ("import", "check") else ""
-    expect_one_sentence(*call(*words), helped)
+# What is typed, and a part of what is said of it.
+COMMANDS = {
+    "next ROOT/nowhere": "",
+    "status GOOD": "",
+    "next CELL --count 0": "",
+    "next CELL --acquisition crystal_ball": "",
+    "import CELL ROOT/nowhere": "",
+    "import CELL GOOD/data --pose never_proposed": "",
+    "import CELL GOOD --pose G9 --json --nonsense": "",
+    "withdraw CELL P999": "",
+    "skip CELL P999": "",
+    "predict CELL ROOT/nowhere.csv": "",
+    "predict CELL POSES --out GOOD/recordings.csv/x.npz": "",
+    "replay CELL --until 0": "",
+    "modes ROOT/nowhere.uff": "",
+    "modes POSES": "",
+    "new CELL --robot ROOT/robot/robot.toml": "",
+    "new ROOT/fresh": "--example",
+    "new": "see planner new --help.",  # a missing argument points to the command's own help
+    "import": "see planner import --help.",
+    "check": "see planner check --help.",
+    "study seed-9": "choose one of busch2022",
+    "study seyedhosseini2025 --out POSES": "name another folder",
+    "frobnicate": "",
+}
 
 
-@pytest.mark.parametrize("suffix", ["uff", "mat", "csv"])
-def test_huge_files_are_refused_without_reading_them(bench, tmp_path, suffix):
-    root, *_ = bench
-    huge = tmp_path / f"huge.{suffix}"
-    with open(huge, "wb") as file:
-        file.truncate(2**30)
-    expect_one_sentence(*call("modes", huge, "--json"), huge.name, "No modes")
-    expect_one_sentence(*call("import", root / "cell", huge, "--pose", "G1"))
-    if suffix == "csv":
-        expect_one_sentence(*call("predict", root / "cell", huge, "--json"))
-    assert sum(p.stat().st_size for p in (root / "cell").rglob("*") if p.is_file()) < 10**8
-    huge.unlink()
+def test_commands(bench, tmp_path):
+    poses = tmp_path / "predict.csv"
+    poses.write_text("\n".join(POSES) + "\n")
+    root, good, cell = bench.robot.parents[1], bench.made, bench.cell
+    places = {"ROOT": root, "GOOD": good, "CELL": cell, "POSES": poses}
+
+    def judge(command: str) -> str:
+        words = command.split()
+        for name, place in places.items():
+            words = [word.replace(name, str(place)) for word in words]
+        return fault(call(*words), COMMANDS[command])
+
+    assert faults({command: command for command in COMMANDS}, judge) == {}
 
 
-def test_damaged_log_exits_5(bench):
-    root, *_ = bench
-    cell = root / "damaged"
-    shutil.copytree(root / "cell", cell)
-    call("next", cell)
-    log = cell / "log.jsonl"
+def test_huge_files_are_refused_without_reading_them(bench, tmp_path):
+    for suffix in ("uff", "mat", "csv"):
+        huge = tmp_path / f"huge.{suffix}"
+        with open(huge, "wb") as file:
+            file.truncate(2**30)
+        assert fault(call("modes", huge, "--json"), huge.name, "No modes") == ""
+        assert fault(call("import", bench.cell, huge, "--pose", "G1")) == ""
+    assert fault(call("predict", bench.cell, huge, "--json")) == ""
+    assert sum(p.stat().st_size for p in bench.cell.rglob("*") if p.is_file()) < 10**8
+
+
+def test_damaged_log_exits_5(first_pose):
+    log = first_pose.cell / "log.jsonl"
     data = log.read_bytes()
     log.write_bytes(data[:40] + b"#" + data[41:])
-    code, out, err = call("status", cell, "--json")
+    code, out, err = call("status", first_pose.cell, "--json")
     assert (code, out) == (5, "")
     assert "line 1" in err

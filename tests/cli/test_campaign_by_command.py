@@ -11,7 +11,7 @@ from planner.proof.load import load_truth
 from planner.proof.model import Truth
 from planner.report.springs import with_exponent
 from planner.surrogate.frequency_models import MODELS
-from tests.support.outside import call, make_cell, record, told
+from tests.support.outside import call, make_cell, record, said, told
 from tests.support.robots import JOINTS_DEG
 
 ASKED = np.array(JOINTS_DEG).T * 0.5 + np.mean(JOINTS_DEG, axis=1) * 0.5  # (2, 6) in degrees
@@ -53,9 +53,9 @@ def three(tmp_path_factory) -> Three:
     assert measured(cell) == []
     assert told("status", cell)["springs"] == []
     for command in ("next", "status"):  # of nothing measured nothing is forecast
-        said = " ".join(call(command, cell)[1].split())
-        assert "is told once two poses are measured" in said
-        assert "RMSE" not in said
+        screen = " ".join(said(command, cell).split())
+        assert "is told once two poses are measured" in screen
+        assert "RMSE" not in screen
     after, names = {0: predicted(cell, table)}, []
     for number in range(3):
         (proposal,) = told("next", cell)["proposals"]
@@ -153,6 +153,10 @@ def test_a_proposal_keeps_its_name_and_place_until_it_is_measured(tmp_path):
     cell = tmp_path / "cell"
     told("new", cell, "--robot", robot, "--campaign", campaign_toml)
     told("import", cell, record(truth, tmp_path / "own", "P001", ASKED[0].tolist()))
+    # A simulation that does not learn has no refitted springs.
+    assert told("status", cell)["springs"] == []
+    assert "refitted" not in said("status", cell)
+    assert "#learned" not in Path(told("report", cell)["report"]).read_text()
 
     def sent() -> tuple[str, list[float]]:
         (proposal,) = told("next", cell)["proposals"]
@@ -169,17 +173,3 @@ def test_a_proposal_keeps_its_name_and_place_until_it_is_measured(tmp_path):
     told("undo", cell)
     assert sent() == third
     assert told("replay", cell)["reproduced"]
-
-
-def test_a_simulation_that_does_not_learn_has_no_refitted_springs(tmp_path):
-    robot, campaign_toml, truth = make_cell(tmp_path, learns=False)
-    cell = tmp_path / "cell"
-    told("new", cell, "--robot", robot, "--campaign", campaign_toml)
-    (proposal,) = told("next", cell)["proposals"]
-    told("import", cell, record(truth, tmp_path / "export", proposal["pose"],
-                                proposal["joints_deg"]))  # fmt: skip
-    assert told("status", cell)["springs"] == []
-    assert "refitted" not in call("status", cell)[1]
-    page = tmp_path / "report.html"
-    told("report", cell, "--out", page)
-    assert "#learned" not in page.read_text()

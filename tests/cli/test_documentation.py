@@ -1,7 +1,6 @@
 """Help, schema and manual: complete, and no example in them is wrong."""
 
 import html
-import json
 import re
 import shlex
 import tomllib
@@ -14,11 +13,11 @@ import typer
 from planner.campaign.config import CampaignConfig
 from planner.campaign.store import EXAMPLE
 from planner.cli.app import app
-from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESCRIPTIONS, DESIGNS
 from planner.milling.cut import Cut, load_cut
 from planner.milling.tool import ToolTable, load_tool
 from planner.robot.config import RobotConfig
+from tests.support.outside import call, said, told
 
 COMMANDS = typer.main.get_command(app).commands
 
@@ -47,41 +46,38 @@ KINDS = {"robot": RobotConfig, "campaign": CampaignConfig, "cut": Cut, "tool": T
 
 
 @pytest.mark.parametrize(("file", "kind"), KINDS.items())
-def test_the_schema_names_every_entry(file, kind, capsys):
-    assert run(["schema", file, "--json"]) == 0
-    answer = json.loads(capsys.readouterr().out)
+def test_the_schema_names_every_entry(file, kind):
+    answer = told("schema", file)
     tables = {t["name"].strip("[]"): t for t in answer["tables"]}
-    told = {e["name"] for e in tables[""]["entries"]} | {n.split(".")[0] for n in tables if n}
-    assert told == names_of(kind)
+    entries = {e["name"] for e in tables[""]["entries"]} | {n.split(".")[0] for n in tables if n}
+    assert entries == names_of(kind)
     assert all(t["about"] for t in answer["tables"])
     definitions = answer["json_schema"]["$defs"]
     assert set(definitions[kind.__name__]["properties"]) == names_of(kind)
-    assert run(["schema", file]) == 0
-    said = capsys.readouterr().out
-    assert all(f"[{name}]" in said for name in tables if name)
+    screen = said("schema", file)
+    assert all(f"[{name}]" in screen for name in tables if name)
 
 
-def test_the_schema_tells_defaults_and_choices(capsys):
-    run(["schema", "campaign", "--json"])
-    tables = {t["name"]: t["entries"] for t in json.loads(capsys.readouterr().out)["tables"]}
+def test_the_schema_tells_defaults_and_choices():
+    tables = {t["name"]: t["entries"] for t in told("schema", "campaign")["tables"]}
     modes = {e["name"]: e for e in tables["[modes]"]}
     assert (modes["count"]["default"], modes["band_hz"]["takes"]) == ("4", "[number, number]")
     assert tables["[fidelity]"][0]["takes"] == '"frozen" or "none" or "updated"'
-    assert run(["schema", "log"]) == 2
+    assert call("schema", "log")[0] == 2
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """The manual, as its command writes it."""
     path = tmp_path_factory.mktemp("manual") / "manual.html"
-    assert run(["manual", "--out", str(path)]) == 0
+    said("manual", "--out", path)
     return path.read_text()
 
 
 def test_the_tutorials_commands_are_taken(written):
-    told = re.search(r'<section id="tutorial">(.*?)</section>', written, re.DOTALL)
-    assert told
-    blocks = re.findall(r"<pre>(.*?)</pre>", told[1], re.DOTALL)
+    section = re.search(r'<section id="tutorial">(.*?)</section>', written, re.DOTALL)
+    assert section
+    blocks = re.findall(r"<pre>(.*?)</pre>", section[1], re.DOTALL)
     lines = [line for block in blocks for line in html.unescape(block).splitlines()]
     assert len(lines) > 8
     for line in lines:
@@ -105,19 +101,16 @@ def test_the_manual_quotes_files_that_are_right(written):
     assert all(f'id="{link}"' in written for link in links)
 
 
-def test_every_acquisition_is_told_in_schema_and_manual(written, capsys):
+def test_every_acquisition_is_told_in_schema_and_manual(written):
     assert set(DESCRIPTIONS) == {*ACQUISITIONS, *DESIGNS}
-    assert run(["schema", "campaign"]) == 0
-    schema = capsys.readouterr().out
-
+    schema = said("schema", "campaign")
     for name, about in DESCRIPTIONS.items():
         assert f"{name}: {about.split()[0]}" in schema
         assert about in html.unescape(written)
 
 
-def test_help_swallows_no_brackets(capsys):
-    assert run(["export", "--help"]) == 0
-    assert "[controller]" in capsys.readouterr().out
+def test_help_swallows_no_brackets():
+    assert "[controller]" in said("export", "--help")
 
 
 def test_the_shell_completes(monkeypatch, capsys):

@@ -14,7 +14,7 @@ from planner.proof.deviation import Deviation
 from planner.proof.load import load_truth
 from planner.proof.recordings import record_poses
 from planner.robot.robot import Robot
-from tests.support.outside import HAMMER, call, told
+from tests.support.outside import HAMMER, call, part_of, refused, told
 from tests.support.rerun_columns import columns_of
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
 
@@ -34,11 +34,15 @@ def cell(tmp_path_factory):
         file.write("cross_axis_sd_percent = 0.2\nmounting_sd_deg = 0.1\nposition_sd_mm = 0.2\n")
     off = Deviation(seed=5, stiffness=0.2, damping=0.3, inertia=0.04, com_m=0.003)
     truth = load_truth(robot, off)
+    return robot, recorded(truth, root / "hits", POSES, 0), truth
+
+
+def recorded(truth, folder, poses, seed):
+    """Hits at random poses P0, P1, ..."""
     low, high = np.deg2rad(np.array(JOINTS_DEG, dtype=float)).T
-    q = np.random.default_rng(0).uniform(low, high, (POSES, 6))
+    q = np.random.default_rng(seed).uniform(low, high, (poses, 6))
     named = [(f"P{i}", row) for i, row in enumerate(q)]
-    folder = record_poses(truth, named, root / "hits", repeats=3, hammer=HAMMER)
-    return robot, folder, truth
+    return record_poses(truth, named, folder, repeats=3, hammer=HAMMER)
 
 
 @pytest.fixture(scope="module")
@@ -54,10 +58,8 @@ def done(cell, tmp_path_factory):
 def test_the_answer_has_every_documented_key(done):
     answer, _ = done
     assert {"parameters", "fit", "held_out", "seconds"} <= set(answer)
-    for entry in answer["parameters"]:
-        assert {"joint", "axis", "stiffness", "stiffness_sd", "damping", "identifiable"} <= set(
-            entry
-        )
+    keys = {"joint", "axis", "stiffness", "stiffness_sd", "damping", "identifiable"}
+    assert all(keys <= set(entry) for entry in answer["parameters"])
     assert [e["joint"] for e in answer["parameters"]] == [f"joint_a{i}" for i in range(1, 7)]
     assert answer["held_out"]["poses"]
     assert answer["simulated"]
@@ -125,9 +127,8 @@ def test_a_refused_hit_is_told_and_two_poses_leave_none_to_judge_by(cell, tmp_pa
     few = part_of(folder, tmp_path / "few", {"P0", "P1"})
     victim = sorted((few / "data").iterdir())[0]
     victim.write_bytes(b"not a recording")
-    code, out, err = call(
-        "identify", few, "--robot", robot, "--no-extend", "--no-inertias", "--json"
-    )
+    quick = "--no-extend", "--no-inertias"
+    code, out, err = call("identify", few, "--robot", robot, *quick, "--json")
     assert code == 3
     assert victim.name in err
     answer = json.loads(out)
@@ -136,18 +137,6 @@ def test_a_refused_hit_is_told_and_two_poses_leave_none_to_judge_by(cell, tmp_pa
     assert answer["held_out"]["frac"] is None
     assert answer["held_out"]["frobenius"] is None
     assert any("No pose was held out" in remark for remark in answer["remarks"])
-
-
-def part_of(folder, target, poses):
-    """A recordings folder with some of the poses."""
-    shutil.copytree(folder, target)
-    lines = (folder / "recordings.csv").read_text().splitlines()
-    kept = [line for line in lines[1:] if line.split(",")[0] in poses]
-    (target / "recordings.csv").write_text("\n".join([lines[0], *kept]) + "\n")
-    for line in lines[1:]:
-        if line not in kept:
-            (target / line.split(",")[-1]).unlink()
-    return target
 
 
 @pytest.mark.parametrize(
@@ -167,19 +156,18 @@ def test_bad_options_are_one_sentence(cell, tmp_path, options, says):
     robot, folder, _ = cell
     known = {"IN": robot, "found.json": tmp_path / "found.json"}
     given = [known.get(o, o) for o in options]
-    assert_one_sentence(*call("identify", folder, "--robot", robot, *given, "--json"), says)
+    assert says in refused("identify", folder, "--robot", robot, *given, "--json")
     assert not (tmp_path / "found.json").exists()
 
 
 def test_bad_recordings_are_one_sentence(cell, tmp_path):
     robot, folder, _ = cell
-    missing = call("identify", tmp_path / "none", "--robot", robot)
-    assert_one_sentence(*missing, "recordings.csv")
+    assert "recordings.csv" in refused("identify", tmp_path / "none", "--robot", robot)
     broken = part_of(folder, tmp_path / "broken", {"P0"})
     table = broken / "recordings.csv"
     text = table.read_text()
     table.write_text(text.replace("joint_a2_deg", "elbow_deg"))
-    assert_one_sentence(*call("identify", broken, "--robot", robot), "joint_a2_deg")
+    assert "joint_a2_deg" in refused("identify", broken, "--robot", robot)
     table.write_text(text)
     for file in (broken / "data").iterdir():
         file.write_bytes(b"")
@@ -188,19 +176,10 @@ def test_bad_recordings_are_one_sentence(cell, tmp_path):
     assert "no pose has a hit that can be used" in err
 
 
-def assert_one_sentence(code: int, out: str, err: str, says: str) -> None:
-    assert (code, out) == (2, ""), err
-    assert says in err
-    assert len(err.strip().splitlines()) == 1
-
-
 def test_compliance_that_the_description_lacks_is_added_unless_that_is_not_wanted(tmp_path):
     """Truth tilts in every joint; the stated torsion springs alone cannot follow."""
     truth = load_truth(make_arm(tmp_path / "true", transverse=True), Deviation(6, 0.15, 0.15))
-    low, high = np.deg2rad(np.array(JOINTS_DEG, dtype=float)).T
-    q = np.random.default_rng(1).uniform(low, high, (3, 6))
-    named = [(f"P{i}", row) for i, row in enumerate(q)]
-    folder = record_poses(truth, named, tmp_path / "hits", repeats=3, hammer=HAMMER)
+    folder = recorded(truth, tmp_path / "hits", 3, 1)
     robot, out = make_arm(tmp_path / "stated"), tmp_path / "found" / "robot.toml"
     plain = told("identify", folder, "--robot", robot, "--no-extend")
     wider = told("identify", folder, "--robot", robot, "--out", out)

@@ -1,54 +1,41 @@
 """What `planner modes` of a matrix writes for other programs, read back by pyuff."""
 
 import csv
-import json
 
 import numpy as np
 import pytest
 import pyuff
 from PIL import Image
 
-from planner.cli.run import run
 from planner.recording.geometry import read_geometry
 from tests.support.hit_structures import hit_frfs
 from tests.support.matrix_files import write_matrix
+from tests.support.outside import told
 from tests.support.structures import plate
 
 BAND = (40.0, 180.0)
 
 
 @pytest.fixture(scope="module")
-def answered(tmp_path_factory):
-    """The files of a small plate with its geometry, analysed, drawn and exported."""
+def exported(tmp_path_factory):
+    """A small plate with its geometry: its FRFs, their file, the folder, and the answer."""
     folder = tmp_path_factory.mktemp("exported")
     structure = plate(6, 4)
     matrix = hit_frfs(structure, [0, 9], np.arange(1, 401) * 0.5, np.random.default_rng(1))
     nodes = np.array(structure.nodes)
-    place = np.array([structure.position_m[n] for n in structure.nodes])
+    place = 1e3 * np.array([structure.position_m[n] for n in structure.nodes])
     trace = np.array([k for line in structure.lines for k in (*line, 0)])
     plain = np.zeros(nodes.size, int)
     before = [
         {"type": 164, "units_code": 5, "units_description": "mm", "temp_mode": 1,
          "length": 1000.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15},
         {"type": 2411, "node_nums": nodes, "def_cs": plain, "disp_cs": plain, "color": plain,
-         "x": 1e3 * place[:, 0], "y": 1e3 * place[:, 1], "z": 1e3 * place[:, 2]},
+         **dict(zip("xyz", place.T, strict=True))},
         {"type": 82, "trace_num": 1, "nodes": trace, "id": "plate"},
     ]  # fmt: skip
     path = write_matrix(folder / "set.uff", matrix, before=before)
-    options = ["--band-hz", str(BAND[0]), str(BAND[1]), "--json"]
-    options += ["--plot", str(folder / "pictures"), "--export", str(folder / "files")]
-    return structure, matrix, path, folder, options
-
-
-@pytest.fixture(scope="module")
-def answer(answered):
-    import contextlib
-    import io
-
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out):
-        assert run(["modes", str(answered[2]), *answered[4]]) == 0
-    return json.loads(out.getvalue())
+    options = "--plot", folder / "pictures", "--export", folder / "files"
+    return structure, matrix, path, folder, told("modes", path, "--band-hz", *BAND, *options)
 
 
 def sets(path):
@@ -56,8 +43,8 @@ def sets(path):
     return [file.read_sets(i) for i in range(len(file.get_set_types()))]
 
 
-def test_the_geometry_is_read_in_metres_and_written_again(answered, answer):
-    structure, _, path, folder, _ = answered
+def test_the_geometry_is_read_in_metres_and_written_again(exported):
+    structure, _, path, folder, _ = exported
     for source in (path, folder / "files" / "modes.uff"):
         geometry = read_geometry((source,))
         assert geometry is not None
@@ -69,8 +56,8 @@ def test_the_geometry_is_read_in_metres_and_written_again(answered, answer):
     assert set(kinds[5:]) == {55}
 
 
-def test_shapes_and_poles_come_back(answered, answer):
-    folder = answered[3]
+def test_shapes_and_poles_come_back(exported):
+    *_, folder, answer = exported
     shapes = [s for s in sets(folder / "files" / "modes.uff") if s["type"] == 55]
     assert len(shapes) == len(answer["modes"]) > 2
     for one, mode in zip(shapes, answer["modes"], strict=True):
@@ -85,8 +72,8 @@ def test_shapes_and_poles_come_back(answered, answer):
             assert values[node] == pytest.approx(complex(*value), rel=1e-4, abs=1e-5)
 
 
-def test_frfs_come_back(answered, answer):
-    _, matrix, _, folder, _ = answered
+def test_frfs_come_back(exported):
+    _, matrix, _, folder, _ = exported
     frfs = [s for s in sets(folder / "files" / "frfs.uff") if s["type"] == 58]
     assert len(frfs) == matrix.count
     names = [dof.node for dof in matrix.responses], [dof.node for dof in matrix.references]
@@ -96,8 +83,8 @@ def test_frfs_come_back(answered, answer):
         np.testing.assert_allclose(one["x"], matrix.frequency_hz, rtol=1e-5)
 
 
-def test_tables_hold_the_same_numbers(answered, answer):
-    folder = answered[3] / "files"
+def test_tables_hold_the_same_numbers(exported):
+    folder, answer = exported[3] / "files", exported[4]
     with open(folder / "modes.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     hz = [mode["frequency_hz"] for mode in answer["modes"]]
@@ -112,8 +99,9 @@ def test_tables_hold_the_same_numbers(answered, answer):
     ]  # fmt: skip
 
 
-def test_right_and_left_vectors_come_back(answered, answer):
-    vectors = [s for s in sets(answered[3] / "files" / "vectors.uff") if s["type"] == 55]
+def test_right_and_left_vectors_come_back(exported):
+    *_, folder, answer = exported
+    vectors = [s for s in sets(folder / "files" / "vectors.uff") if s["type"] == 55]
     assert len(vectors) == 2 * len(answer["modes"])
     for k, one in enumerate(vectors):
         mode, side = answer["modes"][k // 2], ("right", "left")[k % 2]
@@ -124,7 +112,8 @@ def test_right_and_left_vectors_come_back(answered, answer):
             assert values[node] == pytest.approx(complex(*value), rel=1e-4, abs=1e-5)
 
 
-def test_pictures_and_moving_shapes(answer):
+def test_pictures_and_moving_shapes(exported):
+    answer = exported[4]
     names = [path.rsplit("/", 1)[1] for path in answer["plots"]]
     assert {"stabilisation.png", "mac.png", "complexity.png", "driving_points.png",
             "geometry.png", "shapes.png", "mode_01.gif"} <= set(names)  # fmt: skip
@@ -139,7 +128,6 @@ def test_pictures_and_moving_shapes(answer):
     assert np.ptp(frames[0]) > 100
 
 
-def test_real_normal_modes(answered, capsys):
-    assert run(["modes", str(answered[2]), *answered[4][:4], "--real"]) == 0
-    modes = json.loads(capsys.readouterr().out)["modes"]
+def test_real_normal_modes(exported):
+    modes = told("modes", exported[2], "--band-hz", *BAND, "--real")["modes"]
     assert all(imag == 0 for mode in modes for _, imag in mode["shape"])

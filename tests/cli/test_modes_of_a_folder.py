@@ -1,28 +1,19 @@
 """`planner modes FOLDER`: every pose of recordings.csv, labelled over poses, with its Campbell."""
 
-import shutil
-
 import numpy as np
 import pytest
 
 from planner.demo import shipped
-from tests.support.outside import call, told
+from planner.recording.folder import TABLE
+from tests.support.outside import call, part_of, told
 from tests.support.robots import make_arm
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Three poses of the shipped recordings."""
-    source = shipped("kr240_plane") / "recordings"
-    copy = tmp_path_factory.mktemp("some") / "recordings"
-    (copy / "data").mkdir(parents=True)
-    lines = (source / "recordings.csv").read_text().splitlines()
-    kept = [line for line in lines[1:] if line.split(",")[0] in ("A21", "A22", "A23")]
-    (copy / "recordings.csv").write_text("\n".join([lines[0], *kept]) + "\n")
-    for line in kept:
-        name = line.split(",")[-1]
-        shutil.copy(source / name, copy / name)
-    return copy
+    poses, target = ("A21", "A22", "A23"), tmp_path_factory.mktemp("some") / "recordings"
+    return part_of(shipped("kr240_plane") / "recordings", target, poses)
 
 
 @pytest.mark.parametrize("robot", [True, False])
@@ -45,18 +36,8 @@ def test_a_robot_with_other_joints_is_refused(folder, tmp_path):
     assert (code, "joint_a1" in err) == (2, True)
 
 
-def some_of(folder, target, rows):
-    """A copy of a folder with some rows of its table, by `rows(cells)` (None: left out)."""
-    shutil.copytree(folder, target)
-    header, *lines = (folder / "recordings.csv").read_text().splitlines()
-    kept = [row for line in lines if (row := rows(line.split(",")))]
-    text = "\n".join([header, *(",".join(row) for row in kept)])
-    (target / "recordings.csv").write_text(text + "\n", encoding="utf-8")
-    return target
-
-
 def test_a_folder_of_one_pose_is_that_pose(folder, tmp_path):
-    one = some_of(folder, tmp_path / "one", lambda row: row if row[0] == "A21" else None)
+    one = part_of(folder, tmp_path / "one", ("A21",))
     answer = told("modes", str(one))
     files = told("modes", *(str(p) for p in sorted(one.glob("data/A21*"))))
     assert answer["modes"] == files["modes"]
@@ -71,11 +52,10 @@ def test_a_folder_of_one_pose_is_that_pose(folder, tmp_path):
 def test_poses_named_twice_in_scripts_that_fonts_lack(folder, tmp_path):
     """The robot stood still between two poses; their names draw no warning."""
     names = {"1": "\u59ff\u52bf", "2": "\U00012000 2"}  # by the number of the hit
-
-    def still(row):
-        return [names[row[8]], *row[1:]] if row[0] == "A21" and row[8] in names else None
-
-    two = some_of(folder, tmp_path / "two", still)
+    two = part_of(folder, tmp_path / "two", ("A21",))
+    header, *rows = (line.split(",") for line in (two / TABLE).read_text().splitlines())
+    rows = [[names[row[8]], *row[1:]] for row in rows if row[8] in names]
+    (two / TABLE).write_text("\n".join(map(",".join, [header, *rows])), encoding="utf-8")
     code, out, err = call("modes", two, "--plot", tmp_path / "plots")
     assert (code, err) == (0, "")
     assert "Modes of 2 poses" in out

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from tests.support.outside import modes
+from tests.support.hit_files import write_table
+from tests.support.outside import modes, refused
 from tests.support.structures import plate
 
 BAND = (25.0, 120.0)
@@ -17,10 +18,8 @@ def exact_frfs(folder, names, axis=0, turned=False):
     hz, files = np.arange(1, 601) * 0.25, []
     for k, name in enumerate(names):
         h = PLATE.accelerance(hz, [k], [axis])[0, 0] * (-1 if turned else 1)
-        files.append(folder / f"{k}.csv")
-        table = np.column_stack([hz, h.real, h.imag])
-        head = f"frequency_hz,{name}_re,{name}_im"
-        np.savetxt(files[-1], table, delimiter=",", header=head, comments="", fmt="%.9g")
+        table = {"frequency_hz": hz, f"{name}_re": h.real, f"{name}_im": h.imag}
+        files.append(write_table(folder / f"{k}.csv", table))
     return files
 
 
@@ -70,20 +69,18 @@ def test_bands_that_frfs_do_not_hold_are_named(kind, band, told, tmp_path):
         names = [f"accelerance_{axis}x" for axis in ("xy" if kind == "matrix" else "xyz")]
         paths = exact_frfs(tmp_path, names)
     if kind == "folder":
-        joined = np.column_stack([np.loadtxt(p, delimiter=",", skiprows=1)[:, 1:] for p in paths])
-        lines = np.loadtxt(paths[0], delimiter=",", skiprows=1)[:, :1]
-        head = ",".join(["frequency_hz", *(f"{n}_{part}" for n in names for part in ("re", "im"))])
+        each = [np.loadtxt(p, delimiter=",", skiprows=1).T for p in paths]
+        joined = {"frequency_hz": each[0][0]}
+        for name, (_, real, imag) in zip(names, each, strict=True):
+            joined |= {f"{name}_re": real, f"{name}_im": imag}
         for pose in ("P1", "P2"):
-            np.savetxt(tmp_path / f"{pose}.csv", np.hstack([lines, joined]), delimiter=",",
-                       header=head, comments="")  # fmt: skip
+            write_table(tmp_path / f"{pose}.csv", joined)
         rows = "pose,hit,repeat,file\nP1,+x,1,P1.csv\nP2,+x,1,P2.csv\n"
         (tmp_path / "recordings.csv").write_text(rows)
         paths = [tmp_path]
-    code, _, err = modes(*paths, "--quantity", "accelerance", "--band-hz", *band)
-    assert code == 3
+    err = refused("modes", *paths, "--quantity", "accelerance", "--band-hz", *band, code=3)
     assert told in err
     assert "--band-hz" in err
-    assert len(err.strip().splitlines()) == 1
 
 
 def test_file_names_say_where_frfs_are_where_asked(tmp_path):
@@ -91,10 +88,9 @@ def test_file_names_say_where_frfs_are_where_asked(tmp_path):
     paths = []
     for k in range(3):
         h = PLATE.accelerance(hz, [k], [0])[0, 0]
-        paths.append(tmp_path / f"H{k + 1}_1.csv")
-        table = np.column_stack([hz, h.real, h.imag])
-        head = "Frequency (Hz),Real ((m/s^2)/N),Imaginary ((m/s^2)/N)"
-        np.savetxt(paths[-1], table, delimiter=",", header=head, comments="", fmt="%.9g")
+        names = "Frequency (Hz)", "Real ((m/s^2)/N)", "Imaginary ((m/s^2)/N)"
+        table = dict(zip(names, (hz, h.real, h.imag), strict=True))
+        paths.append(write_table(tmp_path / f"H{k + 1}_1.csv", table))
     options = "--band-hz", *BAND
     code, answer, err = modes(*paths, "--from-names", *options)
     assert (code, err) == (0, "")

@@ -1,13 +1,11 @@
 """`planner modes --operating`: responses alone, a tone of a machine among them."""
 
-import json
-
 import numpy as np
 import pytest
 
 from planner.modal.mac import mac
 from planner.proof.recordings import uff_channel, write_sets
-from tests.support.outside import call
+from tests.support.outside import modes
 from tests.support.rerun_columns import lines_of
 from tests.support.running import response
 from tests.support.structures import plate
@@ -27,28 +25,18 @@ def record(structure, tmp_path_factory):
     values = response(structure, POINTS, 100.0, RATE_HZ, np.random.default_rng(0))
     t = np.arange(values.shape[1]) / RATE_HZ
     values += np.std(values, axis=1, keepdims=True) * np.sin(2 * np.pi * TONE_HZ * t)
-    path = tmp_path_factory.mktemp("operating") / "running.uff"
-    signs = (1, 1, -1, *[1] * len(POINTS))
-    return write_sets(path, (
-        uff_channel(sign * samples, RATE_HZ, (structure.nodes[point], 3 * sign), (0, 0))
-        for sign, point, samples in zip(signs, POINTS, values, strict=False)
-    ))  # fmt: skip
+    sets = []
+    for number, (point, samples) in enumerate(zip(POINTS, values, strict=True)):
+        turned = -1 if number == 2 else 1
+        felt = structure.nodes[point], 3 * turned
+        sets.append(uff_channel(turned * samples, RATE_HZ, felt, (0, 0)))
+    return write_sets(tmp_path_factory.mktemp("operating") / "running.uff", sets)
 
 
 def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path):
-    options = (
-        "--operating",
-        "--band-hz",
-        *BAND,
-        "--json",
-        "--plot",
-        tmp_path,
-        "--rrd",
-        tmp_path / "modes.rrd",
-    )
-    code, out, err = call("modes", record, *options)
+    drawn = "--plot", tmp_path, "--rrd", tmp_path / "modes.rrd"
+    code, answer, err = modes(record, "--operating", "--band-hz", *BAND, *drawn)
     assert (code, err) == (0, "")
-    answer = json.loads(out)
     poles, shapes = structure.poles()
     hz, damping = np.abs(poles) / (2 * np.pi), -poles.real / np.abs(poles)
     inside = np.flatnonzero((hz > BAND[0]) & (hz < BAND[1]))
@@ -65,11 +53,11 @@ def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path):
     assert answer["tones_hz"] == [pytest.approx(TONE_HZ, rel=1e-3)]
     assert "UNSCALED" in " ".join(answer["remarks"])
     assert [path.rsplit("/", 1)[1] for path in answer["plots"]] == ["stabilisation.png", "mac.png"]
-    drawn = lines_of(tmp_path / "modes.rrd")
-    assert {f"/figures/stabilisation/0/singular_value_{k}" for k in (1, 2, 3)} <= set(drawn)
+    lines = {f"/figures/stabilisation/0/singular_value_{k}" for k in (1, 2, 3)}
+    assert lines <= set(lines_of(tmp_path / "modes.rrd"))
 
 
 def test_two_files_are_refused(record):
-    code, out, err = call("modes", record, record, "--operating")
-    assert (code, out) == (2, "")
+    code, answer, err = modes(record, record, "--operating")
+    assert (code, answer) == (2, None)
     assert "one record at a time" in err

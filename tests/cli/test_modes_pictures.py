@@ -1,33 +1,27 @@
 """`planner modes` draws what it found: files, a Rerun recording, and sentences for bad folders."""
 
-import json
 import subprocess
 import sys
 
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
-from rerun.chunk import RrdReader
 
 from planner.report.pictures import rendered
-from tests.support.outside import call, make_cell, record
+from tests.support.outside import refused, said, told
+from tests.support.rerun_columns import entities_of
 
 NAMES = ["stabilisation", "frf", "coherence", "mac"]
 
 
 @pytest.fixture(scope="module")
-def hits(tmp_path_factory):
+def hits(first_pose_once):
     """Simulated hits at one pose."""
-    root = tmp_path_factory.mktemp("pictures")
-    _, _, truth = make_cell(root)
-    folder = record(truth, root / "good", "G1", [10.0, -70.0, 90.0, 0.0, 60.0, 0.0])
-    return sorted((folder / "data").iterdir())
+    return first_pose_once.files
 
 
 def test_pictures_are_written_and_named_on_screen(hits, tmp_path):
-    code, out, err = call("modes", *hits, "--plot", tmp_path / "new" / "folder")
-    assert code == 0, err
-    flat = "".join(out.split())
+    flat = "".join(said("modes", *hits, "--plot", tmp_path / "new" / "folder").split())
     for name in NAMES:
         path = tmp_path / "new" / "folder" / f"{name}.png"
         assert path.read_bytes().startswith(b"\x89PNG")
@@ -36,10 +30,9 @@ def test_pictures_are_written_and_named_on_screen(hits, tmp_path):
 
 def test_pictures_are_listed_and_told_to_rerun(hits, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    options = ("--plot", "here", "--format", "svg", "--rrd", "sub/modes.rrd", "--json")
-    code, out, err = call("modes", *hits, *options)
-    assert code == 0, err
-    answer, expected = json.loads(out), [tmp_path / "here" / f"{name}.svg" for name in NAMES]
+    options = "--plot", "here", "--format", "svg", "--rrd", "sub/modes.rrd"
+    answer = told("modes", *hits, *options)
+    expected = [tmp_path / "here" / f"{name}.svg" for name in NAMES]
     assert answer["plots"] == [str(path) for path in expected]
     assert answer["rrd"] == str(tmp_path / "sub" / "modes.rrd")
     for path in expected:  # titles stand in an SVG as comments
@@ -50,16 +43,9 @@ def test_pictures_are_listed_and_told_to_rerun(hits, tmp_path, monkeypatch):
     assert any(name.startswith("/figures/stabilisation/0/") for name in drawn)  # sharp lines
 
 
-def entities_of(rrd):
-    """Entities that draw something."""
-    reader = RrdReader(rrd)
-    return {str(chunk.entity_path) for chunk in reader.stream(store=reader.recordings()[0])}
-
-
 def test_without_a_wish_nothing_is_drawn(hits):
-    code, out, _ = call("modes", *hits, "--json")
-    answer = json.loads(out)
-    assert (code, answer["plots"], answer["rrd"]) == (0, [], None)
+    answer = told("modes", *hits)
+    assert (answer["plots"], answer["rrd"]) == ([], None)
 
 
 @pytest.mark.parametrize(
@@ -75,20 +61,16 @@ def test_a_place_that_cannot_be_written_is_said(hits, tmp_path, monkeypatch, opt
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").write_text("a file")
     (tmp_path / "blocked" / "stabilisation.png").mkdir(parents=True)
-    code, out, err = call("modes", *hits, "--json", *options)
-    assert (code, out) == (2, "")
+    err = refused("modes", *hits, "--json", *options)
     assert words in err
-    assert len(err.strip().splitlines()) == 1
     assert "failed inside" not in err
 
 
 def test_free_decays_are_drawn_without_frfs(shared_data, tmp_path):
     path = shared_data / "imphammer_mit" / "imp_ham_set1_nomass.CSV"
-    options = ("--force", "CH8", "--json", "--plot", tmp_path, "--format", "svg")
-    code, out, _ = call("modes", path, *options)
-    assert code == 0
+    answer = told("modes", path, "--force", "CH8", "--plot", tmp_path, "--format", "svg")
     names = [tmp_path / f"{name}.svg" for name in ("stabilisation", "mac")]
-    assert json.loads(out)["plots"] == [str(name) for name in names]
+    assert answer["plots"] == [str(name) for name in names]
     assert all("SIMULATED" not in name.read_text() for name in names)
 
 

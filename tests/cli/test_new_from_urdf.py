@@ -9,7 +9,7 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.robot.robot import Robot
-from tests.support.outside import call, said, told
+from tests.support.outside import refused, said, told
 from tests.support.published import (
     BOXES,
     DENSITY,
@@ -172,8 +172,7 @@ REFUSED = {
 
 @pytest.mark.parametrize(("arguments", "words"), REFUSED.values(), ids=REFUSED)
 def test_what_is_missing_is_asked_for(arguments, words, tmp_path):
-    code, _, err = call("new", tmp_path / "cell", *arguments(tmp_path))
-    assert (code, words in err, len(err.strip().splitlines())) == (2, True, 1), err
+    assert words in refused("new", tmp_path / "cell", *arguments(tmp_path))
     assert not (tmp_path / "cell").exists()
 
 

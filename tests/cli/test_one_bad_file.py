@@ -7,58 +7,37 @@ import os
 import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from planner.campaign import journal
 from planner.campaign.campaign import Campaign
 from planner.campaign.journal import Journal
 from planner.errors import InputError
+from planner.recording.hits import hits_from
 from planner.recording.read import read
 from planner.robot.mesh_files import copy_meshes
 from planner.words import by_reason
+from tests.support.hit_files import columns
 from tests.support.odd_recordings import ODD
-from tests.support.outside import call, make_cell, record, told
-from tests.support.robots import JOINTS_DEG
+from tests.support.outside import call, told
 
-MIDDLE = [round((a + b) / 2, 3) for a, b in JOINTS_DEG]
 TRIED = ["an external link", "a flipped byte in gzip", "an acceleration of 1e200",
          "FRFs of unequal length", "spectra that are a word", "rates that differ"]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def bench(tmp_path_factory):
-    """A new campaign, and a pose's recordings."""
-    root = tmp_path_factory.mktemp("bench")
-    robot, campaign_toml, truth = make_cell(root, learns=False)
-    assert call("new", root / "cell", "--robot", robot, "--campaign", campaign_toml)[0] == 0
-    return root, record(truth, root / "good", "G1", MIDDLE)
-
-
 @pytest.fixture
-def cell(bench, tmp_path):
-    return shutil.copytree(bench[0] / "cell", tmp_path / "cell")
+def cell(first_pose) -> Path:
+    return first_pose.cell
 
 
-def named_columns(file: Path) -> dict:
-    (found,) = read(file)
-    by = {c.quantity + str(abs(c.direction)): c.samples for c in found.channels}
-    force = next(v for k, v in by.items() if k.startswith("force"))
-    times = {"time_s": [k / found.sampling_rate_hz for k in range(len(force))], "force_n": force}
-
-    return {k: np.array(v) for k, v in times.items()} | {
-        f"acceleration_{a}_m_s2": by[f"acceleration{i}"] for i, a in enumerate("xyz", 1)
-    }
-
-
-def test_bad_files_are_refused_and_the_others_imported(bench, cell, tmp_path):
-    _, good = bench
-    folder = shutil.copytree(good, tmp_path / "export")
-    columns = named_columns(next((folder / "data").glob("*px_1.uff")))
+def test_bad_files_are_refused_and_the_others_imported(first_pose, tmp_path):
+    cell, folder = first_pose.cell, first_pose.made
+    good = next((folder / "data").glob("*px_1.uff"))
+    (hit,) = hits_from(read(good))
     table = (folder / "recordings.csv").read_text().splitlines()
     for number, what in enumerate(TRIED, 11):
         name, write = ODD[what]
-        write(folder / "data" / name, columns)
+        write(folder / "data" / name, columns(hit, hit.sampling_rate_hz))
         row = table[1].split(",")
         table.append(",".join([*row[:-2], str(number), f"data/{name}"]))
     (folder / "recordings.csv").write_text("\n".join(table) + "\n")
@@ -74,8 +53,8 @@ def test_bad_files_are_refused_and_the_others_imported(bench, cell, tmp_path):
     kept.write_bytes(kept.read_bytes()[:-100])
     more = tmp_path / "more" / "again_px_1.uff"
     more.parent.mkdir()
-    more.write_bytes(next((good / "data").glob("*px_1.uff")).read_bytes() + b"\n")
-    code, _, err = call("import", cell, more, "--pose", "G1")
+    more.write_bytes(good.read_bytes() + b"\n")
+    code, _, err = call("import", cell, more, "--pose", first_pose.pose)
     assert (code, kept.name in err, "restore it" in err) == (2, True, True), err
 
 
@@ -88,11 +67,10 @@ def test_files_refused_alike_are_one_sentence():
     ]
 
 
-def test_a_pose_whose_name_looks_like_markup(bench, cell, tmp_path):
-    folder = shutil.copytree(bench[1], tmp_path / "export")
-    table = folder / "recordings.csv"
-    table.write_text(table.read_text().replace("G1,", "[/red],"))
-    for command in (("import", cell, folder), ("status", cell), ("withdraw", cell, "[/red]")):
+def test_a_pose_whose_name_looks_like_markup(first_pose, cell):
+    table = first_pose.made / "recordings.csv"
+    table.write_text(table.read_text().replace(f"{first_pose.pose},", "[/red],"))
+    for command in (("import", cell, table), ("status", cell), ("withdraw", cell, "[/red]")):
         code, out, err = call(*command)
         assert (code, "[/red]" in out) == (0, True), err
 
@@ -138,10 +116,9 @@ def test_meshes_are_copied_into_the_new_folder_only(tmp_path):
     assert sorted(p.name for p in tmp_path.glob("*.stl")) == ["far.stl"]
 
 
-def test_a_byte_order_mark_is_no_fault(bench, tmp_path):
-    root, _ = bench
-    for folder in ("robot", "plan"):
-        shutil.copytree(root / folder, tmp_path / folder)
+def test_a_byte_order_mark_is_no_fault(first_pose_once, tmp_path):
+    for folder in (first_pose_once.robot.parent, first_pose_once.plan.parent):
+        shutil.copytree(folder, tmp_path / folder.name)
     robot, plan = tmp_path / "robot" / "robot.toml", tmp_path / "plan" / "campaign.toml"
     for path in (robot, plan):
         path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
@@ -149,10 +126,9 @@ def test_a_byte_order_mark_is_no_fault(bench, tmp_path):
     assert told("status", tmp_path / "cell")["measurements"] == []
 
 
-def test_halves_of_killed_writers_are_removed(bench, tmp_path):
-    root, _ = bench
+def test_halves_of_killed_writers_are_removed(first_pose_once, tmp_path):
     (tmp_path / f".cell.{2**22 + 1}.part").mkdir()  # no process has that number
-    robot, plan = root / "robot" / "robot.toml", root / "plan" / "campaign.toml"
+    robot, plan = first_pose_once.robot, first_pose_once.plan
     told("new", tmp_path / "cell", "--robot", robot, "--campaign", plan)
     (tmp_path / "cell" / "recordings" / ".abc.uff.123.part").write_bytes(b"half")
     told("next", tmp_path / "cell")

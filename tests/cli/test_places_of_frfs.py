@@ -10,7 +10,7 @@ from planner.errors import InputError
 from planner.recording.read import place_in_name
 from planner.robot.robot import Robot
 from tests.support.cuts import SLOT
-from tests.support.outside import call, make_cell, told
+from tests.support.outside import call, told
 
 MODES = {"xx": (22.0, 0.03, 200.0), "yy": (27.0, 0.025, 250.0)}
 CUT = SLOT.format("600, 1400, 5", "0.0, 0.02, 200", "full_discretisation")
@@ -60,14 +60,11 @@ def test_a_tap_test_in_files_of_one_frf_each(tmp_path):
 
 
 @pytest.mark.parametrize("how", ["table", "names"])
-def test_frfs_as_text_into_a_campaign(tmp_path, how):
-    robot, plan, _ = make_cell(tmp_path, learns=False)
-    cell, taps = tmp_path / "cell", tmp_path / "taps"
+def test_frfs_as_text_into_a_campaign(first_pose, tmp_path, how):
+    cell, taps = first_pose.cell, tmp_path / "taps"
     taps.mkdir()
-    told("new", cell, "--robot", robot, "--campaign", plan)
-    (proposal,) = told("next", cell)["proposals"]
-    loaded = Robot.load(robot)
-    hertz, q = np.arange(4.0, 60.0, 0.1), loaded.joints.internal(proposal["joints_deg"])
+    loaded = Robot.load(first_pose.robot)
+    hertz, q = np.arange(4.0, 60.0, 0.1), loaded.joints.internal(first_pose.joints_deg)
     simulation = Simulation(loaded)
     (h,) = simulation.accelerance(q, hertz)
     columns = [f"{name}_deg" for name in loaded.joint_names]
@@ -75,13 +72,11 @@ def test_frfs_as_text_into_a_campaign(tmp_path, how):
     for i, felt in enumerate("xyz"):
         for j, hit in enumerate("xyz"):
             write_frf(taps / f"tap_{felt}{hit}.txt", hertz, h[i, j], "m/s²/N")
-            angles = ",".join(f"{a:.6f}" for a in proposal["joints_deg"])
-            rows.append(f"{proposal['pose']},{angles},+{hit},+{felt},tap_{felt}{hit}.txt")
+            angles = ",".join(f"{a:.6f}" for a in first_pose.joints_deg)
+            rows.append(f"{first_pose.pose},{angles},+{hit},+{felt},tap_{felt}{hit}.txt")
     if how == "table":
         (taps / "recordings.csv").write_text("\n".join(rows) + "\n")
-        imported = told("import", cell, taps)
-    else:
-        imported = told("import", cell, taps, "--from-names")
+    imported = told("import", cell, taps, *(["--from-names"] if how == "names" else []))
     assert len(imported["accepted"]) == 9
     (expected,) = simulation.modes(q, 1).frequency_hz
     assert imported["modes"][0]["frequency_hz"] == pytest.approx(expected[0], rel=1e-3)

@@ -2,6 +2,8 @@
 
 import os
 
+import pytest
+
 from planner.compare.processes import Failure, each
 from tests.support import items
 
@@ -20,19 +22,12 @@ def test_a_death_costs_one_item_which_is_done_again(tmp_path):
     assert (tmp_path / "killed").exists()
 
 
-def test_what_kills_every_process_is_given_up_and_the_rest_done():
-    found = dict(each(items.deadly, None, [0, 1, 2]))
-    assert found[0] == 0
-    assert found[2] == 2
+@pytest.mark.parametrize(("work", "why"), [(items.deadly, "died"), (items.failing, "too odd")])
+def test_an_item_that_kills_every_process_or_fails_is_given_up_and_the_rest_done(work, why):
+    found = dict(each(work, None, [0, 1, 2]))
+    assert (found[0], found[2]) == (0, 2)
     assert isinstance(found[1], Failure)
-    assert "died" in found[1].reason
-
-
-def test_a_fault_of_one_item_is_said_and_the_rest_done():
-    found = dict(each(items.failing, None, [0, 1, 2], workers=1))
-    assert found[0] == 0
-    assert found[2] == 2
-    assert "too odd" in found[1].reason
+    assert why in found[1].reason
 
 
 def test_stopping_early_leaves_no_process():

@@ -1,7 +1,6 @@
 """A diagnosis reads a campaign's recordings and writes nothing into its folder."""
 
 import hashlib
-import json
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +8,10 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.recordings_source import recordings_source
-from planner.cli.run import run
 from planner.demo import NAME, Pool, shipped
 from planner.errors import InputError
 from planner.progress import no_progress
-from tests.support.outside import FROZEN
+from tests.support.outside import FROZEN, refused, told
 
 
 def content(folder: Path) -> dict[str, tuple[str, int]]:
@@ -63,23 +61,22 @@ def test_recordings_in_use_and_nothing_else(campaign):
     assert content(campaign.directory) == before
 
 
-def test_identify_takes_a_campaign(campaign, capsys):
+@pytest.mark.parametrize(
+    ("command", "key"),
+    [
+        (("identify", "--no-extend", "--no-inertias"), "parameters"),
+        pytest.param(("diagnose",), "findings", marks=[pytest.mark.slow, pytest.mark.timeout(600)]),
+    ],
+)
+def test_identify_and_diagnose_leave_the_folder_byte_for_byte(campaign, command, key):
     before = content(campaign.directory)
-    quick = "--no-extend", "--no-inertias"
-    assert run(["identify", str(campaign.directory), *quick, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["parameters"]
+    name, *options = command
+    answer = told(name, campaign.directory, *options)
+    assert key in answer
+    assert answer["simulated"]
     assert content(campaign.directory) == before
 
 
-def test_compare_takes_a_campaign_with_its_own_workspace(campaign, capsys):
-    assert run(["compare", str(campaign.directory), "--strategies", "random"]) == 2
-    assert "The pool has 2 poses: 2 are left to judge by" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(600)
-def test_diagnose_leaves_the_folder_byte_for_byte(campaign, capsys):
-    before = content(campaign.directory)
-    assert run(["diagnose", str(campaign.directory), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["simulated"]
-    assert content(campaign.directory) == before
+def test_compare_takes_a_campaign_with_its_own_workspace(campaign):
+    err = refused("compare", campaign.directory, "--strategies", "random")
+    assert "The pool has 2 poses: 2 are left to judge by" in err

@@ -1,7 +1,6 @@
 """Recordings as one data set: poses, visits, levels; from a folder, from files, from hits."""
 
 import csv
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,17 +17,11 @@ from planner.errors import InputError, RefusedError
 from planner.frf.estimator import estimate
 from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames
+from tests.support.hit_files import write_hit
 from tests.support.simulated_hits import make_hit
 
 BAND_HZ = (4.0, 60.0)
 NOTHING_KEPT = Store(None)
-
-
-def write_hit(path: Path, hit) -> None:
-    t = np.arange(len(hit.force_n)) / hit.sampling_rate_hz
-    names = "time_s,force_n," + ",".join(f"acceleration_{axis}_m_s2" for axis in "xyz")
-    columns = np.column_stack([t, hit.force_n, *hit.acceleration_m_s2])
-    np.savetxt(path, columns, "%.12g", ",", header=names, comments="")
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +37,7 @@ def folder(tmp_path_factory):
                 hit = make_hit(rng, f"+{axis}", record_s=3.0, peak_n=(400, 1200)[repeat])
                 if name == "2Ax1.csv":
                     hit = replace(hit, acceleration_m_s2=-hit.acceleration_m_s2)
-                write_hit(root / name, hit)
+                write_hit(root / name, hit, stated=False)
                 angle = {"A": 10.0, "B": 50.0}[pose] + 0.1 * visit
                 rows.append([pose, angle, f"+{axis}", 2 * visit + repeat + 1, name])
     (root / "none.csv").write_text("hello\n")
@@ -199,28 +192,7 @@ def test_folders_whose_recordings_no_table_names_are_told_of(tmp_path):
     found = recordings_in(tmp_path, joints)
     assert unlisted_folders(tmp_path, found) == ()
     (tmp_path / "P2").mkdir()
-    write_hit(tmp_path / "P2" / "hit.csv", make_hit(np.random.default_rng(1), "+x"))
+    write_hit(tmp_path / "P2" / "hit.csv", make_hit(np.random.default_rng(1)), stated=False)
     (said,) = unlisted_folders(tmp_path, found)
     assert "P2 is left out: no recordings.csv says" in said
     assert "name the campaign" in said
-
-
-def test_a_stream_is_a_file_of_several_hits_and_its_bad_ones_are_named(tmp_path):
-    rng, rows = np.random.default_rng(6), ["pose,a_deg,hit,repeat,file"]
-    for axis in "xyz":
-        hits = [make_hit(rng, f"+{axis}", second=0.5 * (axis + str(k) == "y1")) for k in range(3)]
-        whole = replace(
-            hits[0],
-            force_n=np.concatenate([hit.force_n for hit in hits]),
-            acceleration_m_s2=np.hstack([hit.acceleration_m_s2 for hit in hits]),
-        )
-        write_hit(tmp_path / f"{axis}.csv", whole)
-        rows.append(f"A,0,+{axis},1,{axis}.csv")
-    (tmp_path / "recordings.csv").write_text("\n".join(rows))
-    found = Dataset.read(tmp_path, joints("a"), BAND_HZ, store=NOTHING_KEPT)
-    assert Counter(h.axis_index for h in found.visits[0].hits) == {0: 3, 1: 2, 2: 3}
-    ((name, reason),) = found.refused
-    assert "y.csv (hit 2 at 4.0" in name
-    assert "second pulse" in reason
-    alone = estimate(found.visits[0].hits, BAND_HZ)
-    np.testing.assert_array_equal(found.frfs[0].accelerance, alone.accelerance)

@@ -13,9 +13,10 @@ from planner.dataset import measure as measuring
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
+from tests.support.hit_files import write_hit
+from tests.support.simulated_hits import make_hit
 
 BAND_HZ = (4.0, 60.0)
-RATE_HZ, SAMPLES = 400.0, 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,31 +57,24 @@ def test_what_is_kept_comes_back_equal(tmp_path):
     again.values[0, 0] = 0  # arrays are the reader's own
 
 
-@pytest.mark.parametrize("place", [0, 5, 31, 32, 40, -1])
-def test_a_flipped_byte_is_noticed_wherever_it_is(tmp_path, place):
+def flipped(at: int):
+    return lambda data: data[: at % len(data)] + bytes([data[at] ^ 1]) + data[at % len(data) + 1 :]
+
+
+DAMAGED = [flipped(at) for at in (0, 5, 31, 32, 40, -1)]
+DAMAGED += [lambda data, end=end: data[:end] for end in (0, 10, 32, 60, -1)]
+
+
+@pytest.mark.parametrize("damage", DAMAGED)
+def test_a_damaged_entry_is_noticed_wherever_it_is_and_made_anew(tmp_path, damage):
     store = Store(tmp_path)
     store.put("k", result())
-    data = bytearray((tmp_path / "k").read_bytes())
-    data[place] ^= 1
-    (tmp_path / "k").write_bytes(bytes(data))
+    whole = (tmp_path / "k").read_bytes()
+    (tmp_path / "k").write_bytes(damage(whole))
     assert store.get("k", Result) is None
     assert same(store.result("k", Result, result), result())
-    assert store.get("k", Result) is not None
-
-
-def test_a_truncated_or_empty_entry_is_none(tmp_path):
-    store = Store(tmp_path)
-    store.put("k", result())
-    data = (tmp_path / "k").read_bytes()
-    for length in (0, 10, 32, 60, len(data) - 1):
-        (tmp_path / "k").write_bytes(data[:length])
-        assert store.get("k", Result) is None
-
-
-def test_an_entry_under_another_key_is_none(tmp_path):
-    store = Store(tmp_path)
-    store.put("k", result())
-    os.replace(tmp_path / "k", tmp_path / "other")
+    assert (tmp_path / "k").read_bytes() == whole
+    os.replace(tmp_path / "k", tmp_path / "other")  # nor is one under another key taken
     assert store.get("other", Result) is None
 
 
@@ -138,21 +132,13 @@ def test_processes_that_write_the_same_entry_never_see_half_of_it(tmp_path):
 
 
 def write_hits(folder: Path) -> tuple[Source, ...]:
-    """Three hits along each axis on a system with one mode, as CSV files."""
-    rng = np.random.default_rng(3)
-    t = np.arange(SAMPLES) / RATE_HZ
-    force = 100 * np.sin(np.pi * np.clip((t - 0.06) / 0.01, 0, 1)) ** 2
-    ring = np.exp(-6 * t) * np.sin(2 * np.pi * 15 * t)
-    response = np.convolve(force, ring)[:SAMPLES] / RATE_HZ
-    sources = []
+    """Three hits along each axis, as CSV files."""
+    rng, sources = np.random.default_rng(3), []
     for axis in "xyz":
         for repeat in (1, 2, 3):
-            a = np.outer([1.0, 0.5, 2.0], response) + 0.01 * rng.standard_normal((3, SAMPLES))
-            f = force + 0.05 * rng.standard_normal(SAMPLES)
-            path = folder / f"{axis}{repeat}.csv"
-            names = "time_s,force_n," + ",".join(f"acceleration_{b}_m_s2" for b in "xyz")
-            np.savetxt(path, np.column_stack([t, f, *a]), "%.9g", ",", header=names, comments="")
-            sources.append(Source(path, path.name, f"+{axis}", repeat))
+            hit = make_hit(rng, f"+{axis}", record_s=2.0)
+            path = write_hit(folder / f"{axis}{repeat}.csv", hit, stated=False)
+            sources.append(Source(path, path.name, hit.axis, repeat))
     return tuple(sources)
 
 
@@ -191,41 +177,41 @@ def test_a_pose_is_computed_once(sources, tmp_path, monkeypatch):
     agree(again, plain)
 
 
+@pytest.fixture
+def kept(tmp_path):
+    """A pose that was worked out and is kept."""
+    pose = MeasuredPose(write_hits(tmp_path), BAND_HZ, store=Store(tmp_path / "store"))
+    _ = pose.decomposed
+    assert replace(pose).is_kept
+    return pose
+
+
 @pytest.mark.parametrize(
     "change",
     [
-        {"band_hz": (4.0, 50.0)},
-        {"estimator": "h2"},
-        {"window_rate_1_s": 0.5},
+        lambda pose: {"band_hz": (4.0, 50.0)},
+        lambda pose: {"estimator": "h2"},
+        lambda pose: {"window_rate_1_s": 0.5},
+        lambda pose: {"sources": (replace(pose.sources[0], hit="-x"), *pose.sources[1:])},
     ],
 )
-def test_another_parameter_is_another_result(sources, tmp_path, change):
-    first = MeasuredPose(sources, BAND_HZ, store=Store(tmp_path))
-    _ = first.decomposed
-    other = replace(first, **change)
+def test_another_parameter_or_axis_is_another_result(kept, change):
+    other = replace(kept, **change(kept))
     assert not other.is_kept
     agree(other, replace(other, store=None))
 
 
-def test_another_axis_or_a_byte_more_in_a_file_is_another_result(tmp_path):
-    hits = write_hits(tmp_path)
-    store = Store(tmp_path / "store")
-    first = MeasuredPose(hits, BAND_HZ, store=store)
-    _ = first.decomposed
-    turned = (replace(hits[0], hit="-x"), *hits[1:])
-    assert not MeasuredPose(turned, BAND_HZ, store=store).is_kept
-    hits[0].path.write_text(hits[0].path.read_text() + "\n")
-    assert not MeasuredPose(hits, BAND_HZ, store=store).is_kept
+def test_a_byte_more_in_a_file_is_another_result(kept):
+    path = kept.sources[0].path
+    path.write_text(path.read_text() + "\n")
+    assert not replace(kept).is_kept
 
 
-def test_another_program_computes_again(sources, tmp_path, monkeypatch):
-    first = MeasuredPose(sources, BAND_HZ, store=Store(tmp_path))
-    _ = first.decomposed
-    assert MeasuredPose(sources, BAND_HZ, store=Store(tmp_path)).is_kept
+def test_another_program_computes_again(kept, monkeypatch):
     monkeypatch.setattr(content_hash, "program", lambda *packages: "another")
-    other = MeasuredPose(sources, BAND_HZ, store=Store(tmp_path))
+    other = replace(kept)
     assert not other.is_kept
-    agree(other, MeasuredPose(sources, BAND_HZ))
+    agree(other, replace(kept, store=None))
 
 
 def test_the_programs_hash_follows_its_packages():
@@ -249,14 +235,12 @@ def test_a_file_that_changes_while_it_is_read_is_not_kept(tmp_path, monkeypatch)
     assert not (tmp_path / "store").exists()
 
 
-def test_a_copy_elsewhere_is_known_by_its_content(sources, tmp_path):
-    store = Store(tmp_path / "store")
-    _ = MeasuredPose(sources, BAND_HZ, store=store).decomposed
+def test_a_copy_elsewhere_is_known_by_its_content(kept, tmp_path):
     copies = []
-    for source in sources:
+    for source in kept.sources:
         path = tmp_path / f"copy-{source.path.name}"
         path.write_bytes(source.path.read_bytes())
         copies.append(replace(source, path=path))
-    copied = MeasuredPose(tuple(copies), BAND_HZ, store=store)
+    copied = replace(kept, sources=tuple(copies))
     assert copied.is_kept
     assert [v.source.path for v in copied.verdicts] == [source.path for source in copies]

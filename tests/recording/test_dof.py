@@ -14,14 +14,10 @@ def test_a_direction_number_comes_back(number: int) -> None:
     assert dof.sign * dof.positive.number == number
 
 
-def test_signed_directions_are_spelled_by_axis() -> None:
+def test_directions_are_spelled_by_axis_and_unknown_ones_refused() -> None:
     assert Dof.of_uff(7, -3) == Dof("7", "-z")
     assert str(Dof("P3", "y")) == "P3:y"
-    assert Dof.of_uff(1, 5).is_turn
-    assert not Dof.of_uff(1, 2).is_turn
-
-
-def test_unknown_directions_are_refused() -> None:
+    assert [Dof.of_uff(1, number).is_turn for number in (2, 5)] == [False, True]
     for direction in ("w", "+x", "-scalar", ""):
         with pytest.raises(InputError, match="direction"):
             Dof("3", direction)

@@ -62,16 +62,17 @@ def test_headers_delimiters_and_decimals(tmp_path, head, form):
     check_hit(path)
 
 
-@pytest.mark.parametrize("code", ["utf-8-sig", "utf-16", "utf-32", "cp1252"])
-def test_code_pages(tmp_path, code):
-    path = tmp_path / "hit.txt"
-    path.write_text(table(HEADS["brackets"], "\t"), encoding=code)
-    check_hit(path)
+BLANKS = table("Time (s)   Force (N)   Acc X (m/s^2)", "   ").replace("   ", "  ")
+TABBED = table(HEADS["brackets"], "\t")
 
 
-def test_blanks_between_columns_and_in_their_names(tmp_path):
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [(BLANKS, "ascii"), *((TABBED, code) for code in ("utf-8-sig", "utf-16", "utf-32", "cp1252"))],
+)
+def test_code_pages_and_blanks(tmp_path, text, code):
     path = tmp_path / "hit.txt"
-    path.write_text(table("Time (s)   Force (N)   Acc X (m/s^2)", "   ").replace("   ", "  "))
+    path.write_text(text, encoding=code)
     check_hit(path)
 
 
@@ -184,6 +185,8 @@ def test_universal_files_padded_uneven_and_labelled_by_a_ratio(tmp_path):
     force, padded = (13, "Force", "N"), 6 - len(ANSWER[:-2]) % 6
     (record,) = read(write(tmp_path / "p.uff", dataset_58(1, ANSWER[:-2], force, padded=padded)))
     np.testing.assert_allclose(record.channels[0].samples, ANSWER[:-2], atol=1e-5)
+    (record,) = read(write(tmp_path / "n.uff", dataset_58(1, ANSWER, NONE)))
+    assert record.channels[0].quantity == "unknown"
     (record,) = read(write(tmp_path / "u.uff", dataset_58b_mixed(TIME, ANSWER, force)))
     np.testing.assert_array_equal(record.channels[0].samples, ANSWER)
     assert record.sampling_rate_hz == pytest.approx(RATE)
@@ -243,12 +246,6 @@ def test_poses_of_a_german_spreadsheet(tmp_path):
     path = tmp_path / "poses.csv"
     path.write_text("pose;joint_1_deg;Bemerkung\nP1;-12,5;größer\n", encoding="cp1252")
     assert read_poses(path, ["joint_1"])[0].joints_deg == (-12.5,)
-
-
-def test_datasets_of_other_kinds_do_not_disturb(tmp_path):
-    none = dataset_58(1, ANSWER, NONE)
-    (record,) = read(write(tmp_path / "n.uff", none))
-    assert record.channels[0].quantity == "unknown"
 
 
 @pytest.mark.parametrize("force_first", [True, False])

@@ -21,8 +21,8 @@ from planner.proof.hits import Hammer, SimulatedHit
 from planner.proof.recordings import write_uff
 from planner.recording.folder import read_poses, read_recordings
 from planner.robot.robot import Robot
-from tests.support.bad_input import columns, write_csv, write_h5, write_mat, write_tdms
 from tests.support.containers import MANY_HITS, ONE_HIT
+from tests.support.hit_files import WRITERS, columns, write_mat
 from tests.support.outside import call, make_cell
 from tests.support.simulated_hits import RATE_HZ, make_hit
 from tests.support.uff_files import dataset_58, units_164, write
@@ -79,12 +79,11 @@ def judge(path: Path) -> None:
 def subjects(folder: Path) -> list[tuple[Path, Callable[[Path], object]]]:
     """Valid files, and what reads them."""
     hit = make_hit(np.random.default_rng(0), record_s=1.0)
-    table = columns(SimulatedHit("+x", hit.force_n, hit.acceleration_m_s2))
-    table["time_s"] = np.arange(hit.force_n.size) / RATE_HZ
+    table = columns(hit, RATE_HZ)
     hammer = Hammer(sampling_rate_hz=RATE_HZ)
     write_uff(folder / "hit.uff", SimulatedHit("+x", hit.force_n, hit.acceleration_m_s2), hammer)
-    for write_one in (write_csv, write_h5, write_mat, write_tdms):
-        write_one(folder / f"hit.{write_one.__name__.removeprefix('write_')}", table)
+    for suffix, write_one in WRITERS.items():
+        write_one(folder / f"hit{suffix}", table)
     (folder / "hit.csv.gz").write_bytes(gzip.compress((folder / "hit.csv").read_bytes()))
     lines = np.linspace(0.0, 100.0, 100)
     frfs = {"frequency_hz": lines, **{f"accelerance_{a}x": lines + 1j for a in "xyz"}}
@@ -170,10 +169,11 @@ def fuzzed(folder: Path, count: int, seed: int) -> tuple[Counter[str], list[str]
     return seen, wrong
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(1800)
-def test_2000_mutated_files(tmp_path):
-    seen, wrong = fuzzed(tmp_path, 2000, seed=1)
+@pytest.mark.parametrize(
+    "count", [200, pytest.param(2000, marks=[pytest.mark.slow, pytest.mark.timeout(1800)])]
+)
+def test_mutated_files(tmp_path, count):
+    seen, wrong = fuzzed(tmp_path, count, seed=1)
     print("\n" + "\n".join(f"{what}: {n}" for what, n in sorted(seen.items())))
     print("\n".join(wrong[:40]))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024

@@ -10,17 +10,11 @@ from planner.recording.hits import hits_from
 from planner.recording.mat5 import read_mat5
 from planner.recording.read import READERS, hits_in, read, version
 from planner.recording.screening import screen
-from tests.support.bad_input import write_h5, write_mat
+from tests.support.hit_files import columns, write_h5, write_mat
 from tests.support.odd_recordings import ODD
 from tests.support.simulated_hits import RATE_HZ, make_hit
 
-
-def columns() -> dict[str, np.ndarray]:
-    hit = make_hit(np.random.default_rng(0))
-    names = [f"acceleration_{a}_m_s2" for a in "xyz"]
-    time_s = np.arange(hit.force_n.size) / RATE_HZ
-    each = dict(zip(names, hit.acceleration_m_s2, strict=True))
-    return {"time_s": time_s, "force_n": hit.force_n, **each}
+GOOD = columns(make_hit(np.random.default_rng(0)), RATE_HZ)
 
 
 @pytest.mark.parametrize("content", [None, b"", bytes(300), b"no hit at all\n", b"1 2\n" * 20])
@@ -41,7 +35,7 @@ def test_every_reader_refuses_what_is_no_recording(tmp_path, suffix, content):
 @pytest.mark.parametrize("what", ODD)
 def test_odd_recordings_are_refused_in_words(tmp_path, what):
     name, write = ODD[what]
-    write(tmp_path / name, columns())
+    write(tmp_path / name, GOOD)
     with pytest.raises(InputError, match=name) as refused:
         hits_from(read(tmp_path / name))
     assert "Error)" not in str(refused.value), refused.value  # it says what, not how it crashed
@@ -49,7 +43,7 @@ def test_odd_recordings_are_refused_in_words(tmp_path, what):
 
 def test_text_of_another_code_page_in_an_attribute_is_no_fault(tmp_path):
     path = tmp_path / "hit.h5"
-    write_h5(path, columns())
+    write_h5(path, GOOD)
     with h5py.File(path, "a") as file:
         file.attrs["note"] = np.bytes_(b"gr\xf6\xdfe")
         file["force_n"].attrs["unit"] = np.bytes_(b"N")
@@ -61,8 +55,8 @@ def test_text_of_another_code_page_in_an_attribute_is_no_fault(tmp_path):
     ("factor", "kind"), [({"time_s": 1e-6}, "too_short"), ({"force_n": 1e-200}, "dead")]
 )
 def test_units_that_cannot_be_are_refused(tmp_path, factor, kind):
-    path, table = tmp_path / "hit.mat", columns()
-    write_mat(path, {**table, **{name: table[name] * by for name, by in factor.items()}})
+    path = tmp_path / "hit.mat"
+    write_mat(path, GOOD | {name: GOOD[name] * by for name, by in factor.items()})
     (hit,) = hits_from(read(path))
     assert kind in {fault.kind for fault in screen(hit, (4.0, 60.0)) if fault.refuse}
 

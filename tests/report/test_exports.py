@@ -10,16 +10,15 @@ import pyuff
 from scipy.io import loadmat
 
 from planner.campaign.campaign import Campaign
-from planner.cli.run import run
 from planner.errors import InputError
 from planner.recording.folder import read_poses
 from planner.recording.records import FrfRecord
 from planner.recording.uff import read_uff
 from planner.report.exports import KINDS, export
-from planner.report.predictions import predictions
 from planner.robot.controller_program import PoseToDrive, program
 from planner.robot.robot import Robot
 from tests.support.named_campaign import SCRIPT
+from tests.support.outside import refused, said
 from tests.support.robots import make_arm
 
 HOSTILE = 'x"); popup("\nHALT\n'
@@ -161,19 +160,18 @@ def test_programs_say_what_nobody_checked_and_what_is_simulated(kind, tmp_path):
     assert ("Only the poses" in checked) == (kind != "poses")
 
 
-def test_a_pose_named_by_hand_that_touches_something_is_not_driven_to(named, tmp_path, capsys):
+def test_a_pose_named_by_hand_that_touches_something_is_not_driven_to(named, tmp_path):
     here = named.state.used[0].joints_deg
     floor = (-5.0, -20.0, 137.0, -100.0, 18.0, -125.0)
-    rows = [",".join(["pose", *named.cell.robot.joints.columns])]
-    file = tmp_path / "poses.csv"
-    for name, angles, code in (("free", here, 0), ("low", floor, 2)):
-        rows.append(",".join([name, *map(str, angles)]))
-        file.write_text("\n".join(rows) + "\n")
-        command = ["export", str(named.directory), "krl", "--poses", str(file)]
-        assert run([*command, "--out", str(tmp_path)]) == code
-    said = capsys.readouterr().err
-    assert "poses.csv, row 3: at low" in said
-    assert " touches " in said
+    rows, file = ["pose", *named.cell.robot.joints.columns], tmp_path / "poses.csv"
+    free, low = (",".join([name, *map(str, q)]) for name, q in (("free", here), ("low", floor)))
+    command = "export", named.directory, "krl", "--poses", file, "--out", tmp_path
+    file.write_text("\n".join([",".join(rows), free, ""]))
+    said(*command)
+    file.write_text("\n".join([",".join(rows), free, low, ""]))
+    err = refused(*command)
+    assert "poses.csv, row 3: at low" in err
+    assert " touches " in err
 
 
 @pytest.mark.parametrize(
@@ -189,27 +187,13 @@ def test_a_wrong_controller_table_is_refused(table, words, tmp_path):
         program("krl", Robot.load(toml), "cell", [PoseToDrive("P1", (0.0,) * 6)])
 
 
-def test_open_proposals_are_driven_to(named, tmp_path, capsys):
+def test_open_proposals_are_driven_to(named, tmp_path):
     other = Campaign(named.directory)
     if not other.state.open:
         other.next()
     proposal = other.next()[0]
-    assert run(["export", str(named.directory), "krl", "--out", str(tmp_path)]) == 0
+    said("export", named.directory, "krl", "--out", tmp_path)
     (file,) = tmp_path.glob("*.src")
     assert f"A1 {proposal.joints_deg[0]:.4f}" in file.read_text()
-    assert run(["export", str(named.directory), "docx"]) == 2
-    said = capsys.readouterr().err
-    assert all(kind in said for kind in KINDS)
-
-
-def test_poses_outside_the_workspace_are_marked(named, tmp_path):
-    """Readbacks a little beside the workspace are inside; a turned first joint is not."""
-    inside = np.deg2rad(named.state.used[0].joints_deg)
-    beside, outside = inside.copy(), inside.copy()
-    beside[0] += np.deg2rad(0.02)
-    outside[0] += np.deg2rad(60)
-    q = [inside, beside, outside]
-    report = predictions(named, ["in", "beside", "out"], q, tmp_path / "p.npz")
-    assert [pose.outside for pose in report.poses] == [False, False, True]
-    text = str(report.text().renderables[1])
-    assert text.startswith("out lies outside the workspace of campaign.toml")
+    err = refused("export", named.directory, "docx")
+    assert all(kind in err for kind in KINDS)

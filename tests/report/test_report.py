@@ -8,10 +8,10 @@ from html.parser import HTMLParser
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.cli.run import run
 from planner.report.page import write_report
 from planner.report.text import SIMULATED, with_sd
 from tests.support.named_campaign import DOLLAR, SCRIPT
+from tests.support.outside import refused, said
 
 LARGEST_BYTES = 5_000_000
 ALONE = {"img", "meta", "br"}  # elements without an end
@@ -98,13 +98,8 @@ def test_it_says_what_was_asked_measured_refused_and_how_good_it_is(report):
 def test_a_browser_shows_it_and_prints_it(report, tmp_path):
     file = tmp_path / "report.html"
     file.write_text(report[2])
-    call = [
-        "chromium",
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        f"--user-data-dir={tmp_path}",
-    ]
+    call = ["chromium", "--headless", "--no-sandbox", "--disable-gpu"]
+    call.append(f"--user-data-dir={tmp_path}")
     shown = subprocess.run([*call, "--dump-dom", file.as_uri()], capture_output=True, text=True,
                            check=True, timeout=120).stdout  # fmt: skip
     assert shown.count("<section") == report[2].count("<section")
@@ -116,13 +111,13 @@ def test_a_browser_shows_it_and_prints_it(report, tmp_path):
     assert len(re.findall(rb"/Type\s*/Page\b", pdf.read_bytes())) > 2
 
 
-def test_a_campaign_without_measurements_has_a_report_too(tmp_path, report, capsys):
+def test_a_campaign_without_measurements_has_a_report_too(tmp_path, report):
     source = report[0].directory
     cell = Campaign.new(
         tmp_path / "cell", source / "robot" / "robot.toml", source / "campaign.toml"
     )
-    assert run(["report", str(cell.directory)]) == 0
+    said("report", cell.directory)
     assert "Nothing has been measured yet" in (tmp_path / "cell" / "report.html").read_text()
-    assert run(["report", str(cell.directory), "--out", str(tmp_path)]) == 2
-    assert run(["report", str(cell.directory), "--diagnosis", str(tmp_path / "none")]) == 2
-    assert "diagnose --out" in capsys.readouterr().err
+    refused("report", cell.directory, "--out", tmp_path)
+    none = refused("report", cell.directory, "--diagnosis", tmp_path / "none")
+    assert "diagnose --out" in none

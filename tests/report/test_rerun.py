@@ -245,14 +245,15 @@ def test_what_lies_in_the_cell_lies_in_the_space_of_the_robot(bare):
     assert np.allclose(fence["Boxes3D:centers"][1], [2.0, 2.0, 0.5])
 
 
-def test_collision_shapes_are_drawn_only_where_there_are_no_visual_ones(tmp_path):
-    _, both = record(tmp_path / "both", urdf())
-    assert len([entity for entity in both.shapes if "/visual_geometries/" in entity]) == 7
-    assert not [entity for entity in both.shapes if "collision" in entity or "capsules" in entity]
-    _, collision = record(tmp_path / "collision", NO_VISUALS)
-    drawn = [entity for entity in collision.shapes if entity.startswith("/robot/")]
-    assert {collision.frame(entity) for entity in drawn} == set(LINKS)
-    assert all("/collision_geometries/" in entity for entity in drawn)
+@pytest.mark.parametrize(
+    ("text", "kind"), [(urdf(), "visual_geometries"), (NO_VISUALS, "collision_geometries")]
+)
+def test_collision_shapes_are_drawn_only_where_there_are_no_visual_ones(text, kind, tmp_path):
+    _, frames = record(tmp_path, text)
+    drawn = [entity for entity in frames.shapes if entity.startswith("/robot/")]
+    assert {frames.frame(entity) for entity in drawn} == set(LINKS)
+    assert len(drawn) == 7
+    assert all(f"/{kind}/" in entity for entity in drawn)
 
 
 def test_meshes_are_found_beside_the_urdf_and_capsules_stand_for_missing_ones(tmp_path):

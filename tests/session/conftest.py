@@ -58,12 +58,10 @@ def session():
 
 
 @pytest.fixture
-def cell(tmp_path):
-    """A campaign whose simulation does not learn, which is quick, its truth, a watched folder."""
-    robot, campaign_toml, truth = make_cell(tmp_path, learns=False)
-    campaign = Campaign.new(tmp_path / "cell", robot, campaign_toml)
+def cell(first_pose, tmp_path):
+    """A campaign with a proposal, its robot's truth, and a folder to watch."""
     (tmp_path / "inbox").mkdir()
-    return campaign, truth, tmp_path / "inbox"
+    return Campaign(first_pose.cell), first_pose.truth, tmp_path / "inbox"
 
 
 @pytest.fixture(scope="session")
@@ -89,13 +87,13 @@ def measured(measured_once, tmp_path):
 
 
 @pytest.fixture
-def deliver(cell, tmp_path):
+def deliver(cell, first_pose, tmp_path):
     """Exports the hits of a pose, each file in two writes, the second of which may lack."""
-    truth, inbox = cell[1:]
+    inbox = cell[2]
 
     def delivered(proposal, number=0, torn=False):
         made = tmp_path / f"made{number}"
-        folder = record(truth, made, proposal.pose, proposal.joints_deg, number)
+        folder = first_pose.at(made, proposal.pose, proposal.joints_deg, number)
         for path in sorted((folder / "data").iterdir()):
             data, target = path.read_bytes(), inbox / path.name
             target.write_bytes(data[: len(data) // 3])

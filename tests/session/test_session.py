@@ -9,10 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
 
 from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
+from planner.errors import InputError
 from planner.proof.hits import simulate_hit
 from planner.proof.recordings import write_uff
 from planner.recording.folder import TABLE
@@ -20,8 +20,9 @@ from planner.replay import replay
 from planner.report.rerun.event_logger import EventLogger
 from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
 from planner.session.session_state import RerunQueue
-from tests.support.hit_csv import write_csv
+from tests.support.hit_files import write_hit
 from tests.support.outside import FROZEN, HAMMER, record
+from tests.support.rerun_columns import entities_of
 
 SIX = ("+x", "+x", "+y", "+y", "+z", "+z")
 WANTED = (
@@ -109,6 +110,26 @@ def three(measured, tmp_path):
     return campaign, inbox, stated.pose, true.pose
 
 
+def test_held_hits_are_moved_to_where_they_fit_and_that_is_taken_back(three):
+    campaign, inbox, stated, true = three
+    (report,) = campaign.import_paths((inbox,), stated)
+    assert report.question is not None
+    assert report.question.fits == true
+    assert stated not in campaign.state.open
+    with pytest.raises(InputError, match="No joint angles"):
+        campaign.move(stated, "nowhere")
+    assert stated in campaign.state.held
+    moved = campaign.move(stated, true)
+    assert (moved.question, len(moved.accepted)) == (None, 9)
+    assert not campaign.state.held
+    assert true in campaign.state.measurements
+    for act in (lambda: None, lambda: campaign.withdraw(stated)):
+        act()
+        campaign.undo()
+        assert campaign.state.held[stated].question == report.question
+        assert true not in campaign.state.measurements
+
+
 def test_without_anybody_to_ask_hits_of_another_pose_are_held(three, session):
     campaign, inbox, stated, true = three
     played = session(campaign, inbox, until=f"go to pose {true}")
@@ -137,30 +158,27 @@ def test_the_question_survives_the_session_and_is_answered_by_a_key(three, sessi
     assert (again.state.refused, again.state.held) == ({}, {})
 
 
-def test_a_table_of_recordings_in_the_folder_gives_the_readback(cell, session, tmp_path):
-    campaign, truth, inbox = cell
-    proposal = campaign.next()[0]
-    folder = record(truth, tmp_path / "made", proposal.pose, proposal.joints_deg)
-    shutil.copytree(folder, inbox, dirs_exist_ok=True)
+def test_a_table_of_recordings_in_the_folder_gives_the_readback(
+    cell, first_pose, session, tmp_path
+):
+    campaign, _, inbox = cell
+    shutil.copytree(first_pose.made, inbox, dirs_exist_ok=True)
     rrd = tmp_path / "session.rrd"
     for _ in range(2):  # the second session resumes, and its recording tells it all
         session(campaign, inbox, until="go to pose P002", rrd=rrd)
-    reader = RrdReader(rrd)
-    seen = {str(chunk.entity_path) for chunk in reader.stream(store=reader.recordings()[0])}
-    assert {"/note", "/frf/xx/0/measured", "/cell/measured", "/cell/proposed"} <= seen
-    measured = campaign.state.measurements[proposal.pose].joints_deg
-    assert 0 < np.max(np.abs(np.subtract(measured, proposal.joints_deg))) <= 0.011
+    drawn = {"/note", "/frf/xx/0/measured", "/cell/measured", "/cell/proposed"}
+    assert drawn <= entities_of(rrd)
+    measured = campaign.state.measurements[first_pose.pose].joints_deg
+    assert 0 < np.max(np.abs(np.subtract(measured, first_pose.joints_deg))) <= 0.011
 
 
-def test_files_that_do_not_say_their_axis_wait_for_the_table(cell, session, tmp_path):
+def test_files_that_do_not_say_their_axis_wait_for_the_table(cell, first_pose, session):
     """The table is written while the session runs; nothing is called a bad hit."""
-    campaign, truth, inbox = cell
-    proposal = campaign.next()[0]
-    made = record(truth, tmp_path / "made", proposal.pose, proposal.joints_deg)
-    table = (made / TABLE).read_text().replace("data/", "").replace(".uff", ".csv")
-    for path in sorted((made / "data").iterdir()):
+    campaign, _, inbox = cell
+    table = (first_pose.made / TABLE).read_text().replace("data/", "").replace(".uff", ".csv")
+    for path in first_pose.files:
         (hit,), _ = Source(path, path.name).read()
-        write_csv(inbox / f"{path.stem}.csv", hit, stated=False)
+        write_hit(inbox / f"{path.stem}.csv", hit, stated=False)
 
     def ask(text):
         return "9 of no stated axis" in text and bool((inbox / TABLE).write_text(table))

@@ -1,16 +1,14 @@
 """Streams of hits in a watched folder: judged hit by hit, whatever the format."""
 
-from tests.support.outside import HAMMER, record
+from tests.support.outside import HAMMER
 from tests.support.streams import joined, write_wav
 
 
-def test_streams_wait_for_their_scales_and_are_judged_hit_by_hit(cell, session, tmp_path):
-    campaign, truth, inbox = cell
-    proposal = campaign.next()[0]
-    made = record(truth, tmp_path / "made", proposal.pose, proposal.joints_deg)
+def test_streams_wait_for_their_scales_and_are_judged_hit_by_hit(cell, first_pose, session):
+    campaign, _, inbox = cell
     rate = round(HAMMER.sampling_rate_hz)
     for axis in "xyz":
-        samples = joined(made, f"p{axis}")
+        samples = joined(first_pose.made, f"p{axis}")
         if axis == "x":  # the second hit rebounds
             top = rate + int(samples[0, rate : 4 * rate].argmax())
             samples[0, top + 40 : top + 80] += 0.5 * samples[0, top - 20 : top + 20]

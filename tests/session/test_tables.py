@@ -10,16 +10,15 @@ from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from planner.session.inbox import FolderTable
-from tests.support.hit_csv import write_csv
-from tests.support.outside import call, make_cell, record
+from tests.support.hit_files import write_hit
+from tests.support.outside import call
 
 
 @pytest.fixture
-def posed(cell, tmp_path):
+def posed(cell, first_pose):
     """A campaign with a proposed pose, what was recorded there, and a folder to watch."""
-    campaign, truth, inbox = cell
-    pose = campaign.next()[0]
-    return campaign, pose, record(truth, tmp_path / "made", pose.pose, pose.joints_deg), inbox
+    campaign, _, inbox = cell
+    return campaign, campaign.next()[0], first_pose.made, inbox
 
 
 def without(folder, unwanted):
@@ -29,7 +28,7 @@ def without(folder, unwanted):
     for row in rows:
         path = folder / row["file"]
         (hit,), _ = Source(path, path.name).read()
-        write_csv(path.with_suffix(".csv"), hit, stated=False)
+        write_hit(path.with_suffix(".csv"), hit, stated=False)
         path.unlink()
         row["file"] = row["file"].replace(".uff", ".csv")
     kept = [name for name in rows[0] if not unwanted(name)]
@@ -85,12 +84,11 @@ def test_hits_of_another_pose_by_their_table_are_not_counted_here(posed, session
     assert [m.pose for m in campaign.state.used] == ["X1"]
 
 
-def test_a_left_over_file_of_the_pose_before_is_left_out_alone(posed, session, tmp_path):
+def test_a_left_over_file_of_the_pose_before_is_left_out_alone(posed, first_pose, session):
     campaign, pose, made, inbox = posed
     campaign.import_paths((made,))
     second = campaign.next()[0]
-    truth = make_cell(tmp_path / "again")[2]
-    there = record(truth, inbox / "there", second.pose, second.joints_deg)
+    there = first_pose.at(inbox / "there", second.pose, second.joints_deg)
     (left,) = (there / "data").glob("*z_3.uff")
     shutil.copy(next((made / "data").glob("*z_1.uff")), left)
     said = session(campaign, inbox, until="8 hits in").flat

@@ -15,7 +15,7 @@ from planner.proof.recordings import write_uff
 from planner.recording.points import PointNames
 from planner.session.hit_verdicts import Before, Verdicts
 from planner.session.inbox import Inbox
-from tests.support.hit_csv import write_csv
+from tests.support.hit_files import write_hit
 from tests.support.outside import HAMMER, make_cell
 from tests.support.robots import BAND_HZ
 
@@ -78,15 +78,6 @@ def test_a_hit_along_another_axis_than_said_is_held(bench):
     found = bench.of()
     assert found["z2"].kind == "repeat"
     assert found["z1"].kind == found["z3"].kind == "good"
-
-
-def test_two_that_disagree_are_both_held_where_nothing_tells(bench):
-    bench.hit("z1", "+z")
-    bench.hit("z2", "-z", said="+z")
-    found = bench.of()
-    assert kinds(found) == {"z1": "unsure", "z2": "unsure"}
-    assert "hit 2 (z2.uff)" in found["z1"].text
-    assert "hit 1 (z1.uff)" in found["z2"].text
 
 
 def test_the_first_hit_along_an_axis_may_be_one_of_another(bench):
@@ -188,7 +179,7 @@ def test_a_hit_sampled_at_another_rate_alone_is_not_taken(bench):
 def at_rate(path: Path, name: str, rate_hz: float) -> Path:
     """The same hit as a file of another sampling rate."""
     (hit,), _ = Source(path, path.name).read()
-    return write_csv(path.with_name(f"{name}.csv"), hit, rate_hz)
+    return write_hit(path.with_name(f"{name}.csv"), hit, rate_hz)
 
 
 def test_a_foreign_file_of_long_ago_is_not_said_to_be_written(tmp_path):

@@ -14,7 +14,8 @@ import pytest
 from planner.progress import no_progress
 from planner.studies import registry
 from planner.studies.report import StudyAnswer
-from planner.studies.run import run_all, run_study
+from planner.studies.run import run_all
+from tests.support.outside import told
 
 QUICK = "seyedhosseini2025"  # the others take long even if small, and go the same way
 # Claims that must hold, be it in kind: of the small version too; in full.
@@ -45,9 +46,13 @@ def assert_holds(answer: StudyAnswer, parts: tuple[str, ...]) -> None:
     "name", [pytest.param(n, marks=() if n == QUICK else pytest.mark.slow) for n in registry.NAMES]
 )
 def test_a_small_study_runs_from_hits_to_claims(name, tmp_path):
-    answer = run_study(name, tmp_path, True, no_progress)
-    assert answer.small
+    told_json = told("study", name, "--small", "--out", tmp_path)
+    answer = StudyAnswer.from_json(told_json)
+    assert answer.to_json() == told_json
+    assert (answer.study, answer.small) == (name, True)
     assert answer.data.startswith("SIMULATED")
+    assert all(Path(f).is_absolute() and Path(f).stat().st_size > 0 for f in answer.files)
+    assert any(f.endswith(".png") for f in answer.files)
     page = (tmp_path / f"{name}.html").read_text()
     assert registry.load(name).PAPER.citation.replace("&", "&amp;") in page
     assert page.count("data:image/png;base64,") >= 2
@@ -65,14 +70,14 @@ def test_a_small_study_runs_from_hits_to_claims(name, tmp_path):
 def answers(tmp_path_factory):
     """All studies' answers by name, printed; STUDY_SMALL: of the versions cut down."""
     folder = Path(os.environ.get("STUDY_FOLDER") or tmp_path_factory.mktemp("studies"))
-    told = run_all(folder, bool(os.environ.get("STUDY_SMALL")), no_progress)
-    for answer in told.studies:
+    every = run_all(folder, bool(os.environ.get("STUDY_SMALL")), no_progress)
+    for answer in every.studies:
         for table in (*answer.tables, answer.claims):
             print(f"\n{table.title}\n" + " | ".join(table.columns))
             for row in table.rows:
                 print(" | ".join(c if isinstance(c, str) else f"{c:.3f}" for c in row))
-    assert all(Path(file).stat().st_size > 0 for file in told.files)
-    return {answer.study: answer for answer in told.studies}
+    assert all(Path(file).stat().st_size > 0 for file in every.files)
+    return {answer.study: answer for answer in every.studies}
 
 
 def busch2022(tables, numbers):

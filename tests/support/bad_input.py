@@ -1,16 +1,8 @@
 """Ways to get tables and recordings wrong, by name."""
 
-from pathlib import Path
-from typing import Any
-
-import h5py
 import numpy as np
-import scipy.io
 
-from planner.proof.hits import SimulatedHit
-from tests.support.outside import HAMMER
-
-CUTS = tuple(np.random.default_rng(7).uniform(size=10))  # where a file ends, of its length
+CUTS = tuple(np.random.default_rng(7).uniform(size=5))  # where a file ends, of its length
 
 
 def edited(lines: list[str], row: int, column: int, cell: str) -> list[str]:
@@ -91,17 +83,6 @@ def hit_file_mutations(good: bytes) -> dict[str, bytes]:
     return found
 
 
-def columns(hit: SimulatedHit) -> dict[str, np.ndarray]:
-    """A hit as named columns."""
-    n = hit.force_n.size
-    names = [f"acceleration_{a}_m_s2" for a in "xyz"]
-    return {
-        "time_s": np.arange(n) / HAMMER.sampling_rate_hz,
-        "force_n": hit.force_n,
-        **dict(zip(names, hit.acceleration_m_s2, strict=True)),
-    }
-
-
 def bad_columns(good: dict[str, np.ndarray]) -> dict[str, dict[str, np.ndarray]]:
     """Mutations of a hit's named columns (n,)."""
     uneven = good["time_s"].copy()
@@ -128,36 +109,3 @@ def bad_columns(good: dict[str, np.ndarray]) -> dict[str, dict[str, np.ndarray]]
             ("force_parsec" if k == "force_n" else k): v for k, v in good.items()
         },
     }
-
-
-def write_csv(path: Path, table: dict[str, np.ndarray], hit: str = "+x") -> None:
-    rows = [",".join(repr(float(v)) for v in row) for row in zip(*table.values(), strict=True)]
-    path.write_text("\n".join([f"hit = {hit}", ",".join(table), *rows]) + "\n")
-
-
-def write_mat(path: Path, table: dict[str, np.ndarray], hit: str = "+x", **more: Any) -> None:
-    scipy.io.savemat(path, {**table, "hit": hit, **more})
-
-
-def write_h5(path: Path, table: dict[str, np.ndarray], hit: str = "+x", **more: Any) -> None:
-    with h5py.File(path, "w") as file:
-        file.attrs.update({"hit": hit, **more})
-        for name, values in table.items():
-            file[name] = values
-
-
-def write_tdms(path: Path, table: dict[str, np.ndarray], hit: str = "+x", **more: Any) -> None:
-    """With properties of channels as LabVIEW has them; `force_…` are the force's alone."""
-    from nptdms import ChannelObject, RootObject, TdmsWriter
-
-    own = {k.removeprefix("force_"): v for k, v in more.items() if k.startswith("force_")}
-    common = {k: v for k, v in more.items() if not k.startswith("force_")}
-    made = [
-        ChannelObject("hit", name, values, {**common, **(own if name == "force_n" else {})})
-        for name, values in table.items()
-    ]
-    with TdmsWriter(str(path)) as writer:
-        writer.write_segment([RootObject({"hit": hit}), *made])
-
-
-WRITERS = {".csv": write_csv, ".mat": write_mat, ".h5": write_h5, ".tdms": write_tdms}

@@ -25,7 +25,7 @@ from planner.proof.load import load_truth
 from planner.proof.recordings import write_uff
 from planner.replay import replay
 from planner.session.watch import watch
-from tests.support.hit_csv import write_csv
+from tests.support.hit_files import write_hit
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=320.0, oversampling=4)
@@ -87,7 +87,7 @@ class Engineer:
         if kind == "unstated":
             (read,), _ = Source(path, path.name).read()
             path.unlink()
-            path = write_csv(path.with_suffix(".csv"), read, stated=False)
+            path = write_hit(path.with_suffix(".csv"), read, stated=False)
         self.at[sha256(path)] = joints_deg
         return path
 

@@ -15,6 +15,7 @@ from planner.effects.table import EffectLibrary
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
+from planner.frf import metrics
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.proof.cases import SCATTER
@@ -77,6 +78,14 @@ class Case:
         tolerances = Tolerances.of(simulation.robot.config, simulation.robot.joints.slides)
         prior = RobotPrior(EffectLibrary.of(simulation, CAD_INERTIAS))
         return RobotPosterior.of(Search(prior, self.frfs, self.q, self.band_hz, tolerances).found())
+
+
+def one_thing(name: str, kind: str, seed: int, folder: Path) -> Case:
+    """One of `faulty_robots.KINDS`, large."""
+    rng, arm = drawn_arm(name, seed, folder)
+    injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
+    injected = added(injected, kind, 1.0, arm, rng)
+    return _measured(arm, injected, (kind,), EVERYDAY, rng)
 
 
 def everyday(name: str, seed: int, folder: Path) -> Case:
@@ -179,6 +188,11 @@ def limits(arm: Arm, simulation: Simulation) -> tuple[np.ndarray, np.ndarray]:
     return low, high
 
 
+def frac_of(true: np.ndarray, predicted: np.ndarray) -> float:
+    """Global FRAC of the direct FRFs."""
+    return metrics.direct_mean(metrics.agreement(true, predicted).global_frac)
+
+
 @dataclass(frozen=True)
 class Judged:
     """Of a posterior at unseen poses: frequencies' RMSE in %, the FRFs' FRAC, common scale,
@@ -201,8 +215,6 @@ class Judged:
     @classmethod
     def of(cls, case: Case, found: RobotPosterior) -> "Judged":
         """Scale is the least squares factor from the truth, the mean over poses."""
-        from tests.support.frf_campaigns import frac_of
-
         mean, sd = found.predicted(case.unseen, case.lines_hz)
         true = case.true_frf
         pairs = list(zip(true, mean, strict=True))

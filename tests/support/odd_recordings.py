@@ -12,9 +12,7 @@ import h5py
 import numpy as np
 import scipy.io
 
-from tests.support.bad_input import write_h5, write_mat, write_tdms
-
-Columns = dict[str, np.ndarray]
+from tests.support.hit_files import Columns, write_h5, write_mat, write_tdms
 
 
 def _without_time(columns: Columns) -> Columns:

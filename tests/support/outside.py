@@ -4,8 +4,10 @@ import contextlib
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.model import Truth
 from planner.proof.recordings import record_poses
+from planner.recording.folder import TABLE
 from tests.support.robots import campaign_text, make_arm
 
 PLANNER = (sys.executable, "-c", "from planner.cli import main; main()")
@@ -55,10 +58,28 @@ def told(*arguments: object) -> dict:
     return json.loads(said(*arguments, "--json"))
 
 
+def refused(*arguments: object, code: int = 2) -> str:
+    """The one sentence with which a command refuses its input, in this process."""
+    found, out, err = call(*arguments)
+    assert (found, out, len(err.strip().splitlines())) == (code, "", 1), err
+    return err
+
+
 def modes(*arguments: object) -> tuple[int, Any, str]:
     """Exit code, JSON answer (None where there is none) and stderr of `planner modes`."""
     code, out, err = call("modes", *arguments, "--json")
     return code, json.loads(out) if out else None, err
+
+
+def part_of(folder: Path, target: Path, poses: Collection[str]) -> Path:
+    """A copy of a recordings folder with some of the poses."""
+    header, *lines = (folder / TABLE).read_text().splitlines()
+    kept = [line for line in lines if line.split(",")[0] in poses]
+    for name in (line.split(",")[-1] for line in kept):
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(folder / name, target / name)
+    (target / TABLE).write_text("\n".join([header, *kept]) + "\n")
+    return target
 
 
 FROZEN = '[fidelity]\nsimulation = "frozen"\n'

@@ -7,6 +7,12 @@ import numpy as np
 from rerun.chunk import RrdReader
 
 
+def entities_of(rrd: Path | str) -> set[str]:
+    """Entities that draw something."""
+    reader = RrdReader(rrd)
+    return {str(chunk.entity_path) for chunk in reader.stream(store=reader.recordings()[0])}
+
+
 def columns_of(rrd: Path) -> dict[tuple[str, str], list[Any]]:
     """All values of a recording by entity and component."""
     reader, found = RrdReader(rrd), {}

@@ -11,12 +11,12 @@ from scipy import signal
 from planner.proof.recordings import uff_channel, write_sets
 from planner.recording.hits import hits_from
 from planner.recording.read import read
-from tests.support import bad_input
+from tests.support import hit_files
+from tests.support.hit_files import NAMES
 
 RATE_HZ, FINER = 1024, 8
 MODES = (12.0, 0.03), (23.0, 0.025), (41.0, 0.02)  # Hz, damping ratio
 SHAPES = np.array([[0.94, 0.31, 0.16], [0.27, 0.89, 0.36], [0.17, -0.34, 0.93]])
-NAMES = ("force_n", *(f"acceleration_{axis}_m_s2" for axis in "xyz"))
 CLEAN = ((1.0, 700.0), (5.0, 900.0), (9.2, 600.0)), 13.0  # hits (s, N), length (s)
 # The third rebounds, the fourth is soft, the last is cut off.
 MIXED = (
@@ -60,37 +60,16 @@ def joined(folder: Path, axis: str) -> np.ndarray:
     return np.hstack(parts)
 
 
-def _table(samples: np.ndarray) -> dict[str, np.ndarray]:
-    return dict(zip(NAMES, samples, strict=True))
-
-
-def write_csv(path: Path, samples: np.ndarray, axis: str) -> None:
+def columns(samples: np.ndarray) -> dict[str, np.ndarray]:
     time_s = np.arange(samples.shape[1]) / RATE_HZ
-    bad_input.write_csv(path, {"time_s": time_s, **_table(samples)}, axis)
-
-
-def write_mat(path: Path, samples: np.ndarray, axis: str) -> None:
-    bad_input.write_mat(path, _table(samples), axis, sampling_rate_hz=float(RATE_HZ))
-
-
-def write_h5(path: Path, samples: np.ndarray, axis: str) -> None:
-    bad_input.write_h5(path, _table(samples), axis, sampling_rate_hz=float(RATE_HZ))
-
-
-def write_tdms(path: Path, samples: np.ndarray, axis: str) -> None:
-    bad_input.write_tdms(path, _table(samples), axis, wf_increment=1 / RATE_HZ)
+    return {"time_s": time_s, **dict(zip(NAMES, samples, strict=True))}
 
 
 def write_uff(path: Path, samples: np.ndarray, axis: str) -> None:
     along = ("xyz".index(axis[1]) + 1) * (-1 if axis[0] == "-" else 1)
-    felt = zip((along, 1, 2, 3), samples, strict=True)
-    write_sets(
-        path,
-        [
-            uff_channel(values, RATE_HZ, (1, direction), (1, along), force=number == 0)
-            for number, (direction, values) in enumerate(felt)
-        ],
-    )
+    kinds = zip(samples, (along, 1, 2, 3), (True, *3 * (False,)), strict=True)
+    write_sets(path, (uff_channel(values, RATE_HZ, (1, direction), (1, along), force)
+                      for values, direction, force in kinds))  # fmt: skip
 
 
 def write_wav(
@@ -122,7 +101,7 @@ def write_scales(path: Path, axis: str) -> None:
             file.write(f"{path.name},{number},{name},{unit},{scale},{axis}\n")
 
 
-WRITERS: dict[str, Callable[[Path, np.ndarray, str], None]] = {
-    ".csv": write_csv, ".mat": write_mat, ".h5": write_h5, ".tdms": write_tdms,
-    ".uff": write_uff, ".wav": write_wav,
-}  # fmt: skip
+WRITERS: dict[str, Callable[[Path, np.ndarray, str], object]] = {
+    suffix: lambda path, samples, axis, write=write: write(path, columns(samples), axis)
+    for suffix, write in hit_files.WRITERS.items()
+} | {".uff": write_uff, ".wav": write_wav}

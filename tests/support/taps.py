@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.proof.recordings import uff_channel, write_sets
+from tests.support.hit_files import write_table
 from tests.support.structures import Structure
 
 RATE_HZ, SAMPLES, LONG = 1024.0, 1024, 16
@@ -66,10 +67,7 @@ def write_uff(path: Path, taps: list[Tap], turned: bool = False) -> Path:
 def write_csv(path: Path, one: Tap, columns: str, *attributes: str) -> Path:
     """Named columns, {} where the node goes, below lines of attributes ("hit: +z")."""
     nodes = [f"n{one.structure.nodes[k]}" for k in one.felt]
-    head = [f"# {text}" for text in attributes]
     names = ["time_s", "force_n", *(columns.format(node) for node in nodes)]
-    t = np.arange(one.force_n.size) / RATE_HZ
-    table = np.column_stack([t, one.force_n, one.acceleration_m_s2.T])
-    text = "\n".join([*head, ",".join(names)])
-    np.savetxt(path, table, delimiter=",", header=text, comments="", fmt="%.9g")
-    return path
+    rows = [np.arange(one.force_n.size) / RATE_HZ, one.force_n, *one.acceleration_m_s2]
+    head = (f"# {text}" for text in attributes)
+    return write_table(path, dict(zip(names, rows, strict=True)), *head)
