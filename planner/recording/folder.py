@@ -51,15 +51,15 @@ def read_recordings(
 ) -> tuple[PoseRow, ...]:
     """Rows of a recordings folder's table, in recording order; the robot's `joints` and `points`.
 
-    A `bare` table may have no column of joints at all, where poses alone tell how the robot stood:
-    its rows then hold none.
+    A `bare` table may have no column of joints at all, under whatever name, where poses alone tell
+    how the robot stood: its rows then hold none.
     Raises InputError naming file, row and remedy.
     """
     points = points or PointNames()
     path = folder / TABLE
     header, lines = _rows(path)
     units = JointUnits.of(joints)
-    told = not bare or any(name.endswith((ANGLE, SLIDE)) for name in header)
+    told = not bare or (units.names and any(map(ANGLE_LIKE.search, header)))
     columns = _joint_columns(path, header, units) if told else ()
     for name in ("pose", "hit", "file"):
         if name not in header:

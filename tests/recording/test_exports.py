@@ -1,5 +1,6 @@
 """Files as analysers, spreadsheets and machinists write them: read as meant, or refused."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -295,3 +296,12 @@ def test_rows_of_one_file_with_several_hits(tmp_path):
     table.write_text(f"{head}P1,5,+x,all.uff\nP2,6,+y,all.uff\n")
     with pytest.raises(InputError, match="listed in row 2 already"):
         read_recordings(tmp_path, ["joint_1"])
+
+
+@pytest.mark.parametrize("column", ["joint_1_rad", "J1", "joint 1 [°]", "A1"])
+def test_joints_under_another_name_are_never_passed_over(tmp_path, column):
+    """Of a proposed pose, too, whose joints would be known without the table."""
+    (tmp_path / "a.uff").write_bytes(b"")
+    (tmp_path / "recordings.csv").write_text(f"pose,{column},hit,file\nP1,0.5,+x,a.uff\n")
+    with pytest.raises(InputError, match=f"joint_1_deg.*has.*{re.escape(column)}"):
+        read_recordings(tmp_path, ["joint_1"], bare=True)
