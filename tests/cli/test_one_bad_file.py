@@ -143,7 +143,7 @@ def test_a_full_disk_is_said_in_a_sentence_and_loses_nothing(cell, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(journal.os, "fsync", full)
-        code, out, err = call("next", cell)
+        code, out, err = call("next", cell, "--count", 2)
     assert (code, out) == (2, "")
     assert "No space left" in err
     assert "inside" not in err
