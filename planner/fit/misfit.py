@@ -2,9 +2,8 @@
 
 Two residuals: logarithms of ratios lead home from afar, plain ones in units of what is not
 explained end there. That is noise, and a discrepancy proportional to |H| that neighbouring lines
-share (`ρ`). Hits, readback and the scatter of springs and dampers from visit to visit are
-eliminated pose by pose (Woodbury), linearised about where they were last; the chain is common to
-all poses.
+share (`ρ`). Hits, readback and what springs and dampers scatter from visit to visit go pose by pose
+(Woodbury), linearised about where they were last; the chain is common to all poses.
 """
 
 from collections.abc import Sequence
@@ -146,8 +145,8 @@ class FrfMisfit:
         out: np.ndarray | None = None,
         added: Sequence[Impedance | None] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives (n, D − chain, r, c, F) by x, and (n, 2e, r, c, F) by what e springs and
-        their dampers scatter from visit to visit, in sds.
+        """Derivatives (n, D − chain, r, c, F) by x, and (n, 2e, r, c, F) by sds of what e springs
+        scatter from visit to visit, their dampers with them, and dampers by themselves.
 
         The former into `out`, where it is given; `added` are the impedances at x, if they are
         known.
@@ -176,7 +175,6 @@ class FrfMisfit:
             at += count
         t, stiffer, damped = self.tolerances, by_block[:, :e], by_block[:, e:]
         visits = np.empty((n, 2 * e, *shape), dtype=complex)
-        # Dampers scatter with their springs, and far more by themselves.
         np.multiply(stiffer + damped[:, :e], t.visit_stiffness, out=visits[:, :e])
         np.multiply(damped.reshape(n, -1, e, *shape).sum(1), t.visit_damping, out=visits[:, e:])
         return out, visits
@@ -241,8 +239,8 @@ class FrfMisfit:
     def zero_nuisances(self) -> np.ndarray:
         """(n, l): own numbers, all 0."""
         numbers, joints = self.nuisance_counts
-        scatter = 2 * len(self.structure.springs)
-        return np.zeros((len(self.data.q), numbers.hits + joints + scatter))
+        springs = len(self.structure.springs)
+        return np.zeros((len(self.data.q), numbers.hits + joints + 2 * springs))
 
     def about(self, own: np.ndarray, x: np.ndarray) -> np.ndarray:
         """(n, hits + chain + joints), from own numbers and the chain as x has it."""
