@@ -145,8 +145,7 @@ def chain_faults(
     """What the tool's chain may show instead at q (dof,) in rad."""
     if frf.layout.sensors != TOOL.sensors:
         return
-    within = expected.posterior.tolerances if sure else None
-    for fault in possible(expected.shown(q, frf), within):
+    for fault in possible(expected.shown(q, frf), expected.posterior.tolerances, sure):
         yield Alternative(q, fault.asked, about="chain", fault=fault)
     for kind in FILTERS if sure else ():
 

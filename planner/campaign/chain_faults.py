@@ -17,7 +17,7 @@ LEAST, MOST, STEP = np.log(1.5), np.log(3e6), 0.12
 SCALE_SD = np.log(30.0)  # of the logarithm of a wrong factor
 UNITS = {4.448: "lbf or N", 9.81: "g or m/s²", 39.37: "in/s² or m/s²", 1000.0: "mm or m"}
 AS_UNIT = 0.2  # of the logarithm: as near a factor is told
-BEYOND = 3.0  # sds of gains, from which a factor is none that a sound chain has
+BEYOND = 3.0  # sds, from which a factor or a turn is none that a sound chain has
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,21 +166,22 @@ def _times(channels: tuple[int, ...], factor: float) -> ChainFault:
     return ChainFault(np.diag(diagonal), channels, factor)
 
 
-def possible(shown: np.ndarray, within: Tolerances | None) -> Iterator[ChainFault]:
+def possible(shown: np.ndarray, within: Tolerances, sure: bool) -> Iterator[ChainFault]:
     """All that may be wrong, where hits show `shown` (3, 3) times what is expected of them.
 
-    `within` are the tolerances of a sound chain, None: springs and inertias that few poses leave
-    open may well bring a small factor, too.
+    `within` are the tolerances of a sound chain. Unless `sure`, springs and inertias that few poses
+    leave open may well bring a small factor, too.
     """
     yield from (*TURNED, *AGAINST, *EXCHANGED)
-    least = LEAST if within is None else BEYOND * np.hypot(within.gain, within.force_gain)
+    least = BEYOND * np.hypot(within.gain, within.force_gain) if sure else LEAST
     for channels in ((0, 1, 2), (0,), (1,), (2,)):
         factor = float(np.median(np.diag(shown)[list(channels)]))
         if factor > 0 and abs(np.log(factor)) > least:
             yield _times(channels, factor)
     left, _, right = np.linalg.svd(shown)
     rotation = left @ right
-    if np.linalg.det(rotation) > 0:
+    turn = np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1))
+    if np.linalg.det(rotation) > 0 and turn > BEYOND * within.across:
         yield ChainFault(rotation)
 
 
