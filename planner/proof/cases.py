@@ -47,9 +47,10 @@ TWICE = 0.5  # how often the first pose is hit again at the end
 
 @dataclass(frozen=True)
 class ConcealedCase:
-    """A case; `imperfections` are places that a diagnosis may name, too small to be asked for.
+    """A case; `imperfections` are effects at places that a diagnosis may name.
 
-    `questions` answer what tells of each effect; they are asked once recordings are written.
+    `questions` answer what tells of each effect, and of each imperfection; they are asked once
+    recordings are written.
     `held_out`: names of poses, frequencies (F,) in Hz and true FRFs (real and imaginary parts;
     pose, response, hit, F).
     """
@@ -57,7 +58,9 @@ class ConcealedCase:
     robot: str
     concealed: Sequence[DrawnEffect]
     questions: Sequence[Callable[[], DetectionProblem]] = ()
-    imperfections: Sequence[tuple[str, str]] = ()
+    imperfections: Mapping[tuple[str, str], Callable[[], DetectionProblem]] = field(
+        default_factory=dict
+    )
     held_out: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -79,15 +82,26 @@ def make_case(
     found = concealed(kind, scene, load)
     injected = found[-1].injected if found else plain
     recorded = _recorded(folder / "recordings", scene, injected, load, hammer, errors, own)
-    before = [plain, *(drawn.injected for drawn in found)]
-    asked = [
-        partial(
-            detection_problem, recorded, without_effect(recorded.measured, without, drawn.injected)
+    steps = zip([plain, *(drawn.injected for drawn in found)], found, strict=False)
+    asked = [_question(recorded, [(before, drawn.injected)]) for before, drawn in steps]
+    also = {
+        one.place: _question(
+            recorded, [(o.before, o.after) for o in imperfections if o.place == one.place]
         )
-        for without, drawn in zip(before, found, strict=False)
-    ]
+        for one in imperfections
+    }
     name = scene.arm.name if robot == RANDOM else robot
-    return ConcealedCase(name, found, asked, imperfections, _held_out(injected, recorded))
+    return ConcealedCase(name, found, asked, also, _held_out(injected, recorded))
+
+
+def _question(
+    recorded: ScoredCase, steps: Sequence[tuple[InjectedFaults, InjectedFaults]]
+) -> Callable[[], DetectionProblem]:
+    """What tells of all that each of some steps, before and after, put in."""
+    without = recorded.measured
+    for before, after in steps:
+        without = without_effect(without, before, after)
+    return partial(detection_problem, recorded, without)
 
 
 def _robot(

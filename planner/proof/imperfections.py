@@ -1,8 +1,16 @@
 """Small unlisted imperfections: no robot is quite what its simulation has, with nothing wrong."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from planner.proof.deviation import AttachedResonator, BentLink, Compensator, StiffnessRipple
+from planner.proof.deviation import (
+    AttachedResonator,
+    BentLink,
+    Compensator,
+    Spring,
+    StiffnessRipple,
+)
 from planner.proof.fault_injection import InjectedFaults, JointDrift
 from planner.proof.laws import AmplitudeSoftening, Friction, Iwan, JointLaw
 from planner.proof.nonlinear import Port
@@ -21,57 +29,87 @@ BEAM = 30.0, 100.0  # stiffness of a link as a beam over that of its joint
 COMPENSATOR = 0.005, 0.03  # of joint 2's stiffness
 
 
-def imperfect(scene: Scene) -> tuple[InjectedFaults, tuple[tuple[str, str], ...]]:
+@dataclass(frozen=True, eq=False)
+class Imperfection:
+    """What a diagnosis may call `effect`, `at` a place; the robot without it and with it."""
+
+    effect: str
+    at: str
+    before: InjectedFaults
+    after: InjectedFaults
+
+    @property
+    def place(self) -> tuple[str, str]:
+        """What it is, and where."""
+        return self.effect, self.at
+
+
+def imperfect(scene: Scene) -> tuple[InjectedFaults, tuple[Imperfection, ...]]:
     """Each joint a little nonlinear, rippled, drifting and soft across; links, hoses, a gas spring.
 
-    Damping is partly viscous, partly a loss factor, by a share of each gear's own. With it the
-    names (effect, place) by which a diagnosis could rightly call them.
+    Damping is partly viscous, partly a loss factor, by a share of each gear's own.
     """
-    rng = scene.rng
+    rng, found = scene.rng, []
+
+    def with_it(changed: Scene, *effects: str, at: str) -> Scene:
+        found.extend(Imperfection(e, at, scene.injected, changed.injected) for e in effects)
+        return changed
+
     common = scene.log_uniform(*SOFT) if rng.random() < SOFT_SHARE else 1.0
-    scene = scene.deviating(common=common, mixed=1.0)
-    places = [("structural_damping", "joints"), ("drift", "campaign")]
+    softer = scene.deviating(common=common)
+    for joint in scene.joints if abs(np.log(common)) > np.log(1.2) else ():
+        with_it(softer, "joint_stiffness", at=joint)
+    scene = softer
+    scene = with_it(scene.deviating(mixed=1.0), "structural_damping", at="joints")
     for joint in scene.joints:
-        scene, effects = _joint(scene, joint)
-        places += [(effect, joint) for effect in effects]
-        if abs(np.log(common)) > np.log(1.2):
-            places.append(("joint_stiffness", joint))
+        effect, port = _law(scene, joint)
+        scene = with_it(scene.changed(ports=(*scene.injected.ports, port)), effect, at=joint)
+        wave = _ripple(scene, joint)
+        scene = with_it(scene.adding(harmonics=(wave,)), "angle_dependent_stiffness", at=joint)
+        if scene.per_joint == 1:
+            bearings = scene.adding(extra=_bearings(scene, joint))
+            scene = with_it(bearings, "transverse_compliance", at=joint)
     drifts = tuple((j, DRIFT_SD * float(rng.standard_normal()), "warming") for j in scene.joints)
-    scene = scene.changed(drift=JointDrift(drifts))
+    scene = with_it(scene.changed(drift=JointDrift(drifts)), "drift", at="campaign")
     for _ in range(HOSES + int(rng.integers(HOSES + 1))):
         hose = _hose(scene)
-        scene = scene.adding(resonators=(hose,))
-        places.append(("local_resonator", hose.link))
-    number = int(rng.choice([n for n in (2, 3) if np.linalg.norm(scene.length(n)) > 0]))
-    stiff = scene.stiffness(f"joint_{number}")
-    bending = scene.log_uniform(*BEAM) * stiff, scene.log_uniform(*BEAM) * stiff
-    twist = scene.log_uniform(*BEAM) * stiff
-    beam = BentLink(f"link_{number}", bending, twist, scene.arm.damping_s)
-    scene = scene.adding(beams=(beam,), compensators=(gas_spring(scene, COMPENSATOR),))
-    places += [("link_flexibility", beam.link), ("angle_dependent_stiffness", "joint_2")]
-    return scene.injected, tuple(dict.fromkeys(places))
+        scene = with_it(scene.adding(resonators=(hose,)), "local_resonator", at=hose.link)
+    beam = _beam(scene)
+    scene = with_it(scene.adding(beams=(beam,)), "link_flexibility", at=beam.link)
+    spring = gas_spring(scene, COMPENSATOR)
+    scene = with_it(scene.adding(compensators=(spring,)), "angle_dependent_stiffness", at="joint_2")
+    return scene.injected, tuple(found)
 
 
-def _joint(scene: Scene, joint: str) -> tuple[Scene, list[str]]:
-    own, angle, rng = scene.stiffness(joint), scene.angle(joint), scene.rng
+def _law(scene: Scene, joint: str) -> tuple[str, Port]:
+    own, angle = scene.stiffness(joint), scene.angle(joint)
     share = scene.log_uniform(*LAWS) * own
     laws: list[tuple[str, JointLaw]] = [
-        ("nonlinear_stiffness", AmplitudeSoftening(share * rng.choice([-1, 1]), 0.3 * angle)),
+        ("nonlinear_stiffness", AmplitudeSoftening(share * scene.rng.choice([-1, 1]), 0.3 * angle)),
         ("friction", Iwan(share, 0.3 * share * angle)),
         ("friction", Friction(share, 0.3 * share * angle)),
     ]
-    effect, law = laws[int(rng.integers(len(laws)))]
-    scene = scene.changed(ports=(*scene.injected.ports, Port(law, joint=joint)))
-    cosine, sine = RIPPLE * rng.standard_normal(2)
-    wave = StiffnessRipple(joint, int(rng.integers(1, 3)), float(cosine), float(sine))
-    scene = scene.adding(harmonics=(wave,))
-    effects = [effect, "angle_dependent_stiffness"]
-    if scene.per_joint == 1:
-        axes = across(scene.axis(joint))
-        springs = [scene.spring(joint, a, own * scene.log_uniform(*BEARINGS)) for a in axes]
-        scene = scene.adding(extra=springs)
-        effects.append("transverse_compliance")
-    return scene, effects
+    effect, law = laws[int(scene.rng.integers(len(laws)))]
+    return effect, Port(law, joint=joint)
+
+
+def _ripple(scene: Scene, joint: str) -> StiffnessRipple:
+    cosine, sine = RIPPLE * scene.rng.standard_normal(2)
+    return StiffnessRipple(joint, int(scene.rng.integers(1, 3)), float(cosine), float(sine))
+
+
+def _bearings(scene: Scene, joint: str) -> list[Spring]:
+    own, axes = scene.stiffness(joint), across(scene.axis(joint))
+    return [scene.spring(joint, a, own * scene.log_uniform(*BEARINGS)) for a in axes]
+
+
+def _beam(scene: Scene) -> BentLink:
+    usable = [n for n in (2, 3) if np.linalg.norm(scene.length(n)) > 0]
+    number = int(scene.rng.choice(usable))
+    stiff = scene.stiffness(f"joint_{number}")
+    bending = scene.log_uniform(*BEAM) * stiff, scene.log_uniform(*BEAM) * stiff
+    twist = scene.log_uniform(*BEAM) * stiff
+    return BentLink(f"link_{number}", bending, twist, scene.arm.damping_s)
 
 
 def _hose(scene: Scene) -> AttachedResonator:

@@ -3,7 +3,8 @@
     python -m planner.proof.make FOLDER --cases 12 --seed 7 --number 3
 
 writes FOLDER/{robot,recordings} of the third of twelve cases, and prints its answer. Nothing in the
-folder tells what was concealed.
+folder tells what was concealed. With `--named local_resonator@link_3` it prints instead how much
+of |H| that imperfection changes.
 """
 
 import argparse
@@ -54,21 +55,32 @@ def answer(kind: str, engine: str, made: ConcealedCase) -> str:
         "engine": engine,
         "robot": made.robot,
         "effects": effects,
-        "imperfections": [{"effect": e, "at": at} for e, at in made.imperfections],
+        "imperfections": [{"effect": effect, "at": at} for effect, at in made.imperfections],
         "held_out": made.held_out,
         "salt": secrets.token_hex(16),
     }
     return json.dumps(whole, indent=1)
 
 
-def make_one(kind: str, engine: str, seed: int, folder: Path, laboratory: bool = False) -> str:
-    """Write a case of an engine of ENGINES, known robots in turn; its answer."""
+def sizes(made: ConcealedCase, named: Sequence[str]) -> str:
+    """Sizes of imperfections that a diagnosis named as effect@place, by name: JSON."""
+    places = {name: tuple(name.split("@")) for name in named}
+    asked = {
+        name: made.imperfections[at] for name, at in places.items() if at in made.imperfections
+    }
+    return json.dumps({name: detectability(question()).size for name, question in asked.items()})
+
+
+def make_one(
+    kind: str, engine: str, seed: int, folder: Path, laboratory: bool = False
+) -> ConcealedCase:
+    """Write a case of an engine of ENGINES, known robots in turn."""
     drawn = engine == "tree"
     handling = LABORATORY if laboratory else ROUGH if drawn else EVERYDAY
     for tried in range(seed, seed + SCENES * ANOTHER, ANOTHER):
         robot = RANDOM if drawn else sorted(ARMS)[tried % len(ARMS)]
         try:
-            return answer(kind, engine, make_case(kind, robot, tried, folder, handling))
+            return make_case(kind, robot, tried, folder, handling)
         except NothingDetectableError:
             continue
     raise SystemExit(f"No {kind} of seed {seed} shows in the noise; take another seed.")
@@ -82,12 +94,15 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--number", type=int, default=1, help="of the case, from 1 on")
     parser.add_argument("--laboratory", action="store_true", help="no hit and no sensor errs")
+    parser.add_argument("--named", nargs="*", help="imperfections of which to tell the size")
     options = parser.parse_args()
     place, own = (options.number - 1) % len(ENGINES), (options.number - 1) // len(ENGINES)
     count = len(range(place, options.cases, len(ENGINES)))
     kind = deck(count, SINGLES, OUT_OF_LIBRARY_KINDS, options.seed)[own]
-    seed = 100_000 * options.seed + own
-    print(make_one(kind, ENGINES[place], seed, options.folder, options.laboratory), end="")
+    seed, engine = 100_000 * options.seed + own, ENGINES[place]
+    made = make_one(kind, engine, seed, options.folder, options.laboratory)
+    told = answer(kind, engine, made) if options.named is None else sizes(made, options.named)
+    print(told, end="")
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from planner import program
 from planner.compare import cluster, processes
 from planner.errors import InputError
 from planner.frf import metrics
-from planner.proof.score import Scored, score
+from planner.proof.score import Scored, named_imperfections, score
 
 STATED = "proof.json"
 LIMIT_S = 1800
@@ -112,18 +112,31 @@ def conducted(_: None, task: Task) -> dict[str, Any] | processes.Failure:
     """Make a case, seal its answer, and run the public command, which sees the recordings only."""
     with tempfile.TemporaryDirectory() as meantime:
         folder = (task.folder or Path(meantime)).absolute() / task.name
-        command = [sys.executable, "-m", "planner.proof.make", str(folder)]
-        command += ["--cases", str(task.proof.cases), "--seed", str(task.proof.seed)]
-        command += ["--number", str(task.number)]
-        command += ["--laboratory"] if task.proof.laboratory else []
-        made = subprocess.run(command, capture_output=True, text=True, check=False)
-        if made.returncode:
-            return processes.Failure((made.stderr.strip() or "nothing said").splitlines()[-1])
-        answer = made.stdout
+        answer = _made(task, folder)
+        if isinstance(answer, processes.Failure):
+            return answer
         sealed = hashlib.sha256(answer.encode()).hexdigest()
-        told = diagnosed(folder)
-        told["frac"] = _frac(json.loads(answer), told)
+        told, true = diagnosed(folder), json.loads(answer)
+        told["frac"] = _frac(true, told)
+        named = [f"{effect}@{at}" for effect, at in named_imperfections(true, told)]
+        # Made anew, elsewhere: a case that stays is as it was diagnosed.
+        sizes = _made(task, Path(meantime) / "again", "--named", *named) if named else "{}"
+        if isinstance(sizes, processes.Failure):
+            return sizes
+    told["imperfections"] = json.loads(sizes)
     return {"seal": sealed, "answer": answer, "told": told}
+
+
+def _made(task: Task, folder: Path, *more: str) -> str | processes.Failure:
+    """What is said of a case that is made, in a process of its own."""
+    command = [sys.executable, "-m", "planner.proof.make", str(folder)]
+    command += ["--cases", str(task.proof.cases), "--seed", str(task.proof.seed)]
+    command += ["--number", str(task.number)]
+    command += ["--laboratory"] if task.proof.laboratory else []
+    made = subprocess.run([*command, *more], capture_output=True, text=True, check=False)
+    if made.returncode:
+        return processes.Failure((made.stderr.strip() or "nothing said").splitlines()[-1])
+    return made.stdout
 
 
 def diagnosed(case: Path) -> dict[str, Any]:

@@ -5,7 +5,7 @@ poses set aside, and `nats`, what the recordings tell of that (see `refit`). Wit
 
 - required: at least DETECTABLE_NATS and 1.5 m; it is right if named and placed, or in a set of two;
 - silence is required where nothing has 0.67 m; between, either is right;
-- a false name is of nothing that was concealed, nor of an imperfection;
+- a false name is of nothing that was concealed, nor of an imperfection of at least 0.5 m;
 - "unexplained" is right where an effect without a name has 1.5 m, "consistent" where nothing does.
 """
 
@@ -19,7 +19,8 @@ from planner.effects.chain import ARTEFACTS
 from planner.robot.config import DiagnoseTable
 
 MATTERS = DiagnoseTable().matters  # of |H|: what a diagnosis need not explain
-CLEARLY, HARDLY = 1.5 * MATTERS, 0.67 * MATTERS  # of the issue: apart by more than sizes err
+# Apart by more than sizes err.
+CLEARLY, HARDLY, LEAST = 1.5 * MATTERS, 0.67 * MATTERS, 0.5 * MATTERS
 DETECTABLE_NATS = 20.0
 LARGEST_SET = 2  # places that can't be told apart and yet count as told
 BINS = 10
@@ -58,6 +59,7 @@ class Scored:
 
     `group` is null, single, artefact, pair or outsider. `covered` counts parameters inside their
     90 % interval and all that can be compared; `frac` is FRAC of predictions with the true FRFs.
+    `imperfections`: sizes of those that were named.
     """
 
     name: str
@@ -74,11 +76,12 @@ class Scored:
     covered: tuple[int, int]
     frac: float | None
     seconds: float | None
+    imperfections: tuple[float, ...]
 
     @property
     def silence_required(self) -> bool:
-        """Whether nothing that is there matters."""
-        return all(e.size < HARDLY for e in self.shown)
+        """Whether nothing that is there matters, as far as its size was asked for."""
+        return all(size < HARDLY for size in (*self.imperfections, *(e.size for e in self.shown)))
 
     @property
     def silent(self) -> bool:
@@ -102,7 +105,8 @@ def score(name: str, answer: Mapping[str, Any], told: Mapping[str, Any]) -> Scor
         )
         for e, p in zip(answer["effects"], true, strict=True)
     )
-    there = {*true, *map(_place, answer.get("imperfections", ()))} - NOTHING
+    sizes = {tuple(name.split("@")): size for name, size in told.get("imperfections", {}).items()}
+    there = {*true, *(place for place, size in sizes.items() if size >= LEAST)} - NOTHING
     false = tuple(p for p in named if not wide[p] & there)
     right = not false and _right(verdict, shown)
     group = _group(true)
@@ -110,7 +114,17 @@ def score(name: str, answer: Mapping[str, Any], told: Mapping[str, Any]) -> Scor
     return Scored(
         name, group, answer.get("engine", ""), answer["robot"], shown, verdict, said, named, false,
         first["probability"], right, covered, told.get("frac"), told.get("seconds"),
+        tuple(sizes.values()),
     )  # fmt: skip
+
+
+def named_imperfections(answer: Mapping[str, Any], told: Mapping[str, Any]) -> list[Place]:
+    """Imperfections that a diagnosis named: only the size of these matters to its score."""
+    if "failed" in told:
+        return []
+    first = tuple(map(_place, told["candidates"][0]["effects"]))
+    named = _named(told, told["verdict"], first)
+    return [place for place in map(_place, answer["imperfections"]) if place in named]
 
 
 def _place(effect: Mapping[str, Any]) -> Place:

@@ -21,7 +21,13 @@ from planner.proof.refit import (
 )
 from planner.proof.report import write
 from planner.proof.run import Proof
-from planner.proof.score import calibration_error, figures, score, share
+from planner.proof.score import (
+    calibration_error,
+    figures,
+    named_imperfections,
+    score,
+    share,
+)
 
 HELD = {"frac": 0.9, "frobenius": 0.9}
 MASS, BASE, OTHER = ("added_mass", "link_3"), ("base_compliance", "base"), ("added_mass", "link_4")
@@ -92,11 +98,17 @@ def test_a_set_of_two_counts_beside_the_name_and_a_larger_one_does_not():
     assert not unsaid.shown[0].in_set  # a set of which nothing is named tells nobody anything
 
 
-def test_an_imperfection_is_no_false_name_and_no_silence():
-    found = score("a", answer(imperfections=[BASE]), told(BASE))
-    assert found.false_names == ()
-    assert not found.silent
-    assert figures([found])["silence_where_required"].right == 0
+@pytest.mark.parametrize(
+    ("size", "false", "required"),
+    [(0.02, [], False), (BETWEEN / 2, [], True), (SLIGHT, [BASE], True)],
+)
+def test_an_imperfection_is_a_false_name_where_it_is_too_small(size, false, required):
+    true, said = answer(imperfections=[BASE, MASS]), told(BASE)
+    assert named_imperfections(true, said) == [BASE]
+    found = score("a", true, {**said, "imperfections": {"base_compliance@base": size}})
+    assert list(found.false_names) == false
+    silence = figures([found])["silence_where_required"]
+    assert (silence.right, silence.of) == (0, int(required))
 
 
 def test_figures_count_what_they_say():
