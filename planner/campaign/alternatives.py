@@ -20,6 +20,7 @@ BETTER = 3.0  # times less is left by a mistake that explains them
 # wrong: a joint beside its readback, a delay, the corner of a high-pass and the rate of a window.
 STEPS = 2.0 ** np.arange(1, 7)
 FINE = 0.02  # of where it is likeliest: so finely that is told
+NO_RECORD = 1e6  # times |H| is off what no record can show
 MUCH = 10.0  # times farther than is stated hits may have struck, or joints may stand
 FAR_OFF_HITS = (
     "hits look struck far beside the tool's tip, or slanted: was it that point, and along its axes?"
@@ -151,7 +152,7 @@ def chain_faults(
 
         def less(by: float, kind: Callable[[float], ChainFault] = kind) -> float:
             shown, _ = kind(by).undone(frf)
-            return expected.off_by_line(q, shown) if shown.exponential_rate_1_s >= 0 else np.inf
+            return expected.off_by_line(q, shown) if shown.exponential_rate_1_s >= 0 else NO_RECORD
 
         by = _best(less)
         if by:

@@ -19,7 +19,7 @@ from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import EffectLibrary, diagnosed
 from planner.errors import InputError
 from planner.fit.explanations import ExploredStructures, most_probable
-from planner.fit.fitted import StructureFit, settled
+from planner.fit.fitted import StructureFit, settled, size_of
 from planner.fit.held_out import set_aside
 from planner.fit.identify import TOO_SOFT
 from planner.fit.misfit import FrfMisfit
@@ -220,10 +220,13 @@ def _explored(
     search = told(search)
     begun, straight, matters = [search.plain()], recorded, simulation.robot.config.diagnose.matters
     levels = level_laws(recorded, begun[0], 0) if recorded.visits else None
-    # A joint's law, where hits of different force differ, comes first: it bends what is linear.
+    # A joint's law, where hits of different force differ, comes first: it bends what is linear. Any
+    # linear fit tells it that leaves no more than what need not be explained.
     for _ in range(ROUNDS if levels and levels.seen.size >= matters else 0):
-        found = replace(search, thorough=False).explored(begun)
-        best, begun = most_probable(found.settled), found.settled
+        best = most_probable(begun)
+        if size_of(best) > search.floor:
+            begun = list(replace(search, thorough=False).explored(begun).settled)
+            best = most_probable(begun)
         progress("comparing hits of different force", 0.85)
         seen = level_laws(recorded, best)
         levels = seen if levels is None or seen.laws or not levels.laws else levels
