@@ -191,7 +191,7 @@ def _without(
     """The best that there is without an effect: refitted from here, or as the search came by."""
     rest = Counter(key_of(best)) - Counter([effect.name])
     met = [f for f in explored.settled if Counter(key_of(f)) == rest and effect in added(best)]
-    fewer = without(best, [effect])
+    fewer = None if any(f.settled for f in met) else without(best, [effect])
     if fewer is not None:
         met.append(settled(fewer.misfit, fewer.at, rounds=2))
     return max(met, key=evidence_of, default=None)
