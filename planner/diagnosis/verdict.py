@@ -8,6 +8,7 @@ chain) counts by evidence beyond its stated tolerance.
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import expit
@@ -34,6 +35,7 @@ EXPLAINS = 2.0  # times what matters: a discrepancy up to which nothing else is 
 # Effects without a name of their own imitate what a named one's shape lacks: they count from so
 # many times what matters on, and so much of all that is gained.
 GENERAL, OF_ALL = 3.0, 0.05
+LIKELY = 0.01  # probability of another set, from which the size of what it has is asked for
 BENT = 2.0  # times what levels still differ by, from which a linear effect beside a law is told
 LINES = 40  # of the band, on which sizes are told
 Place = tuple[str, str | None]
@@ -98,15 +100,11 @@ def judged(
     named and predicts poses set aside `worse` than the refitted robot explains nothing.
     """
     weights, best = probabilities(explored.settled), most_probable(explored.settled)
-    effects = _weighed(explored, best, weights, matters, q)
+    sizes = _Sizes(explored, weights, matters, q)
+    effects, others = (
+        _beside_laws(found, levels) for found in (sizes.of_best(), sizes.of_others())
+    )
     laws = levels.laws if levels else ()
-    if levels and laws:
-        bent = BENT * levels.left.size
-        bends = {law.at for law in laws}
-        beside = [e.operator.artefact or (e.change > bent and e.place[1] not in bends)
-                  for e in effects]  # fmt: skip
-        pairs = zip(effects, beside, strict=True)
-        effects = [replace(e, counts=e.counts and apart) for e, apart in pairs]
     named = [e for e in effects if e.counts]
     nameless = any(e.operator.general for e in named)
     wrong = nameless or (worse and named)
@@ -114,54 +112,87 @@ def judged(
     unknown = left or bool(levels and levels.unexplained) or UNKNOWN in from_signals
     there = named or from_signals or laws
     verdict = "unexplained" if unknown else "explained" if there else "consistent"
-    candidates = _candidates(weights, effects, unknown, tuple(from_signals))
+    candidates = _candidates(weights, [*effects, *others], unknown, tuple(from_signals))
     if levels and laws and not unknown:
         candidates = _with_laws(candidates, levels)
     return Verdict(verdict, tuple(effects), candidates, _sets(named, weights), best)
 
 
-def _weighed(
-    explored: ExploredStructures,
-    best: StructureFit,
-    weights: dict[Key, float],
-    matters: float,
-    q: np.ndarray,
-) -> list[NamedEffect]:
-    """Each effect's size where the rest is refitted without it, smallest first given up.
+def _beside_laws(effects: Sequence[NamedEffect], levels: Levels | None) -> list[NamedEffect]:
+    """Of effects beside joints' laws what is no work of what these leave."""
+    if levels is None or not levels.laws:
+        return list(effects)
+    bent, bends = BENT * levels.left.size, {law.at for law in levels.laws}
 
-    What is too small to count is gone when the others are weighed: two hoses that stand for one
-    would each hide how much the other matters.
-    """
-    gained, lines = best.evidence - explored.plain.evidence, np.linspace(*_band(best), LINES)
+    def apart(e: NamedEffect) -> bool:
+        return e.operator.artefact or (e.change > bent and e.place[1] not in bends)
+
+    return [replace(e, counts=e.counts and apart(e)) for e in effects]
+
+
+@dataclass(frozen=True, eq=False)
+class _Sizes:
+    """Each effect's size where the rest is refitted without it, at q (n, dof) in rad."""
+
+    explored: ExploredStructures
+    weights: dict[Key, float]
+    matters: float
+    q: np.ndarray
+
+    @cached_property
+    def best(self) -> StructureFit:
+        """The likeliest fit."""
+        return most_probable(self.explored.settled)
 
     def weigh(
-        fit: StructureFit, effect: Operator, own: Operator
+        self, fit: StructureFit, effect: Operator, own: Operator
     ) -> tuple[NamedEffect, StructureFit | None]:
-        fewer = _without(explored, fit, effect)
-        nats, change = gained, 1.0
+        """An effect of a fit, told as `own` of the best; and the fit without it."""
+        gained = self.best.evidence - self.explored.plain.evidence
+        nats, change, lines = gained, 1.0, np.linspace(*_band(self.best), LINES)
+        fewer = _without(self.explored, fit, effect)
         if fewer is not None:
-            h, other = (_physics(RobotPosterior.of(f), q, lines) for f in (fit, fewer))
+            h, other = (_physics(RobotPosterior.of(f), self.q, lines) for f in (fit, fewer))
             nats = fit.evidence - fewer.evidence
             change = float(np.linalg.norm(np.abs(h) - np.abs(other)) / np.linalg.norm(h))
-        probability = sum(w for key, w in weights.items() if effect.name in key)
+        probability = sum(w for key, w in self.weights.items() if effect.name in key)
         if effect in built(fit):
             probability = float(expit(nats - RARE))
-        counts = _counts(effect, nats, change, matters, gained)
+        counts = _counts(effect, nats, change, self.matters, gained)
         return NamedEffect(own, float(nats), change, float(probability), counts), fewer
 
-    found, fit, left = [weigh(best, e, e)[0] for e in _beyond(best)], best, list(added(best))
-    while left:
-        # What was settled by itself has effects of its own: those of the best are told.
-        pairs = zip(sorted(added(fit), key=_name), sorted(left, key=_name), strict=True)
-        each = sorted((weigh(fit, e, own) for e, own in pairs), key=lambda pair: pair[0].change)
-        slight = next(((e, fewer) for e, fewer in each if not e.counts and fewer), None)
-        if slight is None:
-            found += [effect for effect, _ in each]
-            break
-        effect, fit = slight
-        found.append(effect)
-        left = [own for own in left if own is not effect.operator]
-    return sorted(found, key=lambda e: -e.change)
+    def of_best(self) -> list[NamedEffect]:
+        """Of the likeliest set, smallest first given up.
+
+        What is too small to count is gone when the others are weighed: two hoses that stand for one
+        would each hide how much the other matters.
+        """
+        fit, left = self.best, list(added(self.best))
+        found = [self.weigh(fit, e, e)[0] for e in _beyond(fit)]
+        while left:
+            # What was settled by itself has effects of its own: those of the best are told.
+            pairs = zip(sorted(added(fit), key=_name), sorted(left, key=_name), strict=True)
+            each = sorted(
+                (self.weigh(fit, e, own) for e, own in pairs), key=lambda pair: pair[0].change
+            )
+            slight = next(((e, fewer) for e, fewer in each if not e.counts and fewer), None)
+            if slight is None:
+                found += [effect for effect, _ in each]
+                break
+            effect, fit = slight
+            found.append(effect)
+            left = [own for own in left if own is not effect.operator]
+        return sorted(found, key=lambda e: -e.change)
+
+    def of_others(self) -> list[NamedEffect]:
+        """What other likely sets have and the likeliest has not."""
+        known, found = {e.name for e in self.best.structure.effects}, []
+        likely = [f for f in self.explored.settled if self.weights[key_of(f)] > LIKELY]
+        for fit in sorted(likely, key=lambda f: -self.weights[key_of(f)]):
+            new = [e for e in added(fit) if e.name not in known]
+            found += [self.weigh(fit, e, e)[0] for e in new]
+            known |= {e.name for e in new}
+        return found
 
 
 def _name(effect: Operator) -> Place:

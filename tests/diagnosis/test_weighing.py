@@ -38,6 +38,18 @@ def plain_fits(monkeypatch):
     monkeypatch.setattr(verdict, "_physics", lambda f, q, lines: f.h)
     monkeypatch.setattr(verdict, "RobotPosterior", SimpleNamespace(of=lambda f: f))
     monkeypatch.setattr(verdict, "_without", fewer)
+    monkeypatch.setattr(verdict, "most_probable", lambda fits: fits[0])
+    monkeypatch.setattr(verdict, "key_of", lambda f: key(f.effects))
+
+
+def sizes(*sets: tuple[SimpleNamespace, ...]) -> verdict._Sizes:
+    """Of sets that were settled, the likeliest first; all as likely."""
+    explored = SimpleNamespace(plain=fit(), settled=tuple(fit(*effects) for effects in sets))
+    return verdict._Sizes(explored, {key(effects): 0.5 for effects in sets}, 0.01, Q)
+
+
+def key(effects: tuple[SimpleNamespace, ...]) -> tuple:
+    return tuple(sorted(e.name for e in effects))
 
 
 @pytest.mark.parametrize(
@@ -50,7 +62,12 @@ def plain_fits(monkeypatch):
     ],
 )
 def test_what_two_share_counts_once(effects, counting):
-    explored = SimpleNamespace(plain=fit(), settled=())
-    found = verdict._weighed(explored, fit(*effects), {}, 0.01, Q)
+    found = sizes(effects).of_best()
     assert [e.operator for e in found if e.counts] == counting
     assert {id(e.operator) for e in found} == set(map(id, effects))
+
+
+def test_what_only_another_likely_set_has_counts_by_its_size():
+    assert [e.counts for e in sizes((HEAVY,), (HEAVY, OTHER)).of_others()] == [False]
+    assert [e.counts for e in sizes((OTHER,), (OTHER, LIGHT)).of_others()] == [True]
+    assert sizes((HEAVY, OTHER), (HEAVY,)).of_others() == []
