@@ -186,7 +186,7 @@ class _Sizes:
 
     def of_others(self) -> list[NamedEffect]:
         """What other likely sets have and the likeliest has not."""
-        known, found = {e.name for e in self.best.structure.effects}, []
+        known, found = {e.name for e in added(self.best)}, []
         likely = [f for f in self.explored.settled if self.weights[key_of(f)] > LIKELY]
         for fit in sorted(likely, key=lambda f: -self.weights[key_of(f)]):
             new = [e for e in added(fit) if e.name not in known]
