@@ -120,9 +120,8 @@ def fitted(
     starts, steps = [], FEW_GENERATIONS if small else SEARCHED.get(name, 0)
     if name not in SEARCHED:
         tolerances = None if ours else EXACT_HITS
-        ended = hits.hit_poses.dataset(FULL_HZ, rows).one_hit_frfs
         found = identify(
-            ended, q, nominal, priors, band_hz=BAND_HZ, tolerances=tolerances, extend=ours
+            frfs, q, nominal, priors, band_hz=BAND_HZ, tolerances=tolerances, extend=ours
         ).identified
         values, misfit = np.array([e.value for e in found.estimates]), found.misfit
         if ours:

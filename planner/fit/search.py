@@ -37,13 +37,15 @@ from planner.fit.fitted import (
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotBelief
-from planner.fit.structure import RobotStructure, effects_free
+from planner.fit.structure import RobotStructure, effects_free, exported
 from planner.fit.trials import FAR, FAR_OFF, FOLLOWED, LOG_STEPS, Trials, explained
 from planner.inference.parallel import parallel_map
+from planner.measurement.measured_frfs import completed
 
 SEARCHED, SCREENED, LAST = 24, 48, 44  # lines a pose: while searching, for operators, at the end
 SETTLED = 4  # of those that compete
 MOST = 6  # effects
+COMPLETIONS = 2  # rounds
 STIFF_AT_FIRST = 3.0  # prior sds of springs that may be there
 AGAIN = 0.03  # least size with which what was found before goes on
 
@@ -63,9 +65,28 @@ class Search(Trials):
         return ExploredStructures(begun[0], self._explore(begun, warm=True))
 
     def found(self, warm: FitRecord | None = None) -> StructureFit:
-        """The effects that explain them best; from what was found before, if that is given."""
-        found = self._last(self._believed(self._found(warm)))
-        return replace(found, wider=self._widened(found)) if self.widen else found
+        """The effects that explain them best; from what was found before, if that is given.
+
+        Decays that the ends of records cut off are filled in as what was known has them, until that
+        is found again, and at last as it has them.
+        """
+        known, begun = warm, self if warm is None else self._completed(warm)
+        best = begun._found(warm)
+        for _ in range(COMPLETIONS if self._cut_off else 0):
+            again = best.tried.record
+            if known is not None and known.labels == again.labels:
+                break
+            known = again
+            best = self._completed(known)._gone_on(known)
+        if self._cut_off:
+            known = best.tried.record
+            begun = self._completed(known)
+            best = begun.recovered(known)
+        return begun._ended(best)
+
+    @property
+    def _cut_off(self) -> bool:
+        return any(np.isfinite(f.tail_s) for f in self.frfs)
 
     def _found(self, warm: FitRecord | None) -> StructureFit:
         if not self.extend:
@@ -91,6 +112,23 @@ class Search(Trials):
             return found
         fewer = settled(fewer.misfit, fewer.at)
         return self._pruned(fewer) if log_probability(fewer) > log_probability(found) else found
+
+    def _gone_on(self, known: FitRecord) -> StructureFit:
+        best = self.recovered(known)
+        return most_probable(self._explore([best], True)) if self.extend else best
+
+    def _completed(self, known: FitRecord) -> "Search":
+        """With the decays that records cut off, as a structure has them."""
+        if not self._cut_off:
+            return self
+        misfit, x = self.again(known, self.data(SEARCHED), known.size)
+        simulation = exported(misfit.structure, x)[0]
+        out = [completed(frf, simulation, row) for frf, row in zip(self.frfs, self.q, strict=True)]
+        return replace(self, frfs=tuple(out))
+
+    def _ended(self, best: StructureFit) -> StructureFit:
+        found = self._last(self._believed(best))
+        return replace(found, wider=self._widened(found)) if self.widen else found
 
     def _believed(self, best: StructureFit) -> StructureFit:
         """Without misread angles where something is left."""
@@ -127,7 +165,7 @@ class Search(Trials):
 
     def recalled(self, known: FitRecord) -> StructureFit:
         """What was found of these FRFs before, as it was."""
-        misfit, x = self.again(known, self.data(LAST), known.size)
+        misfit, x = self.again(known, self._completed(known).data(LAST), known.size)
         at = misfit(x, known.own)
         wider = None if known.wider is None else self.recalled(known.wider)
         found = StructureFit(misfit, at, misfit.evidence(at), wider)

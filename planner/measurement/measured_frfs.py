@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.dynamics.gradient import laplace
+from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import Poles
 from planner.errors import InputError
 from planner.frf.frf import Frf
@@ -204,3 +205,18 @@ def cut_off(solved: Poles, s: np.ndarray, tail_s: np.ndarray) -> np.ndarray:
         lost = pole**2 * np.exp((pole - s[i]) * tail_s[i]) / (s[i] - pole)
         out[i] = (flat.T @ lost).reshape(out[i].shape)
     return out
+
+
+def completed(frf: Frf, simulation: Simulation, q: np.ndarray) -> Frf:
+    """An FRF at q (dof,) in rad with the decays that its records cut off, as a simulation has them.
+
+    As it is where it is known not to lack any.
+    """
+    if not np.isfinite(frf.tail_s):
+        return frf
+    above = frf.frequency_hz > 0
+    s = laplace(frf.frequency_hz[above], frf.exponential_rate_1_s)
+    solved = simulation.solved(simulation.elastic.matrices(q[None], layout=frf.layout))
+    values = frf.accelerance.copy()
+    values[..., above] += cut_off(solved, s, np.array([frf.tail_s]))[0]
+    return replace(frf, accelerance=values, tail_s=float("inf"))
