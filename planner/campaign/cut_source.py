@@ -199,7 +199,7 @@ def at_poses_in_band(
         cuts = [turned_to(cut, *row) for row in zip(rotation, feeds, names, strict=True)]
     else:
         cuts = cuts_at(cut, rotation, position, names)
-    mean, sd = campaign.frf_at(q, lines)
+    mean, sd = tip_frfs(campaign, q, lines)
     for i, name in enumerate(names):
         where, remarks = f"{campaign.directory}, pose {name}", ()
         if change is None:
@@ -211,6 +211,22 @@ def at_poses_in_band(
             yield _with(of_frf(replace(frf, simulated=simulated), cuts[i]), remarks)
         except OutOfBandError as error:
             yield error
+
+
+def tip_frfs(campaign: Campaign, q: np.ndarray, lines: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerance (p, 3, 3, F) in m/s²/N of the tcp by forces there, and sd, at q (p, dof) in rad.
+
+    What is predicted where the sensor sits is carried to the tcp by as much as the simulation has
+    both apart; without one it is taken as it is.
+    """
+    mean, sd = campaign.frf_at(q, lines)
+    simulation, robot = campaign.model.low.simulation, campaign.cell.robot.config
+    if simulation is None or robot.sensor_frame == robot.tcp_frame:
+        return mean, sd
+    there = simulation.accelerance(q, lines)
+    tip = simulation.frfs(q, lines, sensors=(robot.tcp_frame,))[:, 0, :, 0]
+    size, was = (np.linalg.norm(h, axis=(1, 2), keepdims=True) for h in (tip, there))
+    return mean + tip - there, sd * size / np.where(was > 0, was, 1.0)
 
 
 def outside(campaign: Campaign, names: Sequence[str], q: np.ndarray) -> tuple[str, ...]:
@@ -242,7 +258,7 @@ def tip_of(
     if is_campaign(source):
         campaign = Campaign(source)
         q, lines = campaign.posture(pose), campaign.frequency_lines
-        mean, sd = campaign.frf_at(q, lines)
+        mean, sd = tip_frfs(campaign, q[None], lines)
         tip = tip_at(campaign, str(pose), q, lines, mean[0], sd[0])
         return replace(tip, simulated=campaign.state.simulated), str(pose)
     if several_poses([source]):

@@ -8,8 +8,11 @@ import json
 import numpy as np
 import pytest
 
+from planner.campaign.campaign import Campaign
+from planner.campaign.cut_source import tip_frfs
 from planner.cli.run import run
 from planner.proof.arms import KR10
+from planner.proof.load import load_truth
 from tests.support.rerun_columns import lines_of
 
 CUT = """
@@ -89,15 +92,31 @@ def test_map_of_the_workspace(cell, tmp_path, capsys):
 
 
 def test_poses_that_chatter_outside_the_band_are_left_out_of_the_map(tmp_path, capsys):
-    said = asked(made(tmp_path, "[5.0, 16.0]"), capsys, "--map", "--poses", 4)
-    assert said["left_out"] == ["W002"]
-    assert said["poses"] == ["W001", "W003", "W004"]
+    said = asked(made(tmp_path, "[5.0, 13.0]"), capsys, "--map", "--poses", 4)
+    assert said["left_out"] == ["W001"]
+    assert said["poses"] == ["W002", "W003", "W004"]
     assert np.array(said["position_m"]).shape == (3, 3)
     (why,) = said["remarks"]
-    assert why.startswith("W002 is left out: the cut would chatter there outside the 5 to 16 Hz")
+    assert why.startswith("W001 is left out: the cut would chatter there outside the 5 to 13 Hz")
     assert "chatter" in asked(
         made(tmp_path / "narrow", "[5.0, 6.0]"), capsys, "--map", "--poses", 2, code=2
     )
+
+
+def test_frfs_are_carried_from_the_sensor_to_the_tip(cell):
+    """By as much as the other engine has both apart."""
+    campaign, lines = Campaign(cell / "cell"), np.array([12.0, 25.0, 60.0])
+    config = campaign.cell.robot.config
+    assert config.sensor_frame != config.tcp_frame
+    q = campaign.cell.poses([[10.0, -70.0, 95.0, 20.0, 40.0, -30.0]])
+    truth = load_truth(cell / "robot" / "robot.toml")
+    mass, damping, stiffness, hit, sensor = truth.matrices(q[0])
+    s = 2j * np.pi * lines[:, None, None]
+    moved = s**2 * np.linalg.solve(s**2 * mass + s * damping + stiffness, hit.T[None])
+    apart = np.moveaxis((hit - sensor) @ moved, 0, 2)
+    found, sd = tip_frfs(campaign, q, lines)
+    np.testing.assert_allclose(found[0] - campaign.frf_at(q, lines)[0][0], apart, rtol=1e-6)
+    assert np.all(sd > 0)
 
 
 @pytest.mark.slow
