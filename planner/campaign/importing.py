@@ -228,7 +228,7 @@ def displacement(
     off = proposal and joints.apart(proposal.joints_deg, joints_deg)
     if not off:
         return ()
-    return (f"The readback of {pose} is up to {off} from its setpoint; the readback is used.",)
+    return (f"The readback of {pose} is up to {off} from its setpoint.",)
 
 
 def axes_not_hit(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:

@@ -56,6 +56,9 @@ def stability(
 ) -> int:
     """To which depth a cut is stable at each spindle speed, and how it chatters beyond.
 
+    FRFs of a campaign are carried from the sensor to the tcp; those of a file are taken for the
+    tip's, as they are.
+
     Example: planner stability cell7 --pose P001 --cut cut.toml --plot pictures
     """
     from planner.campaign.cut_source import StabilityRequest

@@ -11,6 +11,7 @@ from planner.words import significant
 
 DEPARTED = 4.0  # prior sds
 TOLD = 3  # at most
+KNOWN = 0.3  # sd of ln k to which a stiffness is known when a word is said of it
 
 
 def sds_off(structure: RobotStructure, x: np.ndarray) -> np.ndarray:
@@ -26,10 +27,14 @@ def departed(structure: RobotStructure, x: np.ndarray) -> tuple[int, ...]:
     return tuple(map(int, np.flatnonzero(np.abs(sds_off(structure, x)) > DEPARTED)))
 
 
-def departures_text(structure: RobotStructure, x: np.ndarray) -> str:
-    """What robot.toml may state wrongly; empty where all is near it."""
+def departures_text(structure: RobotStructure, x: np.ndarray, sd: np.ndarray) -> str:
+    """What robot.toml may state wrongly; empty where all is near it, or not known to be far.
+
+    `sd` (D,) of x: a spring that is stiffer than the recordings can tell is no fault.
+    """
     far = departed(structure, x)
-    told = [*_bodies(structure, x, far), *_springs(structure, x, far)]
+    known = tuple(i for i in far if i >= structure.stiffnesses or sd[i] < KNOWN)
+    told = [*_bodies(structure, x, far), *_springs(structure, x, known)]
     if not told:
         return ""
     return (

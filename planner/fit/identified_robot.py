@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
-from planner.fit.departures import departures_text
+from planner.fit.departures import KNOWN, departures_text
 from planner.fit.fitted import StructureFit
 from planner.fit.frequency_uncertainty import frequency_sd
 from planner.fit.posterior import RobotPosterior
@@ -14,7 +14,6 @@ from planner.fit.result import Estimate, Identification, as_identification
 from planner.words import counted, significant
 
 BEYOND = 2.0  # sds of the gains, from which their deviation is told
-KNOWN = 0.3  # sd of ln k to which a spring not stated is known when it is told of
 # Poses from which a place is told as found: from one, neighbours imitate each other.
 PLACED = 3
 ABOVE, NOT_THERE = 2, 1.0  # modes that a wider structure may have beside; ln f of one that is none
@@ -92,7 +91,8 @@ class IdentifiedRobot:
     @property
     def departures(self) -> str:
         """What robot.toml may state wrongly; empty where the fit is near it."""
-        return departures_text(self.posterior.structure, self.posterior.x)
+        p = self.posterior
+        return departures_text(p.structure, p.x, p.sd)
 
     @property
     def words(self) -> str:

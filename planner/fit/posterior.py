@@ -40,6 +40,11 @@ class RobotBelief:
         structure = prior.stated()
         return cls(structure, structure.mean, inverse(structure.precision), tolerances)
 
+    @cached_property
+    def sd(self) -> np.ndarray:
+        """(D,) of x."""
+        return np.sqrt(np.diagonal(self.covariance))
+
     @property
     def physical(self) -> slice:
         """Where the numbers of springs, bodies and effects are: all but the chain's."""
@@ -159,7 +164,7 @@ class RobotPosterior(RobotBelief):
 
     def values(self, effect: Operator) -> dict[str, tuple[float, float]]:
         """An effect's stiffnesses and own numbers by name, with sds, in their units."""
-        s, sd = self.structure, np.sqrt(np.diagonal(self.covariance))
+        s, sd = self.structure, self.sd
         out = {}
         for i, p in enumerate(s.parameters[: s.stiffnesses]):
             if set(p.blocks) <= {*effect.springs, *effect.spring_priors}:

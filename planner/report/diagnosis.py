@@ -334,7 +334,7 @@ def diagnosis_report(found: "Diagnosis", odd: "OddPose | None" = None) -> Diagno
     aside = tuple(recorded.poses[i] for i in found.aside)
     undecided = [c for c in verdict.candidates if c.probability > LIKELY]
     there = found.best.structure, found.best.at.x
-    masses = departures_text(*there) or masses_text(*there)
+    masses = departures_text(*there, found.robot.sd) or masses_text(*there)
     return DiagnosisReport(
         verdict=verdict.verdict,
         findings=established_effects(found, undecided, names),

@@ -81,10 +81,14 @@ class LimitsBySpeed(Answer):
         })  # fmt: skip
 
     def _table(self, title: str, last: str, cells: Sequence[str]) -> Table:
-        """Some of the speeds, at most so many, and `cells` (n,) of a last column."""
+        """Some of the speeds, and `cells` (n,) of a last column."""
         columns = "spindle (rpm)", "depth limit (mm)", "at 95 % (mm)", "chatter (Hz)"
-        made = table(f"{title}, {self.cut.method.replace('_', ' ')}", *columns, last)
-        for i in range(0, len(cells), max(1, -(-len(cells) // MOST_ROWS))):
+        each = -(-len(cells) // MOST_ROWS)
+        some = f", one of every {each} speeds (--json: all)" if each > 1 else ""
+        made = table(f"{title}, {self.cut.method.replace('_', ' ')}{some}", *columns, last)
+        # The speed at which least is stable is never one that is left out.
+        least = int(np.argmin(np.where(np.isfinite(self.robust_m), self.robust_m, np.inf)))
+        for i in sorted({*range(0, len(cells), each), least, len(cells) - 1}):
             depths = self.losses[i].depth_m, self.robust_m[i]
             made.add_row(
                 f"{self.cut.speeds_rpm[i]:.0f}", *(depth_mm(depth, "–") for depth in depths),
@@ -112,7 +116,10 @@ class StabilityReport(LimitsBySpeed):
         lines = [text for kind, text in KINDS.items() if kind in kinds]
         if self.there is not None:
             verdict = "stable" if self.there.size < 1 else "not stable"
-            lines.append(f"At the point |µ| = {self.there.size:.6f}: {verdict}.")
+            lines.append(
+                f"At the point |µ| = {self.there.size:.6f}, the growth of a disturbance from one "
+                f"period to the next: {verdict}."
+            )
         made = self._table("First loss of stability", "kind", kinds)
         return Group(made, *map(Text, lines), *remarks(self.remarks), *self.end)
 

@@ -283,20 +283,21 @@ def test_nothing_counts_as_known_where_nothing_explains(prior, few, size, explai
 
 def test_what_the_fit_moved_far_is_told(prior):
     structure = RobotStructure(prior)
-    x = structure.mean.copy()
-    assert not departures_text(structure, x)
+    x, sure = structure.mean.copy(), np.full(structure.size, 0.1)
+    assert not departures_text(structure, x, sure)
     spring = next(i for i, p in enumerate(structure.parameters) if p.stated)
     mass = structure.names.index("mass of joint_5")
     for number in (spring, mass):
         x[number] += 5 * structure.sd[number]
-    told = departures_text(structure, x)
+    told = departures_text(structure, x, sure)
     times = np.exp(5 * structure.sd[spring])
     assert f"{significant(times)} times stiffer than robot.toml has it" in told
     assert "link_5 would have to weigh" in told
+    assert "times stiffer" not in departures_text(structure, x, 10 * sure)
     x = structure.mean.copy()
     assert not masses_text(structure, x)
     x[mass] += 2 * structure.sd[mass]
-    assert not departures_text(structure, x)
+    assert not departures_text(structure, x, sure)
     (heavier,) = (m for m in refitted_masses(structure, x) if m.link == "link_5")
     assert heavier.more_kg > heavier.sd_kg
     assert f"link_5 {significant(heavier.stated_kg + heavier.more_kg)} kg where " in masses_text(
