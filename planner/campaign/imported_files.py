@@ -55,20 +55,28 @@ def sort_paths(
     """Deliveries by pose, in recording order.
 
     A folder with recordings.csv says itself which pose a file belongs to (`pose` then picks one,
-    or renames the only one), and so do its subfolders; bare files belong to `pose` or, without it,
-    to `default_pose`, "" where there is none. A table without joints is one of proposed poses.
+    or renames the only one), and so do its subfolders; a file that is named is what the table
+    beside it says, if that lists it. Bare files belong to `pose` or, without it, to `default_pose`,
+    "" where there is none. A table without joints is one of proposed poses.
     """
     deliveries: list[ImportedFiles] = []
     bare: list[Path] = []
+    by_folder: dict[Path, list[Path]] = {}
     for path in paths:
         if path.exists() and (folders := table_folders(path)):
             deliveries += _from_tables(path, folders, joints, points, pose)
         elif path.is_dir():
             bare += files_in(path, READERS)
         elif path.is_file():
-            bare += [path] if path.name != CHANNELS else []
+            if path.name != CHANNELS:
+                by_folder.setdefault(path.parent, []).append(path)
         else:
             raise InputError(f"{path} does not exist; name recordings or a recordings folder.")
+    for folder, files in by_folder.items():
+        listed = _listed(folder, files, joints, points, pose)
+        deliveries += listed
+        told = {source.path.resolve() for one in listed for source in one.sources}
+        bare += [file for file in files if file.resolve() not in told]
     if bare:
         stated = StatedPoints(names=points)
         sources = tuple(Source(path, str(path), stated=stated) for path in bare)
@@ -97,6 +105,23 @@ def _from_tables(
         where = folders[0] / TABLE if len(folders) == 1 else path
         raise InputError(f"{where} has no pose {pose}; its poses are {', '.join(names[:8])}.")
     return found
+
+
+def _listed(
+    folder: Path, files: Sequence[Path], joints: JointUnits, points: PointNames, pose: str | None
+) -> list[ImportedFiles]:
+    """Those of some files that a folder's table lists, if it has one; of `pose` alone, if given."""
+    table = folder / TABLE
+    text = table.read_text(encoding="utf-8", errors="replace") if table.is_file() else ""
+    named = {file.resolve() for file in files if file.name in text}
+    if not named:
+        return []
+    found = [
+        replace(one, sources=tuple(s for s in one.sources if s.path.resolve() in named))
+        for one in _from_table(folder, joints, points)
+        if pose in (None, one.pose)
+    ]
+    return [one for one in found if one.sources]
 
 
 def _from_table(folder: Path, joints: JointUnits, points: PointNames) -> list[ImportedFiles]:

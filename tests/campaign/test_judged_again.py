@@ -3,6 +3,7 @@
 import hashlib
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -226,3 +227,13 @@ def test_commands_to_be_copied_are_quoted(first, tmp_path):
     said = " ".join(out.split())
     assert "The target is not reached yet; what lacks: " in said
     assert "3 more poses, as 3 are the least (measurements_min)" in said
+
+
+def test_a_file_that_is_named_is_what_the_table_beside_it_says(first):
+    (first.made / TABLE).write_text(without_axes(first))
+    files = sorted(first.made.glob("*.csv"))
+    wanted = [file for file in files if file.name != TABLE][:4]
+    code, out, said = call("import", first.cell, *wanted, "--json")
+    assert (code, len(json.loads(out)["accepted"])) == (0, 4), said
+    (measured,) = Campaign(first.cell).state.used
+    assert {Path(hit.file).name for hit in measured.hits} == {file.name for file in wanted}
