@@ -35,6 +35,8 @@ from planner.fit.identified_robot import PLACED
 from planner.frf.frf import Frf
 from planner.recording.points import TOOL
 
+NEAR_DEG = 2.0  # to the setpoint, in which angles that are none of degrees are recognised
+
 
 def pose_mismatch(
     model: Model,
@@ -104,6 +106,8 @@ def _setpoint(
     typed = np.flatnonzero(np.abs(np.subtract(sent, joints_deg)) > joints.same()).tolist()
     which = ", ".join(either(joints, i, sent[i], joints_deg[i]) for i in typed)
     what = f"fit the setpoint of {pose} better than its readback: is {which}?"
+    if np.all(np.abs(np.rad2deg(joints_deg) - sent) < NEAR_DEG):
+        what = f"fit the setpoint of {pose} better than its readback: are its angles in radians?"
     there = joints.internal([sent])[0]
     return [Alternative(there, what, about="readback", rival=True)] if typed else []
 

@@ -21,7 +21,7 @@ from planner.session.screen import ScreenText, fitted
 from planner.words import command, counted, short_name
 
 WIDTH, HEIGHT = 80, 22  # of the smallest terminal, less a line for work and the cursor's
-LAST = 4  # verdicts that are shown
+LAST = 4  # verdicts that are shown whatever they are
 COLOURS = {"good": "bold green", "repeat": "bold red", "late": "bold yellow",
            "elsewhere": "yellow", "unsure": "bold yellow", "unstated": "bold yellow"}  # fmt: skip
 
@@ -105,13 +105,17 @@ class PosePage:
         ]
 
     def _verdicts(self) -> list[ScreenText]:
-        """The last hits; the very last one in any case."""
-        *before, last = self.hits[-LAST:] or (None,)
+        """The last hits; the very last one, and those that are not good, in any case."""
+        if not self.hits:
+            return []
+        *before, last = self.hits
+        asked = [hit for hit in before[: 1 - LAST] if hit.kind != "good"]
+        told = [*asked, *before[1 - LAST :]]
         parts = [
-            ScreenText([None, *_forms(hit)], len(before) - i)
-            for i, hit in enumerate(before) if hit
-        ]  # fmt: skip
-        return [*parts, ScreenText(_forms(last))] if last else parts
+            ScreenText([*([None] if hit.kind == "good" else []), *_forms(hit)], len(told) - i)
+            for i, hit in enumerate(told)
+        ]
+        return [*parts, ScreenText(_forms(last))]
 
     def _angles(self) -> Table:
         slides = any(self.joints.slides)
