@@ -193,10 +193,21 @@ class _Agreement:
         return np.where(alike, other_sizes(frfs, upright), 0.0)
 
     def _upright(self, frfs: np.ndarray) -> np.ndarray:
-        """FRFs (n, N) without what tilts of the hits explain."""
+        """FRFs (n, N) without what tilts of the hits explain.
+
+        A hit in another unit has tilts as much smaller: one that is unlike as it is may be alike at
+        the centre's size.
+        """
         if not self.across:
             return frfs
-        return self.centre + untilted(frfs - self.centre, np.array(self.across))
+        norms = np.linalg.norm(frfs, axis=1, keepdims=True)
+        size = np.where(norms > 0, norms / np.linalg.norm(self.centre), 1.0)
+        both = [
+            by * (self.centre + untilted(frfs / by - self.centre, np.array(self.across)))
+            for by in (np.ones_like(size), size)
+        ]
+        pairs = zip(*both, strict=True)
+        return np.array([a if _likeness(a, self.centre) > LIKE else b for a, b in pairs])
 
 
 def untilted(off: np.ndarray, across: np.ndarray) -> np.ndarray:
