@@ -184,8 +184,8 @@ class Campaign(ReadOnlyCampaign):
             undone, since = last_undone(self.entries)
             if undone is None:
                 raise InputError(
-                    f"{self.directory} holds no act that was taken back last; only what no other "
-                    f"act followed can be done again."
+                    f"{self.directory}: the last act was no undo; only an undo that nothing else "
+                    f"followed can be done again."
                 )
             assert isinstance(undone.event, events.Undone)
             self.append(events.Undone(tuple(entry.seq for entry in (*since, undone))))

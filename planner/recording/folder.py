@@ -63,7 +63,12 @@ def read_recordings(
     columns = _joint_columns(path, header, units) if told else ()
     for name in ("pose", "hit", "file"):
         if name not in header:
-            raise InputError(f"{path} has no column {name}; add it (see its first row).")
+            what = {
+                "pose": "a name such as P001",
+                "hit": "along which axis it was hit, such as +x",
+                "file": "the recording's file",
+            }[name]
+            raise InputError(f"{path} has no column {name}; add it: in each row {what}.")
     inside = folder.resolve()
     rows: list[PoseRow] = []
     seen: dict[tuple[object, ...], int] = {}

@@ -177,7 +177,7 @@ def _responses(
     if not whole or (of_tool and not set(of_tool) >= set(tool)):
         raise InputError(
             f"{record.source} holds {describe(record)}: a hit needs one acceleration in each of x, "
-            f"y and z; export all three with their directions."
+            f"y and z; export all three with their directions, if the file is whole."
         )
     return found
 

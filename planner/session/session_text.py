@@ -107,7 +107,7 @@ def _in(report: ImportReport) -> str:
 def not_now(key: str) -> str:
     """What is said of a key that does nothing here; those that do are on the page."""
     shown = key if key.isprintable() else repr(key)
-    return f"{shown} is not possible now: the keys that are stand above in [brackets]."
+    return f"{shown} does nothing now; the keys that do are those above in [brackets]."
 
 
 def incomplete(page: PosePage) -> str:

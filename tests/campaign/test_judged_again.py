@@ -191,7 +191,7 @@ def test_what_was_shown_at_a_pose_is_not_imported_at_another_by_its_folder(first
 def test_what_was_taken_back_last_can_be_done_again(first):
     folder = first.cell
     code, _, said = call("redo", folder)
-    assert (code, "no act that was taken back last" in said) == (2, True)
+    assert (code, "the last act was no undo" in said) == (2, True)
     call("import", folder, first.made)
     call("next", folder)
     before = Campaign(folder).state

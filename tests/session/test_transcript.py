@@ -111,7 +111,7 @@ def test_keys_act_without_enter_and_the_terminal_is_left_as_it_was(cell):
         shown = "go to pose P001", "joint_a1", "angle (°)", "tool at x", "expected (Hz)", "[?] help"
         terminal.until(*shown)
         terminal.press("a", "Nothing to import yet")
-        terminal.press("b", "b is not possible now")
+        terminal.press("b", "b does nothing now")
         terminal.press("k", "stands in the way?")
         terminal.press("\n", "go to pose P002", "P001 will not be offered again ([u]")
         terminal.press("q", "Session ended: quit")
