@@ -14,7 +14,7 @@ SLOWEST_HZ, FASTEST_HZ = 1.0, 1e4
 SAG_M = 0.02
 SAG_RAD, FALLS_RAD = 0.02, 0.5  # under its own weight: what a spring may give, what none can carry
 # Damping ratio of one spring alone; published fits have up to 3.5 at a wrist's last joint.
-RATIO = 5.0
+RATIO, USUAL_RATIO = 5.0, 0.02
 SPARE_HZ = 0.5  # a band that begins this near to a mode cuts its peak
 
 
@@ -87,15 +87,14 @@ def _spring(block: Compliance, inertia: float, where: str) -> Iterator[CheckRema
         remedy = f"Stiffnesses are in {unit}; leave out what does not give."
         yield CheckRemark("warning", f"{given} is as good as rigid: {alone}.", where, remedy)
     ratio = block.damping / (2 * inertia * rate)
+    unit = "N·s/m" if block.slide else "N·m·s/rad"
     if ratio > RATIO:
         text = f"Its damper of {block.damping:.4g} has a damping ratio of {ratio:.2g}."
-        unit = "N·s/m" if block.slide else "N·m·s/rad"
         remedy = f"Dampers are in {unit}; a ratio of 0.01 to 0.1 is usual."
         yield CheckRemark("warning", text, where, remedy)
     elif block.damping == 0 and block.loss_factor == 0:
         text = "It has no damping: resonances of simulated FRFs are without bound."
-        usual = 0.04 * inertia * rate  # a ratio of 0.02
-        unit = "N·s/m" if block.slide else "N·m·s/rad"
+        usual = 2 * USUAL_RATIO * inertia * rate
         remedy = f"A damping ratio of 0.01 to 0.05 is usual, here some {usual:.2g} {unit}."
         yield CheckRemark("warning", text, where, remedy)
 

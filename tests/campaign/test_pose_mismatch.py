@@ -8,10 +8,12 @@ import json
 import shutil
 from contextlib import contextmanager
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from planner.campaign import pose_mismatch
 from planner.campaign.campaign import Campaign
 from planner.campaign.import_checks import question_about
 from planner.campaign.state import fold
@@ -191,6 +193,17 @@ def test_misread_angles_and_hits_from_behind_are_asked_about(
         read = float(report.question.text.split(said)[1].split("°")[0])
         stated = np.array(pool.rows[WRONG][0].joints_deg)
         assert abs(read - stated[int(said[-1]) - 1]) < 0.5
+
+
+def test_angles_in_radians_are_asked_about_as_that(campaign, pool):
+    sent = pool.rows[WRONG][0].joints_deg
+    state = SimpleNamespace(proposals={"P9": SimpleNamespace(joints_deg=sent)})
+    for typed, said in (
+        (tuple(np.deg2rad(sent) + 0.01), "are its angles in radians?"),
+        ((*sent[:2], sent[2] + 8, *sent[3:]), "is joint_3"),
+    ):
+        (asked,) = pose_mismatch._setpoint(campaign.model, state, "P9", typed)
+        assert said in asked.what
 
 
 @pytest.mark.slow
