@@ -56,6 +56,7 @@ def test_the_log_and_answers_say_the_units(cell):
 
 def test_what_another_acquisition_would_propose_is_said_with_units(cell):
     folder, _, _ = cell
+    told("next", folder)  # a pose that was proposed is needed
     answer = told("replay", folder, "--acquisition", "variance")
     rail, *angles = next(p for s in answer["steps"] for p in s["instead"])["joints_deg"]
     screen = re.sub(r"[\s│]+", "", said("replay", folder, "--acquisition", "variance"))
