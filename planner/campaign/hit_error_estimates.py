@@ -20,6 +20,7 @@ from planner.fit.hit_error_fit import (
 from planner.fit.identified_robot import IdentifiedRobot
 from planner.fit.posterior import FOLLOWED
 from planner.frf.frf import Frf
+from planner.inference.covariance import covariance_root
 from planner.measurement.nuisances import ACROSS, HIT_NUMBERS, OF_HIT, Tolerances
 from planner.modal.modes import Mode
 from planner.modal.residues import laplace, residue_changes
@@ -158,8 +159,7 @@ def _changes(
         out[0, :, axis] += np.einsum("k,kif,f->if", told.mean[i], basis[axis], share[i])
         at = OF_HIT * axis + np.arange(OF_HIT)
         whole[at, OF_HIT * i + np.arange(OF_HIT)] = np.mean(share[i])
-    values, vectors = np.linalg.eigh(whole @ told.covariance @ whole.T)
-    roots = vectors * np.sqrt(np.maximum(values, 0.0))
+    roots = covariance_root(whole @ told.covariance @ whole.T)
     for axis in range(3):
         part = roots[OF_HIT * axis : OF_HIT * axis + OF_HIT]
         out[1:, :, axis] = np.einsum("kj,kif->jif", part, basis[axis])

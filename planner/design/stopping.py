@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planner.inference.covariance import covariance_root
 from planner.words import counted, significant
 
 if TYPE_CHECKING:  # a forecast that was kept is read without JAX
@@ -139,7 +140,7 @@ def mean_squares(outputs: "FrequencyOutputs", seed: int = 0) -> np.ndarray:
         between, _, _ = outputs.covariance(k, poses, poses)
         apart = _means_apart(outputs.posteriors[k], poses.x, poses.low[:, k])
         for s, one in enumerate(between):
-            root = _root(one)
+            root = covariance_root(one)
             drawn = rng.standard_normal((each, len(poses))) @ root.T
             error[s * each : (s + 1) * each] += drawn + apart[s]
         total += error**2 @ importance[:, k]
@@ -170,8 +171,3 @@ def _means_apart(posterior: "Posterior", x: np.ndarray, low: np.ndarray) -> np.n
     """How far the mean of each hyperparameter sample (s, u) is from that of all."""
     means, _ = posterior.predictive(x, low)
     return means - means.mean(axis=0)
-
-
-def _root(covariance: np.ndarray) -> np.ndarray:
-    values, vectors = np.linalg.eigh(covariance)
-    return vectors * np.sqrt(np.maximum(values, 0.0))

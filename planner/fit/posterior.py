@@ -12,7 +12,7 @@ from planner.fit.fitted import StructureFit
 from planner.fit.misfit import FrfMisfit
 from planner.fit.structure import RobotPrior, RobotStructure, exported
 from planner.fit.weights import SHARE
-from planner.inference.covariance import inverse
+from planner.inference.covariance import covariance_root, inverse
 from planner.measurement.measured_frfs import Measured
 from planner.measurement.nuisances import Tolerances
 from planner.recording.points import TOOL, Layout
@@ -60,8 +60,7 @@ class RobotBelief:
         """R with R Rᵀ the covariance of the physical numbers."""
         covariance = self.covariance[self.physical, self.physical]
         unit = np.sqrt(np.diagonal(covariance))
-        values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
-        return unit[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+        return unit[:, None] * covariance_root(covariance / np.outer(unit, unit))
 
     def response(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """FRFs (n, 3, 3, F) of the tool in m/s²/N at q (n, dof) in rad, and their sds."""

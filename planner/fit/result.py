@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import eigh
 
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import Parametrisation, parametrise
@@ -128,7 +129,7 @@ def undetermined(parametrisation: Parametrisation, covariance: np.ndarray) -> tu
     count = len(names)
     root = np.linalg.cholesky(parametrisation.covariance)
     half = np.linalg.solve(root, covariance[:count, :count])
-    values, vectors = np.linalg.eigh(np.linalg.solve(root, half.T))
+    values, vectors = eigh(np.linalg.solve(root, half.T))
     found = []
     for value, along in sorted(zip(values, vectors.T, strict=True), key=lambda v: -v[0]):
         if value > TOLD**2:

@@ -260,7 +260,7 @@ class DiagnosisReport(Answer):
         return (
             f"None of the effects that planner knows explains the recordings (probability "
             f"{probable(first.probability)}). Closest comes {near}: with it, simulated and "
-            f"measured FRFs agree to {agrees:.4f} (FRAC; 1 is fully). That may be the larger part "
+            f"measured FRFs agree to {100 * agrees:.2f} % (FRAC). That may be the larger part "
             f"of the cause, with something unknown beside it. Before you repair anything, check "
             f"sensor, hammer and the stated poses, and look for what else touched or hung on the "
             f"robot."
@@ -271,7 +271,7 @@ class DiagnosisReport(Answer):
         if self.robot is None or self.urdf is None:
             return []
         alone = self.written.frac if self.written else None
-        agrees = "" if alone is None else f" (FRAC {alone:.4f} as it is written)"
+        agrees = "" if alone is None else f" (FRAC {100 * alone:.2f} % as it is written)"
         both = f"{self.robot}{agrees}, which needs {self.urdf.name} beside it"
         if self.verdict == "unexplained":
             doubt = "what was found does not explain the recordings: no campaign should use it."
@@ -285,7 +285,7 @@ class DiagnosisReport(Answer):
 
     def _agreement(self) -> RenderableType:
         made = table(
-            f"Agreement with measured FRFs, FRAC / Frobenius ({self.seconds:.0f} s)",
+            f"Agreement with measured FRFs, FRAC / Frobenius in % ({self.seconds:.0f} s)",
             *("poses", "as given", "refitted", "explained"),
         )
         aside = self.held_out
@@ -294,7 +294,7 @@ class DiagnosisReport(Answer):
             rows.append((f"held out: {', '.join(aside.poses)}", aside))
         for name, of in rows:
             sides = (of.nominal, of.refitted, of.explained)
-            made.add_row(name, *(f"{s.frac:.4f} / {s.frobenius:.4f}" for s in sides))
+            made.add_row(name, *(f"{100 * s.frac:.2f} / {100 * s.frobenius:.2f}" for s in sides))
         return made
 
 

@@ -1,6 +1,6 @@
 """From recordings to the answer of `modes`: one pose, any points, unlabelled FRFs, responses."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -61,21 +61,35 @@ def check_options(
 def sources_of(paths: Sequence[Path], from_names: bool = False) -> tuple[Source, ...]:
     """All recordings that files and folders hold; InputError for what does not exist.
 
-    With `from_names` FRFs have what they do not state of their places from the files' names.
+    A file is what the table beside it says, if that lists it. With `from_names` FRFs have what they
+    do not state of their places from the files' names.
     """
     found: list[Source] = []
+    named = dict.fromkeys(path.parent for path in paths if path.is_file())
+    beside = {folder: _listed(folder, {p.name for p in paths}) for folder in named}
     for path in paths:
         if (path / TABLE).is_file():
-            rows = read_recordings(path, joint_columns(path), ANYWHERE, bare=True)
-            listed = map(Source.of, rows)  # points are those that the table says, of no robot
-            found += [replace(s, stated=replace(s.stated, names=PointNames())) for s in listed]
+            found += _listed(path)
         elif path.is_dir():
             found += [Source(file, str(file)) for file in files_in(path, READERS)]
         elif path.is_file():
-            found += [Source(path, str(path))] if path.name != CHANNELS else []
+            told = [s for s in beside[path.parent] if s.path.resolve() == path.resolve()]
+            found += told or ([Source(path, str(path))] if path.name != CHANNELS else [])
         else:
             raise InputError(f"{path} does not exist; name the recordings of one pose.")
     return tuple(replace(source, from_name=from_names) for source in found)
+
+
+def _listed(folder: Path, names: Collection[str] | None = None) -> list[Source]:
+    """What a folder's table says of its files; none, where it has no table or one without any of
+    `names`. Points are those that the table says, of no robot."""
+    table = folder / TABLE
+    text = table.read_text(encoding="utf-8", errors="replace") if table.is_file() else ""
+    if not text or (names is not None and not any(name in text for name in names)):
+        return []
+    rows = read_recordings(folder, joint_columns(folder), ANYWHERE, bare=True)
+    told = (Source.of(row) for row in rows if row.file)
+    return [replace(s, stated=replace(s.stated, names=PointNames())) for s in told]
 
 
 def _titled(files: Sequence[str]) -> str:

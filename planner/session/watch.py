@@ -31,6 +31,8 @@ from planner.session.screen import Keys, Screen, no_keys, terminal_keys
 from planner.session.session_state import PoseInProgress, RerunQueue, Session, SessionState
 from planner.words import short_name
 
+AS_PROPOSED = "Angles are taken as proposed, unless recordings.csv beside the hits states others."
+
 
 @dataclass(frozen=True)
 class SessionSummary(Answer):
@@ -96,6 +98,7 @@ def _run(session: Session) -> SessionSummary:
     try:
         for remark in campaign.cell.remarks:
             session.say(remark, "yellow")
+        session.say(AS_PROPOSED, "dim")
         with session.screen.working("fitting the model to what was measured"):
             _ = campaign.model
         say_last_import(session)
