@@ -8,8 +8,8 @@ independent given what was measured.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import eigh
 
+from planner.inference.covariance import eigen
 from planner.surrogate.gp import Posterior
 from planner.surrogate.modal_surrogate import Surrogate
 
@@ -154,7 +154,7 @@ class FrequencyOutputs:
             return replace(self, planned=planned)
         gained = root.T @ pose.information[0, list(axes)].sum(axis=0) @ root
         # G ≥ 0, though rounding may say otherwise where a resonance has next to no damping.
-        values, vectors = eigh(gained)
+        values, vectors = eigen(gained)
         left = root @ vectors / np.sqrt(1 + np.maximum(values, 0))  # root (I + G)⁻¹ rootᵀ
         return replace(self, planned=planned, covariance_root=left)
 

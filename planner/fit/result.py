@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
 
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import Parametrisation, parametrise
 from planner.fit.departures import departed
 from planner.fit.posterior import RobotPosterior
+from planner.inference.covariance import eigen
 from planner.measurement.agreement import MODEL_ERROR
 
 # The data have told something of a direction once its sd is half of what it was before.
@@ -129,7 +129,7 @@ def undetermined(parametrisation: Parametrisation, covariance: np.ndarray) -> tu
     count = len(names)
     root = np.linalg.cholesky(parametrisation.covariance)
     half = np.linalg.solve(root, covariance[:count, :count])
-    values, vectors = eigh(np.linalg.solve(root, half.T))
+    values, vectors = eigen(np.linalg.solve(root, half.T))
     found = []
     for value, along in sorted(zip(values, vectors.T, strict=True), key=lambda v: -v[0]):
         if value > TOLD**2:

@@ -1,11 +1,6 @@
-"""Covariances of what is known by a precision, and their roots.
-
-By SciPy's eigenvalues: NumPy's, by divide and conquer, did not converge for a precision of 178
-numbers whose condition was 2e4.
-"""
+"""Covariances of what is known by a precision, and their roots."""
 
 import numpy as np
-from scipy.linalg import eigh
 
 
 def inverse(precision: np.ndarray) -> np.ndarray:
@@ -14,12 +9,24 @@ def inverse(precision: np.ndarray) -> np.ndarray:
     Where a barrier stands close, entries differ by so many decades that a plain inverse loses it.
     """
     unit = 1 / np.sqrt(np.diagonal(precision))
-    values, vectors = eigh(precision * np.outer(unit, unit))
+    values, vectors = eigen(precision * np.outer(unit, unit))
     values = np.maximum(values, np.finfo(float).eps * len(unit) * values[-1])
     return np.outer(unit, unit) * ((vectors / values) @ vectors.T)
 
 
 def covariance_root(covariance: np.ndarray) -> np.ndarray:
     """R (p, p) with R Rᵀ a covariance that is positive, but for rounding."""
-    values, vectors = eigh(covariance)
+    values, vectors = eigen(covariance)
     return vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+def eigen(symmetric: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues (p,), rising, and eigenvectors (p, p) of a finite matrix (p, p)."""
+    try:
+        return np.linalg.eigh(symmetric)
+    except np.linalg.LinAlgError:
+        # Divide and conquer once failed for a precision of 178 numbers whose condition was 2e4;
+        # robust representations find it. SciPy is loaded here alone, as it takes 0.6 s.
+        from scipy.linalg import eigh
+
+        return eigh(symmetric)

@@ -11,7 +11,7 @@ from scipy.stats import ortho_group
 
 from planner.inference import triangular
 from planner.inference.assignment import least_cost
-from planner.inference.covariance import inverse
+from planner.inference.covariance import covariance_root, inverse
 from planner.inference.log_space import log_sum, shares
 
 
@@ -46,6 +46,17 @@ def test_inverse_of_a_precision():
     root = rng.standard_normal((12, 12))
     precision = root @ root.T + np.eye(12)
     np.testing.assert_allclose(inverse(precision) @ precision, np.eye(12), atol=1e-12)
+
+
+def test_eigenvalues_where_divide_and_conquer_does_not_converge(monkeypatch):
+    def fails(matrix):
+        raise np.linalg.LinAlgError("Eigenvalues did not converge")
+
+    matrix = np.cov(np.random.default_rng(0).standard_normal((12, 40)))
+    there = covariance_root(matrix)
+    monkeypatch.setattr(np.linalg, "eigh", fails)
+    for root in (there, covariance_root(matrix)):
+        np.testing.assert_allclose(root @ root.T, matrix, atol=1e-13)
 
 
 def test_no_variance_is_negative_where_a_barrier_stands_close():
