@@ -107,6 +107,7 @@ class ToolChange:
 
 
 TOWARDS = 0.99  # cosine of the angle between directions that are the same
+BEYOND = 0.5  # cosine: more than 60° off the way back to the robot's last joint. Chosen.
 
 
 def _directions(cut: Cut, tool: "Tool", file: Path | None) -> str:
@@ -134,7 +135,8 @@ def structure_of(asked: StabilityRequest, cut: Cut) -> Structure:
         campaign = asked.campaign
         q = campaign.posture(asked.pose)
         (found,) = at_poses(campaign, (str(asked.pose),), q[None], cut, change)
-        return _with(found, outside(campaign, (str(asked.pose),), q[None]))
+        said = *outside(campaign, (str(asked.pose),), q[None]), *beyond_the_tip(campaign, cut)
+        return _with(found, said)
     if asked.peak_force_n is not None:
         raise InputError(
             f"--peak-force-n goes with a campaign, which {source} is not; predict its FRFs at that "
@@ -220,11 +222,11 @@ def tip_frfs(campaign: Campaign, q: np.ndarray, lines: np.ndarray) -> tuple[np.n
     both apart; without one it is taken as it is.
     """
     mean, sd = campaign.frf_at(q, lines)
-    simulation, robot = campaign.model.low.simulation, campaign.cell.robot.config
-    if simulation is None or robot.sensor_frame == robot.tcp_frame:
+    simulation, robot = campaign.model.low.simulation, campaign.cell.robot
+    if simulation is None or robot.sensor_at_tcp:
         return mean, sd
     there = simulation.accelerance(q, lines)
-    tip = simulation.frfs(q, lines, sensors=(robot.tcp_frame,))[:, 0, :, 0]
+    tip = simulation.frfs(q, lines, sensors=(robot.config.tcp_frame,))[:, 0, :, 0]
     size, was = (np.linalg.norm(h, axis=(1, 2), keepdims=True) for h in (tip, there))
     return mean + tip - there, sd * size / np.where(was > 0, was, 1.0)
 
@@ -234,6 +236,23 @@ def outside(campaign: Campaign, names: Sequence[str], q: np.ndarray) -> tuple[st
     there = campaign.cell.inside(q)
     said = outside_remark([name for name, one in zip(names, there, strict=True) if not one])
     return (said,) if said else ()
+
+
+def beyond_the_tip(campaign: Campaign, cut: Cut) -> tuple[str, ...]:
+    """A remark where a cut's axis has the spindle on that side of the tip where the robot is not.
+
+    The limits of one and the other differ: teeth come round the other way.
+    """
+    robot = campaign.cell.robot
+    place = robot.model.frames[robot.tcp_id].placement  # from the last joint
+    arm, axis = -place.rotation.T @ place.translation, np.array(cut.axis)
+    if axis @ arm >= -BEYOND * np.linalg.norm(axis) * np.linalg.norm(arm):
+        return ()
+    return (
+        f"axis = {list(cut.axis)} of cut.toml has the spindle beyond the tip, seen from the robot; "
+        f"if it sits between robot and tip, write axis = {[0.0 - v for v in cut.axis]}: the limits "
+        f"are others.",
+    )
 
 
 def _with(structure: Structure, remarks: tuple[str, ...]) -> Structure:

@@ -223,9 +223,9 @@ def _of_another(directory: Path, hit: HitRecord, at: str, pose: str) -> str:
     """Why a recording that is in use at one pose cannot belong to another."""
     back = command("planner", "withdraw", directory, at)
     return (
-        f"it has the same data as {hit.whole_name}, imported as a recording of pose {at}, and "
-        f"cannot belong to {pose} too; put the right file here, or, if it is right here, take back "
-        f"what was imported there ({back}) and import both again"
+        f"the same data are in use as {hit.whole_name} of pose {at}; put what was recorded at "
+        f"{pose} here, or, if this was, take back what was imported there ({back}) and import "
+        f"both again"
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from planner.campaign.acquisition_inputs import acquisition_inputs, poses_at, uncertain_parameters
 from planner.campaign.cell import Cell
 from planner.campaign.hit_error_estimates import CampaignHitErrors
-from planner.campaign.hit_errors import HitErrorEstimate
+from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
 from planner.campaign.labels import LabelledPose, observations
 from planner.campaign.low_fidelity import FEW_POSES, LowFidelity
 from planner.campaign.state import Measurement
@@ -89,6 +89,13 @@ class Model:
     def hit_errors(self) -> dict[str, tuple[HitErrorEstimate, ...]]:
         """Of the hits of each pose, where a simulation tells them."""
         return self.estimated.poses if self.estimated else {}
+
+    @property
+    def systematic_hit_errors(self) -> tuple[str, ...]:
+        """What all hits have in common, in words; of one pose nothing, for there what the
+        simulation lacks may look like hits that tilt."""
+        poses = self.hit_errors.values()
+        return systematic_errors([hit for own in poses for hit in own]) if len(poses) > 1 else ()
 
     @cached_property
     def seen_exactly(self) -> ModalObservations:

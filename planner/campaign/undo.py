@@ -87,7 +87,7 @@ def in_words(entry: Entry) -> str:
         return f"took back {which} {listed([str(act) for act in event.acts])}"
     if isinstance(event, FilesShown | FilesPlaced):
         if isinstance(event, FilesPlaced):
-            return f"{counted(len(event.files), 'file')} said to be of {event.pose}"
+            return f"{counted(len(event.files), 'late file')} taken as {event.pose}'s"
         like = f", like those of {event.pose}" if event.at else ""
         return f"{counted(len(event.files), 'file')} shown at {event.at or event.pose}{like}"
     told = msgspec.to_builtins(event)

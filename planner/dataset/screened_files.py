@@ -13,7 +13,7 @@ from planner.recording.points import StatedPoints
 from planner.recording.read import hits_in, placed_by_name, read_hits
 from planner.recording.records import NOTICED, Fault, FrfRecord, Hit, PoseRow, Record
 from planner.recording.repeats import screen_repeats
-from planner.recording.sampling import sampled_otherwise
+from planner.recording.sampling import recorded_otherwise
 from planner.recording.screening import screen
 from planner.recording.spectra import driving_point
 from planner.words import counted
@@ -179,7 +179,7 @@ def _refuse_others(
 ) -> None:
     """Refuse what cannot be averaged with most hits of the pose: FRFs, and other sampling rates."""
     own = [number for number, found in enumerate(hits) for _ in found]
-    said = sampled_otherwise([hit for found in hits for hit in found])
+    said = recorded_otherwise([hit for found in hits for hit in found])
     other = {number: text for number, text in zip(own, said, strict=True) if text}
     for number, (verdict, found) in enumerate(zip(verdicts, hits, strict=True)):
         text = other.get(number, "")

@@ -128,8 +128,9 @@ class Simulation:
     ) -> np.ndarray:
         """FRFs (n, s, 3, h, 3, F) from every hit frame to every sensor frame, in their own axes.
 
-        `hits` and `sensors` name frames of the URDF (none: the tcp and the sensor); `quantity` is
-        "accelerance" (m/s²/N) or "receptance" (m/N). Raises InputError for unknown frames.
+        `hits` and `sensors` name frames of the URDF or points of robot.toml (none: the tcp and the
+        sensor); `quantity` is "accelerance" (m/s²/N) or "receptance" (m/N). Raises InputError for
+        unknown ones.
         """
         synthesis = {"accelerance": accelerance, "receptance": receptance}[quantity]
         values = synthesis(self.solved(self.elastic.matrices(q, hits, sensors)), frequency_hz)

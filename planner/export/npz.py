@@ -7,25 +7,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.errors import writing
-from planner.recording.joints import JointUnits
 
 if TYPE_CHECKING:
     from planner.milling.coupling import CoupledFrf
+    from planner.robot.robot import Robot
 
 
 def save_frfs(
     path: Path, frequency_hz: np.ndarray, mean: np.ndarray, sd: np.ndarray | None,
-    poses: Sequence[str], joints: JointUnits, q: np.ndarray, outside: np.ndarray | None = None,
+    poses: Sequence[str], robot: "Robot", q: np.ndarray, outside: np.ndarray | None = None,
     force_n: np.ndarray | None = None,
 ) -> None:  # fmt: skip
     """Write FRFs (n, 3, 3, F) in m/s²/N at lines (F,) and poses q (n, dof) to exactly this file.
 
-    With which of them lie `outside` (n,) the workspace, and the peak force_n (n,) that was asked
-    for, NaN where none was. `sd` is None where nothing tells it.
+    With whether the robot's sensor, which FRFs are of, is at its tcp, which of them lie `outside`
+    (n,) the workspace, and the peak force_n (n,) that was asked for, NaN where none was. `sd` is
+    None where nothing tells it.
 
     Raises InputError where that cannot be done.
     """
+    joints = robot.joints
     more = {"joint_units": np.array(joints.units)} if any(joints.slides) else {}
+    more["sensor_at_tcp"] = np.array(robot.sensor_at_tcp)
     told = {"frf_sd": sd, "outside": outside, "peak_force_n": force_n}
     more |= {name: values for name, values in told.items() if values is not None}
     _save(path, frequency_hz=frequency_hz, frf_mean=mean, pose=np.array(poses),

@@ -100,12 +100,14 @@ class IdentifiedRobot:
         found = " ".join(self.posterior.words)
         if not found or self.poses >= PLACED:
             return found and f"The recordings show what robot.toml does not state. {found}"
-        return (
-            f"The robot differs from what robot.toml states. All of this together explains it: "
-            f"{found} From {counted(self.poses, 'pose')} each may as well be something like it on "
-            f"another joint or link: repair nothing yet, and "
-            f"measure {counted(PLACED - self.poses, 'more pose')}."
+        said = (
+            f"The robot differs from what robot.toml states. From {counted(self.poses, 'pose')} "
+            f"nothing tells where: repair nothing yet, and measure "
+            f"{counted(PLACED - self.poses, 'more pose')}."
         )
+        if self.poses == 1:  # many sets of causes explain a single pose
+            return said
+        return f"{said} This together explains it, each may be on another joint or link: {found}"
 
 
 def _same(every_hz: np.ndarray, hertz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

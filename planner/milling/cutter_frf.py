@@ -14,6 +14,10 @@ from planner.recording.records import AXES
 
 SEEN = 1e-9  # share of a direction in the plane of the cut that does not count
 LEAST_LINES = 16
+BESIDE = (
+    "These FRFs are of the sensor, which is not at the tcp, and are taken for the tip's: name the "
+    "campaign itself for those of the tip."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +78,7 @@ class CutterFrf:
 
     def _with_cross(self, used: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
         """FRFs between axes in use (3,) that have one each, where these lack, and what they are."""
-        h, known, said = self.receptance.copy(), self._known, []
+        h, known, said = self.receptance.copy(), self._known, [*self.remarks]
         there = used & known.diagonal()
         for i, j in np.argwhere(np.outer(there, there) & ~known):
             h[i, j] = self.receptance[j, i] if known[j, i] else 0.0
@@ -102,7 +106,8 @@ def read_frf(path: Path, pose: str | None, from_names: bool = False) -> CutterFr
         names, held = read_npz(path)
         row, sd = row_of(path, names, pose), held.get("frf_sd")
         name, spread = f"{path}, pose {names[row]}", None if sd is None else sd[row]
-        return of_accelerance(name, held["frequency_hz"], held["frf_mean"][row], spread)
+        found = of_accelerance(name, held["frequency_hz"], held["frf_mean"][row], spread)
+        return found if held.get("sensor_at_tcp", True) else replace(found, remarks=(BESIDE,))
     if pose is not None:
         raise InputError(f"{path} holds FRFs of one pose only; leave --pose out.")
     frequency, frfs = labelled_frfs(read_frfs(path, from_names), "accelerance", InputError)

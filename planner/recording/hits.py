@@ -236,7 +236,7 @@ def _in_the_file(source: Path) -> str:
     """How a file of its kind states the hit's axis."""
     kind = source.name.lower().removesuffix(".gz").rpartition(".")[2]
     return {
-        **dict.fromkeys(("csv", "tsv", "txt"), 'write it as its first line, such as "# hit: +x"'),
+        **dict.fromkeys(("csv", "tsv", "txt"), 'begin the file with a line such as "# hit: +x"'),
         **dict.fromkeys(("uff", "unv", "uf58"), "state it in the file (ref_dir)"),
         "lvm": "write it into its header, as a line of hit, a tab and +x",
         "wav": 'state it in channels.csv (column hit, such as "+x")',

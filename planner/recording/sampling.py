@@ -1,5 +1,6 @@
 """When channels and hits were sampled: rates, and channels that do not begin together."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ SLOWEST_S = 1e6  # between two samples
 # Relative. Times that are rounded to a hundredth of a step, or to six digits, tell the rate of some
 # hundred samples better than that; rates that analysers offer lie a percent or more apart. Chosen.
 ALIKE = 1e-4
+SHORT = 0.6  # of the others' length, below which a record was cut off. Chosen.
 
 
 def sampling_rate(path: Path, time_s: np.ndarray) -> float:
@@ -106,13 +108,24 @@ def same_rate(one: Hit, other: Hit) -> bool:
     return abs(one.sampling_rate_hz / other.sampling_rate_hz - 1) <= ALIKE
 
 
-def sampled_otherwise(hits: Sequence[Hit]) -> tuple[str, ...]:
-    """Per hit, at which other rate than most of them it was sampled; "" where it was not."""
+def recorded_otherwise(hits: Sequence[Hit]) -> tuple[str, ...]:
+    """Per hit, at which other rate than most of them it was sampled, or how much shorter its
+    record is, to which theirs would be cut; "" where neither is so.
+
+    Hits that one record holds last until the next, and are not held against each other.
+    """
     if not hits:
         return ()
     usual = max(hits, key=lambda hit: sum(same_rate(hit, other) for other in hits))
-    return tuple(
-        "" if same_rate(hit, usual) else
-        f"sampled at {hit.sampling_rate_hz:.7g} Hz, the others at {usual.sampling_rate_hz:.7g} Hz"
-        for hit in hits
-    )  # fmt: skip
+    seconds = np.array([len(hit.force_n) / hit.sampling_rate_hz for hit in hits])
+    parts, long_s = Counter(hit.source for hit in hits), float(np.median(seconds))
+    found = []
+    for hit, own in zip(hits, seconds, strict=True):
+        said = ""
+        if not same_rate(hit, usual):
+            said = f"sampled at {hit.sampling_rate_hz:.7g} Hz, the others at "
+            said += f"{usual.sampling_rate_hz:.7g} Hz"
+        elif own < SHORT * long_s and parts[hit.source] == 1:
+            said = f"its record ends after {own:.3g} s, the others after {long_s:.3g} s"
+        found.append(said)
+    return tuple(found)

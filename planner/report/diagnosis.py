@@ -190,8 +190,8 @@ class DiagnosisReport(Answer):
         search = self.found.search
         lines = frequency_lines(search.band_hz)
         mean, sd = self.predict(q, lines, peak_force_n)
-        joints = search.prior.effect_library.stiff.robot.joints
-        save_frfs(npz, lines, mean, sd, poses, joints, q)
+        robot = search.prior.effect_library.stiff.robot
+        save_frfs(npz, lines, mean, sd, poses, robot, q)
         return replace(self, npz=str(npz))
 
     def write(self, folder: Path) -> "DiagnosisReport":

@@ -9,7 +9,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.events import Question
-from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
+from planner.campaign.hit_errors import HitErrorEstimate
 from planner.modal.modes import Homogeneity
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.modes import ModeAnswer
@@ -172,9 +172,8 @@ class ImportedPoses(Answer):
     def of(cls, reports: "tuple[ImportReport, ...]", simulated: bool = False) -> "ImportedPoses":
         """Of what `Campaign.import_paths` gave; hits are told by what all of them taught."""
         model = reports[-1].model
-        every = [hit for own in model.hit_errors.values() for hit in own]
         poses = tuple(PoseImport.of(report, model) for report in reports)
-        common = systematic_errors(every) if any(pose.accepted for pose in poses) else ()
+        common = model.systematic_hit_errors if any(pose.accepted for pose in poses) else ()
         return cls(poses, common, simulated or any(pose.simulated for pose in poses))
 
     @property

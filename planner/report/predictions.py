@@ -139,8 +139,8 @@ def predictions(
         if struck is not None:
             prediction = struck_modes(struck, prediction, angles, force_n)
             mean = mean + change_at_force(struck, angles, force_n, lines)
-    outside, joints = ~campaign.cell.inside(angles), campaign.cell.robot.joints
-    save_frfs(npz, lines, mean, sd, names, joints, angles, outside, force_n if asked else None)
+    outside, robot = ~campaign.cell.inside(angles), campaign.cell.robot
+    save_frfs(npz, lines, mean, sd, names, robot, angles, outside, force_n if asked else None)
     forces = np.full(len(names), np.nan) if force_n is None else force_n
     poses = tuple(
         PosePrediction.of(name, ExpectedMode.all_of(prediction, i), bool(outside[i]), forces[i])
@@ -173,9 +173,7 @@ def robot_predictions(
     if robot.config.law and asked.any():
         there = modes_at_force(simulation, q[asked], force_n[asked], f.shape[1])
         f[asked], ratio[asked] = there.frequency_hz, there.damping_ratio
-    save_frfs(
-        npz, lines, mean, None, names, robot.joints, q, None, force_n if asked.any() else None
-    )
+    save_frfs(npz, lines, mean, None, names, robot, q, None, force_n if asked.any() else None)
     said = () if robot.config.law or not asked.any() else (UNCHANGED,)
     shown = []
     for name, force, *own in zip(names, force_n, f, ratio, strict=True):

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 COLUMNS = "joint and axis", "stated", "refitted ± sd", "unit", "known"
 NOT_KNOWN = (
     "Known, yes: the recordings tell this stiffness; its sd is half of what was assumed before, or "
-    "less. No: they tell less, and the value leans on what was assumed, or it is so far from that "
-    "that something else may have moved it."
+    "less. No: they tell less, and the value leans on what was assumed, or lies so far off what is "
+    "stated that something else may have moved it."
 )
 
 

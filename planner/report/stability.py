@@ -9,7 +9,13 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.campaign.cut_source import StabilityRequest, outside, structure_of, structures_of_file
+from planner.campaign.cut_source import (
+    StabilityRequest,
+    beyond_the_tip,
+    outside,
+    structure_of,
+    structures_of_file,
+)
 from planner.campaign.toolpath_poses import (
     FeedAdvice,
     PathPoses,
@@ -227,7 +233,10 @@ def path_report(
             turned = turn_advice(travelled, cut, answer.best[0], part_of(progress, 0.5, 1.0))
             answer = replace(answer, turn=turned)
         feed = travelled.feed_in_base(answer.feed.turn_deg[answer.feed.best])
-        said = *outside(travelled.campaign, travelled.names, travelled.q), *answer.remarks
+        said = (
+            *outside(travelled.campaign, travelled.names, travelled.q),
+            *beyond_the_tip(travelled.campaign, cut), *answer.remarks,
+        )  # fmt: skip
         answer = replace(answer, feed=replace(answer.feed, direction_base=feed), remarks=said)
 
     def figures():

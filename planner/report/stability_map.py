@@ -8,7 +8,12 @@ import numpy as np
 from rich.console import Group
 from rich.text import Text
 
-from planner.campaign.cut_source import StabilityRequest, ToolChange, at_poses_in_band
+from planner.campaign.cut_source import (
+    StabilityRequest,
+    ToolChange,
+    at_poses_in_band,
+    beyond_the_tip,
+)
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.path import best_speed_of, limits_along
@@ -118,7 +123,7 @@ def map_report(
         wanted_depth_m=wanted[1] if wanted else None,
         wanted_share=share,
         left_out=left_out,
-        remarks=(told,) if left_out else (),
+        remarks=(*beyond_the_tip(campaign, cut), *((told,) if left_out else ())),
         simulated=campaign.state.simulated,
         joint_units=joints.declared,
     )  # fmt: skip

@@ -186,7 +186,7 @@ class ElasticModel:
         layout: Layout = TOOL,
         slopes: bool = False,
     ) -> Matrices:
-        """Matrices of poses q (n, dof) in rad, between named frames of the URDF.
+        """Matrices of poses q (n, dof) in rad, between named frames or points.
 
         Where none are named, between the points of a layout; `slopes` are asked for by
         `with_slopes`. Raises InputError where a frame does not exist.
@@ -194,8 +194,8 @@ class ElasticModel:
         q = np.atleast_2d(q)
         n, e, robot = len(q), self.size, self.robot
         own = robot.layout_ids(layout)
-        ids = [[robot.frame_id("hit frame", name) for name in hits] or own[0]]
-        ids += [[robot.frame_id("sensor frame", name) for name in sensors] or own[1]]
+        ids = [[robot.place_id("hit frame", name) for name in hits] or own[0]]
+        ids += [[robot.place_id("sensor frame", name) for name in sensors] or own[1]]
         # One for each call, so that threads do not meet in it.
         data, weight = self._model.createData(), self._weighed.createData()
         whole = np.empty((n, self._model.nv, self._model.nv))

@@ -61,7 +61,7 @@ def names_of(
     """
     place = {p.name: model.getFrameId(PREFIX + p.name, pin.FrameType.OP_FRAME) for p in points}
     for name, there in ((TCP, tcp), (SENSOR, sensor)):
-        if name in place and not _same(model, place[name], there):
+        if name in place and not is_one_place(model, place[name], there):
             raise InputError(
                 f'{path}: [[point]] "{name}" is not where robot.toml\'s {name}_frame is: state '
                 f'{name}_frame = "{name}" to put that there, or leave out its link and place.'
@@ -70,12 +70,13 @@ def names_of(
     return PointNames(
         {p.name: "".join(axis for axis in AXES if axis in p.axes) for p in points},
         {str(p.node): p.name for p in points if p.node is not None},
-        tuple(name for name, own in place.items() if _same(model, own, tcp)),
-        tuple(name for name, own in place.items() if _same(model, own, sensor)),
+        tuple(name for name, own in place.items() if is_one_place(model, own, tcp)),
+        tuple(name for name, own in place.items() if is_one_place(model, own, sensor)),
     )
 
 
-def _same(model: pin.Model, one: int, other: int) -> bool:
+def is_one_place(model: pin.Model, one: int, other: int) -> bool:
+    """Whether two frames of a model, by their numbers, are one."""
     a, b = model.frames[one], model.frames[other]
     if a.parentJoint != b.parentJoint:
         return False

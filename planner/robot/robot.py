@@ -19,7 +19,7 @@ from planner.robot.config_file import (
     load_config,
     with_axes,
 )
-from planner.robot.points import PREFIX, add_points, check_points, names_of
+from planner.robot.points import PREFIX, add_points, check_points, is_one_place, names_of
 from planner.robot.shapes import UnusableShape, leave_out_unusable
 from planner.robot.urdf import build_model, read_urdf
 from planner.robot.urdf_elements import state_inertias
@@ -180,14 +180,19 @@ class Robot:
     @cached_property
     def tcp_id(self) -> int:
         """Pinocchio's frame number of the tcp."""
-        return self._tool_frame("tcp_frame", self.config.tcp_frame)
+        return self.place_id("tcp_frame", self.config.tcp_frame)
 
     @cached_property
     def sensor_id(self) -> int:
         """Pinocchio's frame number of the sensor."""
-        return self._tool_frame("sensor_frame", self.config.sensor_frame)
+        return self.place_id("sensor_frame", self.config.sensor_frame)
 
-    def _tool_frame(self, entry: str, name: str) -> int:
+    @property
+    def sensor_at_tcp(self) -> bool:
+        """Whether the sensor is where the tool is hit, its axes parallel to the tcp's."""
+        return is_one_place(self.model, self.tcp_id, self.sensor_id)
+
+    def place_id(self, entry: str, name: str) -> int:
         """Number of a frame of the URDF, or of a [[point]] that lies in one of its links."""
         placed = any(p.name == name and p.link for p in self.config.point)
         point = placed and not any(self.model.existFrame(name, kind) for kind in FRAME_TYPES)

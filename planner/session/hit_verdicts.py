@@ -10,7 +10,7 @@ from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import version
 from planner.recording.records import Hit
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, other_size, screen_repeats
-from planner.recording.sampling import sampled_otherwise
+from planner.recording.sampling import recorded_otherwise
 from planner.recording.spectra import driving_point
 from planner.session.inbox import FolderTable
 
@@ -114,7 +114,7 @@ class Verdicts:
     def _beside_repeats(self, judged: list[HitVerdict]) -> list[HitVerdict]:
         """With which do not go with the others, and what a vote among three and more says."""
         hits = [hit for verdict in judged for hit in verdict.hits]
-        rates = dict(zip(map(id, hits), sampled_otherwise(hits), strict=True))
+        rates = dict(zip(map(id, hits), recorded_otherwise(hits), strict=True))
         repeats = dict(zip(map(id, hits), screen_repeats(tuple(hits), self._band), strict=True))
         out = []
         for verdict in judged:

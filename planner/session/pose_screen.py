@@ -256,7 +256,7 @@ def _keys(page: PosePage, can: tuple[bool, bool]) -> str:
         ("R", "refuse all", bool(page.hits)),
         ("b", f"late ones to {' and '.join(sorted(late))}", "late" in kinds),
         ("h", _right_here(kinds), bool(kinds & {"late", "unsure"})),
-        ("s", f"mark {page.proposal.pose} for a second look", True), ("k", "skip this pose", True),
+        ("s", f"mark {page.proposal.pose} for later", True), ("k", "skip this pose", True),
         ("u", "undo", can[0]), ("U", "redo", can[1]), ("q", "quit", True), ("?", "help", True),
     ])  # fmt: skip
 

@@ -6,7 +6,6 @@ from rich.panel import Panel
 from rich.text import Text
 
 from planner.campaign.events import HitRecord, Question
-from planner.campaign.hit_errors import systematic_errors
 from planner.campaign.importing import ImportReport
 from planner.campaign.labels import found_modes
 from planner.campaign.model import Model
@@ -16,7 +15,7 @@ from planner.words import counted, short_name, significant
 
 HELP = """\
 a, Enter  import the hits that wait      r, R  set bad hits, or all, aside
-k         skip this pose; asks whether something stands in the way of those near it too
+k         skip this pose, and those around it if you type what is in the way
 b, h      late hits: b, they are of the pose named; h, of this one (those asked about are right)
 s         mark this pose for a second look (★ in status and report)
 u, U      take back the last act; redo it
@@ -80,8 +79,8 @@ def _missed(report: ImportReport) -> list[RenderableType]:
         column.no_wrap = True
     for hit in hits:
         rows.add_row(*hit.cells)
-    every = [hit for own in report.model.hit_errors.values() for hit in own]
-    return [Text(""), rows, *(Text(habit, style="bold") for habit in systematic_errors(every))]
+    habits = report.model.systematic_hit_errors
+    return [Text(""), rows, *(Text(habit, style="bold") for habit in habits)]
 
 
 def question_panel(question: Question, pose: str, other: str) -> RenderableType:
@@ -96,6 +95,8 @@ def question_panel(question: Question, pose: str, other: str) -> RenderableType:
             f"{question.fits}, import its files once more as another pose with right angles, and "
             f"go on with watch."
         )
+    if question.about == "readback":
+        more += " Where recordings.csv is wrong: correct it, then [u], and the hits are read again."
     parts = Group(text, Text(more), Text(f"{keys}[u] undo  [q] quit", style="dim"))
     return Panel(parts, title=f"Pose {pose}: a question", title_align="left", expand=False)
 

@@ -4,6 +4,7 @@
 """
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -117,6 +118,35 @@ def test_frfs_are_carried_from_the_sensor_to_the_tip(cell):
     found, sd = tip_frfs(campaign, q, lines)
     np.testing.assert_allclose(found[0] - campaign.frf_at(q, lines)[0][0], apart, rtol=1e-6)
     assert np.all(sd > 0)
+
+
+def test_tip_and_sensor_may_be_points_of_robot_toml(cell, tmp_path):
+    campaign, lines = Campaign(cell / "cell"), np.array([12.0, 25.0, 60.0])
+    config = campaign.cell.robot.config
+    shutil.copytree(cell / "robot", tmp_path / "robot")
+    text = (tmp_path / "robot" / "robot.toml").read_text()
+    for name in ("tcp", "sensor"):
+        link = getattr(config, f"{name}_frame")
+        text = text.replace(f'{name}_frame = "{link}"', f'{name}_frame = "{name}_there"')
+        text += f'[[point]]\nname = "{name}_there"\nlink = "{link}"\n'
+    (tmp_path / "robot" / "robot.toml").write_text(text)
+    other = Campaign.new(
+        tmp_path / "cell", tmp_path / "robot" / "robot.toml", cell / "campaign.toml"
+    )
+    assert other.cell.robot.config.tcp_frame == "tcp_there"
+    q = campaign.cell.poses([[10.0, -70.0, 95.0, 20.0, 40.0, -30.0]])
+    for found, known in zip(tip_frfs(other, q, lines), tip_frfs(campaign, q, lines), strict=True):
+        np.testing.assert_allclose(found, known, rtol=1e-9)
+
+
+def test_a_spindle_beyond_the_tip_is_remarked_upon(cell, tmp_path, capsys):
+    remarks = []
+    for z in ("1.0", "-1.0"):
+        text = "".join(line for line in CUT.splitlines(True) if not line.startswith("axis"))
+        (tmp_path / "cut.toml").write_text(f"axis = [0.0, 0.0, {z}]\n{text}")
+        said = asked(cell, capsys, "--cut", tmp_path / "cut.toml", "--map", "--poses", 2)
+        remarks.append(any("beyond the tip" in text for text in said["remarks"]))
+    assert sorted(remarks) == [False, True]
 
 
 @pytest.mark.slow

@@ -106,7 +106,7 @@ class Said:
     ("verdict", "ranked", "words"),
     [
         ("unexplained", ((UNKNOWN, 0.92), (BASE, 0.08)),
-         ("None of the effects that planner knows explains", "(probability 92 %)", "0.9999",
+         ("None of the effects that planner knows explains", "(probability 92 %)", "99.99 %",
           "base compliance at base and transverse compliance at joint_1:")),
         ("unexplained", ((UNKNOWN, 1.0), ((("none", None),), 0.0)),
          ("none of the effects that planner knows describes it",)),

@@ -92,7 +92,8 @@ def test_a_left_over_file_of_the_pose_before_is_left_out_alone(posed, first_pose
     (left,) = (there / "data").glob("*z_3.uff")
     shutil.copy(next((made / "data").glob("*z_1.uff")), left)
     said = session(campaign, inbox, until="8 hits in").flat
-    assert f"imported as a recording of pose {pose.pose}, and cannot" in said
+    assert "the same data are in use as" in said
+    assert f"of pose {pose.pose}; put what was recorded at" in said
     assert [len(m.accepted) for m in campaign.state.used] == [9, 8]
 
 

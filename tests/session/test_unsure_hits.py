@@ -2,6 +2,7 @@
 
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -191,3 +192,21 @@ def test_a_foreign_file_of_long_ago_is_not_said_to_be_written(tmp_path):
     time.sleep(0.1)  # the size stood still, though not for as long as a new file has to
     assert box.scan(none_known) == ([], [])
     assert box.ignored() == [old]
+
+
+def test_a_record_that_was_cut_off_is_not_taken(bench):
+    for name, axis in (("x1", "+x"), ("x2", "+x"), ("y1", "+y")):
+        bench.hit(name, axis)
+    (read,), _ = Source(bench.files[1], "x2").read()
+    for name, share in (("short", 0.4), ("shorter", 0.8)):
+        count = round(share * len(read.force_n))
+        cut = replace(
+            read, force_n=read.force_n[:count], acceleration_m_s2=read.acceleration_m_s2[:, :count]
+        )
+        bench.files.append(write_hit(bench.folder / f"{name}.csv", cut))
+    found = bench.of()
+    assert kinds(found)["short"] == "repeat"
+    assert "its record ends after 0.8 s, the others after 2 s" in found["short"].text
+    assert {"x1": "good", "x2": "good", "y1": "good", "shorter": "good"}.items() <= (
+        kinds(found).items()
+    )
