@@ -236,7 +236,8 @@ HALF_RAD, HALF_M = np.deg2rad(20.0), 0.25  # half widths of ranges, before they 
 NARROWER = 0.7  # by which all are, as long as too many of their poses cannot be
 REACHED = 0.75  # share of poses in the ranges that must be free
 POSES, LOOKED_AT, NARROWINGS, SOME = 800, 48, 8, 8
-DOWN = 0.3  # how much the tool's direction counts, against distances in units of the arm
+DOWN, BENT = 0.3, 0.3  # how much the tool's direction counts, and how far joints stand from their
+# middles on the mean, against distances in units of the arm
 SINGULAR = 0.01  # see `singularity`
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -286,7 +287,8 @@ def _by_nearness(robot: Robot) -> np.ndarray:
     _, place = robot.forward_batch(q)
     target = _shoulder(robot, middle) + arm * AHEAD * _ahead(robot, middle)
     down = np.array([tool_direction(robot, one) @ -UP for one in q])
-    cost = np.linalg.norm(place - target, axis=1) / arm + DOWN * (1 - down)
+    bent = np.mean(np.abs(q - middle) / np.maximum(away, 1e-9), axis=1)
+    cost = np.linalg.norm(place - target, axis=1) / arm + DOWN * (1 - down) + BENT * bent
     return q[np.argsort(cost, kind="stable")]
 
 
