@@ -109,15 +109,17 @@ def withdraw(
     reason: Annotated[str, option("Why; kept in the log.")] = "",
     as_json: AsJson = False,
 ) -> int:
-    """Set a measured pose aside; its recordings stay.
+    """Set a measured pose aside, or hits that are held; their recordings stay.
 
     Example: planner withdraw cell7 P003 --reason "loose sensor"
     """
     from planner.campaign.campaign import Campaign
     from planner.report.campaign_changes import withdrawn
 
-    Campaign(directory).withdraw(pose, reason)
-    return respond(withdrawn(directory, pose, reason), as_json)
+    campaign = Campaign(directory)
+    held = pose in campaign.state.held
+    campaign.withdraw(pose, reason)
+    return respond(withdrawn(directory, pose, reason, held), as_json)
 
 
 def skip(

@@ -128,12 +128,20 @@ def _told(entries: Sequence[Entry], what: str) -> tuple[dict[str, Any], str]:
     return keys, f"{in_words(entry)}{follow}"
 
 
-def withdrawn(directory: Path, pose: str, reason: str) -> Done:
-    """Answer of `withdraw`."""
+def withdrawn(directory: Path, pose: str, reason: str, held: bool) -> Done:
+    """Answer of `withdraw`, of a measured pose or of hits that were `held`."""
+    keys = {"withdrawn": pose, "reason": reason}
+    if held:
+        return Done(
+            keys,
+            f"The hits of {pose} that were held are set aside; their recordings are kept. Hit it "
+            f"again, or import corrected files: "
+            f"{command('planner', 'import', directory, 'FOLDER', '--pose', pose)}.",
+        )
     again = command("planner", "confirm", directory, pose)
     anew = command("planner", "import", directory, "FOLDER", "--pose", f"{pose}b")
     return Done(
-        {"withdrawn": pose, "reason": reason},
+        keys,
         f"Pose {pose} is set aside; its recordings are kept. To use them again: {again}. Corrected "
         f"or new ones take another name: {anew}.",
     )
