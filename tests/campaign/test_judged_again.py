@@ -72,7 +72,7 @@ def test_the_same_files_without_a_table_are_of_the_pose_they_were_imported_at(fi
     told += f"({len(others)} more files are copies, too); nothing changed."
     assert (code, "".join(told.split()) in "".join(out.split())) == (0, True)
     code, _, said = call("import", folder, made / "data", "--pose", "P002")
-    assert (code, f"a recording of pose {pose}" in said) == (2, True)
+    assert (code, f" of pose {pose}; put" in said) == (2, True)
 
 
 def test_held_files_are_judged_again_once_their_row_is_corrected(first):
@@ -147,7 +147,7 @@ def test_a_file_of_another_pose_does_not_keep_the_others_out(first, tmp_path):
     shutil.copy(next((first.made / "data").glob("*z_1.uff")), left)
     code, _, said = call("import", folder, there)
     assert (code, said.count("Refused"), left.name in said) == (3, 1, True)
-    assert f"recording of pose {pose}, and cannot belong to {second.pose}" in said
+    assert f"of pose {pose}; put what was recorded at {second.pose}" in said
     assert f"(planner withdraw '{folder}' {pose})" in " ".join(said.split())
     assert [len(m.accepted) for m in Campaign(folder).state.used] == [9, 8]
 
