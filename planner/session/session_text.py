@@ -16,7 +16,7 @@ from planner.words import counted, short_name, significant
 HELP = """\
 a, Enter  import the hits that wait      r, R  set bad hits, or all, aside
 k         skip this pose, and those around it if you type what is in the way
-b, h      late hits: b, they are of the pose named; h, of this one (those asked about are right)
+b, h      late hits: b, of the pose named; h, of this one (or: these are right)
 s         mark this pose for a second look (★ in status and report)
 u, U      take back the last act; redo it
 q         quit; everything is on disk, and planner watch goes on from here"""
