@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.inference.covariance import eigen
+
 PROPORTIONAL = 1e-10  # off-diagonal modal damping below this is rounding
 # A critically damped mode has a double pole, for which there is no residue: split by this share
 # of |λ|, it errs by SPLIT² and its two large residues cancel to rounding / SPLIT, both ~ 1e-11.
@@ -95,7 +97,7 @@ def solve_poles(
 def normal_modes(mass: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Undamped modes of M and K (n, e, e): ω² (n, e), ascending, and mass-normalised shapes."""
     lower = np.linalg.cholesky(mass)
-    square, vectors = np.linalg.eigh(_whiten(lower, stiffness))
+    square, vectors = eigen(_whiten(lower, stiffness))
     return square, np.linalg.solve(np.swapaxes(lower, 1, 2), vectors)
 
 

@@ -11,7 +11,7 @@ from scipy.stats import ortho_group
 
 from planner.inference import triangular
 from planner.inference.assignment import least_cost
-from planner.inference.covariance import covariance_root, inverse
+from planner.inference.covariance import covariance_root, eigen, inverse
 from planner.inference.log_space import log_sum, shares
 
 
@@ -57,6 +57,11 @@ def test_eigenvalues_where_divide_and_conquer_does_not_converge(monkeypatch):
     monkeypatch.setattr(np.linalg, "eigh", fails)
     for root in (there, covariance_root(matrix)):
         np.testing.assert_allclose(root @ root.T, matrix, atol=1e-13)
+    values, vectors = eigen(np.stack([matrix, 2 * matrix]))
+    np.testing.assert_allclose(values[1], 2 * values[0])
+    np.testing.assert_allclose(vectors[0] * values[0] @ vectors[0].T, matrix, atol=1e-13)
+    with pytest.raises(np.linalg.LinAlgError):
+        eigen(np.full((2, 2), np.nan))
 
 
 def test_no_variance_is_negative_where_a_barrier_stands_close():
