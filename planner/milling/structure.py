@@ -163,8 +163,8 @@ def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
     ]
     if np.any(spread > 0):
         remarks.append(
-            f"Depths at 95 % draw each mode's frequency, damping and size within the FRFs' sd, of "
-            f"which that gives {100 * given:.0f} % (of its square)."
+            f"Depths at 95 %: frequency, damping and size of each mode are drawn so that the FRFs "
+            f"scatter by their sd ({100 * given:.0f} % of its square is met)."
         )
     noisy = fit if plane.sd is None and fit.error > ROUNDING else None
     return Structure(fit.modes, spread, plane, tuple(remarks), noisy)
