@@ -201,13 +201,14 @@ def at_poses_in_band(
         cuts = [turned_to(cut, *row) for row in zip(rotation, feeds, names, strict=True)]
     else:
         cuts = cuts_at(cut, rotation, position, names)
-    mean, sd = tip_frfs(campaign, q, lines)
+    at_tip = tip_frfs(campaign, q, lines) if change is None else None
     for i, name in enumerate(names):
         where, remarks = f"{campaign.directory}, pose {name}", ()
-        if change is None:
-            frf = of_accelerance(where, lines, mean[i], sd[i])
+        if at_tip is not None:
+            frf = of_accelerance(where, lines, at_tip[0][i], at_tip[1][i])
         else:
-            tip = tip_at(campaign, name, q[i], lines, mean[i], sd[i])
+            assert change is not None
+            tip = tip_at(campaign, name, q[i], lines)
             frf, remarks = change.coupled(tip, where)
         try:
             yield _with(of_frf(replace(frf, simulated=simulated), cuts[i]), remarks)
@@ -277,8 +278,7 @@ def tip_of(
     if is_campaign(source):
         campaign = Campaign(source)
         q, lines = campaign.posture(pose), campaign.frequency_lines
-        mean, sd = tip_frfs(campaign, q[None], lines)
-        tip = tip_at(campaign, str(pose), q, lines, mean[0], sd[0])
+        tip = tip_at(campaign, str(pose), q, lines)
         return replace(tip, simulated=campaign.state.simulated), str(pose)
     if several_poses([source]):
         from planner.campaign.posture_tip import posture_tip
@@ -305,16 +305,18 @@ def tip_of(
     return completed(found, Simulation(loaded), q), found.name
 
 
-def tip_at(
-    campaign: Campaign, pose: str, q: np.ndarray, lines: np.ndarray, mean: np.ndarray,
-    sd: np.ndarray,
-) -> "TipReceptance":  # fmt: skip
-    """Of a campaign's accelerance (3, 3, F) and its sd at q (dof,), with its simulation's turns."""
+def tip_at(campaign: Campaign, pose: str, q: np.ndarray, lines: np.ndarray) -> "TipReceptance":
+    """Of what the campaign's sensor shows at q (dof,) in rad at `lines` (F,) in Hz.
+
+    `completed` carries it to the tip and adds the turns, both by the simulation. InputError where
+    there is none.
+    """
     from planner.milling.tip_files import MEASURE, completed
 
     simulation = campaign.model.low.simulation
     if simulation is None:
         raise InputError(f"{campaign.directory} has no simulation for the rotations; {MEASURE}.")
+    (mean,), (sd,) = campaign.frf_at(q[None], lines)
     s2 = (2j * np.pi * lines) ** 2
     return completed(CutterFrf(pose, lines, mean / s2, sd / np.abs(s2)), simulation, q)
 

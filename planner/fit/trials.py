@@ -153,8 +153,7 @@ class Trials:
         near = _best_of_each(p for p in pool if p and p.evidence > least)
         near = _best_of_each(parallel_map(lambda p: self._stepped(p, data), near[:FOLLOWED]))
         won = near[0].evidence - base.evidence if near else 0.0
-        least = base.evidence + min(WON_BACK * won, won - FAR)
-        near = [p for p in near if p.evidence >= least][:count]
+        near = [p for p in near if p.evidence - base.evidence >= min(WON_BACK * won, won)][:count]
         ends = parallel_map(lambda p: self._settled(p, data), near)
         found = (self._from(p, data) for p in ends)
         told = (f for f in found if self.may_be_named(base, f, f.structure.effects[-1]))

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.cut_source import tip_frfs
+from planner.campaign.cut_source import tip_at, tip_frfs
 from planner.cli.run import run
+from planner.milling.cutter_frf import CutterFrf
+from planner.milling.tip_files import completed
 from planner.proof.arms import KR10
 from planner.proof.load import load_truth
 from tests.support.rerun_columns import lines_of
@@ -118,6 +120,32 @@ def test_frfs_are_carried_from_the_sensor_to_the_tip(cell):
     found, sd = tip_frfs(campaign, q, lines)
     np.testing.assert_allclose(found[0] - campaign.frf_at(q, lines)[0][0], apart, rtol=1e-6)
     assert np.all(sd > 0)
+
+
+def test_a_tool_is_coupled_to_what_the_sensor_shows(cell):
+    """Carried to the tip once: of the simulation's own FRFs exactly."""
+    campaign, lines = Campaign(cell / "cell"), np.array([12.0, 25.0, 60.0])
+    simulation, s2 = campaign.model.low.simulation, (2j * np.pi * lines) ** 2
+    q = campaign.cell.poses([[10.0, -70.0, 95.0, 20.0, 40.0, -30.0]])
+    shown = simulation.accelerance(q, lines)[0] / s2
+    tip = completed(CutterFrf("", lines, shown, 0 * np.abs(shown)), simulation, q[0])
+    there = simulation.frfs(q, lines, sensors=("tcp",), quantity="receptance")[0, 0, :, 0]
+    found = np.moveaxis(tip.receptance[:, :3, :3], 0, -1)
+    np.testing.assert_allclose(found, there, atol=1e-9 * np.abs(there).max())
+    measured = np.moveaxis(tip_at(campaign, "P", q[0], lines).measured, 0, -1)
+    np.testing.assert_allclose(measured, campaign.frf_at(q, lines)[0][0] / s2)
+
+
+def test_frfs_of_a_sensor_beside_the_tip_are_said_to_be_that(cell, tmp_path, capsys):
+    q = Campaign(cell / "cell").cell.robot.joints.columns
+    (tmp_path / "p.csv").write_text(",".join(["pose", *q]) + "\nA,10,-70,95,20,40,-30\n")
+    poses, npz = str(tmp_path / "p.csv"), str(tmp_path / "p.npz")
+    assert run(["predict", str(cell / "cell"), poses, "--out", npz]) == 0
+    capsys.readouterr()
+    (tmp_path / "cut.toml").write_text((cell / "cut.toml").read_text().replace('"base"', '"frf"'))
+    cut = str(tmp_path / "cut.toml")
+    assert run(["stability", npz, "--cut", cut, "--samples", "20", "--json"]) == 0
+    assert any("not at the tcp" in text for text in json.loads(capsys.readouterr().out)["remarks"])
 
 
 def test_tip_and_sensor_may_be_points_of_robot_toml(cell, tmp_path):
