@@ -244,14 +244,16 @@ def _blueprint(cell: Cell, progress: str) -> rrb.Blueprint:
         name="Decisions",
         columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"]),
     )
-    beside = rrb.Vertical(figure_view("frf/xx", "FRF xx of the tool"), learning_view(progress), log)
+    target = cell.config.stop.frequency_sd_percent
+    learning = learning_view(progress, target)
+    beside = rrb.Vertical(figure_view("frf/xx", "FRF xx of the tool"), learning, log)
     frfs = [figure_view(f"frf/{a}{a}", f"FRF {a}{a} of the tool") for a in AXES]
     return rrb.Blueprint(
         rrb.Tabs(
             rrb.Horizontal(robot, beside, column_shares=[3, 2], name="Cell"),
             rrb.Grid(*frfs, figure_view("hits/force", "Force of the hits"), name="FRFs"),
             mode_views(count, _eye(cell, NEAR)),
-            progress_views(progress, count),
+            progress_views(progress, count, target),
             rrb.TextDocumentView(origin="/note", name="What is what"),
         ),
         rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="following"),

@@ -16,8 +16,10 @@ from planner.report.plot_marks import AXES, FAINTEST, magnitude, name_axes, pane
 LINES = 300  # frequency lines of a plot: as many as its width shows
 PULSE_MS = (-5.0, 35.0)  # of a hit, shown from its peak
 SIZE = (7.0, 3.6)  # inches
-EXPECTED, SPREAD, TARGET = (255, 150, 40), (150, 95, 40), (120, 200, 120)
-MEASURED, ALL = (235, 235, 235), (150, 154, 158)
+NEAR_TARGET = 4.0  # times the target: what is shown; before the first measurement sds are far above
+EXPECTED, SPREAD = (255, 150, 40), (150, 95, 40)
+MEASURED = TARGET = (235, 235, 235)
+ALL = (150, 154, 158)
 
 
 def frf_figures(
@@ -155,19 +157,30 @@ def _style(name: str) -> list[rr.SeriesLines | rr.SeriesPoints]:
     return [dots] if kind == "measured" else [line] if thin or kind == "target" else [line, dots]
 
 
-def progress_views(path: str, count: int) -> rrb.Container:
+def progress_views(path: str, count: int, target_percent: float) -> rrb.Container:
     """What is not known yet, and the frequencies measured against those expected."""
     modes = [
         rrb.TimeSeriesView(origin=f"/{path}/frequency/mode_{k}", name=f"mode {k}: frequency (Hz)")
         for k in range(1, count + 1)
     ]
-    damping = rrb.TimeSeriesView(origin=f"/{path}/damping", name="damping (%), ± 2 sd")
+    damping = rrb.TimeSeriesView(
+        origin=f"/{path}/damping",
+        name="damping (%), ± 2 sd; colours as on the left",
+        plot_legend=rrb.PlotLegend(visible=False),
+    )
     return rrb.Horizontal(
-        learning_view(path), rrb.Grid(*modes, damping), column_shares=[2, 3], name="Progress"
+        learning_view(path, target_percent),
+        rrb.Grid(*modes, damping),
+        column_shares=[2, 3],
+        name="Progress",
     )
 
 
-def learning_view(path: str) -> rrb.TimeSeriesView:
-    """The sd of the natural frequencies over the workspace."""
-    name = "What is not known yet: sd of the natural frequencies (%)"
-    return rrb.TimeSeriesView(origin=f"/{path}/learning", name=name)
+def learning_view(path: str, target_percent: float) -> rrb.TimeSeriesView:
+    """The sd of the natural frequencies over the workspace, near its target."""
+    return rrb.TimeSeriesView(
+        origin=f"/{path}/learning",
+        name="What is not known yet: sd of the natural frequencies (%)",
+        axis_y=rrb.ScalarAxis(range=(0.0, NEAR_TARGET * target_percent)),
+        plot_legend=rrb.PlotLegend("RightTop"),
+    )
