@@ -152,8 +152,8 @@ class DemonstrationReport(Answer):
         first, *later = (step.seconds for step in self.steps)
         lines = [
             *self.campaign.model.remarks,
-            f"On {len(self.measured_hz)} poses that were never used. Refit and next proposal: "
-            f"first {first:.2f} s, then at most {max(later, default=0.0):.2f} s.",
+            f"RMSE is of {len(self.measured_hz)} poses that were never used. Refit and next "
+            f"proposal: first {first:.2f} s, then at most {max(later, default=0.0):.2f} s.",
             f"Campaign: {self.campaign.directory}",
             f"Rerun recording: {self.rrd} (open with: rerun FILE)",
         ]

@@ -136,7 +136,7 @@ def joint_offsets(
     for i, by in enumerate(parallel_map(best, range(len(axes)))):
         if by:
             angle = stated[i] + by * same[i]
-            what = f"fit another angle far better: is {either(joints, i, angle, stated[i])}?"
+            what = f"fit {instead(joints, i, angle, stated[i])} far better."
             yield Alternative(there(i, by), what, about="readback", rarer=_rarer(len(axes)))
 
 
@@ -193,11 +193,11 @@ def flipped_signs(joints: JointUnits, joints_deg: tuple[float, ...]) -> Iterator
     stated = np.array(joints_deg)
     for i in np.flatnonzero(np.abs(stated) > joints.same()).tolist():
         other = np.where(np.arange(len(stated)) == i, -stated, stated)
-        what = f"fit the other sign of an angle: is {either(joints, i, other[i], stated[i])}?"
+        what = f"fit {instead(joints, i, other[i], stated[i])} far better: a wrong sign?"
         yield Alternative(joints.internal([other])[0], what, about="readback")
 
 
-def either(joints: JointUnits, number: int, one: float, other: float) -> str:
-    return (
-        f"{joints.names[number]} {joints.text(number, one, 2)} or {joints.text(number, other, 2)}"
-    )
+def instead(joints: JointUnits, number: int, fits: float, stated: float) -> str:
+    """A joint's angle that hits fit, and the one that is stated."""
+    name, text = joints.names[number], joints.text
+    return f"{name} at {text(number, fits, 2)}, not at {text(number, stated, 2)} as stated,"

@@ -86,7 +86,7 @@ def _told(hit: Hit, doubt: Doubt, first: str, others: str, both_doubted: bool) -
         return f"{first}, along {hit.axis[-1]}, {other_size(doubt.size, others).rstrip('?')}"
     if doubt.along:
         return f"{first} is said to be {hit.axis}, but answers as {others} along {doubt.along} did"
-    said = f"(likeness {doubt.likeness:.2f})"
+    said = f"(correlation {doubt.likeness:.2f})"
     if both_doubted:
         verb = "disagree" if " and " in first else "disagrees"
         return (

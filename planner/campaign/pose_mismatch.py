@@ -19,9 +19,9 @@ from planner.campaign.alternatives import (
     Alternative,
     StatedHits,
     chain_faults,
-    either,
     far_off_hits,
     flipped_signs,
+    instead,
     joint_offsets,
 )
 from planner.campaign.chain_mismatch import chain_mismatch
@@ -104,8 +104,8 @@ def _setpoint(
     joints = model.cell.robot.joints
     sent = state.proposals[pose].joints_deg if pose in state.proposals else joints_deg
     typed = np.flatnonzero(np.abs(np.subtract(sent, joints_deg)) > joints.same()).tolist()
-    which = ", ".join(either(joints, i, sent[i], joints_deg[i]) for i in typed)
-    what = f"fit the setpoint of {pose} better than its readback: is {which}?"
+    which = " ".join(instead(joints, i, sent[i], joints_deg[i]) for i in typed)
+    what = f"fit the setpoint of {pose} ({which.rstrip(',')}) better than its readback."
     if np.all(np.abs(np.rad2deg(joints_deg) - sent) < NEAR_DEG):
         what = f"fit the setpoint of {pose} better than its readback: are its angles in radians?"
     there = joints.internal([sent])[0]
@@ -144,7 +144,7 @@ def _asked(pose: str, off_percent: float, fits: Alternative | None) -> Question:
     if fits is not None and fits.about == "chain":
         text = f"At {pose}, {fits.what} Are these hits right as they are?"
     elif fits is not None and fits.about == "readback":
-        text = f"These hits {fits.what} Are the angles right as they are?"
+        text = f"These hits {fits.what} Are the angles right as stated?"
     elif fits is not None and fits.about == "earlier":
         again = fits.pose == pose
         those = f"those of {fits.pose}" + (" before" if again else "")

@@ -64,6 +64,12 @@ def last_undone(entries: Sequence[Entry]) -> tuple[Entry | None, tuple[Entry, ..
     return None, ()
 
 
+def in_short(entry: Entry) -> str:
+    """What an act was, and of which pose, where it is of one: "imported P004"."""
+    told = msgspec.to_builtins(entry.event)
+    return f"{told['kind']} {told.get('pose', '')}".strip()
+
+
 def in_words(entry: Entry) -> str:
     """What an entry of the log says, in words."""
     event = entry.event

@@ -96,4 +96,4 @@ def _stiffness(values: Mapping[str, tuple[float, float]]) -> str:
     for name, (value, sd) in known.items():
         unit = "N/m" if " along " in name else "N·m/rad"
         said.append(f"{name.split(' ', 1)[1]} {with_sd(value, sd)} {unit}")
-    return ", ".join(said) if said else "the recordings do not tell yet by how much"
+    return f"stiffness {', '.join(said)}" if said else "the recordings do not tell yet by how much"

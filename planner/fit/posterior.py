@@ -178,7 +178,7 @@ class RobotPosterior(RobotBelief):
     def words(self) -> tuple[str, ...]:
         """What the structure has beside what is stated and that matters, and by how much."""
         return tuple(
-            f"{words} Without that, simulated FRFs would be {significant(100 * share)} % off."
+            f"{words} A simulation without it has FRFs {significant(100 * share)} % off."
             for share, words in self._told(artefacts=False)
         )
 

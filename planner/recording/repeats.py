@@ -107,7 +107,7 @@ class _Alike:
                 continue
             same = [self.frfs[j] for j in group if j != i and self.level[j] == self.level[i]]
             if told := _disagreement(self.frfs[i], own, across, same):
-                text = f"Its FRF {told[1]} (likeness {share:.2f}, others {typical:.2f})"
+                text = f"Its FRF {told[1]} (correlation {share:.2f}, others {typical:.2f})"
                 yield i, Fault(told[0], f"{text}; check axis and hit point, and hit again.")
 
     def doubt(self, i: int) -> Doubt | None:
@@ -330,4 +330,4 @@ def other_size(size: float, others: str) -> str:
     theirs = [f"those in {unit}" for grown, unit in UNITS.items() if abs(size + grown) < NEAR_UNIT]
     unit, way = "".join(own or theirs), "larger" if size > 0 else "smaller"
     unit = unit or "another unit or sensitivity"
-    return f"is {np.exp(abs(size)):.2g} times {way} than {others}: {unit}?"
+    return f"has an FRF {np.exp(abs(size)):.2g} times {way} than {others}: {unit}?"

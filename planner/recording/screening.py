@@ -6,6 +6,7 @@ import numpy as np
 
 from planner.recording.channel_faults import channel_faults, step
 from planner.recording.records import Fault, Hit
+from planner.words import significant
 
 LEAST_LINES = 8  # frequency lines in the band: fewer hold no mode
 QUIET_SAMPLES, ANSWER_S = 12, 0.25  # from which noise is judged, and the answer to a hit
@@ -43,7 +44,9 @@ def screen(hit: Hit, band_hz: Band) -> tuple[Fault, ...]:
 def _weak(hit: Hit) -> Iterator[Fault]:
     peak, noise, ratio = hit.pulse.peak_n, hit.pulse.noise_n, _response_snr(hit)
     if peak < LEAST_SNR * noise:
-        text = f"The force peak of {peak:.3g} N is only {peak / noise:.1f} times the noise"
+        text = (
+            f"The force peak of {significant(peak, 3)} N is only {peak / noise:.1f} times the noise"
+        )
         yield Fault("too_weak", f"{text}; hit harder.")
     told = any(fault.kind == "not_at_rest" for fault in hit.faults)
     if ratio is not None and not told and ratio < LEAST_RESPONSE_SNR:
@@ -73,8 +76,8 @@ def _pulse(hit: Hit) -> Iterator[Fault]:
     if hit.force_n[pulse.peak] <= pulse.offset_n:
         yield Fault(
             "polarity",
-            f"The force pulse of {pulse.peak_n:.3g} N is negative: a hammer only pushes; check the "
-            f"polarity of the force channel.",
+            f"The force pulse of {significant(pulse.peak_n, 3)} N is negative: a hammer only "
+            f"pushes; check the polarity of the force channel.",
         )
     if pulse.first < LEAST_PRETRIGGER:
         yield Fault("truncated", "The pulse starts at the record's edge; set a pre-trigger.")
@@ -98,7 +101,8 @@ def _double(hit: Hit) -> Iterator[Fault]:
     if max(second, valley) > least:
         yield Fault(
             "double_hit",
-            f"A second pulse of {max(second, valley):.3g} N follows the first of {peak:.3g} N; "
+            f"A second pulse of {significant(max(second, valley), 3)} N follows the first of "
+            f"{significant(peak, 3)} N; "
             f"hit once and let it bounce off.",
         )
 

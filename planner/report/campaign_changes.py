@@ -110,13 +110,13 @@ def kind_of(entry: Entry) -> str:
 def undone(entries: Sequence[Entry]) -> Done:
     """Answer of `undo`: the log's entry that was taken back, and those that went with it."""
     keys, words = _told(entries, "undone")
-    return Done(keys, f"Took back entry {keys['undone']} of the log ({words}).")
+    return Done(keys, f"Undone: {words} (entry {keys['undone']} of the log).")
 
 
 def redone(entries: Sequence[Entry]) -> Done:
     """Answer of `redo`: the log's entry that holds again, and those that came with it."""
     keys, words = _told(entries, "redone")
-    return Done(keys, f"Entry {keys['redone']} of the log holds again ({words}).")
+    return Done(keys, f"Redone: {words} (entry {keys['redone']} of the log).")
 
 
 def _told(entries: Sequence[Entry], what: str) -> tuple[dict[str, Any], str]:

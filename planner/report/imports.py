@@ -222,13 +222,11 @@ def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
             f"{'the new hits' if asked.fits == pose else pose} are wrong: {withdraw}."
         )
     if asked.disagree or asked.about:
-        right = "they are" if asked.about else "each is"
         return (
-            f"{asked.text} The new hits of {pose} are held, not used. Where files or "
-            f"recordings.csv are wrong, correct them and import again (--pose {pose}); to take the "
-            f"import back: "
-            f"{command('planner', 'undo', directory)}; if {right} right: {confirm}; to set all "
-            f"aside: {withdraw}."
+            f"{asked.text} The new hits of {pose} are held, not used. If they are right: "
+            f"{confirm}. If files or recordings.csv are wrong: correct them and import again "
+            f"(--pose {pose}). To refuse all: {withdraw}. To undo the import: "
+            f"{command('planner', 'undo', directory)}."
         )
     there = command(asked.fits or "OTHER")
     return (

@@ -13,6 +13,7 @@ from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, other_si
 from planner.recording.sampling import recorded_otherwise
 from planner.recording.spectra import driving_point
 from planner.session.inbox import FolderTable
+from planner.words import significant
 
 BAD = ("repeat", "unsure", "unstated")  # kinds of verdicts on which something is to be done
 Part = tuple[Path, int]  # which of a file's hits, from 1
@@ -212,8 +213,8 @@ def _weak(verdict: HitVerdict, usable: list[Hit]) -> HitVerdict:
     if usual is None:
         return verdict
     text = (
-        f"{own.pulse.peak_n:.3g} N, others {usual:.3g} N (median) along {own.axis[-1]}; "
-        f"hit harder, or as softly once more if a level of its own is meant."
+        f"{significant(own.pulse.peak_n, 3)} N, others {significant(usual, 3)} N (median) along "
+        f"{own.axis[-1]}; hit harder, or as softly once more if a level of its own is meant."
     )
     return replace(verdict, kind="repeat", text=text, weak=True)
 
@@ -224,4 +225,4 @@ def _asked(hit: Hit, doubt: Doubt, others: str) -> str:
         return f"{other_size(doubt.size, others)} {again.capitalize()}"
     if doubt.along:
         return f"answers as {others} along {doubt.along} did: {again}"
-    return f"disagrees with {others} (likeness {doubt.likeness:.2f}): {again}"
+    return f"disagrees with {others} (correlation {doubt.likeness:.2f}): {again}"

@@ -20,11 +20,10 @@ from planner.session.pose_screen import page_with_hits, page_without_hits
 from planner.session.session_state import BAD, PoseInProgress, Session, SessionState
 from planner.words import by_reason, counted, short_name
 
-ENTER = ("a", "\n", "\r")
 IMPORTING = "importing and refitting"
 ESCAPE, ERASE = "\x1b", ("\x7f", "\b")
 ASKED = (
-    "What stands in the way? Type it, then Enter: poses around it are left out too.\n"
+    "Is something in the way? Name it, then Enter: poses near this one are skipped too.\n"
     "Enter alone skips this pose only, Escape goes back. "
 )
 
@@ -85,7 +84,7 @@ def _act(
     asked, state = replace(state, visit=replace(visit, asked=key)), replace(state, visit=visit)
     over = replace(state, visit=None)
     match key:
-        case "a" | "\n" | "\r":
+        case "a":
             if visit.any_of("good") and not visit.page.complete and not again:
                 session.say(session_text.incomplete(visit.page), "yellow")
                 return asked
@@ -162,7 +161,7 @@ def _refuse(session: Session, visit: PoseInProgress, files: Collection[Path]) ->
     session.campaign.refuse(visit.proposal.pose, chosen, visit.reasons(chosen), stated)
     session.rerun_queue.note()
     numbers = [str(v.number) for v in visit.verdicts if v.path in chosen]
-    said = f"{counted(len(numbers), 'hit')} set aside ({', '.join(numbers)})"
+    said = f"{counted(len(numbers), 'hit')} refused ({', '.join(numbers)})"
     session.say(f"{said}; hit again ([u] takes that back).")
 
 
@@ -249,7 +248,7 @@ def answer(session: Session, state: SessionState, key: str | None, other: str) -
     """
     campaign, pose = session.campaign, state.asking
     answered = replace(state, asking="")
-    if key in ENTER:
+    if key == "a":
         with session.screen.working("refitting"):
             campaign.confirm(pose)
             session.rerun_queue.note()
@@ -258,7 +257,10 @@ def answer(session: Session, state: SessionState, key: str | None, other: str) -
     elif key == "r":
         campaign.refuse_held(pose)
         session.rerun_queue.note()
-        session.say(f"The hits of {pose} are set aside; hit again ([u] takes that back).")
+        session.say(
+            f"The hits of {pose} are refused: mend the cause, then hit or export again ([u] takes "
+            f"that back)."
+        )
     elif key == "o" and other:
         with session.screen.working(IMPORTING):
             report = campaign.move(pose, other)
@@ -285,7 +287,7 @@ def measured(session: Session, state: SessionState, pose: str) -> SessionState:
     if session.explaining is not None and len(logged.used) >= LEAST:
         session.explaining.ask()
     if further.announced and not state.announced:
-        session.say("The target of campaign.toml is reached.", "bold green")
+        session.say("The target of campaign.toml is reached: [q] ends.", "bold green")
     return further
 
 

@@ -26,9 +26,15 @@ COLOURS = {"good": "bold green", "repeat": "bold red", "late": "bold yellow",
            "elsewhere": "yellow", "unsure": "bold yellow", "unstated": "bold yellow"}  # fmt: skip
 
 
-def verdict_in_words(hit: HitVerdict, whole: bool = True) -> Text:
-    """What is to be done about a hit, in colour; after it why, where the `whole` is said."""
+def verdict_in_words(hit: HitVerdict, whole: bool = True, again: bool = True) -> Text:
+    """What is to be done about a hit, in colour; after it why, where the `whole` is said.
+
+    A bad one is not to be hit `again` where its axis has its hits.
+    """
     do, why = remedy_first(hit.text)
+    if hit.kind == "repeat" and not again:
+        said = f"hit {hit.number} ({hit.axis}): not used"
+        return Text(f"{said}: {why or do}" if whole else said, "dim")
     text = f"{do} {why}".strip() if whole else do
     named = f"{hit.number} ({(hit.axis or 'axis not stated') + when(hit.at_s)})"
     if hit.kind == "good":
@@ -86,7 +92,8 @@ class PosePage:
         path, most = command(self.folder), WIDTH - 25
         # Of one that is too long for the line the end: folders differ there.
         end = path if len(path) <= most else f"…{path[1 - most :]}"
-        where = [Text(f"waiting for hits in {one}", "dim") for one in (end, path)]
+        waits = "all hits are in: [a]; more may come in" if self.complete else "waiting for hits in"
+        where = [Text(f"{waits} {one}", "dim") for one in (end, path)]
         parts.append(ScreenText([None, *where], 4))
         parts.append(ScreenText([Text(self.keys, style="reverse")]))
         lines = fitted(parts, width, height - rows)
@@ -95,7 +102,7 @@ class PosePage:
     def _place(self) -> list[ScreenText]:
         """Where the tool is, and what is expected there."""
         x, y, z = self.proposal.position_m
-        place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m"
+        place = f"{self.frame} at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m of the base"
         each = zip(self.expected_hz, self.expected_sd_hz, strict=True)
         expected = ", ".join(with_sd(hz, sd) for hz, sd in each)
         short = ", ".join(f"{hz:.2f}" for hz in self.expected_hz)
@@ -112,10 +119,18 @@ class PosePage:
         asked = [hit for hit in before[: 1 - LAST] if hit.kind != "good"]
         told = [*asked, *before[1 - LAST :]]
         parts = [
-            ScreenText([*([None] if hit.kind == "good" else []), *_forms(hit)], len(told) - i)
+            ScreenText([*([None] if hit.kind == "good" else []), *self._forms(hit)], len(told) - i)
             for i, hit in enumerate(told)
         ]
-        return [*parts, ScreenText(_forms(last))]
+        return [*parts, ScreenText(self._forms(last))]
+
+    def _forms(self, hit: HitVerdict) -> list[Text]:
+        again = self._again(hit)
+        return [verdict_in_words(hit, whole, again) for whole in (False, True)]
+
+    def _again(self, hit: HitVerdict) -> bool:
+        """Whether a bad hit is to be made again: its axis has not its hits yet."""
+        return self.counts[hit.axis[-1:]] < self.per_axis if hit.axis else True
 
     def _angles(self) -> Table:
         slides = any(self.joints.slides)
@@ -136,24 +151,17 @@ class PosePage:
             row = Text(f"{axis}  {count}/{self.per_axis}  {marks}", style=style)
             way = f"  +{axis} {ways[axis]}" if ways else ""
             made.add_row(row.append(way, style="not bold"))
-        # Where an axis has its hits, a bad one more is nothing to do again.
-        lacking = [axis for axis in "xyz" if self.counts[axis] < self.per_axis]
-        again = [h for h in self.hits if h.kind == "repeat" and h.axis[-1:] in ("", *lacking)]
+        again = [hit for hit in self.hits if hit.kind == "repeat" and self._again(hit)]
         if again:
             axes = ", ".join(dict.fromkeys(hit.axis or "?" for hit in again))
-            made.add_row(
-                Text(f"hit again along {axes}: {len(again)} of no use", style=COLOURS["repeat"])
-            )
-        for kind, said in (("unsure", "held: right?"), ("unstated", "of no stated axis")):
+            said = f"hit again along {axes}: {counted(len(again), 'hit')} bad"
+            made.add_row(Text(said, style=COLOURS["repeat"]))
+        for kind, said in (("unsure", "held: right?"), ("unstated", "without an axis")):
             if count := sum(hit.kind == kind for hit in self.hits):
                 made.add_row(Text(f"{count} {said}", style=COLOURS[kind]))
         if self.complete:
             made.add_row(Text("all hits are in", style="bold green"))
         return made
-
-
-def _forms(hit: HitVerdict) -> list[Text]:
-    return [verdict_in_words(hit, whole=False), verdict_in_words(hit)]
 
 
 def keys_that_do(pairs: Sequence[tuple[str, str, bool]]) -> str:
@@ -205,13 +213,13 @@ def page_with_hits(
     page: PosePage,
     verdicts: Sequence[HitVerdict],
     waiting: Sequence[tuple[Path, str]],
-    can: tuple[bool, bool],
+    can: tuple[str, str],
     auto: bool,
     progress: str,
 ) -> PosePage:
     """The page with the hits that wait, the files that are not whole yet, and keys that do.
 
-    `can`: whether there is an act to take back, and one that was and can hold again.
+    `can`: the act that can be undone, and the one that can be redone; ""s where there is none.
     """
     names = [one.path.name for one in verdicts]
     hits = tuple(_judged(one, names) for one in verdicts)
@@ -223,7 +231,7 @@ def page_with_hits(
 
 def _judged(verdict: HitVerdict, names: Sequence[str]) -> HitVerdict:
     said = f"answers as {verdict.came} did" if verdict.alike else f"came at {verdict.came}"
-    late = f"{said}: [b] it is from there, [h] from here"
+    late = f"{said}: [b] from there, [h] from here"
     text = late if verdict.kind == "late" else verdict.text
     if verdict.kind == "elsewhere":
         text = f"of {verdict.came} by recordings.csv, goes there with [a]"
@@ -246,26 +254,27 @@ def _streams(verdicts: Sequence[HitVerdict]) -> tuple[str, ...]:
     )
 
 
-def _keys(page: PosePage, can: tuple[bool, bool]) -> str:
+def _keys(page: PosePage, can: tuple[str, str]) -> str:
     kinds = {hit.kind for hit in page.hits}
     late = {hit.came for hit in page.hits if hit.kind == "late"}
     usable = bool(kinds & {"good", "elsewhere"})
     return keys_that_do([
-        ("a", "accept" if page.complete else "accept as it is", usable),
+        ("a", "accept" if page.complete else "accept the good hits", usable),
         ("r", "refuse bad hits", bool(kinds & {*BAD})),
         ("R", "refuse all", bool(page.hits)),
-        ("b", f"late ones to {' and '.join(sorted(late))}", "late" in kinds),
+        ("b", f"late hits are from {' and '.join(sorted(late))}", "late" in kinds),
         ("h", _right_here(kinds), bool(kinds & {"late", "unsure"})),
-        ("s", f"mark {page.proposal.pose} for later", True), ("k", "skip this pose", True),
-        ("u", "undo", can[0]), ("U", "redo", can[1]), ("q", "quit", True), ("?", "help", True),
+        ("s", f"star {page.proposal.pose}", True), ("k", "skip this pose", True),
+        ("u", f"undo: {can[0]}", bool(can[0])), ("U", f"redo: {can[1]}", bool(can[1])),
+        ("q", "quit", True), ("?", "help", True),
     ])  # fmt: skip
 
 
 def _right_here(kinds: set[str]) -> str:
     if "late" not in kinds:
-        return "those asked about are right"
-    asked = ", those asked about right" if "unsure" in kinds else ""
-    return f"late ones are from here{asked}"
+        return "hits in doubt are right"
+    asked = ", hits in doubt right" if "unsure" in kinds else ""
+    return f"late hits are from here{asked}"
 
 
 def _named(path: Path, why: str) -> str:

@@ -20,12 +20,13 @@ from planner.campaign.events import (
     Proposal,
     Proposed,
     Refused,
+    Undone,
 )
 from planner.campaign.imported_files import differs_from_table
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, taken_back
-from planner.campaign.undo import last_acts, last_undone
+from planner.campaign.undo import in_short, last_acts, last_undone
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source, read_one
 from planner.report.rerun.event_logger import EventLogger
@@ -136,7 +137,8 @@ class SessionState:
             ends = "as many measurements as campaign.toml allows"
         return replace(
             self, measured=measured, history=history, announced=self.announced or model.done,
-            progress=f"frequencies known to ±{significant(overall)} %; {left}", stop=ends,
+            progress=f"frequency sd over the workspace {significant(overall)} %; {left}",
+            stop=ends,
         )  # fmt: skip
 
 
@@ -234,10 +236,12 @@ class Session:
         return {}
 
     @property
-    def can_take_back(self) -> tuple[bool, bool]:
-        """Whether there is an act to take back, and one that was and can hold again."""
+    def can_take_back(self) -> tuple[str, str]:
+        """The act that can be undone, and the one that can be redone, in a word or two; ""s."""
         entries = self.campaign.entries
-        return bool(last_acts(entries, decisions_only=True)), bool(last_undone(entries)[0])
+        acts, undone = last_acts(entries, decisions_only=True), last_undone(entries)[0]
+        was = undone and isinstance(undone.event, Undone) and entries[undone.event.acts[0] - 1]
+        return (in_short(acts[0]) if acts else ""), (in_short(was) if was else "")
 
     def key(self) -> str | None:
         """The next key, or None after a moment."""

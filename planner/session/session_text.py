@@ -14,13 +14,16 @@ from planner.session.pose_screen import PosePage, remedy_first
 from planner.words import counted, short_name, significant
 
 HELP = """\
-a, Enter  import the hits that wait      r, R  set bad hits, or all, aside
-k         skip this pose, and those around it if you type what is in the way
-b, h      late hits: b, of the pose named; h, of this one (or: these are right)
-s         mark this pose for a second look (★ in status and report)
-u, U      take back the last act; redo it
-q         quit; everything is on disk, and planner watch goes on from here"""
-NONE_BAD = "No hit is to be repeated: press r again, or R, to set all that wait aside."
+a     accept: import the good hits, refit, go on      r, R  refuse bad hits, or all
+k     skip this pose, and those near it if you type what is in the way
+b, h  late hits: b, they are from the pose named; h, from this one
+h     hits in doubt: they are right
+s     star this pose, for a second look later (★ in status and report)
+u, U  undo the last act; redo it
+q     quit; all is on disk: the same command goes on from here
++x, +y, +z: the tcp's axes, seen from the base; hits against them count, too
+±     one standard deviation (sd)"""
+NONE_BAD = "No hit is bad: press r again, or R, to refuse all that wait."
 NOTHING_NEW = "Nothing to import yet: no new recording is whole and usable."
 FULLY, SHORTLY = 2, 4  # refusals that are said in full, and those of which is said what to do
 LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it may be followed
@@ -85,7 +88,7 @@ def _missed(report: ImportReport) -> list[RenderableType]:
 
 def question_panel(question: Question, pose: str, other: str) -> RenderableType:
     """What is asked of held hits, and the keys; `other` is the open pose they may be from."""
-    keys = f"[a] yes, use them at {pose}  [r] refuse, hit again  "
+    keys = f"[a] yes, use them at {pose}  [r] no, refuse them  "
     keys += f"[o] no, they are from {other}  " if other else ""
     text = Text(question.text, style="bold red")
     more = "They are kept, and not used until you answer."
@@ -97,7 +100,7 @@ def question_panel(question: Question, pose: str, other: str) -> RenderableType:
         )
     if question.about == "readback":
         more += " Where recordings.csv is wrong: correct it, then [u], and the hits are read again."
-    parts = Group(text, Text(more), Text(f"{keys}[u] undo  [q] quit", style="dim"))
+    parts = Group(text, Text(more), Text(f"{keys}[u] undo the import  [q] quit", style="dim"))
     return Panel(parts, title=f"Pose {pose}: a question", title_align="left", expand=False)
 
 
@@ -130,7 +133,7 @@ def result_line(report: ImportReport) -> str:
     off = max(abs(one.off) for one in found)
     missing = len(every) - len(found)
     lacks = f", {counted(missing, 'mode')} not found" if missing else ""
-    return f"{said}, at most {off:.1f} sd off what was expected{lacks}"
+    return f"{said}, within {off:.1f} sd of what was expected{lacks}"
 
 
 def against_expected(pose: str, model: Model, before: Model | None) -> str:
@@ -159,7 +162,7 @@ def progress_line(
         parts.append(f"{seconds_per_pose / 60:.1f} min per pose")
     left = poses_to_go(history, target, minimum)
     if left == (0, 0):
-        parts.append("overall sd below the target")
+        parts.append("target reached")
     elif left is not None:
         more = f"{_span(left)} more pose{'s' if left != (1, 1) else ''}"
         if seconds_per_pose is not None:

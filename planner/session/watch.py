@@ -120,7 +120,7 @@ def _run(session: Session) -> SessionSummary:
             session.rerun_queue.show()
     if state.ended:
         console.print(Text(state.ended))
-    console.print(Text(f"Session ended: {state.stop}. Go on with the same command."))
+    console.print(Text(f"Session ended: {state.stop}. The same command goes on with it."))
     return SessionSummary(
         state.measured,
         state.stop,

@@ -199,7 +199,7 @@ def test_what_was_taken_back_last_can_be_done_again(first):
         Campaign(folder).undo(**by)
         Campaign(folder).next()  # as a session does of itself
         code, out, _ = call("redo", folder)
-        assert (code, "holds again" in out) == (0, True)
+        assert (code, "Redone: " in out) == (0, True)
         after = Campaign(folder).state
         assert (after.measurements, after.open) == (before.measurements, before.open)
         assert call("redo", folder)[0] == 2

@@ -174,7 +174,7 @@ def test_a_refit_that_is_farther_off_is_explained():
     ("history", "target", "least", "left", "said"),
     [
         ([8.0, 4.0, 2.0, 1.0], 0.25, 3, (2, 2), "2.0 min per pose; 2 more poses, 4 min to go"),
-        ([1.0, 0.1], 0.5, 2, (0, 0), "below the target"),
+        ([1.0, 0.1], 0.5, 2, (0, 0), "target reached"),
         ([0.1], 0.5, 3, (2, 2), ""),
         ([2.5, 0.7, 34.6, 0.9], 0.1, 3, None, "no trend yet"),
         ([2.5, 2.49, 2.48, 2.47], 0.1, 3, None, "no trend yet"),

@@ -40,7 +40,7 @@ CLIPPED = judged(
 LATE = judged(4, "+z", "late", "answers as P001 did: [b] it is from there, [h] from here")
 OTHER = judged(
     5, "+z", "repeat",
-    "Its FRF is that of hits along x (likeness 0.12, others 0.99); check axis and hit point, and "
+    "Its FRF is that of hits along x (correlation 0.12, others 0.99); check axis and hit point, and "
     "hit again.",
 )  # fmt: skip
 ALL = DOUBLE, AGAINST, CLIPPED, LATE, OTHER
@@ -61,7 +61,7 @@ def page():
         (8.12, 12.5, 17.8, 22.3, 28.9, 33.1), (0.12, 0.2, 0.3, 0.4, 0.5, 0.6),
         Path("/home/someone/projects/2026/cell7/measurements/exports/analyser-3"),
         unfinished=(("foreign.uff", FOREIGN), ("half.uff", "half.uff is still being written")),
-        progress="frequencies known to ±1.23 %; 2.3 min per pose; 3 more poses, 7 min to go",
+        progress="frequency sd over the workspace 1.23 %; 2.3 min per pose; 3 more poses, 7 min to go",
         keys=KEYS,
     )  # fmt: skip
 
@@ -137,13 +137,13 @@ def test_a_result_higher_than_the_screen_stands_once_above_the_next_page():
 
 def test_names_of_files_leave_room_for_what_is_said_of_them(page):
     name = "measurement_2026-11-24_cell7_left_station_hit_x_003.uff"
-    said = f"disagrees with hit 2 ({name}) (likeness 0.42): hit along x once more"
+    said = f"disagrees with hit 2 ({name}) (correlation 0.42): hit along x once more"
     verdict = HitVerdict(Path("exports") / name, "+x", "unsure", said, number=1)
     why = f"exports/{name} holds no force; export it again."
     made = page_with_hits(page, [verdict], [(verdict.path, why)], (True, False), False, "")
     text = whole(lines(made, height=40))
     assert name not in text
-    assert "disagrees with hit 2 (measurem…n_hit_x_003.uff) (likeness 0.42)" in text
+    assert "disagrees with hit 2 (measurem…n_hit_x_003.uff) (correlation 0.42)" in text
     assert "cannot be used: measurem…n_hit_x_003.uff: Export it again." in text
     assert short_name("exports/P001_x_1.uff") == "P001_x_1.uff"
     refused = HitRecord(name, "", "", reason="A second pulse follows; hit once.")

@@ -37,9 +37,9 @@ def test_a_session_shows_imports_and_goes_on(cell, deliver, session):
     analyser.start()
     played = session(
         campaign, inbox,
-        ("all hits are in", "?"), ("set bad hits, or all, aside", "s"), ("★", "a"),
-        ("Pose P001: 9 hits in", "k"), ("stands in the way?", "\n"), ("not be offered", "u"),
-        ("Took back", "q"),
+        ("all hits are in", "?"), ("refuse bad hits, or all", "s"), ("★", "a"),
+        ("Pose P001: 9 hits in", "k"), ("in the way?", "\n"), ("not be offered", "u"),
+        ("Undone: ", "q"),
         limit_s=60, quiet_s=0.15,
     )  # fmt: skip
     analyser.join()
@@ -65,7 +65,7 @@ def test_resume_ignores_what_was_imported_and_waits_for_torn_files(cell, deliver
 def test_refused_hits_are_not_offered_again_even_by_the_next_session(cell, deliver, session):
     campaign, _, inbox = cell
     deliver(campaign.next()[0])
-    keys = [("all hits are in", "r"), ("No hit is to be", "r"), ("9 hits set aside (1, 2, 3", "a"),
+    keys = [("all hits are in", "r"), ("No hit is bad", "r"), ("9 hits refused (1, 2, 3", "a"),
             ("Nothing to import yet", "q")]  # fmt: skip
     session(campaign, inbox, *keys)
     assert campaign.state.measurements == {}
@@ -81,7 +81,7 @@ def test_refused_hits_are_not_offered_again_even_by_the_next_session(cell, deliv
 
 @pytest.mark.parametrize(
     ("key", "said", "used", "refused"),
-    [("a", "1 hit set aside (", 5, 1), ("h", "are used, as you said", 6, 0)],
+    [("a", "1 hit refused (", 5, 1), ("h", "are used, as you said", 6, 0)],
 )  # fmt: skip
 def test_a_hit_along_another_axis_than_said_is_asked_about(cell, session, key, said, used, refused):
     campaign, truth, inbox = cell
@@ -181,7 +181,7 @@ def test_files_that_do_not_say_their_axis_wait_for_the_table(cell, first_pose, s
         write_hit(inbox / f"{path.stem}.csv", hit, stated=False)
 
     def ask(text):
-        return "9 of no stated axis" in text and bool((inbox / TABLE).write_text(table))
+        return "9 without an axis" in text and bool((inbox / TABLE).write_text(table))
 
     keys = (ask, "s"), ("all hits are in", "a"), ("P001: 9 hits in", "q")
     text = session(campaign, inbox, *keys).text
@@ -219,7 +219,7 @@ def test_undo_after_an_interrupted_import_takes_it_back_with_its_proposal(
 
 def test_a_skip_asks_for_its_reason_and_typing_runs_no_command(cell, session):
     campaign, _, inbox = cell
-    keys = [("go to pose P001", "k"), ("stands in the way?", "q"), (" q_", "\x7f")]
+    keys = [("go to pose P001", "k"), ("in the way?", "q"), (" q_", "\x7f")]
     keys += [("", letter) for letter in "husk"] + [(" husk_", "\n")]
     played = session(campaign, inbox, *keys, ("P001 and poses around it will not", "q"))
     assert played.summary.stopped == "quit"

@@ -112,7 +112,7 @@ def test_keys_act_without_enter_and_the_terminal_is_left_as_it_was(cell):
         terminal.until(*shown)
         terminal.press("a", "Nothing to import yet")
         terminal.press("b", "b does nothing now")
-        terminal.press("k", "stands in the way?")
+        terminal.press("k", "in the way?")
         terminal.press("\n", "go to pose P002", "P001 will not be offered again ([u]")
         terminal.press("q", "Session ended: quit")
         assert terminal.process.wait(timeout=30) == 0
@@ -165,7 +165,7 @@ def test_a_session_in_which_all_goes_wrong(measured):
         assert good <= used_files(campaign.directory)
         # Hits that came late answer as the pose before did; they are asked about, and moved.
         analyser.write("late", analyser.good("+x"))
-        terminal.until("late?", f"[b] late ones to {first.pose}")
+        terminal.until("late?", f"[b] late hits are from {first.pose}")
         terminal.press("b", f"{first.pose}: 1 hit in")
         # The robot stands elsewhere than said: asked, and not used.
         now = Campaign(campaign.directory).state.open[0]
@@ -177,7 +177,7 @@ def test_a_session_in_which_all_goes_wrong(measured):
                 elsewhere.write(f"wrong_{axis}{number}", elsewhere.good(f"+{axis}"))
         terminal.until("all hits are in")
         terminal.press("a", f"Pose {now}: a question", "not used until you answer")
-        terminal.press("r", "set aside; hit again")
+        terminal.press("r", "are refused: mend the cause")
         terminal.press("q", "Session ended: quit")
         assert terminal.process.wait(timeout=30) == 0
     finally:
