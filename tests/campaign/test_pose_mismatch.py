@@ -176,7 +176,7 @@ def test_hits_listed_along_wrong_axes_are_asked_about(campaign, pool):
 @pytest.mark.parametrize(
     ("wrong", "about", "said"),
     [
-        ({"off_deg": (0, 0, 8.0, 0, 0, 0)}, "readback", "is joint_3"),
+        ({"off_deg": (0, 0, 8.0, 0, 0, 0)}, "readback", "fit joint_3 at"),
         ({"other_way": "x"}, "chain", "towards −x?"),
         pytest.param({"louder": 1.12}, "chain", "12 % too large", marks=pytest.mark.slow),
     ],
@@ -192,7 +192,7 @@ def test_misread_angles_and_hits_from_behind_are_asked_about(
     if about == "readback":
         read = float(report.question.text.split(said)[1].split("°")[0])
         stated = np.array(pool.rows[WRONG][0].joints_deg)
-        assert abs(read - stated[int(said[-1]) - 1]) < 0.5
+        assert abs(read - stated[int(said.split("_")[1][0]) - 1]) < 0.5
 
 
 def test_angles_in_radians_are_asked_about_as_that(campaign, pool):
@@ -200,7 +200,7 @@ def test_angles_in_radians_are_asked_about_as_that(campaign, pool):
     state = SimpleNamespace(proposals={"P9": SimpleNamespace(joints_deg=sent)})
     for typed, said in (
         (tuple(np.deg2rad(sent) + 0.01), "are its angles in radians?"),
-        ((*sent[:2], sent[2] + 8, *sent[3:]), "is joint_3"),
+        ((*sent[:2], sent[2] + 8, *sent[3:]), "(joint_3 at"),
     ):
         (asked,) = pose_mismatch._setpoint(campaign.model, state, "P9", typed)
         assert said in asked.what

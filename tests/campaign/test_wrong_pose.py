@@ -77,8 +77,8 @@ def test_a_wrong_angle_at_the_first_pose_is_asked_about_at_the_next(tmp_path):
     assert asked is not None
     assert (asked.about, asked.fits) == ("earlier", "P001")
     # The other sign, or the setpoint, which are next to the same.
-    assert f"° or {read:.2f}°?" in asked.text
-    angle = float(asked.text.split("is joint_4 ")[1].split("°", maxsplit=1)[0])
+    assert f"°, not at {read:.2f}° as stated" in asked.text
+    angle = float(asked.text.split("joint_4 at ")[1].split("°", maxsplit=1)[0])
     assert angle == pytest.approx(-read, abs=0.05)
     assert "--pose P001b" in how_to_answer(campaign.directory, "P002", asked)
     # Of new hits of the same pose `withdraw` would set aside these: their import is undone first.

@@ -46,6 +46,6 @@ def test_the_simulation_explains_what_all_sensors_heard(tmp_path: Path) -> None:
     campaign, truth = measured(tmp_path)
     model = campaign.model
     assert model.low.is_identified
-    assert "The base gives way (about x" in model.remarks[0]
+    assert "The base gives way (stiffness about x" in model.remarks[0]
     assert worst_percent(campaign, truth) < 0.1
     assert model.frequency_sd_percent.max() < 0.3
