@@ -20,7 +20,7 @@ from planner.session.pose_screen import page_with_hits, page_without_hits
 from planner.session.session_state import BAD, PoseInProgress, Session, SessionState
 from planner.words import by_reason, counted, short_name
 
-IMPORTING = "importing and refitting"
+IMPORTING = "importing and refitting; keys act after it"
 ESCAPE, ERASE = "\x1b", ("\x7f", "\b")
 ASKED = (
     "Is something in the way? Name it, then Enter: poses near this one are skipped too.\n"
