@@ -102,7 +102,7 @@ def of_spectra(
         variance,
         coherence,
         tuple(counts),
-        _usable(spectra, band_hz),
+        usable_band(spectra, band_hz),
         windows.laid_1_s + windows.carried_1_s,
         spectra.remarks,
         spectra.tail_s,
@@ -181,7 +181,7 @@ def _level(scatter: np.ndarray, degrees: int) -> np.ndarray:
     return (PRIOR * pooled + values * near) / (PRIOR + values)
 
 
-def _usable(spectra: Spectra, band_hz: tuple[float, float]) -> tuple[float, float]:
+def usable_band(spectra: Spectra, band_hz: tuple[float, float]) -> tuple[float, float]:
     """From the first line to where the weakest pulse has lost DROP_DB, or the lines end."""
     frequency = spectra.frequency_hz
     high = float(frequency[-1])

@@ -115,15 +115,14 @@ def from_records(records: tuple[FrfRecord, ...], window_rate_1_s: float = 0.0) -
         row, column = layout.sensors.index(sensor), layout.hits.index(point)
         at = 3 * row + one.response[1], 3 * column + one.hit[1]
         h[at], coherence[at] = one.values, one.coherence
-    given = np.array([[bool(np.isfinite(one).all()) for one in row] for row in h])
-    measured = np.array([c.all() if layout == TOOL else c.any() for c in given.T])
+    given = np.isfinite(h).all(axis=-1)
+    measured = given.all(axis=0) if layout == TOOL else given.any(axis=0)
     if not measured.any():
         raise RefusedError(
             f"{first.source}: no hit axis has all three responses "
             f"({', '.join(AXES)}); export them together."
         )
     h[:, ~measured] = np.nan
-    hits = tuple(int(m) for m in measured)
+    hits, band = tuple(measured.astype(int).tolist()), (float(frequency[0]), float(frequency[-1]))
     unknown = np.full(shape, np.nan)
-    band = float(frequency[0]), float(frequency[-1])
     return Frf(frequency, h, unknown, coherence, hits, band, window_rate_1_s, layout=layout)

@@ -85,7 +85,7 @@ def stack(
     scale.
     """
     chosen = [_lines(frf, band_hz, most_lines, geometric) for frf in frfs]
-    layout = layout_of(frfs)
+    layout = together([frf.layout for frf in frfs])
     n, f = len(frfs), max(len(c) for c in chosen)
     if f == 0:
         raise InputError(
@@ -111,11 +111,6 @@ def stack(
     return Measured(frequency, laplace(frequency, rates), h, sd, tails, layout)
 
 
-def layout_of(frfs: Sequence[Frf]) -> Layout:
-    """The points of all FRFs."""
-    return together([frf.layout for frf in frfs])
-
-
 def matrices_at(
     elastic: ElasticModel, q: np.ndarray, frfs: Sequence[Frf], sloped: bool = False
 ) -> Matrices:
@@ -123,7 +118,7 @@ def matrices_at(
 
     `sloped`: with slopes by the joint angles, for readbacks may err.
     """
-    layout = layout_of(frfs)
+    layout = together([frf.layout for frf in frfs])
     found = elastic.with_slopes(q, layout) if sloped else elastic.matrices(q, layout=layout)
     there = np.array([[name in f.layout.sensors for name in layout.sensors] for f in frfs])
     return with_sensors(found, elastic.robot, layout, there)
@@ -141,9 +136,7 @@ def with_sensors(found: Matrices, robot: Robot, layout: Layout, there: np.ndarra
     return replace(found, mass=mass)
 
 
-def _lines(
-    frf: Frf, band_hz: tuple[float, float], most: int, geometric: bool = False
-) -> np.ndarray:
+def _lines(frf: Frf, band_hz: tuple[float, float], most: int, geometric: bool) -> np.ndarray:
     low = max(band_hz[0], frf.usable_band_hz[0])
     high = min(band_hz[1], frf.usable_band_hz[1])
     inside = np.flatnonzero((frf.frequency_hz >= low) & (frf.frequency_hz <= high))

@@ -214,18 +214,15 @@ def _date(date: str, time: str) -> np.datetime64 | None:
 
 def _goes_on(before: _Channels, after: _Channels) -> bool:
     """Whether each channel begins where it ended in the last segment."""
-    alike = [*before] == [*after]
-    return alike and all(
-        _follows(len(values), said, after[name][1])
-        for name, (values, said) in before.items()
-        if said["dt"] > 0
-    )
-
-
-def _follows(count: int, first: dict[str, Any], then: dict[str, Any]) -> bool:
-    if (first["unit"], first["x_unit"]) != (then["unit"], "s"):
+    if [*before] != [*after]:
         return False
-    apart = then["t0"] - first["t0"]
-    if "start_time" in first and "start_time" in then:
-        apart += float((then["start_time"] - first["start_time"]) / np.timedelta64(1, "ns") * 1e-9)
-    return abs(apart / first["dt"] - count) < max(0.5, UNEVEN * count)
+    for name, (values, first) in before.items():
+        count, then = len(values), after[name][1]
+        apart = then["t0"] - first["t0"]
+        if "start_time" in first and "start_time" in then:
+            apart += float((then["start_time"] - first["start_time"]) / np.timedelta64(1, "s"))
+        alike = (first["unit"], first["x_unit"]) == (then["unit"], "s")
+        near = abs(apart - count * first["dt"]) < max(0.5, UNEVEN * count) * first["dt"]
+        if first["dt"] > 0 and not (alike and near):
+            return False
+    return True

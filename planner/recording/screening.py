@@ -10,8 +10,6 @@ from planner.recording.records import Fault, Hit
 LEAST_LINES = 8  # frequency lines in the band: fewer hold no mode
 QUIET_SAMPLES, ANSWER_S = 12, 0.25  # from which noise is judged, and the answer to a hit
 SILENCE = 1e-12  # N or m/s²: below, a channel is silent; chosen, far below any noise
-
-
 # When a hit is refused.
 SECOND_PEAK = 0.12  # of the pulse's peak
 LEAST_SNR = 8.0  # peak force over noise
@@ -19,10 +17,8 @@ LEAST_RESPONSE_SNR = 6.0  # of the strongest channel, soon after the pulse
 ROLL_OFF_DB = 20.0  # force spectrum at the band's end, below its top in the band
 LEAST_PRETRIGGER = 2  # samples before the pulse
 
-Band = tuple[float, float]  # in Hz
 
-
-def screen(hit: Hit, band_hz: Band) -> tuple[Fault, ...]:
+def screen(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
     """Faults of one hit by itself; those with `refuse` make it unusable."""
     pulse = hit.pulse
     if pulse.peak_n < SILENCE or np.max(np.abs(hit.acceleration_m_s2)) < SILENCE:
@@ -114,7 +110,7 @@ def _valley(pulse: np.ndarray) -> float:
     return rise
 
 
-def _soft(hit: Hit, band_hz: Band) -> Iterator[Fault]:
+def _soft(hit: Hit, band_hz: tuple[float, float]) -> Iterator[Fault]:
     force = hit.force_n - np.median(hit.force_n)
     size = 1 << int(np.ceil(np.log2(4 * len(force))))
     spectrum = np.abs(np.fft.rfft(force, size))
