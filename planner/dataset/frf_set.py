@@ -13,7 +13,7 @@ from planner.recording.geometry import read_geometry
 from planner.recording.points import ANYWHERE
 from planner.recording.read import read
 from planner.recording.records import FrfRecord, Hit, Record, TimeRecord
-from planner.recording.spectra import excited_band
+from planner.recording.screening import excited_band
 
 
 @dataclass(frozen=True, eq=False)

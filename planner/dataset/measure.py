@@ -142,8 +142,8 @@ class MeasuredPose:
     @property
     def is_kept(self) -> bool:
         """Whether FRF and modes are in the store, so that they cost nothing."""
-        keys = [self._key(what) for what in ("frf", "modes")]
-        return self.store is not None and all(self.store.has(key) for key in keys)
+        store = self.store
+        return store is not None and all(store.has(self._key(what)) for what in ("frf", "modes"))
 
     def kept(self, what: str, kind: type[T], make: Callable[[], T]) -> T:
         """From the store, or made and kept there."""

@@ -13,8 +13,7 @@ from planner.recording.read import hits_in, placed_by_name, read_hits
 from planner.recording.records import NOTICED, Fault, FrfRecord, Hit, PoseRow, Record
 from planner.recording.repeats import screen_repeats
 from planner.recording.sampling import recorded_otherwise
-from planner.recording.screening import screen
-from planner.recording.spectra import driving_point
+from planner.recording.screening import driving_point, screen
 from planner.words import counted
 
 

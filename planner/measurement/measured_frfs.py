@@ -155,8 +155,6 @@ def _lines(frf: Frf, band_hz: tuple[float, float], most: int, geometric: bool) -
 
 def noise_sd(frf: Frf) -> np.ndarray:
     """Sd (r, c, F) of an FRF: from the hits' scatter, else from the coherence, else assumed."""
-    if np.isfinite(frf.variance).all():
-        return np.sqrt(frf.variance)
     h, hits = np.abs(frf.accelerance), np.maximum(frf.hits, 1)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         # Bendat & Piersol 2010, eq. 9.90, for both parts of the complex value.

@@ -118,7 +118,8 @@ def _of_list(name: str, values: list[object]) -> object:
     texts = tuple(v for v in values if isinstance(v, str))
     if len(texts) == len(values):
         return texts
-    if all(isinstance(v, Mapping) for v in values) and (table := _of_structs(values)):
+    structs = [v for v in values if isinstance(v, Mapping)]
+    if len(structs) == len(values) and (table := _of_structs(structs)):
         return table
     arrays = [np.squeeze(v) for v in values if isinstance(v, np.ndarray) and np.size(v) > 1]
     alike = len({a.shape for a in arrays}) == 1 and arrays[0].ndim == 1 and len(arrays) > 1
@@ -127,11 +128,10 @@ def _of_list(name: str, values: list[object]) -> object:
     return {f"{name} {number}": value for number, value in enumerate(values, 1)}
 
 
-def _of_structs(values: list[object]) -> dict[str, object]:
+def _of_structs(values: Sequence[Mapping[str, object]]) -> dict[str, object]:
     """Structs of texts and numbers alone as lists of their texts: a table of channels."""
-    each = [dict(attributes_of(v)) for v in values if isinstance(v, Mapping)]
-    raw = [v for v in values if isinstance(v, Mapping)]
-    if any(len(stated) != len(v) for stated, v in zip(each, raw, strict=True)) or not each[0]:
+    each = [dict(attributes_of(v)) for v in values]
+    if any(len(stated) != len(v) for stated, v in zip(each, values, strict=True)) or not each[0]:
         return {}
     found: dict[str, object] = {}
     for key in each[0]:

@@ -105,10 +105,9 @@ def _chunks(data: bytes) -> dict[bytes, slice]:
 
 def _whole(data: bytes) -> bool:
     """Whether all chunks are there as long as they are stated to be."""
-    ends = [part.stop for part in _chunks(data).values()]
-    stated = len(_stated(data))
-    whole = len(data) > 8 and stated == 8 + struct.unpack("<I", data[4:8])[0]
-    return bool(ends) and whole and stated - 1 <= max(ends) <= stated
+    end, stated = max((part.stop for part in _chunks(data).values()), default=0), len(_stated(data))
+    within = 0 < end and stated - 1 <= end <= stated
+    return within and stated == 8 + struct.unpack("<I", data[4:8])[0]
 
 
 def _samples(path: Path, data: bytes) -> tuple[int, np.ndarray]:
