@@ -99,10 +99,8 @@ def stack(
         count = len(lines)
         frequency[i, :count] = frf.frequency_hz[lines]
         values, noise = frf.accelerance[..., lines], noise_sd(frf)[..., lines]
-        given = np.isfinite(values) & np.isfinite(noise)
-        size = np.abs(values)
-        total = np.sqrt(noise**2 + (model_error * size) ** 2)
-        given &= total > 0
+        total = np.sqrt(noise**2 + (model_error * np.abs(values)) ** 2)
+        given = np.isfinite(total) & (total > 0)
         at = np.ix_([i], layout.rows(frf.layout), layout.columns(frf.layout), range(count))
         h[at] = np.where(given, values, 1.0)
         sd[at] = np.where(given, total, np.inf)

@@ -106,7 +106,7 @@ def _chunks(data: bytes) -> dict[bytes, slice]:
 def _whole(data: bytes) -> bool:
     """Whether all chunks are there as long as they are stated to be."""
     end, stated = max((part.stop for part in _chunks(data).values()), default=0), len(_stated(data))
-    within = 0 < end and stated - 1 <= end <= stated
+    within = end > 0 and stated - 1 <= end <= stated
     return within and stated == 8 + struct.unpack("<I", data[4:8])[0]
 
 
