@@ -228,8 +228,8 @@ def _columns(
     yield EntryColumn(at, values, own, shared, lacks=lacks)
 
 
-def _arrays(tree: EntryTree) -> int:
-    return sum(_arrays(p) if isinstance(p, EntryTree) else 1 for p in tree.parts.values())
+def _arrays(part: EntryTree | np.ndarray) -> int:
+    return sum(map(_arrays, part.parts.values())) if isinstance(part, EntryTree) else 1
 
 
 def _beside(tree: EntryTree) -> dict[str, object]:
@@ -244,7 +244,7 @@ def _beside(tree: EntryTree) -> dict[str, object]:
 
 def _with_own_times(file: Path, tree: EntryTree) -> EntryTree:
     """A group with one array where its two are a channel and what its samples stand at."""
-    holding = {n: p for n, p in tree.parts.items() if not isinstance(p, EntryTree) or _arrays(p)}
+    holding = {n: p for n, p in tree.parts.items() if _arrays(p)}
     arrays = {n: only for n, p in holding.items() if (only := _only(p))}
     axes = {n: unit for n, (_, said) in arrays.items() if (unit := _axis_unit(n, said))}
     if len(holding) != 2 or len(arrays) != 2 or len(axes) != 1:
@@ -263,7 +263,7 @@ def _only(part: EntryTree | np.ndarray) -> tuple[np.ndarray, Stated] | None:
     """The one column that a part holds and what is stated of it; None where it holds others."""
     if not isinstance(part, EntryTree):
         return (part, {}) if part.ndim == 1 else None
-    inner = [p for p in part.parts.values() if not isinstance(p, EntryTree) or _arrays(p)]
+    inner = [p for p in part.parts.values() if _arrays(p)]
     found = _only(inner[0]) if len(inner) == 1 else None
     return (found[0], {**part.attributes, **_beside(part), **found[1]}) if found else None
 

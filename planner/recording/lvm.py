@@ -127,18 +127,14 @@ def _channels(path: Path, segment: _Segment) -> _Channels:
         if name != COMMENT and (name or _cell(segment, "Samples", column))
     }
     times = [column for column in columns if segment.names[column] == ABSCISSA]
+    x_of = {c: max((t for t in times if t < c), default=-1) for c in columns if c not in times}
     found: list[tuple[str, np.ndarray, dict[str, Any]]] = []
-    for column, values in columns.items():
-        at = max((t for t in times if t < column), default=-1)
-        if column in times or not values.size:
-            continue
+    for column, at in x_of.items():
         # An x column is that of the longest channel on its right.
-        own = [
-            c for c in columns if c > at and c not in times and not any(at < t < c for t in times)
-        ]
-        owner = max(own, key=lambda c: columns[c].size)
-        said = _stated(path, segment, column, len(values), owner, columns.get(at, np.zeros(0)))
-        found.append((segment.names[column], values, said))
+        owner = max((c for c in x_of if x_of[c] == at), key=lambda c: columns[c].size)
+        if count := columns[column].size:
+            said = _stated(path, segment, column, count, owner, columns.get(at, np.zeros(0)))
+            found.append((segment.names[column], columns[column], said))
     names = [name for name, *_ in found]
     return {
         f"{name} ({number})" if names.count(name) > 1 or not name else name: (values, said)

@@ -36,8 +36,7 @@ class Layout:
 
     def columns(self, inner: "Layout") -> list[int]:
         """Columns of this layout that are those of an `inner` one."""
-        place_of = {_which(self.hits, i): i for i in range(len(self.hits))}
-        places = [place_of[_which(inner.hits, i)] for i in range(len(inner.hits))]
+        places = [_numbered(self.hits).index(hit) for hit in _numbered(inner.hits)]
         return [3 * place + axis for place in places for axis in range(3)]
 
 
@@ -46,20 +45,14 @@ TOOL = Layout()
 
 def together(layouts: Sequence[Layout]) -> Layout:
     """The smallest layout that holds all, points in the order in which they first occur."""
-    hits: list[str] = []
-    sensors: list[str] = []
-    for layout in layouts:
-        sensors += [name for name in layout.sensors if name not in sensors]
-        for i in range(len(layout.hits)):
-            name, number = _which(layout.hits, i)
-            if hits.count(name) <= number:
-                hits.append(name)
-    return Layout(tuple(hits), tuple(sensors))
+    hits = dict.fromkeys(hit for layout in layouts for hit in _numbered(layout.hits))
+    sensors = dict.fromkeys(name for layout in layouts for name in layout.sensors)
+    return Layout(tuple(name for name, _ in hits), tuple(sensors))
 
 
-def _which(names: Sequence[str], place: int) -> tuple[str, int]:
-    """The name at a place, and how often it stood before."""
-    return names[place], names[:place].count(names[place])
+def _numbered(names: Sequence[str]) -> list[tuple[str, int]]:
+    """Each name, and how often it stood before."""
+    return [(name, names[:place].count(name)) for place, name in enumerate(names)]
 
 
 @dataclass(frozen=True)

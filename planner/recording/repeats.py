@@ -276,11 +276,10 @@ def _groups(hits: tuple[Hit, ...]) -> list[list[int]]:
     """Which hits, by their places among all, can be compared with each other."""
     groups: list[list[int]] = []
     for i, hit in enumerate(hits):
-        own = next((group for group in groups if _comparable(hits[group[0]], hit)), None)
-        if own is None:
-            groups.append([i])
-        else:
-            own.append(i)
+        own = next((group for group in groups if _comparable(hits[group[0]], hit)), [])
+        if not own:
+            groups.append(own)
+        own.append(i)
     return groups
 
 

@@ -176,9 +176,9 @@ def _header_cells(line: str, form: Form, width: int) -> list[str]:
     """As many cells as the table has columns, where a line of the header can be split so."""
     ways = [form.cells(line)[:width]]
     if not form.delimiter:  # names hold blanks, too: "Time (s)   Acc X (g)"
-        ways += [re.split(r"\s{2,}|\t|;|,", line.strip())]
-        ways += [re.findall(r"[^\s(\[]+(?:\s*(?:\([^)]*\)|\[[^\]]*\]))?", line)]
-        ways = [way for way in (ways[1], ways[2], form.cells(line)) if len(way) == width]
+        by_gaps = re.split(r"\s{2,}|\t|;|,", line.strip())
+        by_units = re.findall(r"[^\s(\[]+(?:\s*(?:\([^)]*\)|\[[^\]]*\]))?", line)
+        ways = [by_gaps, by_units, form.cells(line)]
     return next(
         ([cell.strip().strip('"').strip() for cell in w] for w in ways if len(w) == width), []
     )
