@@ -18,7 +18,7 @@ from planner.fit.identified_robot import IdentifiedRobot
 from planner.frf.frf import Frf
 from planner.measurement.measured_frfs import common_band
 from planner.measurement.nuisances import Tolerances
-from planner.measurement.point_places import misplaced, misplaced_questions
+from planner.measurement.point_places import misplaced
 from planner.measurement.sensor_loading import WithoutSensors, without_sensors
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
@@ -143,7 +143,8 @@ def _doubts(
     if not simulations or not frfs:
         return ()
     usable = common_band(frfs, band)
-    found = misplaced(simulations, q[index], frfs, usable)
+    poses = [names[i] for i in index]
+    found = misplaced(simulations, q[index], frfs, usable, poses)
     tool = [(i, frf.of_tool) for i, frf in zip(index, frfs, strict=True)]
     known = [(i, frf) for i, frf in tool if frf is not None]
     if found and known:
@@ -152,8 +153,8 @@ def _doubts(
         fit, _ = _learned(simulations[0], frfs_of_tool, q[list(at)], band)
         if fit is not None:
             tried = [*simulations, fit.identified.simulation]
-            found = misplaced(tried, q[index], frfs, usable)
-    return misplaced_questions(found, [names[i] for i in index])
+            found = misplaced(tried, q[index], frfs, usable, poses)
+    return found
 
 
 def _labelled(

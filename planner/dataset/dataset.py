@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -11,15 +12,7 @@ import numpy as np
 
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.store import Store, user_store
-from planner.dataset.visits import (
-    PoseEntry,
-    Recording,
-    Visit,
-    VisitFiles,
-    recordings_in,
-    unlisted_folders,
-    visit_files_of,
-)
+from planner.dataset.visits import PoseEntry, Recording, Visit, recordings_in, unlisted_folders
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
@@ -41,17 +34,14 @@ class Recorded(Protocol):
     @property
     def joints(self) -> JointUnits:
         """Names and units of its joints, in the order of angles."""
-        ...
 
     @property
     def points(self) -> Any:
         """`PointNames`: where it may be hit and heard."""
-        ...
 
     @property
     def config(self) -> Any:
         """What robot.toml says; its `band_hz` is needed."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +55,13 @@ class Dataset:
     """
 
     entries: tuple[PoseEntry, ...]  # also those without an FRF
-    stays: tuple[VisitFiles, ...]
+    recordings: tuple[Recording, ...]  # that the entries are of
     band_hz: tuple[float, float]
     window_rate_1_s: float = 0.0
     refused: tuple[tuple[str, str], ...] = ()
     remarks: tuple[str, ...] = ()
     simulated: bool = False
+    given: tuple[Visit, ...] = ()  # that the entries are of, where there are no recordings
 
     @classmethod
     def read(
@@ -149,7 +140,7 @@ class Dataset:
             raise RefusedError(f"{name}: no pose has a hit that can be used: {reason}")
         return cls(
             tuple(entries),
-            visit_files_of(recordings),
+            tuple(recordings),
             band_hz,
             window_rate_1_s,
             refused,
@@ -180,13 +171,14 @@ class Dataset:
                 PoseEntry(v.pose, v.q, MeasuredPose((), self.band_hz, "h1", rate, v.hits))
                 for v in given
             ),
-            stays=tuple(VisitFiles(i, (0,), v.q, v.order) for i, v in enumerate(given)),
+            recordings=(),
+            given=given,
             window_rate_1_s=rate,
         )
 
     def __repr__(self) -> str:
         low, high = self.band_hz
-        poses, visits = len(self.entries), len(self.stays)
+        poses, visits = len(self.entries), len(self.given or self._runs)
         return f"Dataset({poses} poses, {visits} visits, {low:g} to {high:g} Hz)"
 
     # -- by pose -------------------------------------------------------------------------------
@@ -229,18 +221,23 @@ class Dataset:
     # -- by visit ------------------------------------------------------------------------------
 
     @cached_property
+    def _runs(self) -> list[list[Recording]]:
+        """Neighbouring recordings of one pose are of one visit."""
+        return [list(run) for _, run in groupby(self.recordings, key=lambda one: one.pose)]
+
+    @cached_property
     def visits(self) -> tuple[Visit, ...]:
         """The v visits with a hit; a pose that was returned to has several.
 
         None of a pose whose FRFs were exported.
         """
-        out = []
-        for stay in self.stays:
-            entry = self.entries[stay.entry]
-            hits = tuple(hit for i in stay.files for hit in entry.measured.files.hits[i])
-            if hits:
-                out.append(Visit(entry.pose, stay.q, stay.order, hits))
-        return tuple(out)
+        found, last = [*self.given], max(len(self._runs) - 1, 1)
+        files = {e.pose: iter(e.measured.files.hits) for e in self.entries}
+        for place, run in enumerate(self._runs):
+            hits = tuple(hit for one in run for hit in next(files[one.pose]))
+            q = np.mean([one.q for one in run], axis=0)
+            found.append(Visit(run[0].pose, q, place / last, hits))
+        return tuple(visit for visit in found if visit.hits)
 
     def frf(self, hits: tuple[Hit, ...]) -> Frf:
         """FRF of some hits of a visit, with an exponential window of rate LAID over them."""

@@ -13,7 +13,7 @@ from planner.recording.geometry import read_geometry
 from planner.recording.points import ANYWHERE
 from planner.recording.read import read
 from planner.recording.records import FrfRecord, Hit, Record, TimeRecord
-from planner.recording.spectra import excited_band
+from planner.recording.screening import excited_band
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,8 @@ def frf_set(
         else:
             why = f"{source.name} holds time histories, other files FRFs; name one kind only."
             refused.append(RefusedFile(source.name, why))
-    if not given or _of_one_point(given):
+    placed, one_sensor = _placed(given)
+    if not given or one_sensor:
         return None
     return FrfSet(
         tuple(given),
@@ -78,7 +79,7 @@ def frf_set(
         tuple(used),
         tuple(refused),
         band_hz,
-        _placed(given),
+        placed,
         window_rate_1_s,
     )
 
@@ -90,8 +91,8 @@ def _read(
     held, refused = [], []
     for source in sources:
         try:
-            own = read(source.path)
-            held.append((source, tuple(map(source.placed, own))))
+            own = (source.placed(r) if isinstance(r, FrfRecord) else r for r in read(source.path))
+            held.append((source, tuple(own)))
         except PlannerError as error:
             if read_geometry((source.path,)) is None:
                 refused.append(RefusedFile(source.name, str(error)))
@@ -149,6 +150,18 @@ def _struck(
     )
 
 
+def _placed(frfs: Sequence[FrfRecord]) -> tuple[bool, bool]:
+    """Whether FRFs state places or directions, and whether they are all three responses of one
+    point, or of a format without points.
+    """
+    every = ((*felt, *hit) for record in frfs for felt, hit in record.places)
+    pairs = {(felt, abs(along), hit, abs(struck)) for felt, along, hit, struck in every}
+    one_point = len({(felt, hit) for felt, _, hit, _ in pairs}) < 2
+    heard = ({i for _, i, _, along in pairs if along == j} for *_, j in pairs)
+    placed = not one_point or any(along for _, along, *_ in pairs)
+    return placed, one_point and any({1, 2, 3} <= axes for axes in heard)
+
+
 def _band(parts: Sequence[Source]) -> tuple[float, float]:
     """Which the hits excite."""
     hits: list[Hit] = []
@@ -158,24 +171,3 @@ def _band(parts: Sequence[Source]) -> tuple[float, float]:
         except PlannerError:
             continue  # said again, where it is read in earnest
     return excited_band(hits) if hits else DEFAULT_BAND_HZ
-
-
-def _placed(frfs: Sequence[FrfRecord]) -> bool:
-    pairs = _pairs(frfs)
-    return len({(felt, hit) for felt, _, hit, _ in pairs}) > 1 or any(d for _, d, *_ in pairs)
-
-
-def _of_one_point(frfs: Sequence[FrfRecord]) -> bool:
-    """Whether FRFs are all three responses of one point, or of a format without points."""
-    pairs = _pairs(frfs)
-    if len({(felt, hit) for felt, _, hit, _ in pairs}) > 1:
-        return False
-    hits = {hit for *_, hit in pairs}
-    felt = {hit: {d for _, d, _, other in pairs if other == hit} for hit in hits}
-    return any({1, 2, 3} <= directions for directions in felt.values())
-
-
-def _pairs(frfs: Sequence[FrfRecord]) -> set[tuple[str, int, str, int]]:
-    """Node and direction, without its sign, of every response and of its hit."""
-    every = ((*felt, *hit) for record in frfs for felt, hit in record.places)
-    return {(felt, abs(along), hit, abs(struck)) for felt, along, hit, struck in every}

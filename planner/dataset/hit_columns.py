@@ -1,22 +1,23 @@
 """What each hit of a pose says by itself, on a few lines, and what one of them all would say."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.dataset.dataset import LAID
-from planner.dataset.measure import MeasuredPose, of_tool, one_hit_frf, tool_frf
+from planner.dataset.measure import MeasuredPose, frf_of, of_tool
 from planner.dataset.screened_files import Source
 from planner.dataset.store import user_store
+from planner.frf.estimator import usable_band
 from planner.frf.frf import Frf
 from planner.frf.spectra import Windows, transform
 from planner.recording.channel_faults import by_good_sensors
+from planner.recording.points import TOOL
 from planner.recording.records import Hit
 
 LINES = 48  # of each hit, at most: four numbers a hit are told from 144 complex values
 Correction = Callable[[tuple[Hit, ...]], tuple[Hit, ...]]  # of the hits of a pose
-DROP = 0.1  # of a pulse's force spectrum, where it ceases to excite: 20 dB
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,7 @@ class PoseHits:
     """The accepted hits of a pose one by one, and `whole`, their FRFs at all points.
 
     These are of one hit in the middle of all, see `MeasuredPose.one_hit_frf`; `averaged` is the
-    tool's FRF as the average of all, the one that `measure` gave.
+    tool's FRF as the average of all, the one that `measure` gave, NaN where others were measured.
     """
 
     columns: HitColumns
@@ -81,16 +82,12 @@ def hit_columns(
     """
     spectra = transform(hits, band_hz, Windows(LAID, window_rate_1_s))
     frequency = spectra.frequency_hz
-    force = np.array([s.force for s in spectra.hits])
-    size = np.abs(force)
-    low, high = band_hz
-    for own in size:
-        weak = (own < DROP * np.max(own)) & (frequency > low)
-        high = min(high, float(frequency[np.argmax(weak)])) if weak.any() else high
-    inside = np.flatnonzero((frequency >= low) & (frequency <= high))
+    high = min(band_hz[1], usable_band(spectra, band_hz)[1])
+    inside = np.flatnonzero((frequency >= band_hz[0]) & (frequency <= high))
     if len(inside) > LINES:
         inside = inside[np.linspace(0, len(inside) - 1, LINES).round().astype(int)]
-    force, size = force[:, inside], size[:, inside]
+    force = np.array([s.force for s in spectra.hits])[:, inside]
+    size = np.abs(force)
     h = np.array([s.response for s in spectra.hits])[:, :, inside] / force[:, None]
     noise = np.array([s.noise for s in spectra.hits])[:, :, None]
     force_noise = np.array([s.force_noise for s in spectra.hits])[:, None, None]
@@ -117,7 +114,6 @@ def hits_of(
 ) -> PoseHits:
     """Those of files that were accepted before, kept like FRFs unless they are `corrected`."""
     pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
-    how = band_hz, window_rate_1_s
 
     def make() -> PoseHits:
         read = [source.read() for source in sources]
@@ -129,9 +125,16 @@ def hits_of(
         columns = no_columns()
         if at_tool:
             file, hits = zip(*at_tool, strict=True)
-            columns = hit_columns(hits, file, *how)
-        whole, averaged = one_hit_frf(every, records, *how), tool_frf(every, records, *how)
-        return PoseHits(columns, whole, averaged)
+            columns = hit_columns(hits, file, band_hz, window_rate_1_s)
+        how = band_hz, "h1", window_rate_1_s
+        whole = frf_of(every, records, *how)
+        one_hit = MeasuredPose((), *how, given=every).one_hit_frf if every else None
+        nothing = np.full((3, 3, len(whole.frequency_hz)), np.nan)
+        averaged = whole.of_tool or replace(
+            whole, accelerance=nothing + 0j, variance=nothing, coherence=nothing, hits=(0, 0, 0),
+            force_share=None, layout=TOOL,
+        )  # fmt: skip
+        return PoseHits(columns, one_hit or whole, averaged)
 
     return pose.kept("hits", PoseHits, make) if corrected is None else make()
 

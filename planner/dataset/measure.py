@@ -13,7 +13,7 @@ from planner.dataset.store import Store, user_store
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.modal.modes import Homogeneity, ModalModel
-from planner.recording.points import SENSOR, TCP, TOOL
+from planner.recording.points import SENSOR, TCP
 from planner.recording.records import FrfRecord, Hit
 
 DEFAULT_BAND_HZ = (4.0, 60.0)  # in which modes of a pose are looked for
@@ -142,8 +142,8 @@ class MeasuredPose:
     @property
     def is_kept(self) -> bool:
         """Whether FRF and modes are in the store, so that they cost nothing."""
-        keys = [self._key(what) for what in ("frf", "modes")]
-        return self.store is not None and all(self.store.has(key) for key in keys)
+        store = self.store
+        return store is not None and all(store.has(self._key(what)) for what in ("frf", "modes"))
 
     def kept(self, what: str, kind: type[T], make: Callable[[], T]) -> T:
         """From the store, or made and kept there."""
@@ -176,9 +176,8 @@ class MeasuredPose:
         if not files.agreeing and not files.records:
             return Averaged(said, None, ("No usable hit: nothing was estimated.",))
         try:
-            frf = _frf(
-                files.agreeing, files.records, self.band_hz, self.estimator, self.window_rate_1_s
-            )
+            how = self.band_hz, self.estimator, self.window_rate_1_s
+            frf = frf_of(files.agreeing, files.records, *how)
         except RefusedError as error:
             return Averaged(said, None, (renamed(str(error), self.sources),))
         return Averaged(said, frf, frf.remarks)
@@ -252,39 +251,14 @@ def measure(
     return found
 
 
-def one_hit_frf(
-    hits: tuple[Hit, ...],
-    records: tuple[FrfRecord, ...],
-    band_hz: tuple[float, float],
-    window_rate_1_s: float = 0.0,
-) -> Frf:
-    """`MeasuredPose.one_hit_frf` of accepted hits, or exported FRFs as they are."""
-    found = MeasuredPose((), band_hz, "h1", window_rate_1_s, hits).one_hit_frf if hits else None
-    return found or _frf(hits, records, band_hz, "h1", window_rate_1_s)
-
-
-def tool_frf(
-    hits: tuple[Hit, ...],
-    records: tuple[FrfRecord, ...],
-    band_hz: tuple[float, float],
-    window_rate_1_s: float = 0.0,
-) -> Frf:
-    """The tool's FRF of accepted hits, or of exported FRFs; NaN where others were measured."""
-    whole = _frf(hits, records, band_hz, "h1", window_rate_1_s)
-    empty = np.full((3, 3, len(whole.frequency_hz)), np.nan)
-    return whole.of_tool or replace(
-        whole, accelerance=empty + 0j, variance=empty, coherence=empty, hits=(0, 0, 0),
-        force_share=None, layout=TOOL,
-    )  # fmt: skip
-
-
-def _frf(
+def frf_of(
     hits: tuple[Hit, ...],
     records: tuple[FrfRecord, ...],
     band_hz: tuple[float, float],
     estimator: str,
     window_rate_1_s: float,
 ) -> Frf:
+    """The average of good hits, or exported FRFs where there are none; raises RefusedError."""
     from planner.frf.estimator import estimate
     from planner.frf.exported import from_records
 

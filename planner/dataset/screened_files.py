@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
-from typing import TypeVar
 
 from planner.errors import AxisNotStatedError, InputError, PlannerError
 from planner.recording.channel_faults import by_good_sensors
@@ -14,11 +13,8 @@ from planner.recording.read import hits_in, placed_by_name, read_hits
 from planner.recording.records import NOTICED, Fault, FrfRecord, Hit, PoseRow, Record
 from planner.recording.repeats import screen_repeats
 from planner.recording.sampling import recorded_otherwise
-from planner.recording.screening import screen
-from planner.recording.spectra import driving_point
+from planner.recording.screening import driving_point, screen
 from planner.words import counted
-
-RecordT = TypeVar("RecordT", bound=Record)
 
 
 @dataclass(frozen=True)
@@ -73,12 +69,10 @@ class Source:
                 f"{', '.join(self.hits)}; correct the one that is wrong."
             )
 
-    def placed(self, record: RecordT) -> RecordT:
-        """FRFs with the places that they do not state themselves; time histories as they are."""
-        if not isinstance(record, FrfRecord):
-            return record
+    def placed(self, record: FrfRecord) -> FrfRecord:
+        """FRFs with the places that they do not state themselves."""
         named = placed_by_name(record, self.name) if self.from_name else record
-        return with_axes(named, self.hit, self.response)  # pyrefly: ignore[bad-return]
+        return with_axes(named, self.hit, self.response)
 
     @property
     def whole_name(self) -> str:
@@ -160,23 +154,17 @@ def told_of_files(verdicts: Sequence[FileVerdict]) -> tuple[str, ...]:
 
 def read_files(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> ScreenedFiles:
     """Read and screen the files of one pose, each hit by itself, then all beside one another."""
-    verdicts: list[FileVerdict] = []
-    hits: list[tuple[Hit, ...]] = []
-    records: list[FrfRecord] = []
-    for source in sources:
-        verdict, found, frfs = read_one(source, band_hz)
-        verdicts.append(verdict)
-        hits.append(found)
-        records += frfs
+    each = [read_one(source, band_hz) for source in sources]
+    verdicts, hits = [verdict for verdict, *_ in each], [found for _, found, _ in each]
+    records = tuple(record for *_, frfs in each for record in frfs)
     if any(hits):
-        _refuse_others(verdicts, hits, records)
+        _refuse_others(verdicts, hits)
+        records = ()
     agreeing = _agreeing(hits, verdicts, band_hz)
-    return ScreenedFiles(tuple(verdicts), tuple(hits), agreeing, tuple(records))
+    return ScreenedFiles(tuple(verdicts), tuple(hits), agreeing, records)
 
 
-def _refuse_others(
-    verdicts: list[FileVerdict], hits: list[tuple[Hit, ...]], records: list[FrfRecord]
-) -> None:
+def _refuse_others(verdicts: list[FileVerdict], hits: list[tuple[Hit, ...]]) -> None:
     """Refuse what cannot be averaged with most hits of the pose: FRFs, and other sampling rates."""
     own = [number for number, found in enumerate(hits) for _ in found]
     said = recorded_otherwise([hit for found in hits for hit in found])
@@ -189,7 +177,6 @@ def _refuse_others(
             reason = not_averaged(verdict.source.name, text)
             verdicts[number] = replace(verdict, accepted=False, reason=reason)
             hits[number] = ()
-    records.clear()
 
 
 def not_averaged(name: str, why: str) -> str:

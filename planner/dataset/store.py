@@ -37,10 +37,8 @@ class Store:
     def result(self, key: str, kind: type[T], make: Callable[[], T]) -> T:
         """What is kept under a key (hex), or else made now and kept.
 
-        Args:
-            key: Hash of all that the result depends on, the kind of result among it.
-            kind: Class of the result.
-            make: Makes the result; what it raises is raised, and nothing is kept.
+        The key is a hash of all that the result depends on, the kind of result among it. What
+        `make` raises is raised, and nothing is kept.
         """
         found = self.get(key, kind)
         if found is None:

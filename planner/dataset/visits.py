@@ -3,7 +3,6 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
@@ -43,15 +42,6 @@ class Recording(NamedTuple):
     source: Source
 
 
-class VisitFiles(NamedTuple):
-    """A visit before its files are read: which entry, which of its files, and as in `Visit`."""
-
-    entry: int
-    files: tuple[int, ...]
-    q: np.ndarray
-    order: float
-
-
 @dataclass(frozen=True, eq=False)
 class PoseEntry:
     """What has an FRF of its own: as a rule a pose with all its visits; q (dof,) in rad."""
@@ -59,23 +49,6 @@ class PoseEntry:
     pose: str
     q: np.ndarray
     measured: MeasuredPose
-
-
-def visit_files_of(recordings: Sequence[Recording]) -> tuple[VisitFiles, ...]:
-    """Neighbouring recordings of one pose are a visit."""
-    numbers: dict[str, int] = {}
-    files: dict[str, int] = {}
-    runs = [list(run) for _, run in groupby(recordings, key=lambda recording: recording.pose)]
-    found = []
-    for place, run in enumerate(runs):
-        pose = run[0].pose
-        first = files.get(pose, 0)
-        files[pose] = first + len(run)
-        entry = numbers.setdefault(pose, len(numbers))
-        q = np.mean([recording.q for recording in run], axis=0)
-        order = place / max(len(runs) - 1, 1)
-        found.append(VisitFiles(entry, tuple(range(first, files[pose])), q, order))
-    return tuple(found)
 
 
 def table_folders(path: Path) -> tuple[Path, ...]:

@@ -23,7 +23,7 @@ from planner.frf.spectra import (
     transform,
     window_sum,
 )
-from planner.recording.points import Layout
+from planner.recording.points import Layout, together
 from planner.recording.records import Hit
 
 ESTIMATORS = "h1", "h2", "hv", "weighted", "one_hit"
@@ -78,19 +78,20 @@ def of_spectra(
         raise ValueError(f"unknown estimator {estimator}")
     frequency = spectra.frequency_hz
     places = list(dict.fromkeys((s.layout, s.rows) for s in spectra.hits))
-    layout = _joined([inner for inner, _ in places])
+    # Each group of sensors that heard hits together has columns of its own.
+    sensors = together([inner for inner, _ in places]).sensors
+    layout = Layout(tuple(inner.hits[0] for inner, _ in places), sensors)
     shape = (*layout.shape, frequency.size)
     h, variance = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
     coherence, share = np.full(shape, np.nan), np.full((shape[1], frequency.size), np.nan)
-    counts = [0] * shape[1]
-    by_noise = estimator in ("weighted", "one_hit")
-    if by_noise and not all(s.noise_known and s.noise.all() for s in spectra.hits):
-        estimator = "h1"
-    for place, axis in ((place, axis) for place in range(len(places)) for axis in range(3)):
-        inner, own = places[place]
-        group = [s for s in spectra.hits if (s.layout, s.rows, s.axis) == (inner, own, axis)]
-        column = 3 * place + axis
-        counts[column] = len(group)
+    counts = []
+    if not all(s.noise_known and s.noise.all() for s in spectra.hits):
+        estimator = "h1" if estimator in ("weighted", "one_hit") else estimator
+    for column in range(shape[1]):
+        inner, own = places[column // 3]
+        where = inner, own, column % 3
+        group = [s for s in spectra.hits if (s.layout, s.rows, s.axis) == where]
+        counts.append(len(group))
         if group:
             found = _column(group, estimator, by_scatter)
             rows = np.array(layout.rows(inner))[list(own)]
@@ -102,7 +103,7 @@ def of_spectra(
         variance,
         coherence,
         tuple(counts),
-        _usable(spectra, band_hz),
+        usable_band(spectra, band_hz),
         windows.laid_1_s + windows.carried_1_s,
         spectra.remarks,
         spectra.tail_s,
@@ -110,12 +111,6 @@ def of_spectra(
         float(np.mean([s.force_window_s for s in spectra.hits])),
         layout,
     )
-
-
-def _joined(layouts: list[Layout]) -> Layout:
-    """One layout for hits that sensors heard together: each group of them has its own columns."""
-    sensors = dict.fromkeys(name for layout in layouts for name in layout.sensors)
-    return Layout(tuple(layout.hits[0] for layout in layouts), tuple(sensors))
 
 
 def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estimated:
@@ -181,7 +176,7 @@ def _level(scatter: np.ndarray, degrees: int) -> np.ndarray:
     return (PRIOR * pooled + values * near) / (PRIOR + values)
 
 
-def _usable(spectra: Spectra, band_hz: tuple[float, float]) -> tuple[float, float]:
+def usable_band(spectra: Spectra, band_hz: tuple[float, float]) -> tuple[float, float]:
     """From the first line to where the weakest pulse has lost DROP_DB, or the lines end."""
     frequency = spectra.frequency_hz
     high = float(frequency[-1])

@@ -1,7 +1,7 @@
 """FRFs of files with their places: what is checked before any of them is used; a pose's matrix."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,19 +11,9 @@ from planner.frf.quantities import convert
 from planner.recording.points import SENSOR, TCP, TOOL, Layout
 from planner.recording.records import AXES, FrfRecord
 
-
-@dataclass(frozen=True, eq=False)
-class LabelledFrf:
-    """One FRF at lines above 0 Hz, and where it was felt and hit.
-
-    Nodes are "" where the format knows none. `values` and `coherence` (F,) are along positive axes
-    (0, 1, 2 for x, y, z).
-    """
-
-    response: tuple[str, int]
-    hit: tuple[str, int]
-    values: np.ndarray
-    coherence: np.ndarray
+# Where an FRF was felt and hit, as nodes ("" where the format knows none) and axes (0, 1, 2), and
+# its values and coherence (F,) along positive axes.
+LabelledFrf = tuple[tuple[str, int], tuple[str, int], np.ndarray, np.ndarray]
 
 
 def labelled_frfs(
@@ -57,7 +47,7 @@ def labelled_frfs(
                 )
             turned = np.sign(i) * np.sign(j) * values[k]
             ends = (felt, abs(i) - 1), (hit, abs(j) - 1)
-            found.append(LabelledFrf(*ends, turned, record.coherence[k][keep]))
+            found.append((*ends, turned, record.coherence[k][keep]))
     return frequency[keep], found
 
 
@@ -107,23 +97,22 @@ def from_records(records: tuple[FrfRecord, ...], window_rate_1_s: float = 0.0) -
     """
     first = records[0]
     frequency, frfs = labelled_frfs(records, "accelerance", RefusedError)
-    sensors, hit_points = [f.response[0] or SENSOR for f in frfs], [f.hit[0] or TCP for f in frfs]
-    layout = Layout(tuple(dict.fromkeys(hit_points)), tuple(dict.fromkeys(sensors)))
+    sensors = dict.fromkeys(node or SENSOR for (node, _), *_ in frfs)
+    layout = Layout(tuple(dict.fromkeys(node or TCP for _, (node, _), *_ in frfs)), tuple(sensors))
     shape = (*layout.shape, len(frequency))
     h, coherence = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
-    for one, sensor, point in zip(frfs, sensors, hit_points, strict=True):
-        row, column = layout.sensors.index(sensor), layout.hits.index(point)
-        at = 3 * row + one.response[1], 3 * column + one.hit[1]
-        h[at], coherence[at] = one.values, one.coherence
-    given = np.array([[bool(np.isfinite(one).all()) for one in row] for row in h])
-    measured = np.array([c.all() if layout == TOOL else c.any() for c in given.T])
+    for (felt, i), (hit, j), *held in frfs:
+        row, column = layout.sensors.index(felt or SENSOR), layout.hits.index(hit or TCP)
+        at = 3 * row + i, 3 * column + j
+        h[at], coherence[at] = held
+    given = np.isfinite(h).all(axis=-1)
+    measured = given.all(axis=0) if layout == TOOL else given.any(axis=0)
     if not measured.any():
         raise RefusedError(
             f"{first.source}: no hit axis has all three responses "
             f"({', '.join(AXES)}); export them together."
         )
     h[:, ~measured] = np.nan
-    hits = tuple(int(m) for m in measured)
+    hits, band = tuple(measured.astype(int).tolist()), (float(frequency[0]), float(frequency[-1]))
     unknown = np.full(shape, np.nan)
-    band = float(frequency[0]), float(frequency[-1])
     return Frf(frequency, h, unknown, coherence, hits, band, window_rate_1_s, layout=layout)

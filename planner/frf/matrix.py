@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.errors import InputError, RefusedError
+from planner.errors import RefusedError
 from planner.frf.exported import common_lines
 from planner.frf.frf import Frf
 from planner.frf.quantities import DERIVATIVE, convert
@@ -83,7 +83,8 @@ def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfM
     """One matrix of all FRFs of all files, by node and direction.
 
     `quantity` says what FRFs are whose file does not. An FRF that is there several times is
-    averaged. Raises RefusedError for lines that differ, InputError for an unknown direction.
+    averaged. Raises RefusedError for lines that differ, InputError for an unknown direction or
+    quantity.
     """
     frequency = common_lines(records, RefusedError)
     remarks = [r for record in records for r in record.remarks]
@@ -165,8 +166,6 @@ def _kind(record: FrfRecord, quantity: str | None, remarks: list[str]) -> tuple[
             remarks.append(f"{record.source.name}: the unit is not known, shapes are not scaled.")
         return record.quantity, bool(record.unit)
     if quantity is not None:
-        if quantity not in DERIVATIVE:
-            raise InputError(f"--quantity {quantity} is not known; give {', '.join(DERIVATIVE)}.")
         return quantity, False
     remarks.append(
         f"{record.source.name} does not say whether its FRFs are accelerance, mobility or "

@@ -30,7 +30,10 @@ def complex_frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
     lines does not count.
     """
     a, b = np.broadcast_arrays(measured, simulated)
-    _check(a, b)
+    if a.shape[-1] == 0:
+        raise ValueError("no frequency line to compare on")
+    if np.any(np.isfinite(a) & ~np.isfinite(b)):
+        raise ValueError("the simulated FRF has no number where one was measured")
     a, b = unit_and_length(a)[0], unit_and_length(b)[0]
     inner = np.abs(np.sum(a.conj() * b, axis=-1)) ** 2
     both_zero = ~(np.any(a != 0, axis=-1) | np.any(b != 0, axis=-1))
@@ -41,19 +44,17 @@ def complex_frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
 class Agreement:
     """Agreement of n poses in one band, per pose and direction: all (n, response, hit).
 
-    `frac` and `complex_frac` are in [0, 1]; `error` and `size` (m/s²/N) are the Euclidean norms
-    over lines of |H_meas| − |H_sim| and of |H_meas|. `agreement[poses]` is that of some poses (one
-    path, one pose): an index array, a mask or a slice.
+    `frac` is in [0, 1]; `error` and `size` (m/s²/N) are the Euclidean norms over lines of
+    |H_meas| − |H_sim| and of |H_meas|. `agreement[poses]` is that of some poses (one path, one
+    pose): an index array, a mask or a slice.
     """
 
     frac: np.ndarray
-    complex_frac: np.ndarray
     error: np.ndarray
     size: np.ndarray
 
     def __getitem__(self, poses: np.ndarray | slice) -> "Agreement":
-        parts = (self.frac, self.complex_frac, self.error, self.size)
-        return Agreement(*(part[poses] for part in parts))
+        return Agreement(*(part[poses] for part in (self.frac, self.error, self.size)))
 
     @property
     def global_frac(self) -> np.ndarray:
@@ -80,14 +81,13 @@ def agreement(measured: np.ndarray, simulated: np.ndarray) -> Agreement:
 
     Raises ValueError where there is no line, or no simulated number where one was measured.
     """
-    shapes = frac(measured, simulated), complex_frac(measured, simulated)
     a, b = np.broadcast_arrays(np.abs(measured), np.abs(simulated))
-    return Agreement(*shapes, unit_and_length(a - b)[1], unit_and_length(a)[1])
+    return Agreement(frac(measured, simulated), unit_and_length(a - b)[1], unit_and_length(a)[1])
 
 
 def stack(parts: Sequence[Agreement]) -> Agreement:
     """All poses of several agreements: how poses with frequency lines of their own are joined."""
-    columns = zip(*((p.frac, p.complex_frac, p.error, p.size) for p in parts), strict=True)
+    columns = zip(*((p.frac, p.error, p.size) for p in parts), strict=True)
     return Agreement(*(np.concatenate(column) for column in columns))
 
 
@@ -107,13 +107,6 @@ def mean_known(values: np.ndarray, axis: int | tuple[int, ...] | None = None) ->
     count = np.sum(known, axis=axis)
     total = np.sum(np.where(known, values, 0.0), axis=axis)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
-
-
-def _check(measured: np.ndarray, simulated: np.ndarray) -> None:
-    if measured.shape[-1] == 0:
-        raise ValueError("no frequency line to compare on")
-    if np.any(np.isfinite(measured) & ~np.isfinite(simulated)):
-        raise ValueError("the simulated FRF has no number where one was measured")
 
 
 def unit_and_length(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -18,12 +18,6 @@ def convert(frequency_hz: np.ndarray, frf: np.ndarray, given: str, wanted: str) 
     frequency_hz (F,). Kinds are "receptance" (m/N), "mobility" (m/s/N), "accelerance" (m/s²/N).
     Raises InputError for another kind, and where a line at 0 Hz would have to be integrated.
     """
-    return np.asarray(frf) * (2j * np.pi * np.asarray(frequency_hz)) ** _times(
-        frequency_hz, given, wanted
-    )
-
-
-def _times(frequency_hz: np.ndarray, given: str, wanted: str) -> int:
     for kind in (given, wanted):
         if kind not in DERIVATIVE:
             raise InputError(
@@ -32,4 +26,4 @@ def _times(frequency_hz: np.ndarray, given: str, wanted: str) -> int:
     times = DERIVATIVE[wanted] - DERIVATIVE[given]
     if times < 0 and np.any(np.asarray(frequency_hz) == 0):
         raise InputError(f"A line at 0 Hz of {given} has no {wanted}: leave that line out.")
-    return times
+    return np.asarray(frf) * (2j * np.pi * np.asarray(frequency_hz)) ** times

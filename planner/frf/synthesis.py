@@ -34,11 +34,8 @@ def receptance(frequency_hz: np.ndarray, poles: np.ndarray, residues: np.ndarray
     return found.reshape(*poles.shape[:-1], *out, iw.size)
 
 
-MOST = 2000
-
-
 def frequency_lines(band_hz: tuple[float, float]) -> np.ndarray:
     """Lines (F,) in Hz over a band: 0.1 Hz apart, at most 2000 intervals of them."""
     low, high = band_hz
     # Spacing (hz): a fifth of the half-power bandwidth of a mode at 10 Hz with 2.5 % damping
-    return np.linspace(low, high, min(MOST, round((high - low) / 0.1)) + 1)
+    return np.linspace(low, high, min(2000, round((high - low) / 0.1)) + 1)

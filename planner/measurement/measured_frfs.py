@@ -85,7 +85,7 @@ def stack(
     scale.
     """
     chosen = [_lines(frf, band_hz, most_lines, geometric) for frf in frfs]
-    layout = layout_of(frfs)
+    layout = together([frf.layout for frf in frfs])
     n, f = len(frfs), max(len(c) for c in chosen)
     if f == 0:
         raise InputError(
@@ -99,21 +99,14 @@ def stack(
         count = len(lines)
         frequency[i, :count] = frf.frequency_hz[lines]
         values, noise = frf.accelerance[..., lines], noise_sd(frf)[..., lines]
-        given = np.isfinite(values) & np.isfinite(noise)
-        size = np.abs(values)
-        total = np.sqrt(noise**2 + (model_error * size) ** 2)
-        given &= total > 0
+        total = np.sqrt(noise**2 + (model_error * np.abs(values)) ** 2)
+        given = np.isfinite(total) & (total > 0)
         at = np.ix_([i], layout.rows(frf.layout), layout.columns(frf.layout), range(count))
         h[at] = np.where(given, values, 1.0)
         sd[at] = np.where(given, total, np.inf)
     rates = np.array([frf.exponential_rate_1_s for frf in frfs])
     tails = np.array([frf.tail_s for frf in frfs])
     return Measured(frequency, laplace(frequency, rates), h, sd, tails, layout)
-
-
-def layout_of(frfs: Sequence[Frf]) -> Layout:
-    """The points of all FRFs."""
-    return together([frf.layout for frf in frfs])
 
 
 def matrices_at(
@@ -123,7 +116,7 @@ def matrices_at(
 
     `sloped`: with slopes by the joint angles, for readbacks may err.
     """
-    layout = layout_of(frfs)
+    layout = together([frf.layout for frf in frfs])
     found = elastic.with_slopes(q, layout) if sloped else elastic.matrices(q, layout=layout)
     there = np.array([[name in f.layout.sensors for name in layout.sensors] for f in frfs])
     return with_sensors(found, elastic.robot, layout, there)
@@ -141,9 +134,7 @@ def with_sensors(found: Matrices, robot: Robot, layout: Layout, there: np.ndarra
     return replace(found, mass=mass)
 
 
-def _lines(
-    frf: Frf, band_hz: tuple[float, float], most: int, geometric: bool = False
-) -> np.ndarray:
+def _lines(frf: Frf, band_hz: tuple[float, float], most: int, geometric: bool) -> np.ndarray:
     low = max(band_hz[0], frf.usable_band_hz[0])
     high = min(band_hz[1], frf.usable_band_hz[1])
     inside = np.flatnonzero((frf.frequency_hz >= low) & (frf.frequency_hz <= high))
@@ -162,8 +153,6 @@ def _lines(
 
 def noise_sd(frf: Frf) -> np.ndarray:
     """Sd (r, c, F) of an FRF: from the hits' scatter, else from the coherence, else assumed."""
-    if np.isfinite(frf.variance).all():
-        return np.sqrt(frf.variance)
     h, hits = np.abs(frf.accelerance), np.maximum(frf.hits, 1)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         # Bendat & Piersol 2010, eq. 9.90, for both parts of the complex value.

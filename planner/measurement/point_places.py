@@ -5,7 +5,7 @@ probably felt there; likewise hits.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,24 +22,20 @@ MOST_LINES = 200  # of a pose, that are compared
 FAR_BETTER, CLOSE = 0.5, 0.6
 
 
-@dataclass(frozen=True)
-class Misplaced:
-    """A point of a pose whose FRFs fit another's; relative differences `named` and `there`."""
-
-    pose: int
-    point: str
-    fits: str
-    hit: bool
-    named: float
-    there: float
+# Of points, of those that they fit and of whether they were hit: the poses where it is so, and
+# relative differences to the simulation, as named and there.
+Misplaced = dict[tuple[str, str, bool], list[tuple[str, float, float]]]
 
 
 def misplaced(
-    simulations: Sequence[Simulation], q: np.ndarray, frfs: Sequence[Frf], band: tuple[float, float]
-) -> list[Misplaced]:
-    """Points whose FRFs, measured at q (n, dof), fit another's far better.
-
-    By that simulation which describes all points best, named as they fit it.
+    simulations: Sequence[Simulation],
+    q: np.ndarray,
+    frfs: Sequence[Frf],
+    band: tuple[float, float],
+    poses: Sequence[str],
+) -> tuple[str, ...]:
+    """A sentence for each point whose FRFs, measured at q (n, dof) of `poses`, fit another's far
+    better. By that simulation which describes all points best, named as they fit it.
     """
     measured = stack(frfs, band, MOST_LINES, 0.0)
     points = [p.name for p in simulations[0].robot.config.point]
@@ -47,12 +43,12 @@ def misplaced(
     hits = tuple(dict.fromkeys((TCP, *measured.layout.hits, *map(names.hit, points))))
     sensors = tuple(dict.fromkeys((SENSOR, *measured.layout.sensors, *map(names.sensor, points))))
     if len(points) < 2:
-        return []
+        return ()
     wide, own = Layout(hits, sensors), measured.layout
     tried = [_differences(simulation, q, measured, wide) for simulation in simulations]
     # How far all sensors are off, each at the point which fits it best.
     by_sensor, by_hit = min(tried, key=lambda sides: np.nansum(np.min(sides[0], axis=-1)))
-    found = []
+    found: Misplaced = {}
     for differences, named, points_there, tool, hit in (
         (by_sensor, own.sensors, sensors, SENSOR, False),
         (by_hit, own.hits, hits, TCP, True),
@@ -62,9 +58,9 @@ def misplaced(
             stated, best = float(each[points_there.index(named[k])]), int(np.argmin(each))
             # The tool's own are as they are.
             if named[k] != tool and each[best] < min(FAR_BETTER * stated, CLOSE):
-                there = float(each[best])
-                found.append(Misplaced(int(i), named[k], points_there[best], hit, stated, there))
-    return found
+                case = poses[i], stated, float(each[best])
+                found.setdefault((named[k], points_there[best], hit), []).append(case)
+    return _questions(found)
 
 
 def _differences(
@@ -99,26 +95,20 @@ def _differences(
     return along(1, h[:, :, :, to_hit]), along(3, h[:, to_sensor])
 
 
-def misplaced_questions(found: Sequence[Misplaced], poses: Sequence[str]) -> tuple[str, ...]:
-    """A sentence for each point that fits another's place, with the poses where it does."""
-    told: dict[tuple[str, str, bool], list[Misplaced]] = {}
-    for one in found:
-        told.setdefault((one.point, one.fits, one.hit), []).append(one)
+def _questions(found: Misplaced) -> tuple[str, ...]:
     sentences, done = [], set()
-    for (point, fits, hit), each in told.items():
+    for (point, fits, hit), cases in found.items():
         if (point, fits, hit) in done:
             continue
-        where = ", ".join(dict.fromkeys(poses[one.pose] for one in each))
-        named, there = (
-            100 * float(np.median(v))
-            for v in zip(*((one.named, one.there) for one in each), strict=True)
-        )
+        poses, *differences = zip(*cases, strict=True)
+        where = ", ".join(dict.fromkeys(poses))
+        named, there = (100 * float(np.median(v)) for v in differences)
         what = "hits at" if hit else "FRFs of"
         text = (
             f"{where}: {what} {point} fit {fits} far better (there they differ from the simulation"
             f" by {there:.0f} %, at {point} by {named:.0f} %)"
         )
-        if (fits, point, hit) in told:
+        if (fits, point, hit) in found:
             done.add((fits, point, hit))
             text += f", and {fits}'s fit {point}: were the two exchanged?"
         else:

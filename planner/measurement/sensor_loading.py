@@ -5,7 +5,7 @@ itself. The simulation with and without the sensors' masses tells by how much.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,7 +35,7 @@ class Unloaded:
 
     modes: tuple[Mode, ...]
     lowered: np.ndarray
-    unlike: float = 0.0
+    unlike: float
 
 
 def unloaded(
@@ -44,7 +44,7 @@ def unloaded(
     """Of modes measured at q (dof,) while these sensors sat on the robot."""
     carried = [name for name in sensors if name in simulation.robot.sensor_mass_kg]
     if not modes or not carried:
-        return Unloaded(tuple(modes), np.zeros(len(modes)))
+        return Unloaded(tuple(modes), np.zeros(len(modes)), 0.0)
     hz, shapes, lowered = _lowered(simulation, q, carried)
     off = np.log(np.array([mode.frequency_hz for mode in modes])[:, None] / (hz * (1 - lowered)))
     alike = mac_matrix(np.array([mode.shape for mode in modes]), shapes)
@@ -86,7 +86,7 @@ class WithoutSensors:
     """
 
     modes: tuple[tuple[Mode, ...], ...]
-    lowered_percent: tuple[dict[float, float | None], ...] = field(default=())
+    lowered_percent: tuple[dict[float, float | None], ...] = ()
     remarks: tuple[str, ...] = ()
 
     def of(self, pose: int, mode: Mode) -> float | None:

@@ -112,8 +112,8 @@ def read_frf(path: Path, pose: str | None, from_names: bool = False) -> CutterFr
         raise InputError(f"{path} holds FRFs of one pose only; leave --pose out.")
     frequency, frfs = labelled_frfs(read_frfs(path, from_names), "accelerance", InputError)
     h = np.full((3, 3, len(frequency)), np.nan + 0j)
-    for one in frfs:
-        h[one.response[1], one.hit[1]] = one.values
+    for (_, i), (_, j), values, _ in frfs:
+        h[i, j] = values
     return of_accelerance(str(path), frequency, h, None)
 
 

@@ -112,7 +112,7 @@ def _frfs(
     assert tool is not None
     ends = str(tip.node), str(back.node)
     frequency, frfs = labelled_frfs(records, "receptance", InputError, frozenset(ends))
-    found = {(*one.response, *one.hit): one.values for one in frfs}
+    found = {(*felt, *hit): values for felt, hit, values, _ in frfs}
     directions = tuple(k for k in range(3) if any(key[1] == k for key in found))
     wanted = [(node, k) for node in ends for k in directions]
     lacking = [(a, b) for a in wanted for b in wanted if (*a, *b) not in found]

@@ -20,7 +20,7 @@ from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, fit_shap
 from planner.modal.residues import realign
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
-from planner.recording.spectra import FIRST_LINE
+from planner.recording.screening import FIRST_LINE
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """What single channels show to be no measurement: dead, overloaded, filled up, samples lost."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -24,27 +24,17 @@ BY_CHANCE, NEAR, NARROW, COARSE = 5e-4, 0.1, 6, 2e-3
 CHANGES, STEPS, SURELY, LONGER, SKEW = 8, 4.0, 12.0, 4, 16
 
 
-@dataclass(frozen=True)
-class Rest:
-    """A channel's last value: from which sample on, and by how many steps it moved until then.
-
-    No steps where it may rest by its resolution.
+def _rest(samples: np.ndarray) -> tuple[int, float]:
+    """Of a channel (n,) that is not constant: from which sample on it has its last value, and by
+    how many steps it moved until then; 0 where it may rest by its resolution.
     """
-
-    start: int
-    steps: float
-
-    @classmethod
-    def of(cls, samples: np.ndarray) -> "Rest":
-        """Of a channel (n,) that is not constant."""
-        start = int(np.flatnonzero(samples != samples[-1])[-1]) + 1
-        before = samples[:start]
-        changes = np.flatnonzero(np.diff(before))[-CHANGES:]
-        if len(changes) < CHANGES:
-            return cls(start, 0.0)
-        if len(samples) - start <= max(SKEW, LONGER * int(np.max(np.diff(changes)))):
-            return cls(start, 0.0)
-        return cls(start, float(np.ptp(before[changes[0] :]) / step(before)))
+    start = int(np.flatnonzero(samples != samples[-1])[-1]) + 1
+    before = samples[:start]
+    changes = np.flatnonzero(np.diff(before))[-CHANGES:]
+    usual = np.max(np.diff(changes), initial=0)
+    if len(changes) < CHANGES or len(samples) - start <= max(SKEW, LONGER * usual):
+        return start, 0.0
+    return start, float(np.ptp(before[changes[0] :]) / step(before))
 
 
 def channel_faults(hit: Hit) -> tuple[Fault, ...]:
@@ -79,9 +69,9 @@ def _of_acceleration(hit: Hit, row: int) -> Fault | None:
     if not np.any(samples - samples[0]):
         text = f"The acceleration along {name} is constant"
         return Fault("dead", f"{text}; check the cable of {name}.")
-    rest = Rest.of(samples)
-    if rest.steps > SURELY:
-        seconds = (len(samples) - rest.start) / hit.sampling_rate_hz
+    start, steps = _rest(samples)
+    if steps > SURELY:
+        seconds = (len(samples) - start) / hit.sampling_rate_hz
         text = f"The acceleration along {name} repeats one value for the last {seconds:.2g} s"
         return Fault("dead", f"{text}, though it moved until then; check the cable of {name}.")
     return _overload(f"acceleration {name}", "m/s²", samples, pulse=False)
@@ -156,10 +146,10 @@ def _quiet(record: TimeRecord) -> int:
 
 def _filled(channels: list[np.ndarray]) -> int:
     """How many samples at the end of channels (n,) were filled in."""
-    rests = [Rest.of(samples) for samples in channels if np.any(samples != samples[:1])]
-    sudden = [rest.start for rest in rests if rest.steps > STEPS]
+    rests = [_rest(samples) for samples in channels if np.any(samples != samples[:1])]
+    sudden = [start for start, steps in rests if steps > STEPS]
     # The first of equal samples may be the last that was measured, or not.
-    if not sudden or max(rest.start for rest in rests) > max(sudden) + SKEW:
+    if not sudden or max(start for start, _ in rests) > max(sudden) + SKEW:
         return 0
     return len(channels[0]) - min(sudden)
 

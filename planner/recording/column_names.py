@@ -140,6 +140,13 @@ def frequency_unit(name: str, stated: str) -> Unit | None:
     return _unit_of(name, stated, Unit("frequency", "Hz", 1.0), FREQUENCIES)
 
 
+def says_something(name: str, stated: str = "") -> bool:
+    """Whether name or unit say what a column holds."""
+    said = stated or unit_text(name)
+    axis = time_unit(name, stated) or frequency_unit(name, stated)
+    return bool(axis or lookup(said) or lookup_ratio(said))
+
+
 def _unit_of(name: str, stated: str, si: Unit, names: tuple[str, ...]) -> Unit | None:
     unit = lookup(stated or unit_text(name))
     if unit is None:

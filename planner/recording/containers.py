@@ -96,14 +96,18 @@ class _Reader:
                 continue  # MATLAB's own, and links to what is read elsewhere
             item = group[name]
             address = h5py.h5o.get_info(item.id).addr
-            if address in self._seen:  # by another name
-                continue
-            self._seen.add(address)
-            if isinstance(item, h5py.Group):
-                entries[name] = self._struct(item, depth + 1)
-            elif isinstance(item, h5py.Dataset):
-                entries[name] = self._dataset(item, depth + 1)
+            if address not in self._seen:  # by another name
+                self._seen.add(address)
+                entries[name] = self._item(item, depth + 1)
         return tree_of(entries, _attributes(group))
+
+    def _item(self, item: object, depth: int) -> object:
+        """What is in a group or dataset; nothing in what is neither."""
+        import h5py
+
+        if isinstance(item, h5py.Group):
+            return self._struct(item, depth)
+        return self._dataset(item, depth) if isinstance(item, h5py.Dataset) else {}
 
     def _struct(self, group: "h5py.Group", depth: int) -> object:
         """A group, or one struct after another where its fields are lists of references."""
@@ -121,17 +125,8 @@ class _Reader:
         return [dict(zip(each, values, strict=True)) for values in zip(*each.values(), strict=True)]
 
     def _elements(self, dataset: "h5py.Dataset", depth: int) -> list[object]:
-        import h5py
-
-        found: list[object] = []
-        for reference in np.asarray(dataset[()]).ravel():
-            item = dataset.file[reference] if reference else None
-            if isinstance(item, h5py.Group):
-                found.append(self._struct(item, depth + 1))
-            else:
-                named = isinstance(item, h5py.Dataset)
-                found.append(self._dataset(item, depth + 1) if named else {})
-        return found
+        references = np.asarray(dataset[()]).ravel()
+        return [self._item(dataset.file[r] if r else None, depth + 1) for r in references]
 
     def _dataset(self, dataset: "h5py.Dataset", depth: int) -> object:
         """Numbers, a text, a list, or a table's columns; with what is stated of them, a level."""

@@ -118,7 +118,8 @@ def _of_list(name: str, values: list[object]) -> object:
     texts = tuple(v for v in values if isinstance(v, str))
     if len(texts) == len(values):
         return texts
-    if all(isinstance(v, Mapping) for v in values) and (table := _of_structs(values)):
+    structs = [v for v in values if isinstance(v, Mapping)]
+    if len(structs) == len(values) and (table := _of_structs(structs)):
         return table
     arrays = [np.squeeze(v) for v in values if isinstance(v, np.ndarray) and np.size(v) > 1]
     alike = len({a.shape for a in arrays}) == 1 and arrays[0].ndim == 1 and len(arrays) > 1
@@ -127,11 +128,10 @@ def _of_list(name: str, values: list[object]) -> object:
     return {f"{name} {number}": value for number, value in enumerate(values, 1)}
 
 
-def _of_structs(values: list[object]) -> dict[str, object]:
+def _of_structs(values: Sequence[Mapping[str, object]]) -> dict[str, object]:
     """Structs of texts and numbers alone as lists of their texts: a table of channels."""
-    each = [dict(attributes_of(v)) for v in values if isinstance(v, Mapping)]
-    raw = [v for v in values if isinstance(v, Mapping)]
-    if any(len(stated) != len(v) for stated, v in zip(each, raw, strict=True)) or not each[0]:
+    each = [dict(attributes_of(v)) for v in values]
+    if any(len(stated) != len(v) for stated, v in zip(each, values, strict=True)) or not each[0]:
         return {}
     found: dict[str, object] = {}
     for key in each[0]:
@@ -228,8 +228,8 @@ def _columns(
     yield EntryColumn(at, values, own, shared, lacks=lacks)
 
 
-def _arrays(tree: EntryTree) -> int:
-    return sum(_arrays(p) if isinstance(p, EntryTree) else 1 for p in tree.parts.values())
+def _arrays(part: EntryTree | np.ndarray) -> int:
+    return sum(map(_arrays, part.parts.values())) if isinstance(part, EntryTree) else 1
 
 
 def _beside(tree: EntryTree) -> dict[str, object]:
@@ -244,7 +244,7 @@ def _beside(tree: EntryTree) -> dict[str, object]:
 
 def _with_own_times(file: Path, tree: EntryTree) -> EntryTree:
     """A group with one array where its two are a channel and what its samples stand at."""
-    holding = {n: p for n, p in tree.parts.items() if not isinstance(p, EntryTree) or _arrays(p)}
+    holding = {n: p for n, p in tree.parts.items() if _arrays(p)}
     arrays = {n: only for n, p in holding.items() if (only := _only(p))}
     axes = {n: unit for n, (_, said) in arrays.items() if (unit := _axis_unit(n, said))}
     if len(holding) != 2 or len(arrays) != 2 or len(axes) != 1:
@@ -263,7 +263,7 @@ def _only(part: EntryTree | np.ndarray) -> tuple[np.ndarray, Stated] | None:
     """The one column that a part holds and what is stated of it; None where it holds others."""
     if not isinstance(part, EntryTree):
         return (part, {}) if part.ndim == 1 else None
-    inner = [p for p in part.parts.values() if not isinstance(p, EntryTree) or _arrays(p)]
+    inner = [p for p in part.parts.values() if _arrays(p)]
     found = _only(inner[0]) if len(inner) == 1 else None
     return (found[0], {**part.attributes, **_beside(part), **found[1]}) if found else None
 

@@ -5,17 +5,12 @@ record; where that is no whole hit, group by group, then what has one length; wh
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from planner.errors import InputError
-from planner.recording.column_names import (
-    frequency_unit,
-    lookup,
-    lookup_ratio,
-    time_unit,
-    unit_text,
-)
+from planner.recording.column_names import lookup, says_something, unit_text
 from planner.recording.entry_columns import EntryColumn, EntryTree, found_in, named_from
 from planner.recording.named_columns import Named, holds_frfs, to_records
 from planner.recording.records import FrfRecord, Record
@@ -30,8 +25,6 @@ LOOKED_FOR = (
 UNREAD = "a table, string array or object of MATLAB's own: save table2struct or cellstr of it"
 
 Columns = tuple[EntryColumn, ...]
-
-
 _Whole = tuple[Record, Columns]  # and the columns that it is of
 
 
@@ -57,10 +50,8 @@ def _as_it_is(path: Path, columns: Columns) -> tuple[Record, ...]:
     try:
         return to_records(path, named_from(path, columns, False))
     except InputError:
-        try:
+        with suppress(InputError):
             return to_records(path, named_from(path, columns, True))
-        except InputError:
-            pass
         raise
 
 
@@ -139,11 +130,7 @@ def _no_hit_is_lost(path: Path, each: Sequence[tuple[Columns, list[_Whole]]]) ->
 
 
 def _known(column: EntryColumn) -> bool:
-    """Whether unit or name say what a column holds."""
-    name, unit = column.title or column.last, column.unit
-    axis = time_unit(name, unit) or frequency_unit(name, unit)
-    said = unit or unit_text(name)
-    return bool(axis or lookup(said) or lookup_ratio(said))
+    return says_something(column.title or column.last, column.unit)
 
 
 def _held(found: Sequence[EntryColumn], root: EntryTree) -> str:

@@ -22,6 +22,8 @@ CHANNELS = "channels.csv"  # scales and units of WAV files
 TABLES = (TABLE, CHANNELS)
 MAX_BYTES = 32 * 1024 * 1024
 MAX_ROWS = 200_000
+NEEDED = {"pose": "a name such as P001", "hit": "along which axis it was hit, such as +x",
+          "file": "the recording's file"}  # fmt: skip
 ANGLE, SLIDE = "_deg", "_mm"
 ANGLE_LIKE = re.compile(r"deg|rad$|°|_mm$|angle|joint|axis|^[AEJ]\d", re.IGNORECASE)
 
@@ -61,13 +63,8 @@ def read_recordings(
     units = JointUnits.of(joints)
     told = not bare or (units.names and any(map(ANGLE_LIKE.search, header)))
     columns = _joint_columns(path, header, units) if told else ()
-    for name in ("pose", "hit", "file"):
+    for name, what in NEEDED.items():
         if name not in header:
-            what = {
-                "pose": "a name such as P001",
-                "hit": "along which axis it was hit, such as +x",
-                "file": "the recording's file",
-            }[name]
             raise InputError(f"{path} has no column {name}; add it: in each row {what}.")
     inside = folder.resolve()
     rows: list[PoseRow] = []

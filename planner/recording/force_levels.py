@@ -52,13 +52,10 @@ def levels(peaks_n: np.ndarray) -> list[np.ndarray]:
     Clusters in logarithms by average linkage: means of two levels differ by SAME_LEVEL or more,
     also where forces in between leave no gap.
     """
+    from scipy.cluster.hierarchy import fcluster, linkage
+
+    if len(peaks_n) < 2:
+        return [peaks_n]
     logarithms = np.log(np.maximum(peaks_n, np.finfo(float).tiny))
-    levels = list(np.split(logarithms, len(logarithms)) if len(logarithms) else [logarithms])
-    while len(levels) > 1:
-        # Of points on a line the nearest two clusters are neighbours, as far apart as their means.
-        gaps = np.diff([np.mean(level) for level in levels])
-        nearest = int(np.argmin(gaps))
-        if gaps[nearest] > np.log(SAME_LEVEL):
-            break
-        levels[nearest : nearest + 2] = [np.concatenate(levels[nearest : nearest + 2])]
-    return np.split(peaks_n, np.cumsum([len(level) for level in levels])[:-1])
+    level = fcluster(linkage(logarithms[:, None], "average"), np.log(SAME_LEVEL), "distance")
+    return np.split(peaks_n, np.flatnonzero(np.diff(level)) + 1)

@@ -127,18 +127,14 @@ def _channels(path: Path, segment: _Segment) -> _Channels:
         if name != COMMENT and (name or _cell(segment, "Samples", column))
     }
     times = [column for column in columns if segment.names[column] == ABSCISSA]
+    x_of = {c: max((t for t in times if t < c), default=-1) for c in columns if c not in times}
     found: list[tuple[str, np.ndarray, dict[str, Any]]] = []
-    for column, values in columns.items():
-        at = max((t for t in times if t < column), default=-1)
-        if column in times or not values.size:
-            continue
+    for column, at in x_of.items():
         # An x column is that of the longest channel on its right.
-        own = [
-            c for c in columns if c > at and c not in times and not any(at < t < c for t in times)
-        ]
-        owner = max(own, key=lambda c: columns[c].size)
-        said = _stated(path, segment, column, len(values), owner, columns.get(at, np.zeros(0)))
-        found.append((segment.names[column], values, said))
+        owner = max((c for c in x_of if x_of[c] == at), key=lambda c: columns[c].size)
+        if count := columns[column].size:
+            said = _stated(path, segment, column, count, owner, columns.get(at, np.zeros(0)))
+            found.append((segment.names[column], columns[column], said))
     names = [name for name, *_ in found]
     return {
         f"{name} ({number})" if names.count(name) > 1 or not name else name: (values, said)
@@ -214,18 +210,15 @@ def _date(date: str, time: str) -> np.datetime64 | None:
 
 def _goes_on(before: _Channels, after: _Channels) -> bool:
     """Whether each channel begins where it ended in the last segment."""
-    alike = [*before] == [*after]
-    return alike and all(
-        _follows(len(values), said, after[name][1])
-        for name, (values, said) in before.items()
-        if said["dt"] > 0
-    )
-
-
-def _follows(count: int, first: dict[str, Any], then: dict[str, Any]) -> bool:
-    if (first["unit"], first["x_unit"]) != (then["unit"], "s"):
+    if [*before] != [*after]:
         return False
-    apart = then["t0"] - first["t0"]
-    if "start_time" in first and "start_time" in then:
-        apart += float((then["start_time"] - first["start_time"]) / np.timedelta64(1, "ns") * 1e-9)
-    return abs(apart / first["dt"] - count) < max(0.5, UNEVEN * count)
+    for name, (values, first) in before.items():
+        count, then = len(values), after[name][1]
+        apart = then["t0"] - first["t0"]
+        if "start_time" in first and "start_time" in then:
+            apart += float((then["start_time"] - first["start_time"]) / np.timedelta64(1, "s"))
+        alike = (first["unit"], first["x_unit"]) == (then["unit"], "s")
+        near = abs(apart - count * first["dt"]) < max(0.5, UNEVEN * count) * first["dt"]
+        if first["dt"] > 0 and not (alike and near):
+            return False
+    return True

@@ -36,8 +36,7 @@ class Layout:
 
     def columns(self, inner: "Layout") -> list[int]:
         """Columns of this layout that are those of an `inner` one."""
-        place_of = {_which(self.hits, i): i for i in range(len(self.hits))}
-        places = [place_of[_which(inner.hits, i)] for i in range(len(inner.hits))]
+        places = [_numbered(self.hits).index(hit) for hit in _numbered(inner.hits)]
         return [3 * place + axis for place in places for axis in range(3)]
 
 
@@ -46,20 +45,14 @@ TOOL = Layout()
 
 def together(layouts: Sequence[Layout]) -> Layout:
     """The smallest layout that holds all, points in the order in which they first occur."""
-    hits: list[str] = []
-    sensors: list[str] = []
-    for layout in layouts:
-        sensors += [name for name in layout.sensors if name not in sensors]
-        for i in range(len(layout.hits)):
-            name, number = _which(layout.hits, i)
-            if hits.count(name) <= number:
-                hits.append(name)
-    return Layout(tuple(hits), tuple(sensors))
+    hits = dict.fromkeys(hit for layout in layouts for hit in _numbered(layout.hits))
+    sensors = dict.fromkeys(name for layout in layouts for name in layout.sensors)
+    return Layout(tuple(name for name, _ in hits), tuple(sensors))
 
 
-def _which(names: Sequence[str], place: int) -> tuple[str, int]:
-    """The name at a place, and how often it stood before."""
-    return names[place], names[:place].count(names[place])
+def _numbered(names: Sequence[str]) -> list[tuple[str, int]]:
+    """Each name, and how often it stood before."""
+    return [(name, names[:place].count(name)) for place, name in enumerate(names)]
 
 
 @dataclass(frozen=True)
@@ -131,13 +124,8 @@ class StatedPoints:
 
         Raises InputError where the file names no point of the robot, or another than the table.
         """
-        own = self._named(source, node, "hit", (self.hit_point,))
-        if own and self.hit_point and self.names.hit(own) != self.names.hit(self.hit_point):
-            raise InputError(
-                f"{source}{self.where} was hit at {_told(node, own)}, the table says "
-                f"{self.hit_point}; correct the one that is wrong."
-            )
-        return self.names.hit(own or self.hit_point or TCP)
+        stated = (self.hit_point,) if self.hit_point else ()
+        return self.names.hit(self._at(source, node, "hit", stated) or TCP)
 
     def knows_response(self, node: str) -> bool:
         """Whether a response at a node is at a point of the robot, or of the table's row."""
@@ -149,22 +137,26 @@ class StatedPoints:
 
     def response_at(self, source: object, node: str) -> str:
         """The same of the point where a response was measured."""
-        stated = self.response_points
-        own = self._named(source, node, "response", stated)
+        own = self._at(source, node, "response", self.response_points)
+        return self.names.sensor(own or SENSOR)
+
+    def _at(self, source: object, node: str, what: str, stated: tuple[str, ...]) -> str:
+        """The point that the file names, else the stated one; "" where neither says any."""
+        own = self._named(source, node, what, stated)
         if own is None and len(stated) > 1:
             raise InputError(
                 f"{source}{self.where} does not say which of {', '.join(stated)} a response is "
                 f"of; name its node, or its column acceleration_{stated[0]}_x_m_s2."
             )
-        same = [
-            name for name in stated if own and self.names.sensor(name) == self.names.sensor(own)
-        ]
-        if own and stated and not same:
+        known = self.names.hit if what == "hit" else self.names.sensor
+        if own and stated and known(own) not in map(known, stated):
+            where = "was hit" if what == "hit" else "has a response"
+            told = own if node == own else f"node {node}, which is {own}"
             raise InputError(
-                f"{source}{self.where} has a response at {_told(node, own)}, the table says "
-                f"{', '.join(stated)}; correct the one that is wrong."
+                f"{source}{self.where} {where} at {told}, the table says {', '.join(stated)}; "
+                f"correct the one that is wrong."
             )
-        return self.names.sensor(own or (stated[0] if stated else SENSOR))
+        return own or (stated[0] if stated else "")
 
     def _named(self, source: object, node: str, what: str, stated: tuple[str, ...]) -> str | None:
         """The point at a node; one that robot.toml does not list is that of a stated point.
@@ -174,7 +166,7 @@ class StatedPoints:
         try:
             return self.names.named(node)
         except KeyError:
-            free = [name for name in stated if name and name not in self.names.nodes.values()]
+            free = [name for name in stated if name not in self.names.nodes.values()]
             if len(free) == 1:
                 return free[0]
             nodes = ", ".join(f"{n} ({name})" for n, name in self.names.nodes.items())
@@ -191,7 +183,3 @@ class StatedPoints:
         if not node.isdigit() or set(of_tool) & set(self.names.nodes.values()):
             return ""
         return f' (name = "{tool}", node = {node}, if it is the tool\'s)'
-
-
-def _told(node: str, name: str) -> str:
-    return name if node == name else f"node {node}, which is {name}"

@@ -9,14 +9,14 @@ import numpy as np
 from planner.recording.force_levels import level_of, levels
 from planner.recording.records import AXES, Fault, Hit
 from planner.recording.sampling import same_rate
-from planner.recording.screening import SILENCE
-from planner.recording.spectra import band_spectra
+from planner.recording.screening import SILENCE, band_spectra
 
 # Likeness of repeats: of two, below the first they are unlike; of more, by so much below what is
 # usual (of 2,430 hits that were 3° and 5 mm off at most none was by 0.1); above the last the same.
 UNLIKE, FAR_BELOW, LIKE = 0.5, 0.2, 0.8
 MOST_TILT = 0.1  # rad: three times what a hand usually tilts by
 SAME = 0.95  # from which, in size too, two hits are of one axis: as like as hits of one pose are
+OTHER_SIZE = np.log(2.0)  # ln of sizes of repeats: hands and levels differ by some 30 %. Chosen.
 WHOLE = 0.5  # share of another axis' FRF that is no tilt: that axis was hit
 
 
@@ -187,10 +187,22 @@ class _Agreement:
         return _likeness(self._upright(frf[None])[0], self.centre)
 
     def sizes(self, frfs: np.ndarray) -> np.ndarray:
-        """As `other_sizes` of FRFs (n, N), where they are alike: what moves modes is no unit."""
+        """ln of how much larger FRFs (n, N) are than half of all or more; 0 where no half differs.
+
+        They differ both as they are and without what tilts of the hits explain, and are alike
+        otherwise: what moves modes is no unit.
+        """
         upright = self._upright(frfs)
-        alike = np.array([_likeness(frf, self.centre) > LIKE for frf in upright])
-        return np.where(alike, other_sizes(frfs, upright), 0.0)
+        size, straight = (
+            np.log(np.maximum(np.linalg.norm(f, axis=1), SILENCE)) for f in (frfs, upright)
+        )
+        apart = (np.abs(own[:, None] - own) for own in (size, straight))
+        other = np.minimum(*apart) > OTHER_SIZE
+        odd = 2 * other.sum(axis=1) >= len(frfs)
+        odd &= np.array([_likeness(frf, self.centre) > LIKE for frf in upright])
+        return np.array([
+            size[i] - np.median(size[other[i]]) if odd[i] else 0.0 for i in range(len(frfs))
+        ])  # fmt: skip
 
     def _upright(self, frfs: np.ndarray) -> np.ndarray:
         """FRFs (n, N) without what tilts of the hits explain.
@@ -264,11 +276,10 @@ def _groups(hits: tuple[Hit, ...]) -> list[list[int]]:
     """Which hits, by their places among all, can be compared with each other."""
     groups: list[list[int]] = []
     for i, hit in enumerate(hits):
-        own = next((group for group in groups if _comparable(hits[group[0]], hit)), None)
-        if own is None:
-            groups.append([i])
-        else:
-            own.append(i)
+        own = next((group for group in groups if _comparable(hits[group[0]], hit)), [])
+        if not own:
+            groups.append(own)
+        own.append(i)
     return groups
 
 
@@ -296,27 +307,9 @@ def _likeness_in_size(frf: np.ndarray, other: np.ndarray) -> float:
     return _likeness(frf, other) * (min(sizes) / max(*sizes, SILENCE))
 
 
-# ln of sizes by which repeats differ: hands and force levels by some 30 % at most. Chosen.
-OTHER_SIZE = np.log(2.0)
 # ln of what FRFs grow by where a file is in another unit than its repeats, and how near that is.
 UNITS = {-np.log(9.80665): "g instead of m/s²", np.log(4.44822): "lbf instead of N"}
 NEAR_UNIT = 0.1
-
-
-def other_sizes(frfs: np.ndarray, upright: np.ndarray) -> np.ndarray:
-    """ln of how much larger FRFs (n, N) are than half of all or more; 0 where no half differs.
-
-    They differ both as they are and `upright` (n, N), without what tilts of the hits explain.
-    """
-    size, straight = (
-        np.log(np.maximum(np.linalg.norm(f, axis=1), SILENCE)) for f in (frfs, upright)
-    )
-    apart = (np.abs(own[:, None] - own) for own in (size, straight))
-    other = np.minimum(*apart) > OTHER_SIZE
-    odd = 2 * other.sum(axis=1) >= len(frfs)
-    return np.array([
-        size[i] - np.median(size[other[i]]) if odd[i] else 0.0 for i in range(len(frfs))
-    ])  # fmt: skip
 
 
 def outvoted(sizes: np.ndarray) -> bool:

@@ -14,13 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.errors import ForeignFileError, InputError
-from planner.recording.column_names import (
-    frequency_unit,
-    lookup,
-    lookup_ratio,
-    time_unit,
-    unit_text,
-)
+from planner.recording.column_names import lookup, lookup_ratio, says_something
 from planner.recording.named_columns import Named, to_records
 from planner.recording.records import Record
 
@@ -165,7 +159,7 @@ def _header(
     if not likely:
         return [f"column_{i + 1}" for i in range(width)], [""] * width, attributes
     # The row that says most of columns; of several that say as much the first.
-    at = max(likely, key=lambda i: (sum(map(_says_something, rows[i])), -i))
+    at = max(likely, key=lambda i: (sum(map(says_something, rows[i])), -i))
     names = [name.lstrip("#").strip() for name in rows[at]]
     units = next((u for row in rows[at + 1 :] if (u := _units(row, names))), [""] * width)
     if names[0].lower() in LABELS:
@@ -182,9 +176,9 @@ def _header_cells(line: str, form: Form, width: int) -> list[str]:
     """As many cells as the table has columns, where a line of the header can be split so."""
     ways = [form.cells(line)[:width]]
     if not form.delimiter:  # names hold blanks, too: "Time (s)   Acc X (g)"
-        ways += [re.split(r"\s{2,}|\t|;|,", line.strip())]
-        ways += [re.findall(r"[^\s(\[]+(?:\s*(?:\([^)]*\)|\[[^\]]*\]))?", line)]
-        ways = [way for way in (ways[1], ways[2], form.cells(line)) if len(way) == width]
+        by_gaps = re.split(r"\s{2,}|\t|;|,", line.strip())
+        by_units = re.findall(r"[^\s(\[]+(?:\s*(?:\([^)]*\)|\[[^\]]*\]))?", line)
+        ways = [by_gaps, by_units, form.cells(line)]
     return next(
         ([cell.strip().strip('"').strip() for cell in w] for w in ways if len(w) == width), []
     )
@@ -192,11 +186,6 @@ def _header_cells(line: str, form: Form, width: int) -> list[str]:
 
 def _numeric(cells: Sequence[str]) -> bool:
     return any(_is_number(cell.replace(",", ".")) for cell in cells)
-
-
-def _says_something(name: str) -> bool:
-    """Whether a name is one of a column: an axis, or something with its unit."""
-    return bool(time_unit(name, "") or frequency_unit(name, "")) or _is_unit(unit_text(name))
 
 
 def _is_unit(cell: str) -> bool:

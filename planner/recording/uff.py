@@ -230,11 +230,8 @@ def _frf_record(
         quantity, unit, factor = _unit_of_ratio(path, s)
         kinds.add((quantity, unit))
         values.append(np.asarray(s["data"], dtype=complex) * factor)
-        match = found.get(_place(s))
-        same = match is not None and len(match["data"]) == len(frequency)
-        coherence.append(
-            np.real(match["data"]) if match and same else np.full(len(frequency), np.nan)
-        )
+        own = np.real(found.get(_place(s), {}).get("data", ()))
+        coherence.append(own if len(own) == len(frequency) else np.full(len(frequency), np.nan))
     if len(kinds) != 1:
         raise InputError(f"{path} mixes FRFs of different kinds; export accelerance only.")
     quantity, unit = kinds.pop()

@@ -9,8 +9,8 @@ import io
 import math
 import struct
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,24 +22,21 @@ from planner.recording.records import Record
 
 WAV = ".wav"
 CHUNK = b"plnr"  # of a kept copy: its rows of channels.csv
-COLUMNS = ("channel", "name", "unit", "full_scale")
-OPTIONAL = ("hit", "hit_point")
 EXAMPLE = '"channel,name,unit,full_scale", "1,force,N,2200" and "2,acceleration x,m/s^2,98.1"'
 
 
-@dataclass(frozen=True)
-class Scaled:
-    """A channel (from 1) of a file, its quantity's name and unit, and what full scale stands for.
+class Scaled(NamedTuple):
+    """A row of the table: a channel (from 1) of a file, and what full scale stands for.
 
-    `hit` and `hit_point` are what the table says of the file.
+    `hit` and `hit_point`, which it need not have, are what it says of the file.
     """
 
     channel: int
     name: str
     unit: str
     full_scale: float
-    hit: str = ""
-    hit_point: str = ""
+    hit: str
+    hit_point: str
 
 
 def read_wav(path: Path) -> tuple[Record, ...]:
@@ -59,15 +56,14 @@ def read_wav(path: Path) -> tuple[Record, ...]:
             )
         columns[one.name] = samples[:, one.channel - 1] * one.full_scale
         units[one.name] = one.unit
-    said = {key: {value for s in scales if (value := getattr(s, key))} for key in OPTIONAL}
-    twice = next((key for key, values in said.items() if len(values) > 1), None)
-    if twice:
-        raise InputError(
-            f"{CHANNELS} says for {path} that {twice} is {' and '.join(sorted(said[twice]))}; "
-            f"leave one."
-        )
-    attributes = {key: values.pop() for key, values in said.items() if values}
-    attributes["sampling_rate_hz"] = str(rate_hz)
+    attributes = {"sampling_rate_hz": str(rate_hz)}
+    for key in ("hit", "hit_point"):
+        said = sorted({getattr(one, key) for one in scales} - {""})
+        if len(said) > 1:
+            raise InputError(
+                f"{CHANNELS} says for {path} that {key} is {' and '.join(said)}; leave one."
+            )
+        attributes |= {key: said[0]} if said else {}
     return to_records(path, Named(columns, units, attributes))
 
 
@@ -84,10 +80,7 @@ def self_contained(path: Path, data: bytes) -> bytes:
     if CHUNK in _chunks(data) or not _whole(data):
         return data
     rows = io.StringIO(newline="")
-    writer = csv.writer(rows, lineterminator="\n")
-    writer.writerow((*COLUMNS, *OPTIONAL))
-    for one in _scales(path, data):
-        writer.writerow([getattr(one, key) for key in (*COLUMNS, *OPTIONAL)])
+    csv.writer(rows, lineterminator="\n").writerows([Scaled._fields, *_scales(path, data)])
     text = rows.getvalue().encode()
     text += b"\n" * (len(text) % 2)
     data = _stated(data)
@@ -112,10 +105,9 @@ def _chunks(data: bytes) -> dict[bytes, slice]:
 
 def _whole(data: bytes) -> bool:
     """Whether all chunks are there as long as they are stated to be."""
-    ends = [part.stop for part in _chunks(data).values()]
-    stated = len(_stated(data))
-    whole = len(data) > 8 and stated == 8 + struct.unpack("<I", data[4:8])[0]
-    return bool(ends) and whole and stated - 1 <= max(ends) <= stated
+    end, stated = max((part.stop for part in _chunks(data).values()), default=0), len(_stated(data))
+    within = end > 0 and stated - 1 <= end <= stated
+    return within and stated == 8 + struct.unpack("<I", data[4:8])[0]
 
 
 def _samples(path: Path, data: bytes) -> tuple[int, np.ndarray]:
@@ -157,14 +149,14 @@ def _scales(path: Path, data: bytes) -> list[Scaled]:
             f"{EXAMPLE}: full_scale is what the largest sample stands for, in that unit."
         )
     header = [name.lower() for name in header]
-    missing = [name for name in COLUMNS if name not in header]
+    missing = [name for name in Scaled._fields[:4] if name not in header]
     if missing:
         raise InputError(f"{table} has no column {missing[0]}; its lines are such as {EXAMPLE}.")
-    cells = [(number, dict(zip(header, values, strict=True))) for number, values in rows]
+    cells = [(n, {k: v.strip() for k, v in zip(header, row, strict=True)}) for n, row in rows]
     own_rows = [
         _scaled(table, number, row)
         for number, row in cells
-        if row.get("file", "").strip() in ("", path.name)
+        if row.get("file", "") in ("", path.name)
     ]
     for key in ("channel", "name"):
         each = [getattr(one, key) for one in own_rows]
@@ -176,8 +168,7 @@ def _scales(path: Path, data: bytes) -> list[Scaled]:
     return own_rows
 
 
-def _scaled(table: Path, number: int, row: dict[str, str]) -> Scaled:
-    cells = {key: value.strip() for key, value in row.items()}
+def _scaled(table: Path, number: int, cells: dict[str, str]) -> Scaled:
     try:
         channel, full_scale = int(cells["channel"]), float(cells["full_scale"])
     except ValueError:
@@ -187,5 +178,5 @@ def _scaled(table: Path, number: int, row: dict[str, str]) -> Scaled:
             f"{table}, row {number}: channel {cells['channel'] or '?'} needs a number from 1, a "
             f"name, a unit and a full_scale above 0; its lines are such as {EXAMPLE}."
         )
-    more = {key: cells.get(key, "") for key in OPTIONAL}
-    return Scaled(channel, cells["name"], cells["unit"], full_scale, **more)
+    of_file = cells.get("hit", ""), cells.get("hit_point", "")
+    return Scaled(channel, cells["name"], cells["unit"], full_scale, *of_file)

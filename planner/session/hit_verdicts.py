@@ -11,7 +11,7 @@ from planner.recording.read import version
 from planner.recording.records import Hit
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, other_size, screen_repeats
 from planner.recording.sampling import recorded_otherwise
-from planner.recording.spectra import driving_point
+from planner.recording.screening import driving_point
 from planner.session.inbox import FolderTable
 from planner.words import significant
 

@@ -9,8 +9,7 @@ from planner.frf.estimator import estimate
 from planner.frf.frf import unreciprocal
 from planner.recording.channel_faults import by_good_sensors
 from planner.recording.dof import Dof
-from planner.recording.screening import screen
-from planner.recording.spectra import driving_point
+from planner.recording.screening import driving_point, screen
 from tests.support.simulated_hits import make_hit
 
 BAND = (4.0, 60.0)
