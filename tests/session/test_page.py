@@ -40,8 +40,8 @@ CLIPPED = judged(
 LATE = judged(4, "+z", "late", "answers as P001 did: [b] it is from there, [h] from here")
 OTHER = judged(
     5, "+z", "repeat",
-    "Its FRF is that of hits along x (correlation 0.12, others 0.99); check axis and hit point, and "
-    "hit again.",
+    "Its FRF is that of hits along x (correlation 0.12, others 0.99); check axis and hit point, "
+    "and hit again.",
 )  # fmt: skip
 ALL = DOUBLE, AGAINST, CLIPPED, LATE, OTHER
 KEYS = keys_that_do([(key, f"does {key} to what waits there", True) for key in "arbhsku"])
@@ -61,7 +61,7 @@ def page():
         (8.12, 12.5, 17.8, 22.3, 28.9, 33.1), (0.12, 0.2, 0.3, 0.4, 0.5, 0.6),
         Path("/home/someone/projects/2026/cell7/measurements/exports/analyser-3"),
         unfinished=(("foreign.uff", FOREIGN), ("half.uff", "half.uff is still being written")),
-        progress="frequency sd over the workspace 1.23 %; 2.3 min per pose; 3 more poses, 7 min to go",
+        progress="frequency sd over the workspace 1.23 %; 2.3 min per pose; 3 more poses",
         keys=KEYS,
     )  # fmt: skip
 
