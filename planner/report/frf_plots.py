@@ -13,15 +13,7 @@ from matplotlib.figure import Figure
 from planner.diagnosis.diagnose import Diagnosis
 from planner.diagnosis.mismatch import Residuals, simulated
 from planner.recording.points import TOOL
-from planner.report.plot_marks import (
-    AXES,
-    empty,
-    magnitude,
-    name_axes,
-    panels,
-    plain_text,
-    write_values,
-)
+from planner.report import plot_marks as marks
 
 # Dashes over wide lines: where two agree, both are seen.
 SEEN = {"label": "measured", "color": "0.25", "lw": 4.5}
@@ -69,7 +61,7 @@ class ComparedFrfs:
         for k in first[:MOST]:
             name = re.sub(r"[^\w.-]", "_", str(self.names[k]))
             figures[f"frf_{name}"] = self.overlay(k)
-        for i, axis in enumerate(AXES):
+        for i, axis in enumerate(marks.AXES):
             measured = self._aligned(self.measured[:, i, i])
             for side in self.sides:
                 figures[f"map_{axis}{axis}_{side.key}"] = frf_map(
@@ -87,15 +79,15 @@ class ComparedFrfs:
     def overlay(self, k: int) -> Figure:
         """Direct FRFs xx, yy, zz of the k-th pose."""
         role = f" ({self.roles[k]})" if self.roles else ""
-        figure, grid = panels((7.5, 7.0), f"{self.place}Pose {self.names[k]}{role}", 3)
+        figure, grid = marks.panels((7.5, 7.0), f"{self.place}Pose {self.names[k]}{role}", 3)
         hz = self.frequency_hz[k]
         for i, panel in enumerate(grid[:, 0]):
-            magnitude(panel, hz, self.measured[k, i, i], **SEEN)
+            marks.magnitude(panel, hz, self.measured[k, i, i], **SEEN)
             for side in self.sides:
-                magnitude(panel, hz, side.h[k, i, i], label=side.label, **side.style)
-            panel.set_ylabel(f"|H {AXES[i]}{AXES[i]}| (m/s²/N)", fontsize=8)
+                marks.magnitude(panel, hz, side.h[k, i, i], label=side.label, **side.style)
+            panel.set_ylabel(f"|H {marks.AXES[i]}{marks.AXES[i]}| (m/s²/N)", fontsize=8)
             panel.grid(True, which="both", alpha=0.25)
-        name_axes(figure, grid, "frequency (Hz)")
+        marks.name_axes(figure, grid, "frequency (Hz)")
         return figure
 
     def overlays(self) -> Iterator[Figure]:
@@ -129,7 +121,7 @@ def frf_map(
         difference = levels["simulated"] - levels["measured"]
         limits = -DIFFERENCE_DB, DIFFERENCE_DB
         shown.append(("simulated − measured", difference, limits, "RdBu_r"))
-    figure, grid = panels((3.6 * len(shown) + 1.2, 4.2), title, 1, len(shown), sharey=True)
+    figure, grid = marks.panels((3.6 * len(shown) + 1.2, 4.2), title, 1, len(shown), sharey=True)
     cells, images = (_edges(np.asarray(place, float)), _edges(frequency_hz)), []
     for panel, (name, level, (low, high), colours) in zip(grid[0], shown, strict=True):
         panel.set_title(name, fontsize=9)
@@ -139,7 +131,7 @@ def frf_map(
         images.append(panel.pcolormesh(*cells, values, **style))
         if len(names):
             every = -(-len(names) // MOST_NAMES)
-            ticks = [plain_text(name) for name in names][::every]
+            ticks = [marks.plain_text(name) for name in names][::every]
             panel.set_xticks(np.asarray(place)[::every], ticks, rotation=90, fontsize=7)
     grid[0, 0].set_ylabel("frequency (Hz)")
     same = list(grid[0, : len(levels)])
@@ -181,7 +173,7 @@ def diagnosis_figures(found: Diagnosis) -> dict[str, Figure]:
 
 def _residuals(before: Residuals, after: Residuals, names: Sequence[str]) -> Figure:
     what = "What is left unexplained, errors of hits and sensor taken out (1: just matters)"
-    figure = empty((9.0, 6.5), what)
+    figure = marks.empty((9.0, 6.5), what)
     (bands, poses), (left, right) = figure.subplots(2, 2)
     middle = (before.edges_hz[1:] + before.edges_hz[:-1]) / 2
     number = np.arange(len(names))
@@ -195,13 +187,13 @@ def _residuals(before: Residuals, after: Residuals, names: Sequence[str]) -> Fig
         panel.set_xlabel(what)
         panel.set_ylabel(UNIT, fontsize=8)
         panel.legend()
-    poses.set_xticks(number, [plain_text(n) for n in names], rotation=60, fontsize=7)
+    poses.set_xticks(number, [marks.plain_text(n) for n in names], rotation=60, fontsize=7)
     scale, image = LogNorm(LEAST, MOST_RESIDUAL), ScalarMappable()
     for panel, (place, label, _) in zip((left, right), sides, strict=True):
         image = panel.imshow(np.maximum(place.by_direction, LEAST), cmap="Reds", norm=scale)
-        write_values(panel, image, ".3g")
-        panel.set_xticks(range(3), [f"hit {a}" for a in AXES])
-        panel.set_yticks(range(3), [f"response {a}" for a in AXES])
+        marks.write_values(panel, image, ".3g")
+        panel.set_xticks(range(3), [f"hit {a}" for a in marks.AXES])
+        panel.set_yticks(range(3), [f"response {a}" for a in marks.AXES])
         panel.set_title(f"by direction, {label}", fontsize=9)
     # One scale for both, so that what an explanation takes away is seen.
     figure.colorbar(image, ax=[left, right], label=UNIT, shrink=0.9)

@@ -9,14 +9,7 @@ from matplotlib.lines import Line2D
 from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_modes import MatrixModes
 from planner.recording.geometry import Geometry
-from planner.report.modal_plots import (
-    FRFS,
-    SPECTRA,
-    auto_mac_figure,
-    poles_by_stability,
-    singular_values,
-    stabilisation_figure,
-)
+from planner.report import modal_plots
 from planner.report.plot_marks import MEASURED, MODEL, empty, magnitude, number_modes, panels
 from planner.report.shape_motion import motions, moved
 
@@ -34,15 +27,16 @@ def matrix_figures(
     """Every picture by its name."""
     data = found.found.data
     table = matrix.accelerance[..., np.isin(matrix.frequency_hz, data.frequency_hz)]
-    singular = singular_values(np.where(np.isfinite(table), table, 0.0))[:MOST_SINGULAR]
-    poles = poles_by_stability(found.found.diagram, data.rate_1_s)
+    singular = modal_plots.singular_values(np.where(np.isfinite(table), table, 0.0))[:MOST_SINGULAR]
+    poles = modal_plots.poles_by_stability(found.found.diagram, data.rate_1_s)
     figures = {
-        "stabilisation": stabilisation_figure(
+        "stabilisation": modal_plots.stabilisation_figure(
             data.frequency_hz, singular, found,
             f"Stabilisation diagram of {matrix.count} FRFs",
-            f"singular values of {FRFS if matrix.scaled else SPECTRA}", poles,
+            f"singular values of {modal_plots.FRFS if matrix.scaled else modal_plots.SPECTRA}",
+            poles,
         ),
-        "mac": auto_mac_figure(found),
+        "mac": modal_plots.auto_mac_figure(found),
         "complexity": complexity_figure(found, "Mode shapes in the complex plane"),
     }  # fmt: skip
     if matrix.driving:

@@ -9,18 +9,8 @@ from pathlib import Path
 import numpy as np
 from rich.text import Text
 
+from planner.campaign import events
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import (
-    Configured,
-    Confirmed,
-    Entry,
-    FilesPlaced,
-    FilesShown,
-    Imported,
-    Proposal,
-    Proposed,
-    Refused,
-)
 from planner.campaign.imported_files import differs_from_table
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
@@ -48,7 +38,7 @@ class PoseInProgress:
     where none is asked for; `before` is the pose measured last.
     """
 
-    proposal: Proposal
+    proposal: events.Proposal
     page: PosePage
     since: float
     before: Before = field(default_factory=dict)
@@ -146,16 +136,17 @@ class RerunQueue:
     def __init__(self, campaign: Campaign, story: EventLogger):
         self._campaign, self._story = campaign, story
         self._noted = len(campaign.entries)
-        self._waiting: deque[tuple[Entry, Model, MeasuredPose | None]] = deque()
+        self._waiting: deque[tuple[events.Entry, Model, MeasuredPose | None]] = deque()
 
     def note(self, reports: Sequence[ImportReport] = ()) -> None:
         """Keep what the log gained."""
         found = {report.pose: report.measured for report in reports}
         for entry in self._campaign.entries[self._noted :]:
             event = entry.event
-            if isinstance(event, FilesShown | FilesPlaced):  # nothing that pictures show
+            # Nothing that pictures show.
+            if isinstance(event, events.FilesShown | events.FilesPlaced):
                 continue
-            measured = found.get(event.pose) if isinstance(event, Imported) else None
+            measured = found.get(event.pose) if isinstance(event, events.Imported) else None
             self._waiting.append((entry, self._campaign.model, measured))
         self._noted = len(self._campaign.entries)
 
@@ -165,13 +156,13 @@ class RerunQueue:
             self._story.log(*self._waiting[0])
             self._waiting.popleft()
 
-    def gained(self) -> list[Entry]:
+    def gained(self) -> list[events.Entry]:
         """What the engineer did, as the log on disk has it, since it was noted last."""
         new = Campaign(self._campaign.directory).entries[self._noted :]
         return [
             entry
             for entry in new
-            if not isinstance(entry.event, Configured | Proposed | FilesShown)
+            if not isinstance(entry.event, events.Configured | events.Proposed | events.FilesShown)
         ]
 
 
@@ -194,7 +185,7 @@ class Session:
     started: float
     deadline: float | None
 
-    def hits_at(self, proposal: Proposal) -> int:
+    def hits_at(self, proposal: events.Proposal) -> int:
         """How many hits make this pose."""
         each = self.campaign.cell.config.cost.hits_per_axis
         return self.hits_per_pose or each * len(proposal.hits)
@@ -222,7 +213,9 @@ class Session:
         undone = taken_back(entries)
         for entry in reversed(entries):
             event = entry.event
-            if entry.seq in undone or not isinstance(event, Imported | Confirmed | Refused):
+            if entry.seq in undone or not isinstance(
+                event, events.Imported | events.Confirmed | events.Refused
+            ):
                 continue
             known = state.hit_at(event.pose)
             records = [hit for at, hit in state.refused.values() if at == event.pose]

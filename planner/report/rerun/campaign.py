@@ -19,17 +19,9 @@ from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
 from planner.report.plot_marks import AXES
+from planner.report.rerun import progress
 from planner.report.rerun.figures import draw, figure_view, open_stream
 from planner.report.rerun.modes import BEFORE_US, GROUND, VIBRATION, draw_modes, mode_views
-from planner.report.rerun.progress import (
-    MeasuredSeries,
-    force_figure,
-    frf_figures,
-    learning_view,
-    measured_modes,
-    progress_views,
-    uncertainty,
-)
 from planner.report.rerun.robot import WORLD, RobotDrawing
 
 TIMELINE = "measurement"
@@ -66,7 +58,7 @@ class RerunView:
         identity = f"{cell.robot.name}|{cell.config}"
         layout = _blueprint(cell, "progress/0")
         self._stream = open_stream(identity, cell.robot.name, layout, rrd, viewer)
-        self._progress = MeasuredSeries(
+        self._progress = progress.MeasuredSeries(
             self._stream, lambda path: self._stream.send_blueprint(_blueprint(cell, path))
         )
         self._drawing = self._robot()
@@ -146,11 +138,11 @@ class RerunView:
         self._move(pose.q)
         if measured is not None:
             self._hits(pose, measured)
-            draw(self._stream, "hits/force", force_figure(measured))
-        figures = frf_figures(model, before, pose, measured)
+            draw(self._stream, "hits/force", progress.force_figure(measured))
+        figures = progress.frf_figures(model, before, pose, measured)
         for axis, figure in zip(AXES, figures, strict=True):
             draw(self._stream, f"frf/{axis}{axis}", figure)
-        self._progress.log(number, measured_modes(pose, before))
+        self._progress.log(number, progress.measured_modes(pose, before))
         self._at(number)
         draw_modes(self._stream, model, pose, measured)
         q = np.array([p.q for p in model.labelled])
@@ -196,7 +188,7 @@ class RerunView:
     def learning(self, number: int, sd_percent: np.ndarray) -> None:
         """The sd (count,) in % of the natural frequencies over the workspace."""
         target = self._cell.config.stop.frequency_sd_percent
-        self._progress.log(number, uncertainty(sd_percent, target))
+        self._progress.log(number, progress.uncertainty(sd_percent, target))
 
     def text(self, number: int, text: str, level: str = "INFO") -> None:
         """A line in the log."""
@@ -228,8 +220,8 @@ def _eye(cell: Cell, near: float = 1.0) -> rrb.EyeControls3D:
     )
 
 
-def _blueprint(cell: Cell, progress: str) -> rrb.Blueprint:
-    """All views; series of what was learned lie below the path `progress`."""
+def _blueprint(cell: Cell, series: str) -> rrb.Blueprint:
+    """All views; series of what was learned lie below the path `series`."""
     count = cell.config.modes.count
     robot = rrb.Spatial3DView(
         origin="/",
@@ -244,14 +236,15 @@ def _blueprint(cell: Cell, progress: str) -> rrb.Blueprint:
         name="Decisions",
         columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"]),
     )
-    beside = rrb.Vertical(figure_view("frf/xx", "FRF xx of the tool"), learning_view(progress), log)
+    learned = progress.learning_view(series)
+    beside = rrb.Vertical(figure_view("frf/xx", "FRF xx of the tool"), learned, log)
     frfs = [figure_view(f"frf/{a}{a}", f"FRF {a}{a} of the tool") for a in AXES]
     return rrb.Blueprint(
         rrb.Tabs(
             rrb.Horizontal(robot, beside, column_shares=[3, 2], name="Cell"),
             rrb.Grid(*frfs, figure_view("hits/force", "Force of the hits"), name="FRFs"),
             mode_views(count, _eye(cell, NEAR)),
-            progress_views(progress, count),
+            progress.progress_views(series, count),
             rrb.TextDocumentView(origin="/note", name="What is what"),
         ),
         rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="following"),

@@ -2,20 +2,8 @@
 
 from pathlib import Path
 
+from planner.campaign import events
 from planner.campaign.cell import Cell
-from planner.campaign.events import (
-    Confirmed,
-    Entry,
-    FilesPlaced,
-    FilesShown,
-    Imported,
-    Proposed,
-    Refused,
-    Skipped,
-    Starred,
-    Undone,
-    Withdrawn,
-)
 from planner.campaign.model import Model
 from planner.campaign.undo import in_words
 from planner.dataset.measure import MeasuredPose
@@ -41,7 +29,7 @@ class EventLogger:
 
     def log(
         self,
-        entry: Entry,
+        entry: events.Entry,
         model: Model,
         measured: MeasuredPose | None = None,
     ) -> None:
@@ -50,32 +38,34 @@ class EventLogger:
             return
         view, event, number = self._view, entry.event, len(model.labelled)
         match event:
-            case Proposed():
+            case events.Proposed():
                 for proposal in event.proposals:
                     view.proposal(number, proposal)
-            case Imported():
+            case events.Imported():
                 self._imported(event, model, measured)
-            case Confirmed():
+            case events.Confirmed():
                 self._measurement(event.pose, model, None, f"Confirmed {event.pose}")
-            case Refused():
+            case events.Refused():
                 for hit in event.hits:
                     view.text(number, f"Refused {hit.file}: {hit.reason}", "WARN")
-            case Skipped() | Withdrawn():
+            case events.Skipped() | events.Withdrawn():
                 reason = f": {event.reason}" if event.reason else ""
                 view.text(number, f"{type(event).__name__} {event.pose}{reason}", "WARN")
-            case Starred():
+            case events.Starred():
                 view.text(number, f"Starred {event.pose}", "INFO")
-            case Undone():
+            case events.Undone():
                 view.text(number, f"{in_words(entry).capitalize()} of the log", "WARN")
-            case FilesShown() | FilesPlaced():
+            case events.FilesShown() | events.FilesPlaced():
                 return
             case _:
                 view.text(number, f"Configured {model.cell.robot.name}", "INFO")
-        if not isinstance(event, Proposed | Refused | Starred):
+        if not isinstance(event, events.Proposed | events.Refused | events.Starred):
             view.learning(number, model.frequency_sd_percent)
         self._before = model
 
-    def _imported(self, event: Imported, model: Model, measured: MeasuredPose | None) -> None:
+    def _imported(
+        self, event: events.Imported, model: Model, measured: MeasuredPose | None
+    ) -> None:
         assert self._view is not None
         number = len(model.labelled)
         found = ", ".join(f"{m.frequency_hz:.2f} Hz" for m in event.modes if m.likely)
