@@ -37,12 +37,15 @@ def modal_figures(
     """Every picture of one pose by its name; without an FRF only those that need none."""
     singular = singular_values(found.data.response)
     what = f"singular values of {FRFS if frf is not None else SPECTRA}"
-    title = "Stabilisation diagram"
     hz, poles = found.data.frequency_hz, poles_by_stability(found.diagram, found.data.rate_1_s)
-    figures = {"stabilisation": stabilisation_figure(hz, singular, modal, title, what, poles)}
+    figures = {
+        "stabilisation": stabilisation_figure(
+            hz, singular, modal, "Stabilisation diagram", what, poles
+        )
+    }
     if frf is not None:
-        figures["frf"] = matrix_figure(frf, found, modal, "FRFs and their fit")
-        figures["coherence"] = coherence_figure(frf, modal, "Coherence")
+        figures["frf"] = matrix_figure(frf, found, modal)
+        figures["coherence"] = coherence_figure(frf, modal)
     figures["mac"] = auto_mac_figure(modal)
     return figures
 
@@ -100,9 +103,8 @@ def stabilisation_figure(
     for k, values in enumerate(singular):
         colour = SINGULAR[min(k, len(SINGULAR) - 1)]
         panel.semilogy(frequency_hz, values, color=colour, lw=1.1, label=f"{curve} {k + 1}")
-    panel.set_xlim(frequency_hz[0], frequency_hz[-1])
-    panel.set_xlabel("frequency (Hz)")
-    panel.set_ylabel(what)
+    ends = frequency_hz[0], frequency_hz[-1]
+    panel.set(xlim=ends, xlabel="frequency (Hz)", ylabel=what)
     panel.grid(True, alpha=0.25)
     for k, tone in enumerate(getattr(modal, "tones_hz", ())):
         panel.axvline(tone, color=TONE, ls="--", lw=1.0, label=None if k else "tone, no mode")
@@ -111,8 +113,8 @@ def stabilisation_figure(
         orders = panel.twinx()
         handles += orders.plot(*poles[0], **STABLE, label="stable pole")
         handles += orders.plot(*poles[1], **UNSTABLE, label="unstable pole")
-        orders.set_ylim(0, max((p[1].max() for p in poles if p.size), default=0) + 1)
-        orders.set_ylabel("model order")
+        highest = max((p[1].max() for p in poles if p.size), default=0)
+        orders.set(ylim=(0, highest + 1), ylabel="model order")
         orders.yaxis.set_major_locator(MaxNLocator(integer=True))
     marks.label_modes(panel, modal)
     handles += [Line2D([], [], color=marks.MODE, label="mode")]
@@ -141,9 +143,7 @@ def poles_by_stability(diagram: Diagram, rate_1_s: float = 0.0) -> tuple[np.ndar
     return stays, moves
 
 
-def matrix_figure(
-    frf: Frf, found: PoleIdentification, modal: ModalModel, title: str = ""
-) -> Figure:
+def matrix_figure(frf: Frf, found: PoleIdentification, modal: ModalModel) -> Figure:
     """Magnitude and phase of every response to every hit axis, measured ± 2 sd, and the fit.
 
     The variance E|δH|² of a complex line is shared by its two parts, so that its magnitude has
@@ -151,7 +151,9 @@ def matrix_figure(
     """
     columns = np.flatnonzero(frf.measured).tolist()
     layout = {"height_ratios": [3, 1.2] * 3}
-    figure, grid = marks.panels((13.0, 10.0), title, 6, len(columns), gridspec_kw=layout)
+    figure, grid = marks.panels(
+        (13.0, 10.0), "FRFs and their fit", 6, len(columns), gridspec_kw=layout
+    )
     fitted = model(found.data, found.fit)
     for i, k in np.ndindex(3, len(columns)):
         size, turn = grid[2 * i, k], grid[2 * i + 1, k]
@@ -201,10 +203,10 @@ def _legend(figure: Figure, grid: Any, handles: list) -> None:
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9)
 
 
-def coherence_figure(frf: Frf, modal: ModalModel, title: str = "") -> Figure:
+def coherence_figure(frf: Frf, modal: ModalModel) -> Figure:
     """Coherence of every response with every hit axis."""
     columns = np.flatnonzero(frf.measured).tolist()
-    figure, grid = marks.panels((13.0, 7.5), title, 3, len(columns))
+    figure, grid = marks.panels((13.0, 7.5), "Coherence", 3, len(columns))
     for i, k in np.ndindex(3, len(columns)):
         panel, values = grid[i, k], frf.coherence[i, columns[k]]
         marks.mark_band(panel, frf, i, columns[k])
@@ -214,8 +216,8 @@ def coherence_figure(frf: Frf, modal: ModalModel, title: str = "") -> Figure:
             why = "unknown: it takes two hits" if frf.hits[columns[k]] < 2 else "unknown"
             panel.text(0.5, 0.5, why, transform=panel.transAxes, ha="center", fontsize=9)
         hits = frf.hits[columns[k]]
-        panel.set_ylim(0, 1.18)  # room for the modes' numbers
-        panel.set_yticks([0, 0.25, 0.5, 0.75, 1])
+        # Room for the modes' numbers.
+        panel.set(ylim=(0, 1.18), yticks=[0, 0.25, 0.5, 0.75, 1])
         panel.set_title(f"{_entry(i, columns[k])} ({hits} averaged)", fontsize=9, pad=3, loc="left")
         marks.number_modes(panel, modal)
         if k == 0:
@@ -273,8 +275,7 @@ def frequency_figure(
         style = {"color": colour, "lw": 1.4, "marker": "o", "ms": 4, "capsize": 3}
         panel.errorbar(x, frequency_hz[:, k], error, **style)
     panel.set_xticks(x, map(marks.plain_text, poses), rotation=90 if len(poses) > 12 else 0)
-    panel.set_xlabel("pose")
-    panel.set_ylabel("natural frequency (Hz)")
+    panel.set(xlabel="pose", ylabel="natural frequency (Hz)")
     panel.grid(True, alpha=0.25)
     marks.label_ends(panel, frequency_hz, modes)
     handles = [Line2D([], [], color="0.3", marker="o", label="measured, ± 2 sd")]

@@ -332,7 +332,7 @@ def test_points_of_flat_structures_are_inside_and_to_scale(turn, lines):
     place = np.array(list(structure.position_m.values()))[:, turn]
     traces = tuple((str(a), str(b)) for a, b in structure.lines) if lines else ()
     geometry = Geometry(tuple(map(str, structure.position_m)), place, traces)
-    figure = geometry_figure(matrix, geometry, "points")
+    figure = geometry_figure(matrix, geometry)
     figure.canvas.draw()
     (panel,) = figure.axes
     limits = np.array([panel.get_xlim(), panel.get_ylim(), panel.get_zlim()])
