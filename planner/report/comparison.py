@@ -11,13 +11,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.compare.bench import Bench
-from planner.compare.curves import (
-    Curves,
-    StrategyCurve,
-    StrategyDifference,
-    baseline_of,
-    paired,
-)
+from planner.compare.curves import Curves, StrategyCurve, StrategyDifference, baseline_of, paired
 from planner.compare.pool import PoolPose
 from planner.compare.processes import Failure
 from planner.compare.tasks import Run, Study, Task

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
-SHOWN_TO = 2.0  # times the end of the band; the others stand in the JSON
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +98,7 @@ class RobotCheckReport(Answer):
                 weight += f" ± {_mass_sd(link):.2g}" if _mass_sd(link) else ""
                 masses.add_row(Text(link.name), link.joint or "–", weight, place, str(link.shapes))
         low, high = robot.config.band_hz
-        most = SHOWN_TO * high
+        most = 2 * high  # the others stand in the JSON
         asked = f"frequency in Hz (damping in %), up to {most:g} Hz"
         modes, poses = table("simulated modes", "pose", asked), self._poses()
         for pose in poses:

@@ -15,7 +15,7 @@ from planner.milling.cut import Cut, load_cut
 from planner.milling.machine import Multiplier, multiplier
 from planner.milling.path import TURNS_DEG, PathLimits, limits_along, limits_by_feed
 from planner.milling.structure import Structure, limit_remarks, out_of_band_remark
-from planner.progress import ProgressCallback, no_progress, part_of
+from planner.progress import ProgressCallback, part_of
 from planner.report.answer import Answer, plain
 from planner.report.pictures import Pictures
 from planner.report.text import number, remarks, table
@@ -112,9 +112,7 @@ class StabilityReport(LimitsBySpeed):
 
 
 def stability_of(
-    asked: cut_source.StabilityRequest,
-    pictures: Pictures | None = None,
-    progress: ProgressCallback = no_progress,
+    asked: cut_source.StabilityRequest, pictures: Pictures, progress: ProgressCallback
 ) -> StabilityReport:
     """Raises InputError where source, cut or point are wrong."""
     cut, point = load_cut(asked.cut), asked.wanted
@@ -147,7 +145,7 @@ def stability_of(
         return {"stability": lobes_figure(cut, found, drawn, point)}
 
     name = ", ".join(filter(None, (asked.source.name, asked.pose)))
-    return answer.with_figures(pictures or Pictures(), figures, name, LOBES)
+    return answer.with_figures(pictures, figures, name, LOBES)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -195,7 +193,7 @@ def path_report(
     way: toolpath_poses.PathRequest,
     cut: Cut,
     pictures: Pictures,
-    progress: ProgressCallback = no_progress,
+    progress: ProgressCallback,
 ) -> PathReport:
     """Of every pose of an npz, or of a campaign along a way."""
     if not asked.source.is_dir():

@@ -13,7 +13,7 @@ from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.path import best_speed_of, limits_along
 from planner.milling.structure import OutOfBandError, Structure
-from planner.progress import ProgressCallback, no_progress, part_of
+from planner.progress import ProgressCallback, part_of
 from planner.report.answer import Answer
 from planner.report.pictures import Pictures
 from planner.report.stability import EVERY, depth_mm
@@ -77,7 +77,7 @@ def map_report(
     count: int,
     cut: Cut,
     pictures: Pictures,
-    progress: ProgressCallback = no_progress,
+    progress: ProgressCallback,
 ) -> MapReport:
     """At the speed of the wanted point, or the one at which the tightest pose allows the most."""
     if not asked.source.is_dir():
@@ -98,10 +98,8 @@ def map_report(
         raise next(s for s in at if isinstance(s, OutOfBandError))
     kept = np.array([i for i, s in enumerate(at) if isinstance(s, Structure)])
     q = candidates.q[kept]
-    wanted = asked.wanted
-    rpm = (
-        wanted[0] if wanted else best_speed_of(poses, cut, MOST_SPEEDS, part_of(progress, 0.0, 0.5))
-    )
+    wanted, first = asked.wanted, part_of(progress, 0.0, 0.5)
+    rpm = wanted[0] if wanted else best_speed_of(poses, cut, MOST_SPEEDS, first)
     limits = limits_along(poses, cut.at_speed(rpm), asked.samples, part_of(progress, 0.5, 1.0))
     robust = limits.robust_m[:, 0]
     share = None if wanted is None else float(np.mean(robust > wanted[1]))

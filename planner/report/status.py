@@ -20,12 +20,7 @@ from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.imports import asked_of
 from planner.report.proposals import forecast_json, standing, unanswered
 from planner.report.saved_diagnosis import diagnosis_of, read_diagnosis, two_answers
-from planner.report.springs import (
-    NOT_KNOWN,
-    RefittedSpring,
-    refitted_springs,
-    springs_table,
-)
+from planner.report.springs import NOT_KNOWN, RefittedSpring, refitted_springs, springs_table
 from planner.report.text import table
 from planner.words import by_reason, counted, local_time, significant
 

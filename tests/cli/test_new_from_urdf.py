@@ -10,15 +10,7 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.robot.robot import Robot
 from tests.support.outside import refused, said, told
-from tests.support.published import (
-    BOXES,
-    DENSITY,
-    HAND,
-    LIMITS,
-    RAIL,
-    published,
-    robot_toml,
-)
+from tests.support.published import BOXES, DENSITY, HAND, LIMITS, RAIL, published, robot_toml
 
 GIVEN = "--mass-kg", "420", "--payload-kg", "20"
 

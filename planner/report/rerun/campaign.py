@@ -13,10 +13,11 @@ import rerun.blueprint as rrb
 from matplotlib import colormaps
 from scipy.spatial.transform import Rotation
 
+from planner.campaign import events
 from planner.campaign.cell import Cell
-from planner.campaign.events import Proposal
 from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
+from planner.campaign.undo import in_words
 from planner.dataset.measure import MeasuredPose
 from planner.report.plot_marks import AXES
 from planner.report.rerun import progress
@@ -33,7 +34,6 @@ COLOURS = {
 }
 SCALE = "0.01 % dark to 10 % yellow"
 NEAR = 0.75  # modes are seen from nearer than the cell
-ARROW = 0.18  # length of a hit's arrow, in units of the arm's length
 NOTE = """\
 Timeline `measurement` counts the measured poses: drag it, or play it.
 Choose the timeline `vibration` at the bottom and press play: the modes move as at the pose
@@ -55,6 +55,7 @@ class RerunView:
 
     def __init__(self, cell: Cell, rrd: Path | None, viewer: bool = False, simulated: bool = False):
         self._cell = cell
+        self._before: Model | None = None  # the model of the entry told last
         identity = f"{cell.robot.name}|{cell.config}"
         layout = _blueprint(cell, "progress/0")
         self._stream = open_stream(identity, cell.robot.name, layout, rrd, viewer)
@@ -87,20 +88,13 @@ class RerunView:
     def _obstacles(self) -> None:
         blocks = self._cell.robot.config.obstacle
         if blocks:
-            self._stream.log(
-                "cell/obstacles",
-                rr.Boxes3D(
-                    centers=[b.center_m for b in blocks],
-                    sizes=[b.size_m for b in blocks],
-                    quaternions=[
-                        Rotation.from_euler("xyz", b.rpy_deg, degrees=True).as_quat()
-                        for b in blocks
-                    ],
-                    labels=[b.name for b in blocks],
-                    colors=COLOURS["obstacle"],
-                ),
-                static=True,
-            )
+            turns = Rotation.from_euler("xyz", [b.rpy_deg for b in blocks], degrees=True)
+            centers, sizes = [b.center_m for b in blocks], [b.size_m for b in blocks]
+            boxes = rr.Boxes3D(
+                centers=centers, sizes=sizes, quaternions=turns.as_quat(),
+                labels=[b.name for b in blocks], colors=COLOURS["obstacle"],
+            )  # fmt: skip
+            self._stream.log("cell/obstacles", boxes, static=True)
 
     def _at(self, number: int) -> None:
         self._stream.set_time(TIMELINE, sequence=number)
@@ -111,29 +105,69 @@ class RerunView:
         if self._drawing is not None:
             self._drawing.move(q)
 
-    def proposal(self, number: int, proposal: Proposal) -> None:
+    def log(self, entry: events.Entry, model: Model, measured: MeasuredPose | None) -> None:
+        """Show one event; `model` is that after it."""
+        event, number = entry.event, len(model.labelled)
+        match event:
+            case events.Proposed():
+                for proposal in event.proposals:
+                    self.proposal(number, proposal)
+            case events.Imported():
+                self._imported(event, model, measured)
+            case events.Confirmed():
+                self._measured(event.pose, model, None, f"Confirmed {event.pose}")
+            case events.Refused():
+                for hit in event.hits:
+                    self.text(number, f"Refused {hit.file}: {hit.reason}", "WARN")
+            case events.Skipped() | events.Withdrawn():
+                reason = f": {event.reason}" if event.reason else ""
+                self.text(number, f"{type(event).__name__} {event.pose}{reason}", "WARN")
+            case events.Starred():
+                self.text(number, f"Starred {event.pose}", "INFO")
+            case events.Undone():
+                self.text(number, f"{in_words(entry).capitalize()} of the log", "WARN")
+            case events.FilesShown() | events.FilesPlaced():
+                return
+            case _:
+                self.text(number, f"Configured {model.cell.robot.name}", "INFO")
+        if not isinstance(event, events.Proposed | events.Refused | events.Starred):
+            target = self._cell.config.stop.frequency_sd_percent
+            self._progress.log(number, progress.uncertainty(model.frequency_sd_percent, target))
+        self._before = model
+
+    def _imported(
+        self, event: events.Imported, model: Model, measured: MeasuredPose | None
+    ) -> None:
+        number = len(model.labelled)
+        found = ", ".join(f"{m.frequency_hz:.2f} Hz" for m in event.modes if m.likely)
+        if any(hit.simulated for hit in event.hits):
+            self.label_simulated()
+        for hit in event.hits:
+            if not hit.accepted:
+                self.text(number, f"Refused {hit.file}: {hit.reason}", "WARN")
+        if event.question is not None:
+            self.text(number, f"Held back: {event.question.text}", "WARN")
+        else:
+            text = f"Imported {event.pose}: {found or 'no usable modes'}"
+            self._measured(event.pose, model, measured, text)
+
+    def proposal(self, number: int, proposal: events.Proposal) -> None:
         """The robot at a proposed pose, and what is expected there."""
         self._at(number)
         q = self._cell.robot.joints.internal(proposal.joints_deg)
         self._move(q)
-        self._stream.log(
-            "cell/proposed",
-            rr.Points3D(
-                [proposal.position_m], radii=0.03, colors=COLOURS["proposed"], labels=proposal.pose
-            ),
-        )
+        place, colour = [proposal.position_m], COLOURS["proposed"]
+        dot = rr.Points3D(place, radii=0.03, colors=colour, labels=proposal.pose)
+        self._stream.log("cell/proposed", dot)
         self.text(number, f"Proposed {proposal.pose}: {proposal.reason}", "INFO")
 
-    def measurement(
-        self,
-        number: int,
-        model: Model,
-        before: Model | None,
-        pose: LabelledPose,
-        measured: MeasuredPose | None,
-        text: str,
-    ) -> None:
-        """A measured pose: robot, hits, FRFs and modes against what was expected `before`."""
+    def _measured(self, name: str, model: Model, measured: MeasuredPose | None, text: str) -> None:
+        """A measured pose: robot, hits, FRFs and modes against what was expected before."""
+        number, before = len(model.labelled), self._before
+        pose = next((p for p in model.labelled if p.pose == name), None)
+        if pose is None:
+            self.text(number, text, "WARN")
+            return
         self._at(number)
         self._move(pose.q)
         if measured is not None:
@@ -151,30 +185,22 @@ class RerunView:
             labels=[p.pose for p in model.labelled],
         )  # fmt: skip
         self._stream.log("cell/measured", dots)
-        self.workspace(number, model)
+        self._workspace(model)
         self.text(number, text, "INFO")
 
     def _hits(self, pose: LabelledPose, measured: MeasuredPose) -> None:
         rotation, position = self._cell.robot.forward(pose.q)
         axes = sorted({hit.axis for hit in measured.hits})
-        size = ARROW * self._cell.robot.arm_m
+        size = 0.18 * self._cell.robot.arm_m  # length of an arrow
         sign = {"-": -size, "+": size}
         vectors = [sign[a[0]] * rotation[:, AXES.index(a[1])] for a in axes]
         if axes:
-            self._stream.log(
-                "cell/hits",
-                rr.Arrows3D(
-                    origins=[position - v for v in vectors],
-                    vectors=vectors,
-                    radii=0.03 * size,
-                    labels=axes,
-                    colors=COLOURS["hit"],
-                ),
-            )
+            style = {"radii": 0.03 * size, "labels": axes, "colors": COLOURS["hit"]}
+            origins = [position - v for v in vectors]
+            self._stream.log("cell/hits", rr.Arrows3D(origins=origins, vectors=vectors, **style))
 
-    def workspace(self, number: int, model: Model) -> None:
+    def _workspace(self, model: Model) -> None:
         """Candidates coloured by the sd of the natural frequencies (blue sure, yellow unsure)."""
-        self._at(number)
         prediction = model.workspace_prediction
         relative = prediction.frequency_sd_hz / prediction.frequency_hz
         sd = 100 * np.sqrt(np.mean(relative**2, axis=1))
@@ -184,11 +210,6 @@ class RerunView:
         colours = (255 * colormaps["viridis"](0.25 + 0.75 * shade)).astype(np.uint8)
         points = rr.Points3D(self._cell.candidates.position_m, radii=0.008, colors=colours)
         self._stream.log("cell/workspace", points)
-
-    def learning(self, number: int, sd_percent: np.ndarray) -> None:
-        """The sd (count,) in % of the natural frequencies over the workspace."""
-        target = self._cell.config.stop.frequency_sd_percent
-        self._progress.log(number, progress.uncertainty(sd_percent, target))
 
     def text(self, number: int, text: str, level: str = "INFO") -> None:
         """A line in the log."""

@@ -39,10 +39,7 @@ def mode_views(count: int, eye: rrb.EyeControls3D) -> rrb.Container:
     """A view for each mode, and the MAC matrix with them."""
     views: list[rrb.View] = [
         rrb.Spatial3DView(
-            origin=f"/modes/mode_{k + 1}",
-            name=f"mode {k + 1}",
-            background=GROUND,
-            eye_controls=eye,
+            origin=f"/modes/mode_{k + 1}", name=f"mode {k + 1}", background=GROUND, eye_controls=eye
         )
         for k in range(count)
     ]

@@ -14,7 +14,6 @@ from planner.dataset.measure import MeasuredPose
 from planner.report.plot_marks import AXES, FAINTEST, magnitude, name_axes, panels
 
 LINES = 300  # frequency lines of a plot: as many as its width shows
-PULSE_MS = (-5.0, 35.0)  # of a hit, shown from its peak
 SIZE = (7.0, 3.6)  # inches
 EXPECTED, SPREAD, TARGET = (255, 150, 40), (150, 95, 40), (120, 200, 120)
 MEASURED, ALL = (235, 235, 235), (150, 154, 158)
@@ -60,7 +59,7 @@ def force_figure(measured: MeasuredPose) -> Figure:
         ms = 1000 * np.arange(hit.force_n.size) / hit.sampling_rate_hz
         ms = ms - ms[int(np.argmax(np.abs(hit.force_n)))]
         panel.plot(ms, np.abs(hit.force_n), label=f"along {axis}")
-    panel.set_xlim(PULSE_MS)
+    panel.set_xlim(-5.0, 35.0)
     panel.grid(True, alpha=0.25)
     name_axes(figure, grid, "time after the peak (ms)", "force (N)")
     return figure
