@@ -57,10 +57,7 @@ class Answer:
         note: str = "",
         more: "More | None" = None,
     ) -> Self:
-        """The same once what `draw` gives is where pictures are wanted, if they are.
-
-        `name`, `note` and `more` as `Pictures.write` has them.
-        """
+        """The same once what `draw` gives is written, if wanted; others as in `Pictures.write`."""
         if not pictures.wanted:
             return self
         simulated = getattr(self, "simulated", False)

@@ -62,16 +62,10 @@ class ExportedFiles(Answer):
 def export(
     campaign: Campaign, kind: str, out: Path | None, poses_csv: Path | None
 ) -> ExportedFiles:
-    """Write a campaign in another format.
+    """Write a campaign as one of KINDS into a folder, by default DIR/export.
 
-    Args:
-        campaign: The campaign.
-        kind: One of KINDS; those of PROGRAMS drive the robot to the open proposals.
-        out: A folder, by default DIR/export.
-        poses_csv: Other poses, for programs and predictions.
-
-    Raises:
-        InputError: The kind is unknown, there is nothing to export, or a file can't be written.
+    Those of PROGRAMS drive the robot to the open proposals, or to other poses, which predictions
+    are for, too. InputError where there is nothing to export, or a file cannot be written.
     """
     if kind not in KINDS:
         raise InputError(f"{kind} is no format; give one of {', '.join(KINDS)}.")
@@ -135,11 +129,8 @@ def _uff(found: ExportData) -> dict[str, Any]:
     """A file for each pose: FRFs and modes as measured, FRFs as predicted."""
     files, used = {}, set[str]()
     for one in found.measured:
-        name, title = (
-            unique(identifier(one.pose), used),
-            f"{found.label}, pose {one.pose}, measured",
-        )
-        frf = one.frf
+        name, frf = unique(identifier(one.pose), used), one.frf
+        title = f"{found.label}, pose {one.pose}, measured"
         sets = uff.tool_frfs(frf.frequency_hz, frf.accelerance, title, frf.coherence)
         files[f"{name}_measured.unv"] = sets
         files[f"{name}_modes.unv"] = uff.tool_modes(one.modes, title)

@@ -133,10 +133,7 @@ class IdentificationReport(Answer):
         return self.with_figures(pictures, lambda: compared.figures(first), name, note, more)
 
     def write(self, robot_toml: Path) -> "IdentificationReport":
-        """Write the identified robot, read it again, and say how well that one agrees.
-
-        Raises InputError where the files cannot be written.
-        """
+        """The robot written, and how well it agrees once read again; InputError where it fails."""
         from planner.dynamics.simulation import Simulation
         from planner.fit.write_robot import write_robot
         from planner.robot.robot import Robot

@@ -106,10 +106,9 @@ def modal_report(
     sources: tuple[Source, ...], band_hz: tuple[float, float] | None, force: str | None,
     estimator: str, pictures: Pictures, window_rate_1_s: float,
 ) -> ModesReport:  # fmt: skip
-    """Analyse files of one pose.
+    """Of files of one pose; `force` names the channel of a long record that is not labelled.
 
-    `force` names the force channel of a long record whose channels are not labelled. Raises
-    RefusedError if no file could be used.
+    Raises RefusedError if no file could be used.
     """
     if force is not None:
         return _by_channel(sources, band_hz, force, pictures)
@@ -190,7 +189,7 @@ def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -
 def matrix_report(
     given: FrfSet, quantity: str | None, pictures: Pictures, real: bool, files_to: Path | None
 ) -> ModesReport:
-    """Analyse FRFs between any points.
+    """Of FRFs between any points.
 
     With `real` the shapes are the real normal modes behind the complex ones; `files_to` is a folder
     for universal files and tables. Raises InputError or RefusedError in one sentence.

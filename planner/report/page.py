@@ -45,10 +45,9 @@ CLASSES = {"error": "error", "warning": "warn"}
 
 
 def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -> Done:
-    """Write the report of a campaign, by default report.html in its folder.
+    """Write the report, by default report.html in the campaign's folder; InputError if it fails.
 
-    `diagnosis` names what `planner diagnose --out` has written. Raises InputError where the file
-    cannot be written.
+    `diagnosis` names what `planner diagnose --out` has written.
     """
     started = time.perf_counter()
     kept = diagnosis_of(campaign.directory, diagnosis)

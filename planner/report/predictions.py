@@ -119,12 +119,10 @@ def predictions(
     npz: Path,
     force_n: np.ndarray | None = None,
 ) -> PredictionReport:
-    """Predict at n poses q, (dof,) in rad each; FRFs go to the npz file.
+    """Predict at n poses q, (dof,) in rad each; FRFs go to the npz file, or InputError is raised.
 
     Of hits of peak force_n (n,), where joints are not linear: FRFs as such hits measure them, modes
     linearised. NaN, or None, is as those of the campaign.
-
-    Raises InputError where that cannot be written.
     """
     # status needs none of what these import
     from planner.campaign.frf_model import UNCHANGED, struck_modes

@@ -209,10 +209,7 @@ def page_with_hits(
     auto: bool,
     progress: str,
 ) -> PosePage:
-    """The page with the hits that wait, the files that are not whole yet, and keys that do.
-
-    `can`: whether there is an act to take back, and one that was and can hold again.
-    """
+    """The page with hits and files that wait, and the keys that do; `can` be undone, redone."""
     names = [one.path.name for one in verdicts]
     hits = tuple(_judged(one, names) for one in verdicts)
     unfinished = tuple((short_name(path), _named(path, why)) for path, why in waiting)

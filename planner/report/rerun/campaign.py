@@ -224,10 +224,7 @@ class RerunView:
 
 
 def _eye(cell: Cell, near: float = 1.0) -> rrb.EyeControls3D:
-    """A look from the side and above at robot and workspace, whatever lies around them.
-
-    `near` below 1 goes nearer.
-    """
+    """A look from the side and above at robot and workspace; `near` below 1 goes nearer."""
     shoulder, reach = cell.robot.shoulder_m, cell.robot.reach_m
     away = np.mean(cell.candidates.position_m, axis=0) - shoulder
     side = np.array([away[1], -away[0], 0.0]) + 0.6 * np.array([away[0], away[1], 0.0])

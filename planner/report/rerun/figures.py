@@ -34,10 +34,7 @@ More = Callable[[rr.RecordingStream], tuple[rrb.View | rrb.Container, rrb.TimePa
 def open_stream(
     identity: str, name: str, blueprint: rrb.Blueprint, rrd: Path | None, viewer: bool = False
 ) -> rr.RecordingStream:
-    """A recording without a clock: the same `identity` and content give the same recording.
-
-    Raises InputError if the file cannot be written.
-    """
+    """A recording that `identity` and content alone determine; InputError if it cannot be."""
     key = hashlib.sha256(identity.encode()).hexdigest()[:32]
     stream = rr.RecordingStream("planner", recording_id=key, send_properties=False)
     # The clock would make two recordings of one campaign differ.
@@ -115,10 +112,7 @@ def draw(stream: rr.RecordingStream, path: str, figure: Figure, static: bool = F
 def record_figures(
     figures: Mapping[str, Figure], name: str, note: str, rrd: Path, more: More | None = None
 ) -> None:
-    """Write a recording with a tab for each figure by its name, then what `more` draws.
-
-    InputError if the file cannot be written.
-    """
+    """A tab for each figure by its name, then what `more` draws; InputError if that cannot be."""
     tabs: list[rrb.View | rrb.Container] = []
     time = rrb.TimePanel(state="hidden")
     # The blueprint comes last: only then it is known what there is to be seen.

@@ -49,10 +49,7 @@ def mode_views(count: int, eye: rrb.EyeControls3D) -> rrb.Container:
 def draw_modes(
     stream: rr.RecordingStream, model: Model, pose: LabelledPose, measured: MeasuredPose | None
 ) -> None:
-    """The modes of a measured pose, at the recording's current time, moving from then on.
-
-    With the matrix that compares their shapes.
-    """
+    """The modes of a measured pose, now and moving from then on, and the MAC of their shapes."""
     robot, simulation = model.cell.robot, model.low.simulation
     seen = mode_motion.measured_shapes(robot, pose, measured)
     drawn = skeleton(robot, pose.q)

@@ -66,10 +66,7 @@ def force_figure(measured: MeasuredPose) -> Figure:
 
 
 def measured_modes(pose: LabelledPose, before: Model | None) -> dict[str, float]:
-    """Frequencies (Hz) and damping (%) of a pose's modes, and what was expected before, by series.
-
-    Before the first measurement nothing was expected.
-    """
+    """Frequencies (Hz) and damping (%) of a pose's modes, and what, if anything, was expected."""
     rows: dict[str, float] = {}
     said = before.predict(pose.q[None]) if before is not None and before.labelled else None
     for k, mode in enumerate(pose.modes, 1):
