@@ -102,9 +102,7 @@ class SessionState:
         kept = [k for k, pose in enumerate(self.measured) if pose in state.measurements]
         measured = tuple(self.measured[k] for k in kept)
         history = tuple(self.history[k] for k in kept)
-        return replace(
-            self, measured=measured, history=history, progress="", here=frozenset()
-        )  # fmt: skip
+        return replace(self, measured=measured, history=history, progress="", here=frozenset())
 
     def after(
         self, pose: str, model: Model, state: CampaignState, seconds: float, auto: bool
