@@ -57,7 +57,7 @@ class ComparedFrfs:
 
     def figures(self, first: Sequence[int]) -> dict[str, Figure]:
         """The direct FRFs of so many of the `first` poses, then maps of each over all poses."""
-        number, figures = np.arange(1.0, len(self.names) + 1), {}
+        figures = {}
         for k in first[:MOST]:
             name = re.sub(r"[^\w.-]", "_", str(self.names[k]))
             figures[f"frf_{name}"] = self.overlay(k)
@@ -65,9 +65,8 @@ class ComparedFrfs:
             measured = self._aligned(self.measured[:, i, i])
             for side in self.sides:
                 figures[f"map_{axis}{axis}_{side.key}"] = frf_map(
-                    number, measured, self._aligned(side.h[:, i, i]), self.frequency_hz[0],
-                    "pose, in recorded order",
-                    f"{self.place}Map of H {axis}{axis}, simulation {side.label}", names=self.names,
+                    self.names, measured, self._aligned(side.h[:, i, i]), self.frequency_hz[0],
+                    f"{self.place}Map of H {axis}{axis}, simulation {side.label}",
                 )  # fmt: skip
         return figures
 
@@ -96,48 +95,36 @@ class ComparedFrfs:
 
 
 def frf_map(
-    place: np.ndarray,
-    measured: np.ndarray | None,
-    simulated: np.ndarray,
-    frequency_hz: np.ndarray,
-    pose_label: str = "pose",
-    title: str = "",
-    names: Sequence[str] = (),
-) -> Figure:
-    """One FRF along a path (Birk et al. 2025, section 2.5): measured, simulated, the difference.
+    names: Sequence[str], measured: np.ndarray, simulated: np.ndarray, frequency_hz: np.ndarray,
+    title: str,
+) -> Figure:  # fmt: skip
+    """One FRF over n named poses (Birk et al. 2025, section 2.5): measured, simulated, difference.
 
-    place (n,) is where on the path a pose is (number, angle, length; increasing); measured, if
-    there is any, and simulated (n, F), complex or magnitudes, in m/s²/N, on frequency_hz (F,) are
-    drawn in dB. NaN stays blank. `names` (n,) of the poses stand at the axis instead of numbers.
+    measured and simulated (n, F), complex or magnitudes, in m/s²/N, on frequency_hz (F,) are drawn
+    in dB. NaN stays blank.
     """
-    both = ("measured", measured), ("simulated", simulated)
-    tiny = np.finfo(float).tiny
-    levels = {
-        name: 20 * np.log10(np.maximum(np.abs(frf), tiny)) for name, frf in both if frf is not None
-    }
-    top = max((np.nanmax(v) for v in levels.values() if not np.isnan(v).all()), default=0.0)
-    shown = [(name, level, (top - FAINTEST_DB, top), "viridis") for name, level in levels.items()]
-    if measured is not None:
-        difference = levels["simulated"] - levels["measured"]
-        limits = -DIFFERENCE_DB, DIFFERENCE_DB
-        shown.append(("simulated − measured", difference, limits, "RdBu_r"))
-    figure, grid = marks.panels((3.6 * len(shown) + 1.2, 4.2), title, 1, len(shown), sharey=True)
-    cells, images = (_edges(np.asarray(place, float)), _edges(frequency_hz)), []
+    least = np.finfo(float).tiny
+    seen, made = (20 * np.log10(np.maximum(np.abs(h), least)) for h in (measured, simulated))
+    top = max((np.nanmax(v) for v in (seen, made) if not np.isnan(v).all()), default=0.0)
+    shown = (
+        ("measured", seen, (top - FAINTEST_DB, top), "viridis"),
+        ("simulated", made, (top - FAINTEST_DB, top), "viridis"),
+        ("simulated − measured", made - seen, (-DIFFERENCE_DB, DIFFERENCE_DB), "RdBu_r"),
+    )
+    figure, grid = marks.panels((12.0, 4.2), title, 1, 3, sharey=True)
+    place, images = np.arange(1, len(names) + 1), []
+    every = -(-len(names) // MOST_NAMES)
+    ticks = [marks.plain_text(name) for name in names][::every]
     for panel, (name, level, (low, high), colours) in zip(grid[0], shown, strict=True):
         panel.set_title(name, fontsize=9)
-        panel.set_xlabel(pose_label)
+        panel.set_xlabel("pose, in recorded order")
         values = np.ma.masked_invalid(level.T)
         style = {"vmin": low, "vmax": high, "cmap": colours, "rasterized": True}
-        images.append(panel.pcolormesh(*cells, values, **style))
-        if len(names):
-            every = -(-len(names) // MOST_NAMES)
-            ticks = [marks.plain_text(name) for name in names][::every]
-            panel.set_xticks(np.asarray(place)[::every], ticks, rotation=90, fontsize=7)
+        images.append(panel.pcolormesh(_edges(place), _edges(frequency_hz), values, **style))
+        panel.set_xticks(place[::every], ticks, rotation=90, fontsize=7)
     grid[0, 0].set_ylabel("frequency (Hz)")
-    same = list(grid[0, : len(levels)])
-    figure.colorbar(images[0], ax=same, label="dB re 1 m/s²/N", pad=0.01)
-    if measured is not None:
-        figure.colorbar(images[2], ax=grid[0, 2], label="dB", pad=0.01)
+    figure.colorbar(images[0], ax=[*grid[0, :2]], label="dB re 1 m/s²/N", pad=0.01)
+    figure.colorbar(images[2], ax=grid[0, 2], label="dB", pad=0.01)
     return figure
 
 

@@ -178,9 +178,7 @@ def _decimals(panel: Axes) -> None:
     panel.tick_params(which="minor", labelsize=7)
 
 
-def coupling_figure(
-    before: CoupledFrf | None, coupled: CoupledFrf, title: str, reference: str
-) -> Figure:
+def coupling_figure(before: CoupledFrf, coupled: CoupledFrf, reference: str) -> Figure:
     """Receptances |H| of motions per force, the tested tool's and the target's ± 2 sd.
 
     Below, line by line, how many times relative errors of the measured FRFs grew.
@@ -188,7 +186,8 @@ def coupling_figure(
     moved = [k for k in range(3) if np.all(np.isfinite(coupled.receptance[k, k]))]
     n = len(moved)
     layout = {"height_ratios": [1.0] * n + [0.7]}
-    figure, grid = panels((4.6 * n + 2.0, 2.9 * n + 2.2), title, n + 1, n, gridspec_kw=layout)
+    size, title = (4.6 * n + 2.0, 2.9 * n + 2.2), "Receptances of the tip, before and after"
+    figure, grid = panels(size, title, n + 1, n, gridspec_kw=layout)
     f = coupled.frequency_hz
     for row, i in enumerate(moved):
         for column, j in enumerate(moved):
@@ -196,9 +195,8 @@ def coupling_figure(
             mean, sd = 1e6 * coupled.receptance[i, j], 1e6 * coupled.sd[i, j]
             floor = FLOOR * np.abs(mean).min()
             magnitude(panel, f, mean, sd, floor, color=MODEL, lw=1.3, label="this tool")
-            if before is not None:
-                size = 1e6 * before.receptance[i, j]
-                magnitude(panel, f, size, color=MEASURED, lw=0.9, label=reference)
+            size = 1e6 * before.receptance[i, j]
+            magnitude(panel, f, size, color=MEASURED, lw=0.9, label=reference)
             panel.set_ylim(bottom=floor)
             panel.set_title(f"response {AXES[i]}, hit {AXES[j]}", fontsize=9, loc="left", pad=3)
             panel.grid(True, which="both", alpha=0.2)

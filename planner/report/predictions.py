@@ -117,12 +117,12 @@ def predictions(
     names: Sequence[str],
     q: Sequence[np.ndarray],
     npz: Path,
-    force_n: np.ndarray | None = None,
+    force_n: np.ndarray,
 ) -> PredictionReport:
     """Predict at n poses q, (dof,) in rad each; FRFs go to the npz file, or InputError is raised.
 
     Of hits of peak force_n (n,), where joints are not linear: FRFs as such hits measure them, modes
-    linearised. NaN, or None, is as those of the campaign.
+    linearised. NaN is as those of the campaign.
     """
     # status needs none of what these import
     from planner.campaign.frf_model import UNCHANGED, struck_modes
@@ -130,8 +130,8 @@ def predictions(
 
     angles, lines = np.array(q), campaign.frequency_lines
     prediction, (mean, sd) = campaign.model.predict(angles), campaign.frf_at(angles)
-    said, asked = (), force_n is not None and bool(np.any(np.isfinite(force_n)))
-    if force_n is not None and asked:
+    said, asked = (), bool(np.any(np.isfinite(force_n)))
+    if asked:
         struck = campaign.model.struck
         said = () if struck else (UNCHANGED,)
         if struck is not None:
@@ -139,9 +139,8 @@ def predictions(
             mean = mean + change_at_force(struck, angles, force_n, lines)
     outside, robot = ~campaign.cell.inside(angles), campaign.cell.robot
     save_frfs(npz, lines, mean, sd, names, robot, angles, outside, force_n if asked else None)
-    forces = np.full(len(names), np.nan) if force_n is None else force_n
     poses = tuple(
-        PosePrediction.of(name, ExpectedMode.all_of(prediction, i), bool(outside[i]), forces[i])
+        PosePrediction.of(name, ExpectedMode.all_of(prediction, i), bool(outside[i]), force_n[i])
         for i, name in enumerate(names)
     )
     return PredictionReport(poses, str(npz.resolve()), len(campaign.state.used), said)

@@ -147,29 +147,24 @@ def against_expected(pose: str, model: Model, before: Model | None) -> str:
 
 
 def progress_line(
-    history: list[float], target: float, seconds_per_pose: float | None, minimum: int
-) -> Text:
+    history: list[float], target: float, seconds_per_pose: float, minimum: int
+) -> str:
     """Time per pose, and from how many to how many it takes until the target, by the trend so far.
 
     Short, for it shares a line of 80 columns. `history` is the overall sd (%) after each
     measurement; it falls about geometrically.
     """
-    parts = []
-    if seconds_per_pose is not None:
-        parts.append(f"{seconds_per_pose / 60:.1f} min per pose")
+    parts = [f"{seconds_per_pose / 60:.1f} min per pose"]
     left = poses_to_go(history, target, minimum)
     if left == (0, 0):
         parts.append("overall sd below the target")
     elif left is not None:
         more = f"{_span(left)} more pose{'s' if left != (1, 1) else ''}"
-        if seconds_per_pose is not None:
-            minutes = [None if n is None else n * seconds_per_pose / 60 for n in left]
-            rounded = [None if m is None else max(1, round(m)) for m in minutes]
-            more += f", {_span((rounded[0] or 1, rounded[1]))} min to go"
-        parts.append(more)
+        minutes = [None if n is None else max(1, round(n * seconds_per_pose / 60)) for n in left]
+        parts.append(f"{more}, {_span((minutes[0] or 1, minutes[1]))} min to go")
     elif len(history) > 1:
         parts.append("no trend yet for how many more")
-    return Text("; ".join(parts))
+    return "; ".join(parts)
 
 
 def _span(of: tuple[int, int | None]) -> str:

@@ -185,7 +185,7 @@ def test_a_refit_that_is_farther_off_is_explained():
     ],
 )
 def test_poses_and_minutes_to_go_are_said_by_a_trend(history, target, least, left, said):
-    line = progress_line(history, target, 120.0, least).plain
+    line = progress_line(history, target, 120.0, least)
     assert said in line
     if left is None:
         assert "more pose" not in line
