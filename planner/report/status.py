@@ -143,7 +143,7 @@ class StatusReport(ModelStatus, Answer):
     plots: tuple[str, ...] = ()
     rrd: str | None = None
     models: tuple["LeftOutModel", ...] | msgspec.UnsetType = msgspec.UNSET  # where asked for
-    model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
+    model: "Callable[[], Model]" = field(repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
         """With the forecast's sentence; "decision" where there is one."""
@@ -152,7 +152,7 @@ class StatusReport(ModelStatus, Answer):
 
     def drawings(self) -> "dict[str, Figure]":
         """Each pose as predicted without it."""
-        if not self.leave_one_out.values or self.model is None:
+        if not self.leave_one_out.values:
             return {}
         from planner.report.campaign_plots import left_out_figure
 
@@ -163,7 +163,6 @@ class StatusReport(ModelStatus, Answer):
         """The same once every model of `[surrogate]` has predicted poses left out."""
         from planner.campaign.model_comparison import compared_models
 
-        assert self.model is not None
         return replace(self, models=compared_models(self.model(), progress=progress))
 
     def text(self) -> Group:
