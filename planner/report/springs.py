@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import msgspec
-from rich.table import Table
 
-from planner.report.text import table, with_sd
+from planner.report.text import with_sd
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -104,12 +103,6 @@ def refitted_springs(model: "Model") -> tuple[RefittedSpring, ...]:
         )
         for n, estimate in sorted(told.items())
     )  # fmt: skip
-
-
-def springs_table(springs: tuple[RefittedSpring, ...]) -> Table:
-    """Spring by spring."""
-    title = "Stiffnesses of the simulation, refitted to all recordings"
-    return table(title, *COLUMNS, rows=(spring.cells for spring in springs))
 
 
 def identified_springs(robot: "Robot", found: "Identification") -> tuple[IdentifiedSpring, ...]:

@@ -20,7 +20,7 @@ from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.imports import asked_of
 from planner.report.proposals import forecast_json, standing, unanswered
 from planner.report.saved_diagnosis import diagnosis_of, read_diagnosis, two_answers
-from planner.report.springs import NOT_KNOWN, RefittedSpring, refitted_springs, springs_table
+from planner.report.springs import COLUMNS, NOT_KNOWN, RefittedSpring, refitted_springs
 from planner.report.text import table
 from planner.words import by_reason, counted, local_time, significant
 
@@ -172,9 +172,13 @@ class StatusReport(ModelStatus, Answer):
             *("pose", "hits", "refused", "frequencies (Hz)", "time"),
             rows=(pose.cells for pose in self.measurements),
         )
-        springs = [springs_table(self.springs), Text(f"  {NOT_KNOWN}")] if self.springs else []
-        springs += [] if self.models is msgspec.UNSET else models_text(self.models)
-        return Group(measured, *springs, Text("\n".join(self._lines())), *self.end)
+        parts: list[RenderableType] = [measured]
+        if self.springs:
+            title = "Stiffnesses of the simulation, refitted to all recordings"
+            each = (spring.cells for spring in self.springs)
+            parts += [table(title, *COLUMNS, rows=each), Text(f"  {NOT_KNOWN}")]
+        parts += [] if self.models is msgspec.UNSET else models_text(self.models)
+        return Group(*parts, Text("\n".join(self._lines())), *self.end)
 
     def _counts(self) -> str:
         """How many poses the model uses, as report and predict count them, and others."""
