@@ -74,7 +74,8 @@ def export(
         campaign.cell.check_pose(row.joints_deg, f"{poses_csv}, row {row.row}")
     folder = (out or campaign.directory / "export").absolute()
     if kind in PROGRAMS:
-        _refuse_contacts(campaign.cell.robot, poses_csv, rows)
+        if rows:
+            _refuse_contacts(campaign.cell.robot, poses_csv, rows)
         return _program(campaign, kind, folder, rows)
     found = export_data(campaign, [r.pose for r in rows], [r.joints_deg for r in rows])
     if not found.measured and not found.poses and kind != "model":
@@ -99,10 +100,9 @@ def export(
 
 def _refuse_contacts(robot: Robot, file: Path | None, rows: Sequence[PoseRow]) -> None:
     """Proposals touch nothing; InputError where a pose that was named by hand does."""
-    collisions = Collisions(robot) if rows else None
+    collisions = Collisions(robot)
     for row in rows:
-        touching = collisions.contacts(robot.joints.internal(row.joints_deg)) if collisions else ()
-        if touching:
+        if touching := collisions.contacts(robot.joints.internal(row.joints_deg)):
             raise InputError(
                 f"{file}, row {row.row}: at {row.pose} {'; '.join(touching)}; name another pose, "
                 f"or list the pair in robot.toml, [collision] ignore."

@@ -67,13 +67,6 @@ class PosePrediction:
     outside: bool = False
     peak_force_n: float | Unset = UNSET
 
-    @classmethod
-    def of(
-        cls, pose: str, modes: tuple[ExpectedMode, ...], outside: bool, force_n: float
-    ) -> "PosePrediction":
-        """NaN is no force that was asked for."""
-        return cls(pose, modes, outside, UNSET if np.isnan(force_n) else float(force_n))
-
     @property
     def title(self) -> str:
         """Its name, and what is special."""
@@ -140,8 +133,8 @@ def predictions(
     outside, robot = ~campaign.cell.inside(angles), campaign.cell.robot
     save_frfs(npz, lines, mean, sd, names, robot, angles, outside, force_n if asked else None)
     poses = tuple(
-        PosePrediction.of(name, ExpectedMode.all_of(prediction, i), bool(outside[i]), force_n[i])
-        for i, name in enumerate(names)
+        PosePrediction(name, ExpectedMode.all_of(prediction, i), bool(outside[i]), force)
+        for i, (name, force) in enumerate(zip(names, _stated(force_n), strict=True))
     )
     return PredictionReport(poses, str(npz.resolve()), len(campaign.state.used), said)
 
@@ -173,9 +166,14 @@ def robot_predictions(
     save_frfs(npz, lines, mean, None, names, robot, q, None, force_n if asked.any() else None)
     said = () if robot.config.law or not asked.any() else (UNCHANGED,)
     shown = []
-    for name, force, *own in zip(names, force_n, f, ratio, strict=True):
+    for name, force, *own in zip(names, _stated(force_n), f, ratio, strict=True):
         inside = ((hz, z) for hz, z in zip(*own, strict=True) if band[0] <= hz <= band[1])
         expected = tuple(ExpectedMode(float(hz), None, float(z), None) for hz, z in inside)
-        shown.append(PosePrediction.of(name, expected, False, force))
+        shown.append(PosePrediction(name, expected, False, force))
     there = str(robot.path.absolute())
     return PredictionReport(tuple(shown), str(npz.resolve()), 0, said, there)
+
+
+def _stated(force_n: np.ndarray) -> list[float | Unset]:
+    """Forces (n,) in N that were asked for; NaN is none."""
+    return [UNSET if np.isnan(force) else float(force) for force in force_n]

@@ -21,7 +21,7 @@ from planner.report.imports import asked_of
 from planner.report.proposals import forecast_json, standing, unanswered
 from planner.report.saved_diagnosis import diagnosis_of, read_diagnosis, two_answers
 from planner.report.springs import COLUMNS, NOT_KNOWN, RefittedSpring, refitted_springs
-from planner.report.text import table
+from planner.report.text import sds_over_workspace, table
 from planner.words import by_reason, counted, local_time, significant
 
 if TYPE_CHECKING:
@@ -189,15 +189,12 @@ class StatusReport(ModelStatus, Answer):
         return f"{counted(self.used, 'pose')} measured{more}"
 
     def _lines(self) -> list[str]:
-        each = enumerate(self.frequency_sd_percent, 1)
         held = ", ".join(h.pose for h in self.held)
         waiting = f"; hit, and waiting for your answer: {held}" if held else ""
         lines = [
             "open: " + (", ".join(p.pose for p in self.open) or "none") + waiting,
             "skipped: " + (", ".join(s.pose for s in self.skipped) or "none"),
-            "sd of frequencies over the workspace: "
-            + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)
-            + f" (all together: target {self.target_frequency_sd_percent:g} %)",
+            sds_over_workspace(self.frequency_sd_percent, self.target_frequency_sd_percent),
             standing(self.forecast, self.waits_for, self.not_predicted),
             f"log: {counted(self.log['entries'], 'entry', 'entries')}",
         ]

@@ -153,15 +153,13 @@ class FolderTable:
     _stamps: dict[Path, Stamp] = field(default_factory=dict)
     _rows: dict[Path, tuple[Path, PoseRow]] = field(default_factory=dict)
 
+    def listed(self, path: Path) -> tuple[Path | None, PoseRow | None]:
+        """The folder whose table lists a file, and what it says of it; None: none does."""
+        return self._rows.get(path.resolve(), (None, None)) if self._rows else (None, None)
+
     def row(self, path: Path) -> PoseRow | None:
         """What a table says of a file; None: nothing."""
-        found = self._rows.get(path.resolve()) if self._rows else None
-        return found[1] if found else None
-
-    def listing(self, path: Path) -> Path | None:
-        """The folder whose table lists a file; None: none does."""
-        found = self._rows.get(path.resolve()) if self._rows else None
-        return found[0] if found else None
+        return self.listed(path)[1]
 
     def follow(self) -> set[Path]:
         """Read what has changed; once a look at the folder, as tables lie anywhere in it.

@@ -9,9 +9,9 @@ from planner.campaign.events import HitRecord, Question
 from planner.campaign.importing import ImportReport
 from planner.campaign.labels import found_modes
 from planner.campaign.model import Model
-from planner.report.text import SIMULATED, plain_table, with_sd
+from planner.report.text import SIMULATED, plain_table, sds_over_workspace, with_sd
 from planner.session.pose_screen import PosePage, remedy_first
-from planner.words import counted, short_name, significant
+from planner.words import counted, short_name
 
 HELP = """\
 a, Enter  import the hits that wait      r, R  set bad hits, or all, aside
@@ -45,12 +45,9 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
     parts: list[RenderableType] = [table, *_missed(report)]
     parts += [Text(_refused(hit), style="red") for hit in report.refused]
     parts += [Text(remark, style="yellow") for remark in report.remarks]
-    sd = ", ".join(
-        f"mode {k} {significant(v)} %" for k, v in enumerate(report.model.frequency_sd_percent, 1)
-    )
     target = report.model.cell.config.stop.frequency_sd_percent
-    known = f"sd of frequencies over the workspace: {sd} (all together: target {target:g} %)"
-    parts += [Text(known), *([SIMULATED] if simulated else [])]
+    parts.append(Text(sds_over_workspace(report.model.frequency_sd_percent, target)))
+    parts += [SIMULATED] if simulated else []
     title = f"Pose {report.pose}: {_in(report)}"
     return Panel(Group(*parts), title=title, title_align="left", expand=False)
 
