@@ -5,7 +5,13 @@ from itertools import islice
 
 import numpy as np
 
-from planner.check import description
+from planner.check.description import (
+    SEVERITIES,
+    CheckRemark,
+    check_frames,
+    check_joints,
+    check_links,
+)
 from planner.check.springs import check_band, check_springs
 from planner.check.surroundings import check_collision, check_workspace
 from planner.dynamics.simulation import Simulation
@@ -39,14 +45,14 @@ class Examination:
 
     robot: Robot
     links: tuple[LinkBody, ...]
-    remarks: tuple[description.CheckRemark, ...]
+    remarks: tuple[CheckRemark, ...]
     poses: tuple[str, ...]
     q: np.ndarray
     frequency_hz: np.ndarray
     damping_ratio: np.ndarray
 
     @property
-    def errors(self) -> tuple[description.CheckRemark, ...]:
+    def errors(self) -> tuple[CheckRemark, ...]:
         """What a campaign cannot begin with."""
         return tuple(r for r in self.remarks if r.severity == "error")
 
@@ -60,11 +66,8 @@ def home_of(robot: Robot) -> np.ndarray:
 def examine(robot: Robot, plan: Plan | None = None) -> Examination:
     """Check a robot that was loaded, and what a campaign asks of it."""
     links, home = link_bodies(robot), home_of(robot)
-    found = [
-        *description.check_links(robot, links),
-        *description.check_joints(robot, plan is not None),
-    ]
-    found += [*description.check_frames(robot), *check_collision(robot, links, home)]
+    found = [*check_links(robot, links), *check_joints(robot, plan is not None)]
+    found += [*check_frames(robot), *check_collision(robot, links, home)]
     if plan is None:
         collisions = Collisions(robot)
         free = (q for q in spread_poses(robot)[1:] if not collisions.contacts(q))
@@ -78,15 +81,13 @@ def examine(robot: Robot, plan: Plan | None = None) -> Examination:
     frequency, damping = np.empty((len(q), 0)), np.empty((len(q), 0))
     if plan is None or plan.simulated:
         found, frequency, damping = _simulated(robot, q, plan, found)
-    worst_first = tuple(
-        sorted(found, key=lambda remark: description.SEVERITIES.index(remark.severity))
-    )
+    worst_first = tuple(sorted(found, key=lambda remark: SEVERITIES.index(remark.severity)))
     return Examination(robot, links, worst_first, poses, q, frequency, damping)
 
 
 def _simulated(
-    robot: Robot, q: np.ndarray, plan: Plan | None, found: list[description.CheckRemark]
-) -> tuple[list[description.CheckRemark], np.ndarray, np.ndarray]:
+    robot: Robot, q: np.ndarray, plan: Plan | None, found: list[CheckRemark]
+) -> tuple[list[CheckRemark], np.ndarray, np.ndarray]:
     """With what springs and modes say; frequencies and damping ratios (n, e)."""
     none = np.empty((len(q), 0))
     try:
@@ -94,7 +95,7 @@ def _simulated(
     except InputError as error:
         severity = "error" if plan is not None or robot.config.compliance else "warning"
         text = str(error).removeprefix(str(robot.path)).lstrip(": ")
-        return [*found, description.CheckRemark(severity, text, robot.path.name)], none, none
+        return [*found, CheckRemark(severity, text, robot.path.name)], none, none
     found = found + check_springs(simulation, q)
     if any(r.severity == "error" for r in found):
         return found, none, none

@@ -65,7 +65,7 @@ class PoseImport(Answer):
 
     @property
     def refused(self) -> tuple[RefusedFile, ...]:
-        """Those left out among them."""
+        """Hits that are not used, those left out among them."""
         hits = (*self.report.refused, *self.report.left_out)
         return tuple(RefusedFile(hit.file, hit.reason) for hit in hits)
 
