@@ -108,6 +108,7 @@ class RerunView:
     def log(self, entry: events.Entry, model: Model, measured: MeasuredPose | None) -> None:
         """Show one event; `model` is that after it."""
         event, number = entry.event, len(model.labelled)
+        self._at(number)
         match event:
             case events.Proposed():
                 for proposal in event.proposals:
@@ -118,18 +119,18 @@ class RerunView:
                 self._measured(event.pose, model, None, f"Confirmed {event.pose}")
             case events.Refused():
                 for hit in event.hits:
-                    self.text(number, f"Refused {hit.file}: {hit.reason}", "WARN")
+                    self._say(f"Refused {hit.file}: {hit.reason}", "WARN")
             case events.Skipped() | events.Withdrawn():
                 reason = f": {event.reason}" if event.reason else ""
-                self.text(number, f"{type(event).__name__} {event.pose}{reason}", "WARN")
+                self._say(f"{type(event).__name__} {event.pose}{reason}", "WARN")
             case events.Starred():
-                self.text(number, f"Starred {event.pose}", "INFO")
+                self._say(f"Starred {event.pose}")
             case events.Undone():
-                self.text(number, f"{in_words(entry).capitalize()} of the log", "WARN")
+                self._say(f"{in_words(entry).capitalize()} of the log", "WARN")
             case events.FilesShown() | events.FilesPlaced():
                 return
             case _:
-                self.text(number, f"Configured {model.cell.robot.name}", "INFO")
+                self._say(f"Configured {model.cell.robot.name}")
         if not isinstance(event, events.Proposed | events.Refused | events.Starred):
             target = self._cell.config.stop.frequency_sd_percent
             self._progress.log(number, progress.uncertainty(model.frequency_sd_percent, target))
@@ -138,15 +139,14 @@ class RerunView:
     def _imported(
         self, event: events.Imported, model: Model, measured: MeasuredPose | None
     ) -> None:
-        number = len(model.labelled)
         found = ", ".join(f"{m.frequency_hz:.2f} Hz" for m in event.modes if m.likely)
         if any(hit.simulated for hit in event.hits):
             self.label_simulated()
         for hit in event.hits:
             if not hit.accepted:
-                self.text(number, f"Refused {hit.file}: {hit.reason}", "WARN")
+                self._say(f"Refused {hit.file}: {hit.reason}", "WARN")
         if event.question is not None:
-            self.text(number, f"Held back: {event.question.text}", "WARN")
+            self._say(f"Held back: {event.question.text}", "WARN")
         else:
             text = f"Imported {event.pose}: {found or 'no usable modes'}"
             self._measured(event.pose, model, measured, text)
@@ -159,16 +159,15 @@ class RerunView:
         place, colour = [proposal.position_m], COLOURS["proposed"]
         dot = rr.Points3D(place, radii=0.03, colors=colour, labels=proposal.pose)
         self._stream.log("cell/proposed", dot)
-        self.text(number, f"Proposed {proposal.pose}: {proposal.reason}", "INFO")
+        self._say(f"Proposed {proposal.pose}: {proposal.reason}")
 
     def _measured(self, name: str, model: Model, measured: MeasuredPose | None, text: str) -> None:
         """A measured pose: robot, hits, FRFs and modes against what was expected before."""
         number, before = len(model.labelled), self._before
         pose = next((p for p in model.labelled if p.pose == name), None)
         if pose is None:
-            self.text(number, text, "WARN")
+            self._say(text, "WARN")
             return
-        self._at(number)
         self._move(pose.q)
         if measured is not None:
             self._hits(pose, measured)
@@ -186,7 +185,7 @@ class RerunView:
         )  # fmt: skip
         self._stream.log("cell/measured", dots)
         self._workspace(model)
-        self.text(number, text, "INFO")
+        self._say(text)
 
     def _hits(self, pose: LabelledPose, measured: MeasuredPose) -> None:
         rotation, position = self._cell.robot.forward(pose.q)
@@ -211,9 +210,8 @@ class RerunView:
         points = rr.Points3D(self._cell.candidates.position_m, radii=0.008, colors=colours)
         self._stream.log("cell/workspace", points)
 
-    def text(self, number: int, text: str, level: str = "INFO") -> None:
+    def _say(self, text: str, level: str = "INFO") -> None:
         """A line in the log."""
-        self._at(number)
         self._stream.log("log", rr.TextLog(text, level=level))
 
     def close(self) -> None:
