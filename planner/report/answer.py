@@ -7,16 +7,12 @@ from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 
-from planner.errors import RefusedFile
-
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import RenderableType
 
     from planner.report.pictures import Pictures
     from planner.report.rerun.figures import More
-
-__all__ = ["NOT_IN_JSON", "Answer", "Done", "RefusedFile", "encoded", "plain"]
 
 # Metadata of a field for what an answer was made of; None where it came from another process.
 NOT_IN_JSON = {"json": False}

@@ -15,8 +15,8 @@ from planner.compare.curves import Curves, StrategyCurve, StrategyDifference, ba
 from planner.compare.pool import PoolPose
 from planner.compare.processes import Failure
 from planner.compare.tasks import Run, Study, Task
-from planner.errors import InputError
-from planner.report.answer import Answer, RefusedFile, encoded, plain
+from planner.errors import InputError, RefusedFile
+from planner.report.answer import Answer, encoded, plain
 from planner.report.pictures import Pictures
 from planner.report.text import table
 

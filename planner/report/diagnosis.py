@@ -14,11 +14,11 @@ from planner.diagnosis.diagnose import Established, ThreefoldSimilarity
 from planner.diagnosis.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
 from planner.dynamics.at_force import change_at_force
 from planner.effects.effect import Operator
-from planner.errors import InputError, writing
+from planner.errors import InputError, RefusedFile, writing
 from planner.fit.departures import departures_text, masses_text
 from planner.fit.posterior import RobotPosterior
 from planner.measurement.agreement import Similarity, fit_similarity
-from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
+from planner.report.answer import NOT_IN_JSON, Answer, encoded, plain
 from planner.report.text import command_line, remarks, table
 from planner.robot.place_names import place_names, with_names
 from planner.words import probable

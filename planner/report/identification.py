@@ -10,8 +10,9 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planner.errors import RefusedFile
 from planner.measurement.agreement import NO_SIMILARITY, Similarity, fit_similarity
-from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
+from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.pictures import Pictures, entitle
 from planner.report.springs import IdentifiedSpring, identified_springs
 from planner.report.text import remarks, table

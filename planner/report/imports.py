@@ -9,7 +9,8 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.events import Question
-from planner.report.answer import Answer, RefusedFile, plain
+from planner.errors import RefusedFile
+from planner.report.answer import Answer, plain
 from planner.report.modes import ModeAnswer
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, remarks, table, with_sd
