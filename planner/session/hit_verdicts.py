@@ -54,12 +54,10 @@ Before = Mapping[str, tuple[Hit, ...]]  # hits of the pose hit last before this 
 class Verdicts:
     """Judges files that wait at a pose; it keeps what it read, and nothing else."""
 
-    def __init__(
-        self, band_hz: tuple[float, float], points: PointNames, table: FolderTable | None = None
-    ):
+    def __init__(self, band_hz: tuple[float, float], points: PointNames, table: FolderTable):
         self._band = band_hz
         self._stated = StatedPoints(names=points)
-        self.table = table or FolderTable()
+        self.table = table
         self._read: dict[tuple, list[tuple[FileVerdict, tuple[Hit, ...]]]] = {}
 
     def unfit(self, path: Path) -> str:
