@@ -55,7 +55,8 @@ class Bench:
 
     def of(self, before: Before | None = None, here: frozenset[Path] = frozenset()):
         self.numbers = self.verdicts.numbered(self.files, self.numbers)
-        return {v.path.stem: v for v in self.verdicts.of(self.files, before, here, self.numbers)}
+        found = self.verdicts.of(self.files, before or {}, here, self.numbers, {}, "P1")
+        return {verdict.path.stem: verdict for verdict in found}
 
 
 @pytest.fixture
