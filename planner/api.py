@@ -26,11 +26,7 @@ from planner.modal.modes import ModalModel
 from planner.progress import ProgressCallback, no_progress
 from planner.recording.records import Hit
 from planner.report.diagnosis import DiagnosisReport, diagnosis_report
-from planner.report.identification import (
-    IdentificationBasis,
-    IdentificationReport,
-    identification_report,
-)
+from planner.report.identification import IdentificationReport, identification_report
 from planner.report.modal_analysis import check_options, sources_of
 from planner.robot.robot import Robot
 
@@ -138,8 +134,7 @@ def identify(
             extend=extend,
             on_step=lambda text: progress(text, 0.0),
         )
-        basis = IdentificationBasis(dataset, judged, nominal)
-        made = identification_report(basis, band, inertias)
+        made = identification_report(dataset, judged, nominal, band, inertias)
     return replace(made, seconds=time.perf_counter() - started)
 
 

@@ -34,15 +34,20 @@ def significant(value: float, digits: int = 2) -> str:
     return f"{rounded:.{max(0, digits - 1 - math.floor(math.log10(abs(rounded))))}f}"
 
 
-def with_sd(value: float, sd: float) -> str:
-    """A number and its sd of two digits, with one power of ten: "1.206e7 ± 0.024e7"."""
-    if not (math.isfinite(value) and sd > 0 and value):
+def with_sd(value: float, sd: float | None) -> str:
+    """A number and its sd of two digits, with one power of ten: "1.206e7 ± 0.024e7".
+
+    Four digits of one whose sd is not known.
+    """
+    if not (math.isfinite(value) and value):
         return f"{value:.3g}"
     power = math.floor(math.log10(abs(value)))
+    known = sd is not None and math.isfinite(sd) and sd > 0
+    last = math.floor(math.log10(sd)) - 1 if known else power - 3
     power = power if abs(power) > 3 else 0
-    digits = max(0, min(8, 1 - math.floor(math.log10(sd / 10**power))))
-    ten = f"e{power}" if power else ""
-    return f"{value / 10**power:.{digits}f}{ten} ± {sd / 10**power:.{digits}f}{ten}"
+    digits, ten = max(0, min(8, power - last)), f"e{power}" if power else ""
+    each = (value, sd) if known else (value,)
+    return " ± ".join(f"{one / 10**power:.{digits}f}{ten}" for one in each)
 
 
 def probable(probability: float) -> str:

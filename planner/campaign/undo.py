@@ -64,8 +64,10 @@ def last_undone(entries: Sequence[Entry]) -> tuple[Entry | None, tuple[Entry, ..
     return None, ()
 
 
-def in_short(entry: Entry) -> str:
-    """What an act was, and of which pose, where it is of one: "imported P004"."""
+def in_short(entry: Entry | None) -> str:
+    """What an act was, and of which pose, where it is of one: "imported P004"; "" of none."""
+    if entry is None:
+        return ""
     told = msgspec.to_builtins(entry.event)
     return f"{told['kind']} {told.get('pose', '')}".strip()
 

@@ -31,11 +31,6 @@ class CheckRemark:
         return f"{self.where}: {self.what} {self.remedy}".rstrip()
 
 
-def worst_first(remarks: list[CheckRemark]) -> tuple[CheckRemark, ...]:
-    """Errors, warnings, notes, each in the order found."""
-    return tuple(sorted(remarks, key=lambda r: SEVERITIES.index(r.severity)))
-
-
 # Limits by which units are told; chosen between robots from 5 to 1,500 kg and a factor of 1000.
 HEAVIEST_KG, LIGHTEST_KG = 2e4, 0.002
 GYRATION = 0.02, 1.2  # radius of gyration over the size of a link; a ball of that size has 0.18

@@ -3,15 +3,14 @@
 from dataclasses import dataclass
 from itertools import islice
 
-import msgspec
 import numpy as np
 
 from planner.check.description import (
+    SEVERITIES,
     CheckRemark,
     check_frames,
     check_joints,
     check_links,
-    worst_first,
 )
 from planner.check.springs import check_band, check_springs
 from planner.check.surroundings import check_collision, check_workspace
@@ -24,7 +23,6 @@ from planner.robot.robot import Robot
 
 POSES = 4  # poses looked at where no workspace is stated
 TRIES = 60  # poses tried to find them
-HOME = "home"
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,6 @@ def examine(robot: Robot, plan: Plan | None = None) -> Examination:
     links, home = link_bodies(robot), home_of(robot)
     found = [*check_links(robot, links), *check_joints(robot, plan is not None)]
     found += [*check_frames(robot), *check_collision(robot, links, home)]
-    poses, q = (HOME,), home[None]
     if plan is None:
         collisions = Collisions(robot)
         free = (q for q in spread_poses(robot)[1:] if not collisions.contacts(q))
@@ -79,12 +76,13 @@ def examine(robot: Robot, plan: Plan | None = None) -> Examination:
         candidates, remarks = check_workspace(robot, plan.workspace, plan.file)
         found += remarks
         others = np.empty((0, len(home))) if candidates is None else candidates.q
-    poses += tuple(f"pose {k + 1}" for k in range(len(others)))
-    q = np.concatenate([q, others])
+    poses = ("home", *(f"pose {k + 1}" for k in range(len(others))))
+    q = np.concatenate([home[None], others])
     frequency, damping = np.empty((len(q), 0)), np.empty((len(q), 0))
     if plan is None or plan.simulated:
         found, frequency, damping = _simulated(robot, q, plan, found)
-    return Examination(robot, links, worst_first(found), poses, q, frequency, damping)
+    worst_first = tuple(sorted(found, key=lambda remark: SEVERITIES.index(remark.severity)))
+    return Examination(robot, links, worst_first, poses, q, frequency, damping)
 
 
 def _simulated(
@@ -116,81 +114,3 @@ def spread_poses(robot: Robot) -> np.ndarray:
     low = np.maximum(robot.lower_rad, home - np.pi)
     high = np.minimum(robot.upper_rad, home + np.pi)
     return np.array([home, *(rng.uniform(low, high) for _ in range(TRIES))])
-
-
-@dataclass(frozen=True)
-class CheckedLink:
-    """A link: what turns it (null: nothing), mass, centre of mass and principal moments.
-
-    `guessed` masses have an sd, `mass_sd_kg`, as others may that robot.toml states.
-    """
-
-    link: str
-    joint: str | None
-    mass_kg: float
-    com_m: tuple[float, ...]
-    moments_kg_m2: tuple[float, ...]
-    inertial: bool
-    collision_shapes: int
-    guessed: bool = False
-    mass_sd_kg: float | None = None
-
-
-@dataclass(frozen=True)
-class CheckedJoint:
-    """A joint's limits and its speed, in degrees and degrees a second; a slide's in mm and mm/s."""
-
-    joint: str
-    lower_deg: float
-    upper_deg: float
-    speed_deg_s: float
-    unit: str | msgspec.UnsetType = msgspec.UNSET  # "mm" of a joint that slides
-
-
-@dataclass(frozen=True)
-class CheckedPose:
-    """What the simulation says at a pose: frequencies and damping ratios, from the lowest."""
-
-    pose: str
-    joints_deg: tuple[float, ...]
-    position_m: tuple[float, ...]
-    frequency_hz: tuple[float, ...]
-    damping_ratio: tuple[float, ...]
-
-
-def checked_poses(found: Examination) -> tuple[CheckedPose, ...]:
-    """What the simulation says at the poses that were looked at."""
-    if not found.frequency_hz.size:
-        return ()
-    robot, known = found.robot, np.isfinite(found.frequency_hz)
-    rows = zip(
-        found.poses,
-        robot.joints.shown(found.q).round(4).tolist(),
-        robot.forward_batch(found.q)[1].tolist(),
-        (f[own].tolist() for f, own in zip(found.frequency_hz, known, strict=True)),
-        (d[own].tolist() for d, own in zip(found.damping_ratio, known, strict=True)),
-        strict=True,
-    )
-    return tuple(CheckedPose(name, *map(tuple, values)) for name, *values in rows)
-
-
-def checked_links(found: Examination) -> tuple[CheckedLink, ...]:
-    """Of all links."""
-    return tuple(
-        CheckedLink(
-            b.name, b.joint or None, b.mass, tuple(b.com_m.tolist()),
-            tuple(b.moments.tolist()), b.stated, b.shapes, b.guessed,
-            None if b.sd_percent is None else b.mass * b.sd_percent / 100,
-        )
-        for b in found.links
-    )  # fmt: skip
-
-
-def checked_joints(found: Examination) -> tuple[CheckedJoint, ...]:
-    """Of all joints that move."""
-    robot = found.robot
-    limits = robot.joints.shown([robot.lower_rad, robot.upper_rad, robot.velocity_rad_s]).T
-    return tuple(
-        CheckedJoint(name, *row, unit="mm" if robot.slides(name) else msgspec.UNSET)
-        for name, row in zip(robot.joint_names, limits.tolist(), strict=True)
-    )

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from planner.errors import RefusedFile
 from planner.words import by_reason
 
 if TYPE_CHECKING:
-    from planner.report.answer import Answer, RefusedFile
+    from planner.report.answer import Answer
 
 RECORDED = "Folder with recordings.csv, or with folders that have one; or a campaign"
 
@@ -66,7 +67,7 @@ def warn(sentence: str) -> None:
     print(" ".join(sentence.split()), file=sys.stderr)
 
 
-def refusals(files: "Iterable[RefusedFile]", questions: Iterable[str] = ()) -> int:
+def refusals(files: Iterable[RefusedFile], questions: Iterable[str] = ()) -> int:
     """Say on stderr what was refused, and what is asked; the exit code that goes with it."""
     refused, asked = list(files), list(questions)
     # What is held is said once, with the question, not hit by hit.

@@ -21,7 +21,7 @@ from planner.cli.campaign_commands import confirm, export, new, redo, report, sk
 from planner.cli.documentation import check, manual, prove, schema, study
 from planner.cli.identification import compare, diagnose, identify
 from planner.cli.modes import modes
-from planner.cli.progress import console, progress_bar
+from planner.cli.progress import progress_bar
 from planner.cli.stability import couple, stability
 from planner.errors import InputError
 from planner.words import command
@@ -143,7 +143,9 @@ def watch(
             f"{folder} is no folder; name the one the analyser exports into, or make it: "
             f"{command('mkdir', '-p', folder)}"
         )
-    screen = console(quiet=False, stderr=as_json)
+    from planner.report.text import UnbrokenConsole
+
+    screen = UnbrokenConsole(stderr=as_json)
     # What follows takes seconds before the first page: libraries, the model.
     screen.print(f"Opening {directory}: the first pose comes in a few seconds.")
     from planner.campaign.campaign import Campaign
@@ -199,20 +201,18 @@ def predict(
     from planner.robot.robot import Robot
 
     with progress_bar("predicting", quiet=as_json) as progress:
-        if source.is_file():
-            robot = Robot.load(source)
-            rows = read_poses(poses, robot.joints)
-            npz = out or source.parent / "predictions" / f"{poses.stem}.npz"
-            q = [checked_pose(robot, r.joints_deg, f"{poses}, row {r.row}") for r in rows]
-            names, force_n = [row.pose for row in rows], peak_forces(rows, peak_force_n)
-            return respond(robot_predictions(robot, names, q, npz, force_n), as_json)
-        campaign = Campaign(source)
-        cell, rows = campaign.cell, read_poses(poses, campaign.cell.robot.joints)
-        q = [cell.check_pose(row.joints_deg, f"{poses}, row {row.row}") for row in rows]
-        npz = out or campaign.directory / "predictions" / f"{poses.stem}.npz"
-        progress(f"{len(rows)} poses", 0.0)
-        force_n = peak_forces(rows, peak_force_n)
-        answer = predictions(campaign, [row.pose for row in rows], q, npz, force_n)
+        campaign = None if source.is_file() else Campaign(source)
+        robot = Robot.load(source) if campaign is None else campaign.cell.robot
+        rows = read_poses(poses, robot.joints)
+        q = [checked_pose(robot, row.joints_deg, f"{poses}, row {row.row}") for row in rows]
+        beside = source.parent if campaign is None else campaign.directory
+        npz = out or beside / "predictions" / f"{poses.stem}.npz"
+        asked = [row.pose for row in rows], q, npz, peak_forces(rows, peak_force_n)
+        if campaign is None:
+            answer = robot_predictions(robot, *asked)
+        else:
+            progress(f"{len(rows)} poses", 0.0)
+            answer = predictions(campaign, *asked)
     return respond(answer, as_json)
 
 

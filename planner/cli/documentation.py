@@ -63,12 +63,13 @@ def manual(
 
     Example: planner manual --out manual.html
     """
-    from planner.report.documentation import write_manual
+    from planner.report.documentation import manual as text_of
+    from planner.report.html import write_page
 
     assert context.parent is not None
     commands = getattr(context.parent.command, "commands", {})
     told = [(name, command.help or "") for name, command in commands.items()]
-    file = write_manual(out, told)
+    file = write_page(text_of(told), out)
     return respond(Done({"manual": str(file)}, f"The manual: {file}"), as_json)
 
 

@@ -56,10 +56,8 @@ def identify(
 
     started = time.perf_counter()
     check_options(band_hz, window_rate_1_s=window_rate_1_s)
-    pictures, given = (
-        Pictures(plot, format_, rrd),
-        recordings_source(recordings, robot, window_rate_1_s),
-    )
+    pictures = Pictures(plot, format_, rrd)
+    given = recordings_source(recordings, robot, window_rate_1_s)
     nominal = given.nominal
     if out is not None:
         check_target(out, nominal)

@@ -51,16 +51,10 @@ def modes(
     """
     from planner.dataset.frf_set import frf_set
     from planner.recording.folder import several_poses
-    from planner.report.modal_analysis import (
-        check_options,
-        matrix_report,
-        modal_report,
-        sources_of,
-        unlabelled_report,
-    )
+    from planner.report import modal_analysis
     from planner.report.pictures import Pictures
 
-    check_options(band_hz, estimator, quantity, window_rate_1_s)
+    modal_analysis.check_options(band_hz, estimator, quantity, window_rate_1_s)
     pictures = Pictures(plot, format_, rrd)
     for_points = [
         name
@@ -79,20 +73,20 @@ def modes(
             answer = answer.with_figures(pictures, answer.drawings, paths[0].name)
         return respond(answer, as_json, refusals(answer.refused))
     if operating:
-        from planner.report.modal_analysis import operating_report
-
-        return respond(operating_report(paths, band_hz, pictures), as_json)
-    sources = sources_of(paths, from_names)
+        return respond(modal_analysis.operating_report(paths, band_hz, pictures), as_json)
+    sources = modal_analysis.sources_of(paths, from_names)
     given = None if force else frf_set(sources, band_hz, estimator, window_rate_1_s)
     if given is not None and given.placed:
-        answer = matrix_report(given, quantity, pictures, real, export)
+        answer = modal_analysis.matrix_report(given, quantity, pictures, real, export)
     elif for_points:
         what = "FRFs without directions" if given else "hits of one pose"
         raise InputError(
             f"{paths[0]} holds {what}, and {for_points[0]} is for FRFs of any points; leave it out."
         )
     elif given is not None:
-        answer = unlabelled_report(given, quantity, pictures)
+        answer = modal_analysis.unlabelled_report(given, quantity, pictures)
     else:
-        answer = modal_report(sources, band_hz, force, estimator, pictures, window_rate_1_s)
+        answer = modal_analysis.modal_report(
+            sources, band_hz, force, estimator, pictures, window_rate_1_s
+        )
     return respond(answer, as_json, refusals(answer.refused))

@@ -15,13 +15,6 @@ if TYPE_CHECKING:
 FIRST_S, LAST_S = 5.0, 60.0  # between lines: the first one, and at most, doubling in between
 
 
-def console(quiet: bool, stderr: bool = True):
-    """A rich console on stderr (or stdout), silent if `quiet`."""
-    from planner.report.text import UnbrokenConsole
-
-    return UnbrokenConsole(stderr=stderr, quiet=quiet)
-
-
 @contextmanager
 def progress_bar(verb: str, quiet: bool) -> Iterator[ProgressCallback]:
     """A function that shows what is being done, and as a bar the share (0 to 1) that is done."""
@@ -34,9 +27,11 @@ def progress_bar(verb: str, quiet: bool) -> Iterator[ProgressCallback]:
         TimeElapsedColumn,
     )
 
+    from planner.report.text import UnbrokenConsole
+
     columns = (SpinnerColumn(), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
                TextColumn("{task.description}", markup=False))  # fmt: skip
-    screen = console(quiet)
+    screen = UnbrokenConsole(stderr=True, quiet=quiet)
     done, started = Event(), time.monotonic()
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task(verb, total=None)

@@ -67,10 +67,9 @@ def export_data(
         modes = ModalPrediction(none, none, none, none, np.empty((*none.shape, 3, 3)), none)
     measured = (
         MeasuredPoseData(
-            m.pose, m.joints_deg, campaign.frf_of(m),
-            tuple(mode for mode in m.modes if mode.likely),
+            m.pose, m.joints_deg, campaign.frf_of(m), tuple(mode for mode in m.modes if mode.likely)
         )
         for m in used
-    )  # fmt: skip
+    )
     found = tuple(measured), names, angles, lines, mean, sd, modes
     return ExportData(campaign.directory.name, cell.robot.joints, state.simulated, *found)

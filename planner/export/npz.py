@@ -22,9 +22,7 @@ def save_frfs(
 
     With whether the robot's sensor, which FRFs are of, is at its tcp, which of them lie `outside`
     (n,) the workspace, and the peak force_n (n,) that was asked for, NaN where none was. `sd` is
-    None where nothing tells it.
-
-    Raises InputError where that cannot be done.
+    None where nothing tells it. InputError if that cannot be.
     """
     joints = robot.joints
     more = {"joint_units": np.array(joints.units)} if any(joints.slides) else {}

@@ -7,16 +7,12 @@ from typing import TYPE_CHECKING, Any, Self
 
 import msgspec
 
-from planner.errors import RefusedFile
-
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import RenderableType
 
     from planner.report.pictures import Pictures
     from planner.report.rerun.figures import More
-
-__all__ = ["NOT_IN_JSON", "Answer", "Done", "RefusedFile", "encoded", "plain"]
 
 # Metadata of a field for what an answer was made of; None where it came from another process.
 NOT_IN_JSON = {"json": False}
@@ -57,10 +53,7 @@ class Answer:
         note: str = "",
         more: "More | None" = None,
     ) -> Self:
-        """The same once what `draw` gives is where pictures are wanted, if they are.
-
-        `name`, `note` and `more` as `Pictures.write` has them.
-        """
+        """The same once what `draw` gives is written, if wanted; others as in `Pictures.write`."""
         if not pictures.wanted:
             return self
         simulated = getattr(self, "simulated", False)

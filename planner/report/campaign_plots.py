@@ -139,11 +139,7 @@ def _fill(
 
 
 def frf_sheet(
-    frequency_hz: np.ndarray,
-    mean: np.ndarray,
-    sd: np.ndarray,
-    measured: Frf,
-    modes_hz: np.ndarray,
+    frequency_hz: np.ndarray, mean: np.ndarray, sd: np.ndarray, measured: Frf, modes_hz: np.ndarray
 ) -> Figure:
     """Columns xx, yy, zz: the model, mean (3, 3, F) ± 2 sd in m/s²/N, over what was measured.
 

@@ -11,18 +11,12 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.compare.bench import Bench
-from planner.compare.curves import (
-    Curves,
-    StrategyCurve,
-    StrategyDifference,
-    baseline_of,
-    paired,
-)
+from planner.compare.curves import Curves, StrategyCurve, StrategyDifference, baseline_of, paired
 from planner.compare.pool import PoolPose
 from planner.compare.processes import Failure
 from planner.compare.tasks import Run, Study, Task
-from planner.errors import InputError
-from planner.report.answer import Answer, RefusedFile, encoded, plain
+from planner.errors import InputError, RefusedFile
+from planner.report.answer import Answer, encoded, plain
 from planner.report.pictures import Pictures
 from planner.report.text import table
 

@@ -113,9 +113,8 @@ class CouplingReport(Answer):
         """Receptances before and after, and how errors grow."""
         from planner.report.milling_plots import coupling_figure
 
-        title = "Receptances of the tip, before and after"
         before = "as measured" if self.reference is None else f"measured: {self.reference}"
-        return {"coupling": coupling_figure(self.before, self.coupled, title, before)}
+        return {"coupling": coupling_figure(self.before, self.coupled, before)}
 
 
 def _contact_sentence(contact: dict[str, Any]) -> str:

@@ -14,11 +14,11 @@ from planner.diagnosis.diagnose import Established, ThreefoldSimilarity
 from planner.diagnosis.mismatch import MismatchPlaces, MismatchShares, Residuals, TwoMisfits
 from planner.dynamics.at_force import change_at_force
 from planner.effects.effect import Operator
-from planner.errors import InputError, writing
+from planner.errors import InputError, RefusedFile, writing
 from planner.fit.departures import departures_text, masses_text
 from planner.fit.posterior import RobotPosterior
 from planner.measurement.agreement import Similarity, fit_similarity
-from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
+from planner.report.answer import NOT_IN_JSON, Answer, encoded, plain
 from planner.report.text import command_line, remarks, table
 from planner.robot.place_names import place_names, with_names
 from planner.words import probable
@@ -159,16 +159,10 @@ class DiagnosisReport(Answer):
     def predict(
         self, q: np.ndarray, frequency_hz: np.ndarray, peak_force_n: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """FRFs of the simulation with what was found, with their uncertainty.
+        """Mean, complex, and sd (n, 3, 3, F) of accelerances in m/s²/N with what was found.
 
-        Args:
-            q: Joint angles (n, dof) in rad.
-            frequency_hz: Frequency lines (F,) in Hz.
-            peak_force_n: Of hits (n,) for which joints that are not linear are linearised; where it
-                is left out or NaN, as the recordings have them on average.
-
-        Returns:
-            Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N.
+        At poses q (n, dof) in rad and lines (F,) in Hz; of hits of peak_force_n (n,), for which
+        joints that are not linear are linearised, else (NaN) as the recordings have them.
         """
         mean, sd = self.found.robot.predicted(q, frequency_hz)
         if peak_force_n is None:
@@ -178,12 +172,7 @@ class DiagnosisReport(Answer):
     def with_predictions(
         self, poses: Sequence[str], q: np.ndarray, npz: Path, peak_force_n: np.ndarray | None = None
     ) -> "DiagnosisReport":
-        """The same once FRFs at poses q (n, dof) in rad (m) are in the npz file.
-
-        Of hits of peak_force_n (n,), as of `predict`.
-
-        Raises InputError where it cannot be written.
-        """
+        """The same once FRFs as of `predict` are in the npz file; InputError if that cannot be."""
         from planner.frf.synthesis import frequency_lines
         from planner.report.predictions import save_frfs
 
@@ -195,10 +184,7 @@ class DiagnosisReport(Answer):
         return replace(self, npz=str(npz))
 
     def write(self, folder: Path) -> "DiagnosisReport":
-        """Write the robot with what was found, its URDF and pictures into a folder.
-
-        Raises InputError where they cannot be written.
-        """
+        """Write robot with what was found, URDF and pictures; InputError where that fails."""
         from planner.dynamics.simulation import Simulation
         from planner.fit.result import as_identification
         from planner.fit.write_robot import write_robot

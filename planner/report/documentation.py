@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -11,9 +10,9 @@ from rich.text import Text
 
 from planner.campaign.file_entries import FILES, SchemaTable, tables_of
 from planner.campaign.store import EXAMPLE
-from planner.errors import InputError, writing
+from planner.errors import InputError
 from planner.report.answer import Answer
-from planner.report.html import rendered, write_page
+from planner.report.html import rendered
 from planner.report.text import table
 
 
@@ -58,10 +57,3 @@ def manual(commands: Sequence[tuple[str, str]]) -> str:
         paragraphs = [one for one in said.split("\n\n") if one.strip()]
         told.append((name, paragraphs, " ".join(example.split())))
     return rendered("manual.html", title="planner: manual", files=files, commands=told)
-
-
-def write_manual(out: Path, commands: Sequence[tuple[str, str]]) -> Path:
-    """Write it; InputError where that is impossible."""
-    with writing(out):
-        out.parent.mkdir(parents=True, exist_ok=True)
-    return write_page(manual(commands), out)

@@ -62,16 +62,10 @@ class ExportedFiles(Answer):
 def export(
     campaign: Campaign, kind: str, out: Path | None, poses_csv: Path | None
 ) -> ExportedFiles:
-    """Write a campaign in another format.
+    """Write a campaign as one of KINDS into a folder, by default DIR/export.
 
-    Args:
-        campaign: The campaign.
-        kind: One of KINDS; those of PROGRAMS drive the robot to the open proposals.
-        out: A folder, by default DIR/export.
-        poses_csv: Other poses, for programs and predictions.
-
-    Raises:
-        InputError: The kind is unknown, there is nothing to export, or a file can't be written.
+    Those of PROGRAMS drive the robot to the open proposals, or to other poses, which predictions
+    are for, too. InputError where there is nothing to export, or a file cannot be written.
     """
     if kind not in KINDS:
         raise InputError(f"{kind} is no format; give one of {', '.join(KINDS)}.")
@@ -80,7 +74,8 @@ def export(
         campaign.cell.check_pose(row.joints_deg, f"{poses_csv}, row {row.row}")
     folder = (out or campaign.directory / "export").absolute()
     if kind in PROGRAMS:
-        _refuse_contacts(campaign.cell.robot, poses_csv, rows)
+        if rows:
+            _refuse_contacts(campaign.cell.robot, poses_csv, rows)
         return _program(campaign, kind, folder, rows)
     found = export_data(campaign, [r.pose for r in rows], [r.joints_deg for r in rows])
     if not found.measured and not found.poses and kind != "model":
@@ -105,10 +100,9 @@ def export(
 
 def _refuse_contacts(robot: Robot, file: Path | None, rows: Sequence[PoseRow]) -> None:
     """Proposals touch nothing; InputError where a pose that was named by hand does."""
-    collisions = Collisions(robot) if rows else None
+    collisions = Collisions(robot)
     for row in rows:
-        touching = collisions.contacts(robot.joints.internal(row.joints_deg)) if collisions else ()
-        if touching:
+        if touching := collisions.contacts(robot.joints.internal(row.joints_deg)):
             raise InputError(
                 f"{file}, row {row.row}: at {row.pose} {'; '.join(touching)}; name another pose, "
                 f"or list the pair in robot.toml, [collision] ignore."
@@ -135,11 +129,8 @@ def _uff(found: ExportData) -> dict[str, Any]:
     """A file for each pose: FRFs and modes as measured, FRFs as predicted."""
     files, used = {}, set[str]()
     for one in found.measured:
-        name, title = (
-            unique(identifier(one.pose), used),
-            f"{found.label}, pose {one.pose}, measured",
-        )
-        frf = one.frf
+        name, frf = unique(identifier(one.pose), used), one.frf
+        title = f"{found.label}, pose {one.pose}, measured"
         sets = uff.tool_frfs(frf.frequency_hz, frf.accelerance, title, frf.coherence)
         files[f"{name}_measured.unv"] = sets
         files[f"{name}_modes.unv"] = uff.tool_modes(one.modes, title)

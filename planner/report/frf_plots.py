@@ -13,15 +13,7 @@ from matplotlib.figure import Figure
 from planner.diagnosis.diagnose import Diagnosis
 from planner.diagnosis.mismatch import Residuals, simulated
 from planner.recording.points import TOOL
-from planner.report.plot_marks import (
-    AXES,
-    empty,
-    magnitude,
-    name_axes,
-    panels,
-    plain_text,
-    write_values,
-)
+from planner.report import plot_marks as marks
 
 # Dashes over wide lines: where two agree, both are seen.
 SEEN = {"label": "measured", "color": "0.25", "lw": 4.5}
@@ -65,17 +57,16 @@ class ComparedFrfs:
 
     def figures(self, first: Sequence[int]) -> dict[str, Figure]:
         """The direct FRFs of so many of the `first` poses, then maps of each over all poses."""
-        number, figures = np.arange(1.0, len(self.names) + 1), {}
+        figures = {}
         for k in first[:MOST]:
             name = re.sub(r"[^\w.-]", "_", str(self.names[k]))
             figures[f"frf_{name}"] = self.overlay(k)
-        for i, axis in enumerate(AXES):
+        for i, axis in enumerate(marks.AXES):
             measured = self._aligned(self.measured[:, i, i])
             for side in self.sides:
                 figures[f"map_{axis}{axis}_{side.key}"] = frf_map(
-                    number, measured, self._aligned(side.h[:, i, i]), self.frequency_hz[0],
-                    "pose, in recorded order",
-                    f"{self.place}Map of H {axis}{axis}, simulation {side.label}", names=self.names,
+                    self.names, measured, self._aligned(side.h[:, i, i]), self.frequency_hz[0],
+                    f"{self.place}Map of H {axis}{axis}, simulation {side.label}",
                 )  # fmt: skip
         return figures
 
@@ -87,15 +78,15 @@ class ComparedFrfs:
     def overlay(self, k: int) -> Figure:
         """Direct FRFs xx, yy, zz of the k-th pose."""
         role = f" ({self.roles[k]})" if self.roles else ""
-        figure, grid = panels((7.5, 7.0), f"{self.place}Pose {self.names[k]}{role}", 3)
+        figure, grid = marks.panels((7.5, 7.0), f"{self.place}Pose {self.names[k]}{role}", 3)
         hz = self.frequency_hz[k]
         for i, panel in enumerate(grid[:, 0]):
-            magnitude(panel, hz, self.measured[k, i, i], **SEEN)
+            marks.magnitude(panel, hz, self.measured[k, i, i], **SEEN)
             for side in self.sides:
-                magnitude(panel, hz, side.h[k, i, i], label=side.label, **side.style)
-            panel.set_ylabel(f"|H {AXES[i]}{AXES[i]}| (m/s²/N)", fontsize=8)
+                marks.magnitude(panel, hz, side.h[k, i, i], label=side.label, **side.style)
+            panel.set_ylabel(f"|H {marks.AXES[i]}{marks.AXES[i]}| (m/s²/N)", fontsize=8)
             panel.grid(True, which="both", alpha=0.25)
-        name_axes(figure, grid, "frequency (Hz)")
+        marks.name_axes(figure, grid, "frequency (Hz)")
         return figure
 
     def overlays(self) -> Iterator[Figure]:
@@ -104,48 +95,36 @@ class ComparedFrfs:
 
 
 def frf_map(
-    place: np.ndarray,
-    measured: np.ndarray | None,
-    simulated: np.ndarray,
-    frequency_hz: np.ndarray,
-    pose_label: str = "pose",
-    title: str = "",
-    names: Sequence[str] = (),
-) -> Figure:
-    """One FRF along a path (Birk et al. 2025, section 2.5): measured, simulated, the difference.
+    names: Sequence[str], measured: np.ndarray, simulated: np.ndarray, frequency_hz: np.ndarray,
+    title: str,
+) -> Figure:  # fmt: skip
+    """One FRF over n named poses (Birk et al. 2025, section 2.5): measured, simulated, difference.
 
-    place (n,) is where on the path a pose is (number, angle, length; increasing); measured, if
-    there is any, and simulated (n, F), complex or magnitudes, in m/s²/N, on frequency_hz (F,) are
-    drawn in dB. NaN stays blank. `names` (n,) of the poses stand at the axis instead of numbers.
+    measured and simulated (n, F), complex or magnitudes, in m/s²/N, on frequency_hz (F,) are drawn
+    in dB. NaN stays blank.
     """
-    both = ("measured", measured), ("simulated", simulated)
-    tiny = np.finfo(float).tiny
-    levels = {
-        name: 20 * np.log10(np.maximum(np.abs(frf), tiny)) for name, frf in both if frf is not None
-    }
-    top = max((np.nanmax(v) for v in levels.values() if not np.isnan(v).all()), default=0.0)
-    shown = [(name, level, (top - FAINTEST_DB, top), "viridis") for name, level in levels.items()]
-    if measured is not None:
-        difference = levels["simulated"] - levels["measured"]
-        limits = -DIFFERENCE_DB, DIFFERENCE_DB
-        shown.append(("simulated − measured", difference, limits, "RdBu_r"))
-    figure, grid = panels((3.6 * len(shown) + 1.2, 4.2), title, 1, len(shown), sharey=True)
-    cells, images = (_edges(np.asarray(place, float)), _edges(frequency_hz)), []
+    least = np.finfo(float).tiny
+    seen, made = (20 * np.log10(np.maximum(np.abs(h), least)) for h in (measured, simulated))
+    top = max((np.nanmax(v) for v in (seen, made) if not np.isnan(v).all()), default=0.0)
+    shown = (
+        ("measured", seen, (top - FAINTEST_DB, top), "viridis"),
+        ("simulated", made, (top - FAINTEST_DB, top), "viridis"),
+        ("simulated − measured", made - seen, (-DIFFERENCE_DB, DIFFERENCE_DB), "RdBu_r"),
+    )
+    figure, grid = marks.panels((12.0, 4.2), title, 1, 3, sharey=True)
+    place, images = np.arange(1, len(names) + 1), []
+    every = -(-len(names) // MOST_NAMES)
+    ticks = [marks.plain_text(name) for name in names][::every]
     for panel, (name, level, (low, high), colours) in zip(grid[0], shown, strict=True):
         panel.set_title(name, fontsize=9)
-        panel.set_xlabel(pose_label)
+        panel.set_xlabel("pose, in recorded order")
         values = np.ma.masked_invalid(level.T)
         style = {"vmin": low, "vmax": high, "cmap": colours, "rasterized": True}
-        images.append(panel.pcolormesh(*cells, values, **style))
-        if len(names):
-            every = -(-len(names) // MOST_NAMES)
-            ticks = [plain_text(name) for name in names][::every]
-            panel.set_xticks(np.asarray(place)[::every], ticks, rotation=90, fontsize=7)
+        images.append(panel.pcolormesh(_edges(place), _edges(frequency_hz), values, **style))
+        panel.set_xticks(place[::every], ticks, rotation=90, fontsize=7)
     grid[0, 0].set_ylabel("frequency (Hz)")
-    same = list(grid[0, : len(levels)])
-    figure.colorbar(images[0], ax=same, label="dB re 1 m/s²/N", pad=0.01)
-    if measured is not None:
-        figure.colorbar(images[2], ax=grid[0, 2], label="dB", pad=0.01)
+    figure.colorbar(images[0], ax=[*grid[0, :2]], label="dB re 1 m/s²/N", pad=0.01)
+    figure.colorbar(images[2], ax=grid[0, 2], label="dB", pad=0.01)
     return figure
 
 
@@ -181,7 +160,7 @@ def diagnosis_figures(found: Diagnosis) -> dict[str, Figure]:
 
 def _residuals(before: Residuals, after: Residuals, names: Sequence[str]) -> Figure:
     what = "What is left unexplained, errors of hits and sensor taken out (1: just matters)"
-    figure = empty((9.0, 6.5), what)
+    figure = marks.empty((9.0, 6.5), what)
     (bands, poses), (left, right) = figure.subplots(2, 2)
     middle = (before.edges_hz[1:] + before.edges_hz[:-1]) / 2
     number = np.arange(len(names))
@@ -195,13 +174,13 @@ def _residuals(before: Residuals, after: Residuals, names: Sequence[str]) -> Fig
         panel.set_xlabel(what)
         panel.set_ylabel(UNIT, fontsize=8)
         panel.legend()
-    poses.set_xticks(number, [plain_text(n) for n in names], rotation=60, fontsize=7)
+    poses.set_xticks(number, [marks.plain_text(n) for n in names], rotation=60, fontsize=7)
     scale, image = LogNorm(LEAST, MOST_RESIDUAL), ScalarMappable()
     for panel, (place, label, _) in zip((left, right), sides, strict=True):
         image = panel.imshow(np.maximum(place.by_direction, LEAST), cmap="Reds", norm=scale)
-        write_values(panel, image, ".3g")
-        panel.set_xticks(range(3), [f"hit {a}" for a in AXES])
-        panel.set_yticks(range(3), [f"response {a}" for a in AXES])
+        marks.write_values(panel, image, ".3g")
+        panel.set_xticks(range(3), [f"hit {a}" for a in marks.AXES])
+        panel.set_yticks(range(3), [f"response {a}" for a in marks.AXES])
         panel.set_title(f"by direction, {label}", fontsize=9)
     # One scale for both, so that what an explanation takes away is seen.
     figure.colorbar(image, ax=[left, right], label=UNIT, shrink=0.9)

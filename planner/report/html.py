@@ -38,5 +38,6 @@ def rendered(template: str, **values: object) -> str:
 def write_page(text: str, path: Path) -> Path:
     """Write a page; its absolute path. InputError if that is impossible."""
     with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8", errors="replace", newline="")
     return path.absolute()

@@ -10,8 +10,9 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planner.errors import RefusedFile
 from planner.measurement.agreement import NO_SIMILARITY, Similarity, fit_similarity
-from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
+from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.pictures import Pictures, entitle
 from planner.report.springs import IdentifiedSpring, identified_springs
 from planner.report.text import remarks, table
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from planner.dynamics.simulation import Simulation
     from planner.fit.held_out import JudgedIdentification
     from planner.report.frf_plots import ComparedFrfs
-    from planner.robot.robot import Robot
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,19 +38,57 @@ class SimilarityChange(Similarity):
 
 
 @dataclass(frozen=True, eq=False)
-class IdentificationBasis:
-    """What an identification was made of, and all that it found."""
+class IdentificationReport(Answer):
+    """Answer of `identify`; `misfit` is χ² per value, 1 at the noise.
 
-    dataset: "Dataset"
-    judged: "JudgedIdentification"
-    nominal: "Simulation"
+    `added` are the springs that robot.toml did not have; `judged` holds the fits themselves.
+    """
+
+    parameters: tuple[IdentifiedSpring, ...]
+    fit: SimilarityChange
+    held_out: SimilarityChange
+    undetermined: tuple[str, ...]
+    misfit: float
+    misfit_by_pose: Mapping[str, float]
+    converged: bool
+    refused: tuple[RefusedFile, ...]
+    remarks: tuple[str, ...]
+    simulated: bool
+    band_hz: tuple[float, float]
+    inertias: bool
+    added: int
+    dataset: "Dataset" = field(repr=False, metadata=NOT_IN_JSON)
+    judged: "JudgedIdentification" = field(repr=False, metadata=NOT_IN_JSON)
+    nominal: "Simulation" = field(repr=False, metadata=NOT_IN_JSON)
+    out: str | None = None
+    plots: tuple[str, ...] = ()
+    rrd: str | None = None
+    urdf: str | msgspec.UnsetType = msgspec.UNSET
+    written: Similarity | msgspec.UnsetType = msgspec.UNSET
+    seconds: float = 0.0
 
     @property
-    def fitted(self) -> "Robot":
-        """The robot with everything that was fitted, as stated."""
-        return self.judged.final.identified.simulation.robot
+    def simulation(self) -> "Simulation":
+        """The identified simulation, with the robot as stated but for what was fitted."""
+        return self.judged.final.identified.simulation
 
-    def compared(self, band_hz: tuple[float, float]) -> "ComparedFrfs | None":
+    def with_pictures(self, pictures: Pictures) -> "IdentificationReport":
+        """The same once FRFs before and after are drawn, where that is wanted."""
+        if not pictures.wanted:
+            return self
+        compared, name, more = self._compared(), self.nominal.robot.name, None
+        if compared is None:
+            return self.with_figures(pictures, dict, name)
+        if pictures.rrd is not None:
+            from planner.report.rerun.figures import one_by_one
+
+            each = (entitle(f, name, self.simulated) for f in compared.overlays())
+            more = one_by_one("pose", "FRFs, pose by pose", each)
+        first = sorted(range(len(compared.roles)), key=lambda k: compared.roles[k] == "used")
+        note = "Those held out are shown with what was identified without them."
+        return self.with_figures(pictures, lambda: compared.figures(first), name, note, more)
+
+    def _compared(self) -> "ComparedFrfs | None":
         """FRFs before and after it, pose by pose; None where the tool was not measured."""
         from planner.measurement.agreement import MODEL_ERROR, MOST_LINES
         from planner.measurement.measured_frfs import stack
@@ -61,7 +99,7 @@ class IdentificationBasis:
         frfs = {i: frf for i, frf in tools if frf is not None}
         if not frfs:
             return None
-        seen = stack(list(frfs.values()), band_hz, MOST_LINES, MODEL_ERROR)
+        seen = stack(list(frfs.values()), self.band_hz, MOST_LINES, MODEL_ERROR)
         fits = [trial if i in aside and trial else judged.final for i in frfs]
         before, after = (
             np.array([s.accelerance(self.dataset.q[i], hz)[0]
@@ -80,72 +118,15 @@ class IdentificationBasis:
             tuple("held out: identified without it" if i in aside else "used" for i in frfs),
         )
 
-
-@dataclass(frozen=True, eq=False)
-class IdentificationReport(Answer):
-    """Answer of `identify`; `misfit` is χ² per value, 1 at the noise.
-
-    `added` are the springs that robot.toml did not have; `basis` holds the fits themselves.
-    """
-
-    parameters: tuple[IdentifiedSpring, ...]
-    fit: SimilarityChange
-    held_out: SimilarityChange
-    undetermined: tuple[str, ...]
-    misfit: float
-    misfit_by_pose: Mapping[str, float]
-    converged: bool
-    refused: tuple[RefusedFile, ...]
-    remarks: tuple[str, ...]
-    simulated: bool
-    band_hz: tuple[float, float]
-    inertias: bool
-    added: int
-    out: str | None = None
-    plots: tuple[str, ...] = ()
-    rrd: str | None = None
-    urdf: str | msgspec.UnsetType = msgspec.UNSET
-    written: Similarity | msgspec.UnsetType = msgspec.UNSET
-    seconds: float = 0.0
-    basis: IdentificationBasis | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
-
-    @property
-    def simulation(self) -> "Simulation":
-        """The identified simulation."""
-        assert self.basis is not None
-        return self.basis.judged.final.identified.simulation
-
-    def with_pictures(self, pictures: Pictures) -> "IdentificationReport":
-        """The same once FRFs before and after are drawn, where that is wanted."""
-        if not pictures.wanted or self.basis is None:
-            return self
-        compared, more = self.basis.compared(self.band_hz), None
-        name = self.basis.nominal.robot.name
-        if compared is None:
-            return self.with_figures(pictures, dict, name)
-        if pictures.rrd is not None:
-            from planner.report.rerun.figures import one_by_one
-
-            each = (entitle(f, name, self.simulated) for f in compared.overlays())
-            more = one_by_one("pose", "FRFs, pose by pose", each)
-        first = sorted(range(len(compared.roles)), key=lambda k: compared.roles[k] == "used")
-        note = "Those held out are shown with what was identified without them."
-        return self.with_figures(pictures, lambda: compared.figures(first), name, note, more)
-
     def write(self, robot_toml: Path) -> "IdentificationReport":
-        """Write the identified robot, read it again, and say how well that one agrees.
-
-        Raises InputError where the files cannot be written.
-        """
+        """The robot written, and how well it agrees once read again; InputError where it fails."""
         from planner.dynamics.simulation import Simulation
         from planner.fit.write_robot import write_robot
         from planner.robot.robot import Robot
 
-        assert self.basis is not None
-        basis = self.basis
-        made = write_robot(robot_toml, basis.fitted, basis.judged.final.identified)
+        made = write_robot(robot_toml, self.simulation.robot, self.judged.final.identified)
         again = Simulation(Robot.load(made.robot_toml))
-        fit = fit_similarity(again, basis.dataset.frfs, basis.dataset.q, self.band_hz)
+        fit = fit_similarity(again, self.dataset.frfs, self.dataset.q, self.band_hz)
         return replace(
             self,
             remarks=(*self.remarks, *made.remarks),
@@ -189,14 +170,14 @@ class IdentificationReport(Answer):
 
 
 def identification_report(
-    basis: IdentificationBasis, band_hz: tuple[float, float], inertias: bool
-) -> IdentificationReport:
+    dataset: "Dataset", judged: "JudgedIdentification", nominal: "Simulation",
+    band_hz: tuple[float, float], inertias: bool,
+) -> IdentificationReport:  # fmt: skip
     """Of an identification that was judged at poses held out."""
-    dataset, judged = basis.dataset, basis.judged
     final, names = judged.final.identified, dataset.poses
     aside = tuple(names[i] for i in judged.held_out)
     return IdentificationReport(
-        parameters=identified_springs(basis.fitted, final),
+        parameters=identified_springs(final.simulation.robot, final),
         fit=SimilarityChange.of(judged.after, judged.before),
         held_out=SimilarityChange.of(judged.held_out_after, judged.held_out_before, poses=aside),
         undetermined=final.undetermined,
@@ -209,7 +190,9 @@ def identification_report(
         band_hz=band_hz,
         inertias=inertias,
         added=judged.final.added,
-        basis=basis,
+        dataset=dataset,
+        judged=judged,
+        nominal=nominal,
     )
 
 

@@ -12,10 +12,9 @@ from planner.compare.curves import Curves
 from planner.report.plot_marks import empty
 
 MARKS = "osv^DPX*<>"
-QUARTILES = 25, 50, 75
 
 
-def learning_figure(strategies: Mapping[str, Curves], title: str = "") -> Figure:
+def learning_figure(strategies: Mapping[str, Curves], title: str) -> Figure:
     """Medians with quartiles over repeats; RMSE on a logarithmic axis with the 1 % line."""
     figure = empty((11.0, 4.6), title)
     panels = figure.subplot_mosaic([["rmse", "r2"], ["rmse", "coverage"]], width_ratios=(1.5, 1))
@@ -25,7 +24,7 @@ def learning_figure(strategies: Mapping[str, Curves], title: str = "") -> Figure
             "marker": MARKS[i % len(MARKS)],
             "label": name,
         }
-        low, median, high = np.percentile(curve.frequency_rmse_percent, QUARTILES, axis=0)
+        low, median, high = np.percentile(curve.frequency_rmse_percent, (25, 50, 75), axis=0)
         panels["rmse"].fill_between(curve.n, low, high, color=style["color"], alpha=0.15, lw=0)
         medians = {"rmse": median, "r2": np.median(curve.r2, axis=0)}
         medians["coverage"] = np.median(curve.coverage95, axis=0)
@@ -47,8 +46,7 @@ def _finish(panels: Mapping[str, Axes], strategies: Mapping[str, Curves]) -> Non
     rmse.set_ylabel("frequency RMSE at unused poses (%)")
     # One bad start must not squeeze all the rest into a line.
     worst = min(float(np.min(np.median(c.r2, axis=0))) for c in strategies.values())
-    r2.set_ylim(max(worst - 0.05, -0.5), 1.02)
-    r2.set_ylabel("R²")
+    r2.set(ylim=(max(worst - 0.05, -0.5), 1.02), ylabel="R²")
     coverage.axhline(0.95, color="black", lw=0.8, ls="--")
     coverage.set_ylim(min(0.8, coverage.get_ylim()[0]), 1.02)
     coverage.set_ylabel("share in 95 % interval")

@@ -8,23 +8,12 @@ from matplotlib.lines import Line2D
 
 from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_modes import MatrixModes
+from planner.modal.modes import motions, moved
 from planner.recording.geometry import Geometry
-from planner.report.modal_plots import (
-    FRFS,
-    SPECTRA,
-    auto_mac_figure,
-    poles_by_stability,
-    singular_values,
-    stabilisation_figure,
-)
+from planner.report import modal_plots
 from planner.report.plot_marks import MEASURED, MODEL, empty, magnitude, number_modes, panels
-from planner.report.shape_motion import motions, moved
 
-MOST_SINGULAR = 4  # curves of the mode indicator
 MOST_SHOWN = 24  # modes that have a panel of their own
-LONGEST_SIDE = 0.69  # of such a box, in units of the zoom: its axes' labels stay in the picture
-FILLED = 0.92  # share of a panel that a shape fills
-FLATTEST = 0.3  # of its largest extent: the least height of the box that shows a structure
 AHEAD, BESIDE = "tab:red", "tab:blue"
 
 
@@ -34,24 +23,25 @@ def matrix_figures(
     """Every picture by its name."""
     data = found.found.data
     table = matrix.accelerance[..., np.isin(matrix.frequency_hz, data.frequency_hz)]
-    singular = singular_values(np.where(np.isfinite(table), table, 0.0))[:MOST_SINGULAR]
-    poles = poles_by_stability(found.found.diagram, data.rate_1_s)
+    singular = modal_plots.singular_values(np.where(np.isfinite(table), table, 0.0))[:4]
+    poles = modal_plots.poles_by_stability(found.found.diagram, data.rate_1_s)
     figures = {
-        "stabilisation": stabilisation_figure(
+        "stabilisation": modal_plots.stabilisation_figure(
             data.frequency_hz, singular, found,
             f"Stabilisation diagram of {matrix.count} FRFs",
-            f"singular values of {FRFS if matrix.scaled else SPECTRA}", poles,
+            f"singular values of {modal_plots.FRFS if matrix.scaled else modal_plots.SPECTRA}",
+            poles,
         ),
-        "mac": auto_mac_figure(found),
-        "complexity": complexity_figure(found, "Mode shapes in the complex plane"),
+        "mac": modal_plots.auto_mac_figure(found),
+        "complexity": complexity_figure(found),
     }  # fmt: skip
     if matrix.driving:
-        figures["driving_points"] = driving_figure(matrix, found, "Driving points")
+        figures["driving_points"] = driving_figure(matrix, found)
     if geometry is not None:
-        figures["geometry"] = geometry_figure(matrix, geometry, "Points")
-        figures["shapes"] = shapes_figure(found, geometry, "Mode shapes")
+        figures["geometry"] = geometry_figure(matrix, geometry)
+        figures["shapes"] = shapes_figure(found, geometry)
     else:
-        figures["shapes"] = bars_figure(found, "Mode shapes")
+        figures["shapes"] = bars_figure(found)
     return figures
 
 
@@ -70,9 +60,9 @@ def _mode_by_mode(found: MatrixModes, title: str, size: float, **options: Any):
     return figure, list(zip(range(1, len(shown) + 1), axes, shown, strict=True))
 
 
-def complexity_figure(found: MatrixModes, title: str = "") -> Figure:
+def complexity_figure(found: MatrixModes) -> Figure:
     """Every shape's points in the complex plane: on one line where all move in phase."""
-    figure, each = _mode_by_mode(found, title, 2.1)
+    figure, each = _mode_by_mode(found, "Mode shapes in the complex plane", 2.1)
     for k, panel, mode in each:
         shape = mode.shape / np.max(np.abs(mode.shape))
         zero = np.zeros(shape.size)
@@ -89,10 +79,10 @@ def complexity_figure(found: MatrixModes, title: str = "") -> Figure:
     return figure
 
 
-def driving_figure(matrix: FrfMatrix, found: MatrixModes, title: str = "") -> Figure:
+def driving_figure(matrix: FrfMatrix, found: MatrixModes) -> Figure:
     """FRFs of points hit where they were felt, with the fit, and how right their sign is."""
     pairs = matrix.driving[:4]
-    figure, grid = panels((12.0, 2.6 * len(pairs) + 1.2), title, len(pairs))
+    figure, grid = panels((12.0, 2.6 * len(pairs) + 1.2), "Driving points", len(pairs))
     data = found.found.data
     places = found.found.entries
     for panel, (o, i) in zip(grid[:, 0], pairs, strict=True):
@@ -114,9 +104,9 @@ def driving_figure(matrix: FrfMatrix, found: MatrixModes, title: str = "") -> Fi
     return figure
 
 
-def geometry_figure(matrix: FrfMatrix, geometry: Geometry, title: str = "") -> Figure:
+def geometry_figure(matrix: FrfMatrix, geometry: Geometry) -> Figure:
     """Points with their numbers and lines; those hit and felt are marked."""
-    figure, (panel,) = _grid(1, title, 8.0, projection="3d")
+    figure, (panel,) = _grid(1, "Points", 8.0, projection="3d")
     _draw_lines(panel, geometry, geometry.position_m, "0.7")
     felt = {dof.node for dof in matrix.responses}
     hit = {dof.node for dof in matrix.references}
@@ -138,7 +128,8 @@ def geometry_figure(matrix: FrfMatrix, geometry: Geometry, title: str = "") -> F
     panel.legend(handles=handles, fontsize=8)
     # With its axes, a flat structure in a cube would be small and the cube cut off.
     extent = _extent(geometry.position_m)
-    zoom = LONGEST_SIDE * float(np.linalg.norm(extent) / np.max(extent))
+    # At a longest side of 0.69, in units of the zoom, its axes' labels stay in the picture.
+    zoom = 0.69 * float(np.linalg.norm(extent) / np.max(extent))
     _finish(panel, geometry.position_m, zoom)
     panel.locator_params(nbins=6)
     panel.set_xlabel("x (m)", labelpad=10)
@@ -157,36 +148,35 @@ def _draw_lines(panel: Any, geometry: Geometry, position: np.ndarray, colour: st
 
 
 def _extent(points: np.ndarray) -> np.ndarray:
-    """(3,) of points (n, 3), and not flat."""
+    """(3,) of points (n, 3), and not flat: its least part is 0.3 of its largest."""
     extent = np.ptp(points, axis=0)
-    return np.maximum(extent, FLATTEST * np.max(extent))
+    return np.maximum(extent, 0.3 * np.max(extent))
 
 
 def _finish(panel: Any, points: np.ndarray, zoom: float) -> None:
     """Equal scales on all axes, which show points (n, 3)."""
     middle, extent = (points.max(axis=0) + points.min(axis=0)) / 2, _extent(points)
     half = 0.52 * np.maximum(extent, 1e-9)
-    panel.set_xlim(middle[0] - half[0], middle[0] + half[0])
-    panel.set_ylim(middle[1] - half[1], middle[1] + half[1])
-    panel.set_zlim(middle[2] - half[2], middle[2] + half[2])
+    limits = zip(("xlim", "ylim", "zlim"), np.stack([middle - half, middle + half], 1), strict=True)
+    panel.set(**dict(limits))
     panel.set_box_aspect(half / np.max(half), zoom=zoom)
     panel.view_init(elev=28, azim=-60)
 
 
 def _fill(panel: Any, points: np.ndarray) -> None:
-    """Zoom so that points (n, 3) fill the panel, and none of them is cut off."""
+    """Zoom so that points (n, 3) fill 0.92 of the panel, and none of them is cut off."""
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
     for _ in range(2):  # perspective: what is nearer grows a little faster
         x, y, _ = proj_transform(points[:, 0], points[:, 1], points[:, 2], panel.get_proj())
         place = (panel.transData - panel.transAxes).transform(np.column_stack([x, y]))
         reach = 2 * np.max(np.abs(place - 0.5))
-        panel.set_box_aspect(panel._box_aspect, zoom=FILLED / max(reach, 1e-9))
+        panel.set_box_aspect(panel._box_aspect, zoom=0.92 / max(reach, 1e-9))
 
 
-def shapes_figure(found: MatrixModes, geometry: Geometry, title: str = "") -> Figure:
+def shapes_figure(found: MatrixModes, geometry: Geometry) -> Figure:
     """Every shape at its largest motion, coloured by it, beside the structure at rest."""
-    figure, each = _mode_by_mode(found, title, 3.0, projection="3d")
+    figure, each = _mode_by_mode(found, "Mode shapes", 3.0, projection="3d")
     for k, panel, mode in each:
         motion = motions(found.dofs, mode.shape, geometry)
         _draw_lines(panel, geometry, geometry.position_m, "0.85")
@@ -202,9 +192,9 @@ def shapes_figure(found: MatrixModes, geometry: Geometry, title: str = "") -> Fi
     return figure
 
 
-def bars_figure(found: MatrixModes, title: str = "") -> Figure:
+def bars_figure(found: MatrixModes) -> Figure:
     """Real parts of all shapes with 2 sd over the degrees of freedom, where no place is known."""
-    figure, each = _mode_by_mode(found, title, 2.6)
+    figure, each = _mode_by_mode(found, "Mode shapes", 2.6)
     names = [str(dof) for dof in found.dofs]
     for k, panel, mode in each:
         x = np.arange(len(names))

@@ -22,7 +22,6 @@ WIDE = 8.0  # ratio of chatter frequencies from which their axis is logarithmic
 ROOM = 1.25  # of the picture above the highest limit
 RING = {"ls": "", "marker": "o", "mfc": "none", "mec": "tab:red", "ms": 13, "mew": 1.8}
 FLOOR = 0.3  # of the least value: bands that reach below are cut off there
-MANY_DECADES = 20.0  # ratio of the band's ends from which the frequency axis is logarithmic
 
 
 def lobes_figure(
@@ -47,9 +46,8 @@ def lobes_figure(
         upper.plot(rpm, robust, color="tab:green", lw=1.8, label="stable with 95 % probability")
     if point is not None:
         upper.plot(point[0], 1e3 * point[1], "x", color=POINT, ms=11, mew=2.5, label="wanted")
-    upper.set_ylim(0, top)
-    upper.set_xlim(rpm[0], rpm[-1] if rpm[-1] > rpm[0] else rpm[0] + 1)
-    upper.set_ylabel("axial depth (mm)")
+    last = rpm[-1] if rpm[-1] > rpm[0] else rpm[0] + 1
+    upper.set(ylim=(0, top), xlim=(rpm[0], last), ylabel="axial depth (mm)")
     upper.grid(True, alpha=0.3)
     figure.legend(loc="outside lower center", ncols=3, fontsize=9)
     _frequencies(lower, rpm, found)
@@ -79,8 +77,7 @@ def _frequencies(panel, rpm: np.ndarray, found: Sequence[StabilityLimit]) -> Non
             )  # fmt: skip
     if np.any(np.isfinite(hertz)) and np.nanmax(hertz) > WIDE * np.nanmin(hertz):
         panel.set_yscale("log")
-    panel.set_ylabel("chatter (Hz)")
-    panel.set_xlabel("spindle speed (rpm)")
+    panel.set(ylabel="chatter (Hz)", xlabel="spindle speed (rpm)")
     panel.grid(True, alpha=0.3)
 
 
@@ -104,15 +101,13 @@ def path_figure(limits: PathLimits, best_rpm: float, feed: FeedAdvice, cut: Cut)
     upper.plot(rpm, least, color="tab:green", lw=2, label="whole path, 95 % probability")
     upper.axvline(best_rpm, color="tab:red", lw=1, ls="--", label="best speed")
     upper.set_ylim(0, min(top, 1.25 * float(np.max(np.where(robust > top, 0, robust))) or top))
-    upper.set_xlabel("spindle speed (rpm)")
-    upper.set_ylabel("axial depth (mm)")
+    upper.set(xlabel="spindle speed (rpm)", ylabel="axial depth (mm)")
     upper.margins(x=0)
     figure.legend(fontsize=9, loc="outside lower center", ncols=2)
     # What is stable up to the largest depth asked for is drawn as that.
     lower.plot(feed.turn_deg, 1e3 * np.minimum(feed.depth_m, cut.depth_m[1]), ".-")
     lower.set_ylim(bottom=0)
-    lower.set_xlabel("feed turned about the tool's axis (°)")
-    lower.set_ylabel("depth (mm)")
+    lower.set(xlabel="feed turned about the tool's axis (°)", ylabel="depth (mm)")
     for panel in (upper, lower):
         panel.grid(True, alpha=0.3)
     return figure
@@ -183,9 +178,7 @@ def _decimals(panel: Axes) -> None:
     panel.tick_params(which="minor", labelsize=7)
 
 
-def coupling_figure(
-    before: CoupledFrf | None, coupled: CoupledFrf, title: str, reference: str
-) -> Figure:
+def coupling_figure(before: CoupledFrf, coupled: CoupledFrf, reference: str) -> Figure:
     """Receptances |H| of motions per force, the tested tool's and the target's ± 2 sd.
 
     Below, line by line, how many times relative errors of the measured FRFs grew.
@@ -193,7 +186,8 @@ def coupling_figure(
     moved = [k for k in range(3) if np.all(np.isfinite(coupled.receptance[k, k]))]
     n = len(moved)
     layout = {"height_ratios": [1.0] * n + [0.7]}
-    figure, grid = panels((4.6 * n + 2.0, 2.9 * n + 2.2), title, n + 1, n, gridspec_kw=layout)
+    size, title = (4.6 * n + 2.0, 2.9 * n + 2.2), "Receptances of the tip, before and after"
+    figure, grid = panels(size, title, n + 1, n, gridspec_kw=layout)
     f = coupled.frequency_hz
     for row, i in enumerate(moved):
         for column, j in enumerate(moved):
@@ -201,9 +195,8 @@ def coupling_figure(
             mean, sd = 1e6 * coupled.receptance[i, j], 1e6 * coupled.sd[i, j]
             floor = FLOOR * np.abs(mean).min()
             magnitude(panel, f, mean, sd, floor, color=MODEL, lw=1.3, label="this tool")
-            if before is not None:
-                size = 1e6 * before.receptance[i, j]
-                magnitude(panel, f, size, color=MEASURED, lw=0.9, label=reference)
+            size = 1e6 * before.receptance[i, j]
+            magnitude(panel, f, size, color=MEASURED, lw=0.9, label=reference)
             panel.set_ylim(bottom=floor)
             panel.set_title(f"response {AXES[i]}, hit {AXES[j]}", fontsize=9, loc="left", pad=3)
             panel.grid(True, which="both", alpha=0.2)
@@ -219,7 +212,7 @@ def coupling_figure(
     grown.set_ylabel("errors grow (times)", fontsize=9)
     grown.set_xlabel("frequency (Hz)", fontsize=9)
     grown.grid(True, which="both", alpha=0.2)
-    if f[-1] / f[0] > MANY_DECADES:
+    if f[-1] / f[0] > 20:  # from which on the frequency axis is logarithmic
         grown.set_xscale("log")
     grown.set_xlim(f[0], f[-1])
     name_axes(figure, grid)

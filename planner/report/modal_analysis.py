@@ -33,7 +33,6 @@ from planner.report.pictures import Pictures
 
 ESTIMATORS = ("h1", "h2", "hv")
 LONGEST_NAME = 40  # characters of a file's name in a title
-NO_PICTURES = Pictures()
 RESPONSES = ("acceleration", "velocity", "displacement", "voltage", "unknown")
 UNSCALED = (
     "UNSCALED: modes are from responses alone; their shapes have no scale and give no FRFs or "
@@ -104,17 +103,12 @@ def _of_model(modal: ModalModel, **others: Any) -> ModesReport:
 
 
 def modal_report(
-    sources: tuple[Source, ...],
-    band_hz: tuple[float, float] | None = None,
-    force: str | None = None,
-    estimator: str = "h1",
-    pictures: Pictures = NO_PICTURES,
-    window_rate_1_s: float = 0.0,
-) -> ModesReport:
-    """Analyse files of one pose.
+    sources: tuple[Source, ...], band_hz: tuple[float, float] | None, force: str | None,
+    estimator: str, pictures: Pictures, window_rate_1_s: float,
+) -> ModesReport:  # fmt: skip
+    """Of files of one pose; `force` names the channel of a long record that is not labelled.
 
-    `force` names the force channel of a long record whose channels are not labelled. Raises
-    RefusedError if no file could be used.
+    Raises RefusedError if no file could be used.
     """
     if force is not None:
         return _by_channel(sources, band_hz, force, pictures)
@@ -154,10 +148,7 @@ def _drawn(
 
 
 def _by_channel(
-    sources: tuple[Source, ...],
-    band_hz: tuple[float, float] | None,
-    force: str,
-    pictures: Pictures,
+    sources: tuple[Source, ...], band_hz: tuple[float, float] | None, force: str, pictures: Pictures
 ) -> ModesReport:
     """Long records with unlabelled channels: the user names the force channel."""
     from planner.modal.free_decays import analyse_record
@@ -196,13 +187,9 @@ def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -
 
 
 def matrix_report(
-    given: FrfSet,
-    quantity: str | None,
-    pictures: Pictures,
-    real: bool = False,
-    files_to: Path | None = None,
+    given: FrfSet, quantity: str | None, pictures: Pictures, real: bool, files_to: Path | None
 ) -> ModesReport:
-    """Analyse FRFs between any points.
+    """Of FRFs between any points.
 
     With `real` the shapes are the real normal modes behind the complex ones; `files_to` is a folder
     for universal files and tables. Raises InputError or RefusedError in one sentence.

@@ -19,30 +19,14 @@ from planner.modal.modes import ModalModel
 from planner.modal.operating import OperatingModes
 from planner.modal.plscf import Diagram, stable
 from planner.recording.records import FrfRecord
-from planner.report.plot_marks import (
-    AXES,
-    COLUMNS,
-    MEASURED,
-    MODE,
-    MODEL,
-    USABLE,
-    label_ends,
-    label_modes,
-    magnitude,
-    mark_band,
-    number_modes,
-    panels,
-    phase,
-    plain_text,
-    write_values,
-)
+from planner.report import plot_marks as marks
 
 SINGULAR = ("black", "0.4", "0.65")
 STABLE = {"marker": "o", "color": "tab:green", "ms": 3.5, "ls": ""}
 UNSTABLE = {"marker": "x", "color": "tab:orange", "ms": 3.5, "mew": 0.7, "ls": ""}
-POINTS = {"color": MEASURED, "lw": 0.6, "marker": ".", "ms": 2.5}
+POINTS = {"color": marks.MEASURED, "lw": 0.6, "marker": ".", "ms": 2.5}
 TONE = "tab:purple"
-FITTED = {"color": MODEL, "lw": 1.2}
+FITTED = {"color": marks.MODEL, "lw": 1.2}
 # What singular values are of: decays' spectra have a size that means nothing.
 FRFS, SPECTRA = "the FRF matrix (m/s²/N)", "the decays' spectra (equal rms)"
 
@@ -53,12 +37,15 @@ def modal_figures(
     """Every picture of one pose by its name; without an FRF only those that need none."""
     singular = singular_values(found.data.response)
     what = f"singular values of {FRFS if frf is not None else SPECTRA}"
-    title = "Stabilisation diagram"
     hz, poles = found.data.frequency_hz, poles_by_stability(found.diagram, found.data.rate_1_s)
-    figures = {"stabilisation": stabilisation_figure(hz, singular, modal, title, what, poles)}
+    figures = {
+        "stabilisation": stabilisation_figure(
+            hz, singular, modal, "Stabilisation diagram", what, poles
+        )
+    }
     if frf is not None:
-        figures["frf"] = matrix_figure(frf, found, modal, "FRFs and their fit")
-        figures["coherence"] = coherence_figure(frf, modal, "Coherence")
+        figures["frf"] = matrix_figure(frf, found, modal)
+        figures["coherence"] = coherence_figure(frf, modal)
     figures["mac"] = auto_mac_figure(modal)
     return figures
 
@@ -111,14 +98,13 @@ def stabilisation_figure(
     (CMIF; Shih et al., Mech. Syst. Signal Process. 2, 1988). `what` is their axis' label, `poles`
     are as of `poles_by_stability`. Tones among operating modes are marked.
     """
-    figure, grid = panels((12.0, 7.0 if len(modal.modes) <= COLUMNS else 10.0), title)
+    figure, grid = marks.panels((12.0, 7.0 if len(modal.modes) <= marks.COLUMNS else 10.0), title)
     panel = grid[0, 0]
     for k, values in enumerate(singular):
         colour = SINGULAR[min(k, len(SINGULAR) - 1)]
         panel.semilogy(frequency_hz, values, color=colour, lw=1.1, label=f"{curve} {k + 1}")
-    panel.set_xlim(frequency_hz[0], frequency_hz[-1])
-    panel.set_xlabel("frequency (Hz)")
-    panel.set_ylabel(what)
+    ends = frequency_hz[0], frequency_hz[-1]
+    panel.set(xlim=ends, xlabel="frequency (Hz)", ylabel=what)
     panel.grid(True, alpha=0.25)
     for k, tone in enumerate(getattr(modal, "tones_hz", ())):
         panel.axvline(tone, color=TONE, ls="--", lw=1.0, label=None if k else "tone, no mode")
@@ -127,11 +113,11 @@ def stabilisation_figure(
         orders = panel.twinx()
         handles += orders.plot(*poles[0], **STABLE, label="stable pole")
         handles += orders.plot(*poles[1], **UNSTABLE, label="unstable pole")
-        orders.set_ylim(0, max((p[1].max() for p in poles if p.size), default=0) + 1)
-        orders.set_ylabel("model order")
+        highest = max((p[1].max() for p in poles if p.size), default=0)
+        orders.set(ylim=(0, highest + 1), ylabel="model order")
         orders.yaxis.set_major_locator(MaxNLocator(integer=True))
-    label_modes(panel, modal)
-    handles += [Line2D([], [], color=MODE, label="mode")]
+    marks.label_modes(panel, modal)
+    handles += [Line2D([], [], color=marks.MODE, label="mode")]
     low, high = panel.get_xlim()
     beyond = [(a, b) for a, b in ((low, modal.band_hz[0]), (modal.band_hz[1], high)) if a < b]
     for ends in beyond:
@@ -157,9 +143,7 @@ def poles_by_stability(diagram: Diagram, rate_1_s: float = 0.0) -> tuple[np.ndar
     return stays, moves
 
 
-def matrix_figure(
-    frf: Frf, found: PoleIdentification, modal: ModalModel, title: str = ""
-) -> Figure:
+def matrix_figure(frf: Frf, found: PoleIdentification, modal: ModalModel) -> Figure:
     """Magnitude and phase of every response to every hit axis, measured ± 2 sd, and the fit.
 
     The variance E|δH|² of a complex line is shared by its two parts, so that its magnitude has
@@ -167,31 +151,33 @@ def matrix_figure(
     """
     columns = np.flatnonzero(frf.measured).tolist()
     layout = {"height_ratios": [3, 1.2] * 3}
-    figure, grid = panels((13.0, 10.0), title, 6, len(columns), gridspec_kw=layout)
+    figure, grid = marks.panels(
+        (13.0, 10.0), "FRFs and their fit", 6, len(columns), gridspec_kw=layout
+    )
     fitted = model(found.data, found.fit)
     for i, k in np.ndindex(3, len(columns)):
         size, turn = grid[2 * i, k], grid[2 * i + 1, k]
         h, sd = frf.accelerance[i, columns[k]], np.sqrt(frf.variance[i, columns[k]] / 2)
         for panel in (size, turn):
-            mark_band(panel, frf, i, columns[k])
+            marks.mark_band(panel, frf, i, columns[k])
         _magnitude(size, frf, h, sd)
-        phase(turn, frf.frequency_hz, h, sd, **POINTS)
+        marks.phase(turn, frf.frequency_hz, h, sd, **POINTS)
         size.plot(found.data.frequency_hz, np.abs(fitted[i, k]), **FITTED)
-        phase(turn, found.data.frequency_hz, fitted[i, k], **FITTED)
+        marks.phase(turn, found.data.frequency_hz, fitted[i, k], **FITTED)
         size.set_title(_entry(i, columns[k]), fontsize=9, pad=3, loc="left")
-        number_modes(size, modal)
+        marks.number_modes(size, modal)
         if k == 0:
             size.set_ylabel("|H| (m/s²/N)", fontsize=8)
             turn.set_ylabel("phase (°)", fontsize=8)
     handles: list = [Line2D([], [], **POINTS, label="measured")]
     if np.any(np.isfinite(frf.variance)):
-        handles.append(Patch(color=MEASURED, alpha=0.25, label="± 2 sd"))
+        handles.append(Patch(color=marks.MEASURED, alpha=0.25, label="± 2 sd"))
     _legend(figure, grid, [*handles, Line2D([], [], **FITTED, label="fit")])
     return figure
 
 
 def _entry(response: int, hit: int) -> str:
-    return f"response {AXES[response]}, hit {AXES[hit]}"
+    return f"response {marks.AXES[response]}, hit {marks.AXES[hit]}"
 
 
 def _magnitude(panel: Axes, frf: Frf, h: np.ndarray, sd: np.ndarray) -> None:
@@ -202,7 +188,7 @@ def _magnitude(panel: Axes, frf: Frf, h: np.ndarray, sd: np.ndarray) -> None:
         panel.text(0.5, 0.5, "not measured", transform=panel.transAxes, ha="center")
         return
     floor = 0.5 * seen.min()
-    magnitude(panel, frf.frequency_hz, h, sd, 0.1 * floor, **POINTS)
+    marks.magnitude(panel, frf.frequency_hz, h, sd, 0.1 * floor, **POINTS)
     panel.set_ylim(floor, 6 * seen.max())  # room for the modes' numbers
 
 
@@ -211,32 +197,32 @@ def _legend(figure: Figure, grid: Any, handles: list) -> None:
         panel.set_xlabel("frequency (Hz)", fontsize=9)
     handles = [
         *handles,
-        Patch(color=USABLE, alpha=0.15, label="coherent, in the usable band"),
-        Line2D([], [], color=MODE, ls=":", label="mode"),
+        Patch(color=marks.USABLE, alpha=0.15, label="coherent, in the usable band"),
+        Line2D([], [], color=marks.MODE, ls=":", label="mode"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9)
 
 
-def coherence_figure(frf: Frf, modal: ModalModel, title: str = "") -> Figure:
+def coherence_figure(frf: Frf, modal: ModalModel) -> Figure:
     """Coherence of every response with every hit axis."""
     columns = np.flatnonzero(frf.measured).tolist()
-    figure, grid = panels((13.0, 7.5), title, 3, len(columns))
+    figure, grid = marks.panels((13.0, 7.5), "Coherence", 3, len(columns))
     for i, k in np.ndindex(3, len(columns)):
         panel, values = grid[i, k], frf.coherence[i, columns[k]]
-        mark_band(panel, frf, i, columns[k])
+        marks.mark_band(panel, frf, i, columns[k])
         if np.any(np.isfinite(values)):
-            panel.plot(frf.frequency_hz, values, color=MEASURED, lw=1.0)
+            panel.plot(frf.frequency_hz, values, color=marks.MEASURED, lw=1.0)
         else:
             why = "unknown: it takes two hits" if frf.hits[columns[k]] < 2 else "unknown"
             panel.text(0.5, 0.5, why, transform=panel.transAxes, ha="center", fontsize=9)
         hits = frf.hits[columns[k]]
-        panel.set_ylim(0, 1.18)  # room for the modes' numbers
-        panel.set_yticks([0, 0.25, 0.5, 0.75, 1])
+        # Room for the modes' numbers.
+        panel.set(ylim=(0, 1.18), yticks=[0, 0.25, 0.5, 0.75, 1])
         panel.set_title(f"{_entry(i, columns[k])} ({hits} averaged)", fontsize=9, pad=3, loc="left")
-        number_modes(panel, modal)
+        marks.number_modes(panel, modal)
         if k == 0:
             panel.set_ylabel("coherence", fontsize=9)
-    _legend(figure, grid, [Line2D([], [], color=MEASURED, label="coherence")])
+    _legend(figure, grid, [Line2D([], [], color=marks.MEASURED, label="coherence")])
     return figure
 
 
@@ -255,10 +241,10 @@ def auto_mac_figure(
 def mac_figure(mac: np.ndarray, rows: Sequence[str], columns: Sequence[str], title: str) -> Figure:
     """MAC (k, l) of shapes with its values in the cells; white where nothing is known."""
     side = float(np.clip(0.6 * len(columns), 4.0, 14.0))
-    figure, grid = panels((side + 2.0, side + 1.2), title)
+    figure, grid = marks.panels((side + 2.0, side + 1.2), title)
     panel = grid[0, 0]
     image = panel.imshow(mac, vmin=0, vmax=1, cmap="Blues")
-    write_values(panel, image, ".2f", fontsize=8)
+    marks.write_values(panel, image, ".2f", fontsize=8)
     panel.set_xticks(range(len(columns)), columns, rotation=45, ha="right", rotation_mode="anchor")
     panel.set_yticks(range(len(rows)), rows)
     panel.tick_params(labelsize=8)
@@ -278,7 +264,7 @@ def frequency_figure(
 
     frequency_hz, sd_hz and simulated_hz (n, k), NaN where there is none (a gap).
     """
-    figure, grid = panels((11.0, 6.5), title)
+    figure, grid = marks.panels((11.0, 6.5), title)
     panel, x = grid[0, 0], np.arange(len(poses))
     for k in range(frequency_hz.shape[1]):
         colour = f"C{k % 10}"
@@ -288,11 +274,10 @@ def frequency_figure(
         error = np.where(np.isfinite(sd_hz[:, k]), 2 * sd_hz[:, k], 0.0)
         style = {"color": colour, "lw": 1.4, "marker": "o", "ms": 4, "capsize": 3}
         panel.errorbar(x, frequency_hz[:, k], error, **style)
-    panel.set_xticks(x, map(plain_text, poses), rotation=90 if len(poses) > 12 else 0)
-    panel.set_xlabel("pose")
-    panel.set_ylabel("natural frequency (Hz)")
+    panel.set_xticks(x, map(marks.plain_text, poses), rotation=90 if len(poses) > 12 else 0)
+    panel.set(xlabel="pose", ylabel="natural frequency (Hz)")
     panel.grid(True, alpha=0.25)
-    label_ends(panel, frequency_hz, modes)
+    marks.label_ends(panel, frequency_hz, modes)
     handles = [Line2D([], [], color="0.3", marker="o", label="measured, ± 2 sd")]
     if simulated_hz is not None:
         style: dict[str, Any] = {"color": "0.3", "ls": "--", "marker": "D", "mfc": "none"}

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from planner.campaign.survey import Survey
 
 SURE = 0.9  # probability of a label below which the text marks it as doubtful
-COMMON = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd", "probability"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -74,7 +73,8 @@ class ModeAnswer:
     @classmethod
     def of(cls, mode: "Mode | MeasuredMode", **more: Any) -> "ModeAnswer":
         """Of a mode of any modal analysis, with other fields where they are known."""
-        own: dict[str, Any] = {name: getattr(mode, name) for name in COMMON}
+        common = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd", "probability"
+        own: dict[str, Any] = {name: getattr(mode, name) for name in common}
         if isinstance(mode, Mode):
             own |= {"shape": mode.shape} | _vectors(mode)
         else:

@@ -45,10 +45,9 @@ CLASSES = {"error": "error", "warning": "warn"}
 
 
 def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -> Done:
-    """Write the report of a campaign, by default report.html in its folder.
+    """Write the report, by default report.html in the campaign's folder; InputError if it fails.
 
-    `diagnosis` names what `planner diagnose --out` has written. Raises InputError where the file
-    cannot be written.
+    `diagnosis` names what `planner diagnose --out` has written.
     """
     started = time.perf_counter()
     kept = diagnosis_of(campaign.directory, diagnosis)
@@ -157,15 +156,13 @@ def _workspace(config: CampaignConfig, joints: JointUnits) -> str:
 
 def _measured(campaign: Campaign, state: CampaignState, now: StatusReport) -> dict[str, Any]:
     """What was measured and refused, and why; where the robot stood."""
-    stood, setpoints = [], 0
+    stood, said = [], "Joints as proposed: nothing was read back"
     for m in state.measured:
-        setpoint = m.pose in state.proposals and state.proposals[m.pose].joints_deg == m.joints_deg
-        setpoints += setpoint
-        source = "setpoint" if setpoint else "readback"
+        source, sent = "setpoint", state.proposals.get(m.pose)
+        if sent is None or sent.joints_deg != m.joints_deg:
+            source = "readback"
+            said = "Joints as read back; where nothing was read back, the setpoint of the proposal"
         stood.append((m.pose, *(f"{v:.2f}" for v in m.joints_deg), source))
-    said = "Joints as read back; where nothing was read back, the setpoint of the proposal"
-    if setpoints == len(stood):
-        said = "Joints as proposed: nothing was read back"
     return {
         "measured": [_pose(m, m.pose in state.starred) for m in state.measured],
         "joints": campaign.cell.robot.joints.headings,

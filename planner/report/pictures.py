@@ -15,10 +15,7 @@ if TYPE_CHECKING:
 
     from planner.report.rerun.figures import More
 
-FORMATS = ("png", "svg")
 SIMULATED_TITLE = "SIMULATED recordings"  # before the title of a picture
-MISSING = re.compile(r"Glyph (\d+) ")
-LAST_RESORT = "Last Resort"  # a font that has a box for every character
 
 
 @dataclass(frozen=True)
@@ -30,7 +27,7 @@ class Pictures:
     rrd: Path | None = None
 
     def __post_init__(self) -> None:
-        if self.format not in FORMATS:
+        if self.format not in ("png", "svg"):
             raise InputError(f"--format {self.format} is not known; give png or svg.")
 
     @property
@@ -122,7 +119,7 @@ def _drawn(figure: "Figure", options: dict[str, Any]) -> tuple[bytes, set[int]]:
         warnings.simplefilter("always")
         figure.savefig(buffer, **options)
     for warning in told:
-        found = MISSING.match(str(warning.message))
+        found = re.match(r"Glyph (\d+) ", str(warning.message))
         if found:
             missing.add(int(found[1]))
         else:
@@ -139,7 +136,8 @@ def _fonts_with(characters: Iterable[int]) -> list[str]:
     left, found = set(characters), []
     if not left:
         return found
-    fonts = [font for font in fontManager.ttflist if not font.name.startswith(LAST_RESORT)]
+    # "Last Resort" has a box for every character.
+    fonts = [font for font in fontManager.ttflist if not font.name.startswith("Last Resort")]
     having = {font.name: left & get_font(font.fname).get_charmap().keys() for font in fonts}
     while left:
         best = max(having, key=lambda name: len(having[name] & left))

@@ -29,7 +29,6 @@ WEIGHTS, ALIKE = (0.2126, 0.7152, 0.0722), 0.179
 MODE, USABLE = "tab:blue", "tab:green"
 COHERENT, WINDOW = 0.8, 7  # from this coherence (median of so many lines around) an FRF is shaded
 FAINTEST = 1e-3  # of an FRF's largest magnitude: bands that reach below are cut off there
-MOST_LABELS = 7  # of a legend that fit side by side
 COLUMNS = 9  # labels of several lines that fit side by side; more are turned upright
 
 
@@ -70,17 +69,15 @@ def panels(
     return figure, figure.subplots(rows, columns, sharex=True, squeeze=False, **layout)
 
 
-def name_axes(
-    figure: Figure, grid: np.ndarray, x: str = "", y: str = "", fontsize: float | None = None
-) -> None:
+def name_axes(figure: Figure, grid: np.ndarray, x: str = "", y: str = "") -> None:
     """Labels at the outer panels of a grid, and one legend of the first panel's curves below."""
     for panel in grid[-1] if x else ():
-        panel.set_xlabel(x, fontsize=fontsize)
+        panel.set_xlabel(x)
     for panel in grid[:, 0] if y else ():
-        panel.set_ylabel(y, fontsize=fontsize)
+        panel.set_ylabel(y)
     handles, labels = grid[0, 0].get_legend_handles_labels()
     if handles:
-        columns = min(len(labels), MOST_LABELS)
+        columns = min(len(labels), 7)  # that fit side by side
         figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=9)
 
 

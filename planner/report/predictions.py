@@ -67,13 +67,6 @@ class PosePrediction:
     outside: bool = False
     peak_force_n: float | Unset = UNSET
 
-    @classmethod
-    def of(
-        cls, pose: str, modes: tuple[ExpectedMode, ...], outside: bool, force_n: float
-    ) -> "PosePrediction":
-        """NaN is no force that was asked for."""
-        return cls(pose, modes, outside, UNSET if np.isnan(force_n) else float(force_n))
-
     @property
     def title(self) -> str:
         """Its name, and what is special."""
@@ -117,14 +110,12 @@ def predictions(
     names: Sequence[str],
     q: Sequence[np.ndarray],
     npz: Path,
-    force_n: np.ndarray | None = None,
+    force_n: np.ndarray,
 ) -> PredictionReport:
-    """Predict at n poses q, (dof,) in rad each; FRFs go to the npz file.
+    """Predict at n poses q, (dof,) in rad each; FRFs go to the npz file, or InputError is raised.
 
     Of hits of peak force_n (n,), where joints are not linear: FRFs as such hits measure them, modes
-    linearised. NaN, or None, is as those of the campaign.
-
-    Raises InputError where that cannot be written.
+    linearised. NaN is as those of the campaign.
     """
     # status needs none of what these import
     from planner.campaign.frf_model import UNCHANGED, struck_modes
@@ -132,8 +123,8 @@ def predictions(
 
     angles, lines = np.array(q), campaign.frequency_lines
     prediction, (mean, sd) = campaign.model.predict(angles), campaign.frf_at(angles)
-    said, asked = (), force_n is not None and bool(np.any(np.isfinite(force_n)))
-    if force_n is not None and asked:
+    said, asked = (), bool(np.any(np.isfinite(force_n)))
+    if asked:
         struck = campaign.model.struck
         said = () if struck else (UNCHANGED,)
         if struck is not None:
@@ -141,10 +132,9 @@ def predictions(
             mean = mean + change_at_force(struck, angles, force_n, lines)
     outside, robot = ~campaign.cell.inside(angles), campaign.cell.robot
     save_frfs(npz, lines, mean, sd, names, robot, angles, outside, force_n if asked else None)
-    forces = np.full(len(names), np.nan) if force_n is None else force_n
     poses = tuple(
-        PosePrediction.of(name, ExpectedMode.all_of(prediction, i), bool(outside[i]), forces[i])
-        for i, name in enumerate(names)
+        PosePrediction(name, ExpectedMode.all_of(prediction, i), bool(outside[i]), force)
+        for i, (name, force) in enumerate(zip(names, _stated(force_n), strict=True))
     )
     return PredictionReport(poses, str(npz.resolve()), len(campaign.state.used), said)
 
@@ -176,9 +166,14 @@ def robot_predictions(
     save_frfs(npz, lines, mean, None, names, robot, q, None, force_n if asked.any() else None)
     said = () if robot.config.law or not asked.any() else (UNCHANGED,)
     shown = []
-    for name, force, *own in zip(names, force_n, f, ratio, strict=True):
+    for name, force, *own in zip(names, _stated(force_n), f, ratio, strict=True):
         inside = ((hz, z) for hz, z in zip(*own, strict=True) if band[0] <= hz <= band[1])
         expected = tuple(ExpectedMode(float(hz), None, float(z), None) for hz, z in inside)
-        shown.append(PosePrediction.of(name, expected, False, force))
+        shown.append(PosePrediction(name, expected, False, force))
     there = str(robot.path.absolute())
     return PredictionReport(tuple(shown), str(npz.resolve()), 0, said, there)
+
+
+def _stated(force_n: np.ndarray) -> list[float | Unset]:
+    """Forces (n,) in N that were asked for; NaN is none."""
+    return [UNSET if np.isnan(force) else float(force) for force in force_n]

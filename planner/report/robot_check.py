@@ -3,28 +3,23 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+import numpy as np
 from rich.console import Group
 from rich.text import Text
 
 from planner.check.description import SEVERITIES, CheckRemark
-from planner.check.examine import (
-    CheckedPose,
-    Examination,
-    checked_joints,
-    checked_links,
-    checked_poses,
-)
+from planner.check.examine import Examination
 from planner.report.answer import Answer, plain
 from planner.report.text import number, table
 from planner.robot.joint_laws import NUMBER_ENTRIES, LawTable
-from planner.robot.link_bodies import mounted
+from planner.robot.link_bodies import LinkBody, mounted
 from planner.words import counted, listed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
-SHOWN_TO = 2.0  # times the end of the band; the others stand in the JSON
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +48,34 @@ class RobotCheckReport(Answer):
             "robot": robot.name, "robot_toml": str(robot.path.absolute()), "ok": self.ok,
             "findings": found.remarks, "mass_kg": mass, "moving_mass_kg": moving,
             "reach_m": robot.reach_m, "band_hz": robot.config.band_hz,
-            "links": checked_links(found), "joints": checked_joints(found),
-            "poses": checked_poses(found), "laws": robot.config.law, "plots": self.plots,
+            "links": [_link(body) for body in found.links], "joints": self._joints(),
+            "poses": self._poses(), "laws": robot.config.law, "plots": self.plots,
             "rrd": self.rrd, "joint_units": robot.joints.declared,
         }  # fmt: skip
         return plain(said)
+
+    def _joints(self) -> list[dict[str, Any]]:
+        """Limits and speed of each, in degrees and degrees a second; a slide's in mm and mm/s."""
+        robot, keys = self.found.robot, ("lower_deg", "upper_deg", "speed_deg_s")
+        limits = robot.joints.shown([robot.lower_rad, robot.upper_rad, robot.velocity_rad_s]).T
+        return [
+            {"joint": name, **dict(zip(keys, row, strict=True)),
+             "unit": "mm" if robot.slides(name) else msgspec.UNSET}
+            for name, row in zip(robot.joint_names, limits, strict=True)
+        ]  # fmt: skip
+
+    def _poses(self) -> list[dict[str, Any]]:
+        """What the simulation says at the poses looked at: their modes, from the lowest."""
+        found, joints = self.found, self.found.robot.joints
+        if not found.frequency_hz.size:
+            return []
+        position, known = found.robot.forward_batch(found.q)[1], np.isfinite(found.frequency_hz)
+        return [
+            {"pose": pose, "joints_deg": joints.shown(found.q[i]).round(4),
+             "position_m": position[i], "frequency_hz": found.frequency_hz[i, known[i]],
+             "damping_ratio": found.damping_ratio[i, known[i]]}
+            for i, pose in enumerate(found.poses)
+        ]  # fmt: skip
 
     def drawings(self) -> "dict[str, Figure]":
         """The robot at home."""
@@ -73,20 +91,19 @@ class RobotCheckReport(Answer):
             f"stand still, reach at most {robot.reach_m:.3g} m",
             *("link", "moved by", "mass (kg)", "centre of mass (m)", "collision shapes"),
         )
-        for link in checked_links(found):
-            if link.inertial or link.collision_shapes:
-                place = ", ".join(f"{v:z.3f}" for v in link.com_m) if link.mass_kg else "–"
-                mass = f"{link.mass_kg:.4g}" if link.inertial else "–"
-                mass += f" ± {link.mass_sd_kg:.2g}" if link.mass_sd_kg else ""
-                cells = link.joint or "–", mass, place, str(link.collision_shapes)
-                masses.add_row(Text(link.link), *cells)
+        for link in found.links:
+            if link.stated or link.shapes:
+                place = ", ".join(f"{v:z.3f}" for v in link.com_m) if link.mass else "–"
+                weight = f"{link.mass:.4g}" if link.stated else "–"
+                weight += f" ± {_mass_sd(link):.2g}" if _mass_sd(link) else ""
+                masses.add_row(Text(link.name), link.joint or "–", weight, place, str(link.shapes))
         low, high = robot.config.band_hz
-        most = SHOWN_TO * high
+        most = 2 * high  # the others stand in the JSON
         asked = f"frequency in Hz (damping in %), up to {most:g} Hz"
-        modes, poses = table("simulated modes", "pose", asked), checked_poses(found)
+        modes, poses = table("simulated modes", "pose", asked), self._poses()
         for pose in poses:
-            at = ", ".join(robot.joints.text(i, v, 0) for i, v in enumerate(pose.joints_deg))
-            modes.add_row(f"{pose.pose}: {at}", _cell(pose, most))
+            at = ", ".join(robot.joints.text(i, v, 0) for i, v in enumerate(pose["joints_deg"]))
+            modes.add_row(f"{pose['pose']}: {at}", _cell(pose, most))
         said = [Text(f"band_hz is {low:g} to {high:g} Hz."), *map(_law, robot.config.law)]
         said += [Text(f"{r.severity}: {r.sentence}", COLOURS[r.severity]) for r in found.remarks]
         parts = [masses, *([modes] if poses else []), *said, _summary(found.remarks)]
@@ -104,8 +121,21 @@ class RobotCheckReport(Answer):
         return ", no tool ([[payload]]) stated"
 
 
-def _cell(pose: CheckedPose, most_hz: float) -> str:
-    both = zip(pose.frequency_hz, pose.damping_ratio, strict=True)
+def _link(body: LinkBody) -> dict[str, Any]:
+    """What turns it (null: nothing), mass, centre of mass (m) and principal moments."""
+    return {
+        "link": body.name, "joint": body.joint or None, "mass_kg": body.mass, "com_m": body.com_m,
+        "moments_kg_m2": body.moments, "inertial": body.stated, "collision_shapes": body.shapes,
+        "guessed": body.guessed, "mass_sd_kg": _mass_sd(body),
+    }  # fmt: skip
+
+
+def _mass_sd(body: LinkBody) -> float | None:
+    return None if body.sd_percent is None else body.mass * body.sd_percent / 100
+
+
+def _cell(pose: dict[str, Any], most_hz: float) -> str:
+    both = zip(pose["frequency_hz"], pose["damping_ratio"], strict=True)
     pairs = [pair for pair in both if pair[0] <= most_hz]
     # Frequency and damping of a mode stay on one line.
     return "   ".join(f"{number(f, '.1f')}\u00a0({number(100 * d, '.1f')})" for f, d in pairs)
@@ -123,7 +153,4 @@ def _summary(findings: tuple[CheckRemark, ...]) -> Text:
         return Text("Nothing looks wrong.", style="green")
     if not any(counts[:2]):
         return Text(f"Nothing looks wrong; {counted(counts[2], 'note')} above.", style="green")
-    said = ", ".join(
-        f"{n} {name}{'s' if n != 1 else ''}" for n, name in zip(counts, SEVERITIES, strict=True)
-    )
-    return Text(said + ".")
+    return Text(", ".join(map(counted, counts, SEVERITIES)) + ".")

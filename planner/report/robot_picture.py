@@ -16,8 +16,6 @@ AXIS_COLOURS = "tab:red", "tab:green", "tab:blue"  # x, y, z, as CAD programs ha
 VIEWS = (("seen from the side", (0, 2)), ("seen from above", (0, 1)))
 FRAME = 0.14  # length of a drawn frame, in units of the arm's length
 ROOM = 0.25  # around the robot, in the same units: more of obstacles is not drawn
-LABEL = 0.045  # height of a joint's label, in units of a view's
-AREA_PER_SHARE = 1200.0  # of a mass's dot in points², times its share of the whole
 
 
 def robot_figure(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Figure:
@@ -73,7 +71,7 @@ def _flat(
     whole = sum(mass for mass, _ in lines.masses) or 1.0
     for k, (mass, place) in enumerate(lines.masses):
         label = f"centre of mass, area ~ mass{remark}" if k == 0 else None
-        panel.scatter(place[a], place[b], s=AREA_PER_SHARE * mass / whole, color=MASS, alpha=0.6,
+        panel.scatter(place[a], place[b], s=1200 * mass / whole, color=MASS, alpha=0.6,
                       zorder=3, lw=0, label=label)  # fmt: skip
     for k, (name, place, rotation) in enumerate(lines.frames):
         _frame(panel, pair, place, rotation, 0.7 * length)
@@ -87,7 +85,7 @@ def _names(panel: Axes, lines: RobotLines, pair: tuple[int, int]) -> None:
     """Names of the joints on the left, kept apart; frames are named on the right."""
     named = sorted((tuple(place[list(pair)])[::-1], name) for name, place, _ in lines.joints)
     low, high = panel.get_ylim()
-    gap = LABEL * (high - low)
+    gap = 0.045 * (high - low)  # height of a label
     heights = spread(np.array([at[0] for at, _ in named]), gap, low + gap, high - gap)
     for (at, name), height in zip(named, heights, strict=True):
         panel.annotate(

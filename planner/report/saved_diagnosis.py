@@ -10,7 +10,6 @@ from planner.report.springs import RefittedSpring
 from planner.words import listed
 
 KEPT = "diagnosis.json"  # as `diagnose --out` writes it
-MOST_PICTURES = 4
 
 
 def diagnosis_of(directory: Path, given: Path | None = None) -> Path | None:
@@ -55,7 +54,7 @@ def two_answers(springs: Sequence[RefittedSpring], found: Mapping[str, Any]) -> 
 
 
 def chapter(file: Path) -> dict[str, Any]:
-    """The answer, and the first of its pictures."""
+    """The answer, and the first four of its pictures."""
     found = read_diagnosis(file)
-    pictures = [Path(p) for p in found.get("plots", ())[:MOST_PICTURES]]
+    pictures = [Path(p) for p in found.get("plots", ())[:4]]
     return found | {"pictures": [p for p in pictures if p.is_file() and p.suffix == ".png"]}

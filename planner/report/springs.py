@@ -1,14 +1,12 @@
 """Springs in answers: as identified, and as a campaign's simulation has them, by robot.toml's."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import msgspec
-from rich.table import Table
 
-from planner.report.text import table, with_sd
+from planner.words import with_sd
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -51,9 +49,9 @@ class IdentifiedSpring:
         axis = axis if self.unit is msgspec.UNSET else f"along {axis} (N/m, N·s/m)"
         return (
             f"{self.joint} {axis}",
-            with_exponent(self.stiffness, self.stiffness_sd, " (kept)"),
+            _fitted(self.stiffness, self.stiffness_sd),
             "yes" if self.identifiable else "no",
-            with_exponent(self.damping, self.damping_sd, " (kept)"),
+            _fitted(self.damping, self.damping_sd),
             "yes" if self.damping_identifiable else "no",
         )
 
@@ -78,8 +76,8 @@ class RefittedSpring:
         """A row of the table."""
         return (
             f"{self.joint} {_axis(self.axis)}",
-            "not stated" if self.stated is None else with_exponent(self.stated),
-            with_exponent(self.stiffness, self.stiffness_sd),
+            "not stated" if self.stated is None else with_sd(self.stated, None),
+            with_sd(self.stiffness, self.stiffness_sd),
             self.unit,
             "yes" if self.identifiable else "no",
         )
@@ -106,12 +104,6 @@ def refitted_springs(model: "Model") -> tuple[RefittedSpring, ...]:
     )  # fmt: skip
 
 
-def springs_table(springs: tuple[RefittedSpring, ...]) -> Table:
-    """Spring by spring."""
-    title = "Stiffnesses of the simulation, refitted to all recordings"
-    return table(title, *COLUMNS, rows=(spring.cells for spring in springs))
-
-
 def identified_springs(robot: "Robot", found: "Identification") -> tuple[IdentifiedSpring, ...]:
     """One entry per [[compliance]] block, in its order."""
     by_block = {(e.kind, number): e for e in found.estimates for number in e.blocks}
@@ -131,13 +123,8 @@ def identified_springs(robot: "Robot", found: "Identification") -> tuple[Identif
     return tuple(springs)
 
 
-def with_exponent(value: float, sd: float | None = None, without: str = "") -> str:
-    """A value and its sd, both with the exponent of the value; `without` one that is said."""
-    exponent = 0 if 0.1 <= value < 1000 or value == 0 else math.floor(math.log10(value))
-    power = f"e{exponent}" if exponent else ""
-    scaled = value / 10**exponent
-    said = f"{scaled:.3f}" if sd is None else with_sd(scaled, sd / 10**exponent, ".3f")
-    return f"{said}{power}{without if sd is None else ''}"
+def _fitted(value: float, sd: float | None) -> str:
+    return f"{with_sd(value, sd)}{' (kept)' if sd is None else ''}"
 
 
 def _axis(axis: tuple[float, ...]) -> str:

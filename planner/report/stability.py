@@ -9,32 +9,13 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from planner.campaign.cut_source import (
-    StabilityRequest,
-    beyond_the_tip,
-    outside,
-    structure_of,
-    structures_of_file,
-)
-from planner.campaign.toolpath_poses import (
-    FeedAdvice,
-    PathPoses,
-    PathRequest,
-    TurnAdvice,
-    turn_advice,
-)
+from planner.campaign import cut_source, toolpath_poses
+from planner.milling import lobes
 from planner.milling.cut import Cut, load_cut
-from planner.milling.lobes import (
-    PROBABILITY,
-    StabilityLimit,
-    depths_of,
-    sampled_limits,
-    stability_limits,
-)
 from planner.milling.machine import Multiplier, multiplier
 from planner.milling.path import TURNS_DEG, PathLimits, limits_along, limits_by_feed
 from planner.milling.structure import Structure, limit_remarks, out_of_band_remark
-from planner.progress import ProgressCallback, no_progress, part_of
+from planner.progress import ProgressCallback, part_of
 from planner.report.answer import Answer, plain
 from planner.report.pictures import Pictures
 from planner.report.text import number, remarks, table
@@ -64,7 +45,7 @@ class LimitsBySpeed(Answer):
     """
 
     cut: Cut
-    losses: tuple[StabilityLimit, ...]
+    losses: tuple[lobes.StabilityLimit, ...]
     robust_m: np.ndarray
     remarks: tuple[str, ...] = ()
     simulated: bool = False
@@ -131,26 +112,24 @@ class StabilityReport(LimitsBySpeed):
 
 
 def stability_of(
-    asked: StabilityRequest,
-    pictures: Pictures | None = None,
-    progress: ProgressCallback = no_progress,
+    asked: cut_source.StabilityRequest, pictures: Pictures, progress: ProgressCallback
 ) -> StabilityReport:
     """Raises InputError where source, cut or point are wrong."""
     cut, point = load_cut(asked.cut), asked.wanted
-    structure = structure_of(asked, cut)
+    structure = cut_source.structure_of(asked, cut)
     machine, samples = structure.machine(cut), structure.samples(cut, asked.samples)
-    found = stability_limits(machine, part_of(progress, 0.0, LOBES_SHARE if samples else 1.0))
-    depth = robust = depths_of(found)
+    found = lobes.stability_limits(machine, part_of(progress, 0.0, LOBES_SHARE if samples else 1.0))
+    depth = robust = lobes.depths_of(found)
     outside = out_of_band_remark(structure, np.array([loss.chatter_hz for loss in found]))
     said, drawn = [*structure.remarks, *([outside] if outside else [])], None
     if samples:
-        drawn = sampled_limits(samples, found, part_of(progress, LOBES_SHARE, 1.0))
+        drawn = lobes.sampled_limits(samples, found, part_of(progress, LOBES_SHARE, 1.0))
         robust, off = drawn.robust(), drawn.robust_sd()
         off = off[np.isfinite(off)]
         if off.size:
             said.append(
-                f"Depths at {100 * PROBABILITY:.0f} % are from {len(drawn.depth_m)} samples, known "
-                f"to ± {100 * np.median(off):.1f} % (median over speeds)."
+                f"Depths at {100 * lobes.PROBABILITY:.0f} % are from {len(drawn.depth_m)} samples, "
+                f"known to ± {100 * np.median(off):.1f} % (median over speeds)."
             )
         said += limit_remarks(structure, cut, depth, ~drawn.open(depth))
     simulated = structure.frf is not None and structure.frf.simulated
@@ -166,7 +145,7 @@ def stability_of(
         return {"stability": lobes_figure(cut, found, drawn, point)}
 
     name = ", ".join(filter(None, (asked.source.name, asked.pose)))
-    return answer.with_figures(pictures or Pictures(), figures, name, LOBES)
+    return answer.with_figures(pictures, figures, name, LOBES)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -174,8 +153,8 @@ class PathReport(LimitsBySpeed):
     """Answer of `stability` along a path: per speed (n,) the pose that allows the least."""
 
     limits: PathLimits
-    feed: FeedAdvice
-    turn: TurnAdvice | None = None
+    feed: toolpath_poses.FeedAdvice
+    turn: toolpath_poses.TurnAdvice | None = None
 
     @property
     def best(self) -> tuple[float, float]:
@@ -210,32 +189,34 @@ class PathReport(LimitsBySpeed):
 
 
 def path_report(
-    asked: StabilityRequest,
-    way: PathRequest,
+    asked: cut_source.StabilityRequest,
+    way: toolpath_poses.PathRequest,
     cut: Cut,
     pictures: Pictures,
-    progress: ProgressCallback = no_progress,
+    progress: ProgressCallback,
 ) -> PathReport:
     """Of every pose of an npz, or of a campaign along a way."""
     if not asked.source.is_dir():
         way.check_none(asked.source)
-        poses = structures_of_file(asked, cut)
+        poses = cut_source.structures_of_file(asked, cut)
         limits = limits_along(poses, cut, asked.samples, progress)
         answer = _at_all(poses, limits, cut)
     else:
-        travelled = PathPoses.of(asked, way, cut)
+        travelled = toolpath_poses.PathPoses.of(asked, way, cut)
         poses = travelled.structures(cut)
         limits = limits_along(
             poses, cut, asked.samples, part_of(progress, 0.0, 0.5 if way.turns else 1.0)
         )
         answer = _at_all(poses, limits, cut)
         if way.turns:
-            turned = turn_advice(travelled, cut, answer.best[0], part_of(progress, 0.5, 1.0))
+            turned = toolpath_poses.turn_advice(
+                travelled, cut, answer.best[0], part_of(progress, 0.5, 1.0)
+            )
             answer = replace(answer, turn=turned)
         feed = travelled.feed_in_base(answer.feed.turn_deg[answer.feed.best])
         said = (
-            *outside(travelled.campaign, travelled.names, travelled.q),
-            *beyond_the_tip(travelled.campaign, cut), *answer.remarks,
+            *cut_source.outside(travelled.campaign, travelled.names, travelled.q),
+            *cut_source.beyond_the_tip(travelled.campaign, cut), *answer.remarks,
         )  # fmt: skip
         answer = replace(answer, feed=replace(answer.feed, direction_base=feed), remarks=said)
 
@@ -270,5 +251,5 @@ def _at_all(poses: list[tuple[str, Structure]], limits: PathLimits, cut: Cut) ->
         remarks=tuple(said),
         simulated=any(one.frf is not None and one.frf.simulated for _, one in poses),
         limits=limits,
-        feed=FeedAdvice(tuple(map(float, TURNS_DEG)), tuple(map(float, turned))),
+        feed=toolpath_poses.FeedAdvice(tuple(map(float, TURNS_DEG)), tuple(map(float, turned))),
     )

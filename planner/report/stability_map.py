@@ -8,17 +8,12 @@ import numpy as np
 from rich.console import Group
 from rich.text import Text
 
-from planner.campaign.cut_source import (
-    StabilityRequest,
-    ToolChange,
-    at_poses_in_band,
-    beyond_the_tip,
-)
+from planner.campaign import cut_source
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.path import best_speed_of, limits_along
 from planner.milling.structure import OutOfBandError, Structure
-from planner.progress import ProgressCallback, no_progress, part_of
+from planner.progress import ProgressCallback, part_of
 from planner.report.answer import Answer
 from planner.report.pictures import Pictures
 from planner.report.stability import EVERY, depth_mm
@@ -78,11 +73,11 @@ class MapReport(Answer):
 
 
 def map_report(
-    asked: StabilityRequest,
+    asked: cut_source.StabilityRequest,
     count: int,
     cut: Cut,
     pictures: Pictures,
-    progress: ProgressCallback = no_progress,
+    progress: ProgressCallback,
 ) -> MapReport:
     """At the speed of the wanted point, or the one at which the tightest pose allows the most."""
     if not asked.source.is_dir():
@@ -91,11 +86,11 @@ def map_report(
         raise InputError(
             f'{asked.cut}: feed_in = "path" means nothing all over a workspace; state it in "base".'
         )
-    change, campaign = ToolChange.of(asked, cut), asked.campaign
+    change, campaign = cut_source.ToolChange.of(asked, cut), asked.campaign
     candidates = campaign.cell.candidates
     count = min(count, campaign.cell.spread)
     asked_of = tuple(f"W{i + 1:03d}" for i in range(count))
-    at = list(at_poses_in_band(campaign, asked_of, candidates.q[:count], cut, change))
+    at = list(cut_source.at_poses_in_band(campaign, asked_of, candidates.q[:count], cut, change))
     poses = [(n, s) for n, s in zip(asked_of, at, strict=True) if isinstance(s, Structure)]
     names = tuple(name for name, _ in poses)
     left_out = tuple(name for name in asked_of if name not in names)
@@ -103,10 +98,8 @@ def map_report(
         raise next(s for s in at if isinstance(s, OutOfBandError))
     kept = np.array([i for i, s in enumerate(at) if isinstance(s, Structure)])
     q = candidates.q[kept]
-    wanted = asked.wanted
-    rpm = (
-        wanted[0] if wanted else best_speed_of(poses, cut, MOST_SPEEDS, part_of(progress, 0.0, 0.5))
-    )
+    wanted, first = asked.wanted, part_of(progress, 0.0, 0.5)
+    rpm = wanted[0] if wanted else best_speed_of(poses, cut, MOST_SPEEDS, first)
     limits = limits_along(poses, cut.at_speed(rpm), asked.samples, part_of(progress, 0.5, 1.0))
     robust = limits.robust_m[:, 0]
     share = None if wanted is None else float(np.mean(robust > wanted[1]))
@@ -123,7 +116,7 @@ def map_report(
         wanted_depth_m=wanted[1] if wanted else None,
         wanted_share=share,
         left_out=left_out,
-        remarks=(*beyond_the_tip(campaign, cut), *((told,) if left_out else ())),
+        remarks=(*cut_source.beyond_the_tip(campaign, cut), *((told,) if left_out else ())),
         simulated=campaign.state.simulated,
         joint_units=joints.declared,
     )  # fmt: skip

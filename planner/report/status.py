@@ -20,13 +20,8 @@ from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.imports import asked_of
 from planner.report.proposals import forecast_json, standing, unanswered
 from planner.report.saved_diagnosis import diagnosis_of, read_diagnosis, two_answers
-from planner.report.springs import (
-    NOT_KNOWN,
-    RefittedSpring,
-    refitted_springs,
-    springs_table,
-)
-from planner.report.text import table
+from planner.report.springs import COLUMNS, NOT_KNOWN, RefittedSpring, refitted_springs
+from planner.report.text import sds_over_workspace, table
 from planner.words import by_reason, counted, local_time, significant
 
 if TYPE_CHECKING:
@@ -148,7 +143,7 @@ class StatusReport(ModelStatus, Answer):
     plots: tuple[str, ...] = ()
     rrd: str | None = None
     models: tuple["LeftOutModel", ...] | msgspec.UnsetType = msgspec.UNSET  # where asked for
-    model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
+    model: "Callable[[], Model]" = field(repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
         """With the forecast's sentence; "decision" where there is one."""
@@ -157,7 +152,7 @@ class StatusReport(ModelStatus, Answer):
 
     def drawings(self) -> "dict[str, Figure]":
         """Each pose as predicted without it."""
-        if not self.leave_one_out.values or self.model is None:
+        if not self.leave_one_out.values:
             return {}
         from planner.report.campaign_plots import left_out_figure
 
@@ -168,7 +163,6 @@ class StatusReport(ModelStatus, Answer):
         """The same once every model of `[surrogate]` has predicted poses left out."""
         from planner.campaign.model_comparison import compared_models
 
-        assert self.model is not None
         return replace(self, models=compared_models(self.model(), progress=progress))
 
     def text(self) -> Group:
@@ -178,9 +172,13 @@ class StatusReport(ModelStatus, Answer):
             *("pose", "hits", "refused", "frequencies (Hz)", "time"),
             rows=(pose.cells for pose in self.measurements),
         )
-        springs = [springs_table(self.springs), Text(f"  {NOT_KNOWN}")] if self.springs else []
-        springs += [] if self.models is msgspec.UNSET else models_text(self.models)
-        return Group(measured, *springs, Text("\n".join(self._lines())), *self.end)
+        parts: list[RenderableType] = [measured]
+        if self.springs:
+            title = "Stiffnesses of the simulation, refitted to all recordings"
+            each = (spring.cells for spring in self.springs)
+            parts += [table(title, *COLUMNS, rows=each), Text(f"  {NOT_KNOWN}")]
+        parts += [] if self.models is msgspec.UNSET else models_text(self.models)
+        return Group(*parts, Text("\n".join(self._lines())), *self.end)
 
     def _counts(self) -> str:
         """How many poses the model uses, as report and predict count them, and others."""
@@ -191,15 +189,12 @@ class StatusReport(ModelStatus, Answer):
         return f"{counted(self.used, 'pose')} measured{more}"
 
     def _lines(self) -> list[str]:
-        each = enumerate(self.frequency_sd_percent, 1)
         held = ", ".join(h.pose for h in self.held)
         waiting = f"; hit, and waiting for your answer: {held}" if held else ""
         lines = [
             "open: " + (", ".join(p.pose for p in self.open) or "none") + waiting,
             "skipped: " + (", ".join(s.pose for s in self.skipped) or "none"),
-            "sd of frequencies over the workspace: "
-            + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)
-            + f" (all together: target {self.target_frequency_sd_percent:g} %)",
+            sds_over_workspace(self.frequency_sd_percent, self.target_frequency_sd_percent),
             standing(self.forecast, self.waits_for, self.not_predicted),
             f"log: {counted(self.log['entries'], 'entry', 'entries')}",
         ]

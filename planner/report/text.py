@@ -9,7 +9,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from planner.words import command, small
+from planner.words import command, significant, small
 
 # No-break spaces, and those about ±, before a unit, and between a mode and what it has. Rich breaks
 # lines at no-break spaces, too: it is given a character that nobody uses in their place, and what
@@ -46,6 +46,13 @@ def plain_table(*columns: str) -> Table:
 def number(value: float | None, form: str = ".2f") -> str:
     """A number, or a dash where there is none."""
     return format(value, form) if value is not None and math.isfinite(value) else "–"
+
+
+def sds_over_workspace(sd_percent: Iterable[float], target_percent: float) -> str:
+    """How sure the frequency of each mode is over the workspace, and how sure all are to be."""
+    each = ", ".join(f"mode {k} {significant(sd)} %" for k, sd in enumerate(sd_percent, 1))
+    target = f"all together: target {target_percent:g} %"
+    return f"sd of frequencies over the workspace: {each} ({target})"
 
 
 def with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:

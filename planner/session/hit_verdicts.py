@@ -55,23 +55,19 @@ Before = Mapping[str, tuple[Hit, ...]]  # hits of the pose hit last before this 
 class Verdicts:
     """Judges files that wait at a pose; it keeps what it read, and nothing else."""
 
-    def __init__(
-        self, band_hz: tuple[float, float], points: PointNames, table: FolderTable | None = None
-    ):
+    def __init__(self, band_hz: tuple[float, float], points: PointNames, table: FolderTable):
         self._band = band_hz
         self._stated = StatedPoints(names=points)
-        self.table = table or FolderTable()
+        self.table = table
         self._read: dict[tuple, list[tuple[FileVerdict, tuple[Hit, ...]]]] = {}
 
     def unfit(self, path: Path) -> str:
         """Why no hit can be made of a file that reads; empty: it can."""
         return " ".join(v.reason for v, _ in self._hits_of(path) if not (v.accepted or v.axis))
 
-    def numbered(
-        self, files: Sequence[Path], numbers: Mapping[Part, int] | None = None
-    ) -> dict[Part, int]:
+    def numbered(self, files: Sequence[Path], numbers: Mapping[Part, int]) -> dict[Part, int]:
         """Numbers of the hits in files: those they have, and further ones as they came."""
-        known = dict(numbers or {})
+        known = dict(numbers)
         for path in files:
             for part in range(1, len(self._hits_of(path)) + 1):
                 known.setdefault((path, part), len(known) + 1)
@@ -80,11 +76,11 @@ class Verdicts:
     def of(
         self,
         files: Sequence[Path],
-        before: Before | None = None,
-        here: frozenset[Path] = frozenset(),
-        numbers: Mapping[Part, int] | None = None,
-        shown: Mapping[Path, str] | None = None,
-        pose: str = "",
+        before: Before,
+        here: frozenset[Path],
+        numbers: Mapping[Part, int],
+        shown: Mapping[Path, str],
+        pose: str,
     ) -> tuple[HitVerdict, ...]:
         """Each hit by itself and beside the others that wait, by number.
 
@@ -92,14 +88,14 @@ class Verdicts:
         those of the pose `before`, or like late ones. Hits that contradict others are unsure unless
         their files are said to be right, of `here`. What is late stands beside no other hit.
         """
-        numbers, before = self.numbered(files, numbers), before or {}
+        numbers = self.numbered(files, numbers)
         found = [
             (_alone(path, *one, numbers[path, part]), len(parts))
             for path in files for parts in (self._hits_of(path),)
             for part, one in enumerate(parts, 1)
         ]  # fmt: skip
         found.sort(key=lambda one: one[0].number)
-        late = self._late([verdict for verdict, _ in found], before, shown or {}, pose)
+        late = self._late([verdict for verdict, _ in found], before, shown, pose)
         found = [one for one in found if one[0].path not in {v.path for v in late}]
         judged = self._beside_repeats([verdict for verdict, _ in found])
         usable = [hit for verdict in judged if verdict.kind == "good" for hit in verdict.hits]

@@ -140,36 +140,32 @@ Stamp = tuple[int, int]  # size and time of a table
 
 @dataclass
 class FolderTable:
-    """The tables of a folder and of those in it. Without `joints` nothing is looked up.
+    """The tables of a folder and of those in it.
 
     `check` raises InputError where the robot cannot stand as a row, which it is told, says.
     """
 
-    folder: Path | None = None
-    joints: JointUnits | None = None
-    points: PointNames = field(default_factory=PointNames)
-    check: Callable[[tuple[float, ...], str], object] = lambda joints_deg, where: None
+    folder: Path
+    joints: JointUnits
+    points: PointNames
+    check: Callable[[tuple[float, ...], str], object]
     waiting: list[tuple[Path, str]] = field(default_factory=list)  # wrong ones, and why
     _stamps: dict[Path, Stamp] = field(default_factory=dict)
     _rows: dict[Path, tuple[Path, PoseRow]] = field(default_factory=dict)
 
+    def listed(self, path: Path) -> tuple[Path | None, PoseRow | None]:
+        """The folder whose table lists a file, and what it says of it; None: none does."""
+        return self._rows.get(path.resolve(), (None, None)) if self._rows else (None, None)
+
     def row(self, path: Path) -> PoseRow | None:
         """What a table says of a file; None: nothing."""
-        found = self._rows.get(path.resolve()) if self._rows else None
-        return found[1] if found else None
-
-    def listing(self, path: Path) -> Path | None:
-        """The folder whose table lists a file; None: none does."""
-        found = self._rows.get(path.resolve()) if self._rows else None
-        return found[0] if found else None
+        return self.listed(path)[1]
 
     def follow(self) -> set[Path]:
         """Read what has changed; once a look at the folder, as tables lie anywhere in it.
 
         The tables that were wrong before and are right now.
         """
-        if self.folder is None or self.joints is None:
-            return set()
         stamps = dict(filter(None, map(_stamped, sorted(self.folder.rglob(TABLE)))))
         if stamps == self._stamps and not self.waiting:  # a file that was missing may have come
             return set()

@@ -204,7 +204,7 @@ def import_waiting(
 
 def _imported_files(session: Session, files: Sequence[Path], pose: str) -> tuple[ImportReport, ...]:
     """Import files at the poses that recordings.csv states; those it does not list at `pose`."""
-    listing = {path: session.verdicts.table.listing(path) for path in files}
+    listing = {path: session.verdicts.table.listed(path)[0] for path in files}
     bare = tuple(path for path in files if listing[path] is None)
     tables = tuple(dict.fromkeys(folder for folder in listing.values() if folder is not None))
     reports = session.campaign.import_paths(tables) if tables else ()

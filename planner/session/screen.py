@@ -61,10 +61,7 @@ class Screen:
             self.console.print(sentence)
 
     def ring(self, kinds: Mapping[tuple[str, int], str]) -> None:
-        """Ring for hits, by file and number, that were not rung for: more often for bad ones.
-
-        Sentences under the page are dropped then.
-        """
+        """Ring for new hits, by file and number, more often for bad ones; sentences go then."""
         new = {kind for hit, kind in kinds.items() if hit not in self._rung}
         self._rung |= kinds.keys()
         if new:
@@ -137,10 +134,7 @@ class ScreenText:
 
 
 def fitted(parts: Iterable[ScreenText], width: int, height: int) -> list[Text]:
-    """The longest forms, in order, that `height` lines of `width` columns hold together.
-
-    The shortest ones are taken in any case.
-    """
+    """The longest forms, in order, that fit into so many lines; else the shortest ones."""
     parts = list(parts)
     chosen = [0] * len(parts)
     lines = [[_height(form, width) for form in part.forms] for part in parts]

@@ -9,19 +9,8 @@ from pathlib import Path
 import numpy as np
 from rich.text import Text
 
+from planner.campaign import events
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import (
-    Configured,
-    Confirmed,
-    Entry,
-    FilesPlaced,
-    FilesShown,
-    Imported,
-    Proposal,
-    Proposed,
-    Refused,
-    Undone,
-)
 from planner.campaign.imported_files import differs_from_table
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
@@ -49,7 +38,7 @@ class PoseInProgress:
     where none is asked for; `before` is the pose measured last.
     """
 
-    proposal: Proposal
+    proposal: events.Proposal
     page: PosePage
     since: float
     before: Before = field(default_factory=dict)
@@ -113,9 +102,7 @@ class SessionState:
         kept = [k for k, pose in enumerate(self.measured) if pose in state.measurements]
         measured = tuple(self.measured[k] for k in kept)
         history = tuple(self.history[k] for k in kept)
-        return replace(
-            self, measured=measured, history=history, progress="", here=frozenset()
-        )  # fmt: skip
+        return replace(self, measured=measured, history=history, progress="", here=frozenset())
 
     def after(
         self, pose: str, model: Model, state: CampaignState, seconds: float, auto: bool
@@ -148,16 +135,17 @@ class RerunQueue:
     def __init__(self, campaign: Campaign, story: EventLogger):
         self._campaign, self._story = campaign, story
         self._noted = len(campaign.entries)
-        self._waiting: deque[tuple[Entry, Model, MeasuredPose | None]] = deque()
+        self._waiting: deque[tuple[events.Entry, Model, MeasuredPose | None]] = deque()
 
     def note(self, reports: Sequence[ImportReport] = ()) -> None:
         """Keep what the log gained."""
         found = {report.pose: report.measured for report in reports}
         for entry in self._campaign.entries[self._noted :]:
             event = entry.event
-            if isinstance(event, FilesShown | FilesPlaced):  # nothing that pictures show
+            # Nothing that pictures show.
+            if isinstance(event, events.FilesShown | events.FilesPlaced):
                 continue
-            measured = found.get(event.pose) if isinstance(event, Imported) else None
+            measured = found.get(event.pose) if isinstance(event, events.Imported) else None
             self._waiting.append((entry, self._campaign.model, measured))
         self._noted = len(self._campaign.entries)
 
@@ -167,13 +155,13 @@ class RerunQueue:
             self._story.log(*self._waiting[0])
             self._waiting.popleft()
 
-    def gained(self) -> list[Entry]:
+    def gained(self) -> list[events.Entry]:
         """What the engineer did, as the log on disk has it, since it was noted last."""
         new = Campaign(self._campaign.directory).entries[self._noted :]
         return [
             entry
             for entry in new
-            if not isinstance(entry.event, Configured | Proposed | FilesShown)
+            if not isinstance(entry.event, events.Configured | events.Proposed | events.FilesShown)
         ]
 
 
@@ -196,7 +184,7 @@ class Session:
     started: float
     deadline: float | None
 
-    def hits_at(self, proposal: Proposal) -> int:
+    def hits_at(self, proposal: events.Proposal) -> int:
         """How many hits make this pose."""
         each = self.campaign.cell.config.cost.hits_per_axis
         return self.hits_per_pose or each * len(proposal.hits)
@@ -224,7 +212,9 @@ class Session:
         undone = taken_back(entries)
         for entry in reversed(entries):
             event = entry.event
-            if entry.seq in undone or not isinstance(event, Imported | Confirmed | Refused):
+            if entry.seq in undone or not isinstance(
+                event, events.Imported | events.Confirmed | events.Refused
+            ):
                 continue
             known = state.hit_at(event.pose)
             records = [hit for at, hit in state.refused.values() if at == event.pose]
@@ -240,8 +230,9 @@ class Session:
         """The act that can be undone, and the one that can be redone, in a word or two; ""s."""
         entries = self.campaign.entries
         acts, undone = last_acts(entries, decisions_only=True), last_undone(entries)[0]
-        was = undone and isinstance(undone.event, Undone) and entries[undone.event.acts[0] - 1]
-        return (in_short(acts[0]) if acts else ""), (in_short(was) if was else "")
+        again = undone.event.acts[:1] if undone and isinstance(undone.event, events.Undone) else ()
+        first = *acts[:1], None
+        return in_short(first[0]), in_short(entries[again[0] - 1] if again else None)
 
     def key(self) -> str | None:
         """The next key, or None after a moment."""

@@ -9,9 +9,9 @@ from planner.campaign.events import HitRecord, Question
 from planner.campaign.importing import ImportReport
 from planner.campaign.labels import found_modes
 from planner.campaign.model import Model
-from planner.report.text import SIMULATED, plain_table, with_sd
+from planner.report.text import SIMULATED, plain_table, sds_over_workspace, with_sd
 from planner.session.pose_screen import PosePage, remedy_first
-from planner.words import counted, short_name, significant
+from planner.words import counted, short_name
 
 HELP = """\
 a     accept: import the good hits, refit, go on      r, R  refuse bad hits, or all
@@ -48,12 +48,9 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
     parts: list[RenderableType] = [table, *_missed(report)]
     parts += [Text(_refused(hit), style="red") for hit in report.refused]
     parts += [Text(remark, style="yellow") for remark in report.remarks]
-    sd = ", ".join(
-        f"mode {k} {significant(v)} %" for k, v in enumerate(report.model.frequency_sd_percent, 1)
-    )
     target = report.model.cell.config.stop.frequency_sd_percent
-    known = f"sd of frequencies over the workspace: {sd} (all together: target {target:g} %)"
-    parts += [Text(known), *([SIMULATED] if simulated else [])]
+    parts.append(Text(sds_over_workspace(report.model.frequency_sd_percent, target)))
+    parts += [SIMULATED] if simulated else []
     title = f"Pose {report.pose}: {_in(report)}"
     return Panel(Group(*parts), title=title, title_align="left", expand=False)
 
@@ -150,29 +147,24 @@ def against_expected(pose: str, model: Model, before: Model | None) -> str:
 
 
 def progress_line(
-    history: list[float], target: float, seconds_per_pose: float | None, minimum: int
-) -> Text:
+    history: list[float], target: float, seconds_per_pose: float, minimum: int
+) -> str:
     """Time per pose, and from how many to how many it takes until the target, by the trend so far.
 
     Short, for it shares a line of 80 columns. `history` is the overall sd (%) after each
     measurement; it falls about geometrically.
     """
-    parts = []
-    if seconds_per_pose is not None:
-        parts.append(f"{seconds_per_pose / 60:.1f} min per pose")
+    parts = [f"{seconds_per_pose / 60:.1f} min per pose"]
     left = poses_to_go(history, target, minimum)
     if left == (0, 0):
         parts.append("target reached")
     elif left is not None:
         more = f"{_span(left)} more pose{'s' if left != (1, 1) else ''}"
-        if seconds_per_pose is not None:
-            minutes = [None if n is None else n * seconds_per_pose / 60 for n in left]
-            rounded = [None if m is None else max(1, round(m)) for m in minutes]
-            more += f", {_span((rounded[0] or 1, rounded[1]))} min to go"
-        parts.append(more)
+        minutes = [None if n is None else max(1, round(n * seconds_per_pose / 60)) for n in left]
+        parts.append(f"{more}, {_span((minutes[0] or 1, minutes[1]))} min to go")
     elif len(history) > 1:
         parts.append("no trend yet for how many more")
-    return Text("; ".join(parts))
+    return "; ".join(parts)
 
 
 def _span(of: tuple[int, int | None]) -> str:

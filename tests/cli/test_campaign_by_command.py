@@ -11,7 +11,7 @@ from planner.proof.load import load_truth
 from planner.proof.model import Truth
 from planner.report.springs import with_exponent
 from planner.surrogate.frequency_models import MODELS
-from tests.support.outside import call, make_cell, record, said, told
+from tests.support.outside import call, make_cell, record, refused, said, told
 from tests.support.robots import JOINTS_DEG
 
 ASKED = np.array(JOINTS_DEG).T * 0.5 + np.mean(JOINTS_DEG, axis=1) * 0.5  # (2, 6) in degrees
@@ -137,8 +137,7 @@ def test_a_measurement_is_set_aside_and_taken_back(three):
     told("withdraw", cell, names[-1])
     assert measured(cell) == [(names[0], False), (names[1], False), (names[2], True)]
     np.testing.assert_allclose(predicted(cell, three.table), after[2], rtol=1e-9)
-    code, _, err = call("withdraw", cell, names[-1])
-    assert (code, names[-1] in err) == (2, True)
+    assert names[-1] in refused("withdraw", cell, names[-1])
     told("undo", cell)
     assert measured(cell) == [(name, False) for name in names]
     np.testing.assert_allclose(predicted(cell, three.table), after[3], rtol=1e-9)
@@ -173,3 +172,28 @@ def test_a_proposal_keeps_its_name_and_place_until_it_is_measured(tmp_path):
     told("undo", cell)
     assert sent() == third
     assert told("replay", cell)["reproduced"]
+
+
+def test_what_another_acquisition_would_have_proposed_and_saved(tmp_path):
+    robot, campaign_toml, truth = make_cell(tmp_path, learns=False)
+    cell, measured = tmp_path / "cell", []
+    told("new", cell, "--robot", robot, "--campaign", campaign_toml)
+    for number in range(5):
+        (proposal,) = told("next", cell)["proposals"]
+        measured.append(proposal["pose"])
+        told("import", cell, record(truth, tmp_path / f"export{number}", measured[-1],
+                                    proposal["joints_deg"], seed=number))  # fmt: skip
+    replayed = told("replay", cell, "--acquisition", "variance")
+    assert replayed["reproduced"]
+    proposed = [step for step in replayed["steps"] if step["event"] == "proposed"]
+    assert proposed
+    assert all(len(step["instead"]) == 1 for step in proposed)
+    assert all(not step["instead"] for step in replayed["steps"] if step["event"] == "imported")
+    runs = replayed["otherwise"]["runs"]
+    was, other = runs["campaign"], runs["variance"]
+    assert was["poses"] == measured[: len(was["poses"])]
+    assert other["poses"][0] == was["poses"][0]
+    assert len(set(other["poses"])) == len(was["poses"]) == len(measured) - 2
+    assert was["n"] == other["n"]
+    assert np.all(np.diff(other["minutes"]) > 0)
+    assert "variance would have needed" in replayed["otherwise"]["text"]

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tests.support.outside import call, told
+from tests.support.outside import refused, told
 
 
 def test_the_example_goes_from_check_to_a_proposal(tmp_path):
@@ -23,6 +23,5 @@ def test_the_example_goes_from_check_to_a_proposal(tmp_path):
 
 def test_it_overwrites_nothing(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
-    code, _, err = call("new", "--example", tmp_path)
-    assert (code, "not empty" in err) == (2, True)
+    assert "not empty" in refused("new", "--example", tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]

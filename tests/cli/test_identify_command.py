@@ -171,9 +171,8 @@ def test_bad_recordings_are_one_sentence(cell, tmp_path):
     table.write_text(text)
     for file in (broken / "data").iterdir():
         file.write_bytes(b"")
-    code, _, err = call("identify", broken, "--robot", robot)
-    assert code == 3
-    assert "no pose has a hit that can be used" in err
+    none = refused("identify", broken, "--robot", robot, code=3)
+    assert "no pose has a hit that can be used" in none
 
 
 def test_compliance_that_the_description_lacks_is_added_unless_that_is_not_wanted(tmp_path):

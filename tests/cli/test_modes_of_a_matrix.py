@@ -13,7 +13,7 @@ from planner.modal.mac import mac
 from planner.recording.dof import Dof
 from tests.support.hit_structures import hit_frfs, unit_mass_shapes
 from tests.support.matrix_files import transposed, write_matrix
-from tests.support.outside import modes
+from tests.support.outside import modes, only_told, told
 from tests.support.rerun_columns import entities_of
 from tests.support.structures import plate
 
@@ -56,9 +56,7 @@ def agree(answer, structure, least=0.995, scale=0.03):
 
 def analysed(*arguments):
     """The answer of a command that must succeed without a word."""
-    code, answer, err = modes(*arguments, "--band-hz", *BAND)
-    assert (code, err) == (0, "")
-    return answer
+    return only_told("modes", *arguments, "--band-hz", *BAND)
 
 
 def places(structure):
@@ -196,8 +194,7 @@ def test_the_recording_has_charts_shapes_and_mac_in_place_of_pictures(
     structure, matrix, tmp_path, placed
 ):
     path = write_matrix(tmp_path / "a.uff", matrix, before=places(structure) if placed else ())
-    code, answer, err = modes(path, "--band-hz", 40, 130, "--rrd", tmp_path / "modes.rrd")
-    assert (code, err) == (0, "")
+    answer = only_told("modes", path, "--band-hz", 40, 130, "--rrd", tmp_path / "modes.rrd")
     wanted = {f"/figures/{name}/frame" for name in ("stabilisation", "driving_points", "mac")}
     shapes = {f"/modes/shape/{k + 1}/points" for k in range(len(answer["modes"]))}
     wanted |= shapes | {"/modes/shape/1/rest"} if placed else {"/figures/shapes/frame"}
@@ -242,8 +239,7 @@ def test_right_and_left_vectors_of_a_robot_without_reciprocity(tmp_path):
     points = tuple(Dof.of_uff(node, direction) for node in "12" for direction in (1, 2))
     matrix = FrfMatrix(hz, points, points, h, np.full(h.shape, np.nan), True)
     path = write_matrix(tmp_path / "set.uff", matrix, "receptance")
-    code, answer, _ = modes(path, "--export", tmp_path / "files")
-    assert code == 0
+    answer = told("modes", path, "--export", tmp_path / "files")
     assert "right and left vectors" in " ".join(answer["remarks"])
     found = np.array([m["frequency_hz"] for m in answer["modes"]])
     for f, right, left, residue in residues:

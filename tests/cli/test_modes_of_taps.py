@@ -8,7 +8,7 @@ import pytest
 
 from planner.modal.mac import mac
 from tests.support.hit_structures import unit_mass_shapes
-from tests.support.outside import modes, refused
+from tests.support.outside import modes, only_told, refused, told
 from tests.support.structures import plate
 from tests.support.taps import tap, write_csv, write_uff
 
@@ -77,8 +77,7 @@ def table(folder, rng):
 )
 def test_hits_of_any_points(write, tmp_path):
     paths = write(tmp_path, np.random.default_rng(4))
-    code, answer, err = modes(*paths, "--band-hz", *BAND)
-    assert (code, err) == (0, "")
+    answer = only_told("modes", *paths, "--band-hz", *BAND)
     assert len(answer["dofs"]) == len(NODES)
     assert answer["simulated"] == (write not in (named_columns, table))
     assert answer["refused"] == []
@@ -99,8 +98,7 @@ def test_a_hammer_and_one_sensor(column, attributes, dof, scaled, tmp_path):
     """Without a band: where the hit excites; what is not stated is not made up."""
     path = write_csv(tmp_path / "tap.csv", tap(PLATE, 0, (0,), np.random.default_rng(2)), column,
                      *attributes)  # fmt: skip
-    code, answer, err = modes(path)
-    assert (code, err) == (0, "")
+    answer = only_told("modes", path)
     assert answer["dofs"] == [dof]
     assert BAND[1] < answer["band_hz"][1] < 512
     assert {mode["scaled"] for mode in answer["modes"]} == {scaled}
@@ -114,8 +112,7 @@ def test_an_analysers_window_is_taken_out_of_the_damping(tmp_path):
     one.acceleration_m_s2[:] *= window
     one.force_n[:] *= window
     path = write_csv(tmp_path / "tap.csv", one, "acceleration_z_m_s2", "hit: +z")
-    code, answer, _ = modes(path, "--window-rate", rate)
-    assert code == 0
+    answer = told("modes", path, "--window-rate", rate)
     agree(answer, shapes=False)
 
 
@@ -136,11 +133,9 @@ def test_faulty_hits_are_refused_and_the_others_used(tmp_path):
 def test_pictures_and_files_of_taps(tmp_path):
     paths = roving_hammer(tmp_path, np.random.default_rng(7))
     options = "--plot", tmp_path / "plots", "--export", tmp_path / "out", "--band-hz", *BAND
-    code, answer, err = modes(*paths, *options)
-    assert (code, err) == (0, "")
+    answer = only_told("modes", *paths, *options)
     assert all(Path(path).read_bytes().startswith(b"\x89PNG") for path in answer["plots"])
-    code, again, _ = modes(tmp_path / "out" / "frfs.uff", "--band-hz", *BAND)
-    assert code == 0
+    again = told("modes", tmp_path / "out" / "frfs.uff", "--band-hz", *BAND)
     assert again["dofs"] == answer["dofs"]
 
 
@@ -165,13 +160,10 @@ def test_what_readers_notice_of_hits_is_told(tmp_path):
         return tmp_path / "late.csv"
 
     late = round(0.01 / (rows[1, 0] - rows[0, 0]))
-    code, answer, err = modes(written(late))
-    assert (code, err) == (0, "")
+    answer = only_told("modes", written(late))
     assert any("acceleration_z_m_s2 begin" in text for text in answer["remarks"])
     assert any("unit is not known: other." in text for text in answer["remarks"])
-    code, _, err = modes(written(len(rows) // 2))
-    assert code == 3
-    assert "s apart" in err
+    assert "s apart" in refused("modes", written(len(rows) // 2), code=3)
 
 
 def test_short_records_of_one_sensor_give_modes_or_a_sentence(tmp_path):

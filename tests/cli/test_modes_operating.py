@@ -5,7 +5,7 @@ import pytest
 
 from planner.modal.mac import mac
 from planner.proof.recordings import uff_channel, write_sets
-from tests.support.outside import modes
+from tests.support.outside import only_told, refused
 from tests.support.rerun_columns import lines_of
 from tests.support.running import response
 from tests.support.structures import plate
@@ -35,8 +35,7 @@ def record(structure, tmp_path_factory):
 
 def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path):
     drawn = "--plot", tmp_path, "--rrd", tmp_path / "modes.rrd"
-    code, answer, err = modes(record, "--operating", "--band-hz", *BAND, *drawn)
-    assert (code, err) == (0, "")
+    answer = only_told("modes", record, "--operating", "--band-hz", *BAND, *drawn)
     poles, shapes = structure.poles()
     hz, damping = np.abs(poles) / (2 * np.pi), -poles.real / np.abs(poles)
     inside = np.flatnonzero((hz > BAND[0]) & (hz < BAND[1]))
@@ -58,6 +57,4 @@ def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path):
 
 
 def test_two_files_are_refused(record):
-    code, answer, err = modes(record, record, "--operating")
-    assert (code, answer) == (2, None)
-    assert "one record at a time" in err
+    assert "one record at a time" in refused("modes", record, record, "--operating")

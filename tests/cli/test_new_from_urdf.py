@@ -10,15 +10,7 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.robot.robot import Robot
 from tests.support.outside import refused, said, told
-from tests.support.published import (
-    BOXES,
-    DENSITY,
-    HAND,
-    LIMITS,
-    RAIL,
-    published,
-    robot_toml,
-)
+from tests.support.published import BOXES, DENSITY, HAND, LIMITS, RAIL, published, robot_toml
 
 GIVEN = "--mass-kg", "420", "--payload-kg", "20"
 
@@ -88,8 +80,7 @@ def test_it_goes_from_a_description_to_a_first_pose(kind, tmp_path):
     masses = [g["value"] for g in new["guessed"] if g["what"].startswith("mass of")]
     assert kind is whole or sum(masses) == pytest.approx(420, rel=1e-3)
     shutil.rmtree(tmp_path / "src")  # the campaign holds all it needs
-    checked = told("check", cell / "robot" / "robot.toml", "--campaign",
-                  cell / "campaign.toml")  # fmt: skip
+    checked = told("check", cell / "robot" / "robot.toml", "--campaign", cell / "campaign.toml")
     warned = [f["what"] for f in checked["findings"] if f["severity"] != "note"]
     assert len(warned) == (kind is no_meshes), warned
     assert all("left out" in what for what in warned)

@@ -11,7 +11,7 @@ import pytest
 from planner.recording.hits import hits_from
 from planner.recording.read import hits_in, read, read_hits
 from tests.support import streams
-from tests.support.outside import call, said, told
+from tests.support.outside import call, refused, said, told
 from tests.support.streams import CLEAN, MIXED, MODES, WRITERS, joined, stream
 
 made = lru_cache(stream)
@@ -86,8 +86,7 @@ def test_a_wav_says_what_its_table_lacks_and_follows_it(first_pose, exports):
     table = exports / "channels.csv"
     text = table.read_text()
     table.unlink()
-    code, _, err = call("modes", exports)
-    assert code == 3
+    err = refused("modes", exports, code=3)
     assert "channels.csv" in err
     assert "channel,name,unit,full_scale" in err
     table.write_text(text)

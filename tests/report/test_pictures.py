@@ -250,20 +250,19 @@ def test_a_map_holds_levels_in_the_right_cells_and_their_difference():
     measured = np.random.default_rng(0).uniform(0.1, 1, (5, 30)) * np.exp(1j)
     measured[2] = np.nan
     measured[1, 4] = 0.0
-    place = np.array([70.0, 80.0, 90.0, 100.0, 110.0])
-    figure = frf_map(place, measured, 2 * np.nan_to_num(measured), FREQUENCY, "joint 3 (°)")
+    figure = frf_map("ABCDE", measured, 2 * np.nan_to_num(measured), FREQUENCY, "H xx")
     shown = map_panels(figure)
     assert list(shown) == ["measured", "simulated", "simulated − measured"]
     levels, corners, limits = shown["measured"]
     assert limits == shown["simulated"][2]  # one scale of colours
     np.testing.assert_allclose(levels[:, 3], 20 * np.log10(np.abs(measured[3])))
-    np.testing.assert_allclose(corners[0, :, 0], [65, 75, 85, 95, 105, 115])
+    np.testing.assert_allclose(corners[0, :, 0], [0.5, 1.5, 2.5, 3.5, 4.5, 5.5])
     np.testing.assert_allclose(corners[:, 0, 1], np.arange(31) - 0.5)
     assert levels.mask[:, 2].all()  # NaN stays blank
     assert levels.mask.sum() == 30
     np.testing.assert_allclose(shown["simulated − measured"][0][:, 3], 20 * np.log10(2))
     assert png(figure)[:4] == b"\x89PNG"
-    assert list(map_panels(frf_map(place[:1], None, np.ones((1, 30)), FREQUENCY))) == ["simulated"]
+    assert list(map_panels(frf_map("A", *np.ones((2, 1, 30)), FREQUENCY, ""))) == list(shown)
 
 
 @pytest.mark.parametrize(("known", "rows"), [(True, 3), (False, 2)])
@@ -332,7 +331,7 @@ def test_points_of_flat_structures_are_inside_and_to_scale(turn, lines):
     place = np.array(list(structure.position_m.values()))[:, turn]
     traces = tuple((str(a), str(b)) for a, b in structure.lines) if lines else ()
     geometry = Geometry(tuple(map(str, structure.position_m)), place, traces)
-    figure = geometry_figure(matrix, geometry, "points")
+    figure = geometry_figure(matrix, geometry)
     figure.canvas.draw()
     (panel,) = figure.axes
     limits = np.array([panel.get_xlim(), panel.get_ylim(), panel.get_zlim()])

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from rich.console import Console, Group
 
+from planner.campaign.events import HitRecord
+from planner.campaign.importing import ImportReport
 from planner.design.stopping import percent
 from planner.diagnosis.diagnose import Established, ThreefoldSimilarity
 from planner.diagnosis.mismatch import MismatchShares
 from planner.diagnosis.odd_pose import OddPose
 from planner.diagnosis.verdict import Candidate
 from planner.measurement.agreement import Similarity
-from planner.report.answer import RefusedFile
 from planner.report.diagnosis import (
     DiagnosisReport,
     EffectAtPlace,
@@ -75,9 +76,10 @@ def test_a_damping_of_which_nothing_is_known_is_no_number():
 
 
 def test_an_import_says_how_a_small_sd_changed():
-    before, after = np.array([0.0123, 1.26]), np.array([0.0091, 0.84])
-    refused = (RefusedFile("x.uff", "A second pulse."),)
-    done = PoseImport("P001", ("y.uff",), refused, (), (), 0.5, before, after, (), None, False)
+    sds = (0.0123, 1.26), (0.0091, 0.84)
+    before, after = (SimpleNamespace(frequency_sd_percent=sd) for sd in sds)
+    hits = HitRecord("y.uff", "", ""), HitRecord("x.uff", "", "", accepted=False)
+    done = PoseImport(ImportReport("P001", None, before, after, hits))
     drawn = io.StringIO()
     UnbrokenConsole(file=drawn, width=300).print(Group(*done.parts()))
     wanted = "sd of the frequencies of modes 1 to 2: 0.012 → 0.0091 %, 1.3 → 0.84 %"
@@ -183,7 +185,7 @@ def test_a_refit_that_is_farther_off_is_explained():
     ],
 )
 def test_poses_and_minutes_to_go_are_said_by_a_trend(history, target, least, left, said):
-    line = progress_line(history, target, 120.0, least).plain
+    line = progress_line(history, target, 120.0, least)
     assert said in line
     if left is None:
         assert "more pose" not in line

@@ -13,9 +13,10 @@ from planner.dataset.screened_files import Source, read_files
 from planner.frf.estimator import estimate
 from planner.proof.hits import simulate_hit
 from planner.proof.recordings import write_uff
+from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames
 from planner.session.hit_verdicts import Before, Verdicts
-from planner.session.inbox import Inbox
+from planner.session.inbox import FolderTable, Inbox
 from tests.support.hit_files import write_hit
 from tests.support.outside import HAMMER, make_cell
 from tests.support.robots import BAND_HZ
@@ -39,7 +40,9 @@ class Bench:
     def __init__(self, truth, folder: Path):
         self.truth, self.folder, self.rng = truth, folder, np.random.default_rng(2)
         self.files: list[Path] = []
-        self.verdicts, self.numbers = Verdicts(BAND_HZ, PointNames()), {}
+        joints, points = JointUnits.of(truth.joint_names), PointNames()
+        table = FolderTable(folder, joints, points, lambda joints_deg, where: None)
+        self.verdicts, self.numbers = Verdicts(BAND_HZ, points, table), {}
 
     def hit(self, name: str, axis: str, said: str = "", size: float = 1.0) -> Path:
         made = simulate_hit(self.truth, Q, axis, HAMMER, self.rng)
@@ -52,7 +55,8 @@ class Bench:
 
     def of(self, before: Before | None = None, here: frozenset[Path] = frozenset()):
         self.numbers = self.verdicts.numbered(self.files, self.numbers)
-        return {v.path.stem: v for v in self.verdicts.of(self.files, before, here, self.numbers)}
+        found = self.verdicts.of(self.files, before or {}, here, self.numbers, {}, "P1")
+        return {verdict.path.stem: verdict for verdict in found}
 
 
 @pytest.fixture

@@ -26,13 +26,12 @@ from planner.campaign.store import check_kept, recording_path
 from planner.cli.run import STOPPED, run
 from planner.errors import PlannerError
 from planner.proof.deviation import Deviation
-from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.recordings import record_poses
 from tests.support.forked import Outcome, forked, preload
+from tests.support.outside import HAMMER
 from tests.support.plain_arm import JOINTS_DEG, make_plain_arm, plain_campaign
 
-HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)
 ENOUGH = 5  # measured poses, after which a campaign is replayed and another begun
 LATEST_S, MOST_CHANGES = 1.2, 150  # of a command's life; beyond, most have ended
 DISK, PAGE = "64m", 4096
@@ -158,9 +157,12 @@ def lost(cell: Cell, before: tuple, command: Command, outcome: Outcome) -> list[
     return found
 
 
-def left_over(cell: Cell) -> list[str]:
-    """Halves of files, which the next act is to have removed."""
-    return [str(path) for path in cell.campaign.rglob(".*.part")]
+def given_again(cell: Cell, command: Command, log: Path) -> list[str]:
+    """The faults of a command that is given once more; halves of files are gone after it."""
+    before, again = entries(cell), forked(doing(command), log)
+    codes = (0, 2, 3) if command[0] in DONE_ONCE else (0, 3)
+    left_over = [str(path) for path in cell.campaign.rglob(".*.part")]
+    return again.faults(codes) + lost(cell, before, command, again) + left_over
 
 
 def kill(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
@@ -179,10 +181,7 @@ def kill(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     outcome = forked(doing(command), log, change, after)
     faults = outcome.faults() + lost(cell, before, command, outcome)
     if command[0] != "watch" and rng.random() < 0.5:
-        before = entries(cell)
-        again = forked(doing(command), log)
-        codes = (0, 2, 3) if command[0] in DONE_ONCE else (0, 3)
-        faults += again.faults(codes) + lost(cell, before, command, again) + left_over(cell)
+        faults += given_again(cell, command, log)
     return {"command": command[:1], "killed": outcome.killed, "cpu_s": outcome.cpu_s,
             "gib": outcome.peak_gib, "faults": faults}  # fmt: skip
 
@@ -205,10 +204,7 @@ def interrupt(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
         new = [e.event.pose for e in gained if isinstance(e.event, Imported)]
         faults += [f"the hits of {pose} are not named" for pose in new[-1:] if pose not in told]
     if not watching:
-        before = entries(cell)
-        again = forked(doing(command), log)
-        codes = (0, 2, 3) if command[0] in DONE_ONCE else (0, 3)
-        faults += again.faults(codes) + lost(cell, before, command, again) + left_over(cell)
+        faults += given_again(cell, command, log)
     return {"command": command[:1], "code": outcome.code, "change": change,
             "said": outcome.err.strip()[-200:], "faults": faults}  # fmt: skip
 

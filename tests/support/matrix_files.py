@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyuff
 
+from planner.export.uff import write_sets
 from planner.frf.matrix import FrfMatrix
 
 KINDS = {"accelerance": (12, "m/s^2"), "mobility": (11, "m/s"), "receptance": (8, "m")}
@@ -44,13 +44,7 @@ def write_matrix(
                 "orddenom_spec_data_type": 13, "orddenom_axis_units_lab": "N", **fields,
             }
         )  # fmt: skip
-    with open(path, "wb") as file:
-        piece = path.with_suffix(".piece.uff")
-        for one in sets:
-            piece.unlink(missing_ok=True)
-            pyuff.UFF(str(piece)).write_sets([one], "add")
-            file.write(piece.read_bytes())
-        piece.unlink()
+    write_sets(path, sets)
     return path
 
 

@@ -58,6 +58,13 @@ def told(*arguments: object) -> dict:
     return json.loads(said(*arguments, "--json"))
 
 
+def only_told(*arguments: object) -> dict:
+    """The same of a command that has not a word to say beside."""
+    code, out, err = call(*arguments, "--json")
+    assert (code, err) == (0, "")
+    return json.loads(out)
+
+
 def refused(*arguments: object, code: int = 2) -> str:
     """The one sentence with which a command refuses its input, in this process."""
     found, out, err = call(*arguments)

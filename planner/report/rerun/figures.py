@@ -6,6 +6,7 @@ near one looks, and that hide one by one.
 """
 
 import hashlib
+import re
 import socket
 import subprocess
 import sys
@@ -26,20 +27,14 @@ from planner.errors import writing
 from planner.report.pictures import png
 
 PORT = 9876
-VIEWER = f"rerun+http://127.0.0.1:{PORT}/proxy"
-VIEWER_START_S = 15.0
 DPI = 160
-WHITE = (255, 255, 255)  # behind what is drawn in black, whatever theme the viewer has
 More = Callable[[rr.RecordingStream], tuple[rrb.View | rrb.Container, rrb.TimePanel]]
 
 
 def open_stream(
     identity: str, name: str, blueprint: rrb.Blueprint, rrd: Path | None, viewer: bool = False
 ) -> rr.RecordingStream:
-    """A recording without a clock: the same `identity` and content give the same recording.
-
-    Raises InputError if the file cannot be written.
-    """
+    """A recording that `identity` and content alone determine; InputError if it cannot be."""
     key = hashlib.sha256(identity.encode()).hexdigest()[:32]
     stream = rr.RecordingStream("planner", recording_id=key, send_properties=False)
     # The clock would make two recordings of one campaign differ.
@@ -52,7 +47,7 @@ def open_stream(
             rrd.write_bytes(b"")
         sinks.append(rr.FileSink(str(rrd)))
     if viewer and _start_viewer():
-        sinks.append(rr.GrpcSink(VIEWER))
+        sinks.append(rr.GrpcSink(f"rerun+http://127.0.0.1:{PORT}/proxy"))
     stream.set_sinks(*sinks, default_blueprint=blueprint)
     stream.send_recording_name(name)
     return stream
@@ -69,7 +64,7 @@ def _start_viewer() -> bool:
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
-    until = time.monotonic() + VIEWER_START_S
+    until = time.monotonic() + 15.0
     while time.monotonic() < until and process.poll() is None:
         if _listens():
             # Without a display it listens first and ends then.
@@ -90,8 +85,8 @@ def _listens() -> bool:
 
 
 def figure_view(path: str, name: str) -> rrb.Spatial2DView:
-    """The view of the figure that is drawn at a path."""
-    return rrb.Spatial2DView(origin=f"/{path}", name=name, background=WHITE)
+    """The view of the figure that is drawn at a path, in black whatever the viewer's theme is."""
+    return rrb.Spatial2DView(origin=f"/{path}", name=name, background=(255, 255, 255))
 
 
 def draw(stream: rr.RecordingStream, path: str, figure: Figure, static: bool = False) -> None:
@@ -117,10 +112,7 @@ def draw(stream: rr.RecordingStream, path: str, figure: Figure, static: bool = F
 def record_figures(
     figures: Mapping[str, Figure], name: str, note: str, rrd: Path, more: More | None = None
 ) -> None:
-    """Write a recording with a tab for each figure by its name, then what `more` draws.
-
-    InputError if the file cannot be written.
-    """
+    """A tab for each figure by its name, then what `more` draws; InputError if that cannot be."""
     tabs: list[rrb.View | rrb.Container] = []
     time = rrb.TimePanel(state="hidden")
     # The blueprint comes last: only then it is known what there is to be seen.
@@ -159,9 +151,7 @@ def _solid_lines(figure: Figure) -> dict[str, tuple[Axes, Line2D]]:
     for number, panel in enumerate(figure.axes):
         for k, line in enumerate(panel.lines if panel.name != "3d" else ()):
             label = str(line.get_label())
-            named = (
-                "" if label.startswith("_") else "".join(c if c.isalnum() else "_" for c in label)
-            )
+            named = "" if label.startswith("_") else re.sub(r"\W", "_", label)
             name = f"{number}/{named or f'line_{k}'}"
             if line.get_visible() and line.get_linestyle() == "-":
                 found[f"{name}_{k}" if name in found else name] = panel, line

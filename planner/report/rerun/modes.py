@@ -10,15 +10,8 @@ import rerun.blueprint as rrb
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
+from planner.campaign import mode_motion
 from planner.campaign.labels import LabelledPose
-from planner.campaign.mode_motion import (
-    PointShapes,
-    agreement,
-    matched,
-    measured_alone,
-    measured_shapes,
-    simulated_shapes,
-)
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
 from planner.modal.matrix_modes import MatrixModes
@@ -46,10 +39,7 @@ def mode_views(count: int, eye: rrb.EyeControls3D) -> rrb.Container:
     """A view for each mode, and the MAC matrix with them."""
     views: list[rrb.View] = [
         rrb.Spatial3DView(
-            origin=f"/modes/mode_{k + 1}",
-            name=f"mode {k + 1}",
-            background=GROUND,
-            eye_controls=eye,
+            origin=f"/modes/mode_{k + 1}", name=f"mode {k + 1}", background=GROUND, eye_controls=eye
         )
         for k in range(count)
     ]
@@ -59,23 +49,20 @@ def mode_views(count: int, eye: rrb.EyeControls3D) -> rrb.Container:
 def draw_modes(
     stream: rr.RecordingStream, model: Model, pose: LabelledPose, measured: MeasuredPose | None
 ) -> None:
-    """The modes of a measured pose, at the recording's current time, moving from then on.
-
-    With the matrix that compares their shapes.
-    """
+    """The modes of a measured pose, now and moving from then on, and the MAC of their shapes."""
     robot, simulation = model.cell.robot, model.low.simulation
-    seen = measured_shapes(robot, pose, measured)
+    seen = mode_motion.measured_shapes(robot, pose, measured)
     drawn = skeleton(robot, pose.q)
     whole = None
     if simulation is None:
-        seen = measured_alone(seen)
+        seen = mode_motion.measured_alone(seen)
     else:
         layout = Layout(sensors=seen.names)
         count = len(pose.modes)
-        whole, there = simulated_shapes(simulation, pose.q, drawn, layout, count)
-        mac = agreement(seen, there)
+        whole, there = mode_motion.simulated_shapes(simulation, pose.q, drawn, layout, count)
+        mac = mode_motion.agreement(seen, there)
         draw(stream, "modes/mac", _mac_figure(pose, mac, len(seen.names)))
-        seen = matched(seen, there)
+        seen = mode_motion.matched(seen, there)
     for k in range(len(pose.modes)):
         path = f"modes/mode_{k + 1}"
         _still(stream, path, drawn, _title(pose, k), robot.arm_m)
@@ -99,8 +86,9 @@ def _still(
 
 
 def _points(
-    stream: rr.RecordingStream, path: str, seen: PointShapes, k: int, size: float, reach_m: float
-) -> None:
+    stream: rr.RecordingStream, path: str, seen: mode_motion.PointShapes, k: int, size: float,
+    reach_m: float,
+) -> None:  # fmt: skip
     """Sensors where they move to by the measured shape."""
     known = np.all(np.isfinite(seen.motion[k]), axis=1)
     places, motion = seen.place_m[known], size * seen.motion[k][known]

@@ -14,7 +14,6 @@ from planner.dataset.measure import MeasuredPose
 from planner.report.plot_marks import AXES, FAINTEST, magnitude, name_axes, panels
 
 LINES = 300  # frequency lines of a plot: as many as its width shows
-PULSE_MS = (-5.0, 35.0)  # of a hit, shown from its peak
 SIZE = (7.0, 3.6)  # inches
 NEAR_TARGET = 4.0  # times the target: what is shown; before the first measurement sds are far above
 EXPECTED, SPREAD = (255, 150, 40), (150, 95, 40)
@@ -62,17 +61,14 @@ def force_figure(measured: MeasuredPose) -> Figure:
         ms = 1000 * np.arange(hit.force_n.size) / hit.sampling_rate_hz
         ms = ms - ms[int(np.argmax(np.abs(hit.force_n)))]
         panel.plot(ms, np.abs(hit.force_n), label=f"along {axis}")
-    panel.set_xlim(PULSE_MS)
+    panel.set_xlim(-5.0, 35.0)
     panel.grid(True, alpha=0.25)
     name_axes(figure, grid, "time after the peak (ms)", "force (N)")
     return figure
 
 
 def measured_modes(pose: LabelledPose, before: Model | None) -> dict[str, float]:
-    """Frequencies (Hz) and damping (%) of a pose's modes, and what was expected before, by series.
-
-    Before the first measurement nothing was expected.
-    """
+    """Frequencies (Hz) and damping (%) of a pose's modes, and what, if anything, was expected."""
     rows: dict[str, float] = {}
     said = before.predict(pose.q[None]) if before is not None and before.labelled else None
     for k, mode in enumerate(pose.modes, 1):

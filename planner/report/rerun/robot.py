@@ -13,8 +13,6 @@ from planner.robot.link_bodies import BodyShape, bodies
 from planner.robot.robot import Robot
 
 WORLD = "tf#/"  # Rerun's frame of the root entity, in which entities lie that name no frame
-GREY = (150, 150, 155)
-RADIUS = 0.025  # of a capsule, in units of the arm's length
 NOT_SHAPES = ("rerun.controls", "CoordinateFrame", "InstancePoses3D", "Transform3D")
 
 
@@ -68,9 +66,9 @@ class RobotDrawing:
         self._stream.log(path, rr.CoordinateFrame(self._frame(body.link)), static=True)
         capsules = rr.Capsules3D(
             lengths=np.linalg.norm(body.ends_m, axis=1),
-            radii=RADIUS * self._robot.arm_m,
+            radii=0.025 * self._robot.arm_m,
             quaternions=[_turn_from_z(end) for end in body.ends_m],
-            colors=GREY,
+            colors=(150, 150, 155),
             fill_mode="solid",
         )
         self._stream.log(path, capsules, static=True)
