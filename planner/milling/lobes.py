@@ -53,8 +53,7 @@ def first_unstable(at: Monodromies, scan: np.ndarray) -> tuple[Level, Level] | N
     for first in range(0, len(scan), CHUNK):
         seen += levels(at, scan[first : first + CHUNK])
         seen = _with_peaks(at, seen)
-        bracket = _bracket(seen)
-        if bracket is not None:
+        if (bracket := _bracket(seen)) is not None:
             return bracket
         seen = seen[-2:]
     return None
@@ -99,7 +98,6 @@ class StabilityLimit:
     kind: str | None = None
     chatter_hz: float = np.nan
     error: float = np.nan
-    points: int = 0
 
 
 NO_LIMIT = StabilityLimit(np.inf)
@@ -184,7 +182,7 @@ def _told(
     mu = complex(values[top])
     flip = abs(mu.imag) < 1e-7 * abs(mu) and mu.real < 0
     hertz = chatter_frequency(machine, built, mu, vectors[:, top], depth)
-    return StabilityLimit(depth, "flip" if flip else "hopf", hertz, error, len(built.seen))
+    return StabilityLimit(depth, "flip" if flip else "hopf", hertz, error)
 
 
 def chatter_frequency(

@@ -93,7 +93,12 @@ def check(
     turned, rows = ((), ()) if swapped else (turned, rows)
     faults = [exchange.text for exchange in swapped]
     faults += _turned(turned, len(driving), reciprocity)
-    faults += [_turned_row(dof, sides.hit) for dof in rows]
+    done = "hit" if sides.hit else "felt"
+    faults += [
+        f"The sign {dof.at} is turned where it was {done}: in all modes it moves against the"
+        f" points around it. The sign of all FRFs {done} there was inverted before the analysis."
+        for dof in rows
+    ]
     single, entries = odd_entries(sides) if enough else ([], [])
     faults += single
     odd = tuple((sides.rows[row], sides.columns[column]) for row, column in entries)
@@ -102,15 +107,6 @@ def check(
     if not driving:
         told = (*told, "No point was hit where it was felt: shapes are not scaled.")
     return Consistency(driving, tuple(faults), told, turned, rows, untied, odd)
-
-
-def _turned_row(dof: Dof, hit: bool) -> str:
-    done = "hit" if hit else "felt"
-    return (
-        f"The sign {dof.at} is turned where it was {done}: in all modes it moves against the"
-        f" points around it. The sign of all FRFs {done} there was "
-        "inverted before the analysis."
-    )
 
 
 def _driving(

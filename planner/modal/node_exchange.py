@@ -84,10 +84,12 @@ def exchanged_nodes(
     if found is None:
         return None
     rows: dict[str, dict[str, int]] = {}  # of each node, by direction
-    for row, dof in sorted(enumerate(dofs[k].positive for k in found.index), key=_direction):
+    placed = enumerate(dofs[k].positive for k in found.index)
+    for row, dof in sorted(placed, key=lambda place: place[1].direction):
         rows.setdefault(dof.node, {})[dof.direction] = row
     nodes = [np.array(list(own.values())) for own in rows.values()]
-    gains = _gains(found, nodes, [tuple(own) for own in rows.values()])
+    directions = [tuple(own) for own in rows.values()]
+    gains = _gains(found, nodes, directions)
     a, b = (int(k) for k in np.unravel_index(np.argmax(gains), gains.shape))
     if not np.isfinite(gains[a, b]):
         return None
@@ -98,7 +100,7 @@ def exchanged_nodes(
     after = replace(found, values=values)
     left = float(np.sum(_surprise(after, nodes)[[a, b]]))
     rivals = np.delete(gains[[a, b]], [a, b], axis=1)
-    again = _gains(after, nodes, [tuple(own) for own in rows.values()])
+    again = _gains(after, nodes, directions)
     clear = (
         before > 2 * SURPRISED * usual
         and left < EXPLAINED * before
@@ -108,10 +110,6 @@ def exchanged_nodes(
     )
     first, second = sorted((a, b))  # which of both is rounding's
     return (list(rows)[first], list(rows)[second]) if clear else None
-
-
-def _direction(place: tuple[int, Dof]) -> str:
-    return place[1].direction
 
 
 def _surprise(found: RowPrediction, nodes: Sequence[np.ndarray]) -> np.ndarray:
