@@ -184,27 +184,27 @@ def transfer(segments: Sequence[Segment], omega: np.ndarray) -> np.ndarray:
 @lru_cache(maxsize=8)  # a contact is identified with the same segments again and again
 def _segment(segment: Segment, lines: bytes) -> np.ndarray:
     omega = np.frombuffer(lines)
-    out = np.zeros((len(omega), 12, 12), complex)
-    bent = _along(segment, lambda section: section.bending(omega))
-    out[np.ix_(range(len(omega)), FIRST_PLANE, FIRST_PLANE)] = bent
-    out[np.ix_(range(len(omega)), SECOND_PLANE, SECOND_PLANE)] = bent * np.outer(TURNED, TURNED)
-    rods = (AXIAL, Section.stretching), (TORSION, Section.twisting)
-    for places, slope in rods:
-        moved = _along(segment, lambda section, slope=slope: slope(section, omega))
-        out[np.ix_(range(len(omega)), places, places)] = moved
+    out, each = np.zeros((len(omega), 12, 12), complex), range(len(omega))
+    bent = _along(segment, Section.bending, omega)
+    out[np.ix_(each, FIRST_PLANE, FIRST_PLANE)] = bent
+    out[np.ix_(each, SECOND_PLANE, SECOND_PLANE)] = bent * np.outer(TURNED, TURNED)
+    out[np.ix_(each, AXIAL, AXIAL)] = _along(segment, Section.stretching, omega)
+    out[np.ix_(each, TORSION, TORSION)] = _along(segment, Section.twisting, omega)
     # The mass at its tip's side: motion there takes a force.
     pushed = segment.mass * (omega**2)[:, None, None] * out[:, :, 6:9]
     out[:, :, :3] += pushed
     return out
 
 
-def _along(segment: Segment, slope: Callable[[Section], np.ndarray]) -> np.ndarray:
+def _along(
+    segment: Segment, slope: Callable[[Section, np.ndarray], np.ndarray], omega: np.ndarray
+) -> np.ndarray:
     """From the tip's side of a segment to its holder's: the exponential of −slope·length."""
     if segment.end_diameter == segment.diameter:
-        return expm(-segment.length * slope(segment.at(0.0)))
-    step = segment.length / SLICES
+        return expm(-segment.length * slope(segment.at(0.0), omega))
+    step, k = segment.length / SLICES, np.arange(SLICES)
     near, far = (
-        np.array([slope(segment.at((k + 0.5 + side * GAUSS) / SLICES)) for k in range(SLICES)])
+        np.array([slope(segment.at(place), omega) for place in (k + 0.5 + side * GAUSS) / SLICES])
         for side in (-1, 1)
     )
     # Run towards the holder, the far point comes first.

@@ -104,7 +104,7 @@ def _decays(
             raise RefusedError(
                 f"{record.source}: no hit stands out of channel {force.name}; hit harder."
             )
-        starts = [_pulse_end(force.samples, hit, rate) for hit in hits]
+        starts = [_pulse_end(force.samples, int(hit), rate) for hit in hits]
         _remark_on_pulse(force, hits, rate, remarks)
     ends = [*starts[1:], values.shape[1]]
     margin = round(0.05 * rate)  # the foot of the next pulse
@@ -161,9 +161,9 @@ def _identify_sound(
     remarks: list[str],
 ) -> tuple[tuple[str, ...], PoleIdentification]:  # fmt: skip
     """Identify, leave out channels that the modes do not explain, identify again."""
-    scale = np.std(samples, axis=(1, 2), keepdims=True)
-    scale[scale == 0] = 1.0
-    found = identify_decays(samples / scale, record.sampling_rate_hz, band)
+    factor = np.std(samples, axis=(1, 2))[:, None]
+    factor[factor == 0] = 1.0
+    found = identify_decays(samples / factor[..., None], record.sampling_rate_hz, band)
     if found is None or not found.modes:
         raise RefusedError(_nothing(record, band))
     explained = _explained(found, band)
@@ -171,7 +171,12 @@ def _identify_sound(
     # in units of the scatter of such a ratio, or if the modes found explain this share of it.
     sound = explained >= 0.2 * np.max(explained)
     if np.all(sound):
-        return names, _rescaled(found, scale)
+        modes = (
+            replace(m, residue=m.residue * factor, residue_sd=m.residue_sd * factor,
+                    shape=rank_one(m.residue * factor)[0])
+            for m in found.modes
+        )  # fmt: skip
+        return names, replace(found, modes=tuple(modes))
     for name, share in zip(np.array(names)[~sound], explained[~sound], strict=True):
         remarks.append(
             f"Sensor {name} does not follow the hits (the modes explain {100 * share:.0f} % of"
@@ -188,18 +193,6 @@ def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarr
     fitted = model(data, found.fit)
     error = np.sum(np.abs(data.response - fitted)[..., inside] ** 2, axis=(1, 2))
     return 1 - error / np.sum(np.abs(data.response[..., inside]) ** 2, axis=(1, 2))
-
-
-def _rescaled(found: PoleIdentification, scale: np.ndarray) -> PoleIdentification:
-    factor = scale[:, :, 0]
-    modes = (
-        replace(
-            mode, residue=mode.residue * factor, residue_sd=mode.residue_sd * factor,
-            shape=rank_one(mode.residue * factor)[0],
-        )
-        for mode in found.modes
-    )  # fmt: skip
-    return replace(found, modes=tuple(modes))
 
 
 def _same(a: Mode, b: Mode) -> bool:
