@@ -125,11 +125,11 @@ def stability_limits(
     if len(speeds) < MANY:
         return tuple(discretised_limit(machine, rpm, scan) for rpm in speeds)
     blocks = [speeds[i : i + BLOCK] for i in range(0, len(speeds), BLOCK)]
-    found = parallel_map(
-        lambda block: [discretised_limit(machine, rpm, scan) for rpm in block],
-        blocks,
-        lambda number, count: progress("lobes", count / len(blocks)),
-    )
+
+    def limits_of(block: list[float]) -> list[StabilityLimit]:
+        return [discretised_limit(machine, rpm, scan) for rpm in block]
+
+    found = parallel_map(limits_of, blocks, lambda _, n: progress("lobes", n / len(blocks)))
     return tuple(loss for block in found for loss in block)
 
 

@@ -84,14 +84,14 @@ def check(
         rows = tuple(sides.rows[k] for k in against)
     # At a point that both roved and stayed either may be turned; its neighbours tell.
     turned = tuple(dof for dof in wrong if dof not in rows)
-    swapped: tuple[Exchange, ...] = ()
+    swapped: Exchange | None = None
     # Two exchanged points may look like two turned signs: one fault is likelier than two.
     if len(rows) == 1 and not turned:
         swapped = exchanged_by_neighbours(sides, geometry)
     elif enough and not turning_helps(sides, turned):
         swapped = exchanged_by_columns(sides) or exchanged_by_neighbours(sides, geometry)
     turned, rows = ((), ()) if swapped else (turned, rows)
-    faults = [exchange.text for exchange in swapped]
+    faults = [swapped.text] if swapped else []
     faults += _turned(turned, len(driving), reciprocity)
     done = "hit" if sides.hit else "felt"
     faults += [
@@ -102,7 +102,7 @@ def check(
     single, entries = odd_entries(sides) if enough else ([], [])
     faults += single
     odd = tuple((sides.rows[row], sides.columns[column]) for row, column in entries)
-    untied = tuple(dof for dof in sides.columns if any(e.concerns(dof) for e in swapped))
+    untied = tuple(dof for dof in sides.columns if swapped and swapped.concerns(dof))
     told = () if faults else _remarks(reciprocity)
     if not driving:
         told = (*told, "No point was hit where it was felt: shapes are not scaled.")
