@@ -10,14 +10,13 @@ et al., Phys. Rep. 470, 2009) in the slices of a tapered one.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, reduce
 
 import msgspec
 import numpy as np
-import scipy.linalg
+from scipy.linalg import expm
 
 SLICES = 24  # of a tapered segment: one that narrows to less than half is then exact to 1e-5
-TAYLOR = 14  # terms of the exponential: 1e-16 at the norm to which matrices are halved
 GAUSS = np.sqrt(3) / 6  # places of Gauss's two points on a slice, from its middle
 
 
@@ -185,56 +184,30 @@ def transfer(segments: Sequence[Segment], omega: np.ndarray) -> np.ndarray:
 @lru_cache(maxsize=8)  # a contact is identified with the same segments again and again
 def _segment(segment: Segment, lines: bytes) -> np.ndarray:
     omega = np.frombuffer(lines)
-    out = np.zeros((len(omega), 12, 12), complex)
-    bent = _along(segment, lambda section: section.bending(omega))
-    out[np.ix_(range(len(omega)), FIRST_PLANE, FIRST_PLANE)] = bent
-    out[np.ix_(range(len(omega)), SECOND_PLANE, SECOND_PLANE)] = bent * np.outer(TURNED, TURNED)
-    rods = (AXIAL, Section.stretching), (TORSION, Section.twisting)
-    for places, slope in rods:
-        moved = _along(segment, lambda section, slope=slope: slope(section, omega))
-        out[np.ix_(range(len(omega)), places, places)] = moved
+    out, each = np.zeros((len(omega), 12, 12), complex), range(len(omega))
+    bent = _along(segment, Section.bending, omega)
+    out[np.ix_(each, FIRST_PLANE, FIRST_PLANE)] = bent
+    out[np.ix_(each, SECOND_PLANE, SECOND_PLANE)] = bent * np.outer(TURNED, TURNED)
+    out[np.ix_(each, AXIAL, AXIAL)] = _along(segment, Section.stretching, omega)
+    out[np.ix_(each, TORSION, TORSION)] = _along(segment, Section.twisting, omega)
     # The mass at its tip's side: motion there takes a force.
     pushed = segment.mass * (omega**2)[:, None, None] * out[:, :, 6:9]
     out[:, :, :3] += pushed
     return out
 
 
-def _along(segment: Segment, slope: Callable[[Section], np.ndarray]) -> np.ndarray:
+def _along(
+    segment: Segment, slope: Callable[[Section, np.ndarray], np.ndarray], omega: np.ndarray
+) -> np.ndarray:
     """From the tip's side of a segment to its holder's: the exponential of −slope·length."""
     if segment.end_diameter == segment.diameter:
-        return exponential(-segment.length * slope(segment.at(0.0)))
-    step = segment.length / SLICES
+        return expm(-segment.length * slope(segment.at(0.0), omega))
+    step, k = segment.length / SLICES, np.arange(SLICES)
     near, far = (
-        np.array([slope(segment.at((k + 0.5 + side * GAUSS) / SLICES)) for k in range(SLICES)])
+        np.array([slope(segment.at(place), omega) for place in (k + 0.5 + side * GAUSS) / SLICES])
         for side in (-1, 1)
     )
     # Run towards the holder, the far point comes first.
     bracket = near @ far - far @ near
-    slices = exponential(-step / 2 * (near + far) + step**2 * np.sqrt(3) / 12 * bracket)
-    total = slices[0]
-    for one in slices[1:]:
-        total = total @ one
-    return total
-
-
-def exponential(a: np.ndarray) -> np.ndarray:
-    """exp of matrices (…, n, n), by Taylor's series of scaled matrices, squared again.
-
-    The entries' units differ (m, rad, N, N·m): they are balanced first.
-    """
-    size = a.shape[-1]
-    largest = np.abs(a).reshape(-1, size, size).max(axis=0)
-    scale = scipy.linalg.matrix_balance(largest, permute=False, separate=True)[1][0]
-    b = a / scale[:, None] * scale
-    norm = np.abs(b).sum(axis=-1).max()
-    # Halved to.
-    halvings = max(0, int(np.ceil(np.log2(max(norm, 1e-300) / 0.5))))
-    b = b / 2.0**halvings
-    eye = np.eye(size)
-    # exp(b) − 1 is what is squared: small parts keep their digits beside the 1.
-    less_one = b / TAYLOR
-    for k in range(TAYLOR - 1, 0, -1):
-        less_one = b @ (eye + less_one) / k
-    for _ in range(halvings):
-        less_one = 2 * less_one + less_one @ less_one
-    return scale[:, None] * (eye + less_one) / scale
+    slices = expm(-step / 2 * (near + far) + step**2 * np.sqrt(3) / 12 * bracket)
+    return reduce(np.matmul, slices)

@@ -212,11 +212,6 @@ class CutterFit:
         square = np.sum(self.found.fit.variance, axis=(0, 1))
         return np.sqrt(square) / (2 * np.pi * self.frf.frequency_hz) ** 2
 
-    @property
-    def error(self) -> float:
-        """‖accelerance − fit‖/‖accelerance‖."""
-        return self.found.fit_error
-
 
 def hidden_below(fit: CutterFit, mean: np.ndarray, depth_m: float) -> float | None:
     """The highest frequency in Hz at which a mode that chatters below a depth could hide, if any.

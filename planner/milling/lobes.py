@@ -53,8 +53,7 @@ def first_unstable(at: Monodromies, scan: np.ndarray) -> tuple[Level, Level] | N
     for first in range(0, len(scan), CHUNK):
         seen += levels(at, scan[first : first + CHUNK])
         seen = _with_peaks(at, seen)
-        bracket = _bracket(seen)
-        if bracket is not None:
+        if (bracket := _bracket(seen)) is not None:
             return bracket
         seen = seen[-2:]
     return None
@@ -99,7 +98,6 @@ class StabilityLimit:
     kind: str | None = None
     chatter_hz: float = np.nan
     error: float = np.nan
-    points: int = 0
 
 
 NO_LIMIT = StabilityLimit(np.inf)
@@ -127,11 +125,11 @@ def stability_limits(
     if len(speeds) < MANY:
         return tuple(discretised_limit(machine, rpm, scan) for rpm in speeds)
     blocks = [speeds[i : i + BLOCK] for i in range(0, len(speeds), BLOCK)]
-    found = parallel_map(
-        lambda block: [discretised_limit(machine, rpm, scan) for rpm in block],
-        blocks,
-        lambda number, count: progress("lobes", count / len(blocks)),
-    )
+
+    def limits_of(block: list[float]) -> list[StabilityLimit]:
+        return [discretised_limit(machine, rpm, scan) for rpm in block]
+
+    found = parallel_map(limits_of, blocks, lambda _, n: progress("lobes", n / len(blocks)))
     return tuple(loss for block in found for loss in block)
 
 
@@ -184,7 +182,7 @@ def _told(
     mu = complex(values[top])
     flip = abs(mu.imag) < 1e-7 * abs(mu) and mu.real < 0
     hertz = chatter_frequency(machine, built, mu, vectors[:, top], depth)
-    return StabilityLimit(depth, "flip" if flip else "hopf", hertz, error, len(built.seen))
+    return StabilityLimit(depth, "flip" if flip else "hopf", hertz, error)
 
 
 def chatter_frequency(

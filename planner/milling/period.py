@@ -97,10 +97,10 @@ def period(
     """Of modes in the cut's plane at a speed; `depth_m` counts where the cutter has a helix."""
     speed = rpm * 2 * np.pi / 60
     found = contact(cut, depth_m, grid.element_rad)
-    even = cut.even
-    points = _points(found, cut, speed, grid.degree, depth_m, _seen(modes) if even else None)
+    seen = _seen(modes) if cut.even else None
+    points = _points(found, cut, speed, grid.degree, depth_m, seen)
     built = _build(modes, found, points, speed, grid.degree)
-    return built if even else _uneven(built, found, points, cut, speed, grid.degree, depth_m)
+    return built if cut.even else _uneven(built, found, points, cut, grid.degree, depth_m)
 
 
 def _seen(modes: CutterModes) -> np.ndarray | None:
@@ -193,9 +193,8 @@ def _joined(shared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _uneven(
-    built: Period, found: Engagement, points: _Points, cut: Cut, speed: float,
-    degree: int, depth_m: float,
-) -> Period:  # fmt: skip
+    built: Period, found: Engagement, points: _Points, cut: Cut, degree: int, depth_m: float
+) -> Period:
     """The same where teeth follow at different angles: each has a delay of its own.
 
     What the tooth before left is interpolated in the element that it was left in.

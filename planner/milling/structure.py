@@ -115,7 +115,7 @@ class Structure:
         """With a cut and its coefficients as stated."""
         return Machine(self.modes, cut)
 
-    def samples(self, cut: Cut, count: int = SAMPLES, seed: int = SEED) -> list[Machine]:
+    def samples(self, cut: Cut, count: int = SAMPLES) -> list[Machine]:
         """So many machines that are as likely as each other; none where nothing is uncertain."""
         sds = cut.kt_sd_percent / 100, cut.kr_sd_percent / 100
         if not count or not (np.any(self.spread > 0) or any(sds) or self.fit is not None):
@@ -123,10 +123,10 @@ class Structure:
         machine, each = self.machine(cut), -(-count // REPLICATES)
         drawn = [
             sample for part in range(REPLICATES)
-            for sample in sampled(machine, self.spread, sds, each, seed + part)
+            for sample in sampled(machine, self.spread, sds, each, SEED + part)
         ]  # fmt: skip
         if self.fit is not None:
-            own = self.fit.drawn(len(drawn), seed)
+            own = self.fit.drawn(len(drawn), SEED)
             drawn = [replace(one, modes=modes) for one, modes in zip(drawn, own, strict=True)]
         return drawn
 
@@ -159,14 +159,15 @@ def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
     count = len(np.unique(fit.modes.poles))
     remarks = [
         *plane.remarks,
-        f"{count} modes fitted to {plane.name} leave {100 * fit.error:.2g} % of the accelerance.",
+        f"{count} modes fitted to {plane.name} leave {100 * fit.found.fit_error:.2g} % of the "
+        f"accelerance.",
     ]
     if np.any(spread > 0):
         remarks.append(
             f"Depths at 95 %: frequency, damping and size of each mode are drawn so that the FRFs "
             f"scatter by their sd ({100 * given:.0f} % of its square is met)."
         )
-    noisy = fit if plane.sd is None and fit.error > ROUNDING else None
+    noisy = fit if plane.sd is None and fit.found.fit_error > ROUNDING else None
     return Structure(fit.modes, spread, plane, tuple(remarks), noisy)
 
 

@@ -84,33 +84,29 @@ def check(
         rows = tuple(sides.rows[k] for k in against)
     # At a point that both roved and stayed either may be turned; its neighbours tell.
     turned = tuple(dof for dof in wrong if dof not in rows)
-    swapped: tuple[Exchange, ...] = ()
+    swapped: Exchange | None = None
     # Two exchanged points may look like two turned signs: one fault is likelier than two.
     if len(rows) == 1 and not turned:
         swapped = exchanged_by_neighbours(sides, geometry)
     elif enough and not turning_helps(sides, turned):
         swapped = exchanged_by_columns(sides) or exchanged_by_neighbours(sides, geometry)
     turned, rows = ((), ()) if swapped else (turned, rows)
-    faults = [exchange.text for exchange in swapped]
+    faults = [swapped.text] if swapped else []
     faults += _turned(turned, len(driving), reciprocity)
-    faults += [_turned_row(dof, sides.hit) for dof in rows]
+    done = "hit" if sides.hit else "felt"
+    faults += [
+        f"The sign {dof.at} is turned where it was {done}: in all modes it moves against the"
+        f" points around it. The sign of all FRFs {done} there was inverted before the analysis."
+        for dof in rows
+    ]
     single, entries = odd_entries(sides) if enough else ([], [])
     faults += single
     odd = tuple((sides.rows[row], sides.columns[column]) for row, column in entries)
-    untied = tuple(dof for dof in sides.columns if any(e.concerns(dof) for e in swapped))
+    untied = tuple(dof for dof in sides.columns if swapped and swapped.concerns(dof))
     told = () if faults else _remarks(reciprocity)
     if not driving:
         told = (*told, "No point was hit where it was felt: shapes are not scaled.")
     return Consistency(driving, tuple(faults), told, turned, rows, untied, odd)
-
-
-def _turned_row(dof: Dof, hit: bool) -> str:
-    done = "hit" if hit else "felt"
-    return (
-        f"The sign {dof.at} is turned where it was {done}: in all modes it moves against the"
-        f" points around it. The sign of all FRFs {done} there was "
-        "inverted before the analysis."
-    )
 
 
 def _driving(

@@ -205,12 +205,12 @@ def estimate_modes(frf: Frf, band_hz: tuple[float, float]) -> ModalModel:
     no mode can be found.
     """
     found = identification(frf, band_hz)
-    columns = np.flatnonzero(frf.measured)
     inside = [
-        m for m in (found.modes if found else ()) if band_hz[0] <= m.frequency_hz <= band_hz[1]
-    ]
-    modes = tuple(_mode(m, columns) for m in inside if m.probability >= LEAST_PROBABILITY)
-    doubtful = tuple(_mode(m, columns) for m in inside if m.probability < LEAST_PROBABILITY)
+        _at_all_axes(mode, np.flatnonzero(frf.measured)) for mode in (found.modes if found else ())
+        if band_hz[0] <= mode.frequency_hz <= band_hz[1]
+    ]  # fmt: skip
+    modes = tuple(mode for mode in inside if mode.probability >= LEAST_PROBABILITY)
+    doubtful = tuple(mode for mode in inside if mode.probability < LEAST_PROBABILITY)
     if found is None or not modes:
         raise RefusedError(
             f"No mode could be found between {band_hz[0]:g} and {band_hz[1]:g} Hz: hit harder or"
@@ -225,10 +225,6 @@ def identification(frf: Frf, band_hz: tuple[float, float]) -> PoleIdentification
 
     Raises RefusedError where too few frequency lines are usable.
     """
-    return identify(_select(frf, band_hz))
-
-
-def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:
     usable = frf.usable_band_hz
     low = max(band_hz[0] / (1 + MARGIN), usable[0], 1e-9)
     high = min(band_hz[1] * (1 + MARGIN), usable[1])
@@ -241,7 +237,7 @@ def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:
     variance = frf.variance[:, columns][..., chosen]
     known = np.all(np.isfinite(variance) & (variance > 0))
     force = frf.force_share
-    return Data(
+    data = Data(
         frf.frequency_hz[chosen],
         h[..., chosen],
         variance if known else None,
@@ -250,14 +246,13 @@ def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:
         force_share=None if force is None else force[columns][:, chosen],
         force_window_s=frf.force_window_s,
     )
+    return identify(data)
 
 
-def _mode(mode: Mode, columns: np.ndarray) -> Mode:
+def _at_all_axes(mode: Mode, columns: np.ndarray) -> Mode:
     """With residues at all three hit axes, NaN where nothing was hit."""
-    residue = np.full((3, 3), np.nan + 1j * np.nan)
-    residue_sd = np.full((3, 3), np.nan)
-    residue[:, columns] = mode.residue
-    residue_sd[:, columns] = mode.residue_sd
+    residue, residue_sd = np.full((3, 3), np.nan + 1j * np.nan), np.full((3, 3), np.nan)
+    residue[:, columns], residue_sd[:, columns] = mode.residue, mode.residue_sd
     return replace(mode, residue=residue, residue_sd=residue_sd)
 
 

@@ -1,6 +1,6 @@
 """Modes of a record whose force cannot be used: free decays after its hits."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.signal import find_peaks, peak_widths
@@ -23,15 +23,6 @@ MAX_ORDER = 30  # higher ones do not help with a handful of channels
 MARGIN, LEAST_LINES = 0.15, 6  # beyond the band that is fitted too; that suffice
 
 
-@dataclass(frozen=True, eq=False)
-class _Decays:
-    """What is identified: responses (channels, decays, n) from the end of each pulse on."""
-
-    samples: np.ndarray
-    names: tuple[str, ...]
-    rate_hz: float
-
-
 def analyse_record(
     record: TimeRecord,
     force_channel: str | None = None,
@@ -48,20 +39,18 @@ def analyse_record(
     is all that led to them (stabilisation diagram, fit).
     """
     remarks = [*record.remarks, *(fault.text for fault in record.faults)]
-    force = _force(record, force_channel)
-    decays = _decays(record, force, remarks)
-    lowest = max(10 * decays.rate_hz / decays.samples.shape[-1], 0.01 * decays.rate_hz)
-    band = band_hz or (lowest, 0.45 * decays.rate_hz)
-    decays, found = _identify_sound(record, decays, band, remarks)
-    # Least probability.
+    samples, names = _decays(record, _force(record, force_channel), remarks)
+    rate = record.sampling_rate_hz
+    band = band_hz or (max(10 * rate / samples.shape[-1], 0.01 * rate), 0.45 * rate)
+    names, found = _identify_sound(record, samples, names, band, remarks)
     sure = [mode for mode in found.modes if mode.probability >= 0.5]
     kept = [mode for mode in sure if band[0] <= mode.frequency_hz <= band[1]]
-    modes = _merge(kept, remarks)
+    modes = tuple(_merged(group, remarks) for group in grouped(kept, _same))
     if not modes:
         raise RefusedError(_nothing(record, band))
     remarks.append(
         "Modes are from free decays, shapes in the order "
-        + ", ".join(decays.names)
+        + ", ".join(names)
         + "; without a usable force they are not scaled."
     )
     return ModalModel(modes, band, found.fit_error, found.order, tuple(remarks)), found
@@ -97,7 +86,10 @@ def _hits(force: np.ndarray, apart: int = 1) -> np.ndarray:
     return find_peaks(np.r_[0.0, size, 0.0], max(20 * noise, 0.15 * most), distance=apart)[0] - 1
 
 
-def _decays(record: TimeRecord, force: Channel | None, remarks: list[str]) -> _Decays:
+def _decays(
+    record: TimeRecord, force: Channel | None, remarks: list[str]
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Responses (channels, decays, n) from the end of each pulse on, and the channels' names."""
     rate = record.sampling_rate_hz
     responses = [c for c in record.channels if c is not force]
     values = np.array([c.samples for c in responses], float)
@@ -112,7 +104,7 @@ def _decays(record: TimeRecord, force: Channel | None, remarks: list[str]) -> _D
             raise RefusedError(
                 f"{record.source}: no hit stands out of channel {force.name}; hit harder."
             )
-        starts = [_pulse_end(force.samples, hit, rate) for hit in hits]
+        starts = [_pulse_end(force.samples, int(hit), rate) for hit in hits]
         _remark_on_pulse(force, hits, rate, remarks)
     ends = [*starts[1:], values.shape[1]]
     margin = round(0.05 * rate)  # the foot of the next pulse
@@ -120,10 +112,9 @@ def _decays(record: TimeRecord, force: Channel | None, remarks: list[str]) -> _D
     # Decays longer than this many samples are cut: their tail is noise.
     length = max(8, min(length, 8192, _lifetime(values, starts, length, rate)))
     samples = np.stack([values[:, s : s + length] for s in starts if s + length <= values.shape[1]])
-    names = tuple(c.name for c in responses)
     if not np.all(np.isfinite(samples)):
         raise RefusedError(f"{record.source}: the decays hold missing values; export them again.")
-    return _Decays(samples.transpose(1, 0, 2), names, rate)
+    return samples.transpose(1, 0, 2), tuple(c.name for c in responses)
 
 
 def _lifetime(values: np.ndarray, starts: list[int], length: int, rate: float) -> int:
@@ -166,12 +157,13 @@ def _remark_on_pulse(force: Channel, hits: np.ndarray, rate: float, remarks: lis
 
 
 def _identify_sound(
-    record: TimeRecord, decays: _Decays, band: tuple[float, float], remarks: list[str]
-) -> tuple[_Decays, PoleIdentification]:
+    record: TimeRecord, samples: np.ndarray, names: tuple[str, ...], band: tuple[float, float],
+    remarks: list[str],
+) -> tuple[tuple[str, ...], PoleIdentification]:  # fmt: skip
     """Identify, leave out channels that the modes do not explain, identify again."""
-    scale = np.std(decays.samples, axis=(1, 2), keepdims=True)
-    scale[scale == 0] = 1.0
-    found = identify_decays(decays.samples / scale, decays.rate_hz, band)
+    factor = np.std(samples, axis=(1, 2))[:, None]
+    factor[factor == 0] = 1.0
+    found = identify_decays(samples / factor[..., None], record.sampling_rate_hz, band)
     if found is None or not found.modes:
         raise RefusedError(_nothing(record, band))
     explained = _explained(found, band)
@@ -179,15 +171,19 @@ def _identify_sound(
     # in units of the scatter of such a ratio, or if the modes found explain this share of it.
     sound = explained >= 0.2 * np.max(explained)
     if np.all(sound):
-        return decays, _rescaled(found, scale)
-    for name, share in zip(np.array(decays.names)[~sound], explained[~sound], strict=True):
+        modes = (
+            replace(m, residue=m.residue * factor, residue_sd=m.residue_sd * factor,
+                    shape=rank_one(m.residue * factor)[0])
+            for m in found.modes
+        )  # fmt: skip
+        return names, replace(found, modes=tuple(modes))
+    for name, share in zip(np.array(names)[~sound], explained[~sound], strict=True):
         remarks.append(
             f"Sensor {name} does not follow the hits (the modes explain {100 * share:.0f} % of"
             " it): it was left out; check the sensor and its cable."
         )
-    names = tuple(np.array(decays.names)[sound].tolist())
-    fewer = _Decays(decays.samples[sound], names, decays.rate_hz)
-    return _identify_sound(record, fewer, band, remarks)
+    names = tuple(np.array(names)[sound].tolist())
+    return _identify_sound(record, samples[sound], names, band, remarks)
 
 
 def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarray:
@@ -199,28 +195,12 @@ def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarr
     return 1 - error / np.sum(np.abs(data.response[..., inside]) ** 2, axis=(1, 2))
 
 
-def _rescaled(found: PoleIdentification, scale: np.ndarray) -> PoleIdentification:
-    factor = scale[:, :, 0]
-    modes = (
-        replace(
-            mode, residue=mode.residue * factor, residue_sd=mode.residue_sd * factor,
-            shape=rank_one(mode.residue * factor)[0],
-        )
-        for mode in found.modes
-    )  # fmt: skip
-    return replace(found, modes=tuple(modes))
-
-
-def _merge(modes: list[Mode], remarks: list[str]) -> tuple[Mode, ...]:
-    """One mode for neighbours within a bandwidth that share their shape.
+def _same(a: Mode, b: Mode) -> bool:
+    """Whether neighbours are one mode: within a bandwidth, and of one shape.
 
     A mode whose frequency or damping changes as it dies away (friction, play) decays in several
     exponentials; two modes of one structure at one place would differ in shape.
     """
-    return tuple(_merged(group, remarks) for group in grouped(modes, _same))
-
-
-def _same(a: Mode, b: Mode) -> bool:
     width = max(a.damping_ratio * a.frequency_hz, b.damping_ratio * b.frequency_hz)
     # MAC above which neighbours within a bandwidth are one mode.
     return abs(a.frequency_hz - b.frequency_hz) < width and mac(a.shape, b.shape) > 0.95

@@ -55,30 +55,27 @@ def homogeneity(
     p = _chance(groups, band_hz, window_rate_1_s)
     same = worst < SHARE or p is None or p > CHANCE
     found = Homogeneity(levels, worst, 1.0 if p is None else p, same)
-    return found, _missed(found) if p is None else _remark(found)
+    return found, _remark(found, p is not None)
 
 
-def _missed(found: Homogeneity) -> str:
-    """What to say where hits were not repeated, so that chance cannot be told."""
-    low, high = found.levels[0], found.levels[-1]
-    if found.difference < SHARE:
+def _remark(found: Homogeneity, repeated: bool) -> str:
+    """One sentence for the engineer; empty where the structure answers in proportion.
+
+    Where hits were not repeated chance cannot be told.
+    """
+    if found.homogeneous if repeated else found.difference < SHARE:
         return ""
-    return (
+    low, high = found.levels[0], found.levels[-1]
+    differ = (
         f"FRFs at {low.peak_force_n:.0f} N and {high.peak_force_n:.0f} N differ by "
-        f"{100 * found.difference:.0f} %. Either the response is not proportional to the "
-        "force, or hits missed the point or the axis; hit twice at each level to see which."
+        f"{100 * found.difference:.0f} %"
     )
-
-
-def _remark(found: Homogeneity) -> str:
-    """One sentence for the engineer; empty where the structure answers in proportion."""
-    if found.homogeneous:
-        return ""
-    low, high = found.levels[0], found.levels[-1]
-    text = (
-        f"The response is not proportional to the force: FRFs at {low.peak_force_n:.0f} N and "
-        f"{high.peak_force_n:.0f} N differ by {100 * found.difference:.0f} %"
-    )
+    if not repeated:
+        return (
+            f"{differ}. Either the response is not proportional to the force, or hits missed the "
+            "point or the axis; hit twice at each level to see which."
+        )
+    text = f"The response is not proportional to the force: {differ}"
     (f0, sd0, zeta0), (f1, sd1, zeta1) = (
         np.array([at.frequency_hz, at.frequency_sd_hz, at.damping_ratio], dtype=float)
         for at in (low, high)
@@ -145,14 +142,9 @@ def _level(
     except RefusedError:
         found = ()
     own = [_same(mode, found) for mode in modal.modes]
-    return ForceLevel(
-        force,
-        len(hits),
-        tuple(m.frequency_hz if m else None for m in own),
-        tuple(m.frequency_sd_hz if m else None for m in own),
-        tuple(m.damping_ratio if m else None for m in own),
-        tuple(m.damping_sd if m else None for m in own),
-    )
+    told = ("frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd")
+    rows = (tuple(getattr(m, name) if m else None for m in own) for name in told)
+    return ForceLevel(force, len(hits), *rows)
 
 
 def _same(mode: Mode, found: tuple[Mode, ...]) -> Mode | None:

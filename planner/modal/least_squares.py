@@ -219,38 +219,24 @@ def refine(
     count = response.shape[-1]
     data = WeightedSets.of(lines, response.reshape(-1, count), variance.reshape(-1, count))
     poles = np.asarray(poles, complex)
-
-    def at(parts: np.ndarray) -> ReducedFit:
-        return reduced_together(data, complex_of(parts))
-
-    def objective(parts: np.ndarray) -> ReducedFit | None:
-        return at(parts) if allowed(complex_of(parts)) else None
-
-    start = np.concatenate([poles.real, poles.imag])
-    parts, point = _minimised(objective, start, at(start))
-    return _finish(data, complex_of(parts), point, variance)
-
-
-def _minimised(
-    objective: Callable[[np.ndarray], ReducedFit | None], parts: np.ndarray, point: ReducedFit
-) -> tuple[np.ndarray, ReducedFit]:
-    """Where damped Gauss-Newton steps (Levenberg-Marquardt) lead; None where poles cannot be."""
-    damping = DAMPING
+    point, damping = reduced_together(data, poles), DAMPING
+    # Damped Gauss-Newton steps (Levenberg-Marquardt)
     for _ in range(MAX_ITERATIONS):
         # In units in which the diagonal is 1: the damping is relative to it.
         diagonal = np.diagonal(point.normal)
         unit = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
         damped = point.normal * np.outer(unit, unit) + damping * np.eye(len(unit))
         step = -unit * np.linalg.lstsq(damped, unit * point.gradient)[0]
-        tried = objective(parts + step)
+        there = poles + complex_of(step)
+        tried = reduced_together(data, there) if allowed(there) else None
         settled = tried is not None and damping < DAMPING and _still(point, tried, step)
         if tried is not None and tried.chi2 < point.chi2:
-            parts, point, damping = parts + step, tried, LIGHTER * damping
+            poles, point, damping = there, tried, LIGHTER * damping
         else:
             damping *= HEAVIER
         if settled or damping > MOST:
             break
-    return parts, point
+    return _finish(data, poles, point, variance)
 
 
 def _still(before: ReducedFit, after: ReducedFit, step: np.ndarray) -> bool:

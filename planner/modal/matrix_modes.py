@@ -8,11 +8,7 @@ from planner.errors import RefusedError
 from planner.frf.matrix import FrfMatrix, by_number
 from planner.modal.consistency import Consistency, check
 from planner.modal.estimate_modes import natural, probability, support
-from planner.modal.mac import (
-    phase_collinearity,
-    phase_deviation_deg,
-    real_normal_modes,
-)
+from planner.modal.mac import phase_collinearity, phase_deviation_deg, real_normal_modes
 from planner.modal.matrix_poles import MatrixPoles, identify_matrix
 from planner.modal.modes import UNSCALED, Eigenvectors, Mode
 from planner.modal.motion_fields import expected
@@ -60,12 +56,9 @@ def modes_of_matrix(
     checks = check(matrix, found, np.array(inside), geometry)
     found = _put_right(matrix, found, checks)
     dofs, entries = _points(matrix, found, checks)
-    shapes = _shapes(found, inside, entries)
-    shapes = _informed(shapes, dofs, geometry)
-    modes = [
-        _mode(found, int(k), shape, entries, matrix.scaled)
-        for k, shape in zip(inside, shapes, strict=True)
-    ]
+    shapes = _informed(_shapes(found, inside, entries), dofs, geometry)
+    each = zip(inside, shapes, strict=True)
+    modes = [_mode(found, int(k), shape, entries, matrix.scaled) for k, shape in each]
     modes = _with_vectors(modes, dofs, matrix, found, inside)
     remarks = (*matrix.remarks, *checks.faults, *checks.remarks)
     return MatrixModes(dofs, tuple(modes), band, remarks, found, checks)
@@ -173,9 +166,8 @@ def _mode(found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, sca
         size = max(float(np.linalg.norm(shape)), 1e-300)
         shape, shape_sd = shape * realign(shape) / size, shape_sd / size
     spread = np.sqrt(fit.spread[m + k]) / (2 * np.pi)
-    likely = probability(
-        float(found.presence[k]), support(pole, found.diagram.sets), float(found.weak[k])
-    )
+    supported = support(pole, found.diagram.sets)
+    likely = probability(float(found.presence[k]), supported, float(found.weak[k]))
     return Mode(
         frequency, float(sd[0]), damping, float(sd[1]), *UNSCALED, shape,
         likely, shape_sd, scaled, phase_collinearity(shape), phase_deviation_deg(shape),
@@ -208,9 +200,7 @@ def with_normal_modes(found: MatrixModes) -> MatrixModes:
     poles = np.array([mode.pole for mode in found.modes])
     shapes = np.stack([mode.shape for mode in found.modes], axis=1)
     real = real_normal_modes(poles, shapes)
-    modes = [
-        replace(mode, shape=shape.astype(complex))
-        for mode, shape in zip(found.modes, real.T, strict=True)
-    ]
+    each = zip(found.modes, real.T, strict=True)
+    modes = tuple(replace(mode, shape=shape.astype(complex)) for mode, shape in each)
     remark = "Shapes are real normal modes; MPC and MPD are those of the complex ones."
-    return replace(found, modes=tuple(modes), remarks=(*found.remarks, remark))
+    return replace(found, modes=modes, remarks=(*found.remarks, remark))

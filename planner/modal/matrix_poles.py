@@ -13,7 +13,7 @@ from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.least_squares import refine
 from planner.modal.mode_selection import doubt, excess, falls, presences
-from planner.modal.plscf import Diagram, PoleSet, diagram, plscf, row_errors, stable
+from planner.modal.plscf import Diagram, diagram, plscf, row_errors, stable
 from planner.modal.set_poles import ROUNDS, DivergedPolesError, SetData, SetPoles, fit_sets
 from planner.modal.set_search import reestimated_sets
 from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
@@ -108,23 +108,14 @@ def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Di
     # Max order.
     orders = ladder(max(2, min(36, block.shape[-1] // 3)))
     frequency = matrix.frequency_hz[chosen]
-    weight = _without_odd_rows(frequency, block, orders[-1], weight)
-    sets: tuple[PoleSet, ...] = plscf(frequency, block, orders, weight)
-    return orders, diagram(sets, (frequency[0] * 0.95, frequency[-1] * 1.05))
-
-
-def _without_odd_rows(
-    frequency: np.ndarray, block: np.ndarray, order: int, weight: np.ndarray
-) -> np.ndarray:
-    """Weights (o, F) with those rows taken down that do not go with the others."""
-    if block.shape[0] < LEAST_ROWS or block.shape[1] < 2:
-        return weight
+    # Rows that do not go with the others are taken down.
     changed = weight
-    for _ in range(REWEIGHED):
-        errors = row_errors(frequency, block, order, changed)
+    for _ in range(REWEIGHED if block.shape[0] >= LEAST_ROWS and block.shape[1] > 1 else 0):
+        errors = row_errors(frequency, block, orders[-1], changed)
         usual = max(float(np.median(errors)), 1e-300)
         changed = weight * np.minimum(1.0, ODD * usual / np.maximum(errors, 1e-300))[:, None] ** 2
-    return changed
+    sets = plscf(frequency, block, orders, changed)
+    return orders, diagram(sets, (frequency[0] * 0.95, frequency[-1] * 1.05))
 
 
 def _references(measured: np.ndarray) -> np.ndarray:
@@ -168,7 +159,9 @@ def select_modes(given: SetData, poles: np.ndarray) -> tuple[SetPoles, np.ndarra
         # Not before: sets would be moved to where they imitate the modes that a fit lacks.
         if searched:
             fit, variance = _settled(given, fit)
-        left = fit.part(_standing(data, fit, variance))
+        _, weak, presence = judged(data, fit, variance)
+        # Poles above the last line stand for all modes there.
+        left = fit.part(data.is_above(fit.poles) | (weak <= 1) & (presence >= PRESENT))
         poles, own = merged_modes(given, left, variance)
         # What a fit lacks is looked for where it has no mode too many.
         if poles.size == fit.poles.size:
@@ -208,12 +201,6 @@ def _fit(
             return fit_sets(given, variance, poles, rounds, known, lines)
         except DivergedPolesError as error:
             poles, known = poles[~error.astray], None
-
-
-def _standing(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
-    """(m,) bool: which poles are modes, or stand for those above the last line."""
-    _, weak, presence = judged(data, fit, variance)
-    return data.is_above(fit.poles) | (weak <= 1) & (presence >= PRESENT)
 
 
 def judged(

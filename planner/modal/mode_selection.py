@@ -78,7 +78,8 @@ def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
     current = _prune(data, current)
     tried: list[complex] = []
     for _ in range(rounds):
-        candidate = _missing(data, current, tried)
+        variance = current.variance * current.excess
+        candidate = _best_atom(data, variance, _error(data, current), tried)
         if candidate is None:
             break
         tried.append(candidate)
@@ -90,14 +91,14 @@ def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
 
 
 def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
-    """PoleFit fit; an unknown variance is taken from the error itself."""
+    """The fit from poles; an unknown variance is taken from the error itself."""
     known = data.variance is not None
     variance = _first_variance(data) if known or before is None else before.variance
 
     def fitted(start: np.ndarray) -> PoleFit:
         plane = data.to_plane(start)
         found = refine(data.lines, data.response, variance, plane, data.allowed)
-        return _in_rad_s(data, found)
+        return found if data.step_s is None else _in_rad_s(data, found, data.step_s)
 
     refined = fitted(poles)
     for _ in range(0 if known else 2 if before is None else 1):
@@ -136,11 +137,9 @@ def model(data: Data, refined: PoleFit) -> np.ndarray:
     return synthesize(data.lines, data.to_plane(refined.poles), refined.residues)
 
 
-def _in_rad_s(data: Data, refined: PoleFit) -> PoleFit:
-    """Poles and their covariance carried from the plane of the lines to the s-plane."""
-    if data.step_s is None:
-        return refined
-    slope = 1 / (refined.poles * data.step_s)
+def _in_rad_s(data: Data, refined: PoleFit, step_s: float) -> PoleFit:
+    """Poles and their covariance carried from the z-plane to the s-plane."""
+    slope = 1 / (refined.poles * step_s)
     real, imag = np.diag(slope.real), np.diag(slope.imag)
     turn = np.block([[real, -imag], [imag, real]])
     covariance = turn @ refined.pole_covariance @ turn.T
@@ -248,11 +247,6 @@ def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:
     if data.variance is None:
         scale *= float(np.mean(after.variance / before.variance))
     return bool(rise > data.threshold * scale)
-
-
-def _missing(data: Data, current: PoleFit, tried: list[complex]) -> complex | None:
-    """Pole of the atom that would lower χ² most, if by more than chance can (None: nowhere)."""
-    return _best_atom(data, current.variance * current.excess, _error(data, current), tried)
 
 
 def strongest(data: Data) -> np.ndarray:

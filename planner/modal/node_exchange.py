@@ -84,10 +84,12 @@ def exchanged_nodes(
     if found is None:
         return None
     rows: dict[str, dict[str, int]] = {}  # of each node, by direction
-    for row, dof in sorted(enumerate(dofs[k].positive for k in found.index), key=_direction):
+    placed = enumerate(dofs[k].positive for k in found.index)
+    for row, dof in sorted(placed, key=lambda place: place[1].direction):
         rows.setdefault(dof.node, {})[dof.direction] = row
     nodes = [np.array(list(own.values())) for own in rows.values()]
-    gains = _gains(found, nodes, [tuple(own) for own in rows.values()])
+    directions = [tuple(own) for own in rows.values()]
+    gains = _gains(found, nodes, directions)
     a, b = (int(k) for k in np.unravel_index(np.argmax(gains), gains.shape))
     if not np.isfinite(gains[a, b]):
         return None
@@ -98,7 +100,7 @@ def exchanged_nodes(
     after = replace(found, values=values)
     left = float(np.sum(_surprise(after, nodes)[[a, b]]))
     rivals = np.delete(gains[[a, b]], [a, b], axis=1)
-    again = _gains(after, nodes, [tuple(own) for own in rows.values()])
+    again = _gains(after, nodes, directions)
     clear = (
         before > 2 * SURPRISED * usual
         and left < EXPLAINED * before
@@ -108,10 +110,6 @@ def exchanged_nodes(
     )
     first, second = sorted((a, b))  # which of both is rounding's
     return (list(rows)[first], list(rows)[second]) if clear else None
-
-
-def _direction(place: tuple[int, Dof]) -> str:
-    return place[1].direction
 
 
 def _surprise(found: RowPrediction, nodes: Sequence[np.ndarray]) -> np.ndarray:
@@ -186,15 +184,15 @@ class Exchange:
         )
 
 
-def exchanged_by_neighbours(sides: RovingSides, geometry: Geometry | None) -> tuple[Exchange, ...]:
+def exchanged_by_neighbours(sides: RovingSides, geometry: Geometry | None) -> Exchange | None:
     """Points that were exchanged, told by their neighbours."""
     if sides.motions is None or geometry is None:
-        return ()
+        return None
     pair = exchanged_nodes(sides.rows, sides.motions[0].real, geometry)
     if pair is None:
-        return ()
+        return None
     first, second = (next(dof for dof in sides.rows if dof.node == node) for node in pair)
-    return (Exchange(first, second, float("nan"), float("nan")),)
+    return Exchange(first, second, float("nan"), float("nan"))
 
 
 def turning_helps(sides: RovingSides, turned: tuple[Dof, ...]) -> bool:
@@ -203,18 +201,17 @@ def turning_helps(sides: RovingSides, turned: tuple[Dof, ...]) -> bool:
         return False
     shape, columns = sides.motions
     sign = np.array([-1.0 if dof in turned else 1.0 for dof in sides.columns])
-    stayed = [i for _, i in sides.driving]
-    rows = [o for o, _ in sides.driving]
+    rows, stayed = (list(each) for each in zip(*sides.driving, strict=True))
     return _misfit(shape, (sign[:, None] * columns)[stayed], rows) < FITS
 
 
-def exchanged_by_columns(sides: RovingSides) -> tuple[Exchange, ...]:
+def exchanged_by_columns(sides: RovingSides) -> Exchange | None:
     """Points that were exchanged, told by rows and columns of the same points."""
     if sides.motions is None or len(sides.driving) < 2:
-        return ()
+        return None
     shape, columns = sides.motions
-    rows = [o for o, _ in sides.driving]
-    weights = columns[[i for _, i in sides.driving]]
+    rows, stayed = (list(each) for each in zip(*sides.driving, strict=True))
+    weights = columns[stayed]
     stated = _misfit(shape, weights, rows)
     tried: dict[tuple[Dof, Dof], float] = {}
     for row in rows:
@@ -225,10 +222,10 @@ def exchanged_by_columns(sides: RovingSides) -> tuple[Exchange, ...]:
                 tried[pair] = _misfit(shape, weights, places)
     ranked = sorted(tried, key=lambda pair: tried[pair])
     if not ranked or tried[ranked[0]] > min(FITS, BETTER * stated):
-        return ()
+        return None
     if len(ranked) > 1 and tried[ranked[1]] < tried[ranked[0]] / BETTER:
-        return ()
-    return (Exchange(*ranked[0], stated, tried[ranked[0]]),)
+        return None
+    return Exchange(*ranked[0], stated, tried[ranked[0]])
 
 
 def _misfit(shape: np.ndarray, columns: np.ndarray, rows: list[int]) -> float:

@@ -75,10 +75,8 @@ def operating_modes(
     )
     if not modes:
         raise RefusedError(NOTHING.format(*band))
-    hz, spectrum = _spectrum(values, rate)
-    return OperatingModes(
-        modes, band, tuple(line.frequency_hz for line in tones), found, hz, spectrum
-    )
+    tones_hz = tuple(line.frequency_hz for line in tones)
+    return OperatingModes(modes, band, tones_hz, found, *_spectrum(values, rate))
 
 
 def _once(modes: Iterable[Mode]) -> tuple[Mode, ...]:
@@ -87,13 +85,11 @@ def _once(modes: Iterable[Mode]) -> tuple[Mode, ...]:
     for mode in sorted(modes, key=lambda mode: mode.damping_ratio):
         width = 2 * mode.damping_ratio * mode.frequency_hz
         # Neighbours within a bandwidth that are so alike (MAC) are one mode, the less damped.
-        twins = [
-            other
-            for other in kept
-            if abs(other.frequency_hz - mode.frequency_hz) < width
+        if not any(
+            abs(other.frequency_hz - mode.frequency_hz) < width
             and mac(other.shape, mode.shape) > 0.9
-        ]
-        if not twins:
+            for other in kept
+        ):
             kept.append(mode)
     return tuple(sorted(kept, key=lambda mode: mode.frequency_hz))
 
@@ -182,9 +178,8 @@ def _of_parts(
 def _mode(line: Line, parts: list[tuple[complex, np.ndarray]], size: np.ndarray) -> Mode:
     shape = line.participation[-1] * size
     shape = shape * realign(shape) / np.linalg.norm(shape)
-    nothing = float("nan")
-    hz_sd = damping_sd = nothing
-    shape_sd = np.full(shape.size, nothing)
+    hz_sd = damping_sd = float("nan")
+    shape_sd = np.full(shape.size, np.nan)
     if len(parts) > 2:
         poles = np.array([pole for pole, _ in parts])
         root = np.sqrt(len(parts))
@@ -192,13 +187,11 @@ def _mode(line: Line, parts: list[tuple[complex, np.ndarray]], size: np.ndarray)
         damping_sd = float(np.std(-poles.real / np.abs(poles), ddof=1) / root)
         others = np.array([own * size for _, own in parts])
         others = others * (others.conj() @ shape / np.sum(np.abs(others) ** 2, axis=1))[:, None]
-        off = others - shape
-        shape_sd = np.sqrt(np.mean(np.abs(off) ** 2, axis=0) / 2) / root
-    seen = len(parts) / SEGMENTS
+        shape_sd = np.sqrt(np.mean(np.abs(others - shape) ** 2, axis=0) / 2) / root
+    likely = float(np.clip(0.3 * line.share + 0.7 * len(parts) / SEGMENTS, 0.0, 1.0))
     return Mode(
-        line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, *UNSCALED, shape,
-        float(np.clip(0.3 * line.share + 0.7 * seen, 0.0, 1.0)), shape_sd,
-        collinearity=phase_collinearity(shape), deviation_deg=phase_deviation_deg(shape),
+        line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, *UNSCALED, shape, likely,
+        shape_sd, collinearity=phase_collinearity(shape), deviation_deg=phase_deviation_deg(shape),
     )  # fmt: skip
 
 

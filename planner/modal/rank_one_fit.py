@@ -208,23 +208,14 @@ def _fitted(
         slope = jacobian.conj().T @ (weight * problem.left(found))
         slope[n:] -= found[n:] / (2 * problem.gain**2)
         # A ridge far below all that is determined: a scale that is free then stays where it is.
-        # Ridge.
         normal[np.arange(n), np.arange(n)] += 1e-11 * np.trace(normal[:n, :n]).real / n
         step = np.linalg.solve(normal, slope)
-        found = _shortened(problem, weight, found, step)
+        # The longest part of the step that does not make the fit worse
+        most = problem.error(found, weight) * (1 + 1e-12)
+        tried = (found + part * step for part in (1.0, 0.5, 0.2, 0.05))
+        found = next((one for one in tried if problem.error(one, weight) <= most), found)
         if np.linalg.norm(step) < still * np.linalg.norm(found):
             break
-    return found
-
-
-def _shortened(
-    problem: _RankOneProblem, weight: np.ndarray, found: np.ndarray, step: np.ndarray
-) -> np.ndarray:
-    """The unknowns after the longest part of a step that does not make the fit worse."""
-    now = problem.error(found, weight)
-    for part in (1.0, 0.5, 0.2, 0.05):
-        if problem.error(found + part * step, weight) <= now * (1 + 1e-12):
-            return found + part * step
     return found
 
 

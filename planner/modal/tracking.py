@@ -81,16 +81,9 @@ def track(
     With `ordered`, labels are places in the order of frequency, which is continuous over the
     workspace even where modes cross, and keep that order; the guide's columns must do so too.
     """
-    if not ordered and len(poses):
-        return _named(poses, guide, x)
-    return _matched(poses, guide, x, ordered)
-
-
-def _named(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray) -> Tracks:
-    """Places in the order of frequency first, then which label each place carries.
-
-    Where a mode is missing between others its place is doubtful: there the guide's families decide.
-    """
+    if ordered or not len(poses):
+        return _matched(poses, guide, x, ordered)
+    # Places in the order of frequency first, then which label each place carries
     order = np.argsort(guide.frequency_hz, axis=1, kind="stable")  # NaN comes last
     rows, labels = np.arange(len(poses))[:, None], np.arange(order.shape[1])
     ranked = replace(
@@ -102,7 +95,8 @@ def _named(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray) -> Trac
     sure = placed.probability[rows, place]
     modes = [tuple(row[b] for b in p) for row, p in zip(placed.modes, place, strict=True)]
     rest = list(placed.unexpected)
-    # A mode is missing below one that was found
+    # Where a mode is missing below one that was found, its place is doubtful: there the guide's
+    # families decide.
     gaps = [
         i for i, row in enumerate(placed.modes)
         if any(now is None and later is not None for now, later in pairwise(row))
@@ -119,13 +113,11 @@ def _matched(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray, order
     expected = np.log(guide.frequency_hz)
     each = zip(poses, guide.frequency_hz, guide.shape, strict=True)
     chosen = [_first(*one) for one in each]
-    gains: list[np.ndarray] = []
     seen: list[list[np.ndarray]] = [chosen]
     certain = np.ones(expected.shape)
     # Max rounds.
     for _ in range(8):
-        belief = _Belief.of(poses, chosen, certain, expected, guide, x)
-        gains = [belief.gain(i, modes) for i, modes in enumerate(poses)]
+        gains = _gains(poses, chosen, certain, guide, x)
         chosen = [best(gain, ordered) for gain in gains]
         chance = [chances(gain, ordered) for gain in gains]
         # Of no mode (−1) the last column tells.
@@ -157,65 +149,55 @@ def _first(modes: Sequence[Mode], expected_hz: np.ndarray, shape: np.ndarray) ->
     return chosen
 
 
-@dataclass(frozen=True, eq=False)
-class _Belief:
-    """What is expected of every label at every pose, that pose's own modes left out."""
+def _gains(
+    poses: Sequence[Sequence[Mode]], chosen: list[np.ndarray], certain: np.ndarray, guide: Guide,
+    x: np.ndarray,
+) -> list[np.ndarray]:  # fmt: skip
+    """(k, modes) of each pose: what each match is better than leaving both unmatched.
 
-    log_hz: np.ndarray  # (n, k)
-    sd: np.ndarray  # (n, k)
-    shape: np.ndarray  # (n, k, 3, 3) unit-trace mixture of expected shapes, as s sᴴ
-    log_damping: np.ndarray  # (k,)
+    What is expected at a pose is from labels chosen at the others, how certain (n, k) they are.
+    """
+    expected = np.log(guide.frequency_hz)
+    log_hz, own, damping = (np.full(expected.shape, np.nan) for _ in range(3))
+    shape = np.full((*expected.shape, 3), np.nan + 0j)
+    for i, (modes, row) in enumerate(zip(poses, chosen, strict=True)):
+        for label in np.flatnonzero(row >= 0):
+            mode = modes[row[label]]
+            log_hz[i, label] = np.log(mode.frequency_hz)
+            own[i, label] = mode.frequency_sd_hz / mode.frequency_hz
+            damping[i, label] = np.log(max(mode.damping_ratio, 1e-6))
+            shape[i, label] = mode.shape
+    ratio, sd = _kriged(log_hz - expected, own, certain, x)
+    both = zip(damping.T, np.isfinite(damping).T, strict=True)
+    middle = np.array([np.median(c[f]) if f.any() else np.nan for c, f in both])
+    shapes = mixture(shape, certain, guide.shape, x, LENGTH)
+    each = zip(poses, expected + ratio, sd, shapes, strict=True)
+    return [_gain(*there, middle) for there in each]
 
-    @classmethod
-    def of(
-        cls,
-        poses: Sequence[Sequence[Mode]],
-        chosen: list[np.ndarray],
-        certain: np.ndarray,
-        expected: np.ndarray,
-        guide: Guide,
-        x: np.ndarray,
-    ) -> "_Belief":
-        """From the labels chosen so far and how certain they are (n, k)."""
-        n, k = expected.shape
-        log_hz, own, damping = (np.full((n, k), np.nan) for _ in range(3))
-        shape = np.full((n, k, 3), np.nan + 0j)
-        for i, (modes, row) in enumerate(zip(poses, chosen, strict=True)):
-            for label in np.flatnonzero(row >= 0):
-                mode = modes[row[label]]
-                log_hz[i, label] = np.log(mode.frequency_hz)
-                own[i, label] = mode.frequency_sd_hz / mode.frequency_hz
-                damping[i, label] = np.log(max(mode.damping_ratio, 1e-6))
-                shape[i, label] = mode.shape
-        ratio, sd = _kriged(log_hz - expected, own, certain, x)
-        known = np.isfinite(damping)
-        both = zip(damping.T, known.T, strict=True)
-        middle = np.array([np.median(c[f]) if f.any() else np.nan for c, f in both])
-        return cls(expected + ratio, sd, mixture(shape, certain, guide.shape, x, LENGTH), middle)
 
-    def gain(self, i: int, modes: Sequence[Mode]) -> np.ndarray:
-        """(k, modes) of pose i: what each match is better than leaving both unmatched."""
-        k = self.log_hz.shape[1]
-        if not len(modes):
-            return np.zeros((k, 0))
-        log_hz, own = _log_hz(modes)
-        spread = self.sd[i][:, None] ** 2 + own**2
-        # The sharper the expectation, the less likely is a stranger to meet it.
-        # Typical sd of log frequency, for which the cost of a missing mode was chosen
-        cost = (log_hz - self.log_hz[i][:, None]) ** 2 / spread + np.log(spread / 0.1**2)
-        zeta = np.log([max(mode.damping_ratio, 1e-6) for mode in modes])
-        # Damping sd of log damping ratio around a label's median
-        cost += np.nan_to_num((zeta - self.log_damping[:, None]) / 0.6) ** 2
-        shape = np.array([mode.shape for mode in modes])
-        known = np.isfinite(shape).all(axis=1)
-        shape[~known] = 1.0
-        shape = shape / np.linalg.norm(shape, axis=1, keepdims=True)
-        alike = np.einsum("mi,kij,mj->km", shape.conj(), self.shape[i], shape).real
-        # Of a mode whose shape was not said: as directions without preference are on average.
-        alike = np.where(known, alike, 1 / 3)
-        cost += SHAPE_WEIGHT * (1 - alike)
-        gain = MISSING_COST + _unexpected_cost(modes) - cost
-        return np.where(np.isfinite(cost), gain, -np.inf)
+def _gain(
+    modes: Sequence[Mode], expected: np.ndarray, sd: np.ndarray, shapes: np.ndarray,
+    log_damping: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """(k, modes) of one pose, from expected log frequencies (k,) and shapes (k, 3, 3) as s sᴴ."""
+    if not len(modes):
+        return np.zeros((len(expected), 0))
+    log_hz, own = _log_hz(modes)
+    spread = sd[:, None] ** 2 + own**2
+    # The sharper the expectation, the less likely is a stranger to meet it.
+    # Typical sd of log frequency, for which the cost of a missing mode was chosen
+    cost = (log_hz - expected[:, None]) ** 2 / spread + np.log(spread / 0.1**2)
+    zeta = np.log([max(mode.damping_ratio, 1e-6) for mode in modes])
+    # Damping sd of log damping ratio around a label's median
+    cost += np.nan_to_num((zeta - log_damping[:, None]) / 0.6) ** 2
+    shape = np.array([mode.shape for mode in modes])
+    known = np.isfinite(shape).all(axis=1)
+    shape[~known] = 1.0
+    shape = shape / np.linalg.norm(shape, axis=1, keepdims=True)
+    alike = np.einsum("mi,kij,mj->km", shape.conj(), shapes, shape).real
+    # Of a mode whose shape was not said: as directions without preference are on average.
+    cost += SHAPE_WEIGHT * (1 - np.where(known, alike, 1 / 3))
+    return np.where(np.isfinite(cost), MISSING_COST + _unexpected_cost(modes) - cost, -np.inf)
 
 
 def _log_hz(modes: Sequence[Mode]) -> tuple[np.ndarray, np.ndarray]:

@@ -97,23 +97,19 @@ def _part(frequency: np.ndarray, response: np.ndarray, part: tuple[float, float]
         still = line.share >= SHARE and line.scatter <= SCATTER
         if inside and still and line.damping_ratio <= DAMPING and presence >= PRESENCE:
             share = min(1.0, _reach(line) / orders[-1] + 0.3)
-            modes.append(_mode(line, residues[:, :, k], share * min(1.0, presence) ** 0.25))
+            # Rough: how often it was there, how still it stood, how much of the response it is.
+            certain = share * min(1.0, presence) ** 0.25 * (1 - line.scatter)
+            late = line.poles[len(line.poles) // 2 :]
+            hz_sd = float(np.std(np.abs(late)) / (2 * np.pi))
+            damping_sd = float(np.std(-late.real / np.abs(late)))
+            modes.append(
+                Mode(
+                    line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, *UNSCALED,
+                    rank_one(residues[:, :, k])[0], float(certain),
+                )
+            )  # fmt: skip
     return modes
 
 
 def _reach(line: Line) -> int:
     return int(line.orders[-1] - line.orders[0])
-
-
-def _mode(line: Line, residue: np.ndarray, certain: float) -> Mode:
-    late = line.poles[len(line.poles) // 2 :]
-    return Mode(
-        line.frequency_hz,
-        float(np.std(np.abs(late)) / (2 * np.pi)),
-        line.damping_ratio,
-        float(np.std(-late.real / np.abs(late))),
-        *UNSCALED,
-        rank_one(residue)[0],
-        # Rough: how often it was there, how still it stood, how much of the response it is.
-        float(certain * (1 - line.scatter)),
-    )

@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from planner.milling.machine import Machine, multipliers
 from planner.milling.period import Discretisation
-from tests.support.milling_cases import MULTIPLIERS, cut, machine, one_mode, semi_growth
+from tests.support.milling_cases import MULTIPLIERS, cut, one_mode, semi_growth
 
 RPM, DEPTH_MM = 5000.0, 0.5
 
@@ -26,7 +26,7 @@ def semi_error(asked: Machine, steps: int) -> float:
 
 
 def test_orders_of_convergence():
-    asked = machine(one_mode(), cut())
+    asked = Machine(one_mode(), cut())
     found = {
         "semi-discretisation": (semi_error(asked, 80), semi_error(asked, 160)),
         "full, degree 1": (full_error(asked, 1, 80), full_error(asked, 1, 160)),
@@ -55,7 +55,7 @@ def cpu(work, repeats: int = 3) -> float:
 
 @pytest.mark.slow
 def test_full_discretisation_costs_less_at_the_same_error():
-    asked = machine(one_mode(), cut())
+    asked = Machine(one_mode(), cut())
     wanted = 1e-3
     steps = next(m for m in range(40, 2000, 20) if semi_error(asked, m) < wanted)
     degree = next(d for d in range(8, 60) if full_error(asked, d, 1) < wanted)

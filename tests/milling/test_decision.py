@@ -7,9 +7,10 @@ from planner.campaign.config import load_campaign_config
 from planner.campaign.decision import Decision
 from planner.errors import InputError
 from planner.milling.lobes import depths_of, stability_limits
+from planner.milling.machine import Machine
 from planner.milling.path import decide, limits_along, limits_by_feed
 from planner.milling.structure import Structure
-from tests.support.milling_cases import cut, machine, one_mode, two_each_way
+from tests.support.milling_cases import cut, one_mode, two_each_way
 
 RPM = 10000.0
 
@@ -20,7 +21,7 @@ def uncertain(sd: float) -> Structure:
 
 
 def limit() -> float:
-    return stability_limits(machine(one_mode(), cut(spindle_rpm=(RPM, RPM, 1))))[0].depth_m
+    return stability_limits(Machine(one_mode(), cut(spindle_rpm=(RPM, RPM, 1))))[0].depth_m
 
 
 def test_at_the_limit_it_is_even_and_surer_the_farther():
@@ -72,7 +73,7 @@ def test_feed_turned_into_a_mode_is_the_cut_turned():
     across = cut(
         milling="down", radial_immersion=0.3, depth_m=(0.0, 0.02, 10), spindle_rpm=(RPM, RPM, 1)
     )
-    wanted = stability_limits(machine(one_mode((0.0, -1.0)), across))[0].depth_m
+    wanted = stability_limits(Machine(one_mode((0.0, -1.0)), across))[0].depth_m
     assert turned[6] == pytest.approx(wanted, rel=1e-6)
     assert turned[12] == pytest.approx(turned[0], rel=1e-6)
 

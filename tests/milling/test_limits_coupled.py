@@ -146,7 +146,7 @@ def limits_of(folder: Path, seed: int) -> dict[str, list[Limits]]:
     found: dict[str, list[Limits]] = {"as hit": [], "another tool": []}
     for i, one in enumerate(q):
         found["as hit"].append(Limits.of(lines, mean[i], sd[i], truth.accelerance(one, TRUE_LINES)))
-        told = couple(tip_at(campaign, f"T{i}", one, lines, mean[i], sd[i]), target, reference)
+        told = couple(tip_at(campaign, f"T{i}", one, lines), target, reference)
         exact = TipReceptance.known(TRUE_LINES, six_by_six(truth, one, TRUE_LINES))
         true = couple(exact, target, reference).accelerance[:3, :3]
         coupled = told.accelerance[:3, :3], told.accelerance_sd[:3, :3]

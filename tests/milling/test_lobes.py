@@ -23,7 +23,6 @@ from tests.support.milling_cases import (
     SPEEDS,
     TWO_EQUAL,
     cut,
-    machine,
     one_mode,
     semi_growth,
     two_each_way,
@@ -36,7 +35,7 @@ SLOW = pytest.mark.slow
 
 @pytest.mark.parametrize("depth_mm", MULTIPLIERS)
 def test_multiplier_of_a_point_is_converged(depth_mm: float):
-    found = multiplier(machine(one_mode(), cut()), 5000.0, depth_mm * 1e-3)
+    found = multiplier(Machine(one_mode(), cut()), 5000.0, depth_mm * 1e-3)
     assert found.size == pytest.approx(MULTIPLIERS[depth_mm], abs=1e-6)
     assert found.error < 1e-6
 
@@ -51,18 +50,18 @@ LITERATURE = [
 def test_first_loss_and_its_kind(modes, milling, wanted, flips):
     for k, speed in enumerate(SPEEDS):
         given = cut(milling=milling[0], radial_immersion=milling[1], spindle_rpm=(speed, speed, 1))
-        (loss,) = stability_limits(machine(modes, given))
+        (loss,) = stability_limits(Machine(modes, given))
         assert 1e3 * loss.depth_m == pytest.approx(wanted[k], rel=CONVERGED)
         assert flips is None or loss.kind == ("flip" if flips[k] else "hopf")
 
 
 def test_zeroth_order_of_two_modes_each_way():
-    assert 1e3 * machine(two_equal(), cut()).floor().floor_m == pytest.approx(0.0479, rel=ZEROTH)
+    assert 1e3 * Machine(two_equal(), cut()).floor().floor_m == pytest.approx(0.0479, rel=ZEROTH)
     given = cut(
         milling="down", radial_immersion=0.5, kt_n_m2=1319.4e6, kr_n_m2=788.8e6,
         spindle_rpm=(4000.0, 16000.0, 7),
     )  # fmt: skip
-    found = machine(two_each_way(), given).floor()
+    found = Machine(two_each_way(), given).floor()
     assert 1e3 * found.floor_m == pytest.approx(0.957, rel=ZEROTH)
     assert found.floor_hz == pytest.approx(1440, rel=1e-3)
     depth, _ = limits(found, given.speeds_rpm, given.teeth)
@@ -121,7 +120,7 @@ def dies_out(
     ],
 )
 def test_steps_in_time_say_the_same(modes: CutterModes, given: Cut, points: int):
-    asked, random = machine(modes, given), np.random.default_rng(3)
+    asked, random = Machine(modes, given), np.random.default_rng(3)
     rpm = random.uniform(8000, 20000, points)
     depth = asked.floor().floor_m * random.uniform(0.5, 3, points)
     each = list(zip(rpm, depth, strict=True))
@@ -136,7 +135,7 @@ def test_steps_in_time_say_the_same(modes: CutterModes, given: Cut, points: int)
 
 def test_one_degree_of_freedom_in_closed_form():
     """The floor is −1/(2 K_s Re G) at its least, K_s the mean coefficient along the mode."""
-    found = machine(one_mode(), cut()).floor()
+    found = Machine(one_mode(), cut()).floor()
     hertz = np.linspace(900, 960, 200_001)
     real = one_mode().receptance(hertz)[:, 0, 0].real.min()
     k_s = 2e8 / 2  # a slot's mean of sin φ (K_t cos φ + K_r sin φ) with two teeth
@@ -149,11 +148,11 @@ def test_semi_discretisation_agrees(helix_deg: float):
         "teeth": 3, "milling": "up", "radial_immersion": 0.3, "helix_deg": helix_deg,
         "depth_m": (0.0, 0.02, 10), "spindle_rpm": (20000.0, 20000.0, 1),
     }  # fmt: skip
-    structure = machine(two_each_way(), cut(**given))
+    structure = Machine(two_each_way(), cut(**given))
     (loss,) = stability_limits(structure)
     for share, unstable in ((0.997, False), (1.003, True)):
         assert (semi_growth(structure, 20000.0, share * loss.depth_m) > 1) == unstable
-    (other,) = stability_limits(machine(two_each_way(), cut(**given, method="semi_discretisation")))
+    (other,) = stability_limits(Machine(two_each_way(), cut(**given, method="semi_discretisation")))
     assert other.depth_m == pytest.approx(loss.depth_m, rel=2e-3)
     assert other.kind == loss.kind
     assert other.chatter_hz == pytest.approx(loss.chatter_hz, rel=1e-3)
@@ -162,7 +161,7 @@ def test_semi_discretisation_agrees(helix_deg: float):
 def test_semi_discretisation_takes_teeth_at_equal_angles_only():
     given = cut(method="semi_discretisation", pitch_deg=[170.0, 190.0], teeth=2)
     with pytest.raises(InputError, match="equal angles only; choose the method full_discr"):
-        stability_limits(machine(two_each_way(), given))
+        stability_limits(Machine(two_each_way(), given))
 
 
 def test_pitches_that_hardly_differ_change_nothing_and_others_do():
@@ -171,7 +170,7 @@ def test_pitches_that_hardly_differ_change_nothing_and_others_do():
             teeth=3, milling="up", radial_immersion=0.3, pitch_deg=pitch_deg,
             depth_m=(0.0, 0.02, 10), spindle_rpm=(20000.0, 20000.0, 1),
         )  # fmt: skip
-        return stability_limits(machine(two_each_way(), given))[0].depth_m
+        return stability_limits(Machine(two_each_way(), given))[0].depth_m
 
     even = depth(None)
     assert depth([120.00001, 119.99999, 120.0]) == pytest.approx(even, rel=1e-5)
@@ -190,11 +189,11 @@ def test_the_cut_turned_with_its_frame_stays_as_it_is():
     given = {"milling": "down", "radial_immersion": 0.5, "spindle_rpm": (9000.0, 9000.0, 1)}
     turned = cut(**given, feed=tuple(turn[:, 0]), axis=tuple(turn[:, 2]))
     found = Machine(whole.in_plane(turned.plane), turned)
-    straight = stability_limits(machine(modes, cut(**given)))[0]
+    straight = stability_limits(Machine(modes, cut(**given)))[0]
     assert stability_limits(found)[0].depth_m == pytest.approx(straight.depth_m, rel=1e-6)
 
 
 def test_no_depth_is_as_stable_as_the_structure():
-    at_rest = multiplier(machine(one_mode(), cut()), 5000.0, 0.0)
+    at_rest = multiplier(Machine(one_mode(), cut()), 5000.0, 0.0)
     pole = one_mode().poles[0]
     assert at_rest.size == pytest.approx(np.exp(pole.real * 60 / (2 * 5000)), rel=1e-9)

@@ -25,6 +25,7 @@ from tests.milling.test_coupling import (
     REFERENCE,
     RIGID_ENOUGH,
     TARGET,
+    TESTED,
     frf,
     machine,
     measured,
@@ -37,13 +38,20 @@ SOFT = (8e6, 2e4, 60.0, 0.4)
 LARGE = 0.05  # of an entry's largest value: peaks below are not looked at
 
 
-def changed(base, put=TARGET, held=LOOSER, noise=0.01, seed=5, back=BACK, place=12):
+def hit_at_both(base=None, noise=0.01, seed=5, place=12, rod=REFERENCE):
+    """Two points of the tested tool on a machine."""
+    both = frf(base or machine(), rod, FREQUENCY, RIGID_ENOUGH, points=(-1, place))
+    return measured(both, noise, seed)
+
+
+def tip_from(seen, back=BACK):
+    return smoothed(two_point_receptance(seen, ACROSS, TESTED, back))
+
+
+def changed(base, put=TARGET, held=LOOSER, seed=5, back=BACK, place=12, rod=REFERENCE):
     """What is predicted for a target on a machine, and the truth (4, 4, F)."""
-    seen = measured(frf(base, REFERENCE, FREQUENCY, RIGID_ENOUGH, points=(-1, place)), noise, seed)
-    reference = tool(REFERENCE, RIGID_ENOUGH)
-    tip = smoothed(two_point_receptance(seen, ACROSS, reference, back))
-    truth = ordered(frf(base, put, FREQUENCY, held))
-    return couple(tip, tool(put, held), reference), truth
+    tip = tip_from(hit_at_both(base, seed=seed, place=place, rod=rod), back)
+    return couple(tip, tool(put, held), TESTED), ordered(frf(base, put, FREQUENCY, held))
 
 
 def at_peaks(found, truth):
@@ -116,13 +124,8 @@ def test_a_much_heavier_and_longer_tool_is_less_sure_and_says_so():
 
 def test_a_second_point_two_millimetres_off():
     """It was measured 18 mm behind the tip, not 20: a tenth off in every rotation, and known."""
-    shifted = [(0.032, 0.02, 12), (0.018, 0.02, 8)]
-    base, reference = machine(), tool(REFERENCE, RIGID_ENOUGH)
-    seen = measured(frf(base, shifted, FREQUENCY, RIGID_ENOUGH, points=(-1, 12)), 0.01, 5)
-    truth = ordered(frf(base, TARGET, FREQUENCY, LOOSER))
     back = Point(BACK.node, BACK.from_tip_m, place_sd_m=0.002)
-    tip = smoothed(two_point_receptance(seen, ACROSS, reference, back))
-    found = couple(tip, tool(TARGET, LOOSER), reference)
+    found, truth = changed(machine(), back=back, rod=[(0.032, 0.02, 12), (0.018, 0.02, 8)])
     off = np.abs(found.receptance[KEPT] - truth)
     assert at_peaks(found, truth)[:2, :2].max() < 0.05
     assert np.mean(off < 3 * found.sd[KEPT]) > 0.95
@@ -130,8 +133,7 @@ def test_a_second_point_two_millimetres_off():
 
 def test_as_many_modes_as_the_noise_shows():
     """Eight of the machine, and the rod's own above the lines; the fit is as sure as it says."""
-    clean = frf(machine(), REFERENCE, FREQUENCY, RIGID_ENOUGH, points=(-1, 12))
-    exact, seen = (measured(clean, n, 1).receptance for n in (0.0, 0.01))
+    exact, seen = (hit_at_both(noise=n, seed=1).receptance for n in (0.0, 0.01))
     tip = TipReceptance.known(FREQUENCY, seen, 0.01 * np.abs(exact), (0, 1, 3, 4))
     found = smoothed(tip)
     count = re.search(r"those of (\d+) common modes", found.remarks[-1])
@@ -145,11 +147,10 @@ def test_as_many_modes_as_the_noise_shows():
 
 def test_what_few_modes_do_not_follow_is_left_as_measured():
     values = np.random.default_rng(0).standard_normal((len(FREQUENCY), 2, 4, 4))
-    clean = frf(machine(), REFERENCE, FREQUENCY, RIGID_ENOUGH, points=(-1, 12))
-    seen = measured(clean, 0.01)
+    seen = hit_at_both(seed=0)
     noise = np.moveaxis(values[:, 0] + 1j * values[:, 1], 0, -1)
     wild = replace(seen, receptance=seen.receptance + 0.3 * np.abs(seen.receptance) * noise)
-    tip = two_point_receptance(wild, ACROSS, tool(REFERENCE, RIGID_ENOUGH), BACK)
+    tip = two_point_receptance(wild, ACROSS, TESTED, BACK)
     left = smoothed(tip)
     assert left.measured is tip.measured
     assert "line by line" in left.remarks[-1]
@@ -157,8 +158,7 @@ def test_what_few_modes_do_not_follow_is_left_as_measured():
 
 @pytest.fixture(scope="module")
 def tip():
-    seen = measured(frf(machine(), REFERENCE, FREQUENCY, RIGID_ENOUGH, points=(-1, 12)), 0.01, 5)
-    return smoothed(two_point_receptance(seen, ACROSS, tool(REFERENCE, RIGID_ENOUGH), BACK))
+    return tip_from(hit_at_both())
 
 
 def hit(held):
@@ -172,7 +172,7 @@ def hit(held):
 
 def test_a_soft_contact_is_found_from_a_wrong_start(tip):
     start = tool(TARGET, (3e7, 1e5, 200.0, 1.0))
-    found = fit_contact(tip, start, tool(REFERENCE, RIGID_ENOUGH), hit(SOFT))
+    found = fit_contact(tip, start, TESTED, hit(SOFT))
     values = [getattr(found.contact, name) for name in NUMBERS]
     assert values[:2] == pytest.approx(SOFT[:2], rel=0.01)
     assert values[2:] == pytest.approx(SOFT[2:], rel=0.1)
@@ -183,7 +183,7 @@ def test_a_soft_contact_is_found_from_a_wrong_start(tip):
 def test_what_the_frfs_do_not_determine_is_not_named(tip):
     """Far stiffer than the tool, a contact's rotation does not show in the band."""
     start = tool(TARGET, (4e7, 4e6, 200.0, 1.0))
-    found = fit_contact(tip, start, tool(REFERENCE, RIGID_ENOUGH), hit(LOOSER)).to_json()
+    found = fit_contact(tip, start, TESTED, hit(LOOSER)).to_json()
     assert found["stiffness_n_m"]["value"] == pytest.approx(LOOSER[0], rel=0.03)
     assert found["damping_nms_rad"]["sd_percent"] is None
 

@@ -12,6 +12,7 @@ from planner.milling.cut import Cut
 from planner.milling.cutter_frf import CutterFrf, of_accelerance
 from planner.milling.cutter_modes import CutterFit, CutterModes, real_modes
 from planner.milling.lobes import depths_of, sampled_limits, stability_limits
+from planner.milling.machine import Machine
 from planner.milling.structure import (
     Structure,
     explaining,
@@ -20,7 +21,7 @@ from planner.milling.structure import (
     of_frf,
     sampled,
 )
-from tests.support.milling_cases import cut, machine, one_mode, semi_growth, two_each_way
+from tests.support.milling_cases import cut, one_mode, semi_growth, two_each_way
 
 LINES = np.arange(200.0, 2400.0, 2.0)
 
@@ -45,7 +46,7 @@ def crossed() -> CutterModes:
 def check_limits(frf: CutterFrf, modes: CutterModes, given: Cut, rtol: float) -> Structure:
     """FRFs give the limits of their modes; returns what was found of them."""
     found = of_frf(frf, given)
-    wanted = depths_of(stability_limits(machine(modes, given)))
+    wanted = depths_of(stability_limits(Machine(modes, given)))
     depth = depths_of(stability_limits(found.machine(given)))
     np.testing.assert_allclose(depth, wanted, rtol=rtol)
     assert np.all(np.isfinite(wanted))
@@ -88,13 +89,13 @@ def test_methods_agree_on_cross_frfs_and_residual_compliance():
     given = {"milling": "down", "radial_immersion": 0.5, "spindle_rpm": (12000.0, 15000.0, 2)}
     soft = crossed()
     soft = CutterModes(soft.poles, soft.shapes, soft.drives, 20 * soft.residual)
-    full = stability_limits(machine(soft, cut(**given)))
+    full = stability_limits(Machine(soft, cut(**given)))
     without = stability_limits(
-        machine(CutterModes(soft.poles, soft.shapes, soft.drives, 0 * soft.residual), cut(**given))
+        Machine(CutterModes(soft.poles, soft.shapes, soft.drives, 0 * soft.residual), cut(**given))
     )
     for rpm, a, c in zip(cut(**given).speeds_rpm, full, without, strict=True):
         for share, unstable in ((0.997, False), (1.003, True)):
-            found = semi_growth(machine(soft, cut(**given)), rpm, share * a.depth_m)
+            found = semi_growth(Machine(soft, cut(**given)), rpm, share * a.depth_m)
             assert (found > 1) == unstable
         assert abs(a.depth_m / c.depth_m - 1) > 0.01
 
@@ -146,7 +147,7 @@ def test_noise_is_sampled_as_wide_as_it_scatters():
     """Limits by other noises lie within the samples of one as often as these say."""
     given = cut(spindle_rpm=(9000.0, 12000.0, 3), method="zeroth_order")
     lines, modes = np.arange(2.0, 2200.0, 2.0), two_each_way()
-    true = depths_of(stability_limits(machine(modes, given)))
+    true = depths_of(stability_limits(Machine(modes, given)))
     inside = []
     for seed in range(8):
         found = of_frf(noisy(modes, lines, 0.003, 10 + seed), given)
@@ -182,7 +183,7 @@ def test_spread_of_modes_explains_the_sd_that_it_makes():
     spread = np.concatenate([
         [0.002, 0.004, 0.001, 0.003], [0.05, 0.02, 0.04, 0.03], [0.03, 0.02, 0.01, 0.05], [0.0],
     ])  # fmt: skip
-    samples = sampled(machine(modes, cut()), spread, (0.0, 0.0), 400, seed=1)
+    samples = sampled(Machine(modes, cut()), spread, (0.0, 0.0), 400, seed=1)
     h = np.array([m.modes.receptance(LINES) for m in samples]).transpose(0, 2, 3, 1)
     off = np.sqrt(np.mean(np.abs(h - h.mean(axis=0)) ** 2, axis=0))
     plane = tip(modes).in_plane(cut())

@@ -9,7 +9,15 @@ import pytest
 from planner.errors import RefusedError
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac
-from tests.support.modal_systems import System, as_frf, exact_frf, noisy, random_system
+from tests.support.modal_systems import (
+    System,
+    as_frf,
+    exact_frf,
+    matched,
+    noisy,
+    random_system,
+    scores,
+)
 
 LINES = np.arange(2.0, 80.0, 0.2)
 BAND = (4.0, 60.0)
@@ -39,19 +47,9 @@ def check_exact(model, system: System, columns: Sequence[int] = (0, 1, 2)) -> No
 
 def lost_and_extra(model, system: System) -> np.ndarray:
     """True modes that were not found, and found ones that are none."""
-    found = hits(model, system)
+    found = matched(model.modes, system)
     lost = found.count(None)
     return np.array([lost, len(model.modes) - len(found) + lost])
-
-
-def hits(model, system: System) -> list[int | None]:
-    """For each true mode the found one within half a bandwidth or 1 %, None if there is none."""
-    out = []
-    for f, zeta in zip(system.frequency_hz, system.damping_ratio, strict=True):
-        away = np.abs(frequencies(model) / f - 1)
-        k = int(np.argmin(away))
-        out.append(k if away[k] < max(0.005, 0.5 * zeta) and k not in out else None)
-    return out
 
 
 @pytest.mark.parametrize("columns", [(0,), (0, 2), (0, 1, 2)])
@@ -80,24 +78,18 @@ def test_exponential_window_is_corrected_exactly(rate, columns):
 @pytest.mark.parametrize("known", [True, False])
 def test_intervals_cover_the_truth(known):
     """95 % intervals of frequency, damping and residues, 1-5 % noise, variance told or not."""
-    scores, residue_scores, wrong = [], [], np.zeros(2)
+    of_poles, of_residues, wrong = [], [], np.zeros(2)
     for seed in range(30):
         rng = np.random.default_rng(100 + seed)
         system = random_system(rng, int(rng.integers(2, 7)), complexity=0.2)
         h, variance = noisy(exact_frf(system, LINES), rng.uniform(0.01, 0.05), rng)
         model = estimate_modes(as_frf(LINES, h, variance if known else None), BAND)
         wrong += lost_and_extra(model, system)
-        for i, k in enumerate(hits(model, system)):
-            if k is None:
-                continue
-            mode = model.modes[k]
-            scores.append((mode.frequency_hz - system.frequency_hz[i]) / mode.frequency_sd_hz)
-            scores.append((mode.damping_ratio - system.damping_ratio[i]) / mode.damping_sd)
-            error = mode.residue - system.residues[i]
-            residue_scores += list((np.stack([error.real, error.imag]) / mode.residue_sd).ravel())
+        poles, residues = scores(model.modes, system)
+        of_poles, of_residues = of_poles + poles, of_residues + residues
     assert np.max(wrong) <= 1
-    assert 0.90 < np.mean(np.abs(scores) < 1.96) < 0.98
-    assert 0.90 < np.mean(np.abs(residue_scores) < 1.96) < 0.98
+    assert 0.90 < np.mean(np.abs(of_poles) < 1.96) < 0.98
+    assert 0.90 < np.mean(np.abs(of_residues) < 1.96) < 0.98
 
 
 def test_close_modes_are_told_apart():
@@ -107,12 +99,10 @@ def test_close_modes_are_told_apart():
         rng = np.random.default_rng(seed)
         system = random_system(rng, 4, damping=(0.01, 0.03), pair=rng.uniform(0.01, 0.02))
         model = seen(exact_frf(system, LINES), 0.02, rng)
-        for i, k in enumerate(hits(model, system)):
+        for i, mode in enumerate(matched(model.modes, system)):
             total += 1
-            if k is None:
-                continue
-            right = abs(model.modes[k].frequency_hz / system.frequency_hz[i] - 1) < 0.003
-            found += right and abs(model.modes[k].damping_ratio / system.damping_ratio[i] - 1) < 0.1
+            if mode is not None and abs(mode.frequency_hz / system.frequency_hz[i] - 1) < 0.003:
+                found += abs(mode.damping_ratio / system.damping_ratio[i] - 1) < 0.1
         assert len(model.modes) == 4
     assert found >= 0.97 * total
 
@@ -204,8 +194,7 @@ def test_ripple_makes_no_likely_modes():
         h, variance = noisy(exact_frf(system, LINES), 0.005, rng)
         ripple = 1 + 0.03 * np.sin(LINES * rng.uniform(0.3, 2.0) + rng.uniform(0, 6))
         model = estimate_modes(as_frf(LINES, h * ripple, variance), BAND)
-        found = hits(model, system)
-        assert None not in found
+        assert None not in matched(model.modes, system)
         likely += sum(m.probability > 0.5 for m in model.modes) - 4
     assert likely <= 2
 

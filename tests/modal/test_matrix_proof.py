@@ -37,7 +37,7 @@ def faults_named(case, found, tally):
     """Turn signs and exchange points of one set, and count what is said about them."""
     rng = np.random.default_rng([*map(int, case.references), 7])
     n, nodes = len(case.structure.nodes), list(dict.fromkeys(case.structure.nodes))
-    here = geometry_of(case)
+    here = geometry_of(case.structure)
     hz = np.abs(found.found.fit.poles) / (2 * np.pi)
     low, high = case.band_hz
     modes = np.flatnonzero((hz >= low) & (hz <= high) & (found.found.weak <= 1))
@@ -87,7 +87,7 @@ def test_fresh_sets():
     calm, tally = [], Counter()
     for seed in SETS:
         case = rough_set(seed)
-        found = modes_of_matrix(case.matrix, case.band_hz, geometry_of(case))
+        found = modes_of_matrix(case.matrix, case.band_hz, geometry_of(case.structure))
         calm += told(case, found.modes, found.dofs) if case.drift < 0.0025 else []
         faults_named(case, found, tally)
     share, right, sized, cover = figures("drift below 0.25 %", calm)
@@ -111,7 +111,7 @@ def test_a_fifth_is_missing():
     values, known, placed = [], [], []
     for seed in MISSING:
         case = rough_set(seed, missing=0.2, drift=0.001)
-        found = modes_of_matrix(case.matrix, case.band_hz, geometry_of(case))
+        found = modes_of_matrix(case.matrix, case.band_hz, geometry_of(case.structure))
         placed += told(case, found.modes, found.dofs)
         found = modes_of_matrix(case.matrix, case.band_hz)
         seen = told(case, found.modes, found.dofs)

@@ -5,7 +5,7 @@ import pytest
 
 from planner.frf.estimator import estimate
 from planner.modal.estimate_modes import estimate_modes
-from tests.support.modal_systems import System, random_system
+from tests.support.modal_systems import System, matched, random_system, scores
 from tests.support.simulated_hits import make_hit
 
 BAND = (4.0, 60.0)
@@ -20,27 +20,20 @@ def struck(system: System, rng: np.random.Generator, repeats: int, **settings):
     return estimate_modes(estimate(hits, BAND), BAND).modes
 
 
-def scores(seeds: range, repeats: int = 3, **settings) -> tuple[np.ndarray, np.ndarray, int]:
+def judged(seeds: range, repeats: int = 3, **settings) -> tuple[list[float], list[float], int]:
     """Errors over standard deviations of poles and of residues, and how many modes were lost."""
     of_poles, of_residues, lost = [], [], 0
     for seed in seeds:
         rng = np.random.default_rng(seed)
         system = random_system(rng, int(rng.integers(2, 6)))
         modes = struck(system, rng, repeats, **settings)
-        truth = zip(system.frequency_hz, system.damping_ratio, system.residues, strict=True)
-        for frequency, damping, residue in truth:
-            mode = min(modes, key=lambda mode: abs(mode.frequency_hz - frequency))
-            if abs(mode.frequency_hz / frequency - 1) > max(0.005, 0.5 * damping):
-                lost += 1
-                continue
-            of_poles.append((mode.frequency_hz - frequency) / mode.frequency_sd_hz)
-            of_poles.append((mode.damping_ratio - damping) / mode.damping_sd)
-            error = mode.residue - residue
-            of_residues.extend((np.stack([error.real, error.imag]) / mode.residue_sd).ravel())
-    return np.array(of_poles), np.array(of_residues), lost
+        poles, residues = scores(modes, system)
+        of_poles, of_residues = of_poles + poles, of_residues + residues
+        lost += matched(modes, system).count(None)
+    return of_poles, of_residues, lost
 
 
-def covered(values: np.ndarray) -> float:
+def covered(values: list[float]) -> float:
     return float(np.mean(np.abs(values) < 1.96))
 
 
@@ -61,7 +54,7 @@ HUNDRED = [
     ],
 )
 def test_intervals_from_hits_cover_the_truth(seeds, settings):
-    of_poles, of_residues, lost = scores(seeds, **settings)
+    of_poles, of_residues, lost = judged(seeds, **settings)
     assert lost <= len(seeds) / 35
     assert 0.90 < covered(of_poles) < 0.985
     assert (0.91 if len(seeds) < 100 else 0.90) < covered(of_residues) < 0.98

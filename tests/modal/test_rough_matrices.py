@@ -18,7 +18,7 @@ from tests.support.rough_hammer_sets import geometry_of, rough_set, tellable, to
 )
 def test_modes_and_what_their_intervals_hold(seed, scale, nuisances, least):
     case = rough_set(seed, **nuisances)
-    found = modes_of_matrix(case.matrix, case.band_hz, geometry_of(case))
+    found = modes_of_matrix(case.matrix, case.band_hz, geometry_of(case.structure))
     seen = told(case, found.modes, found.dofs)
     assert None not in seen
     assert len(found.modes) <= case.poles.size  # none is split

@@ -22,10 +22,7 @@ def sheet():
     rng = np.random.default_rng(8)
     shapes = unit_mass_shapes(structure)[1][:, 3:13].real
     shapes = shapes * (1 + 0.03 * rng.normal(size=(len(shapes), 1)))
-    names = tuple(str(n) for n in structure.position_m)
-    lines = tuple((str(a), str(b)) for a, b in structure.lines)
-    place = Geometry(names, np.array(list(structure.position_m.values())), lines)
-    return [dof_of(structure, k) for k in range(len(shapes))], shapes, place
+    return [dof_of(structure, k) for k in range(len(shapes))], shapes, geometry_of(structure)
 
 
 def test_an_unknown_point_moves_as_its_neighbours_let_expect(sheet):
@@ -73,7 +70,7 @@ def test_three_mixed_up_points_are_not_told_as_two(sheet):
 def frame():
     """Nodes measured along x, y and z; poles, and the modes that were established."""
     case = rough_set(3040, kind="frame")
-    found = modes_of_matrix(case.matrix, case.band_hz, geometry_of(case)).found
+    found = modes_of_matrix(case.matrix, case.band_hz, geometry_of(case.structure)).found
     hz = np.abs(found.fit.poles) / (2 * np.pi)
     low, high = case.band_hz
     return case, found, np.flatnonzero((hz > low) & (hz < high) & (found.weak <= 1))
@@ -90,12 +87,12 @@ def test_exchanged_nodes_of_a_frame_are_told(frame, pair):
     one, two = (np.flatnonzero(owner == node) for node in pair)
     order[one], order[two] = two, one
     matrix, poles = spoiled(case, found, order, np.ones((owner.size, 3)))
-    checks = check(matrix, poles, modes, geometry_of(case))
+    checks = check(matrix, poles, modes, geometry_of(case.structure))
     (fault,) = checks.faults
     assert re.match(rf"Nodes ({pair[0]} and {pair[1]}|{pair[1]} and {pair[0]}) are", fault)
     touched = [dof for dof in case.matrix.references if dof.node in {str(node) for node in pair}]
     assert list(checks.untied) == touched
-    assert check(case.matrix, found, modes, geometry_of(case)).faults == ()
+    assert check(case.matrix, found, modes, geometry_of(case.structure)).faults == ()
 
 
 def test_points_of_unknown_place_and_few_modes_say_nothing(sheet):

@@ -53,11 +53,6 @@ def two_each_way() -> CutterModes:
     return real_modes(hertz, zeta, stiffness / (2 * np.pi * hertz) ** 2, along)
 
 
-def machine(modes: CutterModes, given: Cut) -> Machine:
-    """A structure and a cut."""
-    return Machine(modes, given)
-
-
 def semi_growth(machine: Machine, rpm: float, depth: float, count: int | None = None) -> float:
     """Largest |µ| at a speed and a depth in m, with `count` steps of a tooth's period."""
     if count is None:

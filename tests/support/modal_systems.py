@@ -1,11 +1,13 @@
 """Random modal systems with known poles: the truth that the mode tests are judged by."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from planner.frf.frf import Frf
 from planner.frf.synthesis import accelerance, pole
+from planner.modal.modes import Mode
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +73,29 @@ def exact_frf(system: System, frequency_hz: np.ndarray, rate_1_s: float = 0.0) -
     down = 1 / (s - system.poles.conj()[:, None])
     r = np.moveaxis(system.residues, 0, -1)
     return s**2 * (r @ up + r.conj() @ down)
+
+
+def matched(modes: Sequence[Mode], system: System) -> list[Mode | None]:
+    """For each true mode the found one within half a bandwidth or 0.5 %, None if there is none."""
+    out: list[Mode | None] = []
+    for f, zeta in zip(system.frequency_hz, system.damping_ratio, strict=True):
+        mode = min(modes, key=lambda mode: abs(mode.frequency_hz - f))
+        near = abs(mode.frequency_hz / f - 1) < max(0.005, 0.5 * zeta)
+        out.append(mode if near and mode not in out else None)
+    return out
+
+
+def scores(modes: Sequence[Mode], system: System) -> tuple[list[float], list[float]]:
+    """Errors over standard deviations of poles and of residues of the modes that were found."""
+    of_poles, of_residues = [], []
+    truth = zip(system.frequency_hz, system.damping_ratio, system.residues, strict=True)
+    for mode, (frequency, damping, residue) in zip(matched(modes, system), truth, strict=True):
+        if mode is not None:
+            of_poles.append((mode.frequency_hz - frequency) / mode.frequency_sd_hz)
+            of_poles.append((mode.damping_ratio - damping) / mode.damping_sd)
+            error = mode.residue - residue
+            of_residues += list((np.stack([error.real, error.imag]) / mode.residue_sd).ravel())
+    return of_poles, of_residues
 
 
 def noisy(h: np.ndarray, share: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -216,10 +216,10 @@ def _pieces(rng: np.random.Generator) -> Structure:
     return _damped(made, rng)
 
 
-def geometry_of(case: RoughSet) -> Geometry:
+def geometry_of(structure: Structure) -> Geometry:
     """Places of the nodes and the lines between them, as files state them."""
-    place = case.structure.position_m
-    lines = tuple((str(a), str(b)) for a, b in case.structure.lines)
+    place = structure.position_m
+    lines = tuple((str(a), str(b)) for a, b in structure.lines)
     return Geometry(tuple(str(n) for n in place), np.array(list(place.values())), lines)
 
 
