@@ -49,10 +49,11 @@ def build(cell: Cell, state: CampaignState, hits_of: HitsOf, recall: Recall | No
         q = low.stood(q)
         if straight is not None and straight.latest:
             hits = straight.latest
-        misfit = low.identified.misfit if low.identified else 1.0
+        fit = low.identified_robot
+        misfit = fit.identified.misfit if fit else 1.0
         noise = FrfNoise.of(tuple(h.whole for h in hits), table.band_hz, misfit)
-        if low.identified_robot is not None:
-            tuned, errors = _told_by(low.identified_robot, cell, used, hits, q)
+        if fit is not None:
+            tuned, errors = _told_by(fit, cell, used, hits, q)
     best = _best_guided(cell, used, low, tuned)
     surrogate = fit_surrogate(
         best.seen,

@@ -13,7 +13,6 @@ from msgspec.structs import replace
 
 from planner.campaign import events, store
 from planner.campaign.cell import Cell
-from planner.campaign.config import ModesTable
 from planner.campaign.events import REFUSED, HitRecord, Question
 from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.import_checks import (
@@ -24,7 +23,6 @@ from planner.campaign.import_checks import (
     unexpected_modes,
 )
 from planner.campaign.imported_files import (
-    Fresh,
     ImportedFiles,
     KnownFile,
     at_their_poses,
@@ -39,7 +37,7 @@ from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement, without_entries
 from planner.campaign.store import KeptRecordings
 from planner.dataset.measure import MeasuredPose, measure
-from planner.dataset.screened_files import Source, hits_of_files
+from planner.dataset.screened_files import FileVerdict, Source, hits_of_files
 from planner.errors import InputError
 from planner.progress import ProgressCallback
 from planner.recording.joints import JointUnits
@@ -127,9 +125,9 @@ def refusals(
     said = {path: f"{text} ({REFUSED})" for path, text in reasons.items() if text}
     found = []
     for path in paths:
-        digest, suffix = store.store_recording(directory, path)
-        source = replaced(stated.get(path, Source(path, "")), name=str(path))
-        found.append(record_of(source, digest, suffix, said.get(path, REFUSED)))
+        kept = store.store_recording(directory, path)
+        source = replaced(stated.get(path, Source(path, "")), name=str(path), path=kept)
+        found.append(record_of(source, said.get(path, REFUSED)))
     return tuple(found)
 
 
@@ -156,7 +154,6 @@ class JudgedFiles:
         delivery: ImportedFiles,
         state: CampaignState,
         named: frozenset[Path],
-        table: ModesTable,
     ) -> "JudgedFiles":
         """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
         fresh, already, left_out = new_files(kept.directory, delivery, state, named)
@@ -164,35 +161,33 @@ class JudgedFiles:
         accepted = used.accepted if used else ()
         before = {replace(h, file="") for h in (known.hits if known else ()) if not h.accepted}
         while fresh:
-            newer = [source for source, _ in fresh]
+            newer: Sequence[Source] = fresh
             while True:
                 gone = superseded(accepted, newer)
                 old = tuple(kept.source(hit) for hit in accepted if hit not in gone)
-                hits, measured = measure_files(old, fresh, table)
-                good = [s for (s, _), hit in zip(fresh, hits, strict=True) if hit.accepted]
+                measured = _measured((*old, *fresh), kept.cell)
+                hits = tuple(map(_record, measured.verdicts[len(old) :]))
+                good = [s for s, hit in zip(fresh, hits, strict=True) if hit.accepted]
                 if superseded(accepted, good) == gone:
                     break
                 newer = [source for source in newer if source in good]
             still = [replace(hit, file="") in before for hit in hits]
             if not any(still):
-                sources = tuple(source for source, _ in fresh)
-                return cls(already, left_out, hits, sources, measured, old, gone)
+                return cls(already, left_out, hits, fresh, measured, old, gone)
             left_out += tuple(itertools.compress(hits, still))
             fresh = tuple(one for one, out in zip(fresh, still, strict=True) if not out)
         return cls(already, left_out)
 
 
-def measure_files(
-    old: tuple[Source, ...], fresh: Sequence[Fresh], table: ModesTable
-) -> tuple[tuple[HitRecord, ...], MeasuredPose]:
-    """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
-    new = tuple(source for source, _ in fresh)
-    measured = measure((*old, *new), table.band_hz, window_rate_1_s=table.window_rate_1_s)
-    records = (
-        replace(record, hit=v.axis, accepted=v.accepted, reason=v.reason, simulated=v.simulated)
-        for v, (_, record) in zip(measured.verdicts[len(old) :], fresh, strict=True)
-    )
-    return tuple(records), measured
+def _measured(sources: tuple[Source, ...], cell: Cell) -> MeasuredPose:
+    table = cell.config.modes
+    return measure(sources, table.band_hz, window_rate_1_s=table.window_rate_1_s)
+
+
+def _record(verdict: FileVerdict) -> HitRecord:
+    """What the log keeps of a kept file once it is judged."""
+    record, simulated = record_of(verdict.source, verdict.reason), verdict.simulated
+    return replace(record, hit=verdict.axis, accepted=verdict.accepted, simulated=simulated)
 
 
 def remarks_on(
@@ -262,7 +257,7 @@ def import_paths(
     """Import within an act of the campaign, see `Campaign.import_paths`."""
     cell, state = campaign.cell, campaign.state
     default = state.open[0] if len(state.open) == 1 else None
-    deliveries = sort_paths(given, cell.robot.joints, cell.robot.points, pose, default)
+    deliveries = sort_paths(given, cell.robot, pose, default)
     placed = [(d, readback_of(cell, state, d)) for d in at_their_poses(deliveries, state)]
     named = frozenset(path for path in given if path.is_file())
     reports = []
@@ -300,8 +295,8 @@ def import_pose(
     started, pose = time.perf_counter(), delivery.pose
     instead, delivery = _held_before(campaign, delivery)
     before, state = campaign.model, without_entries(campaign.entries, instead)
-    known, keeps, table = state.hit_at(pose), campaign.recordings, campaign.cell.config.modes
-    judged = JudgedFiles.of(keeps, delivery, state, named, table)
+    known = state.hit_at(pose)
+    judged = JudgedFiles.of(campaign.recordings, delivery, state, named)
     hits, measured = judged.hits, judged.measured
     if measured is None:
         held = campaign.state.held.get(pose)
@@ -334,8 +329,7 @@ def _event(
     measured = alone = judged.measured
     # Among earlier hits, wrong ones would not stand out; one that was replaced is no new visit.
     if judged.old and not judged.superseded:
-        fresh = tuple(zip(judged.sources, judged.hits, strict=True))
-        alone = measure_files((), fresh, before.cell.config.modes)[1]
+        alone = _measured(judged.sources, before.cell)
     new_modes = from_modal(alone.modal)
     asked = contradiction(pose, measured, len(judged.old))
     asked = asked or question_about(before, state, pose, joints_deg, alone)

@@ -252,7 +252,8 @@ def _imported(
     state: CampaignState, changed: CampaignState, event: Imported, entry: Entry
 ) -> CampaignState:
     came = {hit.sha256 for hit in event.hits}
-    before = without(_judged_before(state, came).get(event.pose), event.replaced)
+    earlier = _judged_before(state, came)
+    before = without(earlier.get(event.pose), event.replaced)
     measurement = Measurement(
         pose=event.pose,
         joints_deg=event.joints_deg,
@@ -270,7 +271,7 @@ def _imported(
     if event.question is not None:
         held = {**state.held, event.pose: measurement}
         return replace(state, open=left, refused=refused, held=held)
-    measurements = {**_judged_before(state, came), event.pose: measurement}
+    measurements = {**earlier, event.pose: measurement}
     if state.unchanged_by(event):
         return replace(state, refused=refused, measurements=measurements)
     doubt = (event.again, event.pose) if event.again else _doubt(state, event.pose)
@@ -295,12 +296,10 @@ def without(known: Measurement | None, replaced: Sequence[str]) -> Measurement |
 
 def _judged_before(state: CampaignState, came: set[str]) -> dict[str, Measurement]:
     """The measurements without refused hits of files that came again, and were judged again."""
-    found = {}
-    for pose, measurement in state.measurements.items():
-        hits = tuple(h for h in measurement.hits if h.accepted or h.sha256 not in came)
-        same = len(hits) == len(measurement.hits)
-        found[pose] = measurement if same else replace(measurement, hits=hits)
-    return found
+    return {
+        pose: replace(m, hits=tuple(h for h in m.hits if h.accepted or h.sha256 not in came))
+        for pose, m in state.measurements.items()
+    }
 
 
 def _doubt(state: CampaignState, pose: str) -> tuple[str, str] | None:

@@ -59,7 +59,7 @@ def struck(folder: Path, seed: int, poses: int) -> Struck:
     for number, q in enumerate(rng.permutation(cell.candidates.q)[:poses]):
         stated = tuple(np.round(joints.shown(q), 4).tolist())
         said = true.record(folder / f"hits{number}", f"P{number}", stated)
-        [delivery] = sort_paths((said,), joints, cell.robot.points, None, None)
+        [delivery] = sort_paths((said,), cell.robot, None, None)
         frf = MeasuredPose(delivery.sources, robot.band_hz).frf
         assert frf is not None
         one = draws.sums(joints.internal(stated), frf.within(robot.band_hz))
