@@ -1,20 +1,28 @@
 """A campaign's model from its cell and its state: labels, simulation, surrogate."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from planner.campaign.cell import Cell
+from planner.campaign.config import ModesTable
 from planner.campaign.frequencies_by_simulation import tuned_frequencies
 from planner.campaign.hit_error_estimates import CampaignHitErrors, Visited, estimate
 from planner.campaign.labels import LabelledPose, label, observations
 from planner.campaign.low_fidelity import LowFidelity, Recall, identify_low_fidelity, in_memory
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
-from planner.campaign.straightened import HitsOf, StraightenedHits
-from planner.dataset.hit_columns import PoseHits
+from planner.dataset.hit_columns import Correction, PoseHits, no_columns
 from planner.design.parameter_sensitivity import FrfNoise
+from planner.dynamics.at_force import with_average, with_possible_laws
+from planner.dynamics.simulation import Simulation
 from planner.fit.identified_robot import IdentifiedRobot
+from planner.frf.frf import Frf
+from planner.measurement.straightened_hits import straightened_hits, struck_n
+from planner.recording.points import TCP
+from planner.recording.records import Hit
 from planner.surrogate.average import Average
 from planner.surrogate.frequency_models import MODELS
 from planner.surrogate.gp import STAGES
@@ -24,6 +32,24 @@ SIMULATED_AT = 200  # candidates, where a model learns the simulation
 # Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
 # that are none.
 MISSING_MODE, UNLABELLED_MODE = float(np.log(0.1)), float(np.log(0.01))
+
+
+class HitsOf(Protocol):
+    """What the hits of a measurement say, if need be once they are corrected."""
+
+    def __call__(
+        self, measurement: Measurement, corrected: Correction | None = None, /
+    ) -> PoseHits: ...
+
+
+def hits_unknown(frfs: Mapping[str, Frf]) -> HitsOf:
+    """Of poses by name of which nothing is known but the tool's FRF."""
+
+    def hits_of(measurement: Measurement, _: Correction | None = None, /) -> PoseHits:
+        frf = frfs[measurement.pose]
+        return PoseHits(no_columns(), frf, frf)
+
+    return hits_of
 
 
 def build(cell: Cell, state: CampaignState, hits_of: HitsOf, recall: Recall | None = None) -> Model:
@@ -168,3 +194,44 @@ class _Guided:
             free = [m.frequency_hz for m in measurement.modes if m.likely]
             count += sum(f not in given and f < max(given, default=0.0) for f in free)
         return count
+
+
+class StraightenedHits:
+    """Hits as springs alone would answer them, where robot.toml states laws of joints.
+
+    Those of measurements in use at q (n, dof) in rad; `latest` is what was asked for last.
+    """
+
+    def __init__(
+        self, hits_of: HitsOf, used: tuple[Measurement, ...], q: np.ndarray, table: ModesTable
+    ):
+        self.latest: tuple[PoseHits, ...] = ()
+        self._hits_of, self._how = hits_of, (table.band_hz[1], table.window_rate_1_s)
+        self._used = tuple(zip(used, q, strict=True))
+
+    def frfs(self, simulation: Simulation, count: int) -> tuple[Frf, ...]:
+        """At all points, of the first so many, without what the laws of a simulation do."""
+        simulation = with_possible_laws(simulation)
+
+        def corrected(q: np.ndarray) -> Correction:
+            return lambda hits: straightened_hits(
+                hits, np.tile(q, (len(hits), 1)), simulation, *self._how
+            )
+
+        self.latest = tuple(self._hits_of(m, corrected(q)) for m, q in self._used[:count])
+        return tuple(hits.whole for hits in self.latest)
+
+    def referred(self, simulation: Simulation) -> Simulation:
+        """The same robot, its springs with what the hits of the first pose have of its laws."""
+        struck: list[Hit] = []
+
+        def seen(hits: tuple[Hit, ...]) -> tuple[Hit, ...]:
+            struck.extend(hit for hit in hits if hit.hit_point == TCP)
+            return hits
+
+        (measurement, q), *_ = self._used
+        self._hits_of(measurement, seen)
+        if not struck:
+            return simulation
+        axes = np.array([hit.axis_index for hit in struck])
+        return with_average(simulation, q, axes, struck_n(simulation, struck))

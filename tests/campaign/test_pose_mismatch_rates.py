@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from planner.campaign.import_checks import question_about
 from planner.campaign.model import Model
-from planner.campaign.poses_together import SURE
+from planner.campaign.pose_mismatch import SURE
 from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.recording.records import Hit
