@@ -13,7 +13,7 @@ import numpy as np
 
 from planner.campaign.chain_faults import NONE, SCALED, TURNED, ChainFault, log_prior
 from planner.campaign.events import Question
-from planner.campaign.model import Model
+from planner.campaign.import_checks import Claim
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import solve_poles
 from planner.frf.frf import Frf
@@ -124,22 +124,19 @@ def most_probable(sums: HitSums) -> tuple[ChainFault, float]:
     return fault, most - float(likelihood([NONE])[0])
 
 
-def chain_mismatch(
-    model: Model, pose: str, joints_deg: tuple[float, ...], frf: Frf | None
-) -> Question | None:
+def chain_mismatch(claim: Claim, frf: Frf | None) -> Question | None:
     """What to ask of the chain behind the first pose's hits, before they are believed.
 
     `frf` is the tool's by the new hits alone; None: nothing is asked.
     """
-    simulation = model.cell.simulation
-    if frf is None or simulation is None:
+    cell = claim.model.cell
+    if frf is None or cell.simulation is None:
         return None
-    q, band = model.cell.robot.joints.internal(joints_deg), model.cell.config.modes.band_hz
-    here = hit_sums(simulation, model.cell.tolerances, q, frf.within(band))
+    here = hit_sums(cell.simulation, cell.tolerances, claim.q, frf.within(claim.band_hz))
     if here is None:
         return None
     fault, gain = most_probable(here)
     if gain < LOG_ODDS:
         return None
-    text = f"At {pose}, by the simulation, {fault.asked} Are these hits right as they are?"
+    text = f"At {claim.pose}, by the simulation, {fault.asked} Are these hits right as they are?"
     return Question(text, about="chain")

@@ -16,6 +16,7 @@ from planner.campaign.cell import Cell
 from planner.campaign.events import REFUSED, HitRecord, Question
 from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.import_checks import (
+    Claim,
     alerts,
     contradiction,
     question_about,
@@ -304,7 +305,8 @@ def import_pose(
             pose, held or state.measurements.get(pose), before, before, (),
             held.question if held else None, judged.already, judged.left_out,
         )  # fmt: skip
-    event, told = _event(before, state, pose, known.joints_deg if known else joints_deg, judged)
+    claim = Claim(before, state, pose, known.joints_deg if known else joints_deg)
+    event, told = _event(claim, judged)
     campaign.append(replace(event, instead=instead))
     measurement = (campaign.state.held if event.question else campaign.state.measurements)[pose]
     model = campaign.model
@@ -317,28 +319,21 @@ def import_pose(
     )  # fmt: skip
 
 
-def _event(
-    before: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...],
-    judged: JudgedFiles,
-) -> tuple[events.Imported, tuple[str, ...]]:  # fmt: skip
-    """What the log gains by new files, and remarks to be acted upon while the robot stands there.
-
-    `before` and `state` are those before the import.
-    """
+def _event(claim: Claim, judged: JudgedFiles) -> tuple[events.Imported, tuple[str, ...]]:
+    """What the log gains by new files, and remarks to be acted upon while the robot stands."""
     assert judged.measured is not None
     measured = alone = judged.measured
     # Among earlier hits, wrong ones would not stand out; one that was replaced is no new visit.
     if judged.old and not judged.superseded:
-        alone = _measured(judged.sources, before.cell)
+        alone = _measured(judged.sources, claim.model.cell)
     new_modes = from_modal(alone.modal)
-    asked = contradiction(pose, measured, len(judged.old))
-    asked = asked or question_about(before, state, pose, joints_deg, alone)
+    asked = contradiction(claim.pose, measured, len(judged.old)) or question_about(claim, alone)
     again, drift = "", ""
     if asked is None:
-        again, drift = suspected_drift(before, state, pose, joints_deg, new_modes)
+        again, drift = suspected_drift(claim, new_modes)
     event = events.Imported(
-        pose=pose,
-        joints_deg=joints_deg,
+        pose=claim.pose,
+        joints_deg=claim.joints_deg,
         hits=judged.hits,
         modes=from_modal(measured.modal),
         remarks=measured.remarks,
@@ -347,4 +342,4 @@ def _event(
         again=again,
         replaced=tuple(hit.sha256 for hit in judged.superseded),
     )
-    return event, alerts(before, state, event, measured, new_modes, drift)
+    return event, alerts(claim, event, measured, new_modes, drift)

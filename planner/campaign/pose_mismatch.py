@@ -27,7 +27,7 @@ from planner.campaign.alternatives import (
 )
 from planner.campaign.chain_mismatch import chain_mismatch
 from planner.campaign.events import Question
-from planner.campaign.model import Model
+from planner.campaign.import_checks import Claim
 from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.fit.expected import ExpectedFrfs
@@ -46,36 +46,29 @@ NEAR_DEG = 2.0  # to the setpoint, in which angles that are none of degrees are 
 SURE = 2
 
 
-def pose_mismatch(
-    model: Model,
-    state: CampaignState,
-    pose: str,
-    joints_deg: tuple[float, ...],
-    measured: MeasuredPose,
-) -> Question | None:
+def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
     """What to ask the engineer before new hits of a pose are believed; None: nothing.
 
-    `measured` is of the new hits alone; `model` and `state` are those before the import.
+    `measured` is of the new hits alone.
     """
-    fit, frf = model.low.identified_robot or model.low.rejected, measured.one_hit_frf
+    fit, frf = claim.model.low.identified_robot or claim.model.low.rejected, measured.one_hit_frf
     if frf is None or fit is None:
         return None
-    expected = ExpectedFrfs(fit.posterior, model.cell.config.modes.band_hz)
-    joints = model.cell.robot.joints
-    q, frf = joints.internal([joints_deg])[0], frf.within(expected.band_hz)
+    expected = ExpectedFrfs(fit.posterior, claim.band_hz)
+    q, frf = claim.q, frf.within(expected.band_hz)
     sure, placed = fit.poses >= SURE, fit.poses >= PLACED
     stated = StatedHits(expected, q, frf, placed)
-    answered = _called_right(state)
+    answered = _called_right(claim.state)
     said = "".join(answered)  # not asked again
-    likely = _setpoint(model, state, pose, joints_deg)
+    likely = _setpoint(claim)
     if sure and frf.layout == TOOL and FAR_OFF_HITS not in said:
         likely.append(far_off_hits(expected, q))
     if stated.agree(likely):
         return None
-    mistakes = [*likely, *_poses(model, state, pose, joints_deg)]
+    mistakes = [*likely, *_poses(claim)]
     if sure:
-        mistakes += flipped_signs(joints, joints_deg)
-        mistakes += joint_offsets(joints, expected, frf, joints_deg)
+        mistakes += flipped_signs(claim.joints, claim.joints_deg)
+        mistakes += joint_offsets(claim.joints, expected, frf, claim.joints_deg)
     mistakes += (m for m in chain_faults(expected, q, frf, sure) if m.what not in said)
     fits = stated.best_alternative(mistakes)
     # Another known pose is none by chance; any angle may be, of the pose or of one before.
@@ -84,62 +77,55 @@ def pose_mismatch(
         or fits.about == "readback"
         or (fits.about != "chain" and StatedHits(expected, fits.q, frf).doubted)
     ):
-        fits = _earlier(model, state, pose, joints_deg, frf) or fits
+        fits = _earlier(claim, fit.posterior, frf) or fits
     if fits is None and not stated.impossible:
         return None
     if fits is None and not sure:
-        return None if answered else chain_mismatch(model, pose, joints_deg, measured.frf)
-    return _asked(pose, 100 * expected.off(q, frf), fits)
+        return None if answered else chain_mismatch(claim, measured.frf)
+    return _asked(claim.pose, 100 * expected.off(q, frf), fits)
 
 
-def _poses(
-    model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...]
-) -> Iterator[Alternative]:
+def _poses(claim: Claim) -> Iterator[Alternative]:
     """Where else the robot may be."""
-    joints = model.cell.robot.joints
+    state = claim.state
     known = {m.pose: m.joints_deg for m in state.used}
     known |= {name: state.proposals[name].joints_deg for name in state.open}
-    known.pop(pose, None)
+    known.pop(claim.pose, None)
     for name, there in known.items():
         what = f"repeat those of {name}" if state.hit_at(name) else f"fit {name} far better"
-        yield Alternative(joints.internal([there])[0], what, name)
+        yield Alternative(claim.joints.internal(there), what, name)
 
 
-def _setpoint(
-    model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...]
-) -> list[Alternative]:
+def _setpoint(claim: Claim) -> list[Alternative]:
     """Where the robot was sent, where that is not what is stated."""
-    joints = model.cell.robot.joints
-    sent = state.proposals[pose].joints_deg if pose in state.proposals else joints_deg
+    joints, pose, joints_deg = claim.joints, claim.pose, claim.joints_deg
+    proposal = claim.state.proposals.get(pose)
+    sent = proposal.joints_deg if proposal else joints_deg
     typed = np.flatnonzero(np.abs(np.subtract(sent, joints_deg)) > joints.same()).tolist()
     which = ", ".join(either(joints, i, sent[i], joints_deg[i]) for i in typed)
     what = f"fit the setpoint of {pose} better than its readback: is {which}?"
     if np.all(np.abs(np.rad2deg(joints_deg) - sent) < NEAR_DEG):
         what = f"fit the setpoint of {pose} better than its readback: are its angles in radians?"
-    there = joints.internal([sent])[0]
-    return [Alternative(there, what, about="readback", rival=True)] if typed else []
+    there = Alternative(joints.internal(sent), what, about="readback", rival=True)
+    return [there] if typed else []
 
 
-def _earlier(
-    model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...], frf: Frf
-) -> Alternative | None:
+def _earlier(claim: Claim, found: RobotPosterior, frf: Frf) -> Alternative | None:
     """An angle mistyped at a pose measured before, where all are likelier so.
 
-    `frf` are the new hits of a pose at `joints_deg`.
+    `frf` are the new hits, `found` what the model says of the robot without them.
     """
-    joints, fit = model.cell.robot.joints, model.low.identified_robot or model.low.rejected
-    if fit is None or frf.layout.sensors != TOOL.sensors:
+    if frf.layout.sensors != TOOL.sensors:
         return None
-    known = [*((m.pose, m.joints_deg) for m in model.used), (pose, joints_deg)]
-    q = joints.internal([angles for _, angles in known])
-    poses = PosesTogether(
-        fit.posterior, model.cell.config.modes.band_hz, joints, q, (*model.frfs, frf)
-    )
-    asked = [(m.pose, m.question) for m in model.used if m.question is not None]
+    used = claim.model.used
+    every = [*(replace(claim, pose=m.pose, joints_deg=m.joints_deg) for m in used), claim]
+    q, frfs = np.array([one.q for one in every]), (*claim.model.frfs, frf)
+    poses = PosesTogether(found, claim.band_hz, claim.joints, q, frfs)
+    asked = [(m.pose, m.question) for m in used if m.question is not None]
     right = {a.fits or name for name, a in asked if a.about in ("readback", "earlier")}
-    answered = [i for i, (name, _) in enumerate(known[:-1]) if name in right]
-    found = poses.wrong([_setpoint(model, state, *one) for one in known], answered)
-    return replace(found[1], pose=known[found[0]][0], about="earlier") if found else None
+    answered = [i for i, one in enumerate(every[:-1]) if one.pose in right]
+    wrong = poses.wrong([_setpoint(one) for one in every], answered)
+    return replace(wrong[1], pose=every[wrong[0]].pose, about="earlier") if wrong else None
 
 
 def _called_right(state: CampaignState) -> tuple[str, ...]:

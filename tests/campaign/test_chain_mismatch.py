@@ -7,7 +7,7 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.chain_faults import SCALED, TURNED, ChainFault
-from planner.campaign.import_checks import question_about
+from planner.campaign.import_checks import Claim, question_about
 from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
 from planner.demo import NAME, Pool, shipped
@@ -113,5 +113,6 @@ def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
         (folder := tmp_path / f"{factor:g}").mkdir()
         sources = tuple(Source(scaled(r, folder, factor), r.file.name, r.hit) for r in rows)
         other = measure(sources, band_hz)
-        asked = question_about(held.model, held.state, "A57", rows[0].joints_deg, other)
+        claim = Claim(held.model, held.state, "A57", rows[0].joints_deg)
+        asked = question_about(claim, other)
         assert (asked is not None and asked.about == "chain") == doubted

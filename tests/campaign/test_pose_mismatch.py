@@ -15,7 +15,7 @@ import pytest
 
 from planner.campaign import pose_mismatch
 from planner.campaign.campaign import Campaign
-from planner.campaign.import_checks import question_about
+from planner.campaign.import_checks import Claim, question_about
 from planner.campaign.state import fold
 from planner.campaign.store import CONFIG
 from planner.dataset.measure import MeasuredPose, measure
@@ -164,7 +164,8 @@ def test_hits_listed_along_wrong_axes_are_asked_about(campaign, pool):
     def asked(along):
         listed = tuple(replace(h, axis=h.axis[0] + along[h.axis[1]]) for h in hits)
         measured = MeasuredPose((), band_hz, given=listed)
-        return question_about(campaign.model, campaign.state, "X1", rows[0].joints_deg, measured)
+        claim = Claim(campaign.model, campaign.state, "X1", rows[0].joints_deg)
+        return question_about(claim, measured)
 
     assert asked({"x": "x", "y": "y", "z": "z"}) is None
     question = asked({"x": "x", "y": "z", "z": "y"})
@@ -202,7 +203,7 @@ def test_angles_in_radians_are_asked_about_as_that(campaign, pool):
         (tuple(np.deg2rad(sent) + 0.01), "are its angles in radians?"),
         ((*sent[:2], sent[2] + 8, *sent[3:]), "is joint_3"),
     ):
-        (asked,) = pose_mismatch._setpoint(campaign.model, state, "P9", typed)
+        (asked,) = pose_mismatch._setpoint(Claim(campaign.model, state, "P9", typed))
         assert said in asked.what
 
 
