@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ import msgspec
 
 from planner.campaign import events, store
 from planner.campaign.config import load_campaign_config
-from planner.campaign.journal import remove_parts
+from planner.campaign.journal import encode_line, remove_parts
 from planner.campaign.read_only import ReadOnlyCampaign
 from planner.campaign.undo import last_acts, last_undone
 from planner.dataset.screened_files import Source
@@ -248,10 +249,7 @@ class Campaign(ReadOnlyCampaign):
 
 def _first_entry(directory: Path) -> bytes:
     """The log of a new campaign, once robot and workspace have been held against each other."""
-    from datetime import UTC, datetime
-
     from planner.campaign.cell import Cell, refuse_errors
-    from planner.campaign.journal import encode_line
 
     config = load_campaign_config(directory / store.CONFIG)
     cell = Cell.load(directory / config.robot, config)

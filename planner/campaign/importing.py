@@ -41,7 +41,6 @@ from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import FileVerdict, Source, hits_of_files
 from planner.errors import InputError
 from planner.progress import ProgressCallback
-from planner.recording.joints import JointUnits
 
 if TYPE_CHECKING:
     from planner.campaign.campaign import Campaign
@@ -192,14 +191,11 @@ def _record(verdict: FileVerdict) -> HitRecord:
 
 
 def remarks_on(
-    joints: JointUnits, state: CampaignState, judged: JudgedFiles, measurement: Measurement,
-    stood: tuple[float, ...], told: tuple[str, ...],
-) -> tuple[str, ...]:  # fmt: skip
-    """What is to be known of an import, where the robot `stood`, with what was `told` of its hits.
-
-    `state` is that before it, `measurement` what came of it.
-    """
+    claim: Claim, judged: JudgedFiles, measurement: Measurement, told: tuple[str, ...]
+) -> tuple[str, ...]:
+    """What is to be known of an import, with what was `told` of its hits; `measurement` came."""
     assert judged.measured is not None
+    state = claim.state
     return (
         *hits_of_files(judged.measured.verdicts[len(judged.old) :]),
         *judged.measured.remarks,
@@ -211,20 +207,18 @@ def remarks_on(
             for hit in judged.hits
             if hit.sha256 in state.refused
         ),
-        *displacement(joints, state, measurement.pose, stood),
+        *displacement(claim),
         *axes_not_hit(state, measurement),
     )
 
 
-def displacement(
-    joints: JointUnits, state: CampaignState, pose: str, joints_deg: tuple[float, ...]
-) -> tuple[str, ...]:
+def displacement(claim: Claim) -> tuple[str, ...]:
     """A remark if the robot stood elsewhere than proposed."""
-    proposal = state.proposals.get(pose)
-    off = proposal and joints.apart(proposal.joints_deg, joints_deg)
+    proposal = claim.state.proposals.get(claim.pose)
+    off = proposal and claim.joints.apart(proposal.joints_deg, claim.joints_deg)
     if not off:
         return ()
-    return (f"The readback of {pose} is up to {off} from its setpoint.",)
+    return (f"The readback of {claim.pose} is up to {off} from its setpoint.",)
 
 
 def axes_not_hit(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
@@ -310,7 +304,8 @@ def import_pose(
     campaign.append(replace(event, instead=instead))
     measurement = (campaign.state.held if event.question else campaign.state.measurements)[pose]
     model = campaign.model
-    remarks = remarks_on(campaign.cell.robot.joints, state, judged, measurement, joints_deg, told)
+    stood = replaced(claim, joints_deg=joints_deg)
+    remarks = remarks_on(stood, judged, measurement, told)
     if not event.question and any(hit.accepted for hit in hits):
         remarks += (*unexpected_modes(before, model, pose), *model.remarks)
     return ImportReport(

@@ -156,9 +156,10 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
     for entry in entries:
         if isinstance(entry.event, Proposed):
             made = {p.pose: p for p in entry.event.proposals}
-            state = replace(
-                state, proposals_made=_made(state, entry.event), proposals=state.proposals | made
-            )
+            # A pose that is proposed again keeps its name.
+            numbers = [int(pose[1:]) for pose in made if pose[1:].isdecimal()]
+            count = max([state.proposals_made, *numbers])
+            state = replace(state, proposals_made=count, proposals=state.proposals | made)
         if isinstance(entry.event, Undone):
             if not all(map(state.unchanged_by, _acts_of(entries, entry.event))):
                 state = replace(state, model_version=entry.seq)
@@ -194,12 +195,6 @@ def _acts_of(entries: Sequence[Entry], event: AnyEvent) -> Iterator[AnyEvent]:
         return
     for act in event.acts:
         yield from _acts_of(entries, entries[act - 1].event)
-
-
-def _made(state: CampaignState, event: Proposed) -> int:
-    """How many names were given; a pose that is proposed again keeps its own."""
-    numbers = [p.pose[1:] for p in event.proposals if p.pose[1:].isdecimal()]
-    return max([state.proposals_made, *map(int, numbers)])
 
 
 def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState:
