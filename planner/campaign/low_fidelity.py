@@ -15,7 +15,6 @@ from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import EffectLibrary
 from planner.fit.fitted import FitRecord
 from planner.fit.identified_robot import PLACED, IdentifiedRobot
-from planner.fit.posterior import RobotBelief
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior, exported
 from planner.fit.trials import as_found
@@ -62,13 +61,6 @@ class LowFidelity:
         """What is known before of everything that a robot may have; only with a simulation."""
         assert self.nominal is not None
         return RobotPrior(EffectLibrary.of(self.nominal, CAD_INERTIAS))
-
-    @property
-    def known_robot(self) -> RobotBelief:
-        """What is known of the robot's numbers, before it is measured as stated."""
-        if self.identified_robot is not None:
-            return self.identified_robot.posterior
-        return RobotBelief.stated(self.prior, self.tolerances)
 
     @property
     def is_identified(self) -> bool:

@@ -220,7 +220,7 @@ class ReadOnlyCampaign:
         return tuple(
             Recording(measurement.pose, q, source)
             for measurement, q in zip(used, self.model.low.stood(stated), strict=True)
-            for source in kept.sources(measurement)
+            for source in map(kept.source, measurement.accepted)
         )
 
     def orphans(self) -> list[str]:

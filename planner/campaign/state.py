@@ -247,7 +247,11 @@ def _imported(
     state: CampaignState, changed: CampaignState, event: Imported, entry: Entry
 ) -> CampaignState:
     came = {hit.sha256 for hit in event.hits}
-    earlier = _judged_before(state, came)
+    # Refused hits of files that come again are judged again.
+    earlier = {
+        pose: replace(m, hits=tuple(h for h in m.hits if h.accepted or h.sha256 not in came))
+        for pose, m in state.measurements.items()
+    }
     before = without(earlier.get(event.pose), event.replaced)
     measurement = Measurement(
         pose=event.pose,
@@ -287,14 +291,6 @@ def without(known: Measurement | None, replaced: Sequence[str]) -> Measurement |
         for hit in known.hits
     )  # fmt: skip
     return replace(known, hits=hits)
-
-
-def _judged_before(state: CampaignState, came: set[str]) -> dict[str, Measurement]:
-    """The measurements without refused hits of files that came again, and were judged again."""
-    return {
-        pose: replace(m, hits=tuple(h for h in m.hits if h.accepted or h.sha256 not in came))
-        for pose, m in state.measurements.items()
-    }
 
 
 def _doubt(state: CampaignState, pose: str) -> tuple[str, str] | None:

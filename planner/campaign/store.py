@@ -192,10 +192,8 @@ def _remove_left(directory: Path) -> None:
 def _alive(process: int) -> bool:
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
+    except OSError as error:
+        return not isinstance(error, ProcessLookupError)
     return True
 
 
@@ -292,10 +290,9 @@ class KeptRecordings:
 
     def source(self, hit: HitRecord) -> Source:
         """The kept copy of a recording; InputError where it is not what was imported."""
-        path = self._checked(hit)
         stated = StatedPoints(hit.hit_point, hit.response_points, names=self.cell.robot.points)
-        own = hit.part, hit.response, hit.from_name
-        return Source(path, hit.file, hit.hit, hit.repeat, stated, *own)
+        own = hit.hit, hit.repeat, stated, hit.part, hit.response, hit.from_name
+        return Source(self._checked(hit), hit.file, *own)
 
     def _checked(self, hit: HitRecord) -> Path:
         path = recording_path(self.directory, hit.sha256, hit.suffix)
@@ -316,14 +313,10 @@ class KeptRecordings:
         if now != before:
             found.put(key, now)
 
-    def sources(self, measurement: Measurement) -> tuple[Source, ...]:
-        """Of the accepted hits of a measured pose."""
-        return tuple(self.source(hit) for hit in measurement.accepted)
-
     def hits(self, measurement: Measurement, corrected: "Correction | None" = None) -> "PoseHits":
         """What the accepted hits of a measured pose say, each by itself and at all points."""
         from planner.dataset.hit_columns import hits_of
 
         table = self.cell.config.modes
         how = table.band_hz, table.window_rate_1_s
-        return hits_of(self.sources(measurement), *how, corrected)
+        return hits_of(tuple(map(self.source, measurement.accepted)), *how, corrected)
