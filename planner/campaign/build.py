@@ -1,7 +1,7 @@
 """A campaign's model from its cell and its state: labels, simulation, surrogate."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -32,6 +32,9 @@ SIMULATED_AT = 200  # candidates, where a model learns the simulation
 # Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
 # that are none.
 MISSING_MODE, UNLABELLED_MODE = float(np.log(0.1)), float(np.log(0.01))
+
+Tuned = tuple[np.ndarray, np.ndarray]  # frequencies (n, count) in Hz and their sds
+Guided = tuple[tuple[LabelledPose, ...], ModalObservations, Average]  # with ln f's own fit
 
 
 class HitsOf(Protocol):
@@ -80,16 +83,11 @@ def build(cell: Cell, state: CampaignState, hits_of: HitsOf, recall: Recall | No
         noise = FrfNoise.of(tuple(h.whole for h in hits), table.band_hz, misfit)
         if fit is not None:
             tuned, errors = _told_by(fit, cell, used, hits, q)
-    best = _best_guided(cell, used, low, tuned)
-    surrogate = fit_surrogate(
-        best.seen,
-        primary=best.primary,
-        residues=False,
-        identified=best.low.is_identified,
-        kernel=cell.config.surrogate.kernel,
-    )
+    low, (labelled, seen, primary) = _best_guided(cell, used, low, tuned)
+    kernel = cell.config.surrogate.kernel
+    surrogate = fit_surrogate(seen, primary, False, low.is_identified, kernel)
     frfs = tuple(h.of_tool.within(table.band_hz) for h in hits)
-    return Model(cell, best.labelled, best.low, best.seen, surrogate, noise, errors, used, frfs)
+    return Model(cell, labelled, low, seen, surrogate, noise, errors, used, frfs)
 
 
 def _told_by(
@@ -98,7 +96,7 @@ def _told_by(
     used: tuple[Measurement, ...],
     hits: tuple[PoseHits, ...],
     q: np.ndarray,
-) -> tuple[tuple[np.ndarray, np.ndarray], CampaignHitErrors]:
+) -> tuple[Tuned, CampaignHitErrors]:
     """Frequencies with their sds, and errors of hits, by a robot that was identified from them."""
     band, count = cell.config.modes.band_hz, cell.config.modes.count
     seen = tuple(h.averaged.within(band) for h in hits)
@@ -112,19 +110,18 @@ def _told_by(
 
 
 def _best_guided(
-    cell: Cell,
-    used: tuple[Measurement, ...],
-    low: LowFidelity,
-    tuned: tuple[np.ndarray, np.ndarray] | None,
-) -> "_Guided":
+    cell: Cell, used: tuple[Measurement, ...], low: LowFidelity, tuned: Tuned | None
+) -> tuple[LowFidelity, Guided]:
     """By the simulation as identified or, where that does not fit, as stated or by none."""
     if low.identified_robot is None or low.identified_robot.fits:
-        return _Guided.by(cell, used, low, tuned)
+        return low, _guided(cell, used, low, tuned)
     # What lacks physics is bent by fitting it: as it stands it may be a better guide, or none.
     stated = replace(cell.frozen, rejected=low.identified_robot)
-    tried = low, stated, replace(stated, nominal=None)
-    best = max((_Guided.by(cell, used, one) for one in tried), key=lambda one: one.log_evidence)
-    return best if best.low.identified_robot is None else _Guided.by(cell, used, low, tuned)
+    tried = [
+        (one, _guided(cell, used, one)) for one in (low, stated, replace(stated, nominal=None))
+    ]
+    best = max(tried, key=lambda one: _log_evidence(used, one[1]))
+    return best if best[0] is not low else (low, _guided(cell, used, low, tuned))
 
 
 def simulated_elsewhere(
@@ -138,62 +135,41 @@ def simulated_elsewhere(
     return x, low.frequencies(q).frequency_hz
 
 
-@dataclass(frozen=True, eq=False)
-class _Guided:
-    """Labels and frequencies as one low fidelity makes them."""
+def _guided(
+    cell: Cell, used: tuple[Measurement, ...], low: LowFidelity, tuned: Tuned | None = None
+) -> Guided:
+    """Labels, and frequencies, as one low fidelity makes them.
 
-    low: LowFidelity
-    used: tuple[Measurement, ...]
-    labelled: tuple[LabelledPose, ...]
-    seen: ModalObservations
-    primary: Average
-
-    @classmethod
-    def by(
-        cls,
-        cell: Cell,
-        used: tuple[Measurement, ...],
-        low: LowFidelity,
-        tuned: tuple[np.ndarray, np.ndarray] | None = None,
-    ) -> "_Guided":
-        """`tuned` frequencies, their sds known, take the place of those of modal analyses."""
-        labelled = label(cell, used, low)
-        seen = observations(cell, labelled)
-        if tuned is not None:
-            hz, sd = (
-                np.where(np.isfinite(tuned[1]), own, found)
-                for own, found in zip(tuned, (seen.frequency_hz, seen.frequency_sd_hz), strict=True)
-            )
-            seen = replace(seen, frequency_hz=hz, frequency_sd_hz=sd)
-        known = low.discrepancy if labelled else None
-        primary = fit_primary(
-            seen, known, low.belief, model=cell.config.surrogate.model,
-            kernel=cell.config.surrogate.kernel, elsewhere=simulated_elsewhere(cell, low),
-        )  # fmt: skip
-        return cls(low, used, labelled, seen, primary)
-
-    @property
-    def log_evidence(self) -> float:
-        """How probable the measured modes were, all labels together.
-
-        A label without a mode, and a mode below the last label that got none, are rare too.
-        """
-        labels = self.primary.log_evidence[: self.low.count]
-        missed = sum(mode is None for pose in self.labelled for mode in pose.modes)
-        share = min(1.0, STAGES[-1] / max(len(self.labelled), 1))  # of the poses it is about
-        return float(np.sum(labels)) + share * (
-            missed * MISSING_MODE + self.stray * UNLABELLED_MODE
+    `tuned` ones, where their sds are known, take the place of those of modal analyses.
+    """
+    labelled, table = label(cell, used, low), cell.config.surrogate
+    seen = observations(cell, labelled)
+    if tuned is not None:
+        hz, sd = (
+            np.where(np.isfinite(tuned[1]), own, found)
+            for own, found in zip(tuned, (seen.frequency_hz, seen.frequency_sd_hz), strict=True)
         )
+        seen = replace(seen, frequency_hz=hz, frequency_sd_hz=sd)
+    known, elsewhere = low.discrepancy if labelled else None, simulated_elsewhere(cell, low)
+    primary = fit_primary(seen, known, low.belief, table.model, table.kernel, elsewhere)
+    return labelled, seen, primary
 
-    @property
-    def stray(self) -> int:
-        """Measured modes that are no label's though labels lie above them."""
-        count = 0
-        for pose, measurement in zip(self.labelled, self.used, strict=True):
-            given = {mode.frequency_hz for mode in pose.modes if mode is not None}
-            free = [m.frequency_hz for m in measurement.modes if m.likely]
-            count += sum(f not in given and f < max(given, default=0.0) for f in free)
-        return count
+
+def _log_evidence(used: tuple[Measurement, ...], guided: Guided) -> float:
+    """How probable the measured modes were, all labels together.
+
+    A label without a mode, and a mode below the last label that got none, are rare too.
+    """
+    labelled, _, primary = guided
+    missed = stray = 0
+    for pose, measurement in zip(labelled, used, strict=True):
+        given = {mode.frequency_hz for mode in pose.modes if mode is not None}
+        free = [m.frequency_hz for m in measurement.modes if m.likely]
+        missed += sum(mode is None for mode in pose.modes)
+        stray += sum(f not in given and f < max(given, default=0.0) for f in free)
+    share = min(1.0, STAGES[-1] / max(len(labelled), 1))  # of the poses it is about
+    rare = missed * MISSING_MODE + stray * UNLABELLED_MODE
+    return float(np.sum(primary.log_evidence)) + share * rare
 
 
 class StraightenedHits:

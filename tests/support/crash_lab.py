@@ -163,6 +163,14 @@ def left_over(cell: Cell) -> list[str]:
     return [str(path) for path in cell.campaign.rglob(".*.part")]
 
 
+def given_again(cell: Cell, command: Command, log: Path) -> list[str]:
+    """What is wrong once a command that was stopped was given again."""
+    before = entries(cell)
+    again = forked(doing(command), log)
+    codes = (0, 2, 3) if command[0] in DONE_ONCE else (0, 3)
+    return again.faults(codes) + lost(cell, before, command, again) + left_over(cell)
+
+
 def kill(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     """One command, killed; half of the time it is given again."""
     if cell.log.exists() and len(cell.state().used) >= ENOUGH:
@@ -179,10 +187,7 @@ def kill(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     outcome = forked(doing(command), log, change, after)
     faults = outcome.faults() + lost(cell, before, command, outcome)
     if command[0] != "watch" and rng.random() < 0.5:
-        before = entries(cell)
-        again = forked(doing(command), log)
-        codes = (0, 2, 3) if command[0] in DONE_ONCE else (0, 3)
-        faults += again.faults(codes) + lost(cell, before, command, again) + left_over(cell)
+        faults += given_again(cell, command, log)
     return {"command": command[:1], "killed": outcome.killed, "cpu_s": outcome.cpu_s,
             "gib": outcome.peak_gib, "faults": faults}  # fmt: skip
 
@@ -205,10 +210,7 @@ def interrupt(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
         new = [e.event.pose for e in gained if isinstance(e.event, Imported)]
         faults += [f"the hits of {pose} are not named" for pose in new[-1:] if pose not in told]
     if not watching:
-        before = entries(cell)
-        again = forked(doing(command), log)
-        codes = (0, 2, 3) if command[0] in DONE_ONCE else (0, 3)
-        faults += again.faults(codes) + lost(cell, before, command, again) + left_over(cell)
+        faults += given_again(cell, command, log)
     return {"command": command[:1], "code": outcome.code, "change": change,
             "said": outcome.err.strip()[-200:], "faults": faults}  # fmt: skip
 
