@@ -1,8 +1,7 @@
 """A campaign's model from its cell and its state: labels, simulation, surrogate."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -37,22 +36,13 @@ Tuned = tuple[np.ndarray, np.ndarray]  # frequencies (n, count) in Hz and their 
 Guided = tuple[tuple[LabelledPose, ...], ModalObservations, Average]  # with ln f's own fit
 
 
-class HitsOf(Protocol):
-    """What the hits of a measurement say, if need be once they are corrected."""
-
-    def __call__(
-        self, measurement: Measurement, corrected: Correction | None = None, /
-    ) -> PoseHits: ...
+# What the hits of a measurement say, if need be once they are corrected.
+HitsOf = Callable[[Measurement, Correction | None], PoseHits]
 
 
 def hits_unknown(frfs: Mapping[str, Frf]) -> HitsOf:
     """Of poses by name of which nothing is known but the tool's FRF."""
-
-    def hits_of(measurement: Measurement, _: Correction | None = None, /) -> PoseHits:
-        frf = frfs[measurement.pose]
-        return PoseHits(no_columns(), frf, frf)
-
-    return hits_of
+    return lambda m, _: PoseHits(no_columns(), frfs[m.pose], frfs[m.pose])
 
 
 def build(cell: Cell, state: CampaignState, hits_of: HitsOf, recall: Recall | None = None) -> Model:
@@ -63,16 +53,15 @@ def build(cell: Cell, state: CampaignState, hits_of: HitsOf, recall: Recall | No
     are taken as they would be without these.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
-    hits = tuple(map(hits_of, used))
+    hits = tuple(hits_of(m, None) for m in used)
     noise, errors, tuned = None, None, None
     if cell.config.fidelity.simulation == "updated" and used:
         q = cell.robot.joints.internal([m.joints_deg for m in used])
-        straight = None
-        if cell.robot.config.law and any(len(h.columns.axis) for h in hits):
+        straight = straighten = None
+        if low.nominal and cell.robot.config.law and any(len(h.columns.axis) for h in hits):
             straight = StraightenedHits(hits_of, used, q, table)
-        if straight is not None and low.nominal is not None:
+            straighten = straight.frfs
             low = replace(low, nominal=straight.referred(low.nominal))
-        straighten = None if straight is None else straight.frfs
         known, whole = recall or in_memory(), tuple(h.whole for h in hits)
         low = identify_low_fidelity(low, whole, q, table.band_hz, used, known, straighten)
         q = low.stood(q)

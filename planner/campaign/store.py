@@ -202,12 +202,11 @@ def _copy_robot(robot_toml: Path, target: Path) -> None:
 
     A URDF that lies elsewhere comes to lie beside robot.toml, and is expanded where it is xacro.
     """
-    from planner.robot.config_file import load_config
     from planner.robot.mesh_files import copy_meshes
     from planner.robot.robot import Robot
 
-    source, named = robot_toml.parent.resolve(), load_config(robot_toml).urdf
-    urdf = Robot.load(robot_toml).urdf_path
+    source, robot = robot_toml.parent.resolve(), Robot.load(robot_toml)
+    urdf, named = robot.urdf_path, robot.config.urdf
     inside = urdf.relative_to(source) if urdf.is_relative_to(source) else Path(urdf.name)
     copy = target / inside
     if copy.suffix == ".xacro":
