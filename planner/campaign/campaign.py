@@ -229,22 +229,18 @@ class Campaign(ReadOnlyCampaign):
 
     @contextmanager
     def _acting(self) -> Iterator[None]:
-        """The campaign's lock, its log read afresh and its configuration followed."""
-        with self._journal.writing():
-            remove_parts(self.directory / store.RECORDINGS)
-            self._log_configuration()
-            yield
-
-    def _log_configuration(self) -> None:
-        """Follow changes made by hand to campaign.toml or the robot folder."""
+        """The campaign's lock, its log read afresh, changes made by hand to its files followed."""
         from planner.campaign.cell import refuse_errors
 
-        configured, logged = self._configured(), self.state.configured
-        assert logged is not None
-        if (configured.config, configured.robot) != (logged.config, logged.robot):
-            refuse_errors(self.cell.examined)  # before it is believed
-            store.keep_robot_files(self.directory, configured.robot)
-            self.append(configured)
+        with self._journal.writing():
+            remove_parts(self.directory / store.RECORDINGS)
+            configured, logged = self._configured(), self.state.configured
+            assert logged is not None
+            if (configured.config, configured.robot) != (logged.config, logged.robot):
+                refuse_errors(self.cell.examined)  # before it is believed
+                store.keep_robot_files(self.directory, configured.robot)
+                self.append(configured)
+            yield
 
 
 def _first_entry(directory: Path) -> bytes:

@@ -133,50 +133,45 @@ def refusals(
 
 @dataclass(frozen=True, eq=False)
 class JudgedFiles:
-    """Files of a delivery: new ones, judged, those in use `already`, and those left out.
+    """New files of a delivery, judged, and the modes of all good hits of the pose, old and new.
 
-    Of the new ones nothing rests on those that are refused as they were before: they are left out.
     `old` are the earlier ones beside which they stand, without those `superseded` by good new ones.
     """
 
-    already: tuple[KnownFile, ...]
-    left_out: tuple[HitRecord, ...]
-    hits: tuple[HitRecord, ...] = ()
-    sources: tuple[Source, ...] = ()
-    measured: MeasuredPose | None = None  # None: there is nothing new
-    old: tuple[Source, ...] = ()
-    superseded: tuple[HitRecord, ...] = ()
+    hits: tuple[HitRecord, ...]
+    sources: tuple[Source, ...]
+    measured: MeasuredPose
+    old: tuple[Source, ...]
+    superseded: tuple[HitRecord, ...]
 
-    @classmethod
-    def of(
-        cls,
-        kept: KeptRecordings,
-        delivery: ImportedFiles,
-        state: CampaignState,
-        named: frozenset[Path],
-    ) -> "JudgedFiles":
-        """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
-        fresh, already, left_out = new_files(kept.directory, delivery, state, named)
-        known, used = state.measurements.get(delivery.pose), state.hit_at(delivery.pose)
-        accepted = used.accepted if used else ()
-        before = {replace(h, file="") for h in (known.hits if known else ()) if not h.accepted}
-        while fresh:
-            newer: Sequence[Source] = fresh
-            while True:
-                gone = superseded(accepted, newer)
-                old = tuple(kept.source(hit) for hit in accepted if hit not in gone)
-                measured = _measured((*old, *fresh), kept.cell)
-                hits = tuple(map(_record, measured.verdicts[len(old) :]))
-                good = [s for s, hit in zip(fresh, hits, strict=True) if hit.accepted]
-                if superseded(accepted, good) == gone:
-                    break
-                newer = [source for source in newer if source in good]
-            still = [replace(hit, file="") in before for hit in hits]
-            if not any(still):
-                return cls(already, left_out, hits, fresh, measured, old, gone)
-            left_out += tuple(itertools.compress(hits, still))
-            fresh = tuple(one for one, out in zip(fresh, still, strict=True) if not out)
-        return cls(already, left_out)
+
+def judged_files(
+    kept: KeptRecordings, state: CampaignState, pose: str, fresh: tuple[Source, ...]
+) -> tuple[JudgedFiles | None, tuple[HitRecord, ...]]:
+    """New files of a pose, judged, if any are left, and those refused as they were before.
+
+    Nothing rests on these.
+    """
+    known, used = state.measurements.get(pose), state.hit_at(pose)
+    accepted, left_out = used.accepted if used else (), ()
+    before = {replace(h, file="") for h in (known.hits if known else ()) if not h.accepted}
+    while fresh:
+        newer: Sequence[Source] = fresh
+        while True:
+            gone = superseded(accepted, newer)
+            old = tuple(kept.source(hit) for hit in accepted if hit not in gone)
+            measured = _measured((*old, *fresh), kept.cell)
+            hits = tuple(map(_record, measured.verdicts[len(old) :]))
+            good = [s for s, hit in zip(fresh, hits, strict=True) if hit.accepted]
+            if superseded(accepted, good) == gone:
+                break
+            newer = [source for source in newer if source in good]
+        still = [replace(hit, file="") in before for hit in hits]
+        if not any(still):
+            return JudgedFiles(hits, fresh, measured, old, gone), left_out
+        left_out += tuple(itertools.compress(hits, still))
+        fresh = tuple(one for one, out in zip(fresh, still, strict=True) if not out)
+    return None, left_out
 
 
 def _measured(sources: tuple[Source, ...], cell: Cell) -> MeasuredPose:
@@ -194,7 +189,6 @@ def remarks_on(
     claim: Claim, judged: JudgedFiles, measurement: Measurement, told: tuple[str, ...]
 ) -> tuple[str, ...]:
     """What is to be known of an import, with what was `told` of its hits; `measurement` came."""
-    assert judged.measured is not None
     state = claim.state
     return (
         *hits_of_files(judged.measured.verdicts[len(judged.old) :]),
@@ -291,13 +285,14 @@ def import_pose(
     instead, delivery = _held_before(campaign, delivery)
     before, state = campaign.model, without_entries(campaign.entries, instead)
     known = state.hit_at(pose)
-    judged = JudgedFiles.of(campaign.recordings, delivery, state, named)
-    hits, measured = judged.hits, judged.measured
-    if measured is None:
+    fresh, already, left_out = new_files(campaign.directory, delivery, state, named)
+    judged, refused_again = judged_files(campaign.recordings, state, pose, fresh)
+    left_out += refused_again
+    if judged is None:
         held = campaign.state.held.get(pose)
         return ImportReport(
             pose, held or state.measurements.get(pose), before, before, (),
-            held.question if held else None, judged.already, judged.left_out,
+            held.question if held else None, already, left_out,
         )  # fmt: skip
     claim = Claim(before, state, pose, known.joints_deg if known else joints_deg)
     event, told = _event(claim, judged)
@@ -306,17 +301,16 @@ def import_pose(
     model = campaign.model
     stood = replaced(claim, joints_deg=joints_deg)
     remarks = remarks_on(stood, judged, measurement, told)
-    if not event.question and any(hit.accepted for hit in hits):
+    if not event.question and any(hit.accepted for hit in judged.hits):
         remarks += (*unexpected_modes(before, model, pose), *model.remarks)
     return ImportReport(
-        pose, measurement, before, model, hits, event.question, judged.already, judged.left_out,
-        measured, remarks, alerts=told, refit_seconds=time.perf_counter() - started,
+        pose, measurement, before, model, judged.hits, event.question, already, left_out,
+        judged.measured, remarks, alerts=told, refit_seconds=time.perf_counter() - started,
     )  # fmt: skip
 
 
 def _event(claim: Claim, judged: JudgedFiles) -> tuple[events.Imported, tuple[str, ...]]:
     """What the log gains by new files, and remarks to be acted upon while the robot stands."""
-    assert judged.measured is not None
     measured = alone = judged.measured
     # Among earlier hits, wrong ones would not stand out; one that was replaced is no new visit.
     if judged.old and not judged.superseded:
