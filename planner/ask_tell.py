@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from planner.campaign.build import build
+from planner.campaign.build import build, hits_unknown
 from planner.campaign.cell import Cell, refuse_errors
 from planner.campaign.config import CampaignConfig, check_config, load_campaign_config
 from planner.campaign.events import MeasuredMode, Proposal
@@ -28,7 +28,6 @@ from planner.campaign.measured_modes import (
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
-from planner.campaign.straightened import hits_unknown
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes

@@ -15,7 +15,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
 from planner.campaign.importing import ImportReport
-from planner.campaign.labels import frequencies, label
+from planner.campaign.labels import label, observations
 from planner.campaign.measured_modes import from_modal
 from planner.campaign.state import Measurement
 from planner.dataset.measure import measure
@@ -222,8 +222,7 @@ def _measured_hz(
         measured = measure(sources, table.band_hz, window_rate_1_s=table.window_rate_1_s)
         modes = from_modal(measured.modal)
         found.append(Measurement(pose, pool.rows[pose][0].joints_deg, (), modes))
-    labelled = label(cell, tuple(found))
-    return frequencies(labelled)
+    return observations(cell, label(cell, tuple(found))).frequency_hz
 
 
 def rmse_percent(predicted: np.ndarray, truth: np.ndarray) -> float:

@@ -94,7 +94,7 @@ def replay(
             key = id(cell), after.used
             recall = recalls.setdefault(id(cell), in_memory())
             if key not in models:
-                kept = store.KeptRecordings.of(campaign.directory, cell)
+                kept = store.KeptRecordings(campaign.directory, cell)
                 models[key] = build(cell, after, kept.hits, recall)
             model = models[key]
             yield Step(entry, check, detail, after, model, measured, instead)

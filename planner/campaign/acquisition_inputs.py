@@ -8,6 +8,7 @@ from planner.campaign.cell import Cell
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.design.parameter_sensitivity import FrfNoise, UncertainParameters
 from planner.design.propose import WORKSPACE_POSES
+from planner.fit.posterior import RobotBelief
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -23,7 +24,9 @@ def uncertain_parameters(model: "Model") -> UncertainParameters | None:
     if config.fidelity.simulation != "updated" or low.nominal is None or low.rejected is not None:
         return None
     noise = model.frf_noise or FrfNoise.of((), config.modes.band_hz, 1.0)
-    return UncertainParameters(low.known_robot, noise, config.modes.band_hz)
+    fit = low.identified_robot  # None: before it is measured
+    known = fit.posterior if fit else RobotBelief.stated(low.prior, low.tolerances)
+    return UncertainParameters(known, noise, config.modes.band_hz)
 
 
 def informed_candidates(cell: Cell) -> np.ndarray:

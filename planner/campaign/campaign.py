@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,7 @@ import msgspec
 
 from planner.campaign import events, store
 from planner.campaign.config import load_campaign_config
-from planner.campaign.journal import remove_parts
+from planner.campaign.journal import encode_line, remove_parts
 from planner.campaign.read_only import ReadOnlyCampaign
 from planner.campaign.undo import last_acts, last_undone
 from planner.dataset.screened_files import Source
@@ -228,30 +229,23 @@ class Campaign(ReadOnlyCampaign):
 
     @contextmanager
     def _acting(self) -> Iterator[None]:
-        """The campaign's lock, its log read afresh and its configuration followed."""
-        with self._journal.writing():
-            remove_parts(self.directory / store.RECORDINGS)
-            self._log_configuration()
-            yield
-
-    def _log_configuration(self) -> None:
-        """Follow changes made by hand to campaign.toml or the robot folder."""
+        """The campaign's lock, its log read afresh, changes made by hand to its files followed."""
         from planner.campaign.cell import refuse_errors
 
-        configured, logged = self._configured(), self.state.configured
-        assert logged is not None
-        if (configured.config, configured.robot) != (logged.config, logged.robot):
-            refuse_errors(self.cell.examined)  # before it is believed
-            store.keep_robot_files(self.directory, configured.robot)
-            self.append(configured)
+        with self._journal.writing():
+            remove_parts(self.directory / store.RECORDINGS)
+            configured, logged = self._configured(), self.state.configured
+            assert logged is not None
+            if (configured.config, configured.robot) != (logged.config, logged.robot):
+                refuse_errors(self.cell.examined)  # before it is believed
+                store.keep_robot_files(self.directory, configured.robot)
+                self.append(configured)
+            yield
 
 
 def _first_entry(directory: Path) -> bytes:
     """The log of a new campaign, once robot and workspace have been held against each other."""
-    from datetime import UTC, datetime
-
     from planner.campaign.cell import Cell, refuse_errors
-    from planner.campaign.journal import encode_line
 
     config = load_campaign_config(directory / store.CONFIG)
     cell = Cell.load(directory / config.robot, config)

@@ -149,17 +149,6 @@ class ChainFault:
 NONE = ChainFault(np.eye(3))
 
 
-def _turned() -> tuple[ChainFault, ...]:
-    signed = product(permutations(range(3)), product((1.0, -1.0), repeat=3))
-    every = [np.diag(signs) @ np.eye(3)[list(order)] for order, signs in signed]
-    return tuple(ChainFault(a) for a in every if not np.array_equal(a, np.eye(3)))
-
-
-def _scaled(channels: tuple[int, ...]) -> tuple[ChainFault, ...]:
-    large = np.exp(np.arange(LEAST, MOST, STEP))
-    return tuple(_times(channels, float(factor)) for factor in (*(1 / large), *large))
-
-
 def _times(channels: tuple[int, ...], factor: float) -> ChainFault:
     diagonal = np.ones(3)
     diagonal[list(channels)] = factor
@@ -174,7 +163,7 @@ def possible(shown: np.ndarray, within: Tolerances, sure: bool) -> Iterator[Chai
     """
     yield from (*TURNED, *AGAINST, *EXCHANGED)
     least = BEYOND * np.hypot(within.gain, within.force_gain) if sure else LEAST
-    for channels in ((0, 1, 2), (0,), (1,), (2,)):
+    for channels in CHANNELS:
         factor = float(np.median(np.diag(shown)[list(channels)]))
         if factor > 0 and abs(np.log(factor)) > least:
             yield _times(channels, factor)
@@ -191,12 +180,20 @@ FILTERS: tuple[Callable[[float], ChainFault], ...] = (
     lambda by: ChainFault(np.eye(3), corner_hz=0.1 * by),
     lambda by: ChainFault(np.eye(3), window_rate_1_s=0.1 * by),
 )
-TURNED = _turned()  # all 47 ways to exchange axes and signs
+TURNED = tuple(  # all 47 ways to exchange axes and signs
+    ChainFault(np.diag(signs) @ np.eye(3)[list(order)])
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3))
+)[1:]
 AGAINST = tuple(
     ChainFault(np.eye(3), flipped_hits=s) for n in (1, 2) for s in combinations(range(3), n)
 )
 EXCHANGED = tuple(ChainFault(np.eye(3), order=order) for order in permutations(range(3)))[1:]
-SCALED = tuple(_scaled(channels) for channels in ((0, 1, 2), (0,), (1,), (2,)))
+CHANNELS = (0, 1, 2), (0,), (1,), (2,)  # that have one factor
+LARGE = np.exp(np.arange(LEAST, MOST, STEP))
+SCALED = tuple(
+    tuple(_times(channels, float(factor)) for factor in (*(1 / LARGE), *LARGE))
+    for channels in CHANNELS
+)
 
 
 def log_prior(family: tuple[ChainFault, ...]) -> np.ndarray:

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import msgspec
 import numpy as np
 from scipy.stats import norm
 
@@ -52,7 +51,7 @@ def cut_decision(model: "Model") -> Decision | None:
     """At the poses of the path, or of the workspace; None where no cut is named."""
     cell = model.cell
     table, cut = cell.config.cut, cell.cut
-    if table is msgspec.UNSET or cut is None:
+    if not table or cut is None:
         return None
     if table.joints_deg is not None:
         q = cell.robot.joints.internal(table.joints_deg)

@@ -37,22 +37,8 @@ UNCHANGED = (
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOut:
-    """FRFs (3, 3, F) of a pose, `predicted` from the others, and `off` by what is measured.
-
-    `off` is 0 where not `used`; `known`: variance of noise and of the prediction as it is.
-    """
-
-    frequency_hz: np.ndarray
-    off: np.ndarray
-    predicted: np.ndarray
-    known: np.ndarray
-    used: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class ErrorByZone:
-    """Relative error (ZONES,) of predicted FRFs by frequency zone, beyond `LeftOut.known`.
+    """Relative error (ZONES,) of predicted FRFs by frequency zone, beyond what their sds say.
 
     Relative to the FRF's size near each line; learned from poses that were left out.
     """
@@ -66,8 +52,8 @@ class ErrorByZone:
         low, high = model.cell.config.modes.band_hz
         edges = np.geomspace(max(low, 0.1), high, ZONES + 1)
         log_likelihood = np.zeros((ZONES, len(SIZES)))
-        for pose in _left_out(model) if len(model.frfs) > 1 else ():
-            log_likelihood += _log_likelihood(pose, edges)
+        if len(model.frfs) > 1:
+            log_likelihood += sum(_log_likelihoods(model, edges))
         return cls(edges, np.sqrt(_posterior(log_likelihood) @ SIZES**2))
 
     def at(self, frequency_hz: np.ndarray) -> np.ndarray:
@@ -76,22 +62,16 @@ class ErrorByZone:
         return np.interp(np.log(frequency_hz), np.log(middle), self.relative)
 
 
-def _log_likelihood(pose: LeftOut, edges_hz: np.ndarray) -> np.ndarray:
-    """(ZONES, SIZES): |left|² is e² size² + known on the mean; quiet lines count most."""
-    zone = np.clip(np.searchsorted(edges_hz, pose.frequency_hz) - 1, 0, ZONES - 1)
-    square = local_size(pose.predicted, pose.frequency_hz) ** 2
-    found = np.zeros((ZONES, len(SIZES)))
-    for k in range(ZONES):
-        here = pose.used & (zone == k) & (square > 0)
-        if not here.any():
-            continue
-        size, known = square[here], pose.known[here]
-        left = np.abs(pose.off[here]) ** 2
-        weight = size / (known + ERROR_BEFORE**2 * size) ** 2
-        weight /= weight @ size
-        expected = SIZES**2 + weight @ known
-        found[k] = -VALUES / 2 * (np.log(expected) + weight @ left / expected)
-    return found
+def _log_likelihood(left: np.ndarray, square: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(SIZES,) of a zone's lines (n,): |left|² is e² size² + known on the mean.
+
+    `square` is the FRFs' size² there, `known` the variance of noise and prediction as it is; quiet
+    lines count most.
+    """
+    weight = square / (known + ERROR_BEFORE**2 * square) ** 2
+    weight /= weight @ square
+    expected = SIZES**2 + weight @ known
+    return -VALUES / 2 * (np.log(expected) + weight @ np.abs(left) ** 2 / expected)
 
 
 def _posterior(log_likelihood: np.ndarray) -> np.ndarray:
@@ -117,8 +97,8 @@ def local_size(h: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
     return np.sqrt(OWN * square + (1 - OWN) * square.mean(axis=(-3, -2), keepdims=True))
 
 
-def _left_out(model: "Model") -> Iterator[LeftOut]:
-    """Each pose's FRFs from the fused modes of the others, and the modes above them."""
+def _log_likelihoods(model: "Model", edges_hz: np.ndarray) -> Iterator[np.ndarray]:
+    """(ZONES, SIZES) by each pose's FRFs, from fused modes of the others and the modes above."""
     frfs, band = model.frfs, model.cell.config.modes.band_hz
     lines = int(np.clip(LINES // len(frfs), LEAST, MOST))
     with threadpool_limits(1):
@@ -130,9 +110,15 @@ def _left_out(model: "Model") -> Iterator[LeftOut]:
         above = model.low.above(model.labelled[i].q[None], hertz)[0]
         predicted = mean[0] * (s / (1j * s.imag)) ** 2 + above
         used = measured.used[i]
-        known = np.where(used, measured.sd[i], 0.0) ** 2 + sd[0] ** 2
-        off = np.where(used, measured.accelerance[i] - predicted, 0.0)
-        yield LeftOut(hertz, off, predicted, known, used)
+        left, known = measured.accelerance[i] - predicted, measured.sd[i] ** 2 + sd[0] ** 2
+        square = local_size(predicted, hertz) ** 2
+        zone = np.clip(np.searchsorted(edges_hz, hertz) - 1, 0, ZONES - 1)
+        found = np.zeros((ZONES, len(SIZES)))
+        for k in range(ZONES):
+            here = used & (zone == k) & (square > 0)
+            if here.any():
+                found[k] = _log_likelihood(left[here], square[here], known[here])
+        yield found
 
 
 def _windowed(modes: ModalPrediction, rate_1_s: float) -> ModalPrediction:

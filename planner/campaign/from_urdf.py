@@ -1,6 +1,7 @@
 """A campaign from a maker's URDF alone: robot.toml and campaign.toml by guesses that are named."""
 
 import tempfile
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,6 @@ import numpy as np
 import tomlkit
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.stated_masses import links_kg, mass_conflict
 from planner.campaign.store import CONFIG, ROBOT, campaign_text
 from planner.check.examine import spread_poses
 from planner.dynamics.simulation import Simulation
@@ -19,6 +19,7 @@ from planner.robot.arm_chain import ArmChain, arm_chain
 from planner.robot.config import Compliance, LinkTable, Obstacle, Payload, RobotConfig
 from planner.robot.default_properties import (
     PAYLOAD_KG_M3,
+    SAME,
     default_inertias,
     default_springs,
     nothing_stated,
@@ -27,6 +28,7 @@ from planner.robot.default_properties import (
 from planner.robot.link_bodies import guessed_masses, link_bodies, lowest_m, mounted
 from planner.robot.robot import Robot
 from planner.robot.urdf import read_tree
+from planner.robot.urdf_elements import link_inertia
 from planner.robot.workspace import ranges_inside, tool_direction, workspace_in_front
 
 MODES = 4  # asked for
@@ -36,6 +38,7 @@ PAYLOAD_SHARE, PAYLOAD_SD = 1 / 6, 0.5  # of the robot's mass: 1/3 to 1/9 in dat
 TOOL_SD, DAMPING_SD = 0.3, 4.0  # relative; of dampers e^sd is 5 in identification
 EXAMPLE_M = 0.25  # from flange to tool tip, in robot.toml's comment
 BELOW_M = 0.01  # how far below the base the floor lies
+SAME_MASS = 0.05  # relative: data sheets count cables and oil, URDFs as they like
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,6 @@ class Guessed:
 
     robot: Robot
     joints_deg: list[list[float]]
-    band_hz: tuple[float, float]
     modes: int
     guesses: tuple[Guess, ...]
     remarks: tuple[str, ...]
@@ -87,7 +89,7 @@ def new_from_urdf(
         own = robot_toml.parents[1] / CONFIG
         if campaign_toml is None:
             said = "In front of the arm, guessed: put it where the tool works."
-            modes = {"count": guessed.modes, "band_hz": list(guessed.band_hz)}
+            modes = {"count": guessed.modes, "band_hz": list(guessed.robot.config.band_hz)}
             text = campaign_text(said, f"{ROBOT}/robot.toml", guessed.joints_deg, modes)
             own.write_text(text, encoding="utf-8")
         try:
@@ -112,7 +114,7 @@ def guess(urdf: Path, weights: StatedMasses, robot_toml: Path, planned: bool = T
         raise InputError(
             f"{urdf} states no masses; give the robot's, from its data sheet, with --mass-kg."
         )
-    stated_kg = links_kg(robot, weights.robot)
+    stated_kg = _links_kg(robot, weights.robot)
     links = default_inertias(robot, weights.robot)
     payload = weights.payload or PAYLOAD_SHARE * (weights.robot or total_stated(robot))
     carried = (_tool(chain.tcp, weights.tool, robot),) if weights.tool else ()
@@ -124,8 +126,8 @@ def guess(urdf: Path, weights: StatedMasses, robot_toml: Path, planned: bool = T
     robot = Robot.of(msgspec.structs.replace(robot.config, band_hz=band), robot_toml)
     ranges = ranges_inside(robot, low, high, 1.0)
     guesses = tuple(_guesses(robot, chain, weights, payload, ranges if planned else None))
-    remarks = (*mass_conflict(robot, weights.robot, stated_kg), *_remarks(robot, chain, weights))
-    return Guessed(robot, ranges, band, modes, guesses, remarks)
+    remarks = (*_mass_conflict(robot, weights.robot, stated_kg), *_remarks(robot, chain, weights))
+    return Guessed(robot, ranges, modes, guesses, remarks)
 
 
 def _tool(tcp: str, mass: float, robot: Robot) -> Payload:
@@ -201,6 +203,47 @@ def _guesses(
     yield Guess("height of the floor", round(floor.center_m[2] + floor.size_m[2] / 2, 4), None, "m")
     if ranges is not None:
         yield Guess("workspace joints_deg", ranges, None)
+
+
+def _links_kg(robot: Robot, mass_kg: float | None) -> float:
+    """What the URDF's links weigh in kg; InputError where `mass_kg` cannot be of that robot.
+
+    Links that weigh far less than the robot are placeholders, or not all of its links: common. None
+    weigh far more.
+    """
+    stated = total_stated(robot)
+    if mass_kg is not None and stated > (1 + SAME) * mass_kg:
+        raise InputError(
+            f"--mass-kg is {mass_kg:g}, and the links of {robot.urdf_path} weigh {stated:.4g} kg "
+            f"together; give the robot's mass in kg, or leave it out to use the URDF's masses."
+        )
+    return stated
+
+
+def _mass_conflict(robot: Robot, mass_kg: float | None, stated_kg: float) -> Iterator[str]:
+    """Which masses are used where URDF and data sheet both state some, and differ."""
+    if mass_kg is None or not stated_kg or abs(mass_kg / stated_kg - 1) < SAME_MASS:
+        return
+    guessed = [table.link for table in robot.config.link]
+    links = ElementTree.fromstring(robot.urdf_text).findall("link")
+    stated = [link for link in links if link_inertia(link).mass > 0]
+    name = robot.urdf_path.name
+    both = f"The links of {name} weigh {stated_kg:.4g} kg together, --mass-kg says {mass_kg:g} kg: "
+    if not guessed:
+        yield (
+            f"{both}the URDF's masses are used, because they tell the links apart. Where --mass-kg "
+            f"is right, correct them in [[link]] of robot.toml."
+        )
+    elif len(guessed) < len(stated):
+        yield (
+            f"{both}the URDF's masses are used, and those of {', '.join(guessed)} are guessed: "
+            f"{total_stated(robot):.4g} kg in all."
+        )
+    else:
+        yield (
+            f"{both}--mass-kg is used and shared out by size, because the URDF's masses look like "
+            f"placeholders."
+        )
 
 
 def _part(value: float, percent: float | None) -> float:

@@ -119,9 +119,7 @@ def estimate(
 ) -> CampaignHitErrors:
     """Misses of the hits of all poses, by the simulation as it was identified from them."""
     those = tuple(one for one in visited if len(one.columns.axis))
-    if fit is None or not those:
-        return CampaignHitErrors((), None, t, band_hz)
-    told = fit_hit_errors(fit.posterior, those)
+    told = fit_hit_errors(fit.posterior, those) if fit is not None and those else None
     return CampaignHitErrors(those, told, t, band_hz)
 
 

@@ -1,6 +1,7 @@
 """What an import asks and tells of new hits while the robot still stands there."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,33 +12,52 @@ from planner.campaign.model import FEW_POSES, Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose
 from planner.frf.frf import unreciprocal
+from planner.recording.joints import JointUnits
 from planner.recording.records import Hit
 from planner.recording.repeats import Doubt, doubts, other_size
 from planner.words import listed, with_sd
 
 
-def question_about(
-    model: Model,
-    state: CampaignState,
-    pose: str,
-    joints_deg: tuple[float, ...],
-    measured: MeasuredPose,
-) -> Question | None:
+@dataclass(frozen=True, eq=False)
+class Claim:
+    """The pose that new hits are said to be of, and what was known before they came."""
+
+    model: Model
+    state: CampaignState
+    pose: str
+    joints_deg: tuple[float, ...]
+
+    @property
+    def joints(self) -> JointUnits:
+        """Of the robot."""
+        return self.model.cell.robot.joints
+
+    @property
+    def q(self) -> np.ndarray:
+        """(dof,) in rad."""
+        return self.joints.internal(self.joints_deg)
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """In which modes are looked for."""
+        return self.model.cell.config.modes.band_hz
+
+
+def question_about(claim: Claim, measured: MeasuredPose) -> Question | None:
     """Of the first pose's hits whether the chain can be so; of others, whether pose and chain can.
 
-    `measured` is of the new hits alone; `model` and `state` are those before the import; None:
-    nothing is asked.
+    `measured` is of the new hits alone; None: nothing is asked.
     """
-    known = state.measurements.get(pose)
+    known = claim.state.measurements.get(claim.pose)
     if known is not None and known.question is not None:  # answered
         return None
-    if not model.labelled:
+    if not claim.model.labelled:
         from planner.campaign.chain_mismatch import chain_mismatch  # and SciPy, where it is asked
 
-        return chain_mismatch(model, pose, joints_deg, measured.frf)
+        return chain_mismatch(claim, measured.frf)
     from planner.campaign.pose_mismatch import pose_mismatch
 
-    return pose_mismatch(model, state, pose, joints_deg, measured)
+    return pose_mismatch(claim, measured)
 
 
 def contradiction(pose: str, measured: MeasuredPose, known: int) -> Question | None:
@@ -129,18 +149,15 @@ def hit_again(model: Model, known: Measurement, modes: Sequence[MeasuredMode]) -
     return (f"{known.pose} was hit again and is as it was (at most {what}).",)
 
 
-def suspected_drift(
-    model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...],
-    modes: Sequence[MeasuredMode],
-) -> tuple[str, str]:  # fmt: skip
+def suspected_drift(claim: Claim, modes: Sequence[MeasuredMode]) -> tuple[str, str]:
     """Which early pose tells whether there is drift that a new pose hints at, and why; else ""s.
 
-    `model` and `state` are those before the import; it is a hint only where they expect enough.
+    It is a hint only where enough was expected.
     """
+    model, state, pose = claim.model, claim.state, claim.pose
     if len(model.labelled) < LEAST_POSES or state.hit_at(pose) is not None:
         return "", ""
-    joints = model.cell.robot.joints
-    hz, sd = (row[0].tolist() for row in model.frequencies(joints.internal([joints_deg])))
+    hz, sd = (row[0].tolist() for row in model.frequencies(claim.q[None]))
     expected = [(f, s / f) for f, s in zip(hz, sd, strict=True)]
     found = np.array(_found_again(expected, modes)).reshape(-1, 3)
     off, in_sd = found[:, 1], np.abs(found[:, 1]) / found[:, 2]
@@ -153,7 +170,7 @@ def suspected_drift(
         early.pose,
         f"All modes at {pose} lie to one side of what is expected, by {100 * np.mean(off):+.2f} % "
         f"on average: the robot may have drifted (warmth, load, clamping). Hit {early.pose}, "
-        f"{which}, again ({joints.listed(early.joints_deg, 3)}) and import with --pose "
+        f"{which}, again ({claim.joints.listed(early.joints_deg, 3)}) and import with --pose "
         f"{early.pose}: it says whether. It is proposed next.",
     )
 
@@ -219,8 +236,7 @@ def _axes(hits: Sequence[HitRecord]) -> set[str]:
 
 
 def alerts(
-    model: Model,
-    state: CampaignState,
+    claim: Claim,
     event: Imported,
     measured: MeasuredPose,
     modes: Sequence[MeasuredMode],
@@ -228,13 +244,8 @@ def alerts(
 ) -> tuple[str, ...]:
     """Remarks on new hits, their channels, reciprocity and drift.
 
-    Args:
-        model: Before the import, as is `state`.
-        state: See `model`.
-        event: The import.
-        measured: All hits of the pose, the new ones last.
-        modes: By the new hits alone.
-        drift: What is said of it, where they hint at it.
+    `measured` are all hits of the pose, the new ones last, and `modes` those by the new hits alone;
+    `drift` is what is said of it, where they hint at it.
     """
     verdicts = measured.verdicts[-len(event.hits) :]
     told = tuple(dict.fromkeys(text for one in verdicts for text in one.remarks))
@@ -242,9 +253,9 @@ def alerts(
         return told
     if measured.frf is not None:
         told += unreciprocal(measured.frf)
-    known = state.hit_at(event.pose)
+    known = claim.state.hit_at(event.pose)
     if known is not None:
         # Modes of fewer axes are others: what was lacking of a visit is no second one.
         whole = _axes(event.hits) >= _axes(known.hits)
-        return told + (hit_again(model, known, modes) if whole else ())
+        return told + (hit_again(claim.model, known, modes) if whole else ())
     return (*told, drift) if drift else told

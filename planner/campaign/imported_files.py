@@ -12,9 +12,10 @@ from planner.dataset.visits import table_folders
 from planner.errors import InputError
 from planner.recording.folder import CHANNELS, TABLE, files_in, read_recordings
 from planner.recording.joints import JointUnits
-from planner.recording.points import PointNames, StatedPoints
+from planner.recording.points import StatedPoints
 from planner.recording.read import READERS
 from planner.recording.records import PoseRow
+from planner.robot.robot import Robot
 from planner.words import command
 
 
@@ -46,11 +47,7 @@ class KnownFile:
 
 
 def sort_paths(
-    paths: tuple[Path, ...],
-    joints: JointUnits,
-    points: PointNames,
-    pose: str | None,
-    default_pose: str | None,
+    paths: tuple[Path, ...], robot: Robot, pose: str | None, default_pose: str | None
 ) -> tuple[ImportedFiles, ...]:
     """Deliveries by pose, in recording order.
 
@@ -64,7 +61,7 @@ def sort_paths(
     by_folder: dict[Path, list[Path]] = {}
     for path in paths:
         if path.exists() and (folders := table_folders(path)):
-            deliveries += _from_tables(path, folders, joints, points, pose)
+            deliveries += _from_tables(path, folders, robot, pose)
         elif path.is_dir():
             bare += files_in(path, READERS)
         elif path.is_file():
@@ -73,12 +70,12 @@ def sort_paths(
         else:
             raise InputError(f"{path} does not exist; name recordings or a recordings folder.")
     for folder, files in by_folder.items():
-        listed = _listed(folder, files, joints, points, pose)
+        listed = _listed(folder, files, robot, pose)
         deliveries += listed
         told = {source.path.resolve() for one in listed for source in one.sources}
         bare += [file for file in files if file.resolve() not in told]
     if bare:
-        stated = StatedPoints(names=points)
+        stated = StatedPoints(names=robot.points)
         sources = tuple(Source(path, str(path), stated=stated) for path in bare)
         name = pose or default_pose or ""
         deliveries.append(ImportedFiles(name, None, sources, said=pose is not None))
@@ -86,17 +83,13 @@ def sort_paths(
 
 
 def _from_tables(
-    path: Path,
-    folders: tuple[Path, ...],
-    joints: JointUnits,
-    points: PointNames,
-    pose: str | None,
+    path: Path, folders: tuple[Path, ...], robot: Robot, pose: str | None
 ) -> list[ImportedFiles]:
     """Deliveries of folders, each with a table of its own; `pose` picks one, or renames the only.
 
     Raises InputError where there is none of that name.
     """
-    every = [d for folder in folders for d in _from_table(folder, joints, points)]
+    every = [d for folder in folders for d in _from_table(folder, robot)]
     found = [d for d in every if pose in (None, d.pose)]
     if pose is not None and not found and len(folders) == len(every) == 1:
         found = [replace(every[0], pose=pose)]
@@ -108,7 +101,7 @@ def _from_tables(
 
 
 def _listed(
-    folder: Path, files: Sequence[Path], joints: JointUnits, points: PointNames, pose: str | None
+    folder: Path, files: Sequence[Path], robot: Robot, pose: str | None
 ) -> list[ImportedFiles]:
     """Those of some files that a folder's table lists, if it has one; of `pose` alone, if given."""
     table = folder / TABLE
@@ -118,15 +111,15 @@ def _listed(
         return []
     found = [
         replace(one, sources=tuple(s for s in one.sources if s.path.resolve() in named))
-        for one in _from_table(folder, joints, points)
+        for one in _from_table(folder, robot)
         if pose in (None, one.pose)
     ]
     return [one for one in found if one.sources]
 
 
-def _from_table(folder: Path, joints: JointUnits, points: PointNames) -> list[ImportedFiles]:
+def _from_table(folder: Path, robot: Robot) -> list[ImportedFiles]:
     rows: dict[str, list[PoseRow]] = {}
-    for row in read_recordings(folder, joints, points, bare=True):
+    for row in read_recordings(folder, robot.joints, robot.points, bare=True):
         rows.setdefault(row.pose, []).append(row)
     return [
         ImportedFiles(
@@ -139,13 +132,15 @@ def _from_table(folder: Path, joints: JointUnits, points: PointNames) -> list[Im
     ]
 
 
-Fresh = tuple[Source, HitRecord]  # a new hit's kept file, and its record before it is judged
+def record_of(source: Source, reason: str, digest: str | None = None) -> HitRecord:
+    """What the log keeps of a file, and of what is said of it; for a `reason` it is refused.
 
-
-def record_of(source: Source, digest: str, suffix: str, reason: str) -> HitRecord:
-    """What the log keeps of a file, and of what is said of it; for a `reason` it is refused."""
+    Without a `digest` it is of a kept file, whose name is its hash and its suffix.
+    """
+    name = source.path.name
+    content = (name[:64], name[64:]) if digest is None else (digest, "")
     return HitRecord(
-        source.name, digest, suffix, source.hit, source.repeat, not reason, reason,
+        source.name, *content, source.hit, source.repeat, not reason, reason,
         hit_point=source.stated.hit_point, response_points=source.stated.response_points,
         part=source.part, response=source.response, from_name=source.from_name,
     )  # fmt: skip
@@ -179,8 +174,8 @@ def at_their_poses(
 
 def new_files(
     directory: Path, delivery: ImportedFiles, state: CampaignState, named: frozenset[Path]
-) -> tuple[tuple[Fresh, ...], tuple[KnownFile, ...], tuple[HitRecord, ...]]:
-    """Keep the raw files; those new, those in use at this pose, and those left out.
+) -> tuple[tuple[Source, ...], tuple[KnownFile, ...], tuple[HitRecord, ...]]:
+    """Keep the raw files; each hit of those new, those in use at this pose, and those left out.
 
     A file that the engineer refused, or that was shown at another pose, is new only where it is
     itself among the `named` paths or its table says so; one that cannot be read is left out, as is
@@ -192,30 +187,29 @@ def new_files(
         again = command("planner", "confirm", directory, pose)
         withdrawn = f"{pose} was withdrawn; to use its hits again: {again}; else give the "
         withdrawn += "new measurement another pose name, in recordings.csv or by --pose"
-    fresh: list[Fresh] = []
+    fresh: list[Source] = []
     already, left_out, elsewhere = [], [], []
     seen: dict[str, str] = {}
     for source in delivery.sources:
         try:
             digest = store.recording_hash(source.path)
         except InputError as error:  # one bad file does not keep the others out
-            left_out.append(record_of(source, "", "", str(error)))
+            left_out.append(record_of(source, str(error), ""))
             continue
         at, hit = in_use.get(digest, (pose, None))
         if hit is not None and at != pose:
             reason = _of_another(directory, hit, at, pose)
             if len(delivery.sources) == 1 + len(elsewhere):
                 raise InputError(f"{source.path}: {reason}.")
-            elsewhere.append(record_of(source, digest, "", reason))
+            elsewhere.append(record_of(source, reason, digest))
         elif reason := withdrawn or _reason_against(delivery, source, digest, named, state):
-            left_out.append(record_of(source, digest, "", reason))
+            left_out.append(record_of(source, reason, digest))
         elif hit is not None or (digest in seen and not source.part):
             already.append(KnownFile(source.name, hit.whole_name if hit else seen[digest]))
         else:
             seen.setdefault(digest, source.name)
-            _, suffix = store.store_recording(directory, source.path)
-            kept = replace(source, path=store.recording_path(directory, digest, suffix))
-            fresh += [(part, record_of(part, digest, suffix, "")) for part in kept.parts()]
+            kept = store.store_recording(directory, source.path)
+            fresh += replace(source, path=kept).parts()
     return tuple(fresh), tuple(already), (*left_out, *elsewhere)
 
 

@@ -13,10 +13,10 @@ from msgspec.structs import replace
 
 from planner.campaign import events, store
 from planner.campaign.cell import Cell
-from planner.campaign.config import ModesTable
 from planner.campaign.events import REFUSED, HitRecord, Question
 from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.import_checks import (
+    Claim,
     alerts,
     contradiction,
     question_about,
@@ -24,7 +24,6 @@ from planner.campaign.import_checks import (
     unexpected_modes,
 )
 from planner.campaign.imported_files import (
-    Fresh,
     ImportedFiles,
     KnownFile,
     at_their_poses,
@@ -39,10 +38,9 @@ from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement, without_entries
 from planner.campaign.store import KeptRecordings
 from planner.dataset.measure import MeasuredPose, measure
-from planner.dataset.screened_files import Source, hits_of_files
+from planner.dataset.screened_files import FileVerdict, Source, hits_of_files
 from planner.errors import InputError
 from planner.progress import ProgressCallback
-from planner.recording.joints import JointUnits
 
 if TYPE_CHECKING:
     from planner.campaign.campaign import Campaign
@@ -127,83 +125,71 @@ def refusals(
     said = {path: f"{text} ({REFUSED})" for path, text in reasons.items() if text}
     found = []
     for path in paths:
-        digest, suffix = store.store_recording(directory, path)
-        source = replaced(stated.get(path, Source(path, "")), name=str(path))
-        found.append(record_of(source, digest, suffix, said.get(path, REFUSED)))
+        kept = store.store_recording(directory, path)
+        source = replaced(stated.get(path, Source(path, "")), name=str(path), path=kept)
+        found.append(record_of(source, said.get(path, REFUSED)))
     return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
 class JudgedFiles:
-    """Files of a delivery: new ones, judged, those in use `already`, and those left out.
+    """New files of a delivery, judged, and the modes of all good hits of the pose, old and new.
 
-    Of the new ones nothing rests on those that are refused as they were before: they are left out.
     `old` are the earlier ones beside which they stand, without those `superseded` by good new ones.
     """
 
-    already: tuple[KnownFile, ...]
-    left_out: tuple[HitRecord, ...]
-    hits: tuple[HitRecord, ...] = ()
-    sources: tuple[Source, ...] = ()
-    measured: MeasuredPose | None = None  # None: there is nothing new
-    old: tuple[Source, ...] = ()
-    superseded: tuple[HitRecord, ...] = ()
-
-    @classmethod
-    def of(
-        cls,
-        kept: KeptRecordings,
-        delivery: ImportedFiles,
-        state: CampaignState,
-        named: frozenset[Path],
-        table: ModesTable,
-    ) -> "JudgedFiles":
-        """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
-        fresh, already, left_out = new_files(kept.directory, delivery, state, named)
-        known, used = state.measurements.get(delivery.pose), state.hit_at(delivery.pose)
-        accepted = used.accepted if used else ()
-        before = {replace(h, file="") for h in (known.hits if known else ()) if not h.accepted}
-        while fresh:
-            newer = [source for source, _ in fresh]
-            while True:
-                gone = superseded(accepted, newer)
-                old = tuple(kept.source(hit) for hit in accepted if hit not in gone)
-                hits, measured = measure_files(old, fresh, table)
-                good = [s for (s, _), hit in zip(fresh, hits, strict=True) if hit.accepted]
-                if superseded(accepted, good) == gone:
-                    break
-                newer = [source for source in newer if source in good]
-            still = [replace(hit, file="") in before for hit in hits]
-            if not any(still):
-                sources = tuple(source for source, _ in fresh)
-                return cls(already, left_out, hits, sources, measured, old, gone)
-            left_out += tuple(itertools.compress(hits, still))
-            fresh = tuple(one for one, out in zip(fresh, still, strict=True) if not out)
-        return cls(already, left_out)
+    hits: tuple[HitRecord, ...]
+    sources: tuple[Source, ...]
+    measured: MeasuredPose
+    old: tuple[Source, ...]
+    superseded: tuple[HitRecord, ...]
 
 
-def measure_files(
-    old: tuple[Source, ...], fresh: Sequence[Fresh], table: ModesTable
-) -> tuple[tuple[HitRecord, ...], MeasuredPose]:
-    """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
-    new = tuple(source for source, _ in fresh)
-    measured = measure((*old, *new), table.band_hz, window_rate_1_s=table.window_rate_1_s)
-    records = (
-        replace(record, hit=v.axis, accepted=v.accepted, reason=v.reason, simulated=v.simulated)
-        for v, (_, record) in zip(measured.verdicts[len(old) :], fresh, strict=True)
-    )
-    return tuple(records), measured
+def judged_files(
+    kept: KeptRecordings, state: CampaignState, pose: str, fresh: tuple[Source, ...]
+) -> tuple[JudgedFiles | None, tuple[HitRecord, ...]]:
+    """New files of a pose, judged, if any are left, and those refused as they were before.
+
+    Nothing rests on these.
+    """
+    known, used = state.measurements.get(pose), state.hit_at(pose)
+    accepted, left_out = used.accepted if used else (), ()
+    before = {replace(h, file="") for h in (known.hits if known else ()) if not h.accepted}
+    while fresh:
+        newer: Sequence[Source] = fresh
+        while True:
+            gone = superseded(accepted, newer)
+            old = tuple(kept.source(hit) for hit in accepted if hit not in gone)
+            measured = _measured((*old, *fresh), kept.cell)
+            hits = tuple(map(_record, measured.verdicts[len(old) :]))
+            good = [s for s, hit in zip(fresh, hits, strict=True) if hit.accepted]
+            if superseded(accepted, good) == gone:
+                break
+            newer = [source for source in newer if source in good]
+        still = [replace(hit, file="") in before for hit in hits]
+        if not any(still):
+            return JudgedFiles(hits, fresh, measured, old, gone), left_out
+        left_out += tuple(itertools.compress(hits, still))
+        fresh = tuple(one for one, out in zip(fresh, still, strict=True) if not out)
+    return None, left_out
+
+
+def _measured(sources: tuple[Source, ...], cell: Cell) -> MeasuredPose:
+    table = cell.config.modes
+    return measure(sources, table.band_hz, window_rate_1_s=table.window_rate_1_s)
+
+
+def _record(verdict: FileVerdict) -> HitRecord:
+    """What the log keeps of a kept file once it is judged."""
+    record, simulated = record_of(verdict.source, verdict.reason), verdict.simulated
+    return replace(record, hit=verdict.axis, accepted=verdict.accepted, simulated=simulated)
 
 
 def remarks_on(
-    joints: JointUnits, state: CampaignState, judged: JudgedFiles, measurement: Measurement,
-    stood: tuple[float, ...], told: tuple[str, ...],
-) -> tuple[str, ...]:  # fmt: skip
-    """What is to be known of an import, where the robot `stood`, with what was `told` of its hits.
-
-    `state` is that before it, `measurement` what came of it.
-    """
-    assert judged.measured is not None
+    claim: Claim, judged: JudgedFiles, measurement: Measurement, told: tuple[str, ...]
+) -> tuple[str, ...]:
+    """What is to be known of an import, with what was `told` of its hits; `measurement` came."""
+    state = claim.state
     return (
         *hits_of_files(judged.measured.verdicts[len(judged.old) :]),
         *judged.measured.remarks,
@@ -215,20 +201,18 @@ def remarks_on(
             for hit in judged.hits
             if hit.sha256 in state.refused
         ),
-        *displacement(joints, state, measurement.pose, stood),
+        *displacement(claim),
         *axes_not_hit(state, measurement),
     )
 
 
-def displacement(
-    joints: JointUnits, state: CampaignState, pose: str, joints_deg: tuple[float, ...]
-) -> tuple[str, ...]:
+def displacement(claim: Claim) -> tuple[str, ...]:
     """A remark if the robot stood elsewhere than proposed."""
-    proposal = state.proposals.get(pose)
-    off = proposal and joints.apart(proposal.joints_deg, joints_deg)
+    proposal = claim.state.proposals.get(claim.pose)
+    off = proposal and claim.joints.apart(proposal.joints_deg, claim.joints_deg)
     if not off:
         return ()
-    return (f"The readback of {pose} is up to {off} from its setpoint.",)
+    return (f"The readback of {claim.pose} is up to {off} from its setpoint.",)
 
 
 def axes_not_hit(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
@@ -262,7 +246,7 @@ def import_paths(
     """Import within an act of the campaign, see `Campaign.import_paths`."""
     cell, state = campaign.cell, campaign.state
     default = state.open[0] if len(state.open) == 1 else None
-    deliveries = sort_paths(given, cell.robot.joints, cell.robot.points, pose, default)
+    deliveries = sort_paths(given, cell.robot, pose, default)
     placed = [(d, readback_of(cell, state, d)) for d in at_their_poses(deliveries, state)]
     named = frozenset(path for path in given if path.is_file())
     reports = []
@@ -300,51 +284,45 @@ def import_pose(
     started, pose = time.perf_counter(), delivery.pose
     instead, delivery = _held_before(campaign, delivery)
     before, state = campaign.model, without_entries(campaign.entries, instead)
-    known, keeps, table = state.hit_at(pose), campaign.recordings, campaign.cell.config.modes
-    judged = JudgedFiles.of(keeps, delivery, state, named, table)
-    hits, measured = judged.hits, judged.measured
-    if measured is None:
+    known = state.hit_at(pose)
+    fresh, already, left_out = new_files(campaign.directory, delivery, state, named)
+    judged, refused_again = judged_files(campaign.recordings, state, pose, fresh)
+    left_out += refused_again
+    if judged is None:
         held = campaign.state.held.get(pose)
         return ImportReport(
             pose, held or state.measurements.get(pose), before, before, (),
-            held.question if held else None, judged.already, judged.left_out,
+            held.question if held else None, already, left_out,
         )  # fmt: skip
-    event, told = _event(before, state, pose, known.joints_deg if known else joints_deg, judged)
+    claim = Claim(before, state, pose, known.joints_deg if known else joints_deg)
+    event, told = _event(claim, judged)
     campaign.append(replace(event, instead=instead))
     measurement = (campaign.state.held if event.question else campaign.state.measurements)[pose]
     model = campaign.model
-    remarks = remarks_on(campaign.cell.robot.joints, state, judged, measurement, joints_deg, told)
-    if not event.question and any(hit.accepted for hit in hits):
+    stood = replaced(claim, joints_deg=joints_deg)
+    remarks = remarks_on(stood, judged, measurement, told)
+    if not event.question and any(hit.accepted for hit in judged.hits):
         remarks += (*unexpected_modes(before, model, pose), *model.remarks)
     return ImportReport(
-        pose, measurement, before, model, hits, event.question, judged.already, judged.left_out,
-        measured, remarks, alerts=told, refit_seconds=time.perf_counter() - started,
+        pose, measurement, before, model, judged.hits, event.question, already, left_out,
+        judged.measured, remarks, alerts=told, refit_seconds=time.perf_counter() - started,
     )  # fmt: skip
 
 
-def _event(
-    before: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...],
-    judged: JudgedFiles,
-) -> tuple[events.Imported, tuple[str, ...]]:  # fmt: skip
-    """What the log gains by new files, and remarks to be acted upon while the robot stands there.
-
-    `before` and `state` are those before the import.
-    """
-    assert judged.measured is not None
+def _event(claim: Claim, judged: JudgedFiles) -> tuple[events.Imported, tuple[str, ...]]:
+    """What the log gains by new files, and remarks to be acted upon while the robot stands."""
     measured = alone = judged.measured
     # Among earlier hits, wrong ones would not stand out; one that was replaced is no new visit.
     if judged.old and not judged.superseded:
-        fresh = tuple(zip(judged.sources, judged.hits, strict=True))
-        alone = measure_files((), fresh, before.cell.config.modes)[1]
+        alone = _measured(judged.sources, claim.model.cell)
     new_modes = from_modal(alone.modal)
-    asked = contradiction(pose, measured, len(judged.old))
-    asked = asked or question_about(before, state, pose, joints_deg, alone)
+    asked = contradiction(claim.pose, measured, len(judged.old)) or question_about(claim, alone)
     again, drift = "", ""
     if asked is None:
-        again, drift = suspected_drift(before, state, pose, joints_deg, new_modes)
+        again, drift = suspected_drift(claim, new_modes)
     event = events.Imported(
-        pose=pose,
-        joints_deg=joints_deg,
+        pose=claim.pose,
+        joints_deg=claim.joints_deg,
         hits=judged.hits,
         modes=from_modal(measured.modal),
         remarks=measured.remarks,
@@ -353,4 +331,4 @@ def _event(
         again=again,
         replaced=tuple(hit.sha256 for hit in judged.superseded),
     )
-    return event, alerts(before, state, event, measured, new_modes, drift)
+    return event, alerts(claim, event, measured, new_modes, drift)

@@ -84,11 +84,12 @@ def parse(data: bytes, name: str = "log.jsonl") -> LogContent:
                     f"{name}, line {seq}, is damaged; restore the file from a copy "
                     f"(the lines before it are intact)."
                 )
-            return LogContent(tuple(entries), check, position, data[position:])
+            break
         entries.append(entry)
         check, position = new_check, stop
-    missing = bool(data) and not data.endswith(b"\n")
-    return LogContent(tuple(entries), check, position, b"", missing)
+    torn = data[position:]
+    missing = bool(data) and not torn and not data.endswith(b"\n")
+    return LogContent(tuple(entries), check, position, torn, missing)
 
 
 def _read_line(line: bytes, check: str, seq: int, name: str) -> tuple[Entry | None, str]:

@@ -73,11 +73,6 @@ def label(
     )
 
 
-def frequencies(labelled: tuple[LabelledPose, ...]) -> np.ndarray:
-    """Natural frequencies (n, count) in Hz, NaN where a mode was not found."""
-    return np.array([[m.frequency_hz if m else np.nan for m in p.modes] for p in labelled])
-
-
 def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObservations:
     """The labelled modes as arrays, NaN where a mode was not found or a column not hit."""
     count, n = cell.config.modes.count, len(labelled)

@@ -11,12 +11,10 @@ from planner.campaign.state import Measurement
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.effects.misread_angle import misread_angles
-from planner.effects.parameters import CAD_INERTIAS, Priors
+from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import EffectLibrary
 from planner.fit.fitted import FitRecord
 from planner.fit.identified_robot import PLACED, IdentifiedRobot
-from planner.fit.posterior import RobotBelief
-from planner.fit.result import Identification
 from planner.fit.search import Search
 from planner.fit.structure import RobotPrior, exported
 from planner.fit.trials import as_found
@@ -58,28 +56,11 @@ class LowFidelity:
     identified_robot: IdentifiedRobot | None = None
     rejected: IdentifiedRobot | None = None  # what was identified and then found worse than nominal
 
-    @property
-    def identified(self) -> Identification | None:
-        """What was identified and is used."""
-        return self.identified_robot.identified if self.identified_robot else None
-
-    @property
-    def priors(self) -> Priors:
-        """What is known before anything is measured."""
-        return CAD_INERTIAS
-
     @cached_property
     def prior(self) -> RobotPrior:
-        """The same of everything that a robot may have; only with a simulation."""
+        """What is known before of everything that a robot may have; only with a simulation."""
         assert self.nominal is not None
-        return RobotPrior(EffectLibrary.of(self.nominal, self.priors))
-
-    @property
-    def known_robot(self) -> RobotBelief:
-        """What is known of the robot's numbers, before it is measured as stated."""
-        if self.identified_robot is not None:
-            return self.identified_robot.posterior
-        return RobotBelief.stated(self.prior, self.tolerances)
+        return RobotPrior(EffectLibrary.of(self.nominal, CAD_INERTIAS))
 
     @property
     def is_identified(self) -> bool:
@@ -89,9 +70,8 @@ class LowFidelity:
     @property
     def simulation(self) -> Simulation | None:
         """The identified simulation where there is one."""
-        return (
-            self.identified_robot.identified.simulation if self.identified_robot else self.nominal
-        )
+        fit = self.identified_robot
+        return fit.identified.simulation if fit else self.nominal
 
     def stood(self, q: np.ndarray) -> np.ndarray:
         """Where the joints stood at measured poses, stated as q (n, dof) in rad."""

@@ -24,10 +24,7 @@ from planner.frf.frf import Frf
 from planner.robot.place_names import place_names, with_names
 from planner.surrogate.frequency_models import Predicting
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
-from planner.surrogate.modal_surrogate import (
-    ModalObservations,
-    Surrogate,
-)
+from planner.surrogate.modal_surrogate import ModalObservations, Surrogate
 from planner.words import counted, listed
 
 if TYPE_CHECKING:
@@ -278,11 +275,6 @@ class Model:
         return mean + above, np.hypot(sd, ABOVE_SD * np.abs(above))
 
     @property
-    def _axes(self) -> frozenset[str]:
-        """Along which axes any pose was hit."""
-        return frozenset().union(*(m.axes for m in self.used))
-
-    @property
     def not_predicted(self) -> str:
         """What to say of modes that every pose shows and that are none of those predicted; ""."""
         others = []
@@ -322,7 +314,8 @@ class Model:
             percent = 100 * float(np.sqrt(np.mean(self.surrogate.visit_scatter**2)))
             if percent > 0.3:  # larger than usual
                 check = "Check temperature, clamping and readback."
-                partly = [m.pose for m in self.used if m.axes and m.axes < self._axes]
+                axes = frozenset().union(*(m.axes for m in self.used))
+                partly = [m.pose for m in self.used if m.axes and m.axes < axes]
                 if partly:
                     check = (
                         f"Not every axis was hit at {listed(partly)}: hit the others there, too."

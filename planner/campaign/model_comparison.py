@@ -57,21 +57,15 @@ def compared_models(
     done = parallel_map(fit, items, lambda i, k: progress(items[i][0], k / len(items)))
     found = dict(zip(items, done, strict=True))
     rows = [
-        _row(name, model.seen, found[name, -1], [found[name, i] for i in range(n)])
+        _row(name, model.seen, found[name, -1][2], [found[name, i] for i in range(n)])
         for name in usable
     ]
     rows = [replace(row, campaign=row.model == config.surrogate.model) for row in rows]
     return tuple(sorted(rows, key=lambda row: -row.log_density))
 
 
-@dataclass(frozen=True, eq=False)
-class _Fitted:
-    """Mean and sd (m,) of ln f at the pose left out; evidence of all, seconds of the fit."""
-
-    mean: np.ndarray
-    sd: np.ndarray
-    log_evidence: float | None
-    seconds: float
+# Mean and sd (m,) of ln f at the pose left out; evidence of all, seconds of the fit.
+Fitted = tuple[np.ndarray, np.ndarray, float | None, float]
 
 
 def _without(
@@ -81,7 +75,7 @@ def _without(
     kernel: str | None,
     points: dict[str, tuple[np.ndarray, np.ndarray] | None],
     item: tuple[str, int],
-) -> _Fitted:
+) -> Fitted:
     """A model fitted without one pose (−1: to all), and what it says there."""
     (name, left), started = item, time.perf_counter()
     kept = np.arange(len(seen.x)) != left
@@ -91,15 +85,15 @@ def _without(
     there = seen.at(slice(max(left, 0), max(left, 0) + 1))
     mean, sd = primary.predict(there.x, simulated_log(there), nugget=True)
     evidence = float(primary.log_evidence.sum()) if type(primary) is Average else None
-    return _Fitted(mean[0], sd[0], evidence, time.perf_counter() - started)
+    return mean[0], sd[0], evidence, time.perf_counter() - started
 
 
 def _row(
-    name: str, seen: ModalObservations, whole: _Fitted, each: Sequence[_Fitted]
+    name: str, seen: ModalObservations, log_evidence: float | None, each: Sequence[Fitted]
 ) -> LeftOutModel:
-    measured = np.log(seen.frequency_hz)
-    off = np.array([one.mean for one in each]) - measured
-    sd = np.hypot([one.sd for one in each], seen.frequency_sd_hz / seen.frequency_hz)
+    mean, sd, _, seconds = zip(*each, strict=True)
+    off = np.array(mean) - np.log(seen.frequency_hz)
+    sd = np.hypot(sd, seen.frequency_sd_hz / seen.frequency_hz)
     known = np.isfinite(off)
     off, sd = off[known], sd[known]
     density = -0.5 * np.sum((off / sd) ** 2 + np.log(2 * np.pi * sd**2))
@@ -109,6 +103,6 @@ def _row(
         float(100 * np.sqrt(np.mean(np.expm1(off) ** 2))),
         float(np.mean(np.abs(off) <= INSIDE * sd)),
         float(density),
-        whole.log_evidence,
-        float(np.median([one.seconds for one in each])),  # the first compiles
+        log_evidence,
+        float(np.median(seconds)),  # the first compiles
     )

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import msgspec
 import numpy as np
 
 if TYPE_CHECKING:
@@ -93,13 +92,12 @@ class DecisionStatus:
     def of(cls, model: "Model") -> "DecisionStatus | None":
         """Of a campaign's model; None where campaign.toml names no cut."""
         table = model.cell.config.cut
-        if table is msgspec.UNSET or not model.labelled:
+        if not table or not model.labelled:
             return None
         from planner.campaign.decision import measurements_left
 
         decision = model.decision
-        if decision is None:
-            return None
+        assert decision is not None
         probability = model.cell.config.stop.probability
         sure, q = decision.sure(probability), model.cell.robot.joints.shown(decision.q)
         return cls(

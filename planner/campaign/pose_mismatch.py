@@ -9,13 +9,14 @@ pose, which bent what is expected.
 Without a simulation, or before the first measurement, nothing is expected.
 """
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.campaign.alternatives import (
     FAR_OFF_HITS,
+    LOG_ODDS,
     Alternative,
     StatedHits,
     chain_faults,
@@ -26,48 +27,48 @@ from planner.campaign.alternatives import (
 )
 from planner.campaign.chain_mismatch import chain_mismatch
 from planner.campaign.events import Question
-from planner.campaign.model import Model
-from planner.campaign.poses_together import SURE, PosesTogether
+from planner.campaign.import_checks import Claim
 from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.fit.expected import ExpectedFrfs
+from planner.fit.fitted import StructureFit, explains_all
 from planner.fit.identified_robot import PLACED
+from planner.fit.posterior import RobotPosterior
+from planner.fit.search import Search
 from planner.frf.frf import Frf
+from planner.inference.parallel import parallel_map
+from planner.recording.joints import JointUnits
 from planner.recording.points import TOOL
 
 NEAR_DEG = 2.0  # to the setpoint, in which angles that are none of degrees are recognised
+# Measured poses before which another structure may explain what nothing known fits: until then
+# the simulation alone tells of the chain, as before the first; no joint is looked for elsewhere.
+SURE = 2
 
 
-def pose_mismatch(
-    model: Model,
-    state: CampaignState,
-    pose: str,
-    joints_deg: tuple[float, ...],
-    measured: MeasuredPose,
-) -> Question | None:
+def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
     """What to ask the engineer before new hits of a pose are believed; None: nothing.
 
-    `measured` is of the new hits alone; `model` and `state` are those before the import.
+    `measured` is of the new hits alone.
     """
-    fit, frf = model.low.identified_robot or model.low.rejected, measured.one_hit_frf
+    fit, frf = claim.model.low.identified_robot or claim.model.low.rejected, measured.one_hit_frf
     if frf is None or fit is None:
         return None
-    expected = ExpectedFrfs(fit.posterior, model.cell.config.modes.band_hz)
-    joints = model.cell.robot.joints
-    q, frf = joints.internal([joints_deg])[0], frf.within(expected.band_hz)
+    expected = ExpectedFrfs(fit.posterior, claim.band_hz)
+    q, frf = claim.q, frf.within(expected.band_hz)
     sure, placed = fit.poses >= SURE, fit.poses >= PLACED
     stated = StatedHits(expected, q, frf, placed)
-    answered = _called_right(state)
+    answered = _called_right(claim.state)
     said = "".join(answered)  # not asked again
-    likely = _setpoint(model, state, pose, joints_deg)
+    likely = _setpoint(claim)
     if sure and frf.layout == TOOL and FAR_OFF_HITS not in said:
         likely.append(far_off_hits(expected, q))
     if stated.agree(likely):
         return None
-    mistakes = [*likely, *_poses(model, state, pose, joints_deg)]
+    mistakes = [*likely, *_poses(claim)]
     if sure:
-        mistakes += flipped_signs(joints, joints_deg)
-        mistakes += joint_offsets(joints, expected, frf, joints_deg)
+        mistakes += flipped_signs(claim.joints, claim.joints_deg)
+        mistakes += joint_offsets(claim.joints, expected, frf, claim.joints_deg)
     mistakes += (m for m in chain_faults(expected, q, frf, sure) if m.what not in said)
     fits = stated.best_alternative(mistakes)
     # Another known pose is none by chance; any angle may be, of the pose or of one before.
@@ -76,62 +77,55 @@ def pose_mismatch(
         or fits.about == "readback"
         or (fits.about != "chain" and StatedHits(expected, fits.q, frf).doubted)
     ):
-        fits = _earlier(model, state, pose, joints_deg, frf) or fits
+        fits = _earlier(claim, fit.posterior, frf) or fits
     if fits is None and not stated.impossible:
         return None
     if fits is None and not sure:
-        return None if answered else chain_mismatch(model, pose, joints_deg, measured.frf)
-    return _asked(pose, 100 * expected.off(q, frf), fits)
+        return None if answered else chain_mismatch(claim, measured.frf)
+    return _asked(claim.pose, 100 * expected.off(q, frf), fits)
 
 
-def _poses(
-    model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...]
-) -> Iterator[Alternative]:
+def _poses(claim: Claim) -> Iterator[Alternative]:
     """Where else the robot may be."""
-    joints = model.cell.robot.joints
+    state = claim.state
     known = {m.pose: m.joints_deg for m in state.used}
     known |= {name: state.proposals[name].joints_deg for name in state.open}
-    known.pop(pose, None)
+    known.pop(claim.pose, None)
     for name, there in known.items():
         what = f"repeat those of {name}" if state.hit_at(name) else f"fit {name} far better"
-        yield Alternative(joints.internal([there])[0], what, name)
+        yield Alternative(claim.joints.internal(there), what, name)
 
 
-def _setpoint(
-    model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...]
-) -> list[Alternative]:
+def _setpoint(claim: Claim) -> list[Alternative]:
     """Where the robot was sent, where that is not what is stated."""
-    joints = model.cell.robot.joints
-    sent = state.proposals[pose].joints_deg if pose in state.proposals else joints_deg
+    joints, pose, joints_deg = claim.joints, claim.pose, claim.joints_deg
+    proposal = claim.state.proposals.get(pose)
+    sent = proposal.joints_deg if proposal else joints_deg
     typed = np.flatnonzero(np.abs(np.subtract(sent, joints_deg)) > joints.same()).tolist()
     which = " ".join(instead(joints, i, sent[i], joints_deg[i]) for i in typed)
     what = f"fit the setpoint of {pose} ({which.rstrip(',')}) better than its readback."
     if np.all(np.abs(np.rad2deg(joints_deg) - sent) < NEAR_DEG):
         what = f"fit the setpoint of {pose} better than its readback: are its angles in radians?"
-    there = joints.internal([sent])[0]
-    return [Alternative(there, what, about="readback", rival=True)] if typed else []
+    there = Alternative(joints.internal(sent), what, about="readback", rival=True)
+    return [there] if typed else []
 
 
-def _earlier(
-    model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...], frf: Frf
-) -> Alternative | None:
+def _earlier(claim: Claim, found: RobotPosterior, frf: Frf) -> Alternative | None:
     """An angle mistyped at a pose measured before, where all are likelier so.
 
-    `frf` are the new hits of a pose at `joints_deg`.
+    `frf` are the new hits, `found` what the model says of the robot without them.
     """
-    joints, fit = model.cell.robot.joints, model.low.identified_robot or model.low.rejected
-    if fit is None or frf.layout.sensors != TOOL.sensors:
+    if frf.layout.sensors != TOOL.sensors:
         return None
-    known = [*((m.pose, m.joints_deg) for m in model.used), (pose, joints_deg)]
-    q = joints.internal([angles for _, angles in known])
-    poses = PosesTogether(
-        fit.posterior, model.cell.config.modes.band_hz, joints, q, (*model.frfs, frf)
-    )
-    asked = [(m.pose, m.question) for m in model.used if m.question is not None]
+    used = claim.model.used
+    every = [*(replace(claim, pose=m.pose, joints_deg=m.joints_deg) for m in used), claim]
+    q, frfs = np.array([one.q for one in every]), (*claim.model.frfs, frf)
+    poses = PosesTogether(found, claim.band_hz, claim.joints, q, frfs)
+    asked = [(m.pose, m.question) for m in used if m.question is not None]
     right = {a.fits or name for name, a in asked if a.about in ("readback", "earlier")}
-    answered = [i for i, (name, _) in enumerate(known[:-1]) if name in right]
-    found = poses.wrong([_setpoint(model, state, *one) for one in known], answered)
-    return replace(found[1], pose=known[found[0]][0], about="earlier") if found else None
+    answered = [i for i, one in enumerate(every[:-1]) if one.pose in right]
+    wrong = poses.wrong([_setpoint(one) for one in every], answered)
+    return replace(wrong[1], pose=every[wrong[0]].pose, about="earlier") if wrong else None
 
 
 def _called_right(state: CampaignState) -> tuple[str, ...]:
@@ -160,3 +154,68 @@ def _asked(pose: str, off_percent: float, fits: Alternative | None) -> Question:
         )
     told = fits or Alternative(np.zeros(0), "")
     return Question(text, off_percent=off_percent, fits=told.pose, about=told.about)
+
+
+@dataclass(frozen=True, eq=False)
+class PosesTogether:
+    """Hits of poses q (n, dof) in rad, the new one last, that do not agree: which one is wrong?
+
+    Each is held against what the others alone let expect, and all are fitted with each angle that
+    they fit better: by all springs that there may be and the other effects that `found` has, which
+    is quick.
+    """
+
+    found: RobotPosterior
+    band_hz: tuple[float, float]
+    joints: JointUnits
+    q: np.ndarray
+    frfs: tuple[Frf, ...]
+
+    def wrong(
+        self, likely: Sequence[Sequence[Alternative]], answered: Container[int] = ()
+    ) -> tuple[int, Alternative] | None:
+        """The earlier pose, and its angle, with which all is explained, and likelier than as
+        stated, or with any angle of the new pose.
+
+        Of the first ones, that is: what came later was asked about when it came. `likely` are each
+        pose's own alternatives; the angles of those `answered` are right.
+        """
+        new = len(self.q) - 1
+        tried = [*(i for i in range(min(new, PLACED)) if i not in answered), new]
+        angles = parallel_map(lambda i: self._angle(i, likely[i]), tried)
+        found = [(i, angle) for i, angle in zip(tried, angles, strict=True) if angle is not None]
+        if not any(i < new for i, _ in found):
+            return None
+        (stated, _), *each = parallel_map(self._evidence, [None, *found])
+        (most, explains, (i, angle)), *others = sorted(
+            ((*one, which) for one, which in zip(each, found, strict=True)),
+            key=lambda one: one[0],
+            reverse=True,
+        )
+        least = max([stated, *(value for value, _, (k, _) in others if k == new)])
+        return (i, angle) if i < new and explains and most > least + LOG_ODDS else None
+
+    def _fit(self, q: np.ndarray, poses: Sequence[int]) -> StructureFit:
+        """Of some of the poses, at q (n, dof)."""
+        frfs, p = tuple(self.frfs[k] for k in poses), self.found
+        prior = p.structure.prior
+        return Search(prior, frfs, q[list(poses)], self.band_hz, p.tolerances).freed(p)
+
+    def _angle(self, i: int, likely: Sequence[Alternative]) -> Alternative | None:
+        """Of one pose, by which it fits the others better; None where none does."""
+        others = [k for k in range(len(self.q)) if k != i]
+        expected = ExpectedFrfs(RobotPosterior.of(self._fit(self.q, others)), self.band_hz)
+        stated = tuple(self.joints.shown(self.q[i]))
+        hits = StatedHits(expected, self.q[i], self.frfs[i], len(others) >= PLACED)
+        typed = [*likely, *flipped_signs(self.joints, stated)]
+        if len(others) >= SURE and not hits.agree():
+            typed += joint_offsets(self.joints, expected, self.frfs[i], stated)
+        return hits.best_alternative(typed)
+
+    def _evidence(self, one: tuple[int, Alternative] | None) -> tuple[float, bool]:
+        """Of all together, with one pose's other angle, and whether that explains them."""
+        q, rarer = self.q.copy(), 0.0
+        if one is not None:
+            q[one[0]], rarer = one[1].q, one[1].rarer
+        found = self._fit(q, range(len(q)))
+        return found.evidence - rarer, explains_all(found)

@@ -6,7 +6,7 @@ joints. Vectors are those of the tip's motion and of how far the second point de
 rotations are differences, and what both points have in common cancels in them.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,16 +32,9 @@ from planner.surrogate.models.multitask import RANK, fit_multitask
 WANTED = "predict.csv"
 
 
-@dataclass(frozen=True, eq=False)
-class ModeOfTip:
-    """One mode at the postures x (n, d) that have it: parameters y (n, 2 + 4m) at m directions.
-
-    ln f, ln ζ, then right and left vector, real and imaginary part each; one entry of the left
-    vector is 1.
-    """
-
-    x: np.ndarray
-    y: np.ndarray
+# Of a mode: the postures x (n, d) that have it, and its parameters (n, 2 + 4m) at m directions: ln
+# f, ln ζ, then right and left vector, real and imaginary part each; one entry of the left one is 1.
+Parameters = tuple[np.ndarray, np.ndarray]
 
 
 def posture_tip(folder: Path, tool: Tool | None, pose: str | None) -> TipReceptance:
@@ -102,7 +95,7 @@ def _matrix(pose: str, sources: tuple[Source, ...]) -> FrfMatrix:
     return given.matrix(None)
 
 
-def _followed(matrices: list[FrfMatrix], dofs: list[Dof], x: np.ndarray) -> list[ModeOfTip]:
+def _followed(matrices: list[FrfMatrix], dofs: list[Dof], x: np.ndarray) -> list[Parameters]:
     """Every mode that most postures have."""
     found = [_modes(matrix, dofs) for matrix in matrices]
     if not any(found):
@@ -120,7 +113,7 @@ def _followed(matrices: list[FrfMatrix], dofs: list[Dof], x: np.ndarray) -> list
                  if m is tracks.modes[i][label])
             for i in rows
         ]  # fmt: skip
-        followed.append(_parameters(x[rows], pairs))
+        followed.append((x[rows], _parameters(pairs)))
     if not followed:
         raise InputError("No mode is found in most postures; hit postures nearer to each other.")
     return followed
@@ -150,7 +143,7 @@ def _departure(count: int) -> np.ndarray:
     return np.kron([[1.0, 0.0], [1.0, -1.0]], np.eye(count // 2))
 
 
-def _parameters(x: np.ndarray, pairs: list[Found]) -> ModeOfTip:
+def _parameters(pairs: list[Found]) -> np.ndarray:
     left = np.array([vectors[1] for _, vectors in pairs])
     tip = left.shape[1] // 2
     # The direction in which the mode never comes near to rest is 1.
@@ -160,19 +153,19 @@ def _parameters(x: np.ndarray, pairs: list[Found]) -> ModeOfTip:
     right = np.array([v[0] / (2j * mode.pole.imag) for mode, v in pairs]) * scale
     poles = np.array([[mode.frequency_hz, mode.damping_ratio] for mode, _ in pairs])
     both = np.concatenate([right, left / scale], axis=1)
-    return ModeOfTip(x, np.concatenate([np.log(poles), both.real, both.imag], axis=1))
+    return np.concatenate([np.log(poles), both.real, both.imag], axis=1)
 
 
 def _predicted(
-    modes: list[ModeOfTip], at: np.ndarray, hz: np.ndarray
+    modes: list[Parameters], at: np.ndarray, hz: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Receptances (m, m, F) at one posture (d,), and by how much each parameter's sd moves them."""
     values, errors = 0.0, []
-    for mode in modes:
-        mean, sd = (v[0] for v in fit_multitask(mode.x, mode.y, rank=RANK).predict(at[None]))
+    for x, y in modes:
+        mean, sd = (v[0] for v in fit_multitask(x, y, rank=RANK).predict(at[None]))
         here = _receptance(mean, hz)
         values = values + here
-        for k in np.flatnonzero(np.ptp(mode.y, axis=0) > 0):
+        for k in np.flatnonzero(np.ptp(y, axis=0) > 0):
             errors.append(_receptance(mean + sd[k] * np.eye(len(mean))[k], hz) - here)
     return np.asarray(values), np.array(errors)
 

@@ -19,6 +19,7 @@ from planner.campaign.store import KeptRecordings
 from planner.dataset.store import Store, user_store
 from planner.errors import InputError
 from planner.progress import ProgressCallback, no_progress
+from planner.toml_file import read_toml_text
 from planner.version import __version__
 
 # Imported where they are needed: with what is kept of a model, `status` needs none of them.
@@ -168,7 +169,7 @@ class ReadOnlyCampaign:
     @property
     def recordings(self) -> KeptRecordings:
         """The recordings that were imported, by the points of the robot as configured now."""
-        return KeptRecordings.of(self.directory, self.cell)
+        return KeptRecordings(self.directory, self.cell)
 
     def posture(self, pose: str | None) -> np.ndarray:
         """Joint angles (dof,) in rad of a measured or proposed pose; InputError names them."""
@@ -219,7 +220,7 @@ class ReadOnlyCampaign:
         return tuple(
             Recording(measurement.pose, q, source)
             for measurement, q in zip(used, self.model.low.stood(stated), strict=True)
-            for source in kept.sources(measurement)
+            for source in map(kept.source, measurement.accepted)
         )
 
     def orphans(self) -> list[str]:
@@ -235,7 +236,9 @@ class ReadOnlyCampaign:
 
     def _configured(self) -> Configured:
         """What campaign.toml and the robot folder say now (the log follows with the next act)."""
-        config = load_campaign_config(self.directory / store.CONFIG)
+        path = self.directory / store.CONFIG
+        text = read_toml_text(path, store.CONFIG)
+        config = self._remembered("config", text, lambda: load_campaign_config(path))
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
         return Configured(config, hashes, __version__, begun.joint_units)

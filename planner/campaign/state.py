@@ -156,9 +156,10 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
     for entry in entries:
         if isinstance(entry.event, Proposed):
             made = {p.pose: p for p in entry.event.proposals}
-            state = replace(
-                state, proposals_made=_made(state, entry.event), proposals=state.proposals | made
-            )
+            # A pose that is proposed again keeps its name.
+            numbers = [int(pose[1:]) for pose in made if pose[1:].isdecimal()]
+            count = max([state.proposals_made, *numbers])
+            state = replace(state, proposals_made=count, proposals=state.proposals | made)
         if isinstance(entry.event, Undone):
             if not all(map(state.unchanged_by, _acts_of(entries, entry.event))):
                 state = replace(state, model_version=entry.seq)
@@ -194,12 +195,6 @@ def _acts_of(entries: Sequence[Entry], event: AnyEvent) -> Iterator[AnyEvent]:
         return
     for act in event.acts:
         yield from _acts_of(entries, entries[act - 1].event)
-
-
-def _made(state: CampaignState, event: Proposed) -> int:
-    """How many names were given; a pose that is proposed again keeps its own."""
-    numbers = [p.pose[1:] for p in event.proposals if p.pose[1:].isdecimal()]
-    return max([state.proposals_made, *map(int, numbers)])
 
 
 def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState:
@@ -252,7 +247,12 @@ def _imported(
     state: CampaignState, changed: CampaignState, event: Imported, entry: Entry
 ) -> CampaignState:
     came = {hit.sha256 for hit in event.hits}
-    before = without(_judged_before(state, came).get(event.pose), event.replaced)
+    # Refused hits of files that come again are judged again.
+    earlier = {
+        pose: replace(m, hits=tuple(h for h in m.hits if h.accepted or h.sha256 not in came))
+        for pose, m in state.measurements.items()
+    }
+    before = without(earlier.get(event.pose), event.replaced)
     measurement = Measurement(
         pose=event.pose,
         joints_deg=event.joints_deg,
@@ -270,7 +270,7 @@ def _imported(
     if event.question is not None:
         held = {**state.held, event.pose: measurement}
         return replace(state, open=left, refused=refused, held=held)
-    measurements = {**_judged_before(state, came), event.pose: measurement}
+    measurements = {**earlier, event.pose: measurement}
     if state.unchanged_by(event):
         return replace(state, refused=refused, measurements=measurements)
     doubt = (event.again, event.pose) if event.again else _doubt(state, event.pose)
@@ -291,16 +291,6 @@ def without(known: Measurement | None, replaced: Sequence[str]) -> Measurement |
         for hit in known.hits
     )  # fmt: skip
     return replace(known, hits=hits)
-
-
-def _judged_before(state: CampaignState, came: set[str]) -> dict[str, Measurement]:
-    """The measurements without refused hits of files that came again, and were judged again."""
-    found = {}
-    for pose, measurement in state.measurements.items():
-        hits = tuple(h for h in measurement.hits if h.accepted or h.sha256 not in came)
-        same = len(hits) == len(measurement.hits)
-        found[pose] = measurement if same else replace(measurement, hits=hits)
-    return found
 
 
 def _doubt(state: CampaignState, pose: str) -> tuple[str, str] | None:

@@ -12,14 +12,14 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from planner import content_hash, file_content
-from planner.campaign.config import ModesTable, load_campaign_config
+from planner.campaign.config import load_campaign_config
 from planner.campaign.events import HitRecord
 from planner.campaign.journal import sync_folder, write_synced
 from planner.campaign.state import Measurement
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
 from planner.errors import InputError
-from planner.recording.points import PointNames, StatedPoints
+from planner.recording.points import StatedPoints
 from planner.robot.mesh_files import urdf_source
 from planner.toml_file import read_toml_text
 
@@ -41,8 +41,8 @@ def is_campaign(path: Path) -> bool:
     return any((path / name).exists() for name in (LOG, CONFIG))
 
 
-def store_recording(folder: Path, path: Path) -> tuple[str, str]:
-    """Keep a recording under its content hash; returns (sha256, suffix). Idempotent."""
+def store_recording(folder: Path, path: Path) -> Path:
+    """Keep a recording under its content hash, and say where. Idempotent."""
     from planner.recording.read import content
 
     digest, suffix = recording_hash(path), "".join(path.suffixes[-2:]).lower()
@@ -52,7 +52,7 @@ def store_recording(folder: Path, path: Path) -> tuple[str, str]:
         kept.parent.mkdir(exist_ok=True)
         write_synced(kept, content(path))
         file_content.remember(kept, file_content.mark(kept), digest)
-    return digest, suffix
+    return kept
 
 
 def recording_path(folder: Path, digest: str, suffix: str) -> Path:
@@ -192,10 +192,8 @@ def _remove_left(directory: Path) -> None:
 def _alive(process: int) -> bool:
     try:
         os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
+    except OSError as error:
+        return not isinstance(error, ProcessLookupError)
     return True
 
 
@@ -204,12 +202,11 @@ def _copy_robot(robot_toml: Path, target: Path) -> None:
 
     A URDF that lies elsewhere comes to lie beside robot.toml, and is expanded where it is xacro.
     """
-    from planner.robot.config_file import load_config
     from planner.robot.mesh_files import copy_meshes
     from planner.robot.robot import Robot
 
-    source, named = robot_toml.parent.resolve(), load_config(robot_toml).urdf
-    urdf = Robot.load(robot_toml).urdf_path
+    source, robot = robot_toml.parent.resolve(), Robot.load(robot_toml)
+    urdf, named = robot.urdf_path, robot.config.urdf
     inside = urdf.relative_to(source) if urdf.is_relative_to(source) else Path(urdf.name)
     copy = target / inside
     if copy.suffix == ".xacro":
@@ -285,23 +282,16 @@ def write_example(directory: Path) -> tuple[str, str, str, tuple[str, ...]]:
 
 @dataclass(frozen=True, eq=False)
 class KeptRecordings:
-    """Recordings by content hash in a campaign's folder, whose robot has points of these names."""
+    """Recordings by content hash in a campaign's folder, of a cell's robot."""
 
     directory: Path
-    names: PointNames
-    table: ModesTable
-
-    @classmethod
-    def of(cls, directory: Path, cell: "Cell") -> "KeptRecordings":
-        """As a cell has them."""
-        return cls(directory, cell.robot.points, cell.config.modes)
+    cell: "Cell"
 
     def source(self, hit: HitRecord) -> Source:
         """The kept copy of a recording; InputError where it is not what was imported."""
-        path = self._checked(hit)
-        stated = StatedPoints(hit.hit_point, hit.response_points, names=self.names)
-        own = hit.part, hit.response, hit.from_name
-        return Source(path, hit.file, hit.hit, hit.repeat, stated, *own)
+        stated = StatedPoints(hit.hit_point, hit.response_points, names=self.cell.robot.points)
+        own = hit.hit, hit.repeat, stated, hit.part, hit.response, hit.from_name
+        return Source(self._checked(hit), hit.file, *own)
 
     def _checked(self, hit: HitRecord) -> Path:
         path = recording_path(self.directory, hit.sha256, hit.suffix)
@@ -322,13 +312,10 @@ class KeptRecordings:
         if now != before:
             found.put(key, now)
 
-    def sources(self, measurement: Measurement) -> tuple[Source, ...]:
-        """Of the accepted hits of a measured pose."""
-        return tuple(self.source(hit) for hit in measurement.accepted)
-
     def hits(self, measurement: Measurement, corrected: "Correction | None" = None) -> "PoseHits":
         """What the accepted hits of a measured pose say, each by itself and at all points."""
         from planner.dataset.hit_columns import hits_of
 
-        how = self.table.band_hz, self.table.window_rate_1_s
-        return hits_of(self.sources(measurement), *how, corrected)
+        table = self.cell.config.modes
+        how = table.band_hz, table.window_rate_1_s
+        return hits_of(tuple(map(self.source, measurement.accepted)), *how, corrected)

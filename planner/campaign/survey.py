@@ -24,6 +24,7 @@ from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
 from planner.progress import ProgressCallback
 from planner.recording.folder import joint_columns, read_recordings
+from planner.recording.records import PoseRow
 from planner.robot.robot import Robot
 
 
@@ -60,24 +61,22 @@ def survey(
     """
     band, robot = band_hz or DEFAULT_BAND_HZ, Robot.load(robot_toml) if robot_toml else None
     joints = joint_columns(folder) if robot is None else robot.joints
-    every_row = read_recordings(folder, joints, None if robot is None else robot.points)
-    names = tuple(dict.fromkeys(row.pose for row in every_row))
-    found, every, refused, simulated = [], [], [], False
+    rows: dict[str, list[PoseRow]] = {}
+    for row in read_recordings(folder, joints, None if robot is None else robot.points):
+        rows.setdefault(row.pose, []).append(row)
+    names, q = tuple(rows), joints.internal([own[0].joints_deg for own in rows.values()])
+    every: list[MeasuredPose] = []
     visited: list[tuple[Visited, Frf]] = []
-    for number, name in enumerate(names):
+    for number, (name, own) in enumerate(rows.items()):
         progress(f"pose {name}", number / len(names))
-        rows = [row for row in every_row if row.pose == name]
-        sources = tuple(Source.of(row) for row in rows if row.file)
+        sources = tuple(Source.of(row) for row in own if row.file)
         measured = measure(in_parts(sources), band, estimator, window_rate_1_s)
-        refused += [
-            RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted
-        ]
-        simulated |= any(v.simulated for v in measured.verdicts)
-        found.append(measured.modal.modes if measured.modal else ())
         every.append(measured)
         if robot is not None and measured.frf is not None:
-            q = joints.internal(rows[0].joints_deg)
-            visited.append(_visited(name, q, measured))
+            visited.append(_visited(name, q[number], measured))
+    found = [one.modal.modes if one.modal else () for one in every]
+    verdicts = [verdict for one in every for verdict in one.verdicts]
+    refused = tuple(RefusedFile(v.source.name, v.reason) for v in verdicts if not v.accepted)
     if not any(found):
         reasons = [file.reason for file in refused] + [
             told for one in every for told in one.remarks
@@ -85,8 +84,6 @@ def survey(
         raise RefusedError(
             f"{folder}: no pose gives a mode between {band[0]:g} and {band[1]:g} Hz: {reasons[0]}"
         )
-    first = {row.pose: row for row in reversed(every_row)}
-    q = joints.internal([first[name].joints_deg for name in names])
     nominal = None if robot is None else Simulation(robot)
     errors = _hit_errors(visited, nominal, band)
     found = [tuple(errors.without_hit_errors(*one)) for one in zip(names, found, strict=True)]
@@ -97,8 +94,8 @@ def survey(
     bare = without_sensors(names, found, simulations, q, every)
     tracks, expected = _labelled(bare.modes, q, nominal)
     return Survey(
-        names, tracks, bare, errors, band, tuple(refused), (*doubts, *bare.remarks), simulated,
-        expected,
+        names, tracks, bare, errors, band, refused, (*doubts, *bare.remarks),
+        any(v.simulated for v in verdicts), expected,
     )  # fmt: skip
 
 

@@ -118,14 +118,8 @@ class PathPoses:
                 near = found[angle] = q
         return list(found.items())
 
-    def standing(self, found: list[tuple[int, float, np.ndarray]]) -> "PathPoses":
-        """Other angles q at some of the poses, with the feeds there."""
-        names = tuple(f"{self.names[i]}, turned {turn:g}°" for i, turn, _ in found)
-        feeds = self._in_base[[i for i, _, _ in found]]
-        return replace(self, names=names, q=np.array([q for _, _, q in found]), feeds=feeds)
-
     @property
-    def _in_base(self) -> np.ndarray:
+    def in_base(self) -> np.ndarray:
         """Feeds (p, 3) in the base frame, as the cut or the path has them."""
         rotation, position = self.campaign.cell.robot.forward_batch(self.q)
         feed = np.array(self.cut.feed)
@@ -139,7 +133,7 @@ class PathPoses:
         """The feed turned about the tool's axis, in the base frame; None if poses differ in it."""
         rotation, _ = self.campaign.cell.robot.forward_batch(self.q)
         axis = rotation @ (np.array(self.cut.axis) / np.linalg.norm(self.cut.axis))
-        feed = self._in_base
+        feed = self.in_base
         feed = feed - axis * np.sum(feed * axis, axis=1, keepdims=True)
         feed /= np.linalg.norm(feed, axis=1, keepdims=True)
         turn = np.deg2rad(turn_deg)
@@ -260,19 +254,6 @@ class TurnAdvice:
     best_deg: tuple[float, ...]
     common_deg: float
 
-    @classmethod
-    def of(cls, depth: np.ndarray) -> "TurnAdvice":
-        """From depths (p, angles) in m, NaN where it cannot stand, inf where none is lost."""
-        known = np.where(np.isnan(depth), -1.0, depth)
-        tightest = known.min(axis=0)
-        rows = tuple(tuple(float(v) for v in row) for row in depth)
-        return cls(
-            tuple(map(float, TURNS_DEG)), rows,
-            tuple(tuple(bool(v) for v in row) for row in ~np.isnan(depth)),
-            tuple(float(TURNS_DEG[i]) for i in known.argmax(axis=1)),
-            float(TURNS_DEG[int(tightest.argmax())]),
-        )  # fmt: skip
-
     def text(self, poses: tuple[str, ...]) -> str:
         """Sentences."""
         depth = np.array(self.depth_m)
@@ -298,10 +279,23 @@ def turn_advice(
 ) -> TurnAdvice:
     """At a speed in rpm, of each pose and angle."""
     found = [(i, turn, q) for i in range(len(travelled.q)) for turn, q in travelled.turned(i)]
+    turned = replace(
+        travelled,
+        names=tuple(f"{travelled.names[i]}, turned {turn:g}°" for i, turn, _ in found),
+        q=np.array([q for _, _, q in found]),
+        feeds=travelled.in_base[[i for i, _, _ in found]],
+    )
     depth = np.full((len(travelled.q), len(TURNS_DEG)), np.nan)
     # With the feeds as they are in the base frame, whatever the cut says.
-    poses = travelled.standing(found).structures(msgspec.structs.replace(cut, feed_in="path"))
+    poses = turned.structures(msgspec.structs.replace(cut, feed_in="path"))
     for k, ((i, turn, _), (_, structure)) in enumerate(zip(found, poses, strict=True)):
         depth[i, int(np.argmin(np.abs(TURNS_DEG - turn)))] = limit_at(structure.machine(cut), rpm)
         progress("turns", (k + 1) / len(found))
-    return TurnAdvice.of(depth)
+    known = np.where(np.isnan(depth), -1.0, depth)  # inf where none is lost
+    return TurnAdvice(
+        tuple(TURNS_DEG.tolist()),
+        tuple(map(tuple, depth.tolist())),
+        tuple(map(tuple, (~np.isnan(depth)).tolist())),
+        tuple(TURNS_DEG[known.argmax(axis=1)].tolist()),
+        float(TURNS_DEG[known.min(axis=0).argmax()]),
+    )

@@ -9,12 +9,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from planner import content_hash
-from planner.campaign.build import build
+from planner.campaign.build import build, hits_unknown
 from planner.campaign.low_fidelity import Recall, in_memory
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
-from planner.campaign.straightened import hits_unknown
 from planner.compare.bench import Bench, PoolCell, cell_of
 from planner.compare.score import Score, score
 from planner.compare.tasks import Run, Task

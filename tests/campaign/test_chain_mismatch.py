@@ -7,14 +7,14 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.chain_faults import SCALED, TURNED, ChainFault
-from planner.campaign.import_checks import question_about
+from planner.campaign.import_checks import Claim, question_about
 from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
-from planner.demo import NAME, Pool, shipped
 from planner.frf.frf import Frf
 from planner.recording.folder import TABLE
 from tests.support.chain_cases import FAULTS, SLIGHTEST, cases, fault, judged, scaled, shown_by
 from tests.support.outside import call
+from tests.support.shipped_campaign import RECORDINGS, shipped_campaign, shipped_pool
 
 
 def test_faults_of_a_chain_are_asked_about_and_named(tmp_path):
@@ -88,12 +88,10 @@ def test_every_fault_can_be_told_in_words():
 
 
 def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
-    robot, config = (shipped(NAME) / name for name in ("robot/robot.toml", "campaign.toml"))
-    campaign = Campaign.new(tmp_path / "campaign", robot, config)
-    pool = Pool.load(shipped(NAME) / "recordings", tuple(f"joint_{i}" for i in range(1, 7)))
+    campaign, pool = shipped_campaign(tmp_path), shipped_pool()
     paths = [scaled(row, tmp_path, 1e3) for row in pool.rows["A11"]]
     names = [row.file.name for row in pool.rows["A11"]]
-    lines = (shipped(NAME) / "recordings" / TABLE).read_text().splitlines()
+    lines = (RECORDINGS / TABLE).read_text().splitlines()
     own = [line for line in lines[1:] if any(line.endswith(name) for name in names)]
     (tmp_path / TABLE).write_text("\n".join([lines[0], *own]).replace("data/", "") + "\n")
     code, out, err = call("import", campaign.directory, tmp_path / TABLE, "--json")
@@ -113,5 +111,6 @@ def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
         (folder := tmp_path / f"{factor:g}").mkdir()
         sources = tuple(Source(scaled(r, folder, factor), r.file.name, r.hit) for r in rows)
         other = measure(sources, band_hz)
-        asked = question_about(held.model, held.state, "A57", rows[0].joints_deg, other)
+        claim = Claim(held.model, held.state, "A57", rows[0].joints_deg)
+        asked = question_about(claim, other)
         assert (asked is not None and asked.about == "chain") == doubted

@@ -11,11 +11,11 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.campaign.frf_model import ErrorByZone
 from planner.dataset.store import Store
-from planner.demo import NAME, shipped
 from planner.frf.metrics import agreement, direct_mean
 from planner.surrogate.leave_one_out import left_out_modes
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.case_campaigns import CaseCampaign, FrfScore, lacking
+from tests.support.shipped_campaign import RECORDINGS, shipped_campaign
 from tests.support.surrogates import observed
 
 
@@ -80,11 +80,9 @@ def test_before_any_measurement_the_simulation_as_stated_says_what_to_expect(bas
 
 
 def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
-    source = shipped(NAME)
-    Campaign.new(tmp_path / "c", source / "robot" / "robot.toml", source / "campaign.toml")
     store = Store(tmp_path / "models")
-    campaign = Campaign(tmp_path / "c", store)
-    campaign.import_paths((source / "recordings",), "A11")
+    campaign = shipped_campaign(tmp_path, store=store)
+    campaign.import_paths((RECORDINGS,), "A11")
     q = campaign.cell.candidates.q[:1]
     assert not campaign.model.knows_frfs
     first = campaign.frf_at(q)
@@ -93,5 +91,5 @@ def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
         raise AssertionError("worked out again")
 
     monkeypatch.setattr(ErrorByZone, "of", refused)
-    again = Campaign(tmp_path / "c", store).frf_at(q)
+    again = Campaign(campaign.directory, store).frf_at(q)
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))

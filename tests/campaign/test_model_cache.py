@@ -15,11 +15,11 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.model import Model
 from planner.campaign.store import CONFIG
 from planner.dataset.store import Store
-from planner.demo import NAME, shipped
 from planner.fit.fitted import FitRecord
 from planner.replay import replay
 from planner.report.status import status
 from tests.support.outside import FROZEN, told
+from tests.support.shipped_campaign import RECORDINGS, shipped_campaign
 
 POSES = "A11", "A33"
 
@@ -28,16 +28,13 @@ POSES = "A11", "A33"
 def two(tmp_path_factory):
     """A campaign of two poses, whose simulation stays as it is: no model takes long."""
     parent = tmp_path_factory.mktemp("two")
-    return measured(parent, POSES, Store(None), "\n" + FROZEN).directory
+    return measured(parent, POSES, Store(None), FROZEN).directory
 
 
 def measured(parent, poses, store, more=""):
-    source, folder, config = shipped(NAME), parent / "campaign", parent / "campaign.toml"
-    config.write_text((source / "campaign.toml").read_text() + more)
-    Campaign.new(folder, source / "robot" / "robot.toml", config)
-    campaign = Campaign(folder, store)
+    campaign = shipped_campaign(parent, more, store)
     for pose in poses:
-        campaign.import_paths((source / "recordings",), pose)
+        campaign.import_paths((RECORDINGS,), pose)
     return campaign
 
 

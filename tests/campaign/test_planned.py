@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
 from planner.campaign.model_status import outside_remark
@@ -13,6 +12,7 @@ from planner.demo import NAME, shipped
 from planner.report.predictions import predictions
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import solve
+from tests.support.shipped_campaign import shipped_campaign
 
 POSES = 80  # planned; as many again that are not
 
@@ -79,9 +79,7 @@ def test_a_tilted_tool_is_outside(places, planned):
 
 
 def test_every_answer_marks_them(tmp_path):
-    source = shipped(NAME)
-    robot = source / "robot" / "robot.toml"
-    campaign = Campaign.new(tmp_path / "cell", robot, source / "campaign.toml")
+    campaign = shipped_campaign(tmp_path)
     here = campaign.cell.candidates.q[0]
     off_deg = {"here": [0.0] * 6, "read back": [0.02, *[0.0] * 5], "tilted": [0, 0, 0, 0, 3, 0]}
     q = [here + np.deg2rad(off) for off in off_deg.values()]

@@ -15,17 +15,17 @@ import pytest
 
 from planner.campaign import pose_mismatch
 from planner.campaign.campaign import Campaign
-from planner.campaign.import_checks import question_about
+from planner.campaign.import_checks import Claim, question_about
 from planner.campaign.state import fold
 from planner.campaign.store import CONFIG
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
-from planner.demo import NAME, Pool, shipped
 from planner.recording.folder import TABLE
 from planner.replay import replay
 from planner.report.status import status
 from tests.support.chain_cases import scaled
 from tests.support.outside import FROZEN, call
+from tests.support.shipped_campaign import shipped_campaign, shipped_pool
 
 MEASURED = ("A11", "A57")
 WRONG, CLAIMED = "A25", "A42"
@@ -33,24 +33,17 @@ WRONG, CLAIMED = "A25", "A42"
 
 @pytest.fixture(scope="module")
 def pool():
-    return Pool.load(shipped(NAME) / "recordings", tuple(f"joint_{i}" for i in range(1, 7)))
+    return shipped_pool()
 
 
 @pytest.fixture(scope="module")
 def three(tmp_path_factory, pool):
     """A campaign of two poses, to be copied."""
-    campaign = begun(tmp_path_factory.mktemp("three"))
+    campaign = shipped_campaign(tmp_path_factory.mktemp("three"))
     for pose in MEASURED:
         (report,) = campaign.import_paths((pool.folder,), pose)
         assert report.question is None
     return campaign.directory
-
-
-def begun(parent, more=""):
-    """A campaign without a measured pose."""
-    config = parent / "campaign.toml"
-    config.write_text(f"{(shipped(NAME) / config.name).read_text()}\n{more}")
-    return Campaign.new(parent / "campaign", shipped(NAME) / "robot/robot.toml", config)
 
 
 @contextmanager
@@ -164,7 +157,8 @@ def test_hits_listed_along_wrong_axes_are_asked_about(campaign, pool):
     def asked(along):
         listed = tuple(replace(h, axis=h.axis[0] + along[h.axis[1]]) for h in hits)
         measured = MeasuredPose((), band_hz, given=listed)
-        return question_about(campaign.model, campaign.state, "X1", rows[0].joints_deg, measured)
+        claim = Claim(campaign.model, campaign.state, "X1", rows[0].joints_deg)
+        return question_about(claim, measured)
 
     assert asked({"x": "x", "y": "y", "z": "z"}) is None
     question = asked({"x": "x", "y": "z", "z": "y"})
@@ -202,7 +196,7 @@ def test_angles_in_radians_are_asked_about_as_that(campaign, pool):
         (tuple(np.deg2rad(sent) + 0.01), "are its angles in radians?"),
         ((*sent[:2], sent[2] + 8, *sent[3:]), "(joint_3 at"),
     ):
-        (asked,) = pose_mismatch._setpoint(campaign.model, state, "P9", typed)
+        (asked,) = pose_mismatch._setpoint(Claim(campaign.model, state, "P9", typed))
         assert said in asked.what
 
 
@@ -236,7 +230,7 @@ def test_held_hits_set_aside_are_refused_ones_and_further_ones_wait(held, wrong,
 
 
 def test_refused_files_stay_out_unless_they_are_named(tmp_path, pool):
-    campaign = begun(tmp_path, FROZEN)
+    campaign = shipped_campaign(tmp_path, FROZEN)
     files = tuple(row.file for row in pool.rows["A46"])
     version = campaign.state.model_version
     campaign.refuse("A46", files[:3])

@@ -14,9 +14,9 @@ import pytest
 from scipy.signal import butter, lfilter
 from threadpoolctl import threadpool_limits
 
-from planner.campaign.import_checks import question_about
+from planner.campaign.import_checks import Claim, question_about
 from planner.campaign.model import Model
-from planner.campaign.poses_together import SURE
+from planner.campaign.pose_mismatch import SURE
 from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.recording.records import Hit
@@ -104,7 +104,7 @@ class Asker:
         hits = tuple(map(change, hits)) if change else hits
         measured = MeasuredPose((), case.band_hz, given=hits)
         angles = self.campaign.angles(q)
-        told = question_about(self.model, state or self.state, "X", angles, measured)
+        told = question_about(Claim(self.model, state or self.state, "X", angles), measured)
         if told is None:
             return ""
         return f"earlier {told.fits}" if told.about == "earlier" else told.fits or told.about or "?"

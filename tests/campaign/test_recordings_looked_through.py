@@ -8,20 +8,17 @@ import pytest
 from planner import file_content
 from planner.campaign.campaign import Campaign
 from planner.dataset.store import Store
-from planner.demo import NAME, shipped
 from planner.errors import InputError
 from tests.support.outside import FROZEN
+from tests.support.shipped_campaign import RECORDINGS, shipped_campaign
 
 
 @pytest.fixture(scope="module")
 def one(tmp_path_factory):
     """A campaign of one pose."""
-    source, folder = shipped(NAME), tmp_path_factory.mktemp("one") / "campaign"
-    plan = folder.with_name("campaign.toml")
-    plan.write_text(f"{(source / plan.name).read_text()}\n{FROZEN}")
-    campaign = Campaign.new(folder, source / "robot" / "robot.toml", plan)
-    campaign.import_paths((source / "recordings",), "A11")
-    return folder
+    campaign = shipped_campaign(tmp_path_factory.mktemp("one"), FROZEN)
+    campaign.import_paths((RECORDINGS,), "A11")
+    return campaign.directory
 
 
 @pytest.fixture

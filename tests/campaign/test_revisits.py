@@ -16,7 +16,7 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
-from planner.campaign.import_checks import hit_again, suspected_drift
+from planner.campaign.import_checks import Claim, hit_again, suspected_drift
 from planner.campaign.state import CampaignState, Measurement, fold
 from planner.proof.deviation import Deviation
 from planner.proof.load import load_truth
@@ -67,7 +67,7 @@ def test_a_second_visit_is_held_against_the_scatter_of_visits(hertz, scatter, po
 )  # fmt: skip
 def test_modes_to_one_side_ask_for_the_first_pose_again(hertz, hinted):
     state = CampaignState(measurements={"P001": KNOWN})
-    again, text = suspected_drift(model(1e-3), state, "P004", (1.0, 1.0), modes(*hertz))
+    again, text = suspected_drift(Claim(model(1e-3), state, "P004", (1.0, 1.0)), modes(*hertz))
     assert again == ("P001" if hinted else "")
     assert ("Hit P001, the first pose, again (0.000, 0.000°)" in text) == hinted
 

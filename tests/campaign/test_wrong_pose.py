@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.import_checks import question_about
+from planner.campaign.import_checks import Claim, question_about
 from planner.campaign.low_fidelity import LowFidelity
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
@@ -53,7 +53,7 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path):
 
     def asked(at: int, one: MeasuredPose):
         angles = tuple(np.rad2deg(q[at]).tolist())
-        return question_about(campaign.model, campaign.state, "X", angles, one)
+        return question_about(Claim(campaign.model, campaign.state, "X", angles), one)
 
     assert not any(asked(i, found[i]) for i in range(OTHERS))
     repeated = [asked(i, again) for i in range(OTHERS)]

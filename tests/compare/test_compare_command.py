@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.campaign.build import build
+from planner.campaign.build import build, hits_unknown
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
-from planner.campaign.straightened import hits_unknown
 from planner.compare.bench import assemble, cell_of, comparison_config
 from planner.compare.resume import recorded
 from planner.compare.run import run

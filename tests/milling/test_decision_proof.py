@@ -14,14 +14,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from planner.campaign.build import build
+from planner.campaign.build import build, hits_unknown
 from planner.campaign.cell import Cell
 from planner.campaign.config import CampaignConfig
 from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
-from planner.campaign.straightened import hits_unknown
 from planner.design.space_filling import NESTED
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf

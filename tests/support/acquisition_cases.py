@@ -7,14 +7,13 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from planner.campaign.build import build
+from planner.campaign.build import build, hits_unknown
 from planner.campaign.cell import Cell
 from planner.campaign.config import CampaignConfig
 from planner.campaign.measured_modes import from_mode
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
-from planner.campaign.straightened import hits_unknown
 from planner.frf.frf import Frf
 from planner.frf.metrics import agreement
 from planner.modal.modes import Mode

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from planner.campaign.cell import Cell as CampaignCell
 from planner.campaign.chain_faults import ChainFault
-from planner.campaign.chain_mismatch import LOG_ODDS, HitSums, SpringDraws, most_probable
+from planner.campaign.chain_mismatch import LOG_ODDS, HitSums, hit_sums, most_probable
 from planner.campaign.config import load_campaign_config
 from planner.campaign.imported_files import sort_paths
 from planner.dataset.measure import MeasuredPose
@@ -54,15 +54,16 @@ def struck(folder: Path, seed: int, poses: int) -> Struck:
     )
     cell = CampaignCell.load(robot.toml, load_campaign_config(config))
     assert cell.simulation is not None
-    draws, joints = SpringDraws(cell.simulation, cell.tolerances), cell.robot.joints
+    joints = cell.robot.joints
     found = []
     for number, q in enumerate(rng.permutation(cell.candidates.q)[:poses]):
         stated = tuple(np.round(joints.shown(q), 4).tolist())
         said = true.record(folder / f"hits{number}", f"P{number}", stated)
-        [delivery] = sort_paths((said,), joints, cell.robot.points, None, None)
+        [delivery] = sort_paths((said,), cell.robot, None, None)
         frf = MeasuredPose(delivery.sources, robot.band_hz).frf
         assert frf is not None
-        one = draws.sums(joints.internal(stated), frf.within(robot.band_hz))
+        q, frf = joints.internal(stated), frf.within(robot.band_hz)
+        one = hit_sums(cell.simulation, cell.tolerances, q, frf)
         assert one is not None
         found.append(one)
     return Struck(name, kind, tuple(found))
