@@ -62,7 +62,8 @@ def default_inertias(robot: Robot, mass_kg: float | None) -> tuple[LinkTable, ..
     if mass_kg is not None and known:
         share = sum(weights[n] for n in known) / sum(weights.values())
         told = sum(stated[n] for n in known)
-        if abs(told / (share * mass_kg) - 1) > SAME:
+        # Of these bodies, or of the whole robot: a base that does not move need not state its own.
+        if all(abs(told / mass - 1) > SAME for mass in (share * mass_kg, mass_kg)):
             known = set()
     open_ = [n for n in parts if n not in known]
     if not open_:

@@ -165,14 +165,6 @@ def given_again(cell: Cell, command: Command, log: Path) -> list[str]:
     return again.faults(codes) + lost(cell, before, command, again) + left_over
 
 
-def given_again(cell: Cell, command: Command, log: Path) -> list[str]:
-    """What is wrong once a command that was stopped was given again."""
-    before = entries(cell)
-    again = forked(doing(command), log)
-    codes = (0, 2, 3) if command[0] in DONE_ONCE else (0, 3)
-    return again.faults(codes) + lost(cell, before, command, again) + left_over(cell)
-
-
 def kill(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     """One command, killed; half of the time it is given again."""
     if cell.log.exists() and len(cell.state().used) >= ENOUGH:
