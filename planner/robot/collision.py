@@ -37,22 +37,18 @@ class Collisions:
 
     def __init__(self, robot: Robot):
         self.robot = robot
-        self._check_names()
-
-    def _check_names(self) -> None:
-        config, model = self.robot.config, self.robot.model
-        obstacles = {block.name for block in config.obstacle}
-        links = {str(f.name) for f in model.frames if f.type == pin.FrameType.BODY}
+        obstacles = {block.name for block in robot.config.obstacle}
+        links = {str(f.name) for f in robot.model.frames if f.type == pin.FrameType.BODY}
         for name in sorted(obstacles & links):
             raise InputError(
-                f'{self.robot.path}: [[obstacle]] "{name}" has the name of a link of '
-                f"{self.robot.urdf_path.name}; rename it."
+                f'{robot.path}: [[obstacle]] "{name}" has the name of a link of '
+                f"{robot.urdf_path.name}; rename it."
             )
-        for name in (name for pair in config.collision.ignore for name in pair):
+        for name in (name for pair in robot.config.collision.ignore for name in pair):
             if name not in obstacles | links:
                 raise InputError(
-                    f'{self.robot.path}: [collision] ignore names "{name}", which is neither a '
-                    f"link of {self.robot.urdf_path.name} nor an [[obstacle]]; correct it."
+                    f'{robot.path}: [collision] ignore names "{name}", which is neither a '
+                    f"link of {robot.urdf_path.name} nor an [[obstacle]]; correct it."
                 )
 
     @property
@@ -85,18 +81,14 @@ class Collisions:
         return self._geometry[3]
 
     @property
-    def _links(self) -> tuple[pin.GeometryModel, tuple[UnusableShape, ...]]:
-        return _link_geometry(self.robot)
-
-    @property
     def left_out(self) -> tuple[UnusableShape, ...]:
         """Shapes of the URDF that cannot be used."""
-        return self._links[1]
+        return _link_geometry(self.robot)[1]
 
     @property
     def none_checked(self) -> bool:
         """Whether no link has a shape that can be checked."""
-        return not self._links[0].ngeoms
+        return not _link_geometry(self.robot)[0].ngeoms
 
     @property
     def nothing_checked(self) -> bool:
@@ -111,7 +103,7 @@ class Collisions:
     def with_pairs(self) -> tuple[pin.GeometryModel, tuple[str, ...]]:
         """Shapes with the pairs to check, and which pairs of links overlap."""
         robot = self.robot
-        geometry = self._links[0].copy()
+        geometry = _link_geometry(robot)[0].copy()
         links = list(range(geometry.ngeoms))
         for i, j in [(i, j) for i in links for j in links if i < j]:
             a, b = geometry.geometryObjects[i], geometry.geometryObjects[j]

@@ -1,6 +1,7 @@
 """robot.toml read and checked: what is wrong is said in one sentence."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,13 +9,14 @@ import msgspec
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.joints import JointUnits
+from planner.recording.joints import AxisColumn, JointUnits
 from planner.robot.config import (
     BASE,
     LISTS,
     LOSS_FACTOR_BELOW,
     STATED,
     Compliance,
+    ControllerTable,
     DiagnoseTable,
     HitsTable,
     ReadbackTable,
@@ -28,10 +30,6 @@ from planner.words import command
 
 if TYPE_CHECKING:
     from planner.robot.robot import Robot
-from dataclasses import replace
-
-from planner.recording.joints import AxisColumn
-from planner.robot.config import ControllerTable
 
 LARGEST_SD_PERCENT = 1000.0  # a factor of 11 either way: beyond, nothing is stated
 # Of springs (N·m/rad, N/m) and dampers: 10⁷ times a heavy robot's.

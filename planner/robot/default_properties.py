@@ -137,14 +137,8 @@ def _table(link: str, solid: pin.Inertia, mass: float) -> LinkTable:
     moments = solid.inertia * (mass / solid.mass)
     x, y, z = (round(float(v), 4) for v in solid.lever)
     xx, xy, xz, yy, yz, zz = (float(f"{v:.4g}") for v in moments[np.triu_indices(3)])
-    return LinkTable(
-        link,
-        float(f"{mass:.4g}"),
-        (x, y, z),
-        (xx, xy, xz, yy, yz, zz),
-        SD_PERCENT,
-        guessed=True,
-    )
+    mass, moments = float(f"{mass:.4g}"), (xx, xy, xz, yy, yz, zz)
+    return LinkTable(link, mass, (x, y, z), moments, SD_PERCENT, guessed=True)
 
 
 def link_solids(robot: Robot) -> dict[str, pin.Inertia]:
@@ -160,20 +154,12 @@ def link_solids(robot: Robot) -> dict[str, pin.Inertia]:
             if kind == "visual" and link.get("name", "") in found:
                 for part in link.findall(kind):
                     link.remove(part)
-        for name, solid in _solids(robot, root, kind):
-            found[name] = found[name] + solid if name in found else solid
-    return found
-
-
-def _solids(robot: Robot, root: ElementTree.Element, kind: str) -> list[tuple[str, pin.Inertia]]:
-    geometry = build_geometry(robot.model, root, kind)
-    found = []
-    for shape in geometry.geometryObjects:
-        frame = robot.model.frames[shape.parentFrame]
-        solid = _solid(shape.geometry)
-        if solid is not None:
-            place = frame.placement.inverse() * shape.placement
-            found.append((str(frame.name), place.act(solid)))
+        for shape in build_geometry(robot.model, root, kind).geometryObjects:
+            frame, solid = robot.model.frames[shape.parentFrame], _solid(shape.geometry)
+            if solid is not None:
+                solid = (frame.placement.inverse() * shape.placement).act(solid)
+                name = str(frame.name)
+                found[name] = found[name] + solid if name in found else solid
     return found
 
 
@@ -265,24 +251,16 @@ def carried(robot: Robot, payload_kg: float) -> np.ndarray:
 
 def _springs(robot: Robot, name: str, axis: np.ndarray, load: float) -> list[Compliance]:
     """A joint's own spring, and two across it: as stiff by guess, in truth each as it is."""
-    own = _direction(axis)
-    if robot.slides(name):
-        k = _rounded(load / GIVES_M)
-        return [Compliance(name, own, k, 0.0, slide=True, stiffness_sd_percent=SPRING_SD_PERCENT)]
-    k = _rounded(load / GIVES_RAD)
-    blocks = [Compliance(name, own, k, 0.0, stiffness_sd_percent=SPRING_SD_PERCENT)]
-    across = np.linalg.svd(axis[None])[2][1:]
-    k_across = _rounded(ACROSS * load / GIVES_RAD)
-    for direction in across:
-        tilt = _direction(direction)
-        blocks.append(Compliance(name, tilt, k_across, 0.0, stiffness_sd_percent=SPRING_SD_PERCENT))
+    slides = robot.slides(name)
+    ways = [(axis, load / (GIVES_M if slides else GIVES_RAD))]
+    if not slides:
+        ways += [(way, ACROSS * load / GIVES_RAD) for way in np.linalg.svd(axis[None])[2][1:]]
+    blocks = []
+    for way, k in ways:
+        x, y, z = (round(float(v), 9) + 0.0 for v in way)  # as they are written
+        given = {"slide": slides, "stiffness_sd_percent": SPRING_SD_PERCENT}
+        blocks.append(Compliance(name, (x, y, z), _rounded(k), 0.0, **given))
     return blocks
-
-
-def _direction(axis: np.ndarray) -> tuple[float, float, float]:
-    """An axis (3,) in numbers as they are written."""
-    x, y, z = (round(float(v), 9) + 0.0 for v in axis)
-    return x, y, z
 
 
 def _alike(blocks: list[Compliance], inertia: np.ndarray) -> list[float]:

@@ -41,8 +41,7 @@ class AngleSlopes:
     sensor: np.ndarray
     stiffness: np.ndarray
 
-    def at(self, poses: slice | np.ndarray) -> "AngleSlopes":
-        """Of some of the poses."""
+    def __getitem__(self, poses: slice | np.ndarray) -> "AngleSlopes":
         return AngleSlopes(*(values[poses] for values in vars(self).values()))
 
 
@@ -68,30 +67,7 @@ class Matrices:
 
     def at(self, poses: slice | np.ndarray) -> "Matrices":
         """Of some of the poses."""
-        names = [name for name in self.__dataclass_fields__ if name != "by_angle"]
-        slopes = None if self.by_angle is None else self.by_angle.at(poses)
-        return Matrices(*(getattr(self, name)[poses] for name in names), by_angle=slopes)
-
-    def replaced(self, poses: np.ndarray, other: "Matrices") -> "Matrices":
-        """With those of `other` at some of the poses."""
-        names = [name for name in self.__dataclass_fields__ if name != "by_angle"]
-        slopes = None
-        if self.by_angle is not None and other.by_angle is not None:
-            slopes = AngleSlopes(**_put(self.by_angle, poses, other.by_angle))
-        return Matrices(**_put(self, poses, other, names), by_angle=slopes)
-
-
-def _put(
-    these: Matrices | AngleSlopes,
-    poses: np.ndarray,
-    others: Matrices | AngleSlopes,
-    names: Sequence[str] = (),
-) -> dict[str, np.ndarray]:
-    """Arrays of these, in rows `poses` those of others."""
-    out = {name: getattr(these, name).copy() for name in names or these.__dataclass_fields__}
-    for name, values in out.items():
-        values[poses] = getattr(others, name)
-    return out
+        return Matrices(*(None if v is None else v[poses] for v in vars(self).values()))
 
 
 class ElasticModel:

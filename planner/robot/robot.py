@@ -68,12 +68,7 @@ class Robot:
     def of(cls, config: RobotConfig, robot_toml: Path) -> "Robot":
         """Of what robot.toml says, or would say if it stood there."""
         urdf = _resolved(robot_toml, config.urdf)
-        return cls._built(config, robot_toml, urdf, read_urdf(urdf, robot_toml, config.held))
-
-    @classmethod
-    def _built(
-        cls, config: RobotConfig, robot_toml: Path, urdf: Path, root: ElementTree.Element
-    ) -> "Robot":
+        root = read_urdf(urdf, robot_toml, config.held)
         left_out = leave_out_unusable(root, urdf)
         state_inertias(root, config.link)
         text = ElementTree.tostring(root, encoding="unicode")
@@ -139,15 +134,10 @@ class Robot:
         """Whether an elastic degree of freedom is a shift of a joint that slides."""
         return block.slide and block.joint in self.joint_names and self.slides(block.joint)
 
-    def turning_stiffness(self, joint: str = "") -> tuple[float, ...]:
-        """Stated stiffnesses (N·m/rad) of rotations at a joint, where it has any, or of all.
-
-        Where all springs slide: what they are worth at a lever of LEVER_M.
-        """
-        turning = [b for b in self.config.compliance if not b.slide]
-        sliding = [b.stiffness * LEVER_M**2 for b in self.config.compliance]
-        at = [b.stiffness for b in turning if b.joint == joint]
-        return tuple(at or [b.stiffness for b in turning] or sliding)
+    def turning_stiffness(self) -> tuple[float, ...]:
+        """Stated stiffnesses (N·m/rad) of rotations; without any, of slides at LEVER_M."""
+        turning = [b.stiffness for b in self.config.compliance if not b.slide]
+        return tuple(turning or [b.stiffness * LEVER_M**2 for b in self.config.compliance])
 
     def carries(self, link: str) -> tuple[int, int] | None:
         """Numbers of the joint that moves a link and of the one that it carries, if it does."""
@@ -280,9 +270,8 @@ class Robot:
     def forward_batch(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rotations (n, 3, 3) and positions (n, 3) of the tcp at q (n, dof)."""
         both = [self.forward(row) for row in np.atleast_2d(q)]
-        n = len(both)
-        rotation = np.array([r for r, _ in both]).reshape(n, 3, 3)
-        return rotation, np.array([p for _, p in both]).reshape(n, 3)
+        rotation = np.array([r for r, _ in both]).reshape(-1, 3, 3)
+        return rotation, np.array([p for _, p in both]).reshape(-1, 3)
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
         """Jacobian (6, dof) of the tcp in its own frame, linear part first."""

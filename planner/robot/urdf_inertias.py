@@ -9,7 +9,7 @@ from planner.robot.config import BASE
 from planner.robot.mesh_files import urdf_source
 from planner.robot.robot import Robot
 from planner.robot.urdf_elements import link_inertia, state_inertias, write_inertia
-from planner.robot.virtual_joints import OUTER, SMALL, body_inertia, cut_at
+from planner.robot.virtual_joints import OUTER, SMALL, body_inertia, cut_at, ends_of
 
 SAFE = 0.99  # of the largest share of a change that leaves a body possible
 
@@ -44,10 +44,8 @@ def urdf_with_inertias(
 
 def _of_whole(robot: Robot, link: str, values: np.ndarray) -> tuple[str, np.ndarray]:
     """The joint that moves a link, and a change (10,) of its outer half as one of the link's."""
-    carried = robot.carries(link)
-    assert carried is not None  # otherwise the link has no halves
     there = pin.SE3(np.eye(3), -cut_at(robot, link))
-    return str(robot.model.names[carried[0]]), _seen_from(there, values)
+    return str(robot.model.names[ends_of(robot, link)[0]]), _seen_from(there, values)
 
 
 def _joint_of(robot: Robot, body: str) -> int:

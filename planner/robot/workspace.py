@@ -130,7 +130,9 @@ class Workspace:
             if len(found) == n:
                 break
             if self.tool_axis is None:
-                q, reason = point, _first(collisions, point)
+                q, reason = point, ""
+                if not collisions.free(point):
+                    reason = collisions.violations(point)[0]
             else:
                 q, reason = self._solve(robot, point, collisions, found, places)
             if q is None or reason:
@@ -199,12 +201,6 @@ def ranges_inside(
     rounded = np.array([np.ceil(low - 1e-6), np.floor(high + 1e-6)]) / parts
     rounded = np.where(rounded[0] <= rounded[1], rounded, np.array([low, high]) / parts)
     return (rounded.T + 0.0).tolist()
-
-
-def _first(collisions: Collisions, q: np.ndarray) -> str:
-    if collisions.free(q):
-        return ""
-    return collisions.violations(q)[0]
 
 
 def _joint_box(cls, ranges: list[tuple[float, float]], robot: Robot) -> Workspace:
