@@ -2,8 +2,7 @@
 
 Linearised: how far a joint swings after the hit says which spring and damper come nearest to its
 law along that swing (least squares of the torque), and these say how far it swings: a fixed point.
-Hits along different axes swing joints differently, so that each column of an FRF matrix has springs
-of its own; modes are those of the three hits together.
+Modes are those of the hits along all axes together.
 
 In time: the robot without its laws is propagated pole by pole, exactly for forces and torques that
 are straight between instants; the laws' torques along that motion add their own answer to its FRFs.
@@ -36,24 +35,13 @@ CORRECTED = 3  # times, of a torque at the end of a step
 ROUNDS, SETTLED = 60, 1e-4  # of the fixed point: most, and the change of k that ends it
 
 
-def accelerance_at_force(
-    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray
-) -> np.ndarray:
-    """Accelerance (n, 3, 3, F) in m/s²/N at q (n, dof) in rad, of hits of peak force_n (n,).
-
-    Raises InputError where a joint has no stiffness left at a force.
-    """
-    m, n = simulation.elastic.matrices(q), len(q)
-    each = replace(m.at(np.repeat(np.arange(n), 3)), hit=m.hit.reshape(3 * n, 1, -1))
-    springs = springs_at_force(simulation, each, np.repeat(force_n, 3))
-    solved = _poles(each, springs, each.sensor)
-    return np.moveaxis(accelerance(solved, frequency_hz).reshape(n, 3, 3, -1), 1, 2)
-
-
 def modes_at_force(
     simulation: Simulation, q: np.ndarray, force_n: np.ndarray, count: int
 ) -> SimulatedModes:
-    """The `count` lowest oscillatory modes there. Raises as `accelerance_at_force` does."""
+    """The `count` lowest oscillatory modes at q (n, dof) in rad, of hits of peak force_n (n,).
+
+    Raises InputError where a joint has no stiffness left at a force.
+    """
     m = simulation.elastic.matrices(q)
     springs = springs_at_force(simulation, m, force_n)
     return oscillatory(_poles(m, springs, m.sensor), count)
@@ -79,9 +67,13 @@ def springs_at_force(simulation: Simulation, m: Matrices, force_n: np.ndarray) -
         return Elasticity(stiffness, damping, simulation.elasticity.loss_factor)
     laws = simulation.robot.config.law
     own = [simulation.elastic.own_spring(law.joint) for law in laws]
-    springs = stated = _each(simulation.elasticity, len(force_n))
+    config, each = simulation.robot.config, simulation.elasticity
+    stiffness, damping = (np.tile(v, (len(force_n), 1)) for v in (each.stiffness, each.damping))
+    springs = stated = Elasticity(stiffness, damping, each.loss_factor)
+    ports = _ports(m.mass.shape[1], own, len(force_n))
+    hammer = force_n, config.hammer.pulse_ms / 1e3, 1 / (PER_PERIOD * config.band_hz[1])
     for _ in range(ROUNDS):
-        before, (swing, speed) = springs, _after(simulation, m, springs, own, force_n)
+        before, (swing, speed) = springs, _swings(_poles(m, springs, ports), *hammer)
         stiffness, damping = stated.stiffness.copy(), stated.damping.copy()
         for j, (law, spring) in enumerate(zip(laws, own, strict=True)):
             shares = _solved(*_products(law, swing[:, j], speed[:, j]))
@@ -142,22 +134,6 @@ def _solved(gram: np.ndarray, product: np.ndarray) -> np.ndarray:
     return (np.linalg.pinv(scaled, hermitian=True) @ (product / size)[..., None])[..., 0] / size
 
 
-def _each(springs: Elasticity, count: int) -> Elasticity:
-    """For each of so many poses the same."""
-    stiffness, damping = (np.tile(v, (count, 1)) for v in (springs.stiffness, springs.damping))
-    return Elasticity(stiffness, damping, springs.loss_factor)
-
-
-def _after(
-    simulation: Simulation, m: Matrices, springs: Elasticity, own: Sequence[int],
-    force_n: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Swings and speeds of springs of joints after hits, as of `_swings`."""
-    config, ports = simulation.robot.config, _ports(m.mass.shape[1], own, len(force_n))
-    step_s = 1 / (PER_PERIOD * config.band_hz[1])
-    return _swings(_poles(m, springs, ports), force_n, config.hammer.pulse_ms / 1e3, step_s)
-
-
 def _poles(m: Matrices, springs: Elasticity, seen: np.ndarray) -> Poles:
     """Of springs (n, e), seen through Jacobians (n, s, e)."""
     eye, lossy = np.eye(m.mass.shape[1]), springs.loss_factor.any()
@@ -201,19 +177,17 @@ def _ports(size: int, own: Sequence[int], count: int) -> np.ndarray:
 
 
 def change_at_force(
-    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray,
-    in_time: bool = True,
-) -> np.ndarray:  # fmt: skip
+    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray
+) -> np.ndarray:
     """By how much (n, 3, 3, F) the accelerance is another than that of springs as stated.
 
-    `in_time` as hits of peak force_n (n,) would measure it, else linearised. 0 where no force is
-    stated (NaN), or the robot has no laws. Raises as `accelerance_at_force`.
+    As hits of peak force_n (n,) would measure it; 0 where no force is stated (NaN), or the robot
+    has no laws.
     """
     change = np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
     known = np.flatnonzero(np.isfinite(force_n))
     if known.size and simulation.robot.config.law:
-        of = measured_at_force if in_time else accelerance_at_force
-        there = of(simulation, q[known], force_n[known], frequency_hz)
+        there = measured_at_force(simulation, q[known], force_n[known], frequency_hz)
         change[known] = there - simulation.accelerance(q[known], frequency_hz)
     return change
 

@@ -206,12 +206,16 @@ class ElasticModel:
         """Of Jacobians (n, points, 6, v) of hits and sensors."""
         places = self._virtual.rigid, self._elastic
         inertia = np.einsum("bk,kij->bij", self.inertia, inertia_basis())
-        mass = mass_slopes(self._bodies(q), inertia, *places)
+        bodies = self._bodies(q)  # M = Σ Jᵀ I J
+        slope, momentum = turned(bodies, *places), inertia @ (bodies @ self._elastic)
+        n, _, dof, _, e = slope.shape
+        rows = np.moveaxis(slope, (2, 4), (1, 2)).reshape(n, dof * e, -1)
+        half = (rows @ momentum.reshape(n, -1, e)).reshape(n, dof, e, e)
         stiffness = np.array([self._angle_slope(row) for row in q])
         # (n, points, dof, 3, e), the points side by side with their axes.
         moved = (np.moveaxis(turned(ends, *places)[..., :3, :], 1, 2) for ends in (hits, sensors))
-        hit, sensor = (one.reshape(*stiffness.shape[:2], -1, self.size) for one in moved)
-        return AngleSlopes(mass, hit, sensor, stiffness)
+        hit, sensor = (one.reshape(n, dof, -1, e) for one in moved)
+        return AngleSlopes(half + np.swapaxes(half, 2, 3), hit, sensor, stiffness)
 
     def body_jacobians(self, q: np.ndarray) -> np.ndarray:
         """(n, bodies, 6, e) at q (n, dof) in rad: how the elastic rotations move the bodies.
@@ -245,10 +249,13 @@ class ElasticModel:
 
     def _standing(self, q: np.ndarray, data: pin.Data) -> np.ndarray:
         """Coordinates of the virtual model at q (dof,), sagged unless robot.toml says otherwise."""
-        upright = self._upright(q)
-        if not self.robot.config.geometric_stiffness:
-            return upright
-        return self._sagged(upright, self._carrying + self._with_angle(q), data)
+        full = upright = self._upright(q)
+        if self.robot.config.geometric_stiffness:
+            stiffness = self._carrying + self._with_angle(q)
+            for _ in range(SAG_STEPS):  # K δ = −g(q + δ)
+                weight = pin.computeGeneralizedGravity(self._weighed, data, full)
+                full = upright - self._elastic @ ((weight @ self._elastic) / stiffness)
+        return full
 
     def _upright(self, q: np.ndarray) -> np.ndarray:
         """Coordinates of the virtual model at q (dof,), without weight."""
@@ -271,14 +278,6 @@ class ElasticModel:
             slope = wave.sine * np.cos(angle) - wave.cosine * np.sin(angle)
             change[joint, number] += wave.order * slope
         return change
-
-    def _sagged(self, upright: np.ndarray, stiffness: np.ndarray, data: pin.Data) -> np.ndarray:
-        """Where springs of this stiffness (e,) carry the weight: K δ = −g(q + δ)."""
-        full = upright
-        for _ in range(SAG_STEPS):
-            weight = pin.computeGeneralizedGravity(self._weighed, data, full)
-            full = upright - self._elastic @ ((weight @ self._elastic) / stiffness)
-        return full
 
     def _gravity_stiffness(self, full: np.ndarray, data: pin.Data) -> np.ndarray:
         """Second derivative of the potential energy of the weight, (e, e)."""
@@ -305,15 +304,3 @@ def turned(jacobian: np.ndarray, rigid: np.ndarray, elastic: np.ndarray) -> np.n
     moved = cross(angular, linear) + cross(linear, angular)
     slopes = -np.concatenate([moved, cross(angular, angular)], axis=-2) @ elastic[giving]
     return np.moveaxis(np.tensordot(rigid[turning], slopes, axes=(0, -3)), 0, -3)
-
-
-def mass_slopes(
-    bodies: np.ndarray, inertia: np.ndarray, rigid: np.ndarray, elastic: np.ndarray
-) -> np.ndarray:
-    """(n, dof, e, e) of M = Σ Jᵀ I J, of Jacobians (n, B, 6, v) and inertias (B, 6, 6)."""
-    slope = turned(bodies, rigid, elastic)
-    momentum = inertia @ (bodies @ elastic)
-    n, _, dof, _, e = slope.shape
-    rows = np.moveaxis(slope, (2, 4), (1, 2)).reshape(n, dof * e, -1)
-    half = (rows @ momentum.reshape(n, -1, e)).reshape(n, dof, e, e)
-    return half + np.swapaxes(half, 2, 3)
