@@ -17,6 +17,7 @@ from planner.progress import ProgressCallback, part_of
 from planner.robot.robot import Robot
 from planner.studies.claims import Bound, ClaimRule, in_order
 from planner.studies.report import Paper, Report, Table, on_each, r_squared
+from planner.surrogate.kernels import kennedy_ohagan
 from planner.surrogate.models.averaged import fit_ar1_nargp, fit_gp, fit_recursive
 from planner.surrogate.models.likelihood_gp import (
     NARGP,
@@ -26,7 +27,6 @@ from planner.surrogate.models.likelihood_gp import (
     Samples,
     fit_likelihood,
     fit_nargp,
-    kennedy_ohagan,
 )
 
 from .data import (

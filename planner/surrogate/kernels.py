@@ -147,6 +147,16 @@ class Kernel:
         return mean, sd
 
 
+def perdikaris(d: int, shape: str = "rbf") -> str:
+    """Expression k_ρ(x) k_f(l) + k_δ(x) over (x_1 … x_d, l), l of a level below: NARGP."""
+    return f"{shape}[0:{d}]*{shape}[{d}:{d + 1}]+{shape}[0:{d}]"
+
+
+def kennedy_ohagan(d: int) -> str:
+    """Expression σ² l l' + k_δ(x) over the same columns: AR1."""
+    return f"linear[{d}:{d + 1}]+rbf[0:{d}]"
+
+
 @lru_cache(maxsize=256)
 def parse(expression: str, d: int) -> Kernel:
     """Kernel over d columns; InputError if the expression is not understood.

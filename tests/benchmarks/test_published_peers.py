@@ -22,13 +22,13 @@ from planner.dynamics.simulation import Simulation
 from planner.proof.deviation import Deviation
 from planner.proof.load import load_truth
 from planner.robot.robot import Robot
+from planner.surrogate.kernels import perdikaris
 from planner.surrogate.models.likelihood_gp import (
     NARGP,
     Normalisation,
     Samples,
     at_hyperparameters,
     fit_nargp,
-    perdikaris,
 )
 from tests.support import published_peers
 from tests.support.fusion_problems import PROBLEMS, Design, Problem, design

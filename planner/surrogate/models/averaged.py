@@ -12,11 +12,11 @@ from scipy.optimize import elementwise
 from scipy.special import ndtr
 
 from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
+from planner.surrogate.kernels import perdikaris
 from planner.surrogate.models.likelihood_gp import (
     Exact,
     Normalisation,
     Samples,
-    perdikaris,
     spread,
     widened,
 )
@@ -61,16 +61,14 @@ class AveragedModel:
         return self.units.restored(median + base[:, 0], sd)
 
 
-def fit_gp(
-    samples: Samples, kernel: str = "matern52", prior: OutputPrior = GP_PRIOR
-) -> AveragedModel:
-    """GP of `samples`, x scaled to about [0, 1]; `prior` is in units of y's sd."""
-    return _fit(samples, None, Normalisation(0.0, 1.0), spread(samples.y), kernel, prior)
+def fit_gp(samples: Samples, kernel: str = "matern52") -> AveragedModel:
+    """GP of `samples`, x scaled to about [0, 1]."""
+    return _fit(samples, None, Normalisation(0.0, 1.0), spread(samples.y), kernel, GP_PRIOR)
 
 
 def fit_recursive(
     measured: Samples, low: Exact, low_spread: float, kernel: str = "matern52",
-    prior: OutputPrior = AR1_PRIOR, sees_low: bool = False,
+    sees_low: bool = False,
 ) -> AveragedModel:  # fmt: skip
     """AR1 of the measured samples; `low_spread` is the sd of the simulation over the workspace.
 
@@ -79,16 +77,13 @@ def fit_recursive(
     value = low.predict(measured.x)[0]
     units = Normalisation(float(np.mean(value)) if len(value) else 0.0, low_spread)
     scale = low_spread * _times_more(measured.y, value)
-    return _fit(measured, low, units, scale, kernel, prior, sees_low)
+    return _fit(measured, low, units, scale, kernel, AR1_PRIOR, sees_low)
 
 
-def fit_ar1_nargp(
-    measured: Samples, low: Exact, low_spread: float, kernel: str = "product",
-    prior: OutputPrior = AR1_PRIOR,
-) -> AveragedModel:  # fmt: skip
-    """AR1-NARGP of the measured samples; `kernel` over (x, l), or "product": `perdikaris`."""
-    expression = perdikaris(measured.x.shape[1]) if kernel == "product" else kernel
-    return fit_recursive(measured, low, low_spread, expression, prior, sees_low=True)
+def fit_ar1_nargp(measured: Samples, low: Exact, low_spread: float) -> AveragedModel:
+    """AR1-NARGP of the measured samples."""
+    product = perdikaris(measured.x.shape[1])
+    return fit_recursive(measured, low, low_spread, product, sees_low=True)
 
 
 def _fit(

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.errors import InputError
-from planner.surrogate.kernels import parse
+from planner.surrogate.kernels import parse, perdikaris
 from planner.surrogate.likelihood import maximise
 from planner.surrogate.models.likelihood_gp import (
     NARGP,
@@ -26,7 +26,6 @@ from planner.surrogate.models.likelihood_gp import (
     Normalisation,
     Samples,
     fit_growing,
-    perdikaris,
     widened,
 )
 from planner.surrogate.models.mfdgp import Training, fit_mfdgp

@@ -24,7 +24,7 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.stats import qmc
 
 from planner.errors import InputError
-from planner.surrogate.kernels import parse
+from planner.surrogate.kernels import parse, perdikaris
 from planner.surrogate.likelihood import RELATIVE_TOLERANCE, Peak, log_likelihood, maximise
 from planner.surrogate.training_data import capacity
 
@@ -169,13 +169,8 @@ def fit_growing(
     """Maximum-likelihood GP of many samples, over all of which a climb from afar takes minutes.
 
     Climbs begin with some of the points, which costs next to nothing; every peak found there leads
-    to one of more points, for the likeliest of few need not lead to the likeliest of all.
-
-    Args:
-        samples: as of `fit_likelihood`.
-        counts: so many points, drawn at random, before all of them.
-        kernel: an expression over the columns of x.
-        starts: of the climbs over the first.
+    to one of more points, for the likeliest of few need not lead to the likeliest of all. `counts`
+    are so many points, drawn at random, before all of them; `starts` the climbs over the first.
     """
     order, units = np.random.default_rng(0).permutation(len(samples.y)), Normalisation.of(samples.y)
     peaks: list[Peak] = []
@@ -324,16 +319,6 @@ class NARGP:
         mean, sd = (part.reshape(NODE_COUNT, len(x)) for part in self.high.predict(wide))
         middle = WEIGHTS @ mean
         return middle, np.sqrt(WEIGHTS @ (sd**2 + (mean - middle) ** 2))
-
-
-def perdikaris(d: int, shape: str = "rbf") -> str:
-    """Kernel expression k_ρ(x) k_f(l) + k_δ(x) over the columns (x_1 … x_d, l)."""
-    return f"{shape}[0:{d}]*{shape}[{d}:{d + 1}]+{shape}[0:{d}]"
-
-
-def kennedy_ohagan(d: int) -> str:
-    """Kernel expression σ² l l' + k_δ(x) over the same columns: AR1."""
-    return f"linear[{d}:{d + 1}]+rbf[0:{d}]"
 
 
 def fit_nargp(
