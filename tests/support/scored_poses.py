@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from planner.design.cost import Cost
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
+from planner.design.propose import Travel, propose
 from tests.support.surrogates import simulated
 
 X = np.random.default_rng(4).random((120, 2))
@@ -12,6 +14,13 @@ def over(surrogate, x, workspace):
     """Outputs over the first poses of x (n, 2), and all of them as poses."""
     poses = Poses.plain(x, surrogate.frequency_inputs(simulated(x)))
     return FrequencyOutputs.of(surrogate, Target.evenly(poses[:workspace])), poses
+
+
+def proposed(name, surrogate, x, count, taken=0, travel=None, allowed=True):
+    """Picks among x (n, 2), of which the first are taken; by default the robot is everywhere."""
+    travel = travel or Travel(Cost(np.ones(2)), np.zeros((len(x), 2)))
+    outlook, allowed = over(surrogate, x, 200), np.broadcast_to(allowed, len(x))
+    return propose(name, x, count, x[:taken], 3, outlook, travel, allowed)
 
 
 def with_parameters(surrogate, x, p=6, seed=1):
