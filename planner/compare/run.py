@@ -16,7 +16,7 @@ from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
 from planner.campaign.straightened import hits_unknown
 from planner.compare.bench import Bench, PoolCell, cell_of
-from planner.compare.score import Score, score
+from planner.compare.curves import Score, score
 from planner.compare.tasks import Run, Task
 from planner.design.space_filling import NESTED
 from planner.errors import InputError
