@@ -13,7 +13,7 @@ from planner.inference.covariance import eigen
 from planner.surrogate.gp import Posterior
 from planner.surrogate.modal_surrogate import Surrogate
 
-MEASUREMENT_SD = 1e-3  # relative sd that EMA gives a frequency
+MEASUREMENT_SD = 1e-3  # relative sd that EMA gives a frequency, from hits along all axes
 AXES = 3  # of the hit: x, y, z of the tcp
 ALL_AXES = (0, 1, 2)
 
@@ -136,11 +136,6 @@ class FrequencyOutputs:
     def count(self) -> int:
         """Number of labels."""
         return len(self.noise)
-
-    @property
-    def measurement(self) -> float:
-        """Variance that EMA alone gives a frequency from hits along all axes."""
-        return MEASUREMENT_SD**2
 
     @property
     def weights(self) -> np.ndarray:

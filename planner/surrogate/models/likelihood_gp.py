@@ -228,11 +228,6 @@ class _Hill:
         data = x, y, none, mask, none + JITTER, np.zeros(()), np.zeros(())
         return cls(kernel, len(samples.y), data, own, kept, middle, lower, upper)
 
-    def starts(self, count: int) -> np.ndarray:
-        """The middle, and normal around it (count, …)."""
-        normal = np.random.default_rng(0).standard_normal((count - 1, len(self.kept)))
-        return self.middle + np.vstack([np.zeros(len(self.kept)), normal])
-
     def everywhere(self, count: int) -> np.ndarray:
         """Evenly over all that is plausible (count, …), by Halton's sequence: of climbs from the
         middle alone the likeliest may be far from the greatest likelihood."""
@@ -243,11 +238,13 @@ class _Hill:
         even = qmc.Halton(len(self.kept), rng=0).random(count)
         return low[self.kept] + even * (high - low)[self.kept]
 
-    def roughly(self, starts: int, noise: float | None = None) -> list[Peak]:
-        """Where climbs from several starts end roughly."""
+    def roughly(self, starts: int, noise: float | None) -> list[Peak]:
+        """Where climbs end roughly: from the middle, and from starts that are normal around it."""
+        around = np.zeros((starts, len(self.kept)))
+        around[1:] = np.random.default_rng(0).standard_normal((starts - 1, len(self.kept)))
         levels = NOISES[:1] if noise is None else [level for level in NOISES if level > noise]
         ends = []
-        for i, z in enumerate(self.starts(starts)):
+        for i, z in enumerate(self.middle + around):
             for held in levels[i % (len(levels) + 1) :]:
                 z = self.climb(z, *ROUGHLY, held).x
             ends.append(self.climb(z, *ROUGHLY))
@@ -275,7 +272,8 @@ def at_hyperparameters(
 ) -> LikelihoodGP:
     """The GP of `samples` with given hyperparameters (p,), log τ in their second place."""
     y = units.normalised(samples.y)
-    root = np.linalg.cholesky(_covariance(kernel, theta, samples.x))
+    k = parse(kernel, samples.x.shape[1]).covariance(np, theta, samples.x, samples.x)
+    root = np.linalg.cholesky(k + (np.exp(2 * theta[1]) + JITTER) * np.eye(len(y)))
     white = solve_triangular(root, y, lower=True)
     size = np.sum(np.log(np.diag(root))) + len(y) * (0.5 * np.log(2 * np.pi) + np.log(units.scale))
     value = float(-0.5 * white @ white - size)
@@ -290,12 +288,6 @@ def _free(kernel: str, d: int, isotropic: bool) -> np.ndarray:
         if isotropic and factor.scales.stop > factor.scales.start:
             first[factor.scales] = factor.scales.start
     return np.unique(first, return_inverse=True)[1]
-
-
-def _covariance(kernel: str, theta: np.ndarray, x: np.ndarray) -> np.ndarray:
-    k = parse(kernel, x.shape[1]).covariance(np, theta, x, x)
-    noise = np.exp(2 * theta[1]) + JITTER
-    return k + noise * np.eye(len(x))
 
 
 NODE_COUNT = 21  # of the quadrature: exact for polynomials of degree 41
