@@ -37,14 +37,11 @@ def run(bench: Bench, task: Task) -> Run:
     if bench.program != content_hash.program():
         raise InputError("This worker runs another version of planner; install the same one.")
     with _one_at_a_time, threadpool_limits(1):
-        return _run(bench, task)
-
-
-def _run(bench: Bench, task: Task) -> Run:
-    cell = _cell(bench, task)
-    used = NESTED[INITIAL_DESIGN](cell.candidates.features, task.budget, task.seed)[: task.initial]
-    rest = [i for i in planned(cell, task) if i not in used]
-    return play(bench, used.tolist(), rest[: task.budget - task.initial], task)
+        cell = _cell(bench, task)
+        design = NESTED[INITIAL_DESIGN](cell.candidates.features, task.budget, task.seed)
+        used = design[: task.initial].tolist()
+        rest = [i for i in planned(cell, task) if i not in used]
+        return play(bench, used, rest[: task.budget - task.initial], task)
 
 
 def play(bench: Bench, used: list[int], then: list[int], task: Task) -> Run:

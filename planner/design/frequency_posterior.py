@@ -52,11 +52,6 @@ class Poses:
         """The pose at `index`, as n = 1."""
         return self[np.array([index])]
 
-    def followed_by(self, more: "Poses") -> "Poses":
-        """These, then more."""
-        pairs = zip(vars(self).values(), vars(more).values(), strict=True)
-        return Poses(*(np.concatenate(pair) for pair in pairs))
-
 
 @dataclass(frozen=True, eq=False)
 class Target:
@@ -144,7 +139,9 @@ class FrequencyOutputs:
 
     def planning(self, pose: Poses, axes: tuple[int, ...] = ALL_AXES) -> "FrequencyOutputs":
         """The same once a pose (n = 1) has been hit along `axes` too."""
-        root, planned = self.covariance_root, self.planned.followed_by(pose.uninformed)
+        root = self.covariance_root
+        pairs = zip(vars(self.planned).values(), vars(pose.uninformed).values(), strict=True)
+        planned = Poses(*(np.concatenate(pair) for pair in pairs))
         if not pose.information.shape[-1]:
             return replace(self, planned=planned)
         gained = root.T @ pose.information[0, list(axes)].sum(axis=0) @ root

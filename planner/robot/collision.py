@@ -60,20 +60,18 @@ class Collisions:
         bare = f"{self.robot.urdf_path.name} has no collision geometry"
         look = "Look at each pose before the robot moves there."
         if not self.nothing_checked:
+            names, file = [b.name for b in self.robot.config.obstacle], self.robot.path.name
+            obstacles = f"the obstacles of {file} ({', '.join(names)})"
+            if len(names) > NAMED:
+                obstacles = f"all {len(names)} obstacles of {file}"
             return (
                 f"{left or f'{bare}.'} Instead, thin lines from joint to joint, up to the tool's "
-                f"tip, are checked against {self._named_obstacles()}: links are thicker, and may "
-                f"touch each other. {look}"
+                f"tip, are checked against {obstacles}: links are thicker, and may touch each "
+                f"other. {look}"
             )
         if left:
             return f"Nothing is checked for collision: {left} {look}"
         return f"Nothing is checked for collision, because {bare}. {look}"
-
-    def _named_obstacles(self) -> str:
-        names = [block.name for block in self.robot.config.obstacle]
-        if len(names) > NAMED:
-            return f"all {len(names)} obstacles of {self.robot.path.name}"
-        return f"the obstacles of {self.robot.path.name} ({', '.join(names)})"
 
     @property
     def overlapping(self) -> tuple[str, ...]:

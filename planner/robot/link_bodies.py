@@ -126,16 +126,14 @@ class BodyShape:
 
 def bodies(robot: Robot) -> tuple[BodyShape, ...]:
     """The base, then one body a joint in the robot's order."""
-    return tuple(_body(robot, number) for number in range(robot.model.njoints))
-
-
-def _body(robot: Robot, number: int) -> BodyShape:
-    model, tcp = robot.model, robot.model.frames[robot.tcp_id]
-    ends = [end for k in model.children[number] for end in _ends(robot, int(k))]
-    ends += [tcp.placement.translation] if tcp.parentJoint == number else []
-    apart = [np.array(end) for end in ends if np.linalg.norm(end) > APART_M]
-    links = tuple(frame.name for frame in robot.body_frames(number))
-    return BodyShape(links[0], links, np.array(apart or [np.zeros(3)]))
+    model, tcp, found = robot.model, robot.model.frames[robot.tcp_id], []
+    for number in range(model.njoints):
+        ends = [end for k in model.children[number] for end in _ends(robot, int(k))]
+        ends += [tcp.placement.translation] if tcp.parentJoint == number else []
+        apart = [np.array(end) for end in ends if np.linalg.norm(end) > APART_M]
+        links = tuple(frame.name for frame in robot.body_frames(number))
+        found.append(BodyShape(links[0], links, np.array(apart or [np.zeros(3)])))
+    return tuple(found)
 
 
 def _ends(robot: Robot, joint: int) -> list[np.ndarray]:

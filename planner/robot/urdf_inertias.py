@@ -34,7 +34,9 @@ def urdf_with_inertias(
         if body.endswith(OUTER):
             body, values = _of_whole(robot, body.removesuffix(OUTER), values)
         if np.any(values) and not body.startswith(f"{SMALL} "):
-            frame = _heaviest(robot, body, links)
+            frames = robot.body_frames(_joint_of(robot, body))
+            stated = [frame for frame in frames if frame.name in links]
+            frame = max(stated, key=lambda frame: link_inertia(links[frame.name]).mass)
             if body == BASE and not link_inertia(links[frame.name]).mass:
                 continue  # what `massless_base` gave it is no matter
             share = _change(links[frame.name], _seen_from(frame.placement, values))
@@ -53,14 +55,6 @@ def _joint_of(robot: Robot, body: str) -> int:
     if body == BASE and BASE not in robot.joint_names:
         return 0
     return list(robot.model.names).index(body)
-
-
-def _heaviest(robot: Robot, body: str, links: dict) -> pin.Frame:
-    frames = robot.body_frames(_joint_of(robot, body))
-    return max(
-        (frame for frame in frames if frame.name in links),
-        key=lambda frame: link_inertia(links[frame.name]).mass,
-    )
 
 
 def stated_shares(robot: Robot, body: str) -> tuple[tuple[float, float], ...]:

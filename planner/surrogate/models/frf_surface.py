@@ -117,11 +117,8 @@ class Frame:
 
     def axes(self, frequency_hz: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Scaled lines (f,) and poses (p,)."""
-        a, b = (
-            (v - o) / e
-            for v, o, e in zip((frequency_hz, pose), self.origin, self.extent, strict=True)
-        )
-        return a, b
+        (first, lowest), (lines, poses) = self.origin, self.extent
+        return (frequency_hz - first) / lines, (pose - lowest) / poses
 
     def points(self, frequency_hz: np.ndarray, pose: np.ndarray) -> np.ndarray:
         """All pairs (f·p, 2) of them."""
