@@ -23,9 +23,9 @@ def proposed(name, surrogate, x, count, taken=0, travel=None, allowed=True):
     return propose(name, x, count, x[:taken], 3, outlook, travel, allowed)
 
 
-def with_parameters(surrogate, x, p=6, seed=1):
+def with_parameters(surrogate, x, p=6):
     """The same with p open parameters of a made-up simulation."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     plain = Poses.plain(x, surrogate.frequency_inputs(simulated(x)))
     slope = 0.3 * np.sin(x @ rng.normal(size=(2, 4 * p)) * 3).reshape(len(x), 4, p)
     j = rng.normal(size=(len(x), 3, 2, p)) * (1 + x[:, :1, None, None])
