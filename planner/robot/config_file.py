@@ -190,10 +190,7 @@ def _check_payloads(config: RobotConfig, path: Path) -> None:
         moments = symmetric(block.inertia_kg_m2, STATED)
         finite = bool(np.all(np.isfinite(moments)))
         if not finite or np.linalg.eigvalsh(moments)[0] < -1e-9 * np.abs(moments).max():
-            raise InputError(
-                f"{entry} has inertia_kg_m2 {list(block.inertia_kg_m2)}, which no body can have; "
-                f"give xx, xy, xz, yy, yz, zz in kg·m² about its centre of mass."
-            )
+            raise _no_body(entry, block.inertia_kg_m2)
 
 
 def _check_links(config: RobotConfig, path: Path) -> None:
@@ -214,10 +211,14 @@ def _check_links(config: RobotConfig, path: Path) -> None:
         _finite(f"{entry}: centre_m", table.centre_m, 1e2, "3 lengths in m")
         moments = np.linalg.eigvalsh(symmetric(table.inertia_kg_m2, STATED))
         if moments[0] < 0 or moments[0] + moments[1] < moments[2] * (1 - 1e-6):
-            raise InputError(
-                f"{entry} has inertia_kg_m2 {list(table.inertia_kg_m2)}, which no body can have; "
-                f"give xx, xy, xz, yy, yz, zz in kg·m² about its centre of mass."
-            )
+            raise _no_body(entry, table.inertia_kg_m2)
+
+
+def _no_body(entry: str, moments: Sequence[float]) -> InputError:
+    return InputError(
+        f"{entry} has inertia_kg_m2 {list(moments)}, which no body can have; give xx, xy, xz, yy, "
+        f"yz, zz in kg·m² about its centre of mass."
+    )
 
 
 def _check_obstacles(config: RobotConfig, path: Path) -> None:

@@ -111,7 +111,7 @@ def _parts(robot: Robot) -> dict[int, dict[str, pin.Inertia]]:
 def _usual(robot: Robot, number: int, body: BodyShape) -> pin.Inertia:
     """A cylinder from a body's joint to what it carries, as large as such bodies are."""
     arm = robot.arm_m or 1.0
-    beyond = min(_beyond(robot, number) / arm, 1.0)
+    beyond = min(robot.beyond_m(number) / arm, 1.0)
     volume = ((LEAST + MORE * np.sqrt(beyond)) * arm) ** 3
     end = body.ends_m[np.argmax(np.linalg.norm(body.ends_m, axis=1))]
     length = max(float(np.linalg.norm(end)), float(volume) ** (1 / 3))
@@ -119,17 +119,6 @@ def _usual(robot: Robot, number: int, body: BodyShape) -> pin.Inertia:
     along = end / np.linalg.norm(end) if np.any(end) else np.array([0.0, 0.0, 1.0])
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along).toRotationMatrix()
     return pin.SE3(turn, np.asarray(end) / 2).act(cylinder)
-
-
-def _beyond(robot: Robot, number: int) -> float:
-    """Length in m from a body's joint along the arm to the tcp, its own included."""
-    model = robot.model
-    tcp = model.frames[robot.tcp_id]
-    length, joint = float(np.linalg.norm(tcp.placement.translation)), tcp.parentJoint
-    while joint > max(number, 0) and model.parents[joint] != 0:
-        length += float(np.linalg.norm(model.jointPlacements[joint].translation))
-        joint = model.parents[joint]
-    return length
 
 
 def _table(link: str, solid: pin.Inertia, mass: float) -> LinkTable:

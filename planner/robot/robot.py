@@ -247,7 +247,12 @@ class Robot:
     @cached_property
     def arm_m(self) -> float:
         """Length of the arm pulled straight, joints that slide at their zeros."""
-        places = [self.model.jointPlacements[k + 1] for k in self.tool_chain[:-1]]
+        return self.beyond_m(0)
+
+    def beyond_m(self, joint: int) -> float:
+        """That of what lies beyond a joint, by Pinocchio's number, towards the tcp."""
+        numbers = (k + 1 for k in self.tool_chain[:-1])
+        places = [self.model.jointPlacements[k] for k in numbers if k > joint]
         places.append(self.model.frames[self.tcp_id].placement)
         return float(sum(np.linalg.norm(place.translation) for place in places))
 
