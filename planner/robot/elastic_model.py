@@ -67,7 +67,7 @@ class Matrices:
 
     def at(self, poses: slice | np.ndarray) -> "Matrices":
         """Of some of the poses."""
-        return Matrices(*(None if v is None else v[poses] for v in vars(self).values()))
+        return Matrices(**{name: v[poses] for name, v in vars(self).items() if v is not None})
 
 
 class ElasticModel:
