@@ -66,10 +66,7 @@ class Curves:
     def of(cls, runs: Sequence[Run]) -> "Curves":
         """Of runs with the same initial poses and budget, one at least."""
         runs = sorted(runs, key=lambda run: run.seed)
-        names = (
-            "frequency_rmse_percent", "r2", "coverage95", "minutes", "wall_seconds",
-            "process_seconds",
-        )  # fmt: skip
+        names = list(cls.__dataclass_fields__)[2:]
         columns = (np.array([getattr(run, name) for run in runs], dtype=float) for name in names)
         return cls(tuple(run.seed for run in runs), np.array(runs[0].n), *columns)
 

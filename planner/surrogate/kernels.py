@@ -75,12 +75,7 @@ def matern52(xp: Any, xa: Any, xb: Any) -> Any:
 
 
 KERNELS: dict[str, Shape] = {
-    "bias": bias,
-    "linear": linear,
-    "quadratic": quadratic,
-    "cubic": cubic,
-    "rbf": rbf,
-    "matern52": matern52,
+    shape.__name__: shape for shape in (bias, linear, quadratic, cubic, rbf, matern52)
 }
 SCALELESS = frozenset({"bias"})
 
