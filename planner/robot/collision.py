@@ -3,6 +3,7 @@
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from functools import cached_property, lru_cache
+from itertools import combinations
 
 import coal
 import numpy as np
@@ -103,9 +104,10 @@ class Collisions:
         robot = self.robot
         geometry = _link_geometry(robot)[0].copy()
         links = list(range(geometry.ngeoms))
-        for i, j in [(i, j) for i in links for j in links if i < j]:
-            a, b = geometry.geometryObjects[i], geometry.geometryObjects[j]
-            if not self._ignored(geometry, i, j) and not _neighbours(robot.model, a, b):
+        for i, j in combinations(links, 2):
+            a, b = (geometry.geometryObjects[k].parentJoint for k in (i, j))
+            near = a == b or robot.model.parents[a] == b or robot.model.parents[b] == a
+            if not near and not self._ignored(geometry, i, j):
                 geometry.addCollisionPair(pin.CollisionPair(i, j))
         overlapping = self._drop_overlapping(geometry)
         if not links:
@@ -218,11 +220,6 @@ def _obstacles(robot: Robot) -> list[pin.GeometryObject]:
         placement = pin.SE3(rotation, np.array(block.center_m, dtype=float))
         made.append(pin.GeometryObject(block.name, 0, placement, coal.Box(*block.size_m)))
     return made
-
-
-def _neighbours(model: pin.Model, a: pin.GeometryObject, b: pin.GeometryObject) -> bool:
-    i, j = a.parentJoint, b.parentJoint
-    return i == j or model.parents[i] == j or model.parents[j] == i
 
 
 def _link_lines(robot: Robot) -> list[pin.GeometryObject]:

@@ -43,11 +43,7 @@ def load_config(path: Path) -> RobotConfig:
         raise InputError(f"{path} is a URDF; robot.toml is made of it by {begin} --mass-kg M.")
     config = load_toml(path, RobotConfig, "robot.toml")
     _check(config, path)
-    return with_effects(config, path)
-
-
-def with_effects(config: RobotConfig, path: Path) -> RobotConfig:
-    """The config as its file has it, with what its effects add; InputError where that is wrong."""
+    # What effects add stands in the other lists, after their own.
     added = {
         name: (*getattr(config, name), *(x for e in config.effects for x in getattr(e, name)))
         for name in LISTS

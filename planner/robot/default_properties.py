@@ -67,7 +67,11 @@ def default_inertias(robot: Robot, mass_kg: float | None) -> tuple[LinkTable, ..
     open_ = [n for n in parts if n not in known]
     if not open_:
         return ()
-    density = _density(weights, stated, known, mass_kg)
+    told, weight = sum(stated[n] for n in known), sum(weights[n] for n in known)
+    if mass_kg is not None and mass_kg > told:
+        density = (mass_kg - told) / (sum(weights.values()) - weight)
+    else:
+        density = told / weight
     tables = []
     for number in open_:
         whole = sum(float(s.mass) for s in parts[number].values())
@@ -84,17 +88,6 @@ def _believed(weights: Mapping[int, float], stated: list[float], mass_kg: float 
         return set()
     usual = mass_kg / sum(weights.values()) if mass_kg else float(np.median(list(some.values())))
     return {n for n, density in some.items() if 1 / NO_BODY < density / usual < NO_BODY}
-
-
-def _density(
-    weights: Mapping[int, float], stated: list[float], known: set[int], mass_kg: float | None
-) -> float:
-    """kg for each unit of weight of the bodies that are not known."""
-    told, weight = sum(stated[n] for n in known), sum(weights[n] for n in known)
-    left = sum(weights.values()) - weight
-    if mass_kg is not None and mass_kg > told:
-        return (mass_kg - told) / left
-    return told / weight
 
 
 def _parts(robot: Robot) -> dict[int, dict[str, pin.Inertia]]:

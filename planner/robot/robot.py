@@ -67,7 +67,13 @@ class Robot:
     @classmethod
     def of(cls, config: RobotConfig, robot_toml: Path) -> "Robot":
         """Of what robot.toml says, or would say if it stood there."""
-        urdf = _resolved(robot_toml, config.urdf)
+        try:
+            urdf = (robot_toml.parent / config.urdf).resolve()
+        except (OSError, ValueError) as error:  # a name that no file can have
+            raise InputError(
+                f"{robot_toml}: its URDF {config.urdf!r} cannot be read ({error}); correct the "
+                f"entry urdf."
+            ) from None
         root = read_urdf(urdf, robot_toml, config.held)
         left_out = leave_out_unusable(root, urdf)
         state_inertias(root, config.link)
@@ -284,12 +290,3 @@ class Robot:
             self.model, self._data, self.linkage.at(q), self.tcp_id, pin.LOCAL
         )
         return of_all @ self.linkage.spread
-
-
-def _resolved(robot_toml: Path, urdf: str) -> Path:
-    try:
-        return (robot_toml.parent / urdf).resolve()
-    except (OSError, ValueError) as error:  # a name that no file can have
-        raise InputError(
-            f"{robot_toml}: its URDF {urdf!r} cannot be read ({error}); correct the entry urdf."
-        ) from None

@@ -58,11 +58,6 @@ class ModalObservations:
         return ModalObservations(*(values[poses] for values in vars(self).values()))
 
 
-def simulated_log(seen: ModalObservations) -> np.ndarray:
-    """ln f (n, k) of the simulation, NaN where it has none."""
-    return _log(seen.simulated.frequency_hz)
-
-
 @dataclass(frozen=True, eq=False)
 class Surrogate:
     """The fitted models; immutable."""
