@@ -144,17 +144,6 @@ class Surface:
         return (np.exp(mean) if self.logarithm else mean).reshape(shape), sd.reshape(shape)
 
 
-def frame_of(measured: Grid, simulated: Grid) -> Frame:
-    """The frame that holds both; InputError for amplitudes that are not positive."""
-    for grid in (measured, simulated):
-        if not (grid.amplitude > 0).all():
-            raise InputError("An amplitude is missing or not positive: leave its line out.")
-    lines = np.concatenate([measured.frequency_hz, simulated.frequency_hz])
-    poses = np.concatenate([measured.pose, simulated.pose])
-    extent = np.array([np.ptp(lines), np.ptp(poses)])
-    return Frame(np.array([lines.min(), poses.min()]), np.where(extent > 0, extent, 1.0))
-
-
 def fit_surface(
     measured: Grid,
     simulated: Grid,
@@ -162,10 +151,19 @@ def fit_surface(
     training: Training = SURFACE_TRAINING,
     logarithm: bool = False,
 ) -> Surface:
-    """Fit one of SURFACES; `training` is MFDGP's. InputError for another name."""
+    """Fit one of SURFACES; `training` is MFDGP's.
+
+    InputError for another name, and for amplitudes that are not positive.
+    """
     if model not in SURFACES:
         raise InputError(f"No model {model!r} of an FRF surface: use one of {', '.join(SURFACES)}.")
-    frame = frame_of(measured, simulated)
+    for grid in (measured, simulated):
+        if not (grid.amplitude > 0).all():
+            raise InputError("An amplitude is missing or not positive: leave its line out.")
+    lines = np.concatenate([measured.frequency_hz, simulated.frequency_hz])
+    poses = np.concatenate([measured.pose, simulated.pose])
+    extent = np.array([np.ptp(lines), np.ptp(poses)])
+    frame = Frame(np.array([lines.min(), poses.min()]), np.where(extent > 0, extent, 1.0))
     if logarithm:
         measured, simulated = (
             replace(grid, amplitude=np.log(grid.amplitude)) for grid in (measured, simulated)
