@@ -2,7 +2,8 @@
 
 Linearised: how far a joint swings after the hit says which spring and damper come nearest to its
 law along that swing (least squares of the torque), and these say how far it swings: a fixed point.
-Modes are those of the hits along all axes together.
+Hits along different axes swing joints differently, so that each column of an FRF matrix has springs
+of its own; modes are those of the three hits together.
 
 In time: the robot without its laws is propagated pole by pole, exactly for forces and torques that
 are straight between instants; the laws' torques along that motion add their own answer to its FRFs.
@@ -35,13 +36,24 @@ CORRECTED = 3  # times, of a torque at the end of a step
 ROUNDS, SETTLED = 60, 1e-4  # of the fixed point: most, and the change of k that ends it
 
 
-def modes_at_force(
-    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, count: int
-) -> SimulatedModes:
-    """The `count` lowest oscillatory modes at q (n, dof) in rad, of hits of peak force_n (n,).
+def accelerance_at_force(
+    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray
+) -> np.ndarray:
+    """Accelerance (n, 3, 3, F) in m/s²/N at q (n, dof) in rad, of hits of peak force_n (n,).
 
     Raises InputError where a joint has no stiffness left at a force.
     """
+    m, n = simulation.elastic.matrices(q), len(q)
+    each = replace(m.at(np.repeat(np.arange(n), 3)), hit=m.hit.reshape(3 * n, 1, -1))
+    springs = springs_at_force(simulation, each, np.repeat(force_n, 3))
+    solved = _poles(each, springs, each.sensor)
+    return np.moveaxis(accelerance(solved, frequency_hz).reshape(n, 3, 3, -1), 1, 2)
+
+
+def modes_at_force(
+    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, count: int
+) -> SimulatedModes:
+    """The `count` lowest oscillatory modes there. Raises as `accelerance_at_force` does."""
     m = simulation.elastic.matrices(q)
     springs = springs_at_force(simulation, m, force_n)
     return oscillatory(_poles(m, springs, m.sensor), count)
@@ -177,17 +189,19 @@ def _ports(size: int, own: Sequence[int], count: int) -> np.ndarray:
 
 
 def change_at_force(
-    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray
-) -> np.ndarray:
+    simulation: Simulation, q: np.ndarray, force_n: np.ndarray, frequency_hz: np.ndarray,
+    in_time: bool = True,
+) -> np.ndarray:  # fmt: skip
     """By how much (n, 3, 3, F) the accelerance is another than that of springs as stated.
 
-    As hits of peak force_n (n,) would measure it; 0 where no force is stated (NaN), or the robot
-    has no laws.
+    `in_time` as hits of peak force_n (n,) would measure it, else linearised. 0 where no force is
+    stated (NaN), or the robot has no laws. Raises as `accelerance_at_force`.
     """
     change = np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
     known = np.flatnonzero(np.isfinite(force_n))
     if known.size and simulation.robot.config.law:
-        there = measured_at_force(simulation, q[known], force_n[known], frequency_hz)
+        of = measured_at_force if in_time else accelerance_at_force
+        there = of(simulation, q[known], force_n[known], frequency_hz)
         change[known] = there - simulation.accelerance(q[known], frequency_hz)
     return change
 
