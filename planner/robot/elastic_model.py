@@ -14,6 +14,7 @@ leaves the others as they are.
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -68,6 +69,21 @@ class Matrices:
     def at(self, poses: slice | np.ndarray) -> "Matrices":
         """Of some of the poses."""
         return Matrices(**{name: v[poses] for name, v in vars(self).items() if v is not None})
+
+    def replaced(self, poses: np.ndarray, other: "Matrices") -> "Matrices":
+        """With those of `other` at some of the poses."""
+
+        def put(these: Matrices | AngleSlopes, others: Matrices | AngleSlopes) -> dict[str, Any]:
+            arrays = vars(these).items()
+            out = {name: v.copy() for name, v in arrays if isinstance(v, np.ndarray)}
+            for name, values in out.items():
+                values[poses] = getattr(others, name)
+            return out
+
+        slopes = None
+        if self.by_angle is not None and other.by_angle is not None:
+            slopes = AngleSlopes(**put(self.by_angle, other.by_angle))
+        return Matrices(**put(self, other), by_angle=slopes)
 
 
 class ElasticModel:
