@@ -20,6 +20,7 @@ from planner.report.plot_marks import name_axes, panels
 from planner.studies import drawing
 from planner.studies.report import r_squared
 from planner.surrogate.frf_bands import frf_moments
+from planner.surrogate.kernels import kennedy_ohagan
 from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
 from planner.surrogate.models.likelihood_gp import (
     Exact,
@@ -28,7 +29,6 @@ from planner.surrogate.models.likelihood_gp import (
     Samples,
     fit_likelihood,
     fit_nargp,
-    kennedy_ohagan,
 )
 
 from .data import COMPARED, FREQUENCY_MODELS, KERNELS, RESIDUES, AnalysedPoses, nearest, split

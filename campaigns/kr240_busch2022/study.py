@@ -17,7 +17,8 @@ from planner.progress import ProgressCallback, part_of
 from planner.robot.robot import Robot
 from planner.studies.claims import Bound, ClaimRule, in_order
 from planner.studies.report import Paper, Report, Table, on_each, r_squared
-from planner.surrogate.models.averaged import fit_ar1_nargp, fit_gp, fit_recursive
+from planner.surrogate.kernels import kennedy_ohagan, perdikaris
+from planner.surrogate.models.averaged import fit_averaged
 from planner.surrogate.models.likelihood_gp import (
     NARGP,
     Exact,
@@ -26,7 +27,6 @@ from planner.surrogate.models.likelihood_gp import (
     Samples,
     fit_likelihood,
     fit_nargp,
-    kennedy_ohagan,
 )
 
 from .data import (
@@ -271,12 +271,13 @@ def _frequency(seen: AnalysedPoses, k: int) -> Output:
     """A mode's frequency, with the simulation's known at every pose."""
     low = seen.modes.simulated.frequency_hz[:, k]
     exact, units = Exact(nearest(seen.x, low)), Normalisation.of(low)
+    product = perdikaris(seen.x.shape[1])
     fits = _kernels(KERNELS[1:]) | {
         "AR1": lambda s: _noisy(fit_nargp(s, exact, units, isotropic=True, kernel=kennedy_ohagan)),
         "NARGP": lambda s: _noisy(fit_nargp(s, exact, units, isotropic=True)),
-        "averaged RBF": lambda s: fit_gp(s, "rbf").predict,
-        "averaged AR1": lambda s: fit_recursive(s, exact, units.scale, kernel="rbf").predict,
-        "AR1-NARGP": lambda s: fit_ar1_nargp(s, exact, units.scale).predict,
+        "averaged RBF": lambda s: fit_averaged(s, "rbf").predict,
+        "averaged AR1": lambda s: fit_averaged(s, "rbf", exact, units.scale).predict,
+        "AR1-NARGP": lambda s: fit_averaged(s, product, exact, units.scale, True).predict,
     }
     return Output(seen.modes.frequency_hz[:, k], seen.modes.frequency_sd_hz[:, k], fits)
 

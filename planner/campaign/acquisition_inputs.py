@@ -7,13 +7,13 @@ import numpy as np
 from planner.campaign.cell import Cell
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.design.parameter_sensitivity import FrfNoise, UncertainParameters
-from planner.design.propose import WORKSPACE_POSES
 from planner.fit.posterior import RobotBelief
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
 
-# The first of the candidates, evenly spread, whose information about parameters is worked out.
+# The first of the candidates (a Sobol prefix: evenly spread), which stand for the workspace, and
+# whose information about parameters is worked out.
 MOST_INFORMED = 200
 
 
@@ -49,7 +49,7 @@ def acquisition_inputs(model: "Model", informed: bool) -> tuple[FrequencyOutputs
     else:
         poses = open_.poses(x, inputs, candidates.q[asked], simulated[asked], informed)
         covariance = open_.covariance
-    workspace = poses[: min(WORKSPACE_POSES, MOST_INFORMED, cell.spread)]
+    workspace = poses[: min(MOST_INFORMED, cell.spread)]
     weights = cell.config.acquisition.mode_weights
     target = Target.evenly(workspace, None if weights is None else np.array(weights))
     return FrequencyOutputs.of(surrogate, target, _goal(model, target), covariance), poses

@@ -17,7 +17,7 @@ from planner.inference.parallel import parallel_map
 from planner.progress import ProgressCallback, no_progress
 from planner.surrogate.average import Average
 from planner.surrogate.frequency_models import MODELS
-from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, simulated_log
+from planner.surrogate.modal_surrogate import ModalObservations, fit_primary
 
 INSIDE = 1.96  # sds of the interval that holds 95 %
 
@@ -83,7 +83,7 @@ def _without(
         seen.at(kept), discrepancy, belief, model=name, kernel=kernel, elsewhere=points[name]
     )
     there = seen.at(slice(max(left, 0), max(left, 0) + 1))
-    mean, sd = primary.predict(there.x, simulated_log(there), nugget=True)
+    mean, sd = primary.predict(there.x, np.log(there.simulated.frequency_hz), nugget=True)
     evidence = float(primary.log_evidence.sum()) if type(primary) is Average else None
     return mean[0], sd[0], evidence, time.perf_counter() - started
 

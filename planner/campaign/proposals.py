@@ -100,24 +100,15 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
     for pose in state.avoided:
         there = cell.features(joints.internal([state.proposals[pose].joints_deg]))
         allowed = allowed & (np.linalg.norm(x - there, axis=1) > AVOIDED * np.sqrt(x.shape[1]))
-    asked, seen, said = np.arange(len(x)), None, model.simulated_candidates
+    asked, seen = np.arange(len(x)), None
     if acquisition in INFORMED:
         asked = informed_candidates(cell)
         seen = model.deciding if acquisition == "stability" else model.informed
     elif acquisition not in DESIGNS:
         seen = model.acquisition_inputs
-    picks = choose(
-        acquisition,
-        model.surrogate,
-        x[asked],
-        said[asked],
-        count=count,
-        exclude=cell.features(joints.internal(taken)) if taken else None,
-        seed=state.events,
-        outlook=seen,
-        travel=travel.among(asked),
-        allowed=allowed[asked],
-    )
+    exclude = cell.features(joints.internal(taken)) if taken else x[:0]
+    free = travel.among(asked), allowed[asked]
+    picks = choose(acquisition, x[asked], count, exclude, state.events, seen, *free)
     return tuple(replace(pick, index=int(asked[pick.index])) for pick in picks)
 
 

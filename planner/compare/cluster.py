@@ -13,7 +13,7 @@ CONNECT_TIMEOUT_S = 10.0  # for the scheduler, and for its first worker
 def each(
     function: Callable[[Any, Any], Any], shared: Any, items: Sequence[Any], address: str
 ) -> Iterator[tuple[int, Any]]:
-    """As `local.each`, on the workers of the scheduler at an address.
+    """As `processes.each`, on the workers of the scheduler at an address.
 
     Raises InputError where none answers or none has a worker.
     """

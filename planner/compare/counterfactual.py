@@ -26,11 +26,6 @@ class LearningRun:
     frequency_rmse_percent: tuple[float, ...]
     minutes: tuple[float, ...]
 
-    @classmethod
-    def of(cls, run: Run) -> "LearningRun":
-        """Of a run of a comparison."""
-        return cls(run.poses, run.n, run.frequency_rmse_percent, run.minutes)
-
 
 @dataclass(frozen=True)
 class OtherAcquisition:
@@ -67,7 +62,10 @@ class OtherAcquisition:
             f"{_to_goal(other)}, the campaign as it was {_to_goal(was)} (chosen among the {count} "
             "poses measured)."
         )
-        runs = {"campaign": LearningRun.of(was), acquisition: LearningRun.of(other)}
+        runs = {
+            name: LearningRun(run.poses, run.n, run.frequency_rmse_percent, run.minutes)
+            for name, run in (("campaign", was), (acquisition, other))
+        }
         return cls(acquisition, text, runs)
 
 

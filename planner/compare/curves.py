@@ -1,15 +1,49 @@
-"""Learning curves of strategies over seeds, and how they differ where all else is the same."""
+"""Scores of predictions; learning curves of strategies over seeds, and how they differ."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from planner.compare.tasks import Run
+from planner.frf.metrics import mean_known
 
+Z_95 = 1.959964  # two-sided 95 % of a normal distribution
 GOAL_PERCENT = 1.0
 BOOTSTRAP_RESAMPLES = 2000  # of the seeds
 BASELINE = "maximin_lhs"
+
+
+class Score(NamedTuple):
+    """Relative RMSE in %, R² (mean over modes), share of measured values in 95 % intervals."""
+
+    frequency_rmse_percent: float
+    r2: float
+    coverage95: float
+
+
+def score(
+    predicted_hz: np.ndarray, sd_hz: np.ndarray, measured_hz: np.ndarray, measured_sd: np.ndarray
+) -> Score:
+    """Score predictions of k frequencies at u poses.
+
+    All arguments are (u, k) in Hz, the measured ones NaN where a mode was not found. Intervals
+    contain the prediction's sd and the measurement's own.
+    """
+    known = np.isfinite(measured_hz)
+    relative = np.where(known, predicted_hz / np.where(known, measured_hz, 1.0) - 1, np.nan)
+    left = mean_known((predicted_hz - measured_hz) ** 2, axis=0)
+    spread = mean_known((measured_hz - mean_known(measured_hz, axis=0)) ** 2, axis=0)
+    varies = spread > 0
+    r2 = 1 - np.divide(left, spread, out=np.full_like(left, np.nan), where=varies)
+    sd = np.hypot(sd_hz, np.where(np.isfinite(measured_sd), measured_sd, 0.0))
+    inside = np.where(known, np.abs(predicted_hz - measured_hz) <= Z_95 * sd, np.nan)
+    return Score(
+        float(100 * np.sqrt(mean_known(relative**2))),
+        float(mean_known(r2)),
+        float(mean_known(inside)),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +66,7 @@ class Curves:
     def of(cls, runs: Sequence[Run]) -> "Curves":
         """Of runs with the same initial poses and budget, one at least."""
         runs = sorted(runs, key=lambda run: run.seed)
-        names = (
-            "frequency_rmse_percent", "r2", "coverage95", "minutes", "wall_seconds",
-            "process_seconds",
-        )  # fmt: skip
+        names = list(cls.__dataclass_fields__)[2:]
         columns = (np.array([getattr(run, name) for run in runs], dtype=float) for name in names)
         return cls(tuple(run.seed for run in runs), np.array(runs[0].n), *columns)
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from planner.campaign.config import ModesTable
 from planner.campaign.journal import read_checked, write_checked
@@ -29,7 +28,7 @@ def recorded(
 ) -> tuple[PoolPose, ...]:
     """All poses of recordings; what was found of them before is taken up."""
     files = pool.poses_of(recordings, joints, table)
-    found = {i: pool.make(None, f) for i, f in enumerate(files) if pool.kept(f)}
+    found = {i: pool.make(None, f) for i, f in enumerate(files) if f.measured.is_kept}
     todo = [i for i in range(len(files)) if i not in found]
     _count(progress, "poses", len(found), len(files))
     for k, pose in processes.each(pool.make, None, [files[i] for i in todo], workers):
@@ -60,18 +59,16 @@ def conduct(
     damaged = [paths[task].name for task in todo if paths[task].exists()]
     _count(progress, "runs", len(found), len(paths))
     if todo:
-        for k, answer in _spread(bench, todo, scheduler, workers):
+        if scheduler is not None:
+            answers = cluster.each(run, bench, todo, scheduler)
+        else:
+            answers = processes.each(run, bench, todo, workers)
+        for k, answer in answers:
             if isinstance(answer, Run):
                 write_checked(paths[todo[k]], answer)
             found[todo[k]] = answer
             _count(progress, "runs", len(found), len(paths))
     return {task: found[task] for task in study.tasks}, _told(damaged, kept)
-
-
-def _spread(bench: Bench, tasks: list[Task], scheduler: str | None, workers: int) -> Any:
-    if scheduler is not None:
-        return cluster.each(run, bench, tasks, scheduler)
-    return processes.each(run, bench, tasks, workers)
 
 
 def _count(progress: ProgressCallback, what: str, done: int, total: int) -> None:

@@ -15,7 +15,7 @@ from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
 from planner.compare.bench import Bench, PoolCell, cell_of
-from planner.compare.score import Score, score
+from planner.compare.curves import Score, score
 from planner.compare.tasks import Run, Task
 from planner.design.space_filling import NESTED
 from planner.errors import InputError
@@ -36,14 +36,11 @@ def run(bench: Bench, task: Task) -> Run:
     if bench.program != content_hash.program():
         raise InputError("This worker runs another version of planner; install the same one.")
     with _one_at_a_time, threadpool_limits(1):
-        return _run(bench, task)
-
-
-def _run(bench: Bench, task: Task) -> Run:
-    cell = _cell(bench, task)
-    used = NESTED[INITIAL_DESIGN](cell.candidates.features, task.budget, task.seed)[: task.initial]
-    rest = [i for i in planned(cell, task) if i not in used]
-    return play(bench, used.tolist(), rest[: task.budget - task.initial], task)
+        cell = _cell(bench, task)
+        design = NESTED[INITIAL_DESIGN](cell.candidates.features, task.budget, task.seed)
+        used = design[: task.initial].tolist()
+        rest = [i for i in planned(cell, task) if i not in used]
+        return play(bench, used, rest[: task.budget - task.initial], task)
 
 
 def play(bench: Bench, used: list[int], then: list[int], task: Task) -> Run:

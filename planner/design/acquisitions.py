@@ -127,31 +127,23 @@ def reduction_by_label(
     outputs: FrequencyOutputs, poses: Poses, target: Target
 ) -> tuple[np.ndarray, np.ndarray]:
     """The part of each label in it (k, n), and the variance of a measurement there (k, n)."""
-    by_label = [_label(outputs, target, poses, k) for k in range(outputs.count)]
-    return np.array([r for r, _ in by_label]), np.array([v for _, v in by_label])
-
-
-def _label(
-    outputs: FrequencyOutputs, target: Target, poses: Poses, k: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Reduction (n,) by label k and the variance (n,) of measuring it, mean over the samples."""
-    weight = target.importance[:, k]
-    if not weight.any() or not len(poses):
-        return np.zeros(len(poses)), np.ones(len(poses))
-    post = outputs.posteriors[k]
-    a, va = _features(outputs, k, poses, sign=-1.0)
-    b, _ = _features(outputs, k, target.poses, sign=1.0)
-    # By NumPy: a proposal is one pass, over before JAX is imported and has compiled it.
-    x, at = post.seen(poses.x, poses.low[:, k]), target.poses
-    at = post.seen(at.x, at.low[:, k])
-    delta, squared = parse(post.kernel, x.shape[1]), np.empty(a.shape[:2])
-    for start in range(0, len(poses), BLOCK):
-        some = slice(start, start + BLOCK)
-        for theta, own, there, out in zip(post.theta, a, b, squared, strict=True):
-            cross = delta.covariance(np, theta, x[some], at)
-            out[some] = (cross + own[some] @ there.T) ** 2 @ weight
-    scale = va + outputs.noise[k]
-    return np.mean(squared / scale, axis=0), np.mean(scale, axis=0)
+    shape, importance, where = (outputs.count, len(poses)), target.importance, target.poses
+    reduced, variance = np.zeros(shape), np.ones(shape)
+    for k in np.flatnonzero(importance.any(axis=0)).tolist() if len(poses) else ():
+        post = outputs.posteriors[k]
+        a, va = _features(outputs, k, poses, sign=-1.0)
+        b, _ = _features(outputs, k, where, sign=1.0)
+        # By NumPy: a proposal is one pass, over before JAX is imported and has compiled it.
+        x, at = post.seen(poses.x, poses.low[:, k]), post.seen(where.x, where.low[:, k])
+        delta, squared = parse(post.kernel, x.shape[1]), np.empty(a.shape[:2])
+        for start in range(0, len(poses), BLOCK):
+            some = slice(start, start + BLOCK)
+            for theta, own, there, out in zip(post.theta, a, b, squared, strict=True):
+                cross = delta.covariance(np, theta, x[some], at)
+                out[some] = (cross + own[some] @ there.T) ** 2 @ importance[:, k]
+        scale = va + outputs.noise[k]
+        reduced[k], variance[k] = np.mean(squared / scale, axis=0), np.mean(scale, axis=0)
+    return reduced, variance
 
 
 def _features(

@@ -12,7 +12,13 @@ from itertools import pairwise
 import numpy as np
 
 from planner.design.acquisitions import SUBSETS, Axes, parameter_reduction, reduction_by_label
-from planner.design.frequency_posterior import ALL_AXES, AXES, FrequencyOutputs, Poses
+from planner.design.frequency_posterior import (
+    ALL_AXES,
+    AXES,
+    MEASUREMENT_SD,
+    FrequencyOutputs,
+    Poses,
+)
 
 LEAST_SHARE = 0.05  # of a mode's information: below it the mode may not be found at all
 
@@ -104,7 +110,7 @@ def best_axes(
         if axes != ALL_AXES and np.any(seen[counts] < LEAST_SHARE):
             continue
         # The EMA's own part of the noise grows; the nugget, which is the pose's, stays.
-        more = outputs.measurement * (1 / np.maximum(seen, 1e-9) - 1)
+        more = MEASUREMENT_SD**2 * (1 / np.maximum(seen, 1e-9) - 1)
         reduced = float(np.sum(each[:, 0] * variance[:, 0] / (variance[:, 0] + more)))
         reduced += parameter_reduction(outputs, pose, outputs.workspace, axes)[0]
         minutes = travel + cost.per_pose + cost.hitting(axes)

@@ -13,7 +13,7 @@ from planner.inference.covariance import eigen
 from planner.surrogate.gp import Posterior
 from planner.surrogate.modal_surrogate import Surrogate
 
-MEASUREMENT_SD = 1e-3  # relative sd that EMA gives a frequency
+MEASUREMENT_SD = 1e-3  # relative sd that EMA gives a frequency, from hits along all axes
 AXES = 3  # of the hit: x, y, z of the tcp
 ALL_AXES = (0, 1, 2)
 
@@ -51,11 +51,6 @@ class Poses:
     def one(self, index: int) -> "Poses":
         """The pose at `index`, as n = 1."""
         return self[np.array([index])]
-
-    def followed_by(self, more: "Poses") -> "Poses":
-        """These, then more."""
-        pairs = zip(vars(self).values(), vars(more).values(), strict=True)
-        return Poses(*(np.concatenate(pair) for pair in pairs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,18 +133,15 @@ class FrequencyOutputs:
         return len(self.noise)
 
     @property
-    def measurement(self) -> float:
-        """Variance that EMA alone gives a frequency from hits along all axes."""
-        return MEASUREMENT_SD**2
-
-    @property
     def weights(self) -> np.ndarray:
         """(k,) how much each label counts, over the workspace."""
         return self.workspace.importance.sum(axis=0)
 
     def planning(self, pose: Poses, axes: tuple[int, ...] = ALL_AXES) -> "FrequencyOutputs":
         """The same once a pose (n = 1) has been hit along `axes` too."""
-        root, planned = self.covariance_root, self.planned.followed_by(pose.uninformed)
+        root = self.covariance_root
+        pairs = zip(vars(self.planned).values(), vars(pose.uninformed).values(), strict=True)
+        planned = Poses(*(np.concatenate(pair) for pair in pairs))
         if not pose.information.shape[-1]:
             return replace(self, planned=planned)
         gained = root.T @ pose.information[0, list(axes)].sum(axis=0) @ root

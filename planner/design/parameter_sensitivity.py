@@ -107,12 +107,9 @@ class UncertainParameters:
         the sensors of the FRFs so far listen.
         """
         layout = layout or Layout((TCP,), self.noise.sensors)
-        parts = [
-            self._information(q[i : i + POSES_PER_CHUNK], layout)
-            for i in range(0, len(q), POSES_PER_CHUNK)
-        ]
-        p = len(self.covariance)
-        return np.concatenate(parts) if parts else np.zeros((0, AXES, p, p))
+        starts, p = range(0, len(q), POSES_PER_CHUNK), len(self.covariance)
+        parts = (self._information(q[i : i + POSES_PER_CHUNK], layout) for i in starts)
+        return np.concatenate([np.zeros((0, AXES, p, p)), *parts])
 
     def _information(self, q: np.ndarray, layout: Layout) -> np.ndarray:
         frequency, count = self._lines(q)
@@ -122,13 +119,10 @@ class UncertainParameters:
         h, (told, visits) = motion.accelerance, misfit.slopes(motion, belief.x)
         # What no hit along an axis moves is never measured along it: it tells nothing.
         sd = self._sd(h)
-        weight = np.sqrt(2 * count[:, None, None] / self.noise.misfit) / np.where(
-            sd > 0, sd, np.inf
-        )
-        beside = self._of_the_visit(motion, misfit, visits)
-        told, beside = (
-            (one * weight[:, None])[:, :, self._channels(layout)] for one in (told, beside)
-        )
+        sd = np.where(sd > 0, sd, np.inf)
+        weight = np.sqrt(2 * count[:, None, None] / self.noise.misfit) / sd
+        both, rows = (told, self._of_the_visit(motion, misfit, visits)), self._channels(layout)
+        told, beside = ((one * weight[:, None])[:, :, rows] for one in both)
         return np.array([
             [_marginal_information(a[:, :, axis], b[:, :, axis]) for axis in range(AXES)]
             for a, b in zip(told, beside, strict=True)

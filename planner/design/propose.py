@@ -16,11 +16,9 @@ from planner.design.acquisitions import (
     variance,
 )
 from planner.design.cost import Cost, best_axes, shortest_tour
-from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses, Target
+from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses
 from planner.design.space_filling import DESIGNS
-from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
-from planner.surrogate.modal_surrogate import Surrogate
 
 Score = Callable[[FrequencyOutputs, Poses], np.ndarray]
 
@@ -37,7 +35,6 @@ ACQUISITIONS: dict[str, Score] = {
 # What these look at is nothing where no parameter of the simulation is open.
 OF_PARAMETERS = ("parameter_information", "d_information")
 INFORMED = (*OF_PARAMETERS, "mixed", "goal", "stability")  # those that look at parameters at all
-WORKSPACE_POSES = 200  # candidates (a Sobol prefix: evenly spread) that stand for the workspace
 LEAST_DISTANCE = 1e-3  # in model coordinates, to poses measured or proposed before
 
 
@@ -93,42 +90,33 @@ def check_name(name: str, where: str = "") -> None:
         raise InputError(f'{said} is no acquisition "{name}"; choose one of {known}.')
 
 
-def workspace_outputs(
-    surrogate: Surrogate, x: np.ndarray, simulated: SimulatedModes
-) -> tuple[FrequencyOutputs, Poses]:
-    """Posterior over the first candidates, which stand for the workspace; all as poses."""
-    poses = Poses.plain(x, surrogate.frequency_inputs(simulated))
-    return FrequencyOutputs.of(surrogate, Target.evenly(poses[:WORKSPACE_POSES])), poses
-
-
 def propose(
     name: str,
-    surrogate: Surrogate,
     x: np.ndarray,
-    simulated: SimulatedModes,
     count: int,
-    exclude: np.ndarray | None,
+    exclude: np.ndarray,
     seed: int,
-    outlook: tuple[FrequencyOutputs, Poses] | None = None,
-    travel: Travel | None = None,
-    allowed: np.ndarray | None = None,
+    outlook: tuple[FrequencyOutputs, Poses] | None,
+    travel: Travel,
+    allowed: np.ndarray,
 ) -> tuple[Pick, ...]:
     """Up to `count` picks among candidates x (n, d); the same for the same arguments.
 
     `exclude` (t, d) are poses measured or refused: candidates at the same place are left out, as
-    are those not `allowed` (n,). With `outlook` the simulation's open parameters are seen too;
-    with `travel` the best gain per minute is chosen, and several picks make a short tour.
+    are those not `allowed` (n,). `outlook` is what the model says of the candidates, of which
+    those with the best gain per minute are chosen; several picks make a short tour. DESIGNS look at
+    neither.
     """
     check_name(name)
-    taken = np.zeros((0, x.shape[1])) if exclude is None else exclude
-    distance = np.min(np.linalg.norm(x[:, None] - taken[None], axis=2), axis=1, initial=np.inf)
-    free = np.flatnonzero((distance > LEAST_DISTANCE) & (True if allowed is None else allowed))
+    distance = np.min(np.linalg.norm(x[:, None] - exclude[None], axis=2), axis=1, initial=np.inf)
+    free = np.flatnonzero((distance > LEAST_DISTANCE) & allowed)
     if not free.size:
         return ()
     if name in DESIGNS:
-        picks = free[DESIGNS[name](x[free], taken, count, seed)]
+        picks = free[DESIGNS[name](x[free], exclude, count, seed)]
         return tuple(Pick(int(i), float("nan")) for i in picks)
-    outputs, poses = outlook or workspace_outputs(surrogate, x, simulated)
+    assert outlook is not None
+    outputs, poses = outlook
     if name in OF_PARAMETERS and not len(outputs.covariance_root):
         name = "integrated_variance"
     picks = _one_after_another(ACQUISITIONS[name], outputs, poses, count, free, travel)
@@ -141,33 +129,29 @@ def _one_after_another(
     poses: Poses,
     count: int,
     free: np.ndarray,
-    travel: Travel | None,
+    travel: Travel,
 ) -> tuple[Pick, ...]:
     picks: list[Pick] = []
-    at = None if travel is None else travel.at
+    at = travel.at
     while len(picks) < count and free.size:
         gain = score(outputs, poses[free])
-        minutes = np.full(len(free), np.nan)
-        rate = gain
-        if travel is not None:
-            minutes = travel.cost.minutes(travel.q[free], at, ALL_AXES)
-            rate = gain / minutes
-        best = int(np.argmax(rate))  # the first of equals
+        minutes = travel.cost.minutes(travel.q[free], at, ALL_AXES)
+        best = int(np.argmax(gain / minutes))  # the first of equals
         index, axes, spent = int(free[best]), ALL_AXES, float(minutes[best])
-        if travel is not None and travel.shares is not None:
+        if travel.shares is not None:
             there = float(travel.cost.travel(travel.q[[index]], at)[0])
             axes = best_axes(outputs, poses.one(index), travel.shares[index], travel.cost, there)
             spent = there + travel.cost.per_pose + travel.cost.hitting(axes)
         picks.append(Pick(index, float(gain[best]), spent, axes))
-        at = None if travel is None else travel.q[index]
+        at = travel.q[index]
         outputs = outputs.planning(poses.one(index), axes)
         free = free[np.linalg.norm(poses.x[free] - poses.x[index], axis=1) > LEAST_DISTANCE]
     return tuple(picks)
 
 
-def _toured(picks: tuple[Pick, ...], travel: Travel | None) -> tuple[Pick, ...]:
+def _toured(picks: tuple[Pick, ...], travel: Travel) -> tuple[Pick, ...]:
     """The same picks in the order of a short tour from where the robot stands."""
-    if travel is None or len(picks) < 3:
+    if len(picks) < 3:
         return picks
     q = travel.q[[p.index for p in picks]]
     order, legs = shortest_tour(travel.cost, q, travel.at)

@@ -85,11 +85,11 @@ class Forecast:
         return f"One more pose should bring the RMSE to about {left}."
 
 
-def percent(value: float, digits: int = 2) -> str:
-    """A percentage with so many digits, in no power of ten; what is over 100 is no forecast."""
+def percent(value: float) -> str:
+    """A percentage with two digits, in no power of ten; what is over 100 is no forecast."""
     if value > MOST_PERCENT:
         return f"more than {MOST_PERCENT:.0f} %"
-    return f"{significant(value, digits)} %"
+    return f"{significant(value, 2)} %"
 
 
 def forecast(
@@ -98,24 +98,23 @@ def forecast(
     target_percent: float,
     probability: float,
     least: float = 0.0,
-    seed: int = 0,
 ) -> Forecast:
     """What the model expects of itself; `best` (n = 1) is the pose that would be measured next.
 
     `least` is what the mean square of ln f is at least, where the outputs do not have all that few
     poses leave open.
     """
-    squares = mean_squares(outputs, seed)
+    squares = mean_squares(outputs)
     open_ = max(0.0, least - float(np.mean(squares)))
     squares += open_
     count, size = left_out(outputs.posteriors)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     # The residuals of one pose go together: they count as one.
     freedom, total = PRIOR_COUNT + count, PRIOR_COUNT + count * size**2
     scale = total / rng.chisquare(freedom, len(squares))
     rmse = 100 * np.sqrt(squares * scale)
     bound = float(np.quantile(rmse, probability))
-    after = squares if best is None else open_ + mean_squares(outputs.planning(best), seed)
+    after = squares if best is None else open_ + mean_squares(outputs.planning(best))
     median = float(np.median(rmse))
     gain = median * (1 - np.sqrt(np.mean(after) / np.mean(squares)))
     return Forecast(
@@ -124,9 +123,9 @@ def forecast(
     )  # fmt: skip
 
 
-def mean_squares(outputs: "FrequencyOutputs", seed: int = 0) -> np.ndarray:
+def mean_squares(outputs: "FrequencyOutputs") -> np.ndarray:
     """Samples (≥ FIELD_SAMPLES,) of the weighted mean square error of ln f over the workspace."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     poses = outputs.workspace.poses[:WORKSPACE_POINTS]
     importance = outputs.workspace.importance[:WORKSPACE_POINTS]
     importance = importance / importance.sum()
@@ -138,10 +137,10 @@ def mean_squares(outputs: "FrequencyOutputs", seed: int = 0) -> np.ndarray:
     for k in range(outputs.count):
         error = outputs.trust[k] * parameters @ poses.slope[:, k].T
         between, _, _ = outputs.covariance(k, poses, poses)
-        apart = _means_apart(outputs.posteriors[k], poses.x, poses.low[:, k])
+        means, _ = outputs.posteriors[k].predictive(poses.x, poses.low[:, k])
+        apart = means - means.mean(axis=0)  # of each sample of the hyperparameters from all
         for s, one in enumerate(between):
-            root = covariance_root(one)
-            drawn = rng.standard_normal((each, len(poses))) @ root.T
+            drawn = rng.standard_normal((each, len(poses))) @ covariance_root(one).T
             error[s * each : (s + 1) * each] += drawn + apart[s]
         total += error**2 @ importance[:, k]
     return total
@@ -165,9 +164,3 @@ def left_out(posteriors: "Sequence[Posterior]") -> tuple[int, float]:
     if not squares:
         return 0, 1.0
     return poses, float(np.sqrt(np.mean(np.concatenate(squares))))
-
-
-def _means_apart(posterior: "Posterior", x: np.ndarray, low: np.ndarray) -> np.ndarray:
-    """How far the mean of each hyperparameter sample (s, u) is from that of all."""
-    means, _ = posterior.predictive(x, low)
-    return means - means.mean(axis=0)

@@ -79,9 +79,13 @@ def springs_at_force(simulation: Simulation, m: Matrices, force_n: np.ndarray) -
         return Elasticity(stiffness, damping, simulation.elasticity.loss_factor)
     laws = simulation.robot.config.law
     own = [simulation.elastic.own_spring(law.joint) for law in laws]
-    springs = stated = _each(simulation.elasticity, len(force_n))
+    config, each = simulation.robot.config, simulation.elasticity
+    stiffness, damping = (np.tile(v, (len(force_n), 1)) for v in (each.stiffness, each.damping))
+    springs = stated = Elasticity(stiffness, damping, each.loss_factor)
+    ports = _ports(m.mass.shape[1], own, len(force_n))
+    hammer = force_n, config.hammer.pulse_ms / 1e3, 1 / (PER_PERIOD * config.band_hz[1])
     for _ in range(ROUNDS):
-        before, (swing, speed) = springs, _after(simulation, m, springs, own, force_n)
+        before, (swing, speed) = springs, _swings(_poles(m, springs, ports), *hammer)
         stiffness, damping = stated.stiffness.copy(), stated.damping.copy()
         for j, (law, spring) in enumerate(zip(laws, own, strict=True)):
             shares = _solved(*_products(law, swing[:, j], speed[:, j]))
@@ -140,22 +144,6 @@ def _solved(gram: np.ndarray, product: np.ndarray) -> np.ndarray:
     size = np.sqrt(np.diagonal(gram, axis1=-2, axis2=-1)) + np.finfo(float).tiny
     scaled = gram / size[..., None] / size[..., None, :]
     return (np.linalg.pinv(scaled, hermitian=True) @ (product / size)[..., None])[..., 0] / size
-
-
-def _each(springs: Elasticity, count: int) -> Elasticity:
-    """For each of so many poses the same."""
-    stiffness, damping = (np.tile(v, (count, 1)) for v in (springs.stiffness, springs.damping))
-    return Elasticity(stiffness, damping, springs.loss_factor)
-
-
-def _after(
-    simulation: Simulation, m: Matrices, springs: Elasticity, own: Sequence[int],
-    force_n: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Swings and speeds of springs of joints after hits, as of `_swings`."""
-    config, ports = simulation.robot.config, _ports(m.mass.shape[1], own, len(force_n))
-    step_s = 1 / (PER_PERIOD * config.band_hz[1])
-    return _swings(_poles(m, springs, ports), force_n, config.hammer.pulse_ms / 1e3, step_s)
 
 
 def _poles(m: Matrices, springs: Elasticity, seen: np.ndarray) -> Poles:

@@ -72,11 +72,10 @@ def laplace(frequency_hz: np.ndarray, rate_1_s: np.ndarray | float = 0.0) -> np.
     return 2j * np.pi * np.atleast_2d(frequency_hz) + np.reshape(rate_1_s, (-1, 1))
 
 
-def response(
-    matrices: Matrices, elasticity: Elasticity, s: np.ndarray, mass: np.ndarray | None = None
-) -> np.ndarray:
-    """Accelerance (n, 3s, 3h, F) in m/s²/N at s (n, F); `mass` (n, e, e) takes M's place."""
-    return synthesis(matrices.sensor, _solutions(matrices, elasticity, s, mass, matrices.hit), s)
+def response(matrices: Matrices, elasticity: Elasticity, s: np.ndarray) -> np.ndarray:
+    """Accelerance (n, 3s, 3h, F) in m/s²/N at s (n, F)."""
+    x = _solutions(matrices, elasticity, s, matrices.mass, matrices.hit)
+    return synthesis(matrices.sensor, x, s)
 
 
 def moved(
@@ -87,18 +86,20 @@ def moved(
     added: Sequence[Impedance] = (),
     actual: ActualPorts | None = None,
 ) -> Motion:
-    """The motion behind accelerances at s (n, F); where hits and sensors were, if that is known."""
-    if actual is None:
-        points = matrices.hit.shape[1]
-        both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
-        x = _solutions(matrices, elasticity, s, mass, both, added)
-        return Motion(matrices, x[:, :, :points], x[:, :, points:], s)
-    matrices = actual.turned(matrices)
-    mass = (matrices.mass if mass is None else mass) + actual.heavier(matrices)
-    rows = np.concatenate([actual.hit_jacobian(matrices), actual.sensor_jacobian(matrices)], axis=1)
+    """The motion behind accelerances at s (n, F); where hits and sensors were, if that is known.
+
+    `mass` (n, e, e) takes M's place.
+    """
+    mass = matrices.mass if mass is None else mass
+    hit, sensor = matrices.hit, matrices.sensor
+    if actual is not None:
+        matrices = actual.turned(matrices)
+        mass = mass + actual.heavier(matrices)
+        hit, sensor = actual.hit_jacobian(matrices), actual.sensor_jacobian(matrices)
+    rows = np.concatenate([hit, sensor], axis=1)
     x = _solutions(matrices, elasticity, s, mass, rows, added)
-    points = actual.hit.shape[2]
-    return Motion(matrices, x[:, :, :points], x[:, :, points:], s, actual=actual)
+    points = hit.shape[1]
+    return Motion(matrices, x[:, :, :points], x[:, :, points:], s, actual)
 
 
 def motion_slopes(
@@ -146,12 +147,11 @@ def _solutions(
     matrices: Matrices,
     elasticity: Elasticity,
     s: np.ndarray,
-    mass: np.ndarray | None,
+    mass: np.ndarray,
     rows: np.ndarray,
     added: Sequence[Impedance] = (),
 ) -> np.ndarray:
     """X = Z⁻¹ rowsᵀ as (n, e, rows, F)."""
-    mass = matrices.mass if mass is None else mass
     z = (s**2)[..., None, None] * mass[:, None]
     z += matrices.geometric[:, None]
     diagonal = np.einsum("...ii->...i", z)
@@ -170,9 +170,10 @@ def _by_inertia(
     n, bodies, _, e = inertias.jacobians.shape
     lines = s.shape[1]
     for i in range(n):
-        jacobian = inertias.jacobians[i].reshape(-1, e)
-        hit = _times(jacobian, x_hit[i]).reshape(bodies, 6, -1, lines)
-        sensor = _times(jacobian, x_sensor[i] * -(s[i] ** 4)).reshape(bodies, 6, -1, lines)
+        jacobian = inertias.jacobians[i].reshape(1, -1, e)
+        hit = times_real(jacobian, x_hit[i, None]).reshape(bodies, 6, -1, lines)
+        sensor = times_real(jacobian, x_sensor[i, None] * -(s[i] ** 4))
+        sensor = sensor.reshape(bodies, 6, -1, lines)
         _between(inertias.basis, sensor, hit, out[i].reshape(bodies, -1, *out.shape[2:]))
 
 
@@ -199,9 +200,3 @@ def _between(shapes: np.ndarray, sensor: np.ndarray, hit: np.ndarray, out: np.nd
 @cache
 def _upper(size: int) -> tuple[np.ndarray, np.ndarray]:
     return np.triu_indices(size)
-
-
-def _times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Real matrix (r, e) times complex columns (e, ..., F): one real product of both parts."""
-    flat = np.ascontiguousarray(columns).reshape(columns.shape[0], -1)
-    return (matrix @ flat.view(float)).view(complex).reshape(-1, *columns.shape[1:])

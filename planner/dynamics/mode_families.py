@@ -6,7 +6,6 @@ modes apart that look alike at the tool.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -21,14 +20,8 @@ STEP_RAD = 0.02
 LEAST_HZ = 1e-3  # stands for a mode that has no frequency: gravity is stronger than the springs
 FREQUENCY_STEP = 0.3  # of log frequency in one step: as unlikely as a shape unlike the one before
 
-Undamped = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
-
-
-@dataclass(frozen=True, eq=False)
-class _Modes:
-    frequency_hz: np.ndarray  # (n, e)
-    shape: np.ndarray  # (n, e, e)
-    mass: np.ndarray  # (n, e, e)
+Modes = tuple[np.ndarray, np.ndarray, np.ndarray]  # of `undamped_modes`
+Undamped = Callable[[np.ndarray], Modes]
 
 
 class Families:
@@ -50,8 +43,8 @@ class Families:
         self._hubs = _hubs(np.vstack([reference, poses]))
         distance = np.linalg.norm(self._hubs[:, None] - self._hubs[None], axis=2)
         order, parent = breadth_first_order(minimum_spanning_tree(distance), 0, directed=False)
-        self._net = _Modes(*undamped(self._hubs))
-        self._places = np.tile(np.arange(self._net.shape.shape[2]), (len(self._hubs), 1))
+        self._net = undamped(self._hubs)
+        self._places = np.tile(np.arange(self._net[0].shape[1]), (len(self._hubs), 1))
         ends = self._hubs[order[1:]]
         for i, turn in zip(order[1:], self._turns(parent[order[1:]], ends), strict=True):
             self._places[i] = turn[self._places[parent[i]]]
@@ -68,7 +61,7 @@ class Families:
             return []
         paths = [_path(self._hubs[h], end) for h, end in zip(hub, ends, strict=True)]
         stops = np.cumsum([0, *[len(path) for path in paths]])
-        way = _Modes(*self._undamped(np.vstack(paths)))
+        way = self._undamped(np.vstack(paths))
         turns = []
         for h, first, last in zip(hub, stops[:-1], stops[1:], strict=True):
             turn = _follow(self._net, h, way, first)
@@ -93,10 +86,11 @@ def _path(start: np.ndarray, end: np.ndarray) -> np.ndarray:
     return start + (end - start) * np.arange(1, count + 1)[:, None] / count
 
 
-def _follow(a: _Modes, i: int, b: _Modes, j: int) -> np.ndarray:
+def _follow(a: Modes, i: int, b: Modes, j: int) -> np.ndarray:
     """For each mode of pose i of `a` the one of pose j of `b` that is most like it."""
-    alike = (a.shape[i].T @ b.mass[j] @ b.shape[j]) ** 2
-    apart = np.log(b.frequency_hz[j] / a.frequency_hz[i][:, None]) / FREQUENCY_STEP
+    (hertz, shape, _), (other_hertz, other_shape, mass) = a, b
+    alike = (shape[i].T @ mass[j] @ other_shape[j]) ** 2
+    apart = np.log(other_hertz[j] / hertz[i][:, None]) / FREQUENCY_STEP
     return least_cost(apart**2 - alike)[1]
 
 
@@ -130,9 +124,7 @@ def _partners(damped_hz: np.ndarray, undamped_hz: np.ndarray) -> np.ndarray:
     return out
 
 
-def undamped_modes(
-    mass: np.ndarray, stiffness: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def undamped_modes(mass: np.ndarray, stiffness: np.ndarray) -> Modes:
     """Of M and K (n, e, e): frequencies (n, e), mass-normalised shapes, and M again."""
     square, shapes = normal_modes(mass, stiffness)
     least = (2 * np.pi * LEAST_HZ) ** 2

@@ -144,7 +144,7 @@ def synthesis(rows: np.ndarray, x: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def times_real(ports: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Real ports (n, r, e) times complex motions (n, e, points, F)."""
+    """Real ports (n, r, e) times complex motions (n, e, points, F), in one real product."""
     n, r, _ = ports.shape
     flat = np.ascontiguousarray(x).reshape(n, x.shape[1], -1).view(float)
     return (ports @ flat).view(complex).reshape(n, r, *x.shape[2:])

@@ -95,8 +95,7 @@ class Simulation:
     def frequencies(self, q: np.ndarray, count: int) -> SimulatedModes:
         """The same modes by frequency and damping alone, in half the time; residues are empty."""
         m, none = self.elastic.matrices(q), np.zeros((len(q), 0, self.elastic.size))
-        solved = solve_poles(m.mass, self.damping, self.stiffness + m.geometric, none, none)
-        return oscillatory(solved, count)
+        return oscillatory(self.solved(replace(m, hit=none, sensor=none)), count)
 
     def families(self, reference: np.ndarray, poses: np.ndarray) -> Families:
         """Families of modes followed from `reference` (dof,) over `poses` (n, dof), in rad."""

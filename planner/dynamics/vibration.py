@@ -96,16 +96,11 @@ def solve_poles(
 
 def normal_modes(mass: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Undamped modes of M and K (n, e, e): ω² (n, e), ascending, and mass-normalised shapes."""
-    lower = np.linalg.cholesky(mass)
-    square, vectors = eigen(_whiten(lower, stiffness))
-    return square, np.linalg.solve(np.swapaxes(lower, 1, 2), vectors)
-
-
-def _whiten(lower: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """L⁻¹ A L⁻ᵀ, symmetric."""
-    half = np.linalg.solve(lower, np.broadcast_to(matrix, lower.shape))
+    lower = np.linalg.cholesky(mass)  # M = L Lᵀ, and L⁻¹ K L⁻ᵀ is symmetric
+    half = np.linalg.solve(lower, np.broadcast_to(stiffness, lower.shape))
     full = np.linalg.solve(lower, np.swapaxes(half, 1, 2))
-    return (full + np.swapaxes(full, 1, 2)) / 2
+    square, vectors = eigen((full + np.swapaxes(full, 1, 2)) / 2)
+    return square, np.linalg.solve(np.swapaxes(lower, 1, 2), vectors)
 
 
 def _proportional(
@@ -159,13 +154,8 @@ def _eigen(state: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray
     def solve(part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         if not force.shape[2]:
             return np.linalg.eigvals(state[part]).astype(complex), 0 * state[part], force[part]
-        values, vectors = np.linalg.eig(state[part])
-        vectors = vectors.astype(complex)
-        return (
-            values.astype(complex),
-            vectors,
-            np.linalg.solve(vectors, force[part].astype(complex)),
-        )
+        values, vectors = (found.astype(complex) for found in np.linalg.eig(state[part]))
+        return values, vectors, np.linalg.solve(vectors, force[part].astype(complex))
 
     if len(state) < MANY:
         return solve(slice(None))

@@ -165,7 +165,7 @@ def comparison(
             why = next(iter(failed.values())).reason
             raise InputError(f"Every run of {name} failed: {why}")
         curves[name] = Curves.of(own)
-    refused = tuple(RefusedFile(r.file, r.reason) for p in poses for r in p.refused)
+    refused = tuple(file for pose in poses for file in pose.refused)
     simulated = any(p.simulated for p in poses)
     return ComparisonReport(bench, study, curves, failed, refused, remarks, simulated)
 

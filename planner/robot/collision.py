@@ -3,6 +3,7 @@
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from functools import cached_property, lru_cache
+from itertools import combinations
 
 import coal
 import numpy as np
@@ -37,22 +38,18 @@ class Collisions:
 
     def __init__(self, robot: Robot):
         self.robot = robot
-        self._check_names()
-
-    def _check_names(self) -> None:
-        config, model = self.robot.config, self.robot.model
-        obstacles = {block.name for block in config.obstacle}
-        links = {str(f.name) for f in model.frames if f.type == pin.FrameType.BODY}
+        obstacles = {block.name for block in robot.config.obstacle}
+        links = {str(f.name) for f in robot.model.frames if f.type == pin.FrameType.BODY}
         for name in sorted(obstacles & links):
             raise InputError(
-                f'{self.robot.path}: [[obstacle]] "{name}" has the name of a link of '
-                f"{self.robot.urdf_path.name}; rename it."
+                f'{robot.path}: [[obstacle]] "{name}" has the name of a link of '
+                f"{robot.urdf_path.name}; rename it."
             )
-        for name in (name for pair in config.collision.ignore for name in pair):
+        for name in (name for pair in robot.config.collision.ignore for name in pair):
             if name not in obstacles | links:
                 raise InputError(
-                    f'{self.robot.path}: [collision] ignore names "{name}", which is neither a '
-                    f"link of {self.robot.urdf_path.name} nor an [[obstacle]]; correct it."
+                    f'{robot.path}: [collision] ignore names "{name}", which is neither a '
+                    f"link of {robot.urdf_path.name} nor an [[obstacle]]; correct it."
                 )
 
     @property
@@ -64,20 +61,18 @@ class Collisions:
         bare = f"{self.robot.urdf_path.name} has no collision geometry"
         look = "Look at each pose before the robot moves there."
         if not self.nothing_checked:
+            names, file = [b.name for b in self.robot.config.obstacle], self.robot.path.name
+            obstacles = f"the obstacles of {file} ({', '.join(names)})"
+            if len(names) > NAMED:
+                obstacles = f"all {len(names)} obstacles of {file}"
             return (
                 f"{left or f'{bare}.'} Instead, thin lines from joint to joint, up to the tool's "
-                f"tip, are checked against {self._named_obstacles()}: links are thicker, and may "
-                f"touch each other. {look}"
+                f"tip, are checked against {obstacles}: links are thicker, and may touch each "
+                f"other. {look}"
             )
         if left:
             return f"Nothing is checked for collision: {left} {look}"
         return f"Nothing is checked for collision, because {bare}. {look}"
-
-    def _named_obstacles(self) -> str:
-        names = [block.name for block in self.robot.config.obstacle]
-        if len(names) > NAMED:
-            return f"all {len(names)} obstacles of {self.robot.path.name}"
-        return f"the obstacles of {self.robot.path.name} ({', '.join(names)})"
 
     @property
     def overlapping(self) -> tuple[str, ...]:
@@ -85,18 +80,14 @@ class Collisions:
         return self._geometry[3]
 
     @property
-    def _links(self) -> tuple[pin.GeometryModel, tuple[UnusableShape, ...]]:
-        return _link_geometry(self.robot)
-
-    @property
     def left_out(self) -> tuple[UnusableShape, ...]:
         """Shapes of the URDF that cannot be used."""
-        return self._links[1]
+        return _link_geometry(self.robot)[1]
 
     @property
     def none_checked(self) -> bool:
         """Whether no link has a shape that can be checked."""
-        return not self._links[0].ngeoms
+        return not _link_geometry(self.robot)[0].ngeoms
 
     @property
     def nothing_checked(self) -> bool:
@@ -111,11 +102,12 @@ class Collisions:
     def with_pairs(self) -> tuple[pin.GeometryModel, tuple[str, ...]]:
         """Shapes with the pairs to check, and which pairs of links overlap."""
         robot = self.robot
-        geometry = self._links[0].copy()
+        geometry = _link_geometry(robot)[0].copy()
         links = list(range(geometry.ngeoms))
-        for i, j in [(i, j) for i in links for j in links if i < j]:
-            a, b = geometry.geometryObjects[i], geometry.geometryObjects[j]
-            if not self._ignored(geometry, i, j) and not _neighbours(robot.model, a, b):
+        for i, j in combinations(links, 2):
+            a, b = (geometry.geometryObjects[k].parentJoint for k in (i, j))
+            near = a == b or robot.model.parents[a] == b or robot.model.parents[b] == a
+            if not near and not self._ignored(geometry, i, j):
                 geometry.addCollisionPair(pin.CollisionPair(i, j))
         overlapping = self._drop_overlapping(geometry)
         if not links:
@@ -228,11 +220,6 @@ def _obstacles(robot: Robot) -> list[pin.GeometryObject]:
         placement = pin.SE3(rotation, np.array(block.center_m, dtype=float))
         made.append(pin.GeometryObject(block.name, 0, placement, coal.Box(*block.size_m)))
     return made
-
-
-def _neighbours(model: pin.Model, a: pin.GeometryObject, b: pin.GeometryObject) -> bool:
-    i, j = a.parentJoint, b.parentJoint
-    return i == j or model.parents[i] == j or model.parents[j] == i
 
 
 def _link_lines(robot: Robot) -> list[pin.GeometryObject]:

@@ -1,6 +1,7 @@
 """robot.toml read and checked: what is wrong is said in one sentence."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,13 +9,14 @@ import msgspec
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.joints import JointUnits
+from planner.recording.joints import AxisColumn, JointUnits
 from planner.robot.config import (
     BASE,
     LISTS,
     LOSS_FACTOR_BELOW,
     STATED,
     Compliance,
+    ControllerTable,
     DiagnoseTable,
     HitsTable,
     ReadbackTable,
@@ -28,10 +30,6 @@ from planner.words import command
 
 if TYPE_CHECKING:
     from planner.robot.robot import Robot
-from dataclasses import replace
-
-from planner.recording.joints import AxisColumn
-from planner.robot.config import ControllerTable
 
 LARGEST_SD_PERCENT = 1000.0  # a factor of 11 either way: beyond, nothing is stated
 # Of springs (N·m/rad, N/m) and dampers: 10⁷ times a heavy robot's.
@@ -45,11 +43,7 @@ def load_config(path: Path) -> RobotConfig:
         raise InputError(f"{path} is a URDF; robot.toml is made of it by {begin} --mass-kg M.")
     config = load_toml(path, RobotConfig, "robot.toml")
     _check(config, path)
-    return with_effects(config, path)
-
-
-def with_effects(config: RobotConfig, path: Path) -> RobotConfig:
-    """The config as its file has it, with what its effects add; InputError where that is wrong."""
+    # What effects add stands in the other lists, after their own.
     added = {
         name: (*getattr(config, name), *(x for e in config.effects for x in getattr(e, name)))
         for name in LISTS
@@ -192,10 +186,7 @@ def _check_payloads(config: RobotConfig, path: Path) -> None:
         moments = symmetric(block.inertia_kg_m2, STATED)
         finite = bool(np.all(np.isfinite(moments)))
         if not finite or np.linalg.eigvalsh(moments)[0] < -1e-9 * np.abs(moments).max():
-            raise InputError(
-                f"{entry} has inertia_kg_m2 {list(block.inertia_kg_m2)}, which no body can have; "
-                f"give xx, xy, xz, yy, yz, zz in kg·m² about its centre of mass."
-            )
+            raise _no_body(entry, block.inertia_kg_m2)
 
 
 def _check_links(config: RobotConfig, path: Path) -> None:
@@ -216,10 +207,14 @@ def _check_links(config: RobotConfig, path: Path) -> None:
         _finite(f"{entry}: centre_m", table.centre_m, 1e2, "3 lengths in m")
         moments = np.linalg.eigvalsh(symmetric(table.inertia_kg_m2, STATED))
         if moments[0] < 0 or moments[0] + moments[1] < moments[2] * (1 - 1e-6):
-            raise InputError(
-                f"{entry} has inertia_kg_m2 {list(table.inertia_kg_m2)}, which no body can have; "
-                f"give xx, xy, xz, yy, yz, zz in kg·m² about its centre of mass."
-            )
+            raise _no_body(entry, table.inertia_kg_m2)
+
+
+def _no_body(entry: str, moments: Sequence[float]) -> InputError:
+    return InputError(
+        f"{entry} has inertia_kg_m2 {list(moments)}, which no body can have; give xx, xy, xz, yy, "
+        f"yz, zz in kg·m² about its centre of mass."
+    )
 
 
 def _check_obstacles(config: RobotConfig, path: Path) -> None:

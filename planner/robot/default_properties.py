@@ -68,7 +68,11 @@ def default_inertias(robot: Robot, mass_kg: float | None) -> tuple[LinkTable, ..
     open_ = [n for n in parts if n not in known]
     if not open_:
         return ()
-    density = _density(weights, stated, known, mass_kg)
+    told, weight = sum(stated[n] for n in known), sum(weights[n] for n in known)
+    if mass_kg is not None and mass_kg > told:
+        density = (mass_kg - told) / (sum(weights.values()) - weight)
+    else:
+        density = told / weight
     tables = []
     for number in open_:
         whole = sum(float(s.mass) for s in parts[number].values())
@@ -87,17 +91,6 @@ def _believed(weights: Mapping[int, float], stated: list[float], mass_kg: float 
     return {n for n, density in some.items() if 1 / NO_BODY < density / usual < NO_BODY}
 
 
-def _density(
-    weights: Mapping[int, float], stated: list[float], known: set[int], mass_kg: float | None
-) -> float:
-    """kg for each unit of weight of the bodies that are not known."""
-    told, weight = sum(stated[n] for n in known), sum(weights[n] for n in known)
-    left = sum(weights.values()) - weight
-    if mass_kg is not None and mass_kg > told:
-        return (mass_kg - told) / left
-    return told / weight
-
-
 def _parts(robot: Robot) -> dict[int, dict[str, pin.Inertia]]:
     """By body, counted from the base: solids of its links, or one of its usual size."""
     solids, found = link_solids(robot), {}
@@ -112,7 +105,7 @@ def _parts(robot: Robot) -> dict[int, dict[str, pin.Inertia]]:
 def _usual(robot: Robot, number: int, body: BodyShape) -> pin.Inertia:
     """A cylinder from a body's joint to what it carries, as large as such bodies are."""
     arm = robot.arm_m or 1.0
-    beyond = min(_beyond(robot, number) / arm, 1.0)
+    beyond = min(robot.beyond_m(number) / arm, 1.0)
     volume = ((LEAST + MORE * np.sqrt(beyond)) * arm) ** 3
     end = body.ends_m[np.argmax(np.linalg.norm(body.ends_m, axis=1))]
     length = max(float(np.linalg.norm(end)), float(volume) ** (1 / 3))
@@ -122,30 +115,13 @@ def _usual(robot: Robot, number: int, body: BodyShape) -> pin.Inertia:
     return pin.SE3(turn, np.asarray(end) / 2).act(cylinder)
 
 
-def _beyond(robot: Robot, number: int) -> float:
-    """Length in m from a body's joint along the arm to the tcp, its own included."""
-    model = robot.model
-    tcp = model.frames[robot.tcp_id]
-    length, joint = float(np.linalg.norm(tcp.placement.translation)), tcp.parentJoint
-    while joint > max(number, 0) and model.parents[joint] != 0:
-        length += float(np.linalg.norm(model.jointPlacements[joint].translation))
-        joint = model.parents[joint]
-    return length
-
-
 def _table(link: str, solid: pin.Inertia, mass: float) -> LinkTable:
     """A solid of any density as a [[link]] of `mass` in kg, in numbers as they are written."""
     moments = solid.inertia * (mass / solid.mass)
     x, y, z = (round(float(v), 4) for v in solid.lever)
     xx, xy, xz, yy, yz, zz = (float(f"{v:.4g}") for v in moments[np.triu_indices(3)])
-    return LinkTable(
-        link,
-        float(f"{mass:.4g}"),
-        (x, y, z),
-        (xx, xy, xz, yy, yz, zz),
-        SD_PERCENT,
-        guessed=True,
-    )
+    mass, moments = float(f"{mass:.4g}"), (xx, xy, xz, yy, yz, zz)
+    return LinkTable(link, mass, (x, y, z), moments, SD_PERCENT, guessed=True)
 
 
 def link_solids(robot: Robot) -> dict[str, pin.Inertia]:
@@ -161,20 +137,12 @@ def link_solids(robot: Robot) -> dict[str, pin.Inertia]:
             if kind == "visual" and link.get("name", "") in found:
                 for part in link.findall(kind):
                     link.remove(part)
-        for name, solid in _solids(robot, root, kind):
-            found[name] = found[name] + solid if name in found else solid
-    return found
-
-
-def _solids(robot: Robot, root: ElementTree.Element, kind: str) -> list[tuple[str, pin.Inertia]]:
-    geometry = build_geometry(robot.model, root, kind)
-    found = []
-    for shape in geometry.geometryObjects:
-        frame = robot.model.frames[shape.parentFrame]
-        solid = _solid(shape.geometry)
-        if solid is not None:
-            place = frame.placement.inverse() * shape.placement
-            found.append((str(frame.name), place.act(solid)))
+        for shape in build_geometry(robot.model, root, kind).geometryObjects:
+            frame, solid = robot.model.frames[shape.parentFrame], _solid(shape.geometry)
+            if solid is not None:
+                solid = (frame.placement.inverse() * shape.placement).act(solid)
+                name = str(frame.name)
+                found[name] = found[name] + solid if name in found else solid
     return found
 
 
@@ -266,24 +234,16 @@ def carried(robot: Robot, payload_kg: float) -> np.ndarray:
 
 def _springs(robot: Robot, name: str, axis: np.ndarray, load: float) -> list[Compliance]:
     """A joint's own spring, and two across it: as stiff by guess, in truth each as it is."""
-    own = _direction(axis)
-    if robot.slides(name):
-        k = _rounded(load / GIVES_M)
-        return [Compliance(name, own, k, 0.0, slide=True, stiffness_sd_percent=SPRING_SD_PERCENT)]
-    k = _rounded(load / GIVES_RAD)
-    blocks = [Compliance(name, own, k, 0.0, stiffness_sd_percent=SPRING_SD_PERCENT)]
-    across = np.linalg.svd(axis[None])[2][1:]
-    k_across = _rounded(ACROSS * load / GIVES_RAD)
-    for direction in across:
-        tilt = _direction(direction)
-        blocks.append(Compliance(name, tilt, k_across, 0.0, stiffness_sd_percent=SPRING_SD_PERCENT))
+    slides = robot.slides(name)
+    ways = [(axis, load / (GIVES_M if slides else GIVES_RAD))]
+    if not slides:
+        ways += [(way, ACROSS * load / GIVES_RAD) for way in np.linalg.svd(axis[None])[2][1:]]
+    blocks = []
+    for way, k in ways:
+        x, y, z = (round(float(v), 9) + 0.0 for v in way)  # as they are written
+        given = {"slide": slides, "stiffness_sd_percent": SPRING_SD_PERCENT}
+        blocks.append(Compliance(name, (x, y, z), _rounded(k), 0.0, **given))
     return blocks
-
-
-def _direction(axis: np.ndarray) -> tuple[float, float, float]:
-    """An axis (3,) in numbers as they are written."""
-    x, y, z = (round(float(v), 9) + 0.0 for v in axis)
-    return x, y, z
 
 
 def _alike(blocks: list[Compliance], inertia: np.ndarray) -> list[float]:

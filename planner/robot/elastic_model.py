@@ -14,6 +14,7 @@ leaves the others as they are.
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -41,8 +42,7 @@ class AngleSlopes:
     sensor: np.ndarray
     stiffness: np.ndarray
 
-    def at(self, poses: slice | np.ndarray) -> "AngleSlopes":
-        """Of some of the poses."""
+    def __getitem__(self, poses: slice | np.ndarray) -> "AngleSlopes":
         return AngleSlopes(*(values[poses] for values in vars(self).values()))
 
 
@@ -68,30 +68,22 @@ class Matrices:
 
     def at(self, poses: slice | np.ndarray) -> "Matrices":
         """Of some of the poses."""
-        names = [name for name in self.__dataclass_fields__ if name != "by_angle"]
-        slopes = None if self.by_angle is None else self.by_angle.at(poses)
-        return Matrices(*(getattr(self, name)[poses] for name in names), by_angle=slopes)
+        return Matrices(**{name: v[poses] for name, v in vars(self).items() if v is not None})
 
     def replaced(self, poses: np.ndarray, other: "Matrices") -> "Matrices":
         """With those of `other` at some of the poses."""
-        names = [name for name in self.__dataclass_fields__ if name != "by_angle"]
+
+        def put(these: Matrices | AngleSlopes, others: Matrices | AngleSlopes) -> dict[str, Any]:
+            arrays = vars(these).items()
+            out = {name: v.copy() for name, v in arrays if isinstance(v, np.ndarray)}
+            for name, values in out.items():
+                values[poses] = getattr(others, name)
+            return out
+
         slopes = None
         if self.by_angle is not None and other.by_angle is not None:
-            slopes = AngleSlopes(**_put(self.by_angle, poses, other.by_angle))
-        return Matrices(**_put(self, poses, other, names), by_angle=slopes)
-
-
-def _put(
-    these: Matrices | AngleSlopes,
-    poses: np.ndarray,
-    others: Matrices | AngleSlopes,
-    names: Sequence[str] = (),
-) -> dict[str, np.ndarray]:
-    """Arrays of these, in rows `poses` those of others."""
-    out = {name: getattr(these, name).copy() for name in names or these.__dataclass_fields__}
-    for name, values in out.items():
-        values[poses] = getattr(others, name)
-    return out
+            slopes = AngleSlopes(**put(self.by_angle, other.by_angle))
+        return Matrices(**put(self, other), by_angle=slopes)
 
 
 class ElasticModel:
@@ -230,12 +222,16 @@ class ElasticModel:
         """Of Jacobians (n, points, 6, v) of hits and sensors."""
         places = self._virtual.rigid, self._elastic
         inertia = np.einsum("bk,kij->bij", self.inertia, inertia_basis())
-        mass = mass_slopes(self._bodies(q), inertia, *places)
+        bodies = self._bodies(q)  # M = Σ Jᵀ I J
+        slope, momentum = turned(bodies, *places), inertia @ (bodies @ self._elastic)
+        n, _, dof, _, e = slope.shape
+        rows = np.moveaxis(slope, (2, 4), (1, 2)).reshape(n, dof * e, -1)
+        half = (rows @ momentum.reshape(n, -1, e)).reshape(n, dof, e, e)
         stiffness = np.array([self._angle_slope(row) for row in q])
         # (n, points, dof, 3, e), the points side by side with their axes.
         moved = (np.moveaxis(turned(ends, *places)[..., :3, :], 1, 2) for ends in (hits, sensors))
-        hit, sensor = (one.reshape(*stiffness.shape[:2], -1, self.size) for one in moved)
-        return AngleSlopes(mass, hit, sensor, stiffness)
+        hit, sensor = (one.reshape(n, dof, -1, e) for one in moved)
+        return AngleSlopes(half + np.swapaxes(half, 2, 3), hit, sensor, stiffness)
 
     def body_jacobians(self, q: np.ndarray) -> np.ndarray:
         """(n, bodies, 6, e) at q (n, dof) in rad: how the elastic rotations move the bodies.
@@ -269,10 +265,13 @@ class ElasticModel:
 
     def _standing(self, q: np.ndarray, data: pin.Data) -> np.ndarray:
         """Coordinates of the virtual model at q (dof,), sagged unless robot.toml says otherwise."""
-        upright = self._upright(q)
-        if not self.robot.config.geometric_stiffness:
-            return upright
-        return self._sagged(upright, self._carrying + self._with_angle(q), data)
+        full = upright = self._upright(q)
+        if self.robot.config.geometric_stiffness:
+            stiffness = self._carrying + self._with_angle(q)
+            for _ in range(SAG_STEPS):  # K δ = −g(q + δ)
+                weight = pin.computeGeneralizedGravity(self._weighed, data, full)
+                full = upright - self._elastic @ ((weight @ self._elastic) / stiffness)
+        return full
 
     def _upright(self, q: np.ndarray) -> np.ndarray:
         """Coordinates of the virtual model at q (dof,), without weight."""
@@ -295,14 +294,6 @@ class ElasticModel:
             slope = wave.sine * np.cos(angle) - wave.cosine * np.sin(angle)
             change[joint, number] += wave.order * slope
         return change
-
-    def _sagged(self, upright: np.ndarray, stiffness: np.ndarray, data: pin.Data) -> np.ndarray:
-        """Where springs of this stiffness (e,) carry the weight: K δ = −g(q + δ)."""
-        full = upright
-        for _ in range(SAG_STEPS):
-            weight = pin.computeGeneralizedGravity(self._weighed, data, full)
-            full = upright - self._elastic @ ((weight @ self._elastic) / stiffness)
-        return full
 
     def _gravity_stiffness(self, full: np.ndarray, data: pin.Data) -> np.ndarray:
         """Second derivative of the potential energy of the weight, (e, e)."""
@@ -329,15 +320,3 @@ def turned(jacobian: np.ndarray, rigid: np.ndarray, elastic: np.ndarray) -> np.n
     moved = cross(angular, linear) + cross(linear, angular)
     slopes = -np.concatenate([moved, cross(angular, angular)], axis=-2) @ elastic[giving]
     return np.moveaxis(np.tensordot(rigid[turning], slopes, axes=(0, -3)), 0, -3)
-
-
-def mass_slopes(
-    bodies: np.ndarray, inertia: np.ndarray, rigid: np.ndarray, elastic: np.ndarray
-) -> np.ndarray:
-    """(n, dof, e, e) of M = Σ Jᵀ I J, of Jacobians (n, B, 6, v) and inertias (B, 6, 6)."""
-    slope = turned(bodies, rigid, elastic)
-    momentum = inertia @ (bodies @ elastic)
-    n, _, dof, _, e = slope.shape
-    rows = np.moveaxis(slope, (2, 4), (1, 2)).reshape(n, dof * e, -1)
-    half = (rows @ momentum.reshape(n, -1, e)).reshape(n, dof, e, e)
-    return half + np.swapaxes(half, 2, 3)

@@ -10,21 +10,15 @@ from planner.robot.robot import Robot
 
 TOLERANCE = 1e-6  # m and rad
 DAMPING = 1e-3
-STALLED = 12  # iterations without progress after which a descent is given up
-OUT_OF_REACH = "out of reach"
+ITERATIONS, STALLED = 60, 12  # of a descent; without progress, after which it is given up
 
 
 @dataclass(frozen=True, eq=False)
 class InverseResult:
-    """Joint angles (dof,) in rad (slides: m), or None with the reason in words and its kind.
-
-    `kind` holds no figures, so that kinds can be counted: "out of reach", "limit of joint_3" or
-    "link_4 touches table".
-    """
+    """Joint angles (dof,) in rad (slides: m), or None with the reason in words."""
 
     q: np.ndarray | None
     reason: str = ""
-    kind: str = ""
 
 
 def solve(
@@ -66,11 +60,7 @@ def solve(
                 return InverseResult(q)
             contact = contact or contacts[0]
         miss_m = min(miss_m, error_m)
-    if contact:
-        return InverseResult(None, contact, contact)
-    if limit:
-        return InverseResult(None, limit, f"limit of {limit.split(' at ')[0]}")
-    return _unreached(miss_m)
+    return InverseResult(None, contact or limit) if contact or limit else _unreached(miss_m)
 
 
 def singularity(robot: Robot, q: np.ndarray) -> np.ndarray:
@@ -81,13 +71,13 @@ def singularity(robot: Robot, q: np.ndarray) -> np.ndarray:
     """
     arm = robot.arm_m or 1.0  # of a gantry whose joints all meet in one point
     scale = np.repeat([1 / arm, 1.0], 3)[:, None] * np.where(robot.joints.slides, arm, 1.0)
-    both = [np.linalg.svd(scale * robot.jacobian(row), compute_uv=False)[-1] for row in q]
-    return np.array(both)
+    return np.array([np.linalg.svd(scale * robot.jacobian(row), compute_uv=False)[-1] for row in q])
 
 
 def _unreached(miss_m: float) -> InverseResult:
-    text = f"{OUT_OF_REACH}: the tool comes no closer than {miss_m:.3f} m in this orientation"
-    return InverseResult(None, text, OUT_OF_REACH)
+    return InverseResult(
+        None, f"out of reach: the tool comes no closer than {miss_m:.3f} m in this orientation"
+    )
 
 
 def _beyond_limits(
@@ -108,12 +98,12 @@ def _beyond_limits(
 
 
 def _descend(
-    robot: Robot, target: pin.SE3, start: np.ndarray, bounded: bool, iterations: int = 60
+    robot: Robot, target: pin.SE3, start: np.ndarray, bounded: bool
 ) -> tuple[np.ndarray | None, float]:
     """Solution or None, and the position error left (m)."""
     q, damping = start.copy(), DAMPING
     best, since, at = np.inf, 0, robot.placement(q)
-    for _ in range(iterations):
+    for _ in range(ITERATIONS):
         error = pin.log6(at.actInv(target)).vector
         size = float(np.linalg.norm(error))
         if size < TOLERANCE:
@@ -135,8 +125,7 @@ def _descend(
         if bounded:
             q = np.clip(q, robot.lower_rad, robot.upper_rad)
         at = robot.placement(q)
-    left = float(np.linalg.norm(target.translation - at.translation))
-    return None, left
+    return None, float(np.linalg.norm(target.translation - at.translation))
 
 
 def _step(jacobian: np.ndarray, error: np.ndarray, damping: float) -> np.ndarray:

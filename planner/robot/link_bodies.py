@@ -50,6 +50,7 @@ def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
     root = ElementTree.fromstring(robot.urdf_text)
     left = (*robot.left_out, *leave_out_unreadable(root))
     shapes, tables = shape_corners(root), {table.link: table for table in robot.config.link}
+    joints = root.findall("joint")
     names, lacking = ("", *robot.linkage.names), {one.link for one in left}
     found = []
     for link in root.findall("link"):
@@ -59,7 +60,9 @@ def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
         frame = robot.model.frames[robot.model.getFrameId(name, pin.FrameType.BODY)]
         joint = names[frame.parentJoint]
         inertia = link_inertia(link)
-        corners = np.array([*shapes.get(name, []), *_carried(root, name), np.zeros(3)])
+        carried = (j for j in joints if any(p.get("link") == name for p in j.findall("parent")))
+        ends = [vector(j, "origin", "xyz") for j in carried]
+        corners = np.array([*shapes.get(name, []), *ends, np.zeros(3)])
         found.append(
             LinkBody(
                 name=name,
@@ -105,16 +108,6 @@ def lowest_m(robot: Robot, q: np.ndarray, joints: Sequence[str]) -> float:
     return min(found)
 
 
-def _carried(root: ElementTree.Element, link: str) -> list[np.ndarray]:
-    """Origins of the joints that a link carries, in its frame."""
-    carried = (joint for joint in root.findall("joint") if joint.find("origin") is not None)
-    return [
-        vector(joint, "origin", "xyz")
-        for joint in carried
-        if (parent := joint.find("parent")) is not None and parent.get("link") == link
-    ]
-
-
 APART_M = 1e-6  # joints nearer than this lie at one point
 
 
@@ -133,16 +126,14 @@ class BodyShape:
 
 def bodies(robot: Robot) -> tuple[BodyShape, ...]:
     """The base, then one body a joint in the robot's order."""
-    return tuple(_body(robot, number) for number in range(robot.model.njoints))
-
-
-def _body(robot: Robot, number: int) -> BodyShape:
-    model, tcp = robot.model, robot.model.frames[robot.tcp_id]
-    ends = [end for k in model.children[number] for end in _ends(robot, int(k))]
-    ends += [tcp.placement.translation] if tcp.parentJoint == number else []
-    apart = [np.array(end) for end in ends if np.linalg.norm(end) > APART_M]
-    links = tuple(frame.name for frame in robot.body_frames(number))
-    return BodyShape(links[0], links, np.array(apart or [np.zeros(3)]))
+    model, tcp, found = robot.model, robot.model.frames[robot.tcp_id], []
+    for number in range(model.njoints):
+        ends = [end for k in model.children[number] for end in _ends(robot, int(k))]
+        ends += [tcp.placement.translation] if tcp.parentJoint == number else []
+        apart = [np.array(end) for end in ends if np.linalg.norm(end) > APART_M]
+        links = tuple(frame.name for frame in robot.body_frames(number))
+        found.append(BodyShape(links[0], links, np.array(apart or [np.zeros(3)])))
+    return tuple(found)
 
 
 def _ends(robot: Robot, joint: int) -> list[np.ndarray]:
@@ -214,40 +205,34 @@ def robot_lines(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Rob
     def place_of(name: str) -> pin.SE3:
         return data.oMf[model.getFrameId(name, pin.FrameType.BODY)]
 
-    axes = zip(robot.joint_names, robot.joint_axes, robot.linkage.leads, strict=True)
-    joints = [
-        (name, data.oMi[k + 1].translation.copy(), data.oMi[k + 1].rotation @ axis)
-        for name, axis, k in axes
+    lines = [
+        (data.oMi[number].translation.copy(), data.oMi[number].act(np.asarray(end)))
+        for number, body in enumerate(bodies(robot))
+        for end in body.ends_m
+        if np.any(end)
     ]
+    stand = zip(robot.joint_names, robot.joint_places(q), strict=True)
     named = {robot.config.tcp_frame: robot.tcp_id, robot.config.sensor_frame: robot.sensor_id}
-    frames = [
-        (name, data.oMf[number].translation.copy(), data.oMf[number].rotation.copy())
-        for name, number in named.items()
-    ]
+    rotations, places = placements(robot, q, list(named.values()))
     masses = [(b.mass, place_of(b.name).act(b.com_m)) for b in links if b.joint and b.mass > 0]
-    shapes = []
-    root = ElementTree.fromstring(robot.urdf_text)
-    for name, corners in shape_corners(root).items():
-        for box in np.array(corners).reshape(-1, 8, 3):
-            shapes.append(np.array([place_of(name).act(corner) for corner in box]))
-    return RobotLines(_links(robot, data), joints, frames, masses, shapes, _obstacles(robot))
-
-
-def _links(robot: Robot, data: pin.Data) -> list[tuple[np.ndarray, np.ndarray]]:
-    found = []
-    for number, body in enumerate(bodies(robot)):
-        for end in body.ends_m:
-            if np.any(end):
-                place = data.oMi[number]
-                found.append((place.translation.copy(), place.act(np.asarray(end))))
-    return found
+    shapes = [
+        np.array([place_of(name).act(corner) for corner in box])
+        for name, corners in shape_corners(ElementTree.fromstring(robot.urdf_text)).items()
+        for box in np.array(corners).reshape(-1, 8, 3)
+    ]
+    return RobotLines(
+        lines,
+        [(name, *placed) for name, placed in stand],
+        list(zip(named, places, rotations, strict=True)),
+        masses,
+        shapes,
+        _obstacles(robot),
+    )
 
 
 def _obstacles(robot: Robot) -> list[np.ndarray]:
-    found = []
+    found, signs = [], np.array(list(np.ndindex(2, 2, 2))) - 0.5
     for block in robot.config.obstacle:
         rotation = pin.rpy.rpyToMatrix(*np.deg2rad(block.rpy_deg))
-        half = np.array(block.size_m) / 2
-        signs = 2 * np.array(list(np.ndindex(2, 2, 2))) - 1
-        found.append(np.array(block.center_m) + (signs * half) @ rotation.T)
+        found.append(np.array(block.center_m) + (signs * block.size_m) @ rotation.T)
     return found

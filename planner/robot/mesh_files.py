@@ -31,11 +31,6 @@ def find_mesh(urdf: Path, name: str) -> Path | None:
     return next((place for place in _places(urdf.absolute(), name) if _has_content(place)), None)
 
 
-def find_package(urdf: Path, name: str) -> Path | None:
-    """The folder of a package as a URDF names it; None if missing."""
-    return next((p for p in _packages(urdf.absolute(), name) if p.is_dir()), None)
-
-
 def _places(urdf: Path, name: str) -> Iterator[Path]:
     parts, above = _parts(name), urdf.parents
     if not parts:
@@ -157,7 +152,7 @@ def _finding_packages(urdf: Path) -> Iterator[None]:
         return
 
     def folder(package: str) -> str:
-        found = find_package(urdf, package)
+        found = next((p for p in _packages(urdf.absolute(), package) if p.is_dir()), None)
         if found is None:
             raise LookupError(f"package {package} cannot be found")
         return str(found)

@@ -67,13 +67,14 @@ class Robot:
     @classmethod
     def of(cls, config: RobotConfig, robot_toml: Path) -> "Robot":
         """Of what robot.toml says, or would say if it stood there."""
-        urdf = _resolved(robot_toml, config.urdf)
-        return cls._built(config, robot_toml, urdf, read_urdf(urdf, robot_toml, config.held))
-
-    @classmethod
-    def _built(
-        cls, config: RobotConfig, robot_toml: Path, urdf: Path, root: ElementTree.Element
-    ) -> "Robot":
+        try:
+            urdf = (robot_toml.parent / config.urdf).resolve()
+        except (OSError, ValueError) as error:  # a name that no file can have
+            raise InputError(
+                f"{robot_toml}: its URDF {config.urdf!r} cannot be read ({error}); correct the "
+                f"entry urdf."
+            ) from None
+        root = read_urdf(urdf, robot_toml, config.held)
         left_out = leave_out_unusable(root, urdf)
         state_inertias(root, config.link)
         text = ElementTree.tostring(root, encoding="unicode")
@@ -139,15 +140,10 @@ class Robot:
         """Whether an elastic degree of freedom is a shift of a joint that slides."""
         return block.slide and block.joint in self.joint_names and self.slides(block.joint)
 
-    def turning_stiffness(self, joint: str = "") -> tuple[float, ...]:
-        """Stated stiffnesses (N·m/rad) of rotations at a joint, where it has any, or of all.
-
-        Where all springs slide: what they are worth at a lever of LEVER_M.
-        """
-        turning = [b for b in self.config.compliance if not b.slide]
-        sliding = [b.stiffness * LEVER_M**2 for b in self.config.compliance]
-        at = [b.stiffness for b in turning if b.joint == joint]
-        return tuple(at or [b.stiffness for b in turning] or sliding)
+    def turning_stiffness(self) -> tuple[float, ...]:
+        """Stated stiffnesses (N·m/rad) of rotations; without any, of slides at LEVER_M."""
+        turning = [b.stiffness for b in self.config.compliance if not b.slide]
+        return tuple(turning or [b.stiffness * LEVER_M**2 for b in self.config.compliance])
 
     def carries(self, link: str) -> tuple[int, int] | None:
         """Numbers of the joint that moves a link and of the one that it carries, if it does."""
@@ -257,7 +253,12 @@ class Robot:
     @cached_property
     def arm_m(self) -> float:
         """Length of the arm pulled straight, joints that slide at their zeros."""
-        places = [self.model.jointPlacements[k + 1] for k in self.tool_chain[:-1]]
+        return self.beyond_m(0)
+
+    def beyond_m(self, joint: int) -> float:
+        """That of what lies beyond a joint, by Pinocchio's number, towards the tcp."""
+        numbers = (k + 1 for k in self.tool_chain[:-1])
+        places = [self.model.jointPlacements[k] for k in numbers if k > joint]
         places.append(self.model.frames[self.tcp_id].placement)
         return float(sum(np.linalg.norm(place.translation) for place in places))
 
@@ -280,9 +281,8 @@ class Robot:
     def forward_batch(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rotations (n, 3, 3) and positions (n, 3) of the tcp at q (n, dof)."""
         both = [self.forward(row) for row in np.atleast_2d(q)]
-        n = len(both)
-        rotation = np.array([r for r, _ in both]).reshape(n, 3, 3)
-        return rotation, np.array([p for _, p in both]).reshape(n, 3)
+        rotation = np.array([r for r, _ in both]).reshape(-1, 3, 3)
+        return rotation, np.array([p for _, p in both]).reshape(-1, 3)
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
         """Jacobian (6, dof) of the tcp in its own frame, linear part first."""
@@ -290,12 +290,3 @@ class Robot:
             self.model, self._data, self.linkage.at(q), self.tcp_id, pin.LOCAL
         )
         return of_all @ self.linkage.spread
-
-
-def _resolved(robot_toml: Path, urdf: str) -> Path:
-    try:
-        return (robot_toml.parent / urdf).resolve()
-    except (OSError, ValueError) as error:  # a name that no file can have
-        raise InputError(
-            f"{robot_toml}: its URDF {urdf!r} cannot be read ({error}); correct the entry urdf."
-        ) from None

@@ -98,10 +98,12 @@ def shape_corners(root: ElementTree.Element) -> dict[str, list[np.ndarray]]:
     for link in root.findall("link"):
         corners = found.setdefault(link.get("name", ""), [])
         for part in link.findall("collision") or link.findall("visual"):
-            box = _box(part)
-            if box is not None:
+            shape = _shape(part)
+            if shape is not None:
+                shape.computeLocalAABB()
+                low, high = np.array(shape.aabb_local.min_), np.array(shape.aabb_local.max_)
                 for signs in np.ndindex(2, 2, 2):
-                    corners.append(place_of(part).act(np.where(signs, box[1], box[0])))
+                    corners.append(place_of(part).act(np.where(signs, high, low)))
     return found
 
 
@@ -167,12 +169,3 @@ def _fault(part: ElementTree.Element, urdf: Path) -> str:
     if not sizes.size or not np.all((sizes > 0) & (sizes < LARGEST_M)):
         return f"a {shape.tag} of size {', '.join(f'{v:g}' for v in sizes) or 'unknown'}"
     return ""
-
-
-def _box(part: ElementTree.Element) -> tuple[np.ndarray, np.ndarray] | None:
-    """Lowest and highest corner (3,) of the box around a shape, in its own frame."""
-    shape = _shape(part)
-    if shape is None:
-        return None
-    shape.computeLocalAABB()
-    return np.array(shape.aabb_local.min_), np.array(shape.aabb_local.max_)

@@ -9,7 +9,7 @@ from planner.robot.config import BASE
 from planner.robot.mesh_files import urdf_source
 from planner.robot.robot import Robot
 from planner.robot.urdf_elements import link_inertia, state_inertias, write_inertia
-from planner.robot.virtual_joints import OUTER, SMALL, body_inertia, cut_at
+from planner.robot.virtual_joints import OUTER, SMALL, body_inertia, cut_at, ends_of
 
 SAFE = 0.99  # of the largest share of a change that leaves a body possible
 
@@ -34,7 +34,9 @@ def urdf_with_inertias(
         if body.endswith(OUTER):
             body, values = _of_whole(robot, body.removesuffix(OUTER), values)
         if np.any(values) and not body.startswith(f"{SMALL} "):
-            frame = _heaviest(robot, body, links)
+            frames = robot.body_frames(_joint_of(robot, body))
+            stated = [frame for frame in frames if frame.name in links]
+            frame = max(stated, key=lambda frame: link_inertia(links[frame.name]).mass)
             if body == BASE and not link_inertia(links[frame.name]).mass:
                 continue  # what `massless_base` gave it is no matter
             share = _change(links[frame.name], _seen_from(frame.placement, values))
@@ -44,10 +46,8 @@ def urdf_with_inertias(
 
 def _of_whole(robot: Robot, link: str, values: np.ndarray) -> tuple[str, np.ndarray]:
     """The joint that moves a link, and a change (10,) of its outer half as one of the link's."""
-    carried = robot.carries(link)
-    assert carried is not None  # otherwise the link has no halves
     there = pin.SE3(np.eye(3), -cut_at(robot, link))
-    return str(robot.model.names[carried[0]]), _seen_from(there, values)
+    return str(robot.model.names[ends_of(robot, link)[0]]), _seen_from(there, values)
 
 
 def _joint_of(robot: Robot, body: str) -> int:
@@ -55,14 +55,6 @@ def _joint_of(robot: Robot, body: str) -> int:
     if body == BASE and BASE not in robot.joint_names:
         return 0
     return list(robot.model.names).index(body)
-
-
-def _heaviest(robot: Robot, body: str, links: dict) -> pin.Frame:
-    frames = robot.body_frames(_joint_of(robot, body))
-    return max(
-        (frame for frame in frames if frame.name in links),
-        key=lambda frame: link_inertia(links[frame.name]).mass,
-    )
 
 
 def stated_shares(robot: Robot, body: str) -> tuple[tuple[float, float], ...]:

@@ -44,28 +44,21 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
     source, model = robot.model, pin.Model()
     model.gravity = pin.Motion(np.array([*robot.config.gravity, 0.0, 0.0, 0.0]))
     last, ends, own, springs, small = _add_joints(robot, model)
-    names: list[str] = []
-    carriers: list[int] = []
-    bodies: list[np.ndarray] = []
+    bodies: list[tuple[str, int, np.ndarray]] = []
     for joint in (joint for joint in range(source.njoints) if last[joint]):
         name, whole = (str(source.names[joint]) if joint else BASE), body_inertia(robot, joint)
         if ends[joint][0] == last[joint]:
-            parts = [(name, last[joint], whole)]
+            bodies.append((name, last[joint], whole))
         else:
             inner, outer = _halves(whole, -ends[joint][1].translation)
             half = robot.link_of(name) + OUTER
-            parts = [(name, last[joint], inner), (half, ends[joint][0], outer)]
-        for name, carrier, values in parts:
-            names.append(name)
-            carriers.append(carrier)
-            bodies.append(values)
+            bodies += [(name, last[joint], inner), (half, ends[joint][0], outer)]
     for number, block in enumerate(robot.config.resonator):
-        names.append(f"{SMALL} {number + 1}")
-        carriers.append(small[number])
-        bodies.append(np.array([block.mass, *np.zeros(9)]))
-    order = range(len(robot.config.resonator))
-    springs = np.append(springs, [model.joints[small[k]].idx_q for k in order]).astype(int)
-    inertia = np.array(bodies)
+        mass = np.array([block.mass, *np.zeros(9)])
+        bodies.append((f"{SMALL} {number + 1}", small[number], mass))
+        springs = np.append(springs, model.joints[small[number]].idx_q)
+    names, carriers, each = zip(*bodies, strict=True)
+    inertia = np.array(each)
     if inertia_change is not None:
         inertia = inertia + inertia_change
     for carrier, values in zip(carriers, inertia, strict=True):
@@ -74,9 +67,7 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
     rigid, offset = np.zeros((model.nq, len(robot.joint_names))), np.zeros(model.nq)
     rigid[own], offset[own] = robot.linkage.spread, robot.linkage.offset
     elastic = _elastic(robot, own, springs, model.nq)
-    return VirtualModel(
-        model, rigid, offset, elastic, tuple(names), tuple(carriers), inertia, frames
-    )
+    return VirtualModel(model, rigid, offset, elastic, names, carriers, inertia, frames)
 
 
 def _elastic(robot: Robot, own: np.ndarray, springs: np.ndarray, size: int) -> np.ndarray:
@@ -124,10 +115,7 @@ def halves_moved(robot: Robot, link: str) -> tuple[float, np.ndarray]:
 
     They are those of the inner and the outer half when their centres move apart along x, y, z.
     """
-    carried = robot.carries(link)
-    assert carried is not None  # otherwise the link has no halves
-    half = cut_at(robot, link)
-    whole = body_inertia(robot, carried[0])
+    half, whole = cut_at(robot, link), body_inertia(robot, ends_of(robot, link)[0])
     inner, outer = _halves(whole, half)
     apart = float(np.linalg.norm(outer[1:4] / outer[0] + half - inner[1:4] / inner[0])) / 2
     slope = np.zeros((3, 2, 10))
@@ -140,9 +128,14 @@ def halves_moved(robot: Robot, link: str) -> tuple[float, np.ndarray]:
 
 def cut_at(robot: Robot, link: str) -> np.ndarray:
     """Where a link that bends is cut into halves, (3,) in m of the frame that carries it."""
+    return robot.model.jointPlacements[ends_of(robot, link)[1]].translation / 2
+
+
+def ends_of(robot: Robot, link: str) -> tuple[int, int]:
+    """Numbers of the joints that move and that hang on a link that bends."""
     carried = robot.carries(link)
     assert carried is not None  # otherwise the link has no halves
-    return robot.model.jointPlacements[carried[1]].translation / 2
+    return carried
 
 
 def _halves(
@@ -226,12 +219,7 @@ def _end(
 
 
 def _add_joint(
-    model: pin.Model,
-    parent: int,
-    axis: np.ndarray,
-    placement: pin.SE3,
-    name: str,
-    slide: bool = False,
+    model: pin.Model, parent: int, axis: np.ndarray, placement: pin.SE3, name: str, slide: bool
 ) -> int:
     make = pin.JointModelPrismaticUnaligned if slide else pin.JointModelRevoluteUnaligned
     return model.addJoint(parent, make(axis / np.linalg.norm(axis)), placement, name)

@@ -112,8 +112,18 @@ class Workspace:
             unit = sampler.random_base2(exponent)[: TRIES * n]
             span = (self.upper - self.lower)[self.varying]
             points[:, self.varying] = self.lower[self.varying] + unit * span
-        found = self._reachable(robot, points, n, collisions, rejected)
-        if not len(found):
+        found: list[np.ndarray] = []
+        places: list[np.ndarray] = []
+        for point in points:
+            if len(found) == n:
+                break
+            q, reason = self._posed(robot, point, collisions, found, places)
+            if q is None or reason:
+                rejected[reason] += 1
+            else:
+                found.append(q)
+                places.append(point)
+        if not found:
             reason, _ = rejected.most_common(1)[0]
             raise NoPoseLeftError(
                 f"No pose of the workspace can be reached ({reason}); change [workspace]."
@@ -121,26 +131,7 @@ class Workspace:
         q = np.array(found)
         return Candidates(q, self.features(robot, q), robot.forward_batch(q)[1], dict(rejected))
 
-    def _reachable(
-        self, robot: Robot, points: np.ndarray, n: int, collisions: Collisions, rejected: Counter
-    ) -> list[np.ndarray]:
-        found: list[np.ndarray] = []
-        places: list[np.ndarray] = []
-        for point in points:
-            if len(found) == n:
-                break
-            if self.tool_axis is None:
-                q, reason = point, _first(collisions, point)
-            else:
-                q, reason = self._solve(robot, point, collisions, found, places)
-            if q is None or reason:
-                rejected[reason] += 1
-            else:
-                found.append(q)
-                places.append(point)
-        return found
-
-    def _solve(
+    def _posed(
         self,
         robot: Robot,
         point: np.ndarray,
@@ -148,13 +139,17 @@ class Workspace:
         found: list[np.ndarray],
         places: list[np.ndarray],
     ) -> tuple[np.ndarray | None, str]:
-        """IK from the nearest solved neighbour, so that one branch of solutions is kept."""
+        """Angles at a point, and what keeps the robot from standing there, "" if nothing does.
+
+        IK is from the nearest solved neighbour, so that one branch of solutions is kept.
+        """
+        if self.tool_axis is None:
+            return point, "" if collisions.free(point) else collisions.violations(point)[0]
         if not found:
             return self._first_branch(robot, point, collisions)
         distance = np.linalg.norm((np.array(places) - point), axis=1)
         near = found[int(np.argmin(distance))]
-        rotation = self.rotation(point[3])
-        result = solve(robot, rotation, point[:3], near, collisions, restarts=0)
+        result = solve(robot, self.rotation(point[3]), point[:3], near, collisions, restarts=0)
         return result.q, result.reason
 
     def _first_branch(
@@ -199,12 +194,6 @@ def ranges_inside(
     rounded = np.array([np.ceil(low - 1e-6), np.floor(high + 1e-6)]) / parts
     rounded = np.where(rounded[0] <= rounded[1], rounded, np.array([low, high]) / parts)
     return (rounded.T + 0.0).tolist()
-
-
-def _first(collisions: Collisions, q: np.ndarray) -> str:
-    if collisions.free(q):
-        return ""
-    return collisions.violations(q)[0]
 
 
 def _joint_box(cls, ranges: list[tuple[float, float]], robot: Robot) -> Workspace:

@@ -35,15 +35,6 @@ class OutputPrior:
     nugget_spread: float | None = None
     nugget_shared: float = 0.0
 
-    def of_theta(self, kernel: Kernel) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (p,) of a kernel's hyperparameters θ, which are logarithms."""
-        mean, sd = kernel.prior(
-            self.amplitude, self.nugget, self.length, self.spread, self.length_spread
-        )
-        if self.nugget_spread is not None:
-            sd[1] = self.nugget_spread
-        return mean, sd
-
 
 @dataclass(frozen=True, eq=False)
 class AR1:
@@ -151,7 +142,11 @@ def _unknown_sd(low: np.ndarray, priors: tuple[OutputPrior, ...]) -> np.ndarray:
 
 
 def _stack(priors: list[OutputPrior], uses_low: np.ndarray, kernel: Kernel) -> Prior:
-    theta = [p.of_theta(kernel) for p in priors]
+    theta = [
+        kernel.prior(p.amplitude, p.nugget, p.length, p.spread, p.length_spread) for p in priors
+    ]
+    for (_, sd), p in zip(theta, priors, strict=True):
+        sd[1] = p.spread if p.nugget_spread is None else p.nugget_spread
     return Prior(
         mean=np.array([p.mean for p in priors]) * ~uses_low,
         bias_sd=np.array([p.bias_sd for p in priors]),

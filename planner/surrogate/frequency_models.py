@@ -21,7 +21,7 @@ from planner.surrogate.average import (
     fit_plain_or_free,
     unsimulated,
 )
-from planner.surrogate.kernels import KERNELS
+from planner.surrogate.kernels import KERNELS, perdikaris
 from planner.surrogate.training_data import TrainingData
 
 DEFAULT = "default"
@@ -90,14 +90,9 @@ def _ar1(seen: FrequencyData) -> Average:
 
 
 def _nargp(seen: FrequencyData) -> Average:
-    from planner.surrogate.models.likelihood_gp import (
-        perdikaris,  # by JAX, which takes a second to import
-    )
-
     product = perdikaris(seen.data.x.shape[1], seen.kernel)
-    return Average.of_one(
-        seen.ar1(seen.data, product, sees_low=True, thorough=len(seen.data.x) > 1)
-    )
+    many = len(seen.data.x) > 1
+    return Average.of_one(seen.ar1(seen.data, product, sees_low=True, thorough=many))
 
 
 def _none(seen: FrequencyData) -> Average:

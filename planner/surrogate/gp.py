@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 
 from planner.errors import InputError
 from planner.inference import triangular
-from planner.surrogate.importance import Gaussians, Score, Stage, normal_points, sample
+from planner.surrogate.importance import Gaussians, Score, normal_points, sample
 from planner.surrogate.kernels import parse
 from planner.surrogate.training_data import Padded, Prior, data_covariance, thinned
 
@@ -214,7 +214,7 @@ def fit(
     weighed = np.sum((more or [first])[-1].mask, axis=1)
     for jitter in JITTERS:
         score, *scores = [_score(kernel, part, prior, jitter) for part in (first, *more)]
-        later = [Stage(s, max(samples // 2**i, 1)) for i, s in enumerate(scores, 1)]
+        later = [(s, max(samples // 2**i, 1)) for i, s in enumerate(scores, 1)]
         try:
             z, evidence = sample(score, normal, m, kept, start, prior.nugget_shared, later)
         except np.linalg.LinAlgError:

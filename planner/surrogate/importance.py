@@ -6,7 +6,6 @@ prior × likelihood over the mixture they came from (deterministic mixture weigh
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -47,18 +46,10 @@ def _normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
     return ndtri(np.clip(unit, 1e-6, 1 - 1e-6))
 
 
-@dataclass(frozen=True)
-class Stage:
-    """A score and how many points it is asked for."""
-
-    score: Score
-    count: int
-
-
 def sample(
     score: Score, normal: list[np.ndarray], outputs: int, kept: int,
     start: Gaussians | None = None, shared: np.ndarray | None = None,
-    later: Sequence[Stage] = (),
+    later: Sequence[tuple[Score, int]] = (),
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """`kept` points z (m, kept, p) of equal weight from N(0, 1) × exp(score); log of its integral.
 
@@ -66,16 +57,17 @@ def sample(
     Gaussian around what weighs most so far; `start` is the first of these Gaussians, if there is
     one. `shared` (m,) is the share of the prior variance of the second coordinate that all outputs
     have in common, so that each also learns from the others (the integral stays its own). With
-    `later` stages, whose scores replace this one, each takes a set more and looks only around what
-    the one before favours. LinAlgError if an output has no finite score.
+    `later` stages, each a score that replaces this one and for how many points, each takes a set
+    more and looks only around what the one before favours. LinAlgError if an output has no finite
+    score.
     """
     first = len(normal) - len(later)
     points, log_weight = _from_prior(score, normal[:first], outputs, start)
-    for stage, base in zip(later, normal[first:], strict=True):
+    for (narrower, count), base in zip(later, normal[first:], strict=True):
         centre, root = _around(points, shares(log_weight, axis=1))
         wide = LATER_INFLATION * root
-        points = centre[:, None, :] + base[: stage.count] @ np.swapaxes(wide, 1, 2)
-        like = stage.score(points)
+        points = centre[:, None, :] + base[:count] @ np.swapaxes(wide, 1, 2)
+        like = narrower(points)
         if not np.isfinite(like).any(axis=1).all():
             raise np.linalg.LinAlgError
         log_weight = like + _log_normal(points) - _log_gaussian(points, centre, wide)

@@ -75,12 +75,7 @@ def matern52(xp: Any, xa: Any, xb: Any) -> Any:
 
 
 KERNELS: dict[str, Shape] = {
-    "bias": bias,
-    "linear": linear,
-    "quadratic": quadratic,
-    "cubic": cubic,
-    "rbf": rbf,
-    "matern52": matern52,
+    shape.__name__: shape for shape in (bias, linear, quadratic, cubic, rbf, matern52)
 }
 SCALELESS = frozenset({"bias"})
 
@@ -145,6 +140,16 @@ class Kernel:
                 mean[f.scales] = np.log(length * np.sqrt(max(width, 1)))
                 sd[f.scales] = length_spread
         return mean, sd
+
+
+def perdikaris(d: int, shape: str = "rbf") -> str:
+    """Expression k_ρ(x) k_f(l) + k_δ(x) over (x_1 … x_d, l), l of a level below: NARGP."""
+    return f"{shape}[0:{d}]*{shape}[{d}:{d + 1}]+{shape}[0:{d}]"
+
+
+def kennedy_ohagan(d: int) -> str:
+    """Expression σ² l l' + k_δ(x) over the same columns: AR1."""
+    return f"linear[{d}:{d + 1}]+rbf[0:{d}]"
 
 
 @lru_cache(maxsize=256)

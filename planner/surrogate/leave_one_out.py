@@ -15,7 +15,7 @@ from planner.surrogate.ar1 import AR1
 from planner.surrogate.average import mixed
 from planner.surrogate.frf_bands import ModalPrediction
 from planner.surrogate.gp import Posterior
-from planner.surrogate.modal_surrogate import ModalObservations, Surrogate
+from planner.surrogate.modal_surrogate import ModalObservations, Surrogate, residue_parts
 
 LEVELS = (0.5, 0.8, 0.9, 0.95)
 
@@ -39,10 +39,14 @@ class LeaveOneOut:
             return np.full(len(levels), np.nan)
         return np.array([np.mean(np.abs(known - 0.5) <= level / 2) for level in levels])
 
+    @property
+    def surprise(self) -> np.ndarray:
+        """(n, m) errors in sds of what was expected of them, 0 where there is none."""
+        return np.where(np.isfinite(self.error), np.abs(self.error / self.sd), 0.0)
+
     def worst(self, count: int = 3) -> np.ndarray:
-        """Indices of the measurements whose errors are largest for what was expected of them."""
-        size = np.where(np.isfinite(self.error), np.abs(self.error / self.sd), 0.0).max(axis=1)
-        return np.argsort(-size, kind="stable")[:count]
+        """Indices of the measurements that surprise most."""
+        return np.argsort(-self.surprise.max(axis=1), kind="stable")[:count]
 
 
 def leave_one_out(outputs: Sequence[Posterior], measurements: int) -> LeaveOneOut:
@@ -75,21 +79,17 @@ def left_out_modes(surrogate: Surrogate, seen: ModalObservations) -> ModalPredic
     n, k = seen.frequency_hz.shape
     plain = surrogate.predict(seen.x, seen.simulated)
     assert surrogate.residue is not None
-    frequency = _without(
-        [surrogate.primary.most_probable], np.ones((1, k)), np.log(seen.frequency_hz)
-    )
+    alone, one = [surrogate.primary.most_probable], np.ones((1, k))
+    frequency = _without(alone, one, np.log(seen.frequency_hz))
     fits = surrogate.damping
     weights = fits.weights[fits.counted]
     damping = _without([fits.models[i] for i in fits.counted], weights, np.log(seen.damping_ratio))
     hertz = _log_normal(frequency, plain.frequency_hz, plain.frequency_sd_hz)
     zeta = _log_normal(damping, plain.damping_ratio, plain.damping_sd)
     scale = surrogate.scale[:, None, None]
-    parts = np.stack([seen.residue.real, seen.residue.imag], axis=-1) / scale[..., None]
-    parts[np.isnan(seen.residue)] = np.nan
-    mean, sd = _without(
-        [surrogate.residue.most_probable], np.ones((1, 18 * k)), parts.reshape(n, 18 * k)
-    )
-    mean, sd = (v.reshape(n, k, 3, 3, 2) for v in (mean, sd))
+    parts = residue_parts(seen.residue) / np.repeat(surrogate.scale, 18)
+    found = _without([surrogate.residue.most_probable], np.ones((1, 18 * k)), parts)
+    mean, sd = (v.reshape(n, k, 3, 3, 2) for v in found)
     known = np.isfinite(mean).all(axis=-1)
     residue = np.where(known, scale * (mean[..., 0] + 1j * mean[..., 1]), plain.residue)
     both = np.where(known, scale * np.sqrt(np.mean(sd**2, axis=-1)), plain.residue_sd)
@@ -129,9 +129,7 @@ def report(residuals: LeaveOneOut, poses: tuple[str, ...], outputs: tuple[str, .
         f"frequencies {' and '.join(inside)}."
     ]
     for i in residuals.worst():
-        score = np.where(
-            np.isfinite(residuals.error[i]), np.abs(residuals.error[i] / residuals.sd[i]), 0.0
-        )
+        score = residuals.surprise[i]
         j = int(np.argmax(score))
         if score[j] > 2:
             lines.append(f"{poses[i]}: {outputs[j]} is {score[j]:.1f} sd off what the others say.")

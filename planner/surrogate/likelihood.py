@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -71,11 +72,13 @@ def log_likelihoods(
 @jax_setup.compiled("quick", static_argnums=0)
 def _likelihoods(kernel: str, jitter: float, theta: Array, *data: Array) -> Array:
     """(s,) at θ (s, p), each with data of its own."""
+    return jax.vmap(partial(_likelihood, kernel, jitter))(theta, *data)
 
-    def one(theta: Array, x: Array, y: Array, *rest: Array) -> Array:
-        return log_marginal(data_covariance(jnp, kernel, theta, jitter, x, *rest), y)
 
-    return jax.vmap(one)(theta, *data)
+def _likelihood(
+    kernel: str, jitter: float, theta: Array, x: Array, y: Array, *rest: Array
+) -> Array:
+    return log_marginal(data_covariance(jnp, kernel, theta, jitter, x, *rest), y)
 
 
 def laplace(kernel: str, padded: Padded, prior: Prior) -> tuple[np.ndarray, np.ndarray]:
@@ -85,8 +88,7 @@ def laplace(kernel: str, padded: Padded, prior: Prior) -> tuple[np.ndarray, np.n
         zip(*_outputs(padded, prior), strict=True), prior.theta_mean, prior.theta_sd, strict=True
     ):
         z = _most_probable(kernel, data, mean, sd)
-        x, _, *rest = data
-        covariance = np.linalg.inv(_precision(kernel, z, mean, sd, x, *rest))
+        covariance = np.linalg.inv(_precision(kernel, z, mean, sd, data[0], *data[2:]))
         centres.append(z)
         roots.append(np.linalg.cholesky((covariance + covariance.T) / 2))
     return np.array(centres), np.array(roots)
@@ -124,15 +126,9 @@ def _most_probable(kernel: str, data: _Data, mean: np.ndarray, sd: np.ndarray) -
 
 
 @jax_setup.compiled(static_argnums=0)
-def log_likelihood(
-    kernel: str, theta: Array, jitter: float, x: Array, y: Array, *rest: Array
-) -> tuple[Array, Array]:
+def log_likelihood(kernel: str, theta: Array, jitter: float, *data: Array) -> tuple[Array, Array]:
     """Of one output's data at θ (p,), without the constant, and its slope in θ."""
-
-    def likelihood(theta: Array) -> Array:
-        return log_marginal(data_covariance(jnp, kernel, theta, jitter, x, *rest), y)
-
-    return jax.value_and_grad(likelihood)(theta)
+    return jax.value_and_grad(lambda theta: _likelihood(kernel, jitter, theta, *data))(theta)
 
 
 @jax_setup.compiled(static_argnums=0)
@@ -169,8 +165,7 @@ def maximise(
         log_density: maps x (p,) to the log density and its gradient (p,); where either is not
             finite, x is infeasible and the step is shortened. jax arrays may be returned.
         starts: points (p,) to begin at, one at least.
-        lower: least value of each entry of x, one for all or (p,).
-        upper: greatest value of each entry of x, one for all or (p,).
+        lower, upper: bounds of the entries of x, one for all or (p,).
         most_steps: iterations from each start.
         relative_tolerance: an iteration that gains less than this share of the log density is the
             last.
@@ -178,7 +173,6 @@ def maximise(
     Returns:
         The highest end; the first start with −∞ where the log density was nowhere finite.
     """
-
     from scipy.optimize import minimize  # 0.6 s, which few poses do not need
 
     def negative(x: np.ndarray) -> tuple[float, np.ndarray]:
@@ -192,14 +186,8 @@ def maximise(
     bounds = list(zip(lower * ones, upper * ones, strict=True))
     best = Peak(np.asarray(starts[0]), -np.inf)
     for start in starts:
-        done = minimize(
-            negative,
-            start,
-            jac=True,
-            method="L-BFGS-B",
-            bounds=bounds,
-            options={"maxiter": most_steps, "ftol": relative_tolerance},
-        )
+        how = {"maxiter": most_steps, "ftol": relative_tolerance}
+        done = minimize(negative, start, jac=True, method="L-BFGS-B", bounds=bounds, options=how)
         if done.fun < min(INFEASIBLE, -best.log_density):
             best = Peak(done.x, -float(done.fun))
     return best

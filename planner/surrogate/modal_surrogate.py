@@ -58,11 +58,6 @@ class ModalObservations:
         return ModalObservations(*(values[poses] for values in vars(self).values()))
 
 
-def simulated_log(seen: ModalObservations) -> np.ndarray:
-    """ln f (n, k) of the simulation, NaN where it has none."""
-    return _log(seen.simulated.frequency_hz)
-
-
 @dataclass(frozen=True, eq=False)
 class Surrogate:
     """The fitted models; immutable."""
@@ -118,9 +113,10 @@ class Surrogate:
             np.clip(x, *DAMPING_RANGE), _log(simulated.damping_ratio)
         )
         zeta = np.exp(log_zeta)
-        parts, parts_sd = self._parts(x, simulated)
-        parts = parts.reshape(q, k, 3, 3, 2) * self.scale[:, None, None, None]
-        parts_sd = parts_sd.reshape(q, k, 3, 3, 2) * self.scale[:, None, None, None]
+        wide, both = np.repeat(self.scale, 18), np.full((2, q, 18 * k), np.nan)
+        if self.residue is not None:
+            both = self.residue.predict(x, residue_parts(simulated.residue) / wide)
+        parts, parts_sd = (np.reshape(v * wide, (q, k, 3, 3, 2)) for v in both)
         return ModalPrediction(
             f,
             f_sd,
@@ -138,13 +134,6 @@ class Surrogate:
         f = np.exp(mean)
         return f, f * _relative_sd(sd)
 
-    def _parts(self, x: np.ndarray, simulated: SimulatedModes) -> tuple[np.ndarray, np.ndarray]:
-        """Scaled parts of the residues and their sd, (q, 18 k) each."""
-        if self.residue is None:
-            nothing = np.full((len(x), 18 * self.count), np.nan)
-            return nothing, nothing
-        return self.residue.predict(x, _parts(simulated.residue) / np.repeat(self.scale, 18))
-
 
 def _relative_sd(sd: np.ndarray) -> np.ndarray:
     """Sd of a log-normal variable over its median."""
@@ -157,7 +146,7 @@ def _log(value: np.ndarray) -> np.ndarray:
     return np.log(np.where(value > 0, value, np.nan))
 
 
-def _parts(residue: np.ndarray) -> np.ndarray:
+def residue_parts(residue: np.ndarray) -> np.ndarray:
     """(n, k, 3, 3) complex to (n, 18 k) real: per mode, row by row, real then imaginary."""
     both = np.stack([residue.real, residue.imag], axis=-1)
     both[np.isnan(residue)] = np.nan  # np.nan as a complex number is nan + 0j
@@ -184,10 +173,16 @@ def fit_primary(
             learn the simulation too.
     """
     k = seen.frequency_hz.shape[1]
+    priors = (FREQUENCY_PRIOR,) * k
+    if discrepancy is not None:
+        priors = tuple(
+            replace(FREQUENCY_PRIOR, bias_sd=size, slope_sd=size, amplitude=size, spread=0.5)
+            for size in map(float, discrepancy)
+        )
     y, low = _log(seen.frequency_hz), _log(seen.simulated.frequency_hz)
     data = FrequencyData(
         TrainingData(seen.x, y, seen.frequency_sd_hz / np.exp(y), low),
-        tuple(_frequency_priors(k, discrepancy)),
+        priors,
         (FREQUENCY_PRIOR_ALONE,) * k,
         _centre(low, np.full(k, FREQUENCY_PRIOR_ALONE.mean)),
         None if elsewhere is None else (elsewhere[0], _log(elsewhere[1])),
@@ -245,24 +240,15 @@ def _fit_residues(seen: ModalObservations, scale: np.ndarray, identified: bool) 
     """Fit the real and imaginary parts of every label's residues, in units of `scale`."""
     k, wide = len(scale), np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
-    low = _parts(seen.simulated.residue) / wide
+    low = residue_parts(seen.simulated.residue) / wide
     return fit_hedged(
-        TrainingData(seen.x, _parts(seen.residue) / wide, parts_sd / wide, low),
+        TrainingData(seen.x, residue_parts(seen.residue) / wide, parts_sd / wide, low),
         (RESIDUE_PRIOR_IDENTIFIED if identified else RESIDUE_PRIOR,) * (18 * k),
         (RESIDUE_PRIOR_ALONE,) * (18 * k),
         np.zeros(18 * k),
         RESIDUE_SAMPLES,
         RESIDUE_KEPT,
     )
-
-
-def _frequency_priors(k: int, discrepancy: np.ndarray | None) -> list[OutputPrior]:
-    if discrepancy is None:
-        return [FREQUENCY_PRIOR] * k
-    return [
-        replace(FREQUENCY_PRIOR, bias_sd=size, slope_sd=size, amplitude=size, spread=0.5)
-        for size in map(float, discrepancy)
-    ]
 
 
 def _centre(low: np.ndarray, default: np.ndarray) -> np.ndarray:

@@ -79,19 +79,16 @@ def capacity(n: int) -> int:
 
 def pad(data: TrainingData, uses_low: np.ndarray) -> Padded:
     """Pad to capacity. A value counts if it is known, and its low fidelity too where used."""
-    n, d = data.x.shape
-    m = data.y.shape[1]
-    c = capacity(n)
     known = np.isfinite(data.y) & ~np.isinf(data.sd) & (np.isfinite(data.low) | ~uses_low)
-    out = Padded(
-        np.zeros((c, d)), np.zeros((m, c)), np.ones((m, c)), np.zeros((m, c)), np.zeros((m, c))
-    )
-    out.x[:n] = data.x
-    out.mask[:, :n] = known.T
-    out.y[:, :n] = np.where(known, data.y, 0.0).T
-    out.variance[:, :n] = np.where(known, np.nan_to_num(data.sd), 1.0).T ** 2
-    out.low[:, :n] = np.where(known & uses_low, data.low, 0.0).T
-    return out
+    y, low = np.where(known, data.y, 0.0), np.where(known & uses_low, data.low, 0.0)
+    variance = np.where(known, np.nan_to_num(data.sd), 1.0) ** 2
+    more = capacity(len(data.x)) - len(data.x)
+
+    def padded(values: np.ndarray, by: float = 0.0) -> np.ndarray:
+        return np.pad(values.T, [(0, 0), (0, more)], constant_values=by)
+
+    x = np.pad(data.x, [(0, more), (0, 0)])
+    return Padded(x, padded(y), padded(variance, 1.0), padded(low), padded(known.astype(float)))
 
 
 def thinned(data: Padded, size: int) -> Padded:

@@ -22,17 +22,17 @@ from planner.dynamics.simulation import Simulation
 from planner.proof.deviation import Deviation
 from planner.proof.load import load_truth
 from planner.robot.robot import Robot
+from planner.surrogate.kernels import perdikaris
 from planner.surrogate.models.likelihood_gp import (
     NARGP,
     Normalisation,
     Samples,
     at_hyperparameters,
+    fit_likelihood,
     fit_nargp,
-    perdikaris,
 )
 from tests.support import published_peers
 from tests.support.fusion_problems import PROBLEMS, Design, Problem, design
-from tests.support.nargp_levels import fit_low
 
 SEEDS = int(os.environ.get("PEERS_SEEDS", "10"))
 NOISE = 1e-3  # sd over the cheap values' sd: the variance of 1e-6 that emukit's is given
@@ -85,7 +85,8 @@ def own_nargp(d: Design, theta_low=None, theta_high=None) -> tuple[NARGP, float]
     same = Normalisation(0.0, 1.0)
     cheap, measured = Samples.of(d.x_low, d.y_low), Samples.of(d.x_high, d.y_high)
     if theta_low is None or theta_high is None:
-        low = fit_low(cheap, NOISE, LOW_STARTS)
+        # Its noise is held, as in emukit, whose intermediate levels have a variance of 1e-4.
+        low = fit_likelihood(cheap, "rbf", NOISE, starts=LOW_STARTS)
         model = fit_nargp(measured, low, same, NOISE, same, STARTS)
     else:
         low = at_hyperparameters(cheap, "rbf", theta_low, same)

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.compare.curves import Curves, baseline_of, paired
-from planner.compare.score import score
+from planner.compare.curves import Curves, baseline_of, paired, score
 from planner.compare.tasks import Run
 
 HZ = np.array([[10.0, 20.0], [11.0, 24.0], [12.0, 22.0]])

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from planner.design.acquisitions import integrated_variance
 from planner.design.frequency_posterior import FrequencyOutputs, Target
-from planner.design.propose import ACQUISITIONS, propose
+from planner.design.propose import ACQUISITIONS
 from planner.design.space_filling import DESIGNS, NESTED
 from planner.errors import InputError
 from planner.surrogate.modal_surrogate import fit_surrogate
-from tests.support.scored_poses import X, conditioned_variance, over, with_parameters
+from tests.support.scored_poses import X, conditioned_variance, over, proposed, with_parameters
 from tests.support.surrogates import observed, simulated
 
 NAMES = [*ACQUISITIONS, *DESIGNS]
@@ -69,9 +69,7 @@ def test_variance_is_what_prediction_says_but_for_doubt_about_hyperparameters(su
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_strategy_returns_distinct_reachable_poses(surrogate, name):
-    taken = X[:20]
-    first = propose(name, surrogate, X, simulated(X), 5, taken, seed=3)
-    again = propose(name, surrogate, X, simulated(X), 5, taken, seed=3)
+    first, again = (proposed(name, surrogate, X, 5, 20) for _ in range(2))
     assert [p.index for p in first] == [p.index for p in again]
     assert len({p.index for p in first}) == 5
     assert all(p.index >= 20 for p in first)
@@ -79,12 +77,12 @@ def test_every_strategy_returns_distinct_reachable_poses(surrogate, name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_when_nothing_is_left_nothing_is_proposed(surrogate, name):
-    assert propose(name, surrogate, X[:3], simulated(X[:3]), 1, X[:3], seed=0) == ()
+    assert proposed(name, surrogate, X[:3], 1, 3) == ()
 
 
 def test_unknown_names_are_refused(surrogate):
     with pytest.raises(InputError, match="integrated_variance"):
-        propose("crystal_ball", surrogate, X, simulated(X), 1, None, seed=0)
+        proposed("crystal_ball", surrogate, X, 1)
 
 
 @pytest.mark.parametrize("name", NESTED)

@@ -18,7 +18,7 @@ from planner.design.acquisitions import (
 from planner.design.cost import Cost, axis_shares, best_axes, shortest_tour
 from planner.design.frequency_posterior import FrequencyOutputs, Target
 from planner.design.parameter_sensitivity import FrfNoise, UncertainParameters
-from planner.design.propose import ACQUISITIONS, Travel, propose
+from planner.design.propose import ACQUISITIONS, Travel
 from planner.design.stopping import forecast, left_out, mean_squares
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import Priors
@@ -30,8 +30,8 @@ from planner.measurement.nuisances import EXACT_HITS, Tolerances
 from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
-from tests.support.scored_poses import X, over, with_parameters
-from tests.support.surrogates import observed, simulated
+from tests.support.scored_poses import X, over, proposed, with_parameters
+from tests.support.surrogates import observed
 
 
 @pytest.fixture(scope="module")
@@ -258,14 +258,9 @@ def test_left_out_residuals_are_those_of_refits(surrogate):
 def test_the_best_gain_per_minute_is_near_and_tours_are_short(surrogate):
     q = np.random.default_rng(5).uniform(-1, 1, (len(X), 6))
     slow = Cost(np.full(6, 1e-3), per_pose=0.0, per_hit=1e-6)
-    picks = [
-        propose(
-            "integrated_variance", surrogate, X, simulated(X), 1, None, 0,
-            travel=Travel(Cost(np.full(6, speed), per_pose=0.0, per_hit=1e-6), q, q[0]),
-        )[0]
-        for speed in (1e-3, 1e-2)
-    ]  # fmt: skip
-    assert picks[0].index == picks[1].index == 0  # where it stands: no minutes
+    for cost in (slow, replace(slow, speed_rad_s=np.full(6, 1e-2))):
+        (pick,) = proposed("integrated_variance", surrogate, X, 1, travel=Travel(cost, q, q[0]))
+        assert pick.index == 0  # where it stands: no minutes
     order, legs = shortest_tour(slow, q[:8], q[100])
     given = sum(slow.travel(q[i + 1 : i + 2], q[i])[0] for i in range(7))
     given += slow.travel(q[:1], q[100])[0]
@@ -276,7 +271,7 @@ def test_the_best_gain_per_minute_is_near_and_tours_are_short(surrogate):
 def test_what_is_not_allowed_is_not_proposed(surrogate):
     allowed = X[:, 0] < 0.3
     for name in ("integrated_variance", "maximin_lhs"):
-        picks = propose(name, surrogate, X, simulated(X), 5, None, 0, allowed=allowed)
+        picks = proposed(name, surrogate, X, 5, allowed=allowed)
         assert all(allowed[p.index] for p in picks)
 
 

@@ -130,21 +130,21 @@ def energies(robot, q, masses):
         spin = [Rotation.from_matrix(b[0][k].T @ a[0][k]).as_rotvec()
                 for a, b in zip(ahead, back, strict=True)]  # fmt: skip
         mass += m * np.dot(speed, np.transpose(speed)) + (spin * moments) @ np.transpose(spin)
-    return mass / (2 * STEP) ** 2, _second_differences(
-        lambda at: sum(
-            9.81 * m * (turn[2] @ com + place[2])
-            for (m, com, _), turn, place in zip(masses, *placements(robot, at, ids), strict=True)
-        ),
-        q,
+    e = 1e-3 * np.eye(len(q))
+
+    def f(at):
+        return weight(robot, at, masses)
+
+    return mass / (2 * STEP) ** 2, np.array(
+        [[(f(q + a + b) - f(q + a - b) - f(q - a + b) + f(q - a - b)) / 4e-6 for a in e] for b in e]
     )
 
 
-def _second_differences(f, q, h=1e-3):
-    e = h * np.eye(len(q))
-    return np.array(
-        [[(f(q + a + b) - f(q + a - b) - f(q - a + b) + f(q - a - b)) / (4 * h * h) for a in e]
-         for b in e]
-    )  # fmt: skip
+def weight(robot, q, masses):
+    """Potential energy of all masses at q (dof,)."""
+    ids = [robot.frame_id("link", f"l{k}") for k in range(len(masses))]
+    stands = zip(masses, *placements(robot, q, ids), strict=True)
+    return sum(9.81 * m * (turn[2] @ com + place[2]) for (m, com, _), turn, place in stands)
 
 
 @FEW
@@ -176,19 +176,13 @@ def test_slopes_by_angles_and_sag_know_of_followers(folder, seed):
             slope = (getattr(ahead, name) - getattr(back, name)) / 2e-5
             assert getattr(told, name)[:, joint] == pytest.approx(slope, abs=1e-5)
     # Under its weight a soft robot is where gravity's torque on all that moves is the springs'.
-    soft = Robot.load(drawn_tree(folder / "soft", seed, springs=1e5)[0])
-    _, masses = drawn_tree(folder / "soft", seed, springs=1e5)
-    ids = [soft.frame_id("link", f"l{k}") for k in range(len(masses))]
+    toml, masses = drawn_tree(folder / "soft", seed, springs=1e5)
+    soft = Robot.load(toml)
     order = [soft.joint_names.index(block.joint) for block in soft.config.compliance]
-
-    def height(at):
-        rotation, place = placements(soft, at, ids)
-        return sum(9.81 * m * (r[2] @ c + p[2])
-                   for (m, c, _), r, p in zip(masses, rotation, place, strict=True))  # fmt: skip
-
     steps = STEP * np.eye(LEADS)[order]
-    force = [(height(q[0] + s) - height(q[0] - s)) / (2 * STEP) for s in steps]
-    assert ElasticModel(soft).sag(q)[0] == pytest.approx(-np.array(force) / 1e5, abs=1e-9)
+    ahead, back = ([weight(soft, q[0] + s, masses) for s in way] for way in (steps, -steps))
+    force = np.subtract(ahead, back) / (2 * STEP)
+    assert ElasticModel(soft).sag(q)[0] == pytest.approx(-force / 1e5, abs=1e-9)
 
 
 BALANCER = (  # as makers draw them: cylinder and piston that a joint's angle turns, no limits

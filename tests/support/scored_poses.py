@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from planner.design.cost import Cost
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
+from planner.design.propose import Travel, propose
 from tests.support.surrogates import simulated
 
 X = np.random.default_rng(4).random((120, 2))
@@ -14,9 +16,16 @@ def over(surrogate, x, workspace):
     return FrequencyOutputs.of(surrogate, Target.evenly(poses[:workspace])), poses
 
 
-def with_parameters(surrogate, x, p=6, seed=1):
+def proposed(name, surrogate, x, count, taken=0, travel=None, allowed=True):
+    """Picks among x (n, 2), of which the first are taken; by default the robot is everywhere."""
+    travel = travel or Travel(Cost(np.ones(2)), np.zeros((len(x), 2)))
+    outlook, allowed = over(surrogate, x, 200), np.broadcast_to(allowed, len(x))
+    return propose(name, x, count, x[:taken], 3, outlook, travel, allowed)
+
+
+def with_parameters(surrogate, x, p=6):
     """The same with p open parameters of a made-up simulation."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     plain = Poses.plain(x, surrogate.frequency_inputs(simulated(x)))
     slope = 0.3 * np.sin(x @ rng.normal(size=(2, 4 * p)) * 3).reshape(len(x), 4, p)
     j = rng.normal(size=(len(x), 3, 2, p)) * (1 + x[:, :1, None, None])

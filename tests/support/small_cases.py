@@ -100,16 +100,14 @@ class SmallCase:
     predict_csv: Path
 
 
-def small_case(
-    folder: Path, of: Concealed, errors: MeasurementErrors = LABORATORY, count: int = POSES
-) -> SmallCase:
+def small_case(folder: Path, of: Concealed, errors: MeasurementErrors = LABORATORY) -> SmallCase:
     """An arm of four joints, hit once along each axis at a few poses."""
     tcp = f'[[point]]\nname = "tcp"\nnode = {TCP_NODE}\n'
-    robot_toml, q = write_arm(folder / "robot", tcp), poses(count + 1, SEED)
+    robot_toml, q = write_arm(folder / "robot", tcp), poses(POSES + 1, SEED)
     own = np.random.default_rng(SEED)
     injected = InjectedFaults(replace(SCATTER, **of.change), chain=errors.chain(own), **of.rest)
     truth, shots = load_truth(robot_toml, injected.deviation), [(f"+{a}", 250.0) for a in "xyz"]
-    visits = hand_visits(errors, q[:count], shots, own)
+    visits = hand_visits(errors, q[:POSES], shots, own)
     found = hit_poses(truth, injected, visits, HAMMER, np.random.default_rng(SEED))
     pairs = enumerate(zip(q, found, strict=False), 1)
     rows = [(f"P{i}", np.rad2deg(row), hits) for i, (row, hits) in pairs]
@@ -117,5 +115,5 @@ def small_case(
     write_recordings(
         folder, truth.joint_names, rows, HAMMER, "small case", NODES | {"tcp": TCP_NODE}
     )
-    unused = [("H1", q[count])]
+    unused = [("H1", q[POSES])]
     return SmallCase(robot_toml, folder, write_predict(folder, truth.joint_names, unused))

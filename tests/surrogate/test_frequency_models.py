@@ -9,7 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from planner.design.propose import ACQUISITIONS, workspace_outputs
+from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
+from planner.design.propose import ACQUISITIONS
 from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
 from planner.surrogate.average import Average
@@ -89,7 +90,8 @@ def test_acquisitions_ask_for_a_pose_away_from_those_measured(name: str) -> None
     rng, data = np.random.default_rng(1), seen()
     surrogate = fit_surrogate(data, primary=fitted(name), residues=False)
     candidates = np.vstack([data.x, rng.random((40, 2))])
-    outputs, poses = workspace_outputs(surrogate, candidates, simulated(candidates))
+    poses = Poses.plain(candidates, surrogate.frequency_inputs(simulated(candidates)))
+    outputs = FrequencyOutputs.of(surrogate, Target.evenly(poses))
     for acquisition in ("variance", "integrated_variance", "mutual_information"):
         gain = ACQUISITIONS[acquisition](outputs, poses)
         assert np.isfinite(gain).all()

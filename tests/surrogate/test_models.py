@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from planner.surrogate.models.averaged import fit_ar1_nargp, fit_gp, fit_recursive
+from planner.surrogate.kernels import perdikaris
+from planner.surrogate.models.averaged import fit_averaged
 from planner.surrogate.models.likelihood_gp import Exact, Samples
 
 GRID = np.random.default_rng(8).random((40, 2))
@@ -19,9 +20,9 @@ def high(x):
 
 
 MODELS = {
-    "GP": lambda s: fit_gp(s),
-    "AR1": lambda s: fit_recursive(s, Exact(low), SPREAD),
-    "AR1-NARGP": lambda s: fit_ar1_nargp(s, Exact(low), SPREAD),
+    "GP": lambda s: fit_averaged(s),
+    "AR1": lambda s: fit_averaged(s, "matern52", Exact(low), SPREAD),
+    "AR1-NARGP": lambda s: fit_averaged(s, perdikaris(2), Exact(low), SPREAD, sees_low=True),
 }
 
 
@@ -76,8 +77,8 @@ def test_ar1_nargp_follows_a_bent_relation_that_ar1_cannot():
     grid = np.linspace(0, 1, 101)[:, None]
     s = Samples.of(x, bent(x))
     off = [
-        np.sqrt(np.mean((f(s, wave, 0.7).predict(grid)[0] - bent(grid)) ** 2))
-        for f in (fit_ar1_nargp, fit_recursive)
+        np.sqrt(np.mean((fit_averaged(s, *how).predict(grid)[0] - bent(grid)) ** 2))
+        for how in ((perdikaris(1), wave, 0.7, True), ("matern52", wave, 0.7))
     ]
     assert off[0] < 0.25 * off[1]
 
@@ -96,4 +97,4 @@ def test_evidence_is_the_integral_over_the_prior():
         k = sigma**2 * (1 + r + r**2 / 3) * np.exp(-r) + 1 + np.diag(noise**2 + nugget**2)
         logs.append(-0.5 * (y @ np.linalg.solve(k, y) + np.linalg.slogdet(2 * np.pi * k)[1]))
     expected = np.log(np.mean(np.exp(logs)))
-    assert fit_gp(s).model.log_evidence[0] == pytest.approx(expected, abs=0.1)
+    assert fit_averaged(s).model.log_evidence[0] == pytest.approx(expected, abs=0.1)

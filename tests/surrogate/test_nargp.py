@@ -13,7 +13,6 @@ from planner.surrogate.models.likelihood_gp import (
     fit_likelihood,
     fit_nargp,
 )
-from tests.support.nargp_levels import fit_low
 
 
 def samples(n, seed=0):
@@ -103,7 +102,7 @@ def test_it_bends_where_a_line_cannot():
         return (x[:, 0] - 2**0.5) * wave(x) ** 2
 
     cheap, x = np.linspace(0, 1, 50)[:, None], np.linspace(0, 1, 14)[:, None]
-    low = fit_low(Samples.of(cheap, wave(cheap)), 1e-3)
+    low = fit_likelihood(Samples.of(cheap, wave(cheap)), noise=1e-3)
     model = fit_nargp(Samples.of(x, bent(x)), low, low.units, noise=1e-3)
     grid = np.linspace(0, 1, 101)[:, None]
     mean, sd = model.predict(grid)

@@ -16,7 +16,6 @@ from planner.surrogate.models.likelihood_gp import (
     Exact,
     Normalisation,
     Samples,
-    perdikaris,
     spread,
     widened,
 )
@@ -61,47 +60,27 @@ class AveragedModel:
         return self.units.restored(median + base[:, 0], sd)
 
 
-def fit_gp(
-    samples: Samples, kernel: str = "matern52", prior: OutputPrior = GP_PRIOR
-) -> AveragedModel:
-    """GP of `samples`, x scaled to about [0, 1]; `prior` is in units of y's sd."""
-    return _fit(samples, None, Normalisation(0.0, 1.0), spread(samples.y), kernel, prior)
-
-
-def fit_recursive(
-    measured: Samples, low: Exact, low_spread: float, kernel: str = "matern52",
-    prior: OutputPrior = AR1_PRIOR, sees_low: bool = False,
+def fit_averaged(
+    measured: Samples, kernel: str = "matern52", low: Exact | None = None, low_spread: float = 1.0,
+    sees_low: bool = False,
 ) -> AveragedModel:  # fmt: skip
-    """AR1 of the measured samples; `low_spread` is the sd of the simulation over the workspace.
+    """GP of measured samples, x scaled to about [0, 1], or AR1 over a simulation `low`.
 
-    If it `sees_low`, the kernel is over (x, l).
+    `low_spread` is the sd of the simulation over the workspace. If it `sees_low`, the kernel is
+    over (x, l): `perdikaris` makes it AR1-NARGP.
     """
-    value = low.predict(measured.x)[0]
-    units = Normalisation(float(np.mean(value)) if len(value) else 0.0, low_spread)
-    scale = low_spread * _times_more(measured.y, value)
-    return _fit(measured, low, units, scale, kernel, prior, sees_low)
-
-
-def fit_ar1_nargp(
-    measured: Samples, low: Exact, low_spread: float, kernel: str = "product",
-    prior: OutputPrior = AR1_PRIOR,
-) -> AveragedModel:  # fmt: skip
-    """AR1-NARGP of the measured samples; `kernel` over (x, l), or "product": `perdikaris`."""
-    expression = perdikaris(measured.x.shape[1]) if kernel == "product" else kernel
-    return fit_recursive(measured, low, low_spread, expression, prior, sees_low=True)
-
-
-def _fit(
-    measured: Samples, low: Exact | None, low_units: Normalisation, scale: float, kernel: str,
-    prior: OutputPrior, sees_low: bool = False,
-) -> AveragedModel:  # fmt: skip
-    n = len(measured.y)
-    units = Normalisation(float(np.mean(measured.y)) if n else 0.0, scale)
-    value = np.full(n, np.nan) if low is None else low.predict(measured.x)[0]
+    n, centre = len(measured.y), float(np.mean(measured.y)) if len(measured.y) else 0.0
+    if low is None:
+        value, low_units, prior = np.full(n, np.nan), Normalisation(0.0, 1.0), GP_PRIOR
+        units = Normalisation(centre, spread(measured.y))
+    else:
+        value, prior = low.predict(measured.x)[0], AR1_PRIOR
+        low_units = Normalisation(float(np.mean(value)) if n else 0.0, low_spread)
+        units = Normalisation(centre, low_spread * _times_more(measured.y, value))
     data = TrainingData(
         widened(measured.x, value, low_units) if sees_low else measured.x,
         units.normalised(measured.y)[:, None],
-        (measured.sd / scale)[:, None],
+        (measured.sd / units.scale)[:, None],
         low_units.normalised(value)[:, None],
     )
     middle = np.full(1, np.nan if low is None else 0.0)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.errors import InputError
-from planner.surrogate.kernels import parse
+from planner.surrogate.kernels import parse, perdikaris
 from planner.surrogate.likelihood import maximise
 from planner.surrogate.models.likelihood_gp import (
     NARGP,
@@ -26,7 +26,6 @@ from planner.surrogate.models.likelihood_gp import (
     Normalisation,
     Samples,
     fit_growing,
-    perdikaris,
     widened,
 )
 from planner.surrogate.models.mfdgp import Training, fit_mfdgp
@@ -118,11 +117,8 @@ class Frame:
 
     def axes(self, frequency_hz: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Scaled lines (f,) and poses (p,)."""
-        a, b = (
-            (v - o) / e
-            for v, o, e in zip((frequency_hz, pose), self.origin, self.extent, strict=True)
-        )
-        return a, b
+        (first, lowest), (lines, poses) = self.origin, self.extent
+        return (frequency_hz - first) / lines, (pose - lowest) / poses
 
     def points(self, frequency_hz: np.ndarray, pose: np.ndarray) -> np.ndarray:
         """All pairs (f·p, 2) of them."""
@@ -148,17 +144,6 @@ class Surface:
         return (np.exp(mean) if self.logarithm else mean).reshape(shape), sd.reshape(shape)
 
 
-def frame_of(measured: Grid, simulated: Grid) -> Frame:
-    """The frame that holds both; InputError for amplitudes that are not positive."""
-    for grid in (measured, simulated):
-        if not (grid.amplitude > 0).all():
-            raise InputError("An amplitude is missing or not positive: leave its line out.")
-    lines = np.concatenate([measured.frequency_hz, simulated.frequency_hz])
-    poses = np.concatenate([measured.pose, simulated.pose])
-    extent = np.array([np.ptp(lines), np.ptp(poses)])
-    return Frame(np.array([lines.min(), poses.min()]), np.where(extent > 0, extent, 1.0))
-
-
 def fit_surface(
     measured: Grid,
     simulated: Grid,
@@ -166,10 +151,19 @@ def fit_surface(
     training: Training = SURFACE_TRAINING,
     logarithm: bool = False,
 ) -> Surface:
-    """Fit one of SURFACES; `training` is MFDGP's. InputError for another name."""
+    """Fit one of SURFACES; `training` is MFDGP's.
+
+    InputError for another name, and for amplitudes that are not positive.
+    """
     if model not in SURFACES:
         raise InputError(f"No model {model!r} of an FRF surface: use one of {', '.join(SURFACES)}.")
-    frame = frame_of(measured, simulated)
+    for grid in (measured, simulated):
+        if not (grid.amplitude > 0).all():
+            raise InputError("An amplitude is missing or not positive: leave its line out.")
+    lines = np.concatenate([measured.frequency_hz, simulated.frequency_hz])
+    poses = np.concatenate([measured.pose, simulated.pose])
+    extent = np.array([np.ptp(lines), np.ptp(poses)])
+    frame = Frame(np.array([lines.min(), poses.min()]), np.where(extent > 0, extent, 1.0))
     if logarithm:
         measured, simulated = (
             replace(grid, amplitude=np.log(grid.amplitude)) for grid in (measured, simulated)

@@ -24,7 +24,7 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.stats import qmc
 
 from planner.errors import InputError
-from planner.surrogate.kernels import parse
+from planner.surrogate.kernels import parse, perdikaris
 from planner.surrogate.likelihood import RELATIVE_TOLERANCE, Peak, log_likelihood, maximise
 from planner.surrogate.training_data import capacity
 
@@ -169,13 +169,8 @@ def fit_growing(
     """Maximum-likelihood GP of many samples, over all of which a climb from afar takes minutes.
 
     Climbs begin with some of the points, which costs next to nothing; every peak found there leads
-    to one of more points, for the likeliest of few need not lead to the likeliest of all.
-
-    Args:
-        samples: as of `fit_likelihood`.
-        counts: so many points, drawn at random, before all of them.
-        kernel: an expression over the columns of x.
-        starts: of the climbs over the first.
+    to one of more points, for the likeliest of few need not lead to the likeliest of all. `counts`
+    are so many points, drawn at random, before all of them; `starts` the climbs over the first.
     """
     order, units = np.random.default_rng(0).permutation(len(samples.y)), Normalisation.of(samples.y)
     peaks: list[Peak] = []
@@ -233,11 +228,6 @@ class _Hill:
         data = x, y, none, mask, none + JITTER, np.zeros(()), np.zeros(())
         return cls(kernel, len(samples.y), data, own, kept, middle, lower, upper)
 
-    def starts(self, count: int) -> np.ndarray:
-        """The middle, and normal around it (count, …)."""
-        normal = np.random.default_rng(0).standard_normal((count - 1, len(self.kept)))
-        return self.middle + np.vstack([np.zeros(len(self.kept)), normal])
-
     def everywhere(self, count: int) -> np.ndarray:
         """Evenly over all that is plausible (count, …), by Halton's sequence: of climbs from the
         middle alone the likeliest may be far from the greatest likelihood."""
@@ -248,11 +238,13 @@ class _Hill:
         even = qmc.Halton(len(self.kept), rng=0).random(count)
         return low[self.kept] + even * (high - low)[self.kept]
 
-    def roughly(self, starts: int, noise: float | None = None) -> list[Peak]:
-        """Where climbs from several starts end roughly."""
+    def roughly(self, starts: int, noise: float | None) -> list[Peak]:
+        """Where climbs end roughly: from the middle, and from starts that are normal around it."""
+        around = np.zeros((starts, len(self.kept)))
+        around[1:] = np.random.default_rng(0).standard_normal((starts - 1, len(self.kept)))
         levels = NOISES[:1] if noise is None else [level for level in NOISES if level > noise]
         ends = []
-        for i, z in enumerate(self.starts(starts)):
+        for i, z in enumerate(self.middle + around):
             for held in levels[i % (len(levels) + 1) :]:
                 z = self.climb(z, *ROUGHLY, held).x
             ends.append(self.climb(z, *ROUGHLY))
@@ -280,7 +272,8 @@ def at_hyperparameters(
 ) -> LikelihoodGP:
     """The GP of `samples` with given hyperparameters (p,), log τ in their second place."""
     y = units.normalised(samples.y)
-    root = np.linalg.cholesky(_covariance(kernel, theta, samples.x))
+    k = parse(kernel, samples.x.shape[1]).covariance(np, theta, samples.x, samples.x)
+    root = np.linalg.cholesky(k + (np.exp(2 * theta[1]) + JITTER) * np.eye(len(y)))
     white = solve_triangular(root, y, lower=True)
     size = np.sum(np.log(np.diag(root))) + len(y) * (0.5 * np.log(2 * np.pi) + np.log(units.scale))
     value = float(-0.5 * white @ white - size)
@@ -295,12 +288,6 @@ def _free(kernel: str, d: int, isotropic: bool) -> np.ndarray:
         if isotropic and factor.scales.stop > factor.scales.start:
             first[factor.scales] = factor.scales.start
     return np.unique(first, return_inverse=True)[1]
-
-
-def _covariance(kernel: str, theta: np.ndarray, x: np.ndarray) -> np.ndarray:
-    k = parse(kernel, x.shape[1]).covariance(np, theta, x, x)
-    noise = np.exp(2 * theta[1]) + JITTER
-    return k + noise * np.eye(len(x))
 
 
 NODE_COUNT = 21  # of the quadrature: exact for polynomials of degree 41
@@ -324,16 +311,6 @@ class NARGP:
         mean, sd = (part.reshape(NODE_COUNT, len(x)) for part in self.high.predict(wide))
         middle = WEIGHTS @ mean
         return middle, np.sqrt(WEIGHTS @ (sd**2 + (mean - middle) ** 2))
-
-
-def perdikaris(d: int, shape: str = "rbf") -> str:
-    """Kernel expression k_ρ(x) k_f(l) + k_δ(x) over the columns (x_1 … x_d, l)."""
-    return f"{shape}[0:{d}]*{shape}[{d}:{d + 1}]+{shape}[0:{d}]"
-
-
-def kennedy_ohagan(d: int) -> str:
-    """Kernel expression σ² l l' + k_δ(x) over the same columns: AR1."""
-    return f"linear[{d}:{d + 1}]+rbf[0:{d}]"
 
 
 def fit_nargp(

@@ -125,15 +125,13 @@ class MFDGP:
         return self.high_units.restored(mean, np.sqrt(variance))
 
 
-def fit_mfdgp(cheap: Samples, measured: Samples, how: Training | None = None) -> MFDGP:
+def fit_mfdgp(cheap: Samples, measured: Samples, how: Training) -> MFDGP:
     """Train both layers on cheap and measured samples, x (n, d) scaled to about [0, 1]."""
-    how = how or Training()
     low_units, high_units = Normalisation.of(cheap.y), Normalisation.of(measured.y)
     y_low, y_high = low_units.normalised(cheap.y), high_units.normalised(measured.y)
     d = measured.x.shape[1]
-    near = np.argmin(
-        np.sum((measured.x[:, None] - cheap.x[None]) ** 2, axis=-1), axis=1
-    )  # the cheap value nearest to a measured point begins as its f_1
+    # The cheap value nearest to a measured point begins as its f_1.
+    near = np.argmin(np.sum((measured.x[:, None] - cheap.x[None]) ** 2, axis=-1), axis=1)
     wide = np.column_stack([measured.x, y_low[near]])
     one, two = TiedKernel.of("rbf", d), TiedKernel.cutajar(d)
     first = one.whole.prior(1.0, START_NOISE, LENGTH, 0.0, 0.0)[0]

@@ -147,9 +147,7 @@ def solve_kronecker(
     slope_b = 0.5 * u @ inner_b @ u.T
     alpha = v @ a @ u.T
     in_noise = np.sum(alpha * scaled, axis=0) - n
-    in_noise = in_noise - 2 * np.sum(
-        slope_b * b / np.outer(root, root), axis=1
-    )  # fmt: skip
+    in_noise = in_noise - 2 * np.sum(slope_b * b / np.outer(root, root), axis=1)
     return KroneckerSolution(
         value - 0.5 * n * t * np.log(2 * np.pi),
         alpha / root,
