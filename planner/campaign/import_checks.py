@@ -11,11 +11,15 @@ from planner.campaign.labels import found_modes
 from planner.campaign.model import FEW_POSES, Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose
+from planner.diagnosis.exponential_window import screen_window
 from planner.frf.frf import unreciprocal
 from planner.recording.joints import JointUnits
 from planner.recording.records import Hit
 from planner.recording.repeats import Doubt, doubts, other_size
 from planner.words import listed, with_sd
+
+WINDOWED = "an exponential window that the analyser laid over the records"
+CERTAIN = float(np.log(1000.0))  # nats, from which a window is asked about: as of other mistakes
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +55,8 @@ def question_about(claim: Claim, measured: MeasuredPose) -> Question | None:
     known = claim.state.measurements.get(claim.pose)
     if known is not None and known.question is not None:  # answered
         return None
+    if (window := _unstated_window(claim, measured)) is not None:
+        return window
     if not claim.model.labelled:
         from planner.campaign.chain_mismatch import chain_mismatch  # and SciPy, where it is asked
 
@@ -58,6 +64,23 @@ def question_about(claim: Claim, measured: MeasuredPose) -> Question | None:
     from planner.campaign.pose_mismatch import pose_mismatch
 
     return pose_mismatch(claim, measured)
+
+
+def _unstated_window(claim: Claim, measured: MeasuredPose) -> Question | None:
+    """What to ask of hits whose noise fades, as under an exponential window that nobody stated."""
+    asked = (m.question for m in claim.state.measurements.values() if m.question is not None)
+    if claim.model.cell.config.modes.window_rate_1_s or any(WINDOWED in q.text for q in asked):
+        return None
+    found = screen_window([hit for own in measured.files.hits for hit in own])
+    if found is None or found.log_evidence < CERTAIN:
+        return None
+    rate, sd, _ = found.parameters["rate"]
+    text = (
+        f"At {claim.pose}, noise fades by {with_sd(rate, sd)} 1/s, as under {WINDOWED}: export "
+        f"without it, or state it in campaign.toml ([modes] window_rate_1_s). Are these hits right "
+        f"as they are?"
+    )
+    return Question(text, about="chain")
 
 
 def contradiction(pose: str, measured: MeasuredPose, known: int) -> Question | None:

@@ -175,7 +175,9 @@ def explain(
     not stand at their poses.
     """
     progress("looking at the signals", 0.02)
-    window = None if recorded.window_rate_1_s else screen_window(recorded)
+    window = None
+    if not recorded.window_rate_1_s:
+        window = screen_window([hit for visit in recorded.visits for hit in visit.hits])
     if window is not None:
         recorded = recorded.corrected(recorded.visits, window.parameters["rate"][0])
     robot = simulation.robot

@@ -8,9 +8,7 @@ at the end of the record is less than before the pulse.
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import minimize_scalar, root_scalar
 
-from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
 from planner.recording.records import Hit
 
@@ -22,22 +20,25 @@ WINDOW_LEAST_1_S = 0.05  # slower ones change no damping that matters
 # what is fast has rung down; relative sd of the rate, as analysers begin their windows differently.
 BEFORE, LEAST_HITS, END, UNSURE = 24, 4, 0.8, 0.03
 LARGEST = 500.0  # exponent that a float holds
+TRIED_1_S = 0.25 * 1.5 ** np.arange(13)  # rates up to the fastest, on which a window shows at all
 NOISY = -0.3  # correlation of neighbours, above which it is no noise
 MOST = 0.9  # share of hits whose noise fades by half the rate or more
 
 
-def screen_window(recorded: Dataset) -> Finding | None:
+def screen_window(hits: Sequence[Hit]) -> Finding | None:
     """`exponential_window` with its rate, where noise of force or accelerations fades."""
-    return _by_force(recorded) or _by_answer(recorded)
+    return _by_force(hits) or _by_answer(hits)
 
 
-def _by_force(recorded: Dataset) -> Finding | None:
-    told = [part for visit in recorded.visits for part in map(_noise, visit.hits) if part]
-    if not told:
-        return None
+def _by_force(hits: Sequence[Hit]) -> Finding | None:
+    told = [part for part in map(_noise, hits) if part]
 
     def loss(rate: float) -> float:
         return -_log_likelihood(told, rate)
+
+    if not told or loss(0.0) <= min(map(loss, TRIED_1_S.tolist())):
+        return None
+    from scipy.optimize import minimize_scalar  # 0.6 s, which good hits do not need
 
     found = minimize_scalar(loss, bounds=(-5.0, WINDOW_FASTEST_1_S), method="bounded")
     rate = float(found.x)
@@ -51,12 +52,12 @@ def _by_force(recorded: Dataset) -> Finding | None:
     return _finding("force", rate, sd, evidence)
 
 
-def _by_answer(recorded: Dataset) -> Finding | None:
+def _by_answer(hits: Sequence[Hit]) -> Finding | None:
     """By how much less the noise of accelerations is at the end than before the pulse.
 
     What still rings there hides a window, and does not feign one.
     """
-    told = [part for visit in recorded.visits for part in map(_fading, visit.hits) if part]
+    told = [part for part in map(_fading, hits) if part]
     if len(told) < LEAST_HITS:
         return None
     rates = np.array([rate for rate, _ in told])
@@ -94,8 +95,11 @@ def _fading(hit: Hit) -> tuple[float, float] | None:
         return None
     # Second differences are correlated with their neighbours: they tell a third as much.
     sd = np.sqrt(1.5 / before.shape[1] + 1.5 / end.shape[1]) / float(t.mean())
-    found = root_scalar(left, bracket=(-WINDOW_FASTEST_1_S, WINDOW_FASTEST_1_S))
-    return float(found.root), float(sd)
+    low, high = -WINDOW_FASTEST_1_S, WINDOW_FASTEST_1_S
+    while high - low > 1e-3 * sd:  # of a few records: bisection needs no SciPy
+        middle = (low + high) / 2
+        low, high = (middle, high) if left(middle) > 0 else (low, middle)
+    return low, float(sd)
 
 
 def _alike(steps: np.ndarray) -> float:

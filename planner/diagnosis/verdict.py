@@ -27,7 +27,7 @@ from planner.fit.explanations import (
     probabilities,
 )
 from planner.fit.fitted import StructureFit, evidence_of, settled, size_of, without
-from planner.fit.posterior import RobotPosterior
+from planner.fit.posterior import FOLLOWED, RobotPosterior
 
 LEAST = RARE + float(np.log(9.0))  # nats from which an effect is there: 9 times as likely
 SURE = 0.9  # probability from which an effect's size counts as beyond what matters
@@ -96,7 +96,8 @@ def judged(
     `levels`.
 
     Sizes are told at q (n, dof) in rad, poses that were not measured. Averages over levels are bent
-    by what is left of a joint's law: beside one only what changes FRFs by more is told. What is
+    by what is left of a joint's law: beside one only what changes FRFs by more is told, and no more
+    need be explained than what makes a simulation worth following. What is
     named and predicts poses set aside `worse` than the refitted robot explains nothing.
     """
     weights, best = probabilities(explored.settled), most_probable(explored.settled)
@@ -108,7 +109,8 @@ def judged(
     named = [e for e in effects if e.counts]
     nameless = any(e.operator.general for e in named)
     wrong = nameless or (worse and named)
-    left = (size_of(best) > EXPLAINS * matters or wrong) and not laws
+    bound = FOLLOWED if laws else EXPLAINS * matters
+    left = size_of(best) > bound or (wrong and not laws)
     unknown = left or bool(levels and levels.unexplained) or UNKNOWN in from_signals
     there = named or from_signals or laws
     verdict = "unexplained" if unknown else "explained" if there else "consistent"

@@ -192,18 +192,28 @@ def check_band(frf: CutterFrf, found: LobeCurves, told: np.ndarray | None = None
 
 
 def out_of_band_remark(structure: Structure, chatter_hz: np.ndarray) -> str | None:
-    """A sentence where chatter (n,) lies outside the lines of the FRFs; None where none does."""
+    """A sentence where chatter (n,), NaN where there is none, lies outside the lines of the FRFs.
+
+    Where none is found, what lies beyond may still limit the cut. None: it is all within them.
+    """
     if structure.frf is None:
         return None
     lines = structure.frf.frequency_hz
-    with np.errstate(invalid="ignore"):
-        count = int(np.sum((chatter_hz < lines[0]) | (chatter_hz > lines[-1])))
-    if not count:
-        return None
-    return (
-        f"At {count} of the speeds the cut would chatter outside the FRFs' {lines[0]:g} to "
-        f"{lines[-1]:g} Hz, where the fitted modes only guess: measure there too."
-    )
+    band = f"{lines[0]:g} to {lines[-1]:g} Hz"
+    free = int(np.sum(np.isnan(chatter_hz)))
+    count = int(np.sum((chatter_hz < lines[0]) | (chatter_hz > lines[-1])))
+    said = []
+    if count:
+        said.append(
+            f"At {count} of the speeds the cut would chatter outside the FRFs' {band}, where the "
+            f"fitted modes only guess: measure there too."
+        )
+    if free:
+        said.append(
+            f"At {free} of the speeds no mode within {band} limits the depth: modes beyond, which "
+            f"were not measured, may."
+        )
+    return " ".join(said) or None
 
 
 def limit_remarks(

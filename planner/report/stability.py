@@ -28,7 +28,7 @@ KINDS = {
     "hopf": "hopf: chatter at a frequency of its own, beside multiples of the tooth passing.",
     "flip": "flip: chatter at odd multiples of half the tooth-passing frequency.",
 }
-LOBES = "Where a line has a gap every depth that was asked for is stable."
+LOBES = "Where a line has a gap no mode that was measured limits the depths asked for."
 PATH = "Depths that are stable with 95 % probability at all poses, and at each."
 
 
@@ -99,7 +99,7 @@ class StabilityReport(LimitsBySpeed):
 
     def text(self) -> Group:
         """A table of speeds, then what else there is to say."""
-        kinds = [one.kind or "stable" for one in self.losses]
+        kinds = [one.kind or "none found" for one in self.losses]
         lines = [text for kind, text in KINDS.items() if kind in kinds]
         if self.there is not None:
             verdict = "stable" if self.there.size < 1 else "not stable"

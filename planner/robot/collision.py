@@ -31,8 +31,9 @@ class Collisions:
     that touch in the middle of all joints' ranges (there, far from all limits, a robot stands free:
     it is coarse shapes that overlap), and those that robot.toml's [collision] ignores; and every
     moving link against every [[obstacle]]. An obstacle that is touched there stays in: it is the
-    obstacle that is wrong, and only the engineer can tell. Where the URDF has no shapes, lines from
-    joint to joint stand for the links against obstacles. Raises InputError where [collision] names
+    obstacle that is wrong, and only the engineer can tell. Against obstacles a line from the last
+    joint to the tip stands for the tool, and where the URDF has no shapes lines from joint to joint
+    for the links. Raises InputError where [collision] names
     what does not exist.
     """
 
@@ -110,8 +111,8 @@ class Collisions:
             if not near and not self._ignored(geometry, i, j):
                 geometry.addCollisionPair(pin.CollisionPair(i, j))
         overlapping = self._drop_overlapping(geometry)
-        if not links:
-            links = [geometry.addGeometryObject(obj) for obj in _link_lines(robot)]
+        lines = _link_lines(robot, of_tool_alone=bool(links))
+        links += [geometry.addGeometryObject(obj) for obj in lines]
         for box in [geometry.addGeometryObject(obj) for obj in _obstacles(robot)]:
             for i in links:
                 moves = geometry.geometryObjects[i].parentJoint > 0
@@ -222,7 +223,7 @@ def _obstacles(robot: Robot) -> list[pin.GeometryObject]:
     return made
 
 
-def _link_lines(robot: Robot) -> list[pin.GeometryObject]:
+def _link_lines(robot: Robot, of_tool_alone: bool) -> list[pin.GeometryObject]:
     """Thin rods from joint to joint and to the tool's tip, each on the link that carries it.
 
     They begin where a turning joint has carried them away from what the robot stands on: the
@@ -232,19 +233,21 @@ def _link_lines(robot: Robot) -> list[pin.GeometryObject]:
     model, found = robot.model, []
     for number in range(1, model.njoints):
         frame = model.getFrameId(robot.body_frames(number)[0].name, pin.FrameType.BODY)
-        for place, (a, b) in enumerate(_lines(robot, number)):
+        for place, (a, b) in enumerate(_lines(robot, number, of_tool_alone)):
             name = f"{model.names[number]}_line_{place}"
             found.append(pin.GeometryObject(name, number, frame, *_rod(a, b)))
     return found
 
 
-def _lines(robot: Robot, number: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _lines(
+    robot: Robot, number: int, of_tool_alone: bool
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Ends (3,) of a body's lines in the frame of its joint; of the tip alone at least a point."""
     model, slides = robot.model, robot.linkage.slides
     tcp, start = model.frames[robot.tcp_id], np.zeros(3)
     carried = any(not slides[k - 1] for k in model.supports[number] if 0 < k != number)
     for k in model.children[number]:
-        if carried and not slides[k - 1]:
+        if carried and not (of_tool_alone or slides[k - 1]):
             yield start, model.jointPlacements[k].translation
     if tcp.parentJoint == number:
         tip = tcp.placement.translation
