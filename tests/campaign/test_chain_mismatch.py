@@ -1,17 +1,20 @@
 """Wrong units, signs and axes are asked about at the first pose, good imports are not."""
 
 import json
+from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.chain_faults import SCALED, TURNED, ChainFault
 from planner.campaign.import_checks import Claim, question_about
-from planner.dataset.measure import measure
+from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.frf.frf import Frf
 from planner.recording.folder import TABLE
+from planner.recording.records import Hit
 from tests.support.chain_cases import FAULTS, SLIGHTEST, cases, fault, judged, scaled, shown_by
 from tests.support.outside import call
 from tests.support.shipped_campaign import RECORDINGS, shipped_campaign, shipped_pool
@@ -114,3 +117,28 @@ def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
         claim = Claim(held.model, held.state, "A57", rows[0].joints_deg)
         asked = question_about(claim, other)
         assert (asked is not None and asked.about == "chain") == doubted
+
+
+def test_a_window_that_nobody_stated_is_asked_about(tmp_path):
+    campaign, pool = shipped_campaign(tmp_path), shipped_pool()
+    rows, band_hz = pool.rows["A11"], campaign.cell.config.modes.band_hz
+
+    def faded(hit: Hit, rate_1_s: float) -> Hit:
+        t = (np.arange(len(hit.force_n)) - hit.pulse.peak) / hit.sampling_rate_hz
+        by = np.exp(-rate_1_s * np.maximum(t, 0.0))
+        return replace(hit, force_n=hit.force_n * by, acceleration_m_s2=hit.acceleration_m_s2 * by)
+
+    for rate_1_s, stated_1_s, asks in ((0.0, 0.0, False), (2.0, 0.0, True), (2.0, 2.0, False)):
+        read = (Source(row.file, row.file.name, row.hit).read()[0] for row in rows)
+        hits = tuple(faded(hit, rate_1_s) for own in read for hit in own)
+        cell = campaign.cell
+        modes = msgspec.structs.replace(cell.config.modes, window_rate_1_s=stated_1_s)
+        cell = replace(cell, config=msgspec.structs.replace(cell.config, modes=modes))
+        claim = Claim(replace(campaign.model, cell=cell), campaign.state, "A11", rows[0].joints_deg)
+        asked = question_about(claim, MeasuredPose((), band_hz, "h1", stated_1_s, given=hits))
+        assert (asked is not None and "[modes] window_rate_1_s" in asked.text) == asks
+        if asked is not None:
+            assert float(asked.text.split("fades by ")[1].split()[0]) == pytest.approx(
+                2.0, rel=0.03
+            )
+            assert asked.about == "chain"

@@ -19,6 +19,7 @@ from planner.milling.structure import (
     limit_remarks,
     moved,
     of_frf,
+    out_of_band_remark,
     sampled,
 )
 from tests.support.milling_cases import cut, one_mode, semi_growth, two_each_way
@@ -124,6 +125,18 @@ def test_cross_frfs_that_lack_are_taken_as_the_others_or_nothing_and_named(lacki
     found = check_limits(part, two_each_way(), given, 1e-6)
     assert [f"lacks the FRF {'xy'[i]}{'xy'[j]}: it is taken as {taken}." in " ".join(found.remarks)
             for i, j in lacking] == [True] * len(lacking)  # fmt: skip
+
+
+def test_what_lies_beyond_the_lines_is_said():
+    """Chatter found there is a guess; where none is found, what was not measured may limit."""
+    structure = of_frf(tip(one_mode()), cut())
+    low, *_, high = structure.frf.frequency_hz
+    inside = np.array([(low + high) / 2])
+    assert out_of_band_remark(structure, inside) is None
+    beyond = out_of_band_remark(structure, np.array([*inside, high + 1.0])) or ""
+    assert "At 1 of the speeds the cut would chatter outside" in beyond
+    unlimited = out_of_band_remark(structure, np.array([*inside, np.nan, np.nan])) or ""
+    assert "At 2 of the speeds no mode within" in unlimited
 
 
 def noisy(modes: CutterModes, lines: np.ndarray, share: float, seed: int) -> CutterFrf:

@@ -135,6 +135,13 @@ def test_a_robot_without_collision_shapes_or_obstacles_has_its_limits_only(arm):
     assert "Nothing is checked for collision" in (found.unchecked or "")
 
 
+def test_a_line_stands_for_the_tool_that_has_no_shape(arm):
+    """Links have shapes, the tool beyond the last of them has none."""
+    _, tip = Robot.load(arm).forward(FREE)
+    tiny = (0.02, 0.02, 0.02)
+    assert collisions(arm, box("vice", tip, tiny)).contacts(FREE) == ("link_6 touches vice",)
+
+
 def test_lines_stand_for_links_without_shapes_against_obstacles(arm):
     """The floor is thin: a tool below it touches nothing, but what leads there goes through it."""
     found = collisions(without_shapes(arm))
