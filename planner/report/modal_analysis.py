@@ -11,6 +11,7 @@ from msgspec import UNSET
 from planner.dataset.frf_set import FrfSet
 from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import Source, in_parts, told_of_files
+from planner.diagnosis.exponential_window import screen_window
 from planner.errors import InputError, RefusedError, RefusedFile
 from planner.frf.exported import joined
 from planner.frf.frf import Frf
@@ -120,13 +121,15 @@ def modal_report(
         reasons = [file.reason for file in refused] or list(measured.remarks)
         raise RefusedError(f"No modes could be identified: {reasons[0]}")
     assert frf is not None
+    hits = [hit for own in measured.files.hits for hit in own]
+    window = None if window_rate_1_s else screen_window(hits)
     answer = _of_model(
         modal,
         refused=refused,
         accepted=tuple(v.source.name for v in verdicts if v.accepted),
         hits=frf.hits,
         usable_band_hz=frf.usable_band_hz,
-        remarks=(*told_of_files(verdicts), *measured.remarks),
+        remarks=(*told_of_files(verdicts), *measured.remarks, *([window.text] if window else [])),
         amplitude=measured.homogeneity,
         simulated=any(v.simulated for v in verdicts),
     )
