@@ -245,7 +245,9 @@ def import_paths(
 ) -> tuple[ImportReport, ...]:  # fmt: skip
     """Import within an act of the campaign, see `Campaign.import_paths`."""
     cell, state = campaign.cell, campaign.state
-    default = state.open[0] if len(state.open) == 1 else None
+    # A folder that has the name of an open proposal is of that pose.
+    open_ = [p for p in state.open if len(given) == 1 and given[0].is_dir() and given[0].name == p]
+    default = (open_ or state.open)[0] if len(open_ or state.open) == 1 else None
     deliveries = sort_paths(given, cell.robot, pose, default)
     placed = [(d, readback_of(cell, state, d)) for d in at_their_poses(deliveries, state)]
     named = frozenset(path for path in given if path.is_file())

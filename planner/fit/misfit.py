@@ -199,7 +199,9 @@ class FrfMisfit:
         open_ = basis(h, motion, self.data.measured.s, self.tolerances)
         numbers, joints = self.nuisance_counts
         own = s.size + numbers.hits + joints
-        out = np.empty((len(h), own + 2 * len(s.springs) + 1, *h.shape[1:]), dtype=complex)
+        visit = own + 2 * len(s.springs)
+        count = visit + len(numbers.seated) + 1
+        out = np.empty((len(h), count, *h.shape[1:]), dtype=complex)
         _, visits = self.slopes(motion, x, out[:, : s.chain.start], added)
         out[:, s.chain] = open_[:, numbers.hits : numbers.known]
         out[:, s.size : s.size + numbers.hits] = open_[:, : numbers.hits]
@@ -208,7 +210,9 @@ class FrfMisfit:
             off = effect.stood_off(self.data.q, np.ones(1))
             if off is not None and motion.by_angle is not None:
                 out[:, at.start] = np.einsum("nj,nj...->n...", off, motion.by_angle)
-        out[:, own:-1] = visits
+        out[:, own:visit] = visits
+        chain = open_[:, numbers.hits : numbers.known]
+        np.multiply(chain[:, numbers.seated], self.tolerances.visit_chain, out=out[:, visit:-1])
         return self.through_chain(x, h, out[:, :-1]), out, motion
 
     def through_chain(
@@ -239,8 +243,8 @@ class FrfMisfit:
     def zero_nuisances(self) -> np.ndarray:
         """(n, l): own numbers, all 0."""
         numbers, joints = self.nuisance_counts
-        springs = len(self.structure.springs)
-        return np.zeros((len(self.data.q), numbers.hits + joints + 2 * springs))
+        visit = 2 * len(self.structure.springs) + len(numbers.seated)
+        return np.zeros((len(self.data.q), numbers.hits + joints + visit))
 
     def about(self, own: np.ndarray, x: np.ndarray) -> np.ndarray:
         """(n, hits + chain + joints), from own numbers and the chain as x has it."""

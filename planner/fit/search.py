@@ -205,7 +205,10 @@ class Search(Trials):
         """
         effects, costs = added(best), removal_costs(best)
         for effect in sorted(effects, key=lambda e: costs[e]):
-            if _less(best, effect) not in pool and not (near and costs[effect] > FAR):
+            known = pool.get(_less(best, effect))
+            # What was met from elsewhere and is worse than by first order from here is stuck there.
+            stuck = known is not None and known.evidence < best.evidence - costs[effect]
+            if (known is None or stuck) and not (near and costs[effect] > FAR):
                 yield [self._fewer(best, effect, near)]
         more, first = list[StructureFit](), key_of(best) not in extended
         if first:

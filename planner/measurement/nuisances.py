@@ -33,7 +33,9 @@ class Tolerances:
     `mounting_rad`, `position_m`: of the sensor; `force_gain` of the hammer; `delay_s`; `joint_rad`:
     of each joint's readback, (dof,) where some are of joints that slide (m); `visit_stiffness` of
     ln k of each spring from visit to visit, as temperature and preload go, `visit_damping` of ln c
-    beside it: damping ratios of robots scatter by some ten percent.
+    beside it: damping ratios of robots scatter by some ten percent. `visit_chain`: how much
+    of what the sensor's matrix and the hammer's gain may be off is a visit's own, as a sensor is
+    seated again and a hammer's tip changed.
     """
 
     angle_rad: float = np.deg2rad(_HITS.angle_sd_deg)
@@ -47,6 +49,7 @@ class Tolerances:
     joint_rad: float | tuple[float, ...] = np.deg2rad(ReadbackTable().joint_sd_deg)
     visit_stiffness: float = 0.004
     visit_damping: float = 0.1
+    visit_chain: float = 0.2
 
     @classmethod
     def of(cls, config: RobotConfig, slides: Sequence[bool] = ()) -> "Tolerances":
@@ -67,7 +70,7 @@ class Tolerances:
 
 
 # Of FRFs that are computed, or taken for exact.
-EXACT_HITS = Tolerances(*(0.0,) * 11)
+EXACT_HITS = Tolerances(*(0.0,) * 12)
 
 OF_HIT, OF_SENSOR, OF_HAMMER = 4, 12, 2  # numbers of each hit axis, each sensor, and of all
 
@@ -89,6 +92,12 @@ class NuisanceCounts:
     def known(self) -> int:
         """Of hits and chain: those of the joints follow."""
         return self.hits + self.chain
+
+    @property
+    def seated(self) -> list[int]:
+        """Of the chain, from its first: each sensor's matrix, and the hammer's gain."""
+        sensors = range(0, self.chain - OF_HAMMER, OF_SENSOR)
+        return [*(first + k for first in sensors for k in range(9)), self.chain - OF_HAMMER]
 
 
 # Of one hit point and one sensor: what is predicted at the tool.

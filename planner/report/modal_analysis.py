@@ -68,7 +68,9 @@ def sources_of(paths: Sequence[Path], from_names: bool = False) -> tuple[Source,
     named = dict.fromkeys(path.parent for path in paths if path.is_file())
     beside = {folder: _listed(folder, {p.name for p in paths}) for folder in named}
     for path in paths:
-        if (path / TABLE).is_file():
+        if path.name == TABLE:  # says what the files beside it are
+            found += _listed(path.parent) if len(paths) == 1 else []
+        elif (path / TABLE).is_file():
             found += _listed(path)
         elif path.is_dir():
             found += [Source(file, str(file)) for file in files_in(path, READERS)]

@@ -47,6 +47,7 @@ class Screen:
         self._page, self._shown = None, ""
         if self.console.is_terminal:
             self.console.clear()
+            self._notes.clear()  # what was said before the result is over
             self._notes.extend(notes)
             self._left = True
         self.console.print(result)

@@ -169,6 +169,22 @@ def test_damping_that_scatters_from_visit_to_visit_is_no_discrepancy(prior, few)
     assert sizes[Tolerances().visit_damping] == SIZES[0]
 
 
+def test_a_sensor_that_is_seated_again_at_each_pose_is_known(prior, few):
+    structure, rng, t = RobotStructure(prior), np.random.default_rng(5), Tolerances()
+    x, misfit = structure.mean, FrfMisfit(structure, few, t, 0.06)
+    # Two sds of what visits have of their own: turned by a degree, cables and gains as they come.
+    off = 2 * t.visit_chain * np.where(np.eye(3), t.gain, t.across)
+    seated = np.eye(3) + off * rng.standard_normal((len(few.q), 3, 3))
+    seated *= 1 + 2 * t.visit_chain * t.force_gain * rng.standard_normal((len(few.q), 1, 1))
+    shown = np.einsum("nij,njcf->nicf", seated, misfit.motion(x, None).accelerance)
+    data = replace(few, measured=replace(few.measured, accelerance=shown))
+    evidence = {}
+    for share in (t.visit_chain, 0.0):
+        one = replace(misfit, data=data, tolerances=replace(t, visit_chain=share))
+        evidence[share] = settled(one, one(x), rounds=3).evidence
+    assert evidence[t.visit_chain] > evidence[0.0] + 100.0
+
+
 def test_a_fit_begins_with_a_mass_that_a_body_stands_for_and_gives_the_same_frfs(prior, few):
     """40 kg that a fit had put into a link's own body, with moments that no matter has."""
     plain = RobotStructure(prior)
