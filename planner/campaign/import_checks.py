@@ -19,6 +19,7 @@ from planner.recording.repeats import Doubt, doubts, other_size
 from planner.words import listed, with_sd
 
 WINDOWED = "an exponential window that the analyser laid over the records"
+FAR = 20.0  # times what two readbacks of one pose differ by at most: 10°, 100 mm
 CERTAIN = float(np.log(1000.0))  # nats, from which a window is asked about: as of other mistakes
 
 
@@ -60,10 +61,23 @@ def question_about(claim: Claim, measured: MeasuredPose) -> Question | None:
     if not claim.model.labelled:
         from planner.campaign.chain_mismatch import chain_mismatch  # and SciPy, where it is asked
 
-        return chain_mismatch(claim, measured.frf)
+        return chain_mismatch(claim, measured.frf) or _far_from_setpoint(claim)
     from planner.campaign.pose_mismatch import pose_mismatch
 
     return pose_mismatch(claim, measured)
+
+
+def _far_from_setpoint(claim: Claim) -> Question | None:
+    """What to ask of a readback far from the pose that was proposed, before FRFs can tell."""
+    proposal = claim.state.proposals.get(claim.pose)
+    if proposal is None:
+        return None
+    away = np.abs(np.subtract(proposal.joints_deg, claim.joints_deg)) / claim.joints.same()
+    if np.max(away) < FAR:
+        return None
+    off = claim.joints.apart(proposal.joints_deg, claim.joints_deg)
+    text = f"The readback of {claim.pose} is up to {off} from its setpoint. Is it right as stated?"
+    return Question(text, about="readback")
 
 
 def _unstated_window(claim: Claim, measured: MeasuredPose) -> Question | None:

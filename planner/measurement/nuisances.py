@@ -49,7 +49,7 @@ class Tolerances:
     joint_rad: float | tuple[float, ...] = np.deg2rad(ReadbackTable().joint_sd_deg)
     visit_stiffness: float = 0.004
     visit_damping: float = 0.1
-    visit_chain: float = 0.2
+    visit_chain: float = 0.1
 
     @classmethod
     def of(cls, config: RobotConfig, slides: Sequence[bool] = ()) -> "Tolerances":

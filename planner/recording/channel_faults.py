@@ -85,7 +85,9 @@ def _overload(name: str, unit: str, samples: np.ndarray, pulse: bool) -> Fault |
         equal = sense * size >= top * (1 - 1e-6)
         # A pulse has one top; a decaying response reaches the same top again and again.
         ends = np.flatnonzero(np.diff(np.concatenate([[0], equal.astype(int), [0]])))
-        flat = int(np.max(ends[1::2] - ends[::2])) if pulse else int(np.sum(equal))
+        longest, every = int(np.max(ends[1::2] - ends[::2])), int(np.sum(equal))
+        # Two apart are two swings as large as each other, no flat top.
+        flat = longest if pulse or every == 2 else every
         if not _by_chance(np.maximum(sense * size, 0.0), flat, pulse):
             level = float(samples[int(np.argmax(sense * size))])
             text = f"The {name} is clipped at {level:.4g} {unit} ({flat} samples)"

@@ -2,6 +2,8 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import msgspec
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.campaign.chain_faults import SCALED, TURNED, ChainFault
 from planner.campaign.import_checks import Claim, question_about
+from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.frf.frf import Frf
@@ -142,3 +145,17 @@ def test_a_window_that_nobody_stated_is_asked_about(tmp_path):
                 2.0, rel=0.03
             )
             assert asked.about == "chain"
+
+
+def test_a_readback_far_from_its_setpoint_is_asked_about_at_the_first_pose(tmp_path):
+    campaign, pool = shipped_campaign(tmp_path), shipped_pool()
+    rows, band_hz = pool.rows["A11"], campaign.cell.config.modes.band_hz
+    stated = np.array(rows[0].joints_deg)
+    measured = measure(tuple(Source(r.file, r.file.name, r.hit) for r in rows), band_hz)
+    for off_deg, asks in ((3.0, False), (60.0, True)):
+        setpoint = tuple(stated + off_deg * (np.arange(len(stated)) == 4))
+        proposal = SimpleNamespace(pose="A11", joints_deg=setpoint)
+        state = cast("CampaignState", SimpleNamespace(measurements={}, proposals={"A11": proposal}))
+        asked = question_about(Claim(campaign.model, state, "A11", rows[0].joints_deg), measured)
+        assert (asked is not None and "60.00° from its setpoint" in asked.text) == asks
+        assert asked is None or asked.about == "readback"

@@ -7,9 +7,9 @@ import csv
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.events import Question
 from planner.campaign.import_checks import Claim, question_about
 from planner.campaign.low_fidelity import LowFidelity
 from planner.dataset.measure import MeasuredPose, measure
@@ -61,28 +61,25 @@ def test_another_pose_is_asked_about_before_three_are_measured(tmp_path):
     assert all("repeat those of P001" in one.text for one in repeated if one)
 
 
-def test_a_wrong_angle_at_the_first_pose_is_asked_about_at_the_next(tmp_path):
-    """Nothing tells then: the simulation alone lacks too much. It bends what is expected after."""
+def test_a_wrong_angle_at_the_first_pose_is_asked_about(tmp_path):
+    """FRFs tell nothing then, for the simulation alone lacks too much: the setpoint does."""
     arm = make_generated_arm(tmp_path, 923, 4, 3)
-    campaign, asked = Campaign.new(tmp_path / "campaign", arm.robot_toml, arm.campaign_toml), None
-    for number in range(2):
-        assert asked is None
-        (pose,) = campaign.next()
-        named = [(pose.pose, np.deg2rad(pose.joints_deg))]
-        folder = arm.record(tmp_path / pose.pose, named, number)
-        if number == 0:
-            read = other_sign(folder, "joint_4_deg")
-        (report,) = campaign.import_paths((folder,))
-        asked = report.question
+    campaign = Campaign.new(tmp_path / "campaign", arm.robot_toml, arm.campaign_toml)
+    (pose,) = campaign.next()
+    folder = arm.record(tmp_path / "P001", [("P001", np.deg2rad(pose.joints_deg))], 0)
+    read = other_sign(folder, "joint_4_deg")
+    (report,) = campaign.import_paths((folder,))
+    asked = report.question
     assert asked is not None
-    assert (asked.about, asked.fits) == ("earlier", "P001")
-    # The other sign, or the setpoint, which are next to the same.
-    assert f"°, not at {read:.2f}° as stated" in asked.text
-    angle = float(asked.text.split("joint_4 at ")[1].split("°", maxsplit=1)[0])
-    assert angle == pytest.approx(-read, abs=0.05)
-    assert "--pose P001b" in how_to_answer(campaign.directory, "P002", asked)
+    assert asked.about == "readback"
+    assert f"{abs(read - pose.joints_deg[3]):.2f}° from its setpoint" in asked.text
+
+
+def test_how_an_angle_of_a_pose_before_is_corrected(tmp_path):
+    asked = Question("These hits contradict those of P001.", fits="P001", about="earlier")
+    assert "--pose P001b" in how_to_answer(tmp_path, "P002", asked)
     # Of new hits of the same pose `withdraw` would set aside these: their import is undone first.
-    own = how_to_answer(campaign.directory, "P001", asked)
+    own = how_to_answer(tmp_path, "P001", asked)
     assert own.index("planner undo") < own.index("planner withdraw") < own.index("--pose P001b")
     assert "--pose P001c" in own
 
