@@ -9,8 +9,8 @@ import pytest
 
 from planner.proof.load import load_truth
 from planner.proof.model import Truth
-from planner.report.springs import with_exponent
 from planner.surrogate.frequency_models import MODELS
+from planner.words import with_sd
 from tests.support.outside import call, make_cell, record, refused, said, told
 from tests.support.robots import JOINTS_DEG
 
@@ -81,7 +81,7 @@ def test_what_the_simulation_learned_of_each_joint_stands_beside_what_was_stated
     assert any(abs(s["stiffness"] / s["stated"] - 1) > 0.03 for s in springs)  # it learned
     _, said, _ = call("status", three.cell)
     first = springs[0]
-    shown = with_exponent(first["stiffness"], first["stiffness_sd"])
+    shown = with_sd(first["stiffness"], first["stiffness_sd"])
     assert all(word in said for word in ("stated", "refitted ± sd", "N·m/rad", shown))
     page = tmp_path / "report.html"
     told("report", three.cell, "--out", page)

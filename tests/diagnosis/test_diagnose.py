@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from planner import Dataset, Robot, diagnose
-from planner.fit.search import MOST
 from planner.proof.deviation import Deviation
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import EVERYDAY, LABORATORY
@@ -109,10 +108,7 @@ def test_what_is_concealed_is_named_and_sized(tmp_path, name):
     assert_named_and_sized(diagnosed(small_case(tmp_path, CONCEALED[name])), name)
 
 
-@pytest.mark.parametrize("most", [1, pytest.param(MOST, marks=pytest.mark.slow)])
-def test_what_no_effect_describes_is_unexplained(tmp_path, monkeypatch, most):
-    """Nor does one more effect explain it, after those of the first round."""
-    monkeypatch.setattr("planner.fit.search.MOST", most)
+def test_what_no_effect_describes_is_unexplained(tmp_path):
     answer = diagnosed(small_case(tmp_path, CONCEALED["outsider"]))
     assert answer["verdict"] == "unexplained"
     assert answer["candidates"][0]["effect"] == "unknown"

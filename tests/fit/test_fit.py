@@ -182,7 +182,7 @@ def test_a_sensor_that_is_seated_again_at_each_pose_is_known(prior, few):
     for share in (t.visit_chain, 0.0):
         one = replace(misfit, data=data, tolerances=replace(t, visit_chain=share))
         evidence[share] = settled(one, one(x), rounds=3).evidence
-    assert evidence[t.visit_chain] > evidence[0.0] + 100.0
+    assert evidence[t.visit_chain] > evidence[0.0] + 20.0
 
 
 def test_a_fit_begins_with_a_mass_that_a_body_stands_for_and_gives_the_same_frfs(prior, few):
