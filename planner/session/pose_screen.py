@@ -115,7 +115,7 @@ class PosePage:
         """The last hits; the very last one, and those that are not good, in any case."""
         if not self.hits:
             return []
-        *before, last = self.hits
+        *before, last = _alike_once(self.hits)
         asked = [hit for hit in before[: 1 - LAST] if hit.kind != "good"]
         told = [*asked, *before[1 - LAST :]]
         parts = [
@@ -162,6 +162,16 @@ class PosePage:
         if self.complete:
             made.add_row(Text("all hits are in", style="bold green"))
         return made
+
+
+def _alike_once(hits: Sequence[HitVerdict]) -> list[HitVerdict]:
+    """Hits of which no file says the axis are told once: the same is to be done about all."""
+    first, *more = [hit for hit in hits if hit.kind == "unstated"] or [None]
+    if first is None or not more:
+        return list(hits)
+    numbers = ", ".join(str(hit.number) for hit in more)
+    told = replace(first, text=f"{first.text} The same of {numbers}.")
+    return [told if hit is first else hit for hit in hits if hit not in more]
 
 
 def keys_that_do(pairs: Sequence[tuple[str, str, bool]]) -> str:

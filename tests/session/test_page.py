@@ -167,3 +167,13 @@ def test_a_sentence_under_a_full_page_is_seen(page):
     assert told in whole(text.split("\n"))
     assert " ".join(remedy_first(OTHER.text)) in whole(text.split("\n"))
     assert text.rstrip("\n").count("\n") < 24
+
+
+def test_hits_without_an_axis_are_told_once_and_leave_the_page_its_head(page):
+    text = "tap.csv states no axis; begin the file with a line such as '# hit: +x'."
+    hits = tuple(judged(number, "", "unstated", text) for number in range(1, 10))
+    found = lines(replace(page, hits=hits))
+    assert len(found) <= 22
+    assert "go to pose" in found[0]
+    assert whole(found).count("along which axis?") == 1
+    assert "9 without an axis" in whole(found)
