@@ -166,9 +166,10 @@ class PosePage:
 
 def _alike_once(hits: Sequence[HitVerdict]) -> list[HitVerdict]:
     """Hits of which no file says the axis are told once: the same is to be done about all."""
-    first, *more = [hit for hit in hits if hit.kind == "unstated"] or [None]
-    if first is None or not more:
+    alike = [hit for hit in hits if hit.kind == "unstated"]
+    if len(alike) < 2:
         return list(hits)
+    first, *more = alike
     numbers = ", ".join(str(hit.number) for hit in more)
     told = replace(first, text=f"{first.text} The same of {numbers}.")
     return [told if hit is first else hit for hit in hits if hit not in more]
