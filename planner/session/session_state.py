@@ -231,8 +231,8 @@ class Session:
         entries = self.campaign.entries
         acts, undone = last_acts(entries, decisions_only=True), last_undone(entries)[0]
         again = undone.event.acts[:1] if undone and isinstance(undone.event, events.Undone) else ()
-        first = *acts[:1], None
-        return in_short(first[0]), in_short(entries[again[0] - 1] if again else None)
+        redone = entries[again[0] - 1] if again else None
+        return in_short(acts[0] if acts else None), in_short(redone)
 
     def key(self) -> str | None:
         """The next key, or None after a moment."""
