@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from planner.robot.robot import Robot
+from planner.robot.urdf_inertias import affine_map
 from planner.robot.virtual_joints import OUTER, cut_at, halves_moved, inertia_basis
 
 HALVES = float(np.sqrt(2.0))  # independent halves scatter by more than their sum
@@ -28,11 +29,6 @@ def pseudo_inertia(inertia: np.ndarray) -> np.ndarray:
     rows = [[half - xx, -xy, -xz, x], [-xy, half - yy, -yz, y], [-xz, -yz, half - zz, z],
             [x, y, z, m]]  # fmt: skip
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def _upper(matrix: np.ndarray) -> np.ndarray:
-    """U, upper triangular, with U Uᵀ = matrix."""
-    return np.linalg.cholesky(matrix[::-1, ::-1])[::-1, ::-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +96,7 @@ class BodyNumbers:
             nominal = to @ pseudo_inertia(self.nominal[mine]) @ np.swapaxes(to, 1, 2)
             known = [a @ pseudo_inertia(there[n]) @ a.T for n, a in moved.items() if n in there]
             weighs = np.sum(known, axis=0)
-            affine = _upper(weighs) @ np.linalg.inv(_upper(nominal.sum(axis=0)))
+            affine = affine_map(nominal.sum(axis=0), weighs)
             wanted = affine @ nominal @ affine.T
             factor = wanted[:, 3, 3] / nominal[:, 3, 3]
             change = to @ np.swapaxes(pseudo_inertia(self.change[mine]), 0, 1)

@@ -1,6 +1,6 @@
 """An identified robot as a folder: robot.toml, whose comments and order stay, and its URDF."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,12 +10,13 @@ import tomlkit
 
 from planner.errors import InputError
 from planner.fit.result import Identification
-from planner.robot.config import Compliance, entry_of
+from planner.robot.config import Compliance, Payload, entry_of
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.joint_laws import LawTable
 from planner.robot.mesh_files import copy_meshes
 from planner.robot.robot import Robot
-from planner.robot.urdf_inertias import urdf_with_inertias
+from planner.robot.urdf_inertias import with_inertias
+from planner.words import listed
 
 INERTIAL_ENTRIES = "mass_kg", "centre_m", "inertia_kg_m2"  # of [[link]]
 FOUND = "resonator", "harmonic"  # blocks that an identification may add
@@ -28,32 +29,33 @@ def updated_toml(
     urdf: str | None = None,
     added: Sequence[Compliance] = (),
     laws: Sequence[LawTable] = (),
+    payload: Sequence[Payload] = (),
 ) -> str:
     """The robot.toml `text` with the [[compliance]] blocks' numbers (and its urdf) replaced.
 
-    A new `urdf` is one of `urdf_with_inertias`, which has what [[link]] states in it.
+    A new `urdf` is one of `with_inertias`, which has what [[link]] states in it; so are `payload`s
+    in the stead of those in the text.
     `added` blocks, which the identification counts last, follow those in the text, and so do
     resonators and harmonics that it found; those in the text take its numbers. `laws` replace
     those stated for their joints, and bring the pulse of the hits that told them.
     """
     document = tomlkit.parse(text)
-    listed = document["compliance"]
-    blocks = [*listed]
-    blocks += [b for e in document.get("effects", ()) for b in e.get("compliance", ())]
+    springs, blocks = document["compliance"], _stated(document, "compliance")
     for block in added:
         table = tomlkit.table()
         table.update(joint=block.joint, axis=list(block.axis), stiffness=0.0, damping=0.0)
         if block.slide:
             table["slide"] = True
-        listed.append(table)
+        springs.append(table)
         blocks.append(table)
     for estimate in result.estimates:
         for number in estimate.blocks:
             at = entry_of(estimate.kind, blocks[number])
             blocks[number][at] = float(f"{estimate.value:.{DIGITS}g}")
+    for block, changed in zip(_stated(document, "payload"), payload, strict=False):
+        block.update(msgspec.to_builtins(changed))
     for kind in FOUND:
-        stated = [*document.get(kind, ())]
-        stated += [b for e in document.get("effects", ()) for b in e.get(kind, ())]
+        stated = _stated(document, kind)
         for number, block in enumerate(getattr(result.simulation.robot.config, kind)):
             table = stated[number] if number < len(stated) else tomlkit.table()
             table.update(msgspec.to_builtins(block))
@@ -65,6 +67,12 @@ def updated_toml(
         document["urdf"] = urdf
         drop_stated_inertias(document)
     return tomlkit.dumps(document)
+
+
+def _stated(document: tomlkit.TOMLDocument, kind: str) -> list:
+    """Blocks of a kind, those of [[effects]] after the robot's own."""
+    within = (b for e in document.get("effects", ()) for b in e.get(kind, ()))
+    return [*document.get(kind, ()), *within]
 
 
 def _state_laws(document: tomlkit.TOMLDocument, laws: Sequence[LawTable], pulse_ms: float) -> None:
@@ -119,37 +127,36 @@ def write_robot(
     out, bodies = out.absolute(), result.simulation.elastic.bodies
     change = result.simulation.elastic.inertia - ElasticModel(robot).inertia
     elsewhere = out.parent.resolve() != robot.path.parent.resolve()
-    urdf, name, shares = robot.urdf_path, None, {}
+    urdf, name, moved = robot.urdf_path, None, None
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         if elsewhere or np.any(change):
             name = robot.urdf_path.name if elsewhere else f"{out.stem}.urdf"
             urdf = out.parent / name
-            text, shares = urdf_with_inertias(robot, bodies, change)
-            _write_new(urdf, text)
+            moved = with_inertias(robot, bodies, change)
+            _write_new(urdf, moved.urdf)
             if elsewhere:
-                copy_meshes(text, robot.urdf_path, urdf)
+                copy_meshes(moved.urdf, robot.urdf_path, urdf)
         stated = robot.path.read_text(encoding="utf-8-sig")
         inside = sum(len(e.compliance) for e in robot.config.effects)
         added = robot.config.compliance[len(tomlkit.parse(stated)["compliance"]) + inside :]
-        _write_new(out, updated_toml(stated, result, name, added, laws))
+        payload = () if moved is None else moved.payload
+        _write_new(out, updated_toml(stated, result, name, added, laws, payload))
     except OSError as error:
         raise InputError(
             f"{out} cannot be written ({error.strerror}); name another file with --out."
         ) from None
-    return Written(out, urdf, _impossible(shares))
+    return Written(out, urdf, _impossible(() if moved is None else moved.unchanged))
 
 
-def _impossible(shares: Mapping[str, float]) -> tuple[str, ...]:
+def _impossible(unchanged: Sequence[str]) -> tuple[str, ...]:
     """What became of inertias that no body of matter can have; nothing where there are none."""
-    if not shares:
+    if not unchanged:
         return ()
-    each = ", ".join(f"{body} ({100 * share:.0f} %)" for body, share in shares.items())
     return (
-        f"Of what turns with {each} the URDF takes only that part of the identified change of "
-        f"inertia, as no body can have all of it (moments below 0, or against the triangle "
-        f"inequality): the written robot fits less well than what was found; state what is mounted "
-        f"there ([[payload]]) or correct the URDF's masses.",
+        f"What turns with {listed(unchanged)} has the inertia that is stated, as no body can have "
+        f"the identified one (moments below 0, or against the triangle inequality): the written "
+        f"robot fits less well than what was found; correct the URDF's masses and moments there.",
     )
 
 

@@ -1,47 +1,111 @@
-"""A robot's URDF with other inertias: how identified ones are handed on."""
+"""A robot's links and payloads with other inertias: how identified ones are handed on."""
 
 import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
-from planner.robot.config import BASE
+from planner.robot.config import BASE, STATED, Payload
 from planner.robot.mesh_files import urdf_source
 from planner.robot.robot import Robot
 from planner.robot.urdf_elements import link_inertia, state_inertias, write_inertia
-from planner.robot.virtual_joints import OUTER, SMALL, body_inertia, cut_at, ends_of
+from planner.robot.virtual_joints import (
+    OUTER,
+    SMALL,
+    body_inertia,
+    cut_at,
+    ends_of,
+    payload_inertia,
+)
 
-SAFE = 0.99  # of the largest share of a change that leaves a body possible
+
+def affine_map(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """A (4, 4) with A `before` Aᵀ = `after`, pseudo-inertias that are positive.
+
+    It is upper triangular, so that it moves and stretches: what it makes of any body, A P Aᵀ, is
+    one that matter can form (Lee, Wensing & Park 2020). LinAlgError where one is not positive.
+    """
+    return _upper(after) @ np.linalg.inv(_upper(before))
 
 
-def urdf_with_inertias(
-    robot: Robot, bodies: tuple[str, ...], change: np.ndarray
-) -> tuple[str, dict[str, float]]:
-    """Text of the URDF after change (B, 10) of the bodies' inertias, which `bodies` names.
+def _upper(matrix: np.ndarray) -> np.ndarray:
+    """U, upper triangular, with U Uᵀ = matrix."""
+    return np.linalg.cholesky(matrix[::-1, ::-1])[::-1, ::-1]
 
-    What [[link]] of robot.toml states is in it (a robot.toml beside it must not state them).
-    Bodies, their frames and the ten numbers are those of `ElasticModel.inertia`. Of the links
-    that make up a body the heaviest takes the change, or the share of it that leaves a link which
-    matter can form; shares below 1 are returned by body.
+
+@dataclass(frozen=True)
+class ChangedInertias:
+    """Text of a URDF and its robot's payloads after a change, and bodies that could not have it."""
+
+    urdf: str
+    payload: tuple[Payload, ...]
+    unchanged: tuple[str, ...]
+
+
+def with_inertias(robot: Robot, bodies: tuple[str, ...], change: np.ndarray) -> ChangedInertias:
+    """Links and payloads after change (B, 10) of the bodies' inertias, which `bodies` names.
+
+    What [[link]] of robot.toml states is in the URDF (a robot.toml beside it must not state them).
+    Bodies, their frames and the ten numbers are those of `ElasticModel.inertia`. All that makes up
+    a body is moved and stretched by the one `affine_map` that gives the whole its new inertia, so
+    that each part stays possible; a body that is impossible as stated, or becomes so, stays.
     """
     text = urdf_source(robot.urdf_path).decode("utf-8")
     keep = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
     root = ElementTree.fromstring(text[text.index("<robot") :], keep)
     state_inertias(root, robot.config.link)
-    links = {link.get("name"): link for link in root.findall("link")}
-    shares = {}
+    links = {link.get("name", ""): link for link in root.findall("link")}
+    payload, unchanged = list(robot.config.payload), []
+    for body, values in _whole(robot, bodies, change).items():
+        joint = _joint_of(robot, body)
+        placed = {frame.name: frame.placement for frame in robot.body_frames(joint)}
+        mine = [name for name in placed if name in links]
+        if body == BASE and not any(link_inertia(links[name]).mass for name in mine):
+            continue  # what `massless_base` gave it is no matter
+        before = _spread(body_inertia(robot, joint))
+        try:
+            to = affine_map(before, before + _spread(values))
+        except np.linalg.LinAlgError:
+            unchanged.append(body)
+            continue
+        for name in mine:
+            if (own := link_inertia(links[name])).mass:
+                write_inertia(links[name], _moved(own, placed[name], to))
+        for number, block in enumerate(payload):
+            if block.link in placed and block.mass:
+                own = _moved(payload_inertia(block), placed[block.link], to)
+                payload[number] = _as_payload(block.link, own)
+    text = text[: text.index("<robot")] + ElementTree.tostring(root, encoding="unicode")
+    return ChangedInertias(text, tuple(payload), tuple(unchanged))
+
+
+def _whole(robot: Robot, bodies: tuple[str, ...], change: np.ndarray) -> dict[str, np.ndarray]:
+    """Changes (10,) other than none by body, those of halves as one of their link's."""
+    out: dict[str, np.ndarray] = {}
     for body, values in zip(bodies, change, strict=True):
         if body.endswith(OUTER):
             body, values = _of_whole(robot, body.removesuffix(OUTER), values)
         if np.any(values) and not body.startswith(f"{SMALL} "):
-            frames = robot.body_frames(_joint_of(robot, body))
-            stated = [frame for frame in frames if frame.name in links]
-            frame = max(stated, key=lambda frame: link_inertia(links[frame.name]).mass)
-            if body == BASE and not link_inertia(links[frame.name]).mass:
-                continue  # what `massless_base` gave it is no matter
-            share = _change(links[frame.name], _seen_from(frame.placement, values))
-            shares |= {body: share} if share < 1 else {}
-    return text[: text.index("<robot")] + ElementTree.tostring(root, encoding="unicode"), shares
+            out[body] = out.get(body, np.zeros(10)) + values
+    return out
+
+
+def _moved(inertia: pin.Inertia, placement: pin.SE3, to: np.ndarray) -> pin.Inertia:
+    """What an affine map, in the frame of a body, makes of what is placed there."""
+    there = placement.homogeneous
+    own = np.linalg.inv(there) @ to @ there
+    spread = own @ _spread(inertia.toDynamicParameters()) @ own.T
+    return pin.Inertia.FromDynamicParameters(
+        pin.PseudoInertia.FromMatrix(spread).toDynamicParameters()
+    )
+
+
+def _as_payload(link: str, inertia: pin.Inertia) -> Payload:
+    numbers = [inertia.mass, *inertia.lever, *(inertia.inertia[at] for at in STATED)]
+    mass, x, y, z, *moments = (float(f"{v:.9g}") for v in numbers)
+    xx, xy, xz, yy, yz, zz = moments
+    return Payload(link, mass, (x, y, z), (xx, xy, xz, yy, yz, zz))
 
 
 def _of_whole(robot: Robot, link: str, values: np.ndarray) -> tuple[str, np.ndarray]:
@@ -89,20 +153,3 @@ def _spread(values: np.ndarray) -> np.ndarray:
     Wensing, Kim & Slotine 2018, eq. 12.
     """
     return pin.PseudoInertia.FromDynamicParameters(values).toMatrix()
-
-
-def _change(link: ElementTree.Element, values: np.ndarray) -> float:
-    """Add the share of `values` (10,) that is possible to a link; returns it.
-
-    That is the one that keeps the pseudo-inertia positive; 0 where it is not so before.
-    """
-    import scipy.linalg  # 0.2 s, which reading inertias does not need
-
-    nominal = np.array(link_inertia(link).toDynamicParameters())
-    try:
-        least = scipy.linalg.eigh(_spread(values), _spread(nominal), eigvals_only=True)[0]
-    except np.linalg.LinAlgError:
-        return 0.0
-    share = 1.0 if least > -SAFE else float(SAFE / -least)
-    write_inertia(link, pin.Inertia.FromDynamicParameters(nominal + share * values))
-    return share

@@ -231,15 +231,19 @@ def _body(values: np.ndarray) -> pin.Inertia:
     return pin.Inertia(0.0, np.zeros(3), symmetric(values[4:], PINOCCHIO))
 
 
+def payload_inertia(block: Payload) -> pin.Inertia:
+    """Of a payload in its link's frame."""
+    moments = symmetric(block.inertia_kg_m2, STATED)
+    return pin.Inertia(block.mass, np.array(block.com_m, dtype=float), moments)
+
+
 def body_inertia(robot: Robot, joint: int) -> np.ndarray:
     """(10,) of all links that a joint carries, and of the payloads on them."""
     total = robot.model.inertias[joint]
     for block in robot.config.payload:
         frame = robot.model.frames[robot.frame_id("[[payload]] link", block.link)]
         if frame.parentJoint == joint:
-            moments = symmetric(block.inertia_kg_m2, STATED)
-            body = pin.Inertia(block.mass, np.array(block.com_m, dtype=float), moments)
-            total = total + frame.placement.act(body)
+            total = total + frame.placement.act(payload_inertia(block))
     return np.array(total.toDynamicParameters())
 
 

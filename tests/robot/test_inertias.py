@@ -3,22 +3,37 @@
 import re
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pinocchio as pin
 import pytest
+import tomlkit
 
 from planner.errors import InputError
 from planner.proof.arms import ARMS
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
-from planner.robot.urdf_inertias import urdf_with_inertias
+from planner.robot.urdf_inertias import with_inertias
 from planner.robot.virtual_joints import _halves, virtual_model
 from tests.support.plain_arm import make_plain_arm
+
+SPINDLE = '\n[[payload]]\nlink = "link_6"\nmass = 40.0\ncom_m = [0.02, 0.01, 0.3]\n'
+
+
+def written(robot: Robot, change: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Inertias of bodies as loaded again after a change, and the bodies that have none of it."""
+    made = with_inertias(robot, ElasticModel(robot).bodies, change)
+    robot.urdf_path.write_text(made.urdf)
+    document = tomlkit.parse(robot.path.read_text())
+    for block, payload in zip(document.get("payload", ()), made.payload, strict=True):
+        block.update(msgspec.to_builtins(payload))
+    robot.path.write_text(tomlkit.dumps(document))
+    return ElasticModel(Robot.load(robot.path)).inertia, made.unchanged
 
 
 @pytest.mark.parametrize("name", list(ARMS))
 @pytest.mark.parametrize("base", [False, True])
-def test_a_small_change_is_taken_whole(tmp_path: Path, name, base):
+def test_a_change_is_written_whole(tmp_path: Path, name, base):
     path = ARMS[name].write(tmp_path)
     if base:
         text = path.read_text()
@@ -29,27 +44,36 @@ def test_a_small_change_is_taken_whole(tmp_path: Path, name, base):
     rng = np.random.default_rng(0)
     change = 0.004 * elastic.inertia * rng.standard_normal((len(elastic.bodies), 1))
     change[:, 0] *= 1.2
-    text, shares = urdf_with_inertias(robot, elastic.bodies, change)
-    assert shares == {}
-    robot.urdf_path.write_text(text)
-    after = ElasticModel(Robot.load(path)).inertia
+    after, unchanged = written(robot, change)
+    assert unchanged == ()
     np.testing.assert_allclose(after, elastic.inertia + change, rtol=1e-6, atol=1e-7)
     size = np.abs(change).max()
     assert np.abs(after - elastic.inertia).max() == pytest.approx(size, rel=1e-3)
 
 
-def test_what_matter_cannot_form_is_taken_in_part(tmp_path: Path):
+def test_a_spindle_takes_the_change_that_the_flange_could_not(tmp_path: Path):
+    path = ARMS["kr210"].write(tmp_path)
+    path.write_text(path.read_text() + SPINDLE)
+    robot = Robot.load(path)
+    inertia = ElasticModel(robot).inertia
+    change = np.zeros_like(inertia)
+    change[-1] = -0.3 * inertia[-1]  # more than the flange weighs
+    after, unchanged = written(robot, change)
+    assert unchanged == ()
+    np.testing.assert_allclose(after, inertia + change, rtol=1e-6, atol=1e-7)
+    [spindle] = Robot.load(path).config.payload
+    assert spindle.mass == pytest.approx(0.7 * 40.0)
+    np.testing.assert_allclose(spindle.com_m, [0.02, 0.01, 0.3], rtol=1e-6)
+
+
+def test_what_matter_cannot_form_is_left_as_it_was(tmp_path: Path):
     robot = Robot.load(ARMS["kr210"].write(tmp_path))
     elastic = ElasticModel(robot)
     change = np.zeros_like(elastic.inertia)
     change[1, 0] = -2 * elastic.inertia[1, 0]
-    text, shares = urdf_with_inertias(robot, elastic.bodies, change)
-    body = elastic.bodies[1]
-    assert list(shares) == [body]
-    assert 0 < shares[body] < 0.5
-    robot.urdf_path.write_text(text)
-    after = ElasticModel(Robot.load(robot.path)).inertia
-    np.testing.assert_allclose(after, elastic.inertia + shares[body] * change, rtol=1e-6, atol=1e-7)
+    after, unchanged = written(robot, change)
+    assert unchanged == (elastic.bodies[1],)
+    np.testing.assert_allclose(after, elastic.inertia, rtol=1e-6, atol=1e-7)
 
 
 def test_comments_of_the_urdf_stay(tmp_path: Path):
@@ -59,7 +83,7 @@ def test_comments_of_the_urdf_stay(tmp_path: Path):
     urdf.write_text(head + urdf.read_text().replace("<joint", "<!-- a joint --><joint", 1))
     robot = Robot.load(path)
     elastic = ElasticModel(robot)
-    text, _ = urdf_with_inertias(robot, elastic.bodies, 0.001 * elastic.inertia)
+    text = with_inertias(robot, elastic.bodies, 0.001 * elastic.inertia).urdf
     assert text.startswith(head)
     assert "<!-- a joint -->" in text
 
