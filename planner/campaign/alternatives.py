@@ -21,11 +21,17 @@ BETTER = 3.0  # times less is left by a mistake that explains them
 STEPS = 2.0 ** np.arange(1, 7)
 FINE = 0.02  # of where it is likeliest: so finely that is told
 NO_RECORD = 1e6  # times |H| is off what no record can show
-MUCH = 10.0  # times farther than is stated hits may have struck, or joints may stand
+# Times farther than is stated hits may have struck, or joints may stand; and sds of a body's
+# inertia by which a tool may be another.
+MUCH = 10.0
 FAR_OFF_HITS = (
     "hits look struck far beside the tool's tip, or slanted: was it that point, and along its axes?"
 )
-FOLLOWED = 3  # mistakes that are fitted, those that seem likeliest at once
+OTHER_TOOL = (
+    "what the last joint carries looks another than at the poses before: was the tool changed, or "
+    "does something hang on it?"
+)
+FOLLOWED = 3  # mistakes that are fitted beside rivals, those that seem likeliest at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +110,9 @@ class StatedHits:
             )
 
         found = []
-        for one in sorted(mistakes, key=glanced, reverse=True)[:FOLLOWED]:
+        others = [one for one in mistakes if not one.rival]
+        likeliest = sorted(others, key=glanced, reverse=True)[:FOLLOWED]
+        for one in (*(one for one in mistakes if one.rival), *likeliest):
             frf, volume = shown(one)
             its, left = (one.expected or self.expected).density(one.q, frf)
             gain = its + volume - one.rarer - value
@@ -167,6 +175,12 @@ def far_off_hits(expected: ExpectedFrfs, q: np.ndarray) -> Alternative:
     return Alternative(
         q, FAR_OFF_HITS, about="chain", rival=True, expected=replace(expected, times=MUCH)
     )
+
+
+def other_tool(expected: ExpectedFrfs, q: np.ndarray) -> Alternative:
+    """A tool that was changed, or loaded, since the poses before."""
+    other = replace(expected, tool_sds=MUCH)
+    return Alternative(q, OTHER_TOOL, about="chain", rival=True, expected=other)
 
 
 def _best(less: Callable[[float], float]) -> float:

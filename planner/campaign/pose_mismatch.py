@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.campaign.alternatives import (
-    FAR_OFF_HITS,
     LOG_ODDS,
     Alternative,
     StatedHits,
@@ -24,6 +23,7 @@ from planner.campaign.alternatives import (
     flipped_signs,
     instead,
     joint_offsets,
+    other_tool,
 )
 from planner.campaign.chain_mismatch import chain_mismatch
 from planner.campaign.events import Question
@@ -61,8 +61,9 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
     answered = _called_right(claim.state)
     said = "".join(answered)  # not asked again
     likely = _setpoint(claim)
-    if sure and frf.layout == TOOL and FAR_OFF_HITS not in said:
-        likely.append(far_off_hits(expected, q))
+    if sure and frf.layout == TOOL:
+        both = far_off_hits(expected, q), other_tool(expected, q)
+        likely += (one for one in both if one.what not in said)
     if stated.agree(likely):
         return None
     mistakes = [*likely, *_poses(claim)]

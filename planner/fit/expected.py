@@ -45,13 +45,15 @@ class ExpectedFrfs:
     """Of one more pose, after what `posterior` knows; FRFs in `band_hz` count.
 
     Its hits may be so many `times` farther off and more slanted than is stated, its joints so many
-    `joint_times` farther beside their readback.
+    `joint_times` farther beside their readback; what the last joint carries may be another than
+    before, by so many `tool_sds` of what is known of a body beforehand.
     """
 
     posterior: RobotPosterior
     band_hz: tuple[float, float]
     times: float = 1.0
     joint_times: float = 1.0
+    tool_sds: float = 0.0
 
     @cached_property
     def tolerances(self) -> Tolerances:
@@ -79,10 +81,18 @@ class ExpectedFrfs:
         at = np.array(rows)
         both = (at[:, None] >= 0) & (at >= 0)
         covariance = np.where(both, p.covariance[np.ix_(at, at)], np.eye(len(at)))
+        tool = s.inertial.start + s.bodies.mine[s.bodies.bodies.index(self._last_joint)]
+        covariance[tool, tool] += self.tool_sds**2
         x = np.where(at >= 0, p.x[at], 0.0)
         made = _Informed(s.prior, s.effects, len(sensors), x, inverse(covariance))
         self._structures[sensors] = made
         return made
+
+    @property
+    def _last_joint(self) -> str:
+        """Whose body carries the tool."""
+        robot = self.posterior.structure.prior.effect_library.simulation.robot
+        return str(robot.model.names[robot.model.frames[robot.tcp_id].parentJoint])
 
     def _misfit(self, q: np.ndarray, frf: Frf, size: float) -> FrfMisfit:
         structure = self._structure(frf.layout.sensors)

@@ -95,12 +95,12 @@ class Asker:
 
     def asked(
         self, pose: int, q: np.ndarray, change: Change | None = None,
-        state: CampaignState | None = None,
+        state: CampaignState | None = None, heavier: bool = False,
     ) -> str:  # fmt: skip
         """Of a pose's hits, said to be at q, by a chain that changes them: a pose, "readback",
         "earlier" and a pose, "chain", "?" where nothing fits; "" where nothing is asked."""
         case = self.campaign.case
-        hits = case.measured[pose].hits
+        hits = (case.heavier if heavier else case.measured)[pose].hits
         hits = tuple(map(change, hits)) if change else hits
         measured = MeasuredPose((), case.band_hz, given=hits)
         angles = self.campaign.angles(q)
@@ -126,6 +126,7 @@ def answers(campaign: CaseCampaign, rng: np.random.Generator, mistaken: bool) ->
             bent = Asker(campaign, campaign.state(n, wrong_q, [n]))
             one[FIRST] = (bent.asked(n, q), "earlier P0")
             one |= {name: (ask.asked(n, q, how), "chain") for name, how in FILTERED.items()}
+            one["heavier tool"] = ask.asked(n, q, heavier=True), "chain"
         out.append(one)
     return out
 

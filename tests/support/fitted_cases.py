@@ -2,7 +2,10 @@
 
 import tomllib
 import zlib
+from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -20,7 +23,7 @@ from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.proof.cases import SCATTER
 from planner.proof.deviation import AttachedMass, Spring
-from planner.proof.fault_injection import InjectedFaults
+from planner.proof.fault_injection import InjectedFaults, LoadChange
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import EVERYDAY, MeasurementErrors
 from planner.proof.model import Truth
@@ -37,6 +40,7 @@ ARMS = {
     **{name: ROBOTS[name] for name in ("kr10", "irb6640", "arm of four", "kr240 plane")},
     "kr210": lambda folder, rng: known("kr210", folder, rng),
 }
+HEAVIER = 0.01  # share of what moves that another tool weighs more
 COUNTED = 4  # natural frequencies that are compared, the lowest that hits show
 
 
@@ -71,6 +75,17 @@ class Case:
     truth: Truth
     box_rad: np.ndarray  # (2, dof)
     tool_kg: float  # of a tool that robot.toml lacks
+    struck: Callable[[LoadChange | None], tuple[MeasuredPose, ...]]  # again, with another load
+
+    @cached_property
+    def heavier(self) -> tuple[MeasuredPose, ...]:
+        """The same hits with a tool that is heavier by HEAVIER of all that moves."""
+        urdf = ElementTree.parse(self.toml.parent / tomllib.loads(self.toml.read_text())["urdf"])
+        flange = list(links_moved(urdf.getroot(), self.truth.joint_names).values())[-1]
+        [link] = [e for e in urdf.getroot().findall("link") if e.get("name") == flange]
+        mass = sum(float(m.get("value", 0)) for m in link.iterfind("inertial/mass"))
+        more = HEAVIER * mass_that_moves(urdf.getroot()) / mass
+        return self.struck(LoadChange(flange, 1 + more, 0.0))
 
     def posterior(self) -> RobotPosterior:
         """What a fit makes of it."""
@@ -167,6 +182,12 @@ def _measured(
     q = rng.uniform(low, high, (POSES, len(low)))
     unseen = rng.uniform(low, high, (UNSEEN, len(low)))
     hammer = replace(arm.hammer, noise=float(rng.uniform(0.005, 0.03)))
+    before = deepcopy(rng)
+
+    def struck(load: LoadChange | None) -> tuple[MeasuredPose, ...]:
+        told, same = replace(injected, load=load), deepcopy(before)
+        return struck_poses(truth, told, q, hammer, arm.band_hz, errors, same)
+
     measured = struck_poses(truth, injected, q, hammer, arm.band_hz, errors, rng)
     lines = np.linspace(*arm.band_hz, LINES)
     true = np.array([truth.accelerance(one, lines) for one in unseen])
@@ -176,6 +197,7 @@ def _measured(
     return Case(
         arm.toml, arm.band_hz, q, frfs, unseen, lines, true, seen, concealed, measured,
         truth, np.array([low, high]), sum(m.mass_kg for m in injected.deviation.added),
+        struck,
     )  # fmt: skip
 
 
