@@ -109,7 +109,7 @@ class StatedHits:
                 (one.expected or self.expected).outlier_log_density(one.q, frf) + volume - one.rarer
             )
 
-        found = []
+        fitted = []
         others = [one for one in mistakes if not one.rival]
         likeliest = sorted(others, key=glanced, reverse=True)[:FOLLOWED]
         for one in (*(one for one in mistakes if one.rival), *likeliest):
@@ -120,9 +120,12 @@ class StatedHits:
             told = self.placed and size == SIZES[-1] and one.about == "readback"
             alone = one.rival or (told and gain > CERTAIN)
             better = (1 if alone else BETTER) * left <= size
-            if gain > LOG_ODDS and (better or its + volume > self.outlier_log_density > value):
-                found.append((gain, one))
-        return max(found, key=lambda pair: pair[0], default=(0.0, None))[1]
+            explains = better or its + volume > self.outlier_log_density > value
+            # Once one explains them, another is told where it is so much likelier still.
+            fitted.append((gain - (0.0 if explains else LOG_ODDS), explains, one))
+        if not any(explains and gain > LOG_ODDS for gain, explains, _ in fitted):
+            return None
+        return max(fitted, key=lambda each: each[0])[-1]
 
 
 def joint_offsets(

@@ -72,10 +72,11 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
         mistakes += joint_offsets(claim.joints, expected, frf, claim.joints_deg)
     mistakes += (m for m in chain_faults(expected, q, frf, sure) if m.what not in said)
     fits = stated.best_alternative(mistakes)
-    # Another known pose is none by chance; any angle may be, of the pose or of one before.
+    # Another known pose, or the setpoint, is none by chance; any angle may be, of the pose or of one
+    # before.
     if (
         fits is None
-        or fits.about == "readback"
+        or (fits.about == "readback" and not fits.rival)
         or (fits.about != "chain" and StatedHits(expected, fits.q, frf).doubted)
     ):
         fits = _earlier(claim, fit.posterior, frf) or fits
