@@ -72,8 +72,8 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
         mistakes += joint_offsets(claim.joints, expected, frf, claim.joints_deg)
     mistakes += (m for m in chain_faults(expected, q, frf, sure) if m.what not in said)
     fits = stated.best_alternative(mistakes)
-    # Another known pose, or the setpoint, is none by chance; any angle may be, of the pose or of one
-    # before.
+    # Another known pose, or the setpoint, is none by chance; any angle may be, of this pose or of
+    # one before.
     if (
         fits is None
         or (fits.about == "readback" and not fits.rival)

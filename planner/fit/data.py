@@ -26,6 +26,8 @@ class FrfData:
     jacobians: np.ndarray
     order: np.ndarray | None = None  # nothing changes in the course of time
     off: np.ndarray | float = 0.0  # (n, dof), rad or m: joints stood so far off q
+    # (n,): a visit's own share of the chain's tolerances, in multiples of `visit_chain`
+    multiples: np.ndarray | float = 1.0
 
     @classmethod
     def of(
@@ -104,6 +106,7 @@ class FrfData:
             self.jacobians[poses],
             None if self.order is None else self.order[poses],
             self.off if isinstance(self.off, float) else self.off[poses],
+            self.multiples if isinstance(self.multiples, float) else self.multiples[poses],
         )
 
 

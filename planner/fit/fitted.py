@@ -51,7 +51,9 @@ class StructureFit:
 
     def _record(self, shares: tuple[float, ...]) -> "FitRecord":
         s = self.structure
-        return FitRecord(s.effects, s.names, self.at.x, self.at.own, size_of(self), shares)
+        found, multiples = self.at, self.misfit.data.multiples
+        told = tuple(np.broadcast_to(multiples, len(found.own)).tolist())
+        return FitRecord(s.effects, s.names, found.x, found.own, size_of(self), shares, told)
 
     @property
     def promised(self) -> float:
@@ -84,6 +86,7 @@ class FitRecord:
     own: np.ndarray
     size: float
     shares: tuple[float, ...]
+    multiples: tuple[float, ...]  # of each pose, as in `FrfData`
     wider: "FitRecord | None" = None
 
     @property

@@ -212,7 +212,8 @@ class FrfMisfit:
                 out[:, at.start] = np.einsum("nj,nj...->n...", off, motion.by_angle)
         out[:, own:visit] = visits
         chain = open_[:, numbers.hits : numbers.known]
-        np.multiply(chain[:, numbers.seated], self.tolerances.visit_chain, out=out[:, visit:-1])
+        share = self.tolerances.visit_chain * np.reshape(self.data.multiples, (-1, 1, 1, 1, 1))
+        np.multiply(chain[:, numbers.seated], share, out=out[:, visit:-1])
         return self.through_chain(x, h, out[:, :-1]), out, motion
 
     def through_chain(
@@ -239,6 +240,11 @@ class FrfMisfit:
         by_angle = self.matrices.by_angle
         joints = 0 if by_angle is None else by_angle.mass.shape[1]
         return NuisanceCounts.of(self.data.measured.accelerance), joints
+
+    @property
+    def seated(self) -> slice:
+        """Which columns are of what each visit's chain has for itself."""
+        return slice(-1 - len(self.nuisance_counts[0].seated), -1)
 
     def zero_nuisances(self) -> np.ndarray:
         """(n, l): own numbers, all 0."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from planner.dynamics.motion import Motion
 from planner.effects.effect import Operator
-from planner.fit.fitted import FitRecord, StructureFit, Tried, size_of
+from planner.fit.fitted import StructureFit, Tried
 from planner.fit.gauss_newton import minimised
 from planner.fit.linearised import At, Numbers, Point
 from planner.fit.misfit import FrfMisfit, times
@@ -168,5 +168,6 @@ class OneMore:
             x = moved if self.wider.possible(moved) else x
         volume = np.linalg.slogdet(at.normal + own.precision)[1]
         nats = -at.value - 0.5 * float(volume - np.linalg.slogdet(own.precision)[1])
-        record = FitRecord(s.effects, s.names, x, self.at.own, size_of(self.found), ())
+        known = self.found.tried.record
+        record = replace(known, effects=s.effects, names=s.names, x=x)
         return Tried(record, self.found.evidence + nats - self._worth_held[1])

@@ -38,7 +38,16 @@ from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotBelief
 from planner.fit.structure import RobotStructure, effects_free, exported
-from planner.fit.trials import FAR, FAR_OFF, FOLLOWED, LOG_STEPS, Trials, explained
+from planner.fit.trials import (
+    FAR,
+    FAR_OFF,
+    FOLLOWED,
+    LOG_STEPS,
+    Trials,
+    all_visits,
+    explained,
+)
+from planner.fit.visit_chains import LEAST_VISITS, likeliest_multiples
 from planner.inference.parallel import parallel_map
 from planner.measurement.measured_frfs import completed
 
@@ -89,10 +98,18 @@ class Search(Trials):
         return any(np.isfinite(f.tail_s) for f in self.frfs)
 
     def _found(self, warm: FitRecord | None) -> StructureFit:
+        first = self.plain() if warm is None else self.recovered(warm)
         if not self.extend:
-            return self.plain()
-        known = [] if warm is None else [self.recovered(warm)]
-        if not known or self.widen or not explained(known[0]):
+            return first
+        # What is stated may lack physics, for which visits' chains would stand in.
+        search = self if warm is None else self._chained(first)
+        return search._beside_known(first, warm)
+
+    def _beside_known(self, first: StructureFit, warm: FitRecord | None) -> StructureFit:
+        """The likeliest beside what a fit has, and beside what is stated."""
+        same = np.array_equal(first.misfit.data.multiples, all_visits(self.multiples, len(self.q)))
+        known = [first if same else self.recovered(first.tried.record)]
+        if warm is not None and (self.widen or not explained(known[0])):
             known.append(self.plain())
         # What stands in for what fewer poses could not tell may hide it: from both, apart.
         best = most_probable(one for k in known for one in self._explore([k], warm is not None))
@@ -117,17 +134,27 @@ class Search(Trials):
         best = self.recovered(known)
         return most_probable(self._explore([best], True)) if self.extend else best
 
+    def _chained(self, found: StructureFit) -> "Search":
+        """With what visits' chains have for themselves, as is likeliest beside a fit."""
+        few = len(self.q) < LEAST_VISITS or not self.extend
+        return self if few else self._with(likeliest_multiples(found))
+
+    def _with(self, multiples: tuple[float, ...]) -> "Search":
+        known, other = (all_visits(m, len(self.q)) for m in (self.multiples, multiples))
+        return self if np.array_equal(known, other) else replace(self, multiples=multiples)
+
     def _completed(self, known: FitRecord) -> "Search":
-        """With the decays that records cut off, as a structure has them."""
+        """With visits' chains and the decays that records cut off as a structure has them."""
         if not self._cut_off:
-            return self
+            return self._with(known.multiples)
         misfit, x = self.again(known, self.data(SEARCHED), known.size)
         simulation = exported(misfit.structure, x)[0]
         out = [completed(frf, simulation, row) for frf, row in zip(self.frfs, self.q, strict=True)]
-        return replace(self, frfs=tuple(out))
+        return replace(self._with(known.multiples), frfs=tuple(out))
 
     def _ended(self, best: StructureFit) -> StructureFit:
-        found = self._last(self._believed(best))
+        best = self._believed(best)
+        found = self._chained(best)._last(best)
         return replace(found, wider=self._widened(found)) if self.widen else found
 
     def _believed(self, best: StructureFit) -> StructureFit:

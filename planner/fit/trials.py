@@ -47,6 +47,11 @@ FAR_OFF = 0.03  # of |H|, not explained: few steps may not lead home
 FOLLOWED, SETTLED, FARTHEST = 6, 3, 3  # how many are followed, settled, come from afar
 
 
+def all_visits(multiples: Sequence[float], count: int) -> np.ndarray:
+    """(count,): those of the visits that follow are 1."""
+    return np.append(multiples, np.ones(count - len(multiples)))
+
+
 def as_found(
     prior: RobotPrior, known: FitRecord, sensors: int = 1
 ) -> tuple[RobotStructure, np.ndarray]:
@@ -70,6 +75,7 @@ class Trials:
     order: np.ndarray | None = None  # as in `FrfData.of`
     floor: float = 0.0  # as in `FrfMisfit`
     readings: tuple[Operator, ...] = ()  # of these poses, that may be wrong
+    multiples: tuple[float, ...] = ()  # as in `FrfData`; of poses that follow 1
 
     def __getstate__(self) -> Mapping[str, object]:
         """For another process, which tells nothing."""
@@ -82,9 +88,8 @@ class Trials:
     def data(self, lines: int) -> FrfData:
         """On so many lines a pose."""
         if lines not in self._data:
-            self._data[lines] = FrfData.of(
-                self.prior, self.frfs, self.q, self.band_hz, lines, self.order
-            )
+            data = FrfData.of(self.prior, self.frfs, self.q, self.band_hz, lines, self.order)
+            self._data[lines] = replace(data, multiples=all_visits(self.multiples, len(self.q)))
         return self._data[lines]
 
     def again(self, known: FitRecord, data: FrfData, size: float) -> tuple[FrfMisfit, np.ndarray]:

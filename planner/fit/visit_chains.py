@@ -1,0 +1,91 @@
+"""How much each visit's chain was another than at the other visits, by evidence.
+
+A sensor that is seated again, another hammer tip, a wrong sensitivity: what one visit has for
+itself is a multiple of `Tolerances.visit_chain`, inferred visit by visit as the discrepancy's size
+is of all.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+
+from planner.fit.fitted import StructureFit
+
+# Multiples that are looked at: up to gains some tens of percent off. Few visits are far from 1.
+MULTIPLES = (1.0, 4.0, 16.0, 64.0)
+SPREAD = 1.5  # sd of the logarithm
+LEAST_VISITS = 3  # of two nobody knows whose chain is off
+
+
+@dataclass(frozen=True, eq=False)
+class _Visit:
+    """One visit's part of the normal equations, own numbers eliminated; their volume."""
+
+    schur: np.ndarray  # (D + 1, D + 1)
+    volume: float
+
+
+def likeliest_multiples(found: StructureFit) -> tuple[float, ...]:
+    """Of each visit, where all numbers follow to first order; uphill from the present ones."""
+    visits, levels = _Visits(found), [*map(MULTIPLES.index, _present(found))]
+    best = visits.evidence(levels)
+    for _ in MULTIPLES:
+        before = best
+        for k, level in enumerate(levels):
+            for near in (level - 1, level + 1):
+                tried = [*levels[:k], near, *levels[k + 1 :]]
+                if 0 <= near < len(MULTIPLES) and (value := visits.evidence(tried)) > best:
+                    best, levels = value, tried
+        if best == before:
+            break
+    return tuple(MULTIPLES[k] for k in levels)
+
+
+def _present(found: StructureFit) -> list[float]:
+    multiples = found.misfit.data.multiples
+    return np.broadcast_to(multiples, len(found.misfit.data.q)).tolist()
+
+
+class _Visits:
+    """All visits of a fit, each by any multiple."""
+
+    def __init__(self, found: StructureFit) -> None:
+        misfit, self.structure, self.x = found.misfit, found.structure, found.at.x
+        white = misfit.whitened(misfit.around(found.at.x, found.at.own).columns)
+        self.gram, self.seated = white @ np.swapaxes(white, 1, 2), misfit.seated
+        self.present = _present(found)
+        self.visit = cache(self._visit)
+        _, self.pull, self.curvature = self.structure.bodies.barrier(
+            self.x[self.structure.inertial]
+        )
+
+    def _visit(self, k: int, level: int) -> _Visit:
+        d, gram = self.structure.size, self.gram[k].copy()
+        by = MULTIPLES[level] / self.present[k]
+        gram[self.seated] *= by
+        gram[:, self.seated] *= by
+        own = gram[d:-1, d:-1]
+        factor = np.linalg.cholesky(own + np.eye(len(own)))
+        kept = [*range(d), -1]
+        onto = solve_triangular(factor, gram[d:-1, kept], lower=True)
+        volume = 2 * float(np.sum(np.log(np.diagonal(factor))))
+        return _Visit(gram[np.ix_(kept, kept)] - onto.T @ onto, volume)
+
+    def evidence(self, levels: list[int]) -> float:
+        """As `FrfMisfit.evidence` where one more step would end, but for what is common to all."""
+        s, each = self.structure, [self.visit(k, level) for k, level in enumerate(levels)]
+        whole = np.sum([one.schur for one in each], axis=0)
+        normal, slope = whole[:-1, :-1] + s.precision, whole[:-1, -1]
+        normal[s.inertial, s.inertial] += self.curvature
+        away = self.x - s.mean
+        downhill = slope + s.precision @ away
+        downhill[s.inertial] += self.pull
+        factor = cho_factor(normal)
+        spent = 2 * float(np.sum(np.log(np.diagonal(factor[0]))))
+        gained = float(downhill @ cho_solve(factor, downhill))
+        chi2 = float(whole[-1, -1] + away @ s.precision @ away)
+        rare = float(np.sum((np.log([MULTIPLES[k] for k in levels]) / SPREAD) ** 2))
+        volume = sum(one.volume for one in each)
+        return -0.5 * (chi2 + volume + spent + rare - gained)
