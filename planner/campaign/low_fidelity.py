@@ -82,8 +82,9 @@ class LowFidelity:
 
     @property
     def misread(self) -> tuple[str, ...]:
-        """Where they stood elsewhere than is stated, in a sentence each."""
-        return self.identified_robot.posterior.misread if self.identified_robot else ()
+        """Where they stood elsewhere than is stated, or were heard otherwise, a sentence each."""
+        fit = self.identified_robot
+        return (*fit.posterior.misread, *fit.other_chains) if fit else ()
 
     def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
         """Simulated modes of poses q (n, dof) in rad; NaN without a simulation.
@@ -215,7 +216,8 @@ def identify_low_fidelity(
     with threadpool_limits(1):
         known = found(len(used)) if used else None
         whole = search(len(frfs), known)
-        fit = IdentifiedRobot.of(whole.found() if known is None else whole.recalled(known))
+        last = whole.found() if known is None else whole.recalled(known)
+        fit = IdentifiedRobot.of(last, [m.pose for m in used])
     return replace(before, identified_robot=fit)
 
 

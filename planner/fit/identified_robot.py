@@ -1,5 +1,6 @@
 """What recordings taught a simulation: a structure, and its parameters."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -11,9 +12,11 @@ from planner.fit.fitted import StructureFit
 from planner.fit.frequency_uncertainty import frequency_sd
 from planner.fit.posterior import RobotPosterior
 from planner.fit.result import Estimate, Identification, as_identification
+from planner.fit.visit_chains import other_chain
 from planner.words import counted, significant
 
 BEYOND = 2.0  # sds of the gains, from which their deviation is told
+OTHER = 3.0  # the same of one pose's
 # Poses from which a place is told as found: from one, neighbours imitate each other.
 PLACED = 3
 ABOVE, NOT_THERE = 2, 1.0  # modes that a wider structure may have beside; ln f of one that is none
@@ -28,13 +31,35 @@ class IdentifiedRobot:
     identified: Identification
     poses: int = PLACED
     wider: "IdentifiedRobot | None" = None
+    names: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, found: StructureFit) -> "IdentifiedRobot":
-        """From the structure that was found."""
+    def of(cls, found: StructureFit, names: Sequence[str] = ()) -> "IdentifiedRobot":
+        """From the structure that was found, at poses of these names."""
         posterior = RobotPosterior.of(found)
         wider = None if found.wider is None else cls.of(found.wider)
-        return cls(posterior, as_identification(posterior), len(found.misfit.data.q), wider)
+        poses = len(found.misfit.data.q)
+        return cls(posterior, as_identification(posterior), poses, wider, tuple(names))
+
+    @property
+    def other_chains(self) -> tuple[str, ...]:
+        """Poses whose recordings were made by another chain than all others', a sentence each."""
+        t, found, told = self.posterior.tolerances, self.posterior.found, []
+        for number, name in enumerate(self.names):
+            size, turn = other_chain(found, number)
+            what = []
+            if abs(np.log(size)) > OTHER * np.hypot(t.gain, t.force_gain):
+                what.append(f"accelerations are {size:.2f} times as large for the same forces")
+            if turn > OTHER * t.across:
+                what.append(f"the sensor looks turned by {np.rad2deg(turn):.0f}°")
+            if what:
+                told.append(
+                    f"Beside the other poses, at {name} {' and '.join(what)}: check sensitivities, "
+                    f"the hammer's tip and how the sensor sat. The fit allows for it. Where it was "
+                    f"a mistake, withdraw {name}, correct it, and import its hits again with "
+                    f"--pose {name}b."
+                )
+        return tuple(told)
 
     def frequency_sd(self, q: np.ndarray, modes: SimulatedModes) -> np.ndarray:
         """Sd of ln f (n, count) of its `modes` at q (n, dof) in rad.

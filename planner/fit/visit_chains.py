@@ -43,6 +43,19 @@ def likeliest_multiples(found: StructureFit) -> tuple[float, ...]:
     return tuple(MULTIPLES[k] for k in levels)
 
 
+def other_chain(found: StructureFit, visit: int) -> tuple[float, float]:
+    """How many times as large a visit's accelerations were as at the others, for the same forces;
+    and by how many rad its first sensor was turned."""
+    t, seated = found.misfit.tolerances, found.misfit.seated
+    share = t.visit_chain * _present(found)[visit]
+    sds = np.where(np.eye(3), t.gain, t.across)
+    own = found.at.own[visit, seated.start + 1 :]
+    matrix = np.eye(3) + share * sds * own[:9].reshape(3, 3)
+    left, sizes, right = np.linalg.svd(matrix * (1 + share * t.force_gain * own[-1]))
+    turn = np.arccos(np.clip((np.trace(left @ right) - 1) / 2, -1, 1))
+    return float(np.exp(np.mean(np.log(sizes)))), float(turn)
+
+
 def _present(found: StructureFit) -> list[float]:
     multiples = found.misfit.data.multiples
     return np.broadcast_to(multiples, len(found.misfit.data.q)).tolist()
