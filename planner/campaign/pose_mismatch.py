@@ -84,6 +84,11 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
         return None
     if fits is None and not sure:
         return None if answered else chain_mismatch(claim, measured.frf)
+    if (
+        sure and fit.poses <= PLACED and frf.layout.sensors == TOOL.sensors
+        and (fits is None or fits.about == "chain") and _other_before(claim, fit.posterior, frf)
+    ):  # fmt: skip
+        return None  # the import tells of that pose
     return _asked(claim.pose, 100 * expected.off(q, frf), fits)
 
 
@@ -128,6 +133,22 @@ def _earlier(claim: Claim, found: RobotPosterior, frf: Frf) -> Alternative | Non
     answered = [i for i, one in enumerate(every[:-1]) if one.pose in right]
     wrong = poses.wrong([_setpoint(one) for one in every], answered)
     return replace(wrong[1], pose=every[wrong[0]].pose, about="earlier") if wrong else None
+
+
+def _other_before(claim: Claim, found: RobotPosterior, frf: Frf) -> bool:
+    """Whether a pose before, not this one, was measured by another chain than the others.
+
+    It has bent what is expected, where few poses were measured; all together tell whose it was.
+    """
+    frfs, q = (
+        (*claim.model.frfs, frf),
+        [claim.joints.internal(m.joints_deg) for m in claim.model.used],
+    )
+    prior, t = found.structure.prior, found.tolerances
+    search = Search(prior, frfs, np.array([*q, claim.q]), claim.band_hz, t)
+    fit = search.found(found.found.remembered)
+    *before, here = fit.misfit.data.multiples
+    return explains_all(fit) and here == 1.0 < max(before)
 
 
 def _called_right(state: CampaignState) -> tuple[str, ...]:

@@ -45,13 +45,15 @@ class IdentifiedRobot:
     def other_chains(self) -> tuple[str, ...]:
         """Poses whose recordings were made by another chain than all others', a sentence each."""
         t, found, told = self.posterior.tolerances, self.posterior.found, []
-        for number, name in enumerate(self.names):
-            size, turn = other_chain(found, number)
+        for number, name in enumerate(self.names if self.poses >= PLACED else ()):
+            size, turn, moved = other_chain(found, number)
             what = []
             if abs(np.log(size)) > OTHER * np.hypot(t.gain, t.force_gain):
                 what.append(f"accelerations are {size:.2f} times as large for the same forces")
             if turn > OTHER * t.across:
                 what.append(f"the sensor looks turned by {np.rad2deg(turn):.0f}°")
+            if moved > OTHER * t.position_m:
+                what.append(f"the sensor looks moved by {1e3 * moved:.0f} mm")
             if what:
                 told.append(
                     f"Beside the other poses, at {name} {' and '.join(what)}: check sensitivities, "

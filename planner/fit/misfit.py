@@ -200,7 +200,7 @@ class FrfMisfit:
         numbers, joints = self.nuisance_counts
         own = s.size + numbers.hits + joints
         visit = own + 2 * len(s.springs)
-        count = visit + len(numbers.seated) + 1
+        count = visit + numbers.seated + 1
         out = np.empty((len(h), count, *h.shape[1:]), dtype=complex)
         _, visits = self.slopes(motion, x, out[:, : s.chain.start], added)
         out[:, s.chain] = open_[:, numbers.hits : numbers.known]
@@ -213,7 +213,7 @@ class FrfMisfit:
         out[:, own:visit] = visits
         chain = open_[:, numbers.hits : numbers.known]
         share = self.tolerances.visit_chain * np.reshape(self.data.multiples, (-1, 1, 1, 1, 1))
-        np.multiply(chain[:, numbers.seated], share, out=out[:, visit:-1])
+        np.multiply(chain[:, : numbers.seated], share, out=out[:, visit:-1])
         return self.through_chain(x, h, out[:, :-1]), out, motion
 
     def through_chain(
@@ -244,12 +244,12 @@ class FrfMisfit:
     @property
     def seated(self) -> slice:
         """Which columns are of what each visit's chain has for itself."""
-        return slice(-1 - len(self.nuisance_counts[0].seated), -1)
+        return slice(-1 - self.nuisance_counts[0].seated, -1)
 
     def zero_nuisances(self) -> np.ndarray:
         """(n, l): own numbers, all 0."""
         numbers, joints = self.nuisance_counts
-        visit = 2 * len(self.structure.springs) + len(numbers.seated)
+        visit = 2 * len(self.structure.springs) + numbers.seated
         return np.zeros((len(self.data.q), numbers.hits + joints + visit))
 
     def about(self, own: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -13,8 +13,9 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from planner.fit.fitted import StructureFit
 
-# Multiples that are looked at: up to gains some tens of percent off. Few visits are far from 1.
-MULTIPLES = (1.0, 4.0, 16.0, 64.0)
+# Multiples that are looked at: up to gains some tens of percent off, and sensors 10 cm elsewhere.
+# Few visits are far from 1.
+MULTIPLES = (1.0, 4.0, 16.0, 64.0, 256.0)
 SPREAD = 1.5  # sd of the logarithm
 LEAST_VISITS = 3  # of two nobody knows whose chain is off
 
@@ -43,9 +44,9 @@ def likeliest_multiples(found: StructureFit) -> tuple[float, ...]:
     return tuple(MULTIPLES[k] for k in levels)
 
 
-def other_chain(found: StructureFit, visit: int) -> tuple[float, float]:
+def other_chain(found: StructureFit, visit: int) -> tuple[float, float, float]:
     """How many times as large a visit's accelerations were as at the others, for the same forces;
-    and by how many rad its first sensor was turned."""
+    and by how many rad its first sensor was turned, and by how many m moved."""
     t, seated = found.misfit.tolerances, found.misfit.seated
     share = t.visit_chain * _present(found)[visit]
     sds = np.where(np.eye(3), t.gain, t.across)
@@ -53,7 +54,8 @@ def other_chain(found: StructureFit, visit: int) -> tuple[float, float]:
     matrix = np.eye(3) + share * sds * own[:9].reshape(3, 3)
     left, sizes, right = np.linalg.svd(matrix * (1 + share * t.force_gain * own[-1]))
     turn = np.arccos(np.clip((np.trace(left @ right) - 1) / 2, -1, 1))
-    return float(np.exp(np.mean(np.log(sizes)))), float(turn)
+    moved = share * t.position_m * float(np.linalg.norm(own[9:12]))
+    return float(np.exp(np.mean(np.log(sizes)))), float(turn), moved
 
 
 def _present(found: StructureFit) -> list[float]:

@@ -34,8 +34,8 @@ class Tolerances:
     of each joint's readback, (dof,) where some are of joints that slide (m); `visit_stiffness` of
     ln k of each spring from visit to visit, as temperature and preload go, `visit_damping` of ln c
     beside it: damping ratios of robots scatter by some ten percent. `visit_chain`: how much
-    of what the sensor's matrix and the hammer's gain may be off is a visit's own, as a sensor is
-    seated again and a hammer's tip changed.
+    of what sensor and hammer's gain may be off is a visit's own, as a sensor is seated again and a
+    hammer's tip changed.
     """
 
     angle_rad: float = np.deg2rad(_HITS.angle_sd_deg)
@@ -94,10 +94,9 @@ class NuisanceCounts:
         return self.hits + self.chain
 
     @property
-    def seated(self) -> list[int]:
-        """Of the chain, from its first: each sensor's matrix, and the hammer's gain."""
-        sensors = range(0, self.chain - OF_HAMMER, OF_SENSOR)
-        return [*(first + k for first in sensors for k in range(9)), self.chain - OF_HAMMER]
+    def seated(self) -> int:
+        """Of the chain, the first: each sensor's matrix and place, and the hammer's gain."""
+        return self.chain - 1
 
 
 # Of one hit point and one sensor: what is predicted at the tool.
