@@ -83,7 +83,7 @@ class ChainFault:
         size = float(np.exp(abs(np.log(self.factor))))
         unit = min(UNITS, key=lambda known: abs(np.log(size / known)))
         near = abs(np.log(size / unit)) < AS_UNIT
-        times = f"{significant(unit, 3)} times" if near else f"about {significant(size, 1)} times"
+        times = f"{significant(unit, 3)} times" if near else f"about {significant(size, 2)} times"
         way, other = ("large", "small") if self.factor > 1 else ("small", "large")
         whole = len(self.scaled) == len(AXES)
         what = "accelerations are" if whole else f"channel {AXES[self.scaled[0]]} is"

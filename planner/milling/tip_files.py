@@ -65,6 +65,11 @@ def read_tip(
 def _npz(path: Path, pose: str | None) -> TipReceptance | CutterFrf:
     """With rotations where the file holds them for this pose, else motions alone."""
     names, stored = read_npz(path)
+    if not stored.get("sensor_at_tcp", True):
+        raise InputError(
+            f"{path} holds FRFs of a sensor beside the tip; give the campaign in its place, whose "
+            f"FRFs are carried to the tip."
+        )
     row = row_of(path, names, pose)
     keep = stored["frequency_hz"] > 0
     frequency = stored["frequency_hz"][keep]

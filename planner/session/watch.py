@@ -29,7 +29,7 @@ from planner.session.key_commands import (
 from planner.session.pose_screen import page_with_hits
 from planner.session.screen import Keys, Screen, no_keys, terminal_keys
 from planner.session.session_state import PoseInProgress, RerunQueue, Session, SessionState
-from planner.words import short_name
+from planner.words import counted, short_name
 
 AS_PROPOSED = "Angles are taken as proposed, unless recordings.csv beside the hits states others."
 
@@ -168,8 +168,20 @@ def _looked(session: Session, state: SessionState, visit: PoseInProgress) -> Pos
     """The visit with what the folder holds now; what changed is drawn, and rung for."""
     for table in session.verdicts.table.follow():
         session.say(f"{table.parent.name}/{table.name} was read again and is right now.", "green")
-    whole, waiting = session.inbox.scan(lambda path, digest: session.known(path, digest, state))
+    refused, pose, logged = list[Path](), visit.proposal.pose, session.campaign.state.refused
+
+    def known(path: Path, digest: str) -> bool:
+        there = session.known(path, digest, state)
+        if there and digest in logged and logged[digest][0] == pose:
+            refused.append(path)
+        return there
+
+    whole, waiting = session.inbox.scan(known)
     waiting += session.verdicts.table.waiting
+    if refused:
+        files = counted(len(refused), "file")
+        text = f"{files} of {pose} refused before and not changed; press [u] to take that back."
+        waiting.append((refused[0], text))
     for path in session.inbox.ignored():
         session.say(f"{path.name} is no recording; ignored.", "dim")
     numbers = session.verdicts.numbered(whole, visit.numbers)

@@ -46,7 +46,7 @@ def test_faults_of_a_chain_are_asked_about_and_named(tmp_path):
             "1000 times too large: units or sensitivity",
         ),
         (ChainFault(np.eye(3), (1,), 0.104), "channel y is 9.81 times too small"),
-        (ChainFault(np.eye(3), (0, 1, 2), 2.1), "about 2 times too large"),
+        (ChainFault(np.eye(3), (0, 1, 2), 2.1), "about 2.1 times too large"),
         (ChainFault(-np.eye(3)), "answers against every hit"),
         (ChainFault(np.diag([1.0, -1, 1])), "channel y a wrong sign"),
         (

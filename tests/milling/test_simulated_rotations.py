@@ -98,3 +98,6 @@ def test_an_npz_of_predict_needs_its_joint_angles(simulation, tmp_path):
     assert tip.receptance[:, :3, :3].shape == (len(FREQUENCY), 3, 3)
     with pytest.raises(InputError, match="has no pose P9"):
         tip_of(tmp_path / "with.npz", None, "P9", ROBOT, 0.0)
+    np.savez(tmp_path / "beside.npz", **stored, sensor_at_tcp=False)
+    with pytest.raises(InputError, match="sensor beside the tip"):
+        tip_of(tmp_path / "beside.npz", None, "P1", ROBOT, 0.0)
