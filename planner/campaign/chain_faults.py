@@ -28,7 +28,8 @@ class ChainFault:
     `flipped_hits` are axes along which the hammer hit against the direction that is stated;
     `order` along which axis those hits were that are listed as along x, y, z. Accelerations come
     `delay_s` late, are high-passed at `corner_hz` (AC coupling; forces are where it is negative),
-    and all channels fade by an exponential window of `window_rate_1_s` more than is known.
+    all channels fade by an exponential window of `window_rate_1_s` more than is known, and all
+    frequencies are `time` times what they should be, as by a wrong sampling rate.
     """
 
     matrix: np.ndarray
@@ -39,14 +40,15 @@ class ChainFault:
     delay_s: float = 0.0
     corner_hz: float = 0.0
     window_rate_1_s: float = 0.0
+    time: float = 1.0
 
     def undone(self, frf: Frf) -> tuple[Frf, float]:
         """A tool's FRF (3, c, F) as a sound chain would show it.
 
         And ln of the Jacobian of one complex value of every column.
         """
-        inverse = np.linalg.inv(self.matrix)
-        s = laplace(frf.frequency_hz, frf.exponential_rate_1_s)[0]
+        inverse, frequency_hz = np.linalg.inv(self.matrix), frf.frequency_hz / self.time
+        s = laplace(frequency_hz, frf.exponential_rate_1_s)[0]
         passed = 1 + 2 * np.pi * abs(self.corner_hz) / s
         filtered = np.exp(s * self.delay_s) * passed ** np.sign(self.corner_hz)
         shown = np.einsum("ij,jcf->icf", inverse, frf.accelerance) * filtered
@@ -56,9 +58,12 @@ class ChainFault:
         variance = np.einsum("ij,jcf->icf", inverse**2, frf.variance) * size**2
         listed = np.argsort(self.order) + 3 * np.arange(shown.shape[1] // 3)[:, None]
         shown, variance = shown[:, listed.ravel()], variance[:, listed.ravel()]
-        rate = frf.exponential_rate_1_s + self.window_rate_1_s
+        rate = frf.exponential_rate_1_s / self.time + self.window_rate_1_s
         volume = np.log(np.abs(np.linalg.det(inverse))) + 3 * np.mean(np.log(size))
-        changed = replace(frf, accelerance=shown, variance=variance, exponential_rate_1_s=rate)
+        changed = replace(
+            frf, frequency_hz=frequency_hz, accelerance=shown, variance=variance,
+            exponential_rate_1_s=rate,
+        )  # fmt: skip
         return changed, 2 * float(volume)
 
     @property
@@ -66,14 +71,13 @@ class ChainFault:
         """What looks wrong, as a question."""
         if self.flipped_hits:
             axes = " and ".join(AXES[i] for i in self.flipped_hits)
-            ways = " and ".join(f"−{AXES[i]}" for i in self.flipped_hits)
-            return f"hits along {axes} look struck the other way, towards {ways}?"
+            return f"hits along {axes} look struck the other way than they are listed?"
         wrong = [f"{AXES[i]} along {AXES[at]}" for i, at in enumerate(self.order) if i != at]
         if wrong:
             return f"hits look listed along wrong axes: were those along {', '.join(wrong)}?"
         if self.scaled:
             return self._of_scale
-        if self.delay_s or self.corner_hz or self.window_rate_1_s:
+        if self.delay_s or self.corner_hz or self.window_rate_1_s or self.time != 1:
             return self._of_filter
         exchanged = np.array_equal(np.abs(self.matrix).sum(axis=1), np.ones(3))
         return self._of_axes if exchanged else self._of_turn
@@ -106,6 +110,12 @@ class ChainFault:
             what = "accelerations" if self.corner_hz > 0 else "forces"
             passed = f"{what} lack what is slow, as by a high-pass at {abs(self.corner_hz):.2g} Hz"
             return f"{passed}: is that input AC-coupled?"
+        if self.time != 1:
+            way = "high" if self.time > 1 else "low"
+            return (
+                f"all frequencies are {100 * abs(self.time - 1):.2g} % too {way} by one factor: is "
+                f"the sampling rate right, or has all of the robot changed?"
+            )
         if self.window_rate_1_s > 0:
             faster = f"all decays look {self.window_rate_1_s:.2g} 1/s faster"
             return f"{faster}: does the analyser lay an exponential window over these records?"
@@ -179,6 +189,7 @@ FILTERS: tuple[Callable[[float], ChainFault], ...] = (
     lambda by: ChainFault(np.eye(3), delay_s=by * Tolerances().delay_s),
     lambda by: ChainFault(np.eye(3), corner_hz=0.1 * by),
     lambda by: ChainFault(np.eye(3), window_rate_1_s=0.1 * by),
+    lambda by: ChainFault(np.eye(3), time=1 + 0.002 * by),
 )
 TURNED = tuple(  # all 47 ways to exchange axes and signs
     ChainFault(np.diag(signs) @ np.eye(3)[list(order)])

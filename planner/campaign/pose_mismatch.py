@@ -35,6 +35,7 @@ from planner.fit.fitted import StructureFit, explains_all
 from planner.fit.identified_robot import PLACED
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
+from planner.fit.visit_chains import strained
 from planner.frf.frf import Frf
 from planner.inference.parallel import parallel_map
 from planner.recording.joints import JointUnits
@@ -140,6 +141,8 @@ def _other_before(claim: Claim, found: RobotPosterior, frf: Frf) -> bool:
 
     It has bent what is expected, where few poses were measured; all together tell whose it was.
     """
+    if not strained(found.found):
+        return False
     frfs, q = (
         (*claim.model.frfs, frf),
         [claim.joints.internal(m.joints_deg) for m in claim.model.used],

@@ -17,6 +17,7 @@ from planner.fit.fitted import StructureFit
 # Few visits are far from 1.
 MULTIPLES = (1.0, 4.0, 16.0, 64.0, 256.0)
 SPREAD = 1.5  # sd of the logarithm
+STRAINED = 4.0  # sds
 LEAST_VISITS = 3  # of two nobody knows whose chain is off
 
 
@@ -56,6 +57,12 @@ def other_chain(found: StructureFit, visit: int) -> tuple[float, float, float]:
     turn = np.arccos(np.clip((np.trace(left @ right) - 1) / 2, -1, 1))
     moved = share * t.position_m * float(np.linalg.norm(own[9:12]))
     return float(np.exp(np.mean(np.log(sizes)))), float(turn), moved
+
+
+def strained(found: StructureFit) -> bool:
+    """Whether what a visit's chain has for itself is more than its tolerances let expect."""
+    own = found.at.own[:, found.misfit.seated.start + 1 :]
+    return bool(np.max(np.abs(own)) > STRAINED)
 
 
 def _present(found: StructureFit) -> list[float]:

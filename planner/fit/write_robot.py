@@ -52,11 +52,10 @@ def updated_toml(
         for number in estimate.blocks:
             at = entry_of(estimate.kind, blocks[number])
             blocks[number][at] = float(f"{estimate.value:.{DIGITS}g}")
-    for block, changed in zip(_stated(document, "payload"), payload, strict=False):
-        block.update(msgspec.to_builtins(changed))
-    for kind in FOUND:
+    found = {kind: getattr(result.simulation.robot.config, kind) for kind in FOUND}
+    for kind, values in {"payload": payload, **found}.items():
         stated = _stated(document, kind)
-        for number, block in enumerate(getattr(result.simulation.robot.config, kind)):
+        for number, block in enumerate(values):
             table = stated[number] if number < len(stated) else tomlkit.table()
             table.update(msgspec.to_builtins(block))
             if number >= len(stated):
@@ -140,7 +139,7 @@ def write_robot(
         stated = robot.path.read_text(encoding="utf-8-sig")
         inside = sum(len(e.compliance) for e in robot.config.effects)
         added = robot.config.compliance[len(tomlkit.parse(stated)["compliance"]) + inside :]
-        payload = () if moved is None else moved.payload
+        payload = robot.config.payload if moved is None else moved.payload
         _write_new(out, updated_toml(stated, result, name, added, laws, payload))
     except OSError as error:
         raise InputError(

@@ -57,7 +57,7 @@ class Screen:
         if self.console.is_terminal:
             self._notes.append(sentence)
         if self.console.is_terminal and self._page is not None:
-            self._draw()
+            self._draw(asked=True)
         else:
             self.console.print(sentence)
 
@@ -82,7 +82,7 @@ class Screen:
         """A context in which the screen says what is being done."""
         return self.console.status(what)
 
-    def _draw(self) -> None:
+    def _draw(self, asked: bool = False) -> None:
         if not self.console.is_terminal:
             if self._page is not None:
                 self.console.print(self._page(self.console.width, ENDLESS))
@@ -92,6 +92,8 @@ class Screen:
         if self._page is not None:
             parts.append(self._page(self.console.width, self._height - last))
         room = self._height - self._drawn(last).count("\n")
+        if asked and parts and room < last <= self._height:  # the page gives way until it changes
+            parts, room = [self._notes[-1], Text("any key: back to the page", "dim")], 0
         if self._left:  # as many lines as push it off the screen, into what can be scrolled back to
             self.console.print("\n" * (self.console.height - 1))
             self._left = False

@@ -14,7 +14,8 @@ from planner.session.pose_screen import PosePage, remedy_first
 from planner.words import counted, short_name
 
 HELP = """\
-a     accept: import the good hits, refit, go on      r, R  refuse bad hits, or all
+a     accept: import the good hits, refit, go on
+r, R  refuse bad hits, or all
 k     skip this pose, and those near it if you type what is in the way
 b, h  late hits: b, they are from the pose named; h, from this one
 h     hits in doubt: they are right

@@ -14,7 +14,7 @@ from planner.recording.joints import JointUnits
 from planner.session.hit_verdicts import HitVerdict
 from planner.session.pose_screen import PosePage, keys_that_do, page_with_hits, remedy_first
 from planner.session.screen import Screen
-from planner.session.session_text import refusals
+from planner.session.session_text import HELP, refusals
 from planner.words import short_name
 
 
@@ -167,6 +167,22 @@ def test_a_sentence_under_a_full_page_is_seen(page):
     assert told in whole(text.split("\n"))
     assert " ".join(remedy_first(OTHER.text)) in whole(text.split("\n"))
     assert text.rstrip("\n").count("\n") < 24
+
+
+def test_help_is_seen_where_the_page_is_full(page):
+    console = Console(width=80, height=24, force_terminal=True, legacy_windows=False)
+    screen = Screen(console)
+    with console.capture():
+        screen.show(replace(page, hits=ALL).page)
+    with console.capture() as captured:
+        screen.say(Text(HELP))
+    text = Text.from_ansi(captured.get().split("\x1b[2J")[-1]).plain
+    assert all(line in text for line in HELP.split("\n"))
+    assert "any key" in text
+    assert text.rstrip("\n").count("\n") < 24
+    with console.capture() as captured:
+        screen.say(Text("One more."))
+    assert "go to pose" in captured.get()
 
 
 def test_hits_without_an_axis_are_told_once_and_leave_the_page_its_head(page):
