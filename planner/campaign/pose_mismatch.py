@@ -150,7 +150,7 @@ def _other_before(claim: Claim, found: RobotPosterior, frf: Frf) -> bool:
     prior, t = found.structure.prior, found.tolerances
     search = Search(prior, frfs, np.array([*q, claim.q]), claim.band_hz, t)
     fit = search.found(found.found.remembered)
-    *before, here = fit.misfit.data.multiples
+    *before, here = np.atleast_1d(fit.misfit.data.multiples)
     return explains_all(fit) and here == 1.0 < max(before)
 
 

@@ -19,11 +19,18 @@ from planner.fit.data import FrfData, among
 from planner.fit.inertias import spatial
 from planner.fit.linearised import Around, At, Eliminated, Numbers
 from planner.fit.structure import REACH, RobotStructure
-from planner.measurement.nuisances import NuisanceCounts, Tolerances, actual_ports, basis
+from planner.measurement.nuisances import (
+    OF_SENSOR,
+    NuisanceCounts,
+    Tolerances,
+    actual_ports,
+    basis,
+)
 from planner.robot.elastic_model import Matrices
 from planner.robot.virtual_joints import inertia_basis
 
 FARTHEST = 4.0  # sds of what hits, readback and visits are linearised about
+STAYS = 0.05  # of what a sensor's place scatters by from visit to visit where it is seated again
 NOTHING = 1e-9  # of an FRF's size, that has no logarithm
 
 
@@ -212,8 +219,9 @@ class FrfMisfit:
                 out[:, at.start] = np.einsum("nj,nj...->n...", off, motion.by_angle)
         out[:, own:visit] = visits
         chain = open_[:, numbers.hits : numbers.known]
-        share = self.tolerances.visit_chain * np.reshape(self.data.multiples, (-1, 1, 1, 1, 1))
-        np.multiply(chain[:, : numbers.seated], share, out=out[:, visit:-1])
+        share = self.tolerances.visit_chain * self.seated_shares(self.data.multiples)
+        shares = share[:, :, None, None, None]
+        np.multiply(chain[:, : numbers.seated], shares, out=out[:, visit:-1])
         return self.through_chain(x, h, out[:, :-1]), out, motion
 
     def through_chain(
@@ -245,6 +253,13 @@ class FrfMisfit:
     def seated(self) -> slice:
         """Which columns are of what each visit's chain has for itself."""
         return slice(-1 - self.nuisance_counts[0].seated, -1)
+
+    def seated_shares(self, multiples: np.ndarray | float) -> np.ndarray:
+        """(n or 1, m): of each of those columns; a sensor hardly moves that is not seated again."""
+        by, seated = np.reshape(multiples, (-1, 1)), np.arange(self.nuisance_counts[0].seated)
+        places = seated % OF_SENSOR >= OF_SENSOR - 3
+        places[-1] = False  # the hammer's gain
+        return by * np.where(places & (by == 1), STAYS, 1.0)
 
     def zero_nuisances(self) -> np.ndarray:
         """(n, l): own numbers, all 0."""

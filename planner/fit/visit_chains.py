@@ -48,14 +48,13 @@ def likeliest_multiples(found: StructureFit) -> tuple[float, ...]:
 def other_chain(found: StructureFit, visit: int) -> tuple[float, float, float]:
     """How many times as large a visit's accelerations were as at the others, for the same forces;
     and by how many rad its first sensor was turned, and by how many m moved."""
-    t, seated = found.misfit.tolerances, found.misfit.seated
-    share = t.visit_chain * _present(found)[visit]
-    sds = np.where(np.eye(3), t.gain, t.across)
-    own = found.at.own[visit, seated.start + 1 :]
-    matrix = np.eye(3) + share * sds * own[:9].reshape(3, 3)
-    left, sizes, right = np.linalg.svd(matrix * (1 + share * t.force_gain * own[-1]))
+    t, misfit = found.misfit.tolerances, found.misfit
+    shares = t.visit_chain * misfit.seated_shares(_present(found)[visit])[0]
+    own = shares * found.at.own[visit, misfit.seated.start + 1 :]
+    matrix = np.eye(3) + np.where(np.eye(3), t.gain, t.across) * own[:9].reshape(3, 3)
+    left, sizes, right = np.linalg.svd(matrix * (1 + t.force_gain * own[-1]))
     turn = np.arccos(np.clip((np.trace(left @ right) - 1) / 2, -1, 1))
-    moved = share * t.position_m * float(np.linalg.norm(own[9:12]))
+    moved = t.position_m * float(np.linalg.norm(own[9:12]))
     return float(np.exp(np.mean(np.log(sizes)))), float(turn), moved
 
 
@@ -76,7 +75,7 @@ class _Visits:
     def __init__(self, found: StructureFit) -> None:
         misfit, self.structure, self.x = found.misfit, found.structure, found.at.x
         white = misfit.whitened(misfit.around(found.at.x, found.at.own).columns)
-        self.gram, self.seated = white @ np.swapaxes(white, 1, 2), misfit.seated
+        self.gram, self.misfit = white @ np.swapaxes(white, 1, 2), misfit
         self.present = _present(found)
         self.visit = cache(self._visit)
         _, self.pull, self.curvature = self.structure.bodies.barrier(
@@ -85,9 +84,9 @@ class _Visits:
 
     def _visit(self, k: int, level: int) -> _Visit:
         d, gram = self.structure.size, self.gram[k].copy()
-        by = MULTIPLES[level] / self.present[k]
-        gram[self.seated] *= by
-        gram[:, self.seated] *= by
+        now, then = self.misfit.seated_shares(np.array([self.present[k], MULTIPLES[level]]))
+        gram[self.misfit.seated] *= (then / now)[:, None]
+        gram[:, self.misfit.seated] *= then / now
         own = gram[d:-1, d:-1]
         factor = np.linalg.cholesky(own + np.eye(len(own)))
         kept = [*range(d), -1]

@@ -93,7 +93,7 @@ class Screen:
             parts.append(self._page(self.console.width, self._height - last))
         room = self._height - self._drawn(last).count("\n")
         if asked and parts and room < last <= self._height:  # the page gives way until it changes
-            parts, room = [self._notes[-1], Text("any key: back to the page", "dim")], 0
+            parts[:], room = [self._notes[-1], Text("any key: back to the page", "dim")], 0
         if self._left:  # as many lines as push it off the screen, into what can be scrolled back to
             self.console.print("\n" * (self.console.height - 1))
             self._left = False
