@@ -76,9 +76,11 @@ def by_reason(told: Iterable[tuple[str, str]]) -> list[str]:
         groups.setdefault(same, []).append((file, why))
     said = []
     for same, group in groups.items():
-        (first, why), (last, _) = min(group), max(group)
-        many = f"{len(group)} files ({first} to {Path(last).name}): {same}"
-        said.append(many if len(group) > 1 else f"{first}: {why}")
+        (first, why), *others = sorted(group)
+        names = [first, *(Path(file).name for file, _ in others[: 1 if len(others) > 2 else 2])]
+        more = [f"{len(group) - len(names)} more"] if len(group) > len(names) else []
+        many = f"{len(group)} files ({listed([*names, *more])}): {same}"
+        said.append(many if others else f"{first}: {why}")
     return said
 
 

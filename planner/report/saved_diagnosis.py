@@ -42,12 +42,12 @@ def two_answers(springs: Sequence[RefittedSpring], found: Mapping[str, Any]) -> 
     # Springs that robot.toml states the model refits, too: they tell nothing apart.
     said = [one["at"] for one in found["findings"] if one["effect"] != "joint_stiffness"]
     told = {names.get(at, at) for at in said if at}
-    added = {spring.joint for spring in springs if spring.stated is None}
-    if not added or not told or added == told:
+    added = {spring.joint for spring in springs if spring.stated is None} - told
+    if not added or not told:
         return ""
     return (
-        f"The campaign's model adds springs at {listed(sorted(added))}, the diagnosis names "
-        f"{listed(sorted(told))}. The model predicts, and so lets every joint and the floor tilt "
+        f"The campaign's model adds springs at {listed(sorted(added))}, which the diagnosis does "
+        f"not name. The model predicts, and so lets every joint and the floor tilt "
         f"at once; the diagnosis adds only what the recordings cannot do without, and is what to "
         f"go by for repairs."
     )

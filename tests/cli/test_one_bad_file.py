@@ -62,7 +62,7 @@ def test_files_refused_alike_are_one_sentence():
     files = [(f"d/P3_{i}.csv", f"d/P3_{i}.csv has no force; export it.") for i in (2, 3, 1)]
     files.append(("d/other.csv", "other.csv is empty; export it."))
     assert by_reason(files) == [
-        "3 files (d/P3_1.csv to P3_3.csv): the file has no force; export it.",
+        "3 files (d/P3_1.csv, P3_2.csv and P3_3.csv): the file has no force; export it.",
         "d/other.csv: other.csv is empty; export it.",
     ]
 

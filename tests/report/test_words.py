@@ -136,7 +136,7 @@ def test_joints_have_the_names_that_the_robot_has_for_them(tmp_path):
 @pytest.mark.parametrize(
     ("found", "said"),
     [
-        (["base_compliance base"], "adds springs at A5 and base, the diagnosis names base."),
+        (["base_compliance base"], "adds springs at A5, which the diagnosis does not name."),
         (["base_compliance base", "transverse_compliance joint_5"], ""),
         (["joint_stiffness joint_2"], ""),
         ([], ""),
