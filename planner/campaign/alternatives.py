@@ -183,7 +183,10 @@ def far_off_hits(expected: ExpectedFrfs, q: np.ndarray) -> Alternative:
 def other_tool(expected: ExpectedFrfs, q: np.ndarray) -> Alternative:
     """A tool that was changed, or loaded, since the poses before."""
     other = replace(expected, tool_sds=MUCH)
-    return Alternative(q, OTHER_TOOL, about="chain", rival=True, expected=other)
+    # Ten more numbers take up what springs do from visit to visit, too: evidence has to be certain.
+    return Alternative(
+        q, OTHER_TOOL, about="chain", rival=True, rarer=CERTAIN, expected=other
+    )  # fmt: skip
 
 
 def _best(less: Callable[[float], float]) -> float:

@@ -63,8 +63,8 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
     said = "".join(answered)  # not asked again
     likely = _setpoint(claim)
     if sure and frf.layout == TOOL:
-        both = far_off_hits(expected, q), other_tool(expected, q)
-        likely += (one for one in both if one.what not in said)
+        known = [far_off_hits(expected, q), *([other_tool(expected, q)] if placed else [])]
+        likely += (one for one in known if one.what not in said)
     if stated.agree(likely):
         return None
     mistakes = [*likely, *_poses(claim)]

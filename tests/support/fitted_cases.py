@@ -40,7 +40,7 @@ ARMS = {
     **{name: ROBOTS[name] for name in ("kr10", "irb6640", "arm of four", "kr240 plane")},
     "kr210": lambda folder, rng: known("kr210", folder, rng),
 }
-HEAVIER = 0.01  # share of what moves that another tool weighs more
+HEAVIER = 0.02  # share of what moves that another tool weighs more
 COUNTED = 4  # natural frequencies that are compared, the lowest that hits show
 
 
