@@ -118,7 +118,7 @@ class StatedHits:
             gain = its + volume - one.rarer - value
             # Where as little is left as may be, evidence alone tells of a joint.
             told = self.placed and size == SIZES[-1] and one.about == "readback"
-            alone = one.rival or (told and gain > CERTAIN)
+            alone = (one.rival and not self.impossible) or (told and gain > CERTAIN)
             better = (1 if alone else BETTER) * left <= size
             explains = better or its + volume > self.outlier_log_density > value
             # Once one explains them, another is told where it is so much likelier still.

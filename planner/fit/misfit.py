@@ -30,7 +30,7 @@ from planner.robot.elastic_model import Matrices
 from planner.robot.virtual_joints import inertia_basis
 
 FARTHEST = 4.0  # sds of what hits, readback and visits are linearised about
-STAYS = 0.05  # of what a sensor's place scatters by from visit to visit where it is seated again
+STAYS = 1e-3  # of what a sensor's place scatters by from visit to visit where it is seated again
 NOTHING = 1e-9  # of an FRF's size, that has no logarithm
 
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from planner.fit.fitted import StructureFit
 
@@ -90,7 +89,7 @@ class _Visits:
         own = gram[d:-1, d:-1]
         factor = np.linalg.cholesky(own + np.eye(len(own)))
         kept = [*range(d), -1]
-        onto = solve_triangular(factor, gram[d:-1, kept], lower=True)
+        onto = np.linalg.solve(factor, gram[d:-1, kept])
         volume = 2 * float(np.sum(np.log(np.diagonal(factor))))
         return _Visit(gram[np.ix_(kept, kept)] - onto.T @ onto, volume)
 
@@ -103,9 +102,9 @@ class _Visits:
         away = self.x - s.mean
         downhill = slope + s.precision @ away
         downhill[s.inertial] += self.pull
-        factor = cho_factor(normal)
-        spent = 2 * float(np.sum(np.log(np.diagonal(factor[0]))))
-        gained = float(downhill @ cho_solve(factor, downhill))
+        factor = np.linalg.cholesky(normal)
+        spent = 2 * float(np.sum(np.log(np.diagonal(factor))))
+        gained = float(np.sum(np.linalg.solve(factor, downhill) ** 2))
         chi2 = float(whole[-1, -1] + away @ s.precision @ away)
         rare = float(np.sum((np.log([MULTIPLES[k] for k in levels]) / SPREAD) ** 2))
         volume = sum(one.volume for one in each)
