@@ -174,19 +174,18 @@ def chain_faults(
 
 
 def far_off_hits(expected: ExpectedFrfs, q: np.ndarray) -> Alternative:
-    """Hits of another point, or slanted: they take it up as they are, so nothing else is wrong."""
-    return Alternative(
-        q, FAR_OFF_HITS, about="chain", rival=True, expected=replace(expected, times=MUCH)
-    )
+    """Hits of another point, or slanted: they take it up as they are, so nothing else is wrong.
+
+    So free numbers take up what springs do from visit to visit, too: evidence has to be certain.
+    """
+    far = replace(expected, times=MUCH)
+    return Alternative(q, FAR_OFF_HITS, about="chain", rival=True, rarer=CERTAIN, expected=far)
 
 
 def other_tool(expected: ExpectedFrfs, q: np.ndarray) -> Alternative:
-    """A tool that was changed, or loaded, since the poses before."""
+    """A tool that was changed, or loaded, since the poses before; as certain."""
     other = replace(expected, tool_sds=MUCH)
-    # Ten more numbers take up what springs do from visit to visit, too: evidence has to be certain.
-    return Alternative(
-        q, OTHER_TOOL, about="chain", rival=True, rarer=CERTAIN, expected=other
-    )  # fmt: skip
+    return Alternative(q, OTHER_TOOL, about="chain", rival=True, rarer=CERTAIN, expected=other)
 
 
 def _best(less: Callable[[float], float]) -> float:
