@@ -4,8 +4,8 @@ What was found of the hits before tells which FRFs are to be expected anywhere, 
 is. Where "something else" is likelier than the pose as stated, what that may be competes by
 evidence: another known pose, the setpoint, an angle with the other sign, axes of the sensor
 exchanged, a channel with a wrong scale, a sensor that turned, hits the other way or listed along
-wrong axes, a delay, a high-pass or a window, one joint elsewhere, and a wrong angle of an earlier
-pose, which bent what is expected.
+wrong axes, another tool, a delay, a high-pass, a window or a time base, one joint elsewhere, and a
+wrong angle, or another chain, of an earlier pose, which bent what is expected.
 Without a simulation, or before the first measurement, nothing is expected.
 """
 
@@ -32,7 +32,7 @@ from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.fit.expected import ExpectedFrfs
 from planner.fit.fitted import StructureFit, explains_all
-from planner.fit.identified_robot import PLACED
+from planner.fit.identified_robot import PLACED, IdentifiedRobot
 from planner.fit.posterior import RobotPosterior
 from planner.fit.search import Search
 from planner.fit.visit_chains import strained
@@ -85,10 +85,7 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
         return None
     if fits is None and not sure:
         return None if answered else chain_mismatch(claim, measured.frf)
-    if (
-        sure and fit.poses <= PLACED and frf.layout.sensors == TOOL.sensors
-        and (fits is None or fits.about == "chain") and _other_before(claim, fit.posterior, frf)
-    ):  # fmt: skip
+    if _other_before(claim, fit, frf, fits):
         return None  # the import tells of that pose
     return _asked(claim.pose, 100 * expected.off(q, frf), fits)
 
@@ -136,22 +133,21 @@ def _earlier(claim: Claim, found: RobotPosterior, frf: Frf) -> Alternative | Non
     return replace(wrong[1], pose=every[wrong[0]].pose, about="earlier") if wrong else None
 
 
-def _other_before(claim: Claim, found: RobotPosterior, frf: Frf) -> bool:
+def _other_before(claim: Claim, fit: IdentifiedRobot, frf: Frf, fits: Alternative | None) -> bool:
     """Whether a pose before, not this one, was measured by another chain than the others.
 
     It has bent what is expected, where few poses were measured; all together tell whose it was.
     """
-    if not strained(found.found):
+    few = SURE <= fit.poses <= PLACED and frf.layout.sensors == TOOL.sensors
+    of_chain, known = fits is None or fits.about == "chain", fit.posterior
+    if not (few and of_chain and strained(known.found)):
         return False
-    frfs, q = (
-        (*claim.model.frfs, frf),
-        [claim.joints.internal(m.joints_deg) for m in claim.model.used],
-    )
-    prior, t = found.structure.prior, found.tolerances
-    search = Search(prior, frfs, np.array([*q, claim.q]), claim.band_hz, t)
-    fit = search.found(found.found.remembered)
-    *before, here = np.atleast_1d(fit.misfit.data.multiples)
-    return explains_all(fit) and here == 1.0 < max(before)
+    q = [claim.joints.internal(m.joints_deg) for m in claim.model.used]
+    q, frfs = np.array([*q, claim.q]), (*claim.model.frfs, frf)
+    search = Search(known.structure.prior, frfs, q, claim.band_hz, known.tolerances)
+    found = search.found(known.found.remembered)
+    *before, here = np.atleast_1d(found.misfit.data.multiples)
+    return explains_all(found) and here == 1.0 < max(before)
 
 
 def _called_right(state: CampaignState) -> tuple[str, ...]:
