@@ -175,8 +175,9 @@ def _motion(
     ones, elastic = np.ones((1, 3, 3, len(f))), found.structure.prior.carried
     measured = Measured(f[None], s[None], ones.astype(complex), ones, np.full(1, np.inf))
     data = FrfData(q[None], measured, elastic.matrices(q), elastic.body_jacobians(q[None]))
-    misfit = FrfMisfit(found.structure, data, found.misfit.tolerances)
-    x, m = found.at.x, misfit.matrices
+    x = found.at.x
+    misfit = FrfMisfit(found.structure, data, found.misfit.tolerances).levered(x)
+    m = misfit.matrices
     ports = np.eye(m.hit.shape[2])[own][None]
     wider = replace(m, hit=np.concatenate([m.hit, ports], axis=1))
     springs = found.structure.elasticity(x)

@@ -164,6 +164,11 @@ class Operator(ABC):
         return self.effect or self.kind, self.at.split("#")[0]
 
     @property
+    def frees_only(self) -> bool:
+        """Whether it is nothing but springs."""
+        return bool(self.springs) and not self.numbers
+
+    @property
     def mean(self) -> np.ndarray:
         """Prior mean of ψ."""
         return np.array([n.mean for n in self.numbers])
@@ -184,6 +189,12 @@ class Operator(ABC):
     def chain(self, s: np.ndarray, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """Factor (n or 1, 3, 3, F or 1) of what each sensor hears, and its slopes (p, …) by ψ."""
         return None
+
+    @property
+    def levers(self) -> tuple[tuple[int, int, float], ...]:
+        """Springs whose turning shifts others: numbers of slide and turn, and the sign by which the
+        last of ψ, in m, tells how far per radian."""
+        return ()
 
     @property
     def spring_priors(self) -> Mapping[int, SpringPrior]:

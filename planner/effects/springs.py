@@ -23,7 +23,7 @@ class SoftBase(Operator):
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
-        return f"The base gives way ({_stiffness(values)}): check anchor bolts and foundation."
+        return f"The base gives way ({stiffness_told(values)}): check anchor bolts and foundation."
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class ShiftingBase(Operator):
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
-        return f"The base shifts or turns ({_stiffness(values)}): check anchor bolts and pins."
+        return f"The base shifts or turns ({stiffness_told(values)}): check anchor bolts and pins."
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Tilt(Operator):
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
-        return f"The bearing of {self.at} tilts ({_stiffness(values)}): check its preload."
+        return f"The bearing of {self.at} tilts ({stiffness_told(values)}): check its preload."
 
 
 @dataclass(frozen=True)
@@ -83,13 +83,14 @@ class BendingLink(Operator):
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
-        return f"{self.at} bends ({_stiffness(values)})."
+        return f"{self.at} bends ({stiffness_told(values)})."
 
 
 KNOWN = 0.3  # relative sd to which a stiffness is told
 
 
-def _stiffness(values: Mapping[str, tuple[float, float]]) -> str:
+def stiffness_told(values: Mapping[str, tuple[float, float]]) -> str:
+    """The springs that are known, with their sds."""
     told = {n.split(" of ")[1]: v for n, v in values.items() if n.startswith("stiffness")}
     known = {name: v for name, v in told.items() if v[1] < KNOWN * v[0]}
     said = []

@@ -15,6 +15,7 @@ from planner.effects.added_mass import AROUND, AddedMass
 from planner.effects.chain import ChannelDelay, Polarity, SensorGain, SensorRotation
 from planner.effects.effect import Number, Operator
 from planner.effects.far_off import FarOffSpring
+from planner.effects.foundation import Foundation
 from planner.effects.links import PAIRS, BetweenLinks, GroundContact
 from planner.effects.parameters import Priors, place_name
 from planner.effects.resonator import LinkResonator, StatedResonator, resonator_numbers
@@ -38,6 +39,8 @@ DAMPING_S = 1e-4, 3e-3
 ALONG = 0.5  # cosine above which a stated axis already covers this one
 SHORT, BEND = 0.1, 0.3  # of the longest link: does not bend; of the joint's stiffness: a link's
 ADDED_MASS, ADDED_PLACE = 0.22, 0.35  # sds: of the links' mean mass, of the longest link
+# Of what moves with a base: sds, of the robot's mass and of its reach.
+FOUNDATION_MASS, FOUNDATION_SIZE = 2.0, 0.4
 # Radius of gyration of an added mass: median, in its place's sd, and its logarithm's sd.
 RADIUS, RADIUS_SD = 0.25, 0.7
 RESONATOR_MASS, RESONATOR_DAMPING = 0.05, 0.03  # medians: of the links' mean mass; ratio
@@ -90,9 +93,9 @@ class EffectLibrary:
         for number, key in enumerate(found, stated):
             groups.setdefault(key, []).append(number)
         effects = [kind(at, tuple(numbers)) for (kind, at), numbers in groups.items()]
-        effects += [*_operators(simulation), *further]
-        effects = list({e.label: e for e in effects}.values())  # of one place the last counts
         widest = Simulation(wider)
+        effects += [*_foundation(widest, effects), *_operators(simulation), *further]
+        effects = list({e.label: e for e in effects}.values())  # of one place the last counts
         wide = replace(priors, bounds=bounds)
         return cls(simulation, priors, widest, wide, stated, tuple(effects), there)
 
@@ -203,12 +206,8 @@ def _operators(simulation: Simulation) -> list[Operator]:
         x, y, z = map(float, body[1:4] / body[0]) if body[0] > 0 else (0.0, 0.0, 0.0)
         centre = x, y, z
         at = f"link_{number}"
-        places = tuple(Number(f"position_{a}", "1", 0.0, 1.0) for a in "xyz")
-        width = float(np.log(RADIUS * size / np.sqrt(2)))
-        spread = (Number(f"spread_{a}", "m", width, RADIUS_SD, True) for a in "xyz")
-        skew = (Number(f"skew_{a}", "1", 0.0, 1.0) for a in ("yx", "zx", "zy"))
-        numbers = (Number("mass", "1", 0.0, 1.0), *places, *spread, *skew)
-        found.append(AddedMass(at, (), numbers, joint, centre, ADDED_MASS * mean, size))
+        mine = joint, centre, ADDED_MASS * mean, size
+        found.append(AddedMass(at, (), _mass_numbers(size), *mine))
         middle = np.log([RESONATOR_MASS * mean, np.sqrt(low * high), RESONATOR_DAMPING])
         sds = 1.0, float(np.log(high / low)) / np.sqrt(12), 1.0, *(1.0,) * 3, *(size,) * 3
         numbers = resonator_numbers((*middle, *(0.0,) * 3, *centre), sds)
@@ -217,6 +216,27 @@ def _operators(simulation: Simulation) -> list[Operator]:
         found.append(_structural(robot))
     found += [_angle_spring((1,), *one) for one in _own(robot)]
     return found
+
+
+def _mass_numbers(size: float) -> tuple[Number, ...]:
+    """Of an added mass whose place has the sd `size` in m."""
+    places = tuple(Number(f"position_{a}", "1", 0.0, 1.0) for a in "xyz")
+    width = float(np.log(RADIUS * size / np.sqrt(2)))
+    spread = (Number(f"spread_{a}", "m", width, RADIUS_SD, True) for a in "xyz")
+    skew = (Number(f"skew_{a}", "1", 0.0, 1.0) for a in ("yx", "zx", "zy"))
+    return Number("mass", "1", 0.0, 1.0), *places, *spread, *skew
+
+
+def _foundation(widest: Simulation, springs: Sequence[Operator]) -> list[Operator]:
+    """Of a base that can give way; `springs` are the effects that only free some."""
+    mine = tuple(i for e in springs if e.at == BASE for i in e.springs)
+    if len(mine) < 6:
+        return []
+    moving = sum(float(b[0]) for b in widest.elastic.inertia)
+    size = FOUNDATION_SIZE * widest.robot.reach_m
+    sized = FOUNDATION_MASS * moving, size
+    numbers = *_mass_numbers(size), Number("height", "m", 0.0, size)
+    return [Foundation(BASE, mine, numbers, BASE, (0.0, 0.0, 0.0), *sized)]
 
 
 def _stated_resonators(robot: Robot) -> tuple[Operator, ...]:

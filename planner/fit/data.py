@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from planner.effects.effect import PosedBodies
-from planner.fit.structure import RobotPrior, RobotStructure
+from planner.fit.structure import Levers, RobotPrior, RobotStructure
 from planner.fit.weights import Weights
 from planner.frf.frf import Frf
 from planner.measurement.measured_frfs import Measured, common_band, matrices_at, stack
@@ -28,6 +28,7 @@ class FrfData:
     off: np.ndarray | float = 0.0  # (n, dof), rad or m: joints stood so far off q
     # (n,): a visit's own share of the chain's tolerances, in multiples of `visit_chain`
     multiples: np.ndarray | float = 1.0
+    levers: Levers = ()  # how springs shift others as they turn
 
     @classmethod
     def of(
@@ -97,6 +98,16 @@ class FrfData:
         vars(other)["weights"] = self.weights
         return other
 
+    def levered(self, levers: Levers) -> "FrfData":
+        """The same where springs shift others as they turn: numbers of slide and turn, m/rad."""
+        to = np.eye(self.matrices.mass.shape[-1])
+        for slide, turn, lever in levers:
+            to[slide, turn] = lever
+        moved = moving(self.matrices, to), self.jacobians @ to
+        other = replace(self, matrices=moved[0], jacobians=moved[1], levers=levers)
+        vars(other).update((n, v) for n, v in vars(self).items() if n == "weights")
+        return other
+
     def at(self, poses: np.ndarray) -> "FrfData":
         """Of some of the poses, by their numbers."""
         return FrfData(
@@ -108,6 +119,16 @@ class FrfData:
             self.off if isinstance(self.off, float) else self.off[poses],
             self.multiples if isinstance(self.multiples, float) else self.multiples[poses],
         )
+
+
+def moving(m: Matrices, to: np.ndarray) -> Matrices:
+    """Matrices of other coordinates, of which `to` (e, e) tells how they move those of `m`."""
+    by = m.by_angle
+    if by is not None:
+        by = AngleSlopes(to.T @ by.mass @ to, by.hit @ to, by.sensor @ to, by.stiffness)
+    turned = {name: getattr(m, name) @ to for name in ("hit", "sensor", "hit_turn", "sensor_turn")}
+    mass, geometric = to.T @ m.mass @ to, to.T @ m.geometric @ to
+    return replace(m, mass=mass, geometric=geometric, by_angle=by, **turned)
 
 
 def among(m: Matrices, springs: Sequence[int]) -> Matrices:

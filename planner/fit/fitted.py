@@ -191,10 +191,14 @@ def removal_costs(found: StructureFit) -> dict[Operator, float]:
     return costs
 
 
-def without(best: StructureFit, effects: Sequence[Operator], steps: int = 5) -> StructureFit | None:
+def without(
+    best: StructureFit, effects: Sequence[Operator], steps: int = 5, kept: Sequence[Operator] = ()
+) -> StructureFit | None:
     structure = best.structure
     for effect in effects:
         structure = structure.without(effect)
+    for effect in kept:
+        structure = structure.with_effect(effect)
     misfit = replace(best.misfit, structure=structure)
     x = np.maximum(structure.carried(best.structure, best.at.x), structure.least)
     if not misfit.possible(x):

@@ -18,7 +18,7 @@ from planner.effects.effect import Gain, Motions, Operator
 from planner.fit.data import FrfData, among
 from planner.fit.inertias import spatial
 from planner.fit.linearised import Around, At, Eliminated, Numbers
-from planner.fit.structure import REACH, RobotStructure
+from planner.fit.structure import REACH, Levers, RobotStructure
 from planner.measurement.nuisances import (
     OF_SENSOR,
     NuisanceCounts,
@@ -91,6 +91,20 @@ class FrfMisfit:
             return self
         return replace(self, data=self.data.stood(off, self.structure.prior.carried))
 
+    def levered(self, x: np.ndarray) -> "FrfMisfit":
+        """With matrices where a base turns about axes at the heights of x; else itself."""
+        levers = self.structure.levers(x)
+        if levers == self.data.levers:
+            return self
+        if levers not in self._levered:
+            self._levered.clear()
+            self._levered[levers] = replace(self, data=self.data.levered(levers))
+        return self._levered[levers]
+
+    @cached_property
+    def _levered(self) -> dict[Levers, "FrfMisfit"]:
+        return {}
+
     # ---------------------------------------------------------------- the model
 
     def inertias(self, x: np.ndarray) -> np.ndarray:
@@ -105,7 +119,8 @@ class FrfMisfit:
     def impedances(self, x: np.ndarray) -> list[Impedance | None]:
         """Of each effect; None of those that have none."""
         pairs = zip(self.structure.effects, self.structure.own, strict=True)
-        return [e.impedance(self.poses, x[own]) for e, own in pairs]
+        poses = self.levered(x).poses
+        return [e.impedance(poses, x[own]) for e, own in pairs]
 
     def possible(self, x: np.ndarray) -> bool:
         """Whether such a robot can be, and stands."""
@@ -132,7 +147,8 @@ class FrfMisfit:
 
         `added` are the impedances there, if they are known.
         """
-        m, mass = self.matrices, self.mass(x)
+        there = self.levered(x)
+        m, mass = there.matrices, there.mass(x)
         if m.by_angle is not None:  # slopes by the joints' angles go with the masses as they are
             nominal, now = (np.trace(a, axis1=1, axis2=2) for a in (m.mass, mass))
             scaled = m.by_angle.mass * (now / nominal)[:, None, None, None]
@@ -142,8 +158,8 @@ class FrfMisfit:
         if eta is not None:
             ports = actual_ports(eta, s, self.tolerances, shape)
         elasticity = self.structure.elasticity(x)
-        there = self.impedances(x) if added is None else added
-        return moved(m, elasticity, s, mass, [z for z in there if z is not None], ports)
+        added = self.impedances(x) if added is None else added
+        return moved(m, elasticity, s, mass, [z for z in added if z is not None], ports)
 
     def slopes(
         self,
@@ -162,7 +178,8 @@ class FrfMisfit:
         kinds, e = structure.spread.shape[:2]
         numbers = structure.bodies.slopes(x[structure.inertial])
         there, bodies = self.impedances(x) if added is None else added, len(numbers)
-        every = Inertias(self.jacobians, np.broadcast_to(inertia_basis(), (bodies, 10, 6, 6)))
+        basic = np.broadcast_to(inertia_basis(), (bodies, 10, 6, 6))
+        every = Inertias(self.levered(x).jacobians, basic)
         raw = motion_slopes(motion, elasticity, every, [z for z in there if z is not None])
         springs = (3 if elasticity.loss_factor.any() else 2) * e
         by_block, n, shape = raw[:, : kinds * e], len(raw), raw.shape[2:]
@@ -180,6 +197,9 @@ class FrfMisfit:
             count = own.stop - own.start if impedance else 0
             out[:, own] = raw[:, at : at + count] if count else 0.0
             at += count
+        for effect, own in zip(structure.effects, structure.own, strict=True):
+            if effect.levers:
+                out[:, own.stop - 1] = self.lever_slope(effect, motion, x)
         t, stiffer, damped = self.tolerances, by_block[:, :e], by_block[:, e:]
         visits = np.empty((n, 2 * e, *shape), dtype=complex)
         np.multiply(stiffer + damped[:, :e], t.visit_stiffness, out=visits[:, :e])
@@ -193,6 +213,22 @@ class FrfMisfit:
         out = np.empty((len(raw), len(s.parameters), *raw.shape[2:]), dtype=complex)
         s.spring_slopes(raw, out)
         return out
+
+    def lever_slope(self, effect: Operator, motion: Motion, x: np.ndarray) -> np.ndarray:
+        """Derivative (n, r, c, F) by the number that an effect's levers go with.
+
+        Where turns t shift by N t, Z is D of the base's springs and TᵀZ₁T of all else, T = 1 + zN;
+        as N² = 0, H changes as if D did by −(NᵀD + DN) (first order is all there is).
+        """
+        springs, elasticity, s = self.structure.springs, self.structure.elasticity(x), motion.s
+        hit, sensor, out = motion.x_hit, motion.scaled(motion.x_sensor), 0.0
+        for slide, turn, sign in effect.levers:
+            i, k = springs.index(slide), springs.index(turn)
+            lossy = elasticity.stiffness[i] * (1 + 1j * elasticity.loss_factor[i])
+            force = (sign * s**2 * (lossy + s * elasticity.damping[i]))[:, None, None]
+            both = sensor[:, i, :, None] * hit[:, k, None] + sensor[:, k, :, None] * hit[:, i, None]
+            out = out + force * both
+        return np.asarray(out)
 
     def columns(self, x: np.ndarray, eta: np.ndarray) -> tuple[np.ndarray, np.ndarray, Motion]:
         """Accelerance (n, r, c, F), columns (n, D + l + 1, r, c, F) by x and own numbers, motion.

@@ -25,6 +25,7 @@ from planner.robot.virtual_joints import OUTER
 STIFF = 1e13  # N·m/rad of springs that carry no weight as they do not give
 MOST_LOSS = 0.999 * LOSS_FACTOR_BELOW  # that robot.toml takes
 REACH = 7.5  # prior sds beyond which nothing is looked for
+Levers = tuple[tuple[int, int, float], ...]
 LONGEST = 0.5, 1.0, 1.5  # of a step: in logarithms of springs, in sds of bodies and effects, chain
 
 
@@ -288,6 +289,12 @@ class RobotStructure:
             out += 0.0 if off is None else off
         return out
 
+    def levers(self, x: np.ndarray) -> Levers:
+        """Springs that shift others as they turn: numbers of slide and turn, m/rad."""
+        pairs = zip(self.effects, self.own, strict=True)
+        ends = ((e, float(x[own.stop - 1])) for e, own in pairs)
+        return tuple((i, k, sign * z) for e, z in ends for i, k, sign in e.levers if z)
+
     def massive(self, x: np.ndarray) -> bool:
         """Whether bodies to which effects add something are still such as matter can form."""
         added = self.added_inertia(x)
@@ -345,8 +352,14 @@ def exported(structure: RobotStructure, x: np.ndarray) -> tuple[Simulation, Sequ
         spring: eta * blocks[k].stiffness / elasticity.stiffness[k]
         for k, spring in enumerate(structure.springs) if (eta := losses.get(spring))
     }  # fmt: skip
+    pairs = zip(structure.effects, structure.own, strict=True)
+    heights = {turn: float(x[own.stop - 1]) for e, own in pairs for _, turn, _ in e.levers}
     blocks = [
-        msgspec.structs.replace(b, loss_factor=float(min(factors.get(i, b.loss_factor), MOST_LOSS)))
+        msgspec.structs.replace(
+            b,
+            loss_factor=float(min(factors.get(i, b.loss_factor), MOST_LOSS)),
+            height_m=heights.get(i, b.height_m),
+        )
         for i, b in zip(structure.springs, blocks, strict=True)
     ]
     resonators, harmonics = (

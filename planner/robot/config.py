@@ -35,7 +35,9 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     instead of `stiffness` and `damping`, as for the own spring of a joint that slides.
     `loss_factor` η makes the stiffness K(1+iη) (structural
     damping). Blocks with the same `tie` share their stiffness, damping and loss factor, also when
-    those are identified.
+    those are identified. `height_m` is how high over the URDF's origin the axis of a base's
+    rotation lies (below it: negative, as on a pedestal that rocks about its foot); the base then
+    needs the shifts that go with that.
     """
 
     joint: str
@@ -48,6 +50,7 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     stiffness_sd_percent: float | None = None
     stiffness_n_m: float | None = None
     damping_n_s_m: float | None = None
+    height_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Once read, a shift is a block with `slide`, whose stiffness is in N/m."""
@@ -65,6 +68,8 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if getattr(self, kind) is msgspec.UNSET:
                 missing = stated if self.slide else kind
                 raise ValueError(f"Object missing required field `{missing}`")
+        if self.height_m and (self.joint != BASE or self.slide):
+            raise ValueError(f'height_m is of a rotation of joint = "{BASE}" only')
 
 
 class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

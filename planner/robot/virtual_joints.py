@@ -85,7 +85,30 @@ def _elastic(robot: Robot, own: np.ndarray, springs: np.ndarray, size: int) -> n
             factors[linkage.leads[leader]] = 0.0  # the joint itself is held
             along = np.array(block.axis) @ robot.joint_axes[leader] / np.linalg.norm(block.axis)
             moves[own, number] += factors * along
+        if block.height_m:
+            moves[springs, number] += _shifts(robot, number)
     return moves
+
+
+def _shifts(robot: Robot, number: int) -> np.ndarray:
+    """(e,): how far the base's shifts go with a rotation about an axis at a height; InputError if
+    it has none along that way."""
+    blocks, turning = robot.config.compliance, robot.config.compliance[number]
+    way = np.cross(np.array(turning.axis), np.array([0.0, 0.0, -turning.height_m]))
+    way /= np.linalg.norm(turning.axis)
+    out = np.zeros(len(blocks) + len(robot.config.resonator))
+    for k, block in enumerate(blocks):
+        if block.joint == BASE and block.slide:
+            axis = np.array(block.axis) / np.linalg.norm(block.axis)
+            out[k] = axis @ way
+            way = way - out[k] * axis
+    if np.linalg.norm(way) > 1e-9:
+        raise InputError(
+            f"{robot.path}: [[compliance]] number {number + 1} ({BASE}) has height_m = "
+            f"{turning.height_m:g}, so the base shifts as it turns; add its [[compliance]] with "
+            f"stiffness_n_m and damping_n_s_m along x and y, or leave height_m out."
+        )
+    return out
 
 
 def _carried(frame: pin.Frame, last: list[int], ends: list[tuple[int, pin.SE3]]) -> pin.Frame:

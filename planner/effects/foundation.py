@@ -1,0 +1,92 @@
+"""What a robot stands on moves with it: a block, a bed or a pedestal on springs of its own."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.dynamics.gradient import Impedance
+from planner.effects.added_mass import AddedMass
+from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
+from planner.effects.springs import stiffness_told
+from planner.words import with_sd
+
+SOFT = ((3, 1, -1.0), (4, 0, 1.0))  # along x, about y; along y, about x: of the six springs
+LIGHT, HEAVY = 0.05, (0.5, 1.5)  # of the mass's sd, where fits begin
+KNOWN_SD = 2.0  # sds from which it is said to be heavy
+
+
+@dataclass(frozen=True)
+class Foundation(AddedMass):
+    """The base's springs (about x, y, z, along x, y, z) and the mass that moves on them with it.
+
+    They come together: without its springs such a mass stands still, and without the mass the
+    springs explain less than what imitates both. ψ as an added mass's, and the height in m of the
+    axes about which the base tilts: of what rocks on its foot, that of the foot.
+    """
+
+    kind = "foundation"
+    effect = "base_compliance"
+    absorbed = False
+
+    def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
+        """It is tried as springs are."""
+        return (Start(self, self._heavy(LIGHT), np.inf),)
+
+    def moved_to(self, found: Operator, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
+        """There is one base."""
+        return self.starts(motions, gain)[0]
+
+    def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
+        """See `Operator.beside`: a block is about as heavy as its robot, or heavier."""
+        return tuple(map(self._heavy, HEAVY))
+
+    @property
+    def levers(self) -> tuple[tuple[int, int, float], ...]:
+        """See `Operator.levers`."""
+        return tuple((self.springs[slide], self.springs[turn], sign) for slide, turn, sign in SOFT)
+
+    def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
+        """The mass's; what the height changes, the springs show."""
+        mass = super().impedance(poses, psi[:-1])
+        return replace(mass, slope=(*mass.slope, ((0, 0.0 * poses.s),)))
+
+    def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray, np.ndarray]:
+        """See `Operator.inertia`."""
+        joint, there, slopes = super().inertia(psi[:-1])
+        return joint, there, np.vstack([slopes, 0.0 * slopes[:1]])
+
+    def of_matter(self, inertia: np.ndarray) -> np.ndarray | None:
+        """See `Operator.of_matter`: a base has no other mass of which it could be a share."""
+        return None
+
+    def parameters(
+        self, values: Mapping[str, tuple[float, float]]
+    ) -> dict[str, tuple[float, float, str]]:
+        """See `Operator.parameters`."""
+        springs = {n: v for n, v in values.items() if " of " in n}
+        mass = super().parameters({n: v for n, v in values.items() if n not in springs})
+        told = Operator.parameters(self, springs) | mass
+        return told | {"height": (*values["height"], "m")}
+
+    def _heavy(self, sds: float) -> np.ndarray:
+        return np.array([sds, *self.mean[1:]])
+
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `Operator.box`: no floor takes mass away."""
+        low, high = super().box
+        low[0] = 0.0
+        return low, high
+
+    def words(self, values: Mapping[str, tuple[float, float]]) -> str:
+        """See `Operator.words`."""
+        mass, sd, _ = self.parameters(values)["mass"]
+        heavy = f" with {with_sd(mass, sd)} kg that it stands on" if mass > KNOWN_SD * sd else ""
+        height, sd = values["height"]
+        where = "below" if height < 0 else "above"
+        tilts = f", tilting about a point {with_sd(abs(height), sd)} m {where} its origin"
+        return (
+            f"The base gives way{heavy}{tilts if abs(height) > KNOWN_SD * sd else ''} "
+            f"({stiffness_told(values)}): check anchor bolts and what the robot stands on."
+        )
