@@ -12,7 +12,7 @@ from planner.effects.springs import stiffness_told
 from planner.words import with_sd
 
 SOFT = ((3, 1, -1.0), (4, 0, 1.0))  # along x, about y; along y, about x: of the six springs
-LIGHT, HEAVY = 0.05, (0.5, 1.5)  # of the mass's sd, where fits begin
+LIGHT, HEAVY = 0.2, 1.0  # of the mass's sd, where fits begin
 KNOWN_SD = 2.0  # sds from which it is said to be heavy
 
 
@@ -39,7 +39,7 @@ class Foundation(AddedMass):
 
     def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
         """See `Operator.beside`: a block is about as heavy as its robot, or heavier."""
-        return tuple(map(self._heavy, HEAVY))
+        return (self._heavy(HEAVY),)
 
     @property
     def levers(self) -> tuple[tuple[int, int, float], ...]:

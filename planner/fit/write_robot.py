@@ -46,6 +46,8 @@ def updated_toml(
         table.update(joint=block.joint, axis=list(block.axis), stiffness=0.0, damping=0.0)
         if block.slide:
             table["slide"] = True
+        if block.height_m:
+            table["height_m"] = float(f"{block.height_m:.{DIGITS}g}")
         springs.append(table)
         blocks.append(table)
     for estimate in result.estimates:

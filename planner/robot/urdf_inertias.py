@@ -61,8 +61,6 @@ def with_inertias(robot: Robot, bodies: tuple[str, ...], change: np.ndarray) -> 
         joint = _joint_of(robot, body)
         placed = {frame.name: frame.placement for frame in robot.body_frames(joint)}
         mine = [name for name in placed if name in links]
-        if body == BASE and not any(link_inertia(links[name]).mass for name in mine):
-            continue  # what `massless_base` gave it is no matter
         before = _spread(body_inertia(robot, joint))
         try:
             to = affine_map(before, before + _spread(values))

@@ -23,7 +23,7 @@ from planner.fit.trials import explained
 from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
 from planner.words import significant
-from tests.support.fitted_cases import Case, Judged, everyday
+from tests.support.fitted_cases import Case, Judged, everyday, on_a_block
 
 
 @pytest.fixture(scope="module")
@@ -65,8 +65,12 @@ EVERYTHING = (
 )  # fmt: skip
 
 
-def test_slopes_are_the_derivatives(prior, few):
-    structure = structure_of(prior, *EVERYTHING)
+ON_A_BLOCK = ("foundation at base", *EVERYTHING[2:])
+
+
+@pytest.mark.parametrize("labels", [EVERYTHING, ON_A_BLOCK])
+def test_slopes_are_the_derivatives(prior, few, labels):
+    structure = structure_of(prior, *labels)
     misfit = FrfMisfit(structure, few, Tolerances())
     rng = np.random.default_rng(0)
     x = structure.mean + 0.1 * structure.sd * rng.standard_normal(structure.size)
@@ -81,8 +85,9 @@ def test_slopes_are_the_derivatives(prior, few):
         assert np.linalg.norm(slope - columns[:, i]) < 1e-4 * size, name
 
 
-def test_slopes_of_frequencies_are_the_derivatives(case, prior):
-    structure = structure_of(prior, *(e for e in EVERYTHING if "damping" not in e))
+@pytest.mark.parametrize("labels", [EVERYTHING, ON_A_BLOCK])
+def test_slopes_of_frequencies_are_the_derivatives(case, prior, labels):
+    structure = structure_of(prior, *(e for e in labels if "damping" not in e))
     x = structure.mean + 0.1 * structure.sd
     set_to(structure, x, "local_resonator", 3, 1.0, 0.5, 0.3)
     belief = RobotBelief(structure, x, np.eye(structure.size), Tolerances())
@@ -113,8 +118,9 @@ def test_masses_springs_and_gain_times_one_number_leave_frfs_as_they_are(prior, 
     assert bodies.barrier(other[structure.inertial])[0] < 1e-12
 
 
-def test_what_was_found_is_a_simulation_of_its_own(prior, few):
-    structure = structure_of(prior, *EVERYTHING[:5])
+@pytest.mark.parametrize("labels", [EVERYTHING[:5], ON_A_BLOCK[:4]])
+def test_what_was_found_is_a_simulation_of_its_own(prior, few, labels):
+    structure = structure_of(prior, *labels)
     x = structure.mean.copy()
     set_to(structure, x, "added_mass", 0, 0.5, 0.3, -0.2, 0.1)
     set_to(structure, x, "added_mass", 7, 0.5, -0.4, 0.3)
@@ -258,6 +264,19 @@ def test_a_soft_base_a_bending_link_and_a_hose_are_found_together(case):
     assert judged.frac > 0.998
     assert abs(judged.scale - 1) < 2.5 * judged.scale_sd < 0.1
     assert isinstance(found, RobotPosterior)
+
+
+def test_what_a_robot_stands_on_is_weighed_and_its_foot_is_found(tmp_path):
+    case, block = on_a_block("kr10", 1000, tmp_path)
+    found = case.posterior()
+    [effect] = [e for e in found.structure.effects if e.kind == "foundation"]
+    told = effect.parameters(found.values(effect))
+    (mass, mass_sd, _), (height, height_sd, _) = told["mass"], told["height"]
+    assert abs(mass - block.mass_kg) < max(3 * mass_sd, 0.1 * block.mass_kg)
+    assert abs(height + block.side_m) < max(3 * height_sd, 0.1 * block.side_m)
+    judged = Judged.of(case, found)
+    assert judged.rmse_percent < 0.3
+    assert judged.error < 0.06
 
 
 def test_what_was_found_is_recalled_as_it_was(case, prior):

@@ -1,5 +1,6 @@
 """Robots of another engine that lack several things at once, hit as people hit; FRFs and truth."""
 
+import shutil
 import tomllib
 import zlib
 from collections.abc import Callable
@@ -155,6 +156,62 @@ def forgotten(name: str, seed: int, folder: Path) -> Case:
     return _measured(arm, injected, concealed, EVERYDAY, rng)
 
 
+@dataclass(frozen=True)
+class Block:
+    """What a robot stands on: `mass_kg`, a cube of `side_m`, on springs under its lower face."""
+
+    mass_kg: float
+    side_m: float
+
+
+def on_a_block(name: str, seed: int, folder: Path) -> tuple[Case, Block]:
+    """On a block or pedestal of 0.2 to 3 times what moves, which rocks and shifts about its foot at
+    half to twice the robot's first frequency; a link bends, too."""
+    rng, arm = drawn_arm(name, seed, folder)
+    injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
+    injected = added(injected, "bending link", log_uniform(rng, 0.5, 1.0), arm, rng)
+    table = tomllib.loads(arm.toml.read_text())
+    root = ElementTree.parse(arm.toml.parent / table["urdf"]).getroot()
+    moving = mass_that_moves(root)
+    block = Block(moving * log_uniform(rng, 0.2, 3.0), float(rng.uniform(0.3, 1.0)))
+    shutil.copytree(arm.toml.parent, folder / "stands")
+    _stand(root, block)
+    ElementTree.ElementTree(root).write(folder / "stands" / table["urdf"])
+    stands = folder / "stands" / arm.toml.name
+    truth = load_truth(stands, injected.deviation)
+    middle = np.mean([truth.lower_rad, truth.upper_rad], axis=0)
+    turn = 2 * np.pi * float(truth.modes(middle, 1)[0][0]) * log_uniform(rng, 0.8, 2.0)
+    mass = moving + block.mass_kg
+    arm_m = block.side_m + 0.3 * float(truth.position(middle)[2])  # of the centre over the foot
+    springs = []
+    for axis in np.eye(3):
+        shift, tilt = mass * turn**2 * rng.uniform(1, 3), mass * (arm_m * turn) ** 2 * 2
+        tilt *= log_uniform(rng, 0.7, 1.4)
+        springs += [Spring("base", triple(axis), k, 8e-4 * k, slide) for k, slide in
+                    ((tilt, False), (shift, True))]  # fmt: skip
+    injected = deviate(injected, extra=springs)
+    return _measured(arm, injected, ("foundation", "bending link"), EVERYDAY, rng, stands), block
+
+
+def _stand(root: ElementTree.Element, block: Block) -> None:
+    """Put a robot's URDF on a block whose lower face is the world's floor."""
+    carried = {child.get("link") for child in root.iterfind("joint/child")}
+    [base] = [e.get("name") for e in root.findall("link") if e.get("name") not in carried]
+    moment = block.mass_kg * block.side_m**2 / 6
+    inertial = (
+        f'<inertial><origin xyz="0 0 {block.side_m / 2}"/><mass value="{block.mass_kg}"/>'
+        f'<inertia ixx="{moment}" iyy="{moment}" izz="{moment}" ixy="0" ixz="0" iyz="0"/>'
+        "</inertial>"
+    )
+    root.insert(0, ElementTree.fromstring(f'<link name="foot">{inertial}</link>'))
+    root.append(
+        ElementTree.fromstring(
+            f'<joint name="stands" type="fixed"><origin xyz="0 0 {block.side_m}"/>'
+            f'<parent link="foot"/><child link="{base}"/></joint>'
+        )
+    )
+
+
 def _bearings(truth: Truth) -> list[tuple[str, np.ndarray, float]]:
     """Joints 2 to 4, axes about which nothing gives yet, and the stiffness about their own."""
     k = np.array([s.stiffness for s in truth.springs])
@@ -174,9 +231,9 @@ def drawn_arm(name: str, seed: int, folder: Path) -> tuple[np.random.Generator, 
 
 def _measured(
     arm: Arm, injected: InjectedFaults, concealed: tuple[str, ...], errors: MeasurementErrors,
-    rng: np.random.Generator,
+    rng: np.random.Generator, true_toml: Path | None = None,
 ) -> Case:  # fmt: skip
-    truth = load_truth(arm.toml, injected.deviation)
+    truth = load_truth(true_toml or arm.toml, injected.deviation)
     simulation = Simulation(Robot.load(arm.toml))
     low, high = limits(arm, simulation)
     q = rng.uniform(low, high, (POSES, len(low)))
