@@ -180,9 +180,9 @@ class Search(Trials):
     def freed(self, known: RobotBelief | None = None) -> StructureFit:
         """With every spring that there may be; of operators those that are `known`, from there."""
         data, every = self.data(SEARCHED), self.prior.effect_library.effects
-        effects = [e for e in every if e.frees_only]
+        effects = [e for e in every if e.springs]
         if known is not None:
-            effects += [e for e in known.structure.effects if not (e.frees_only or e.stated)]
+            effects += [e for e in known.structure.effects if not (e.springs or e.stated)]
         stated = self.prior.stated(data.sensors)
         structure = replace(stated, effects=(*stated.effects, *effects))
         x, own = structure.mean.copy(), slice(structure.inertial.stop, structure.chain.start)
