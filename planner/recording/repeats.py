@@ -175,6 +175,15 @@ def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float])
     return max(_likeness_in_size(frf, one) for one in theirs)
 
 
+def answered_as(
+    hit: Hit, theirs: tuple[Hit, ...], own: tuple[Hit, ...], band_hz: tuple[float, float]
+) -> bool:
+    """Whether a hit is answered as `theirs` at another pose: the same, or much more like them than
+    like its `own` pose's along that axis, which may be few and poor."""
+    there, here = (likeness_to(hit, others, band_hz) for others in (theirs, own))
+    return there >= SAME or (here > 0 and there > max(LIKE, here + FAR_BELOW))
+
+
 @dataclass(frozen=True, eq=False)
 class _Agreement:
     """How hits along an axis are answered, and in `across` those along the others."""

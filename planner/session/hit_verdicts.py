@@ -9,7 +9,7 @@ from planner.recording.force_levels import far_below
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import version
 from planner.recording.records import Hit
-from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, other_size, screen_repeats
+from planner.recording.repeats import Doubt, answered_as, doubts, other_size, screen_repeats
 from planner.recording.sampling import recorded_otherwise
 from planner.recording.screening import driving_point
 from planner.session.inbox import FolderTable
@@ -132,22 +132,25 @@ class Verdicts:
             if at := came.get(verdict.path):
                 waiting[at] = (*waiting.get(at, ()), *verdict.hits)
         for verdict in every:
-            if verdict.path not in shown and (at := self._alike(verdict, waiting)):
+            own = tuple(h for v in every if v.path not in (verdict.path, *came) for h in v.hits)
+            if verdict.path not in shown and (at := self._alike(verdict, waiting, own)):
                 came[verdict.path] = at
         late = [(v, at) for v in every if (at := came.get(v.path))]
-        alike = [bool(self._alike(v, {at: before.get(at, ())})) for v, at in late]
+        alike = [bool(self._alike(v, {at: before.get(at, ())}, ())) for v, at in late]
         kinds = ["elsewhere" if self.table.row(v.path) else "late" for v, _ in late]
         return [
             replace(v, kind=kind, text="", came=at, alike=like)
             for (v, at), kind, like in zip(late, kinds, alike, strict=True)
         ]
 
-    def _alike(self, verdict: HitVerdict, hits: Mapping[str, tuple[Hit, ...]]) -> str:
-        """The pose of which hits are answered like one of these; "": none is."""
+    def _alike(
+        self, verdict: HitVerdict, hits: Mapping[str, tuple[Hit, ...]], own: tuple[Hit, ...]
+    ) -> str:
+        """The pose of which hits are answered like one of these, and not like `own`; "": none."""
         for pose, theirs in hits.items():
             # Of one pose it is 0.98 and more on the true robots of the tests; of poses that a
             # campaign proposes one after the other below 0.9.
-            if any(likeness_to(hit, theirs, self._band) >= SAME for hit in verdict.hits):
+            if any(answered_as(hit, theirs, own, self._band) for hit in verdict.hits):
                 return pose
         return ""
 

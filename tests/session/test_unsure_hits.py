@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planner.dataset.screened_files import Source, read_files
+from planner.dataset.screened_files import Source, read_files, read_one
 from planner.frf.estimator import estimate
-from planner.proof.hits import simulate_hit
+from planner.proof.hits import SimulatedHit, noisy, pulse, sampled, simulate_hit
 from planner.proof.recordings import write_uff
 from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames
@@ -52,6 +52,16 @@ class Bench:
         write_uff(path, made, HAMMER)
         self.files.append(path)
         return path
+
+    def struck(self, direction: tuple[float, float, float], q: np.ndarray) -> SimulatedHit:
+        """A hit that is said to be +z, at another pose and in another direction."""
+        force = pulse(HAMMER, self.rng)
+        parts = (
+            share * self.truth.respond(q, force, i, HAMMER.step_s)
+            for i, share in enumerate(direction)
+        )
+        made = sampled("+z", force, np.sum(list(parts), axis=0), HAMMER)
+        return noisy(made, HAMMER, self.rng)
 
     def of(self, before: Before | None = None, here: frozenset[Path] = frozenset()):
         self.numbers = self.verdicts.numbered(self.files, self.numbers)
@@ -119,6 +129,26 @@ def test_a_hit_far_below_the_others_is_to_be_repeated(bench):
     assert alone.of({"P001": before[:2]})["first"].kind != "good"
     bench.hit("soft2", "+x", size=0.045)
     assert set(kinds(bench.of()).values()) == {"good"}
+
+
+def test_a_late_hit_is_told_beside_a_poor_one(bench, tmp_path):
+    """The pose before was hit askew, so that the late hit is not quite like its repeats there, and
+    the one good repeat here is missing: a poor one alone stands for it."""
+    other = Q + np.deg2rad([25.0, 12.0, -20.0, 0.0, 15.0, 0.0])
+    late = bench.struck((0.0, 0.0, 1.0), other)
+    askew = tuple(bench.struck((0.1, -0.1, 0.99), other) for _ in range(2))
+    poor = bench.struck((0.2, 0.1, 0.95), Q)
+    for name, made in (("late", late), ("poor", poor), ("a", askew[0]), ("b", askew[1])):
+        write_uff(tmp_path / f"{name}.uff", made, HAMMER)
+    before = {
+        "P0": tuple(
+            hit
+            for name in "ab"
+            for hit in read_one(Source(tmp_path / f"{name}.uff", name), BAND_HZ)[1]
+        )
+    }
+    bench.files += [tmp_path / "late.uff", tmp_path / "poor.uff"]
+    assert kinds(bench.of(before)) == {"late": "late", "poor": "good"}
 
 
 def test_hits_keep_their_number_whatever_becomes_readable_before_them(bench):
