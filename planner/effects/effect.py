@@ -164,6 +164,11 @@ class Operator(ABC):
         return self.effect or self.kind, self.at.split("#")[0]
 
     @property
+    def widens(self) -> bool:
+        """Whether it is more than its springs: it is looked for where some of them are."""
+        return bool(self.springs and self.numbers)
+
+    @property
     def frees_only(self) -> bool:
         """Whether it is nothing but springs."""
         return bool(self.springs) and not self.numbers

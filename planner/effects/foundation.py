@@ -7,12 +7,11 @@ import numpy as np
 
 from planner.dynamics.gradient import Impedance
 from planner.effects.added_mass import AddedMass
-from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
+from planner.effects.effect import Operator, PosedBodies
 from planner.effects.springs import stiffness_told
 from planner.words import with_sd
 
-SOFT = ((3, 1, -1.0), (4, 0, 1.0))  # along x, about y; along y, about x: of the six springs
-LIGHT, HEAVY = 0.2, 1.0  # of the mass's sd, where fits begin
+LEVERS = ((3, 1, -1.0), (4, 0, 1.0))  # along x, about y; along y, about x: of the six springs
 KNOWN_SD = 2.0  # sds from which it is said to be heavy
 
 
@@ -29,22 +28,12 @@ class Foundation(AddedMass):
     effect = "base_compliance"
     absorbed = False
 
-    def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
-        """It is tried as springs are."""
-        return (Start(self, self._heavy(LIGHT), np.inf),)
-
-    def moved_to(self, found: Operator, psi: np.ndarray, motions: Motions, gain: Gain) -> Start:
-        """There is one base."""
-        return self.starts(motions, gain)[0]
-
-    def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
-        """See `Operator.beside`: a block is about as heavy as its robot, or heavier."""
-        return (self._heavy(HEAVY),)
-
     @property
     def levers(self) -> tuple[tuple[int, int, float], ...]:
         """See `Operator.levers`."""
-        return tuple((self.springs[slide], self.springs[turn], sign) for slide, turn, sign in SOFT)
+        return tuple(
+            (self.springs[slide], self.springs[turn], sign) for slide, turn, sign in LEVERS
+        )
 
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """The mass's; what the height changes, the springs show."""
@@ -56,10 +45,6 @@ class Foundation(AddedMass):
         joint, there, slopes = super().inertia(psi[:-1])
         return joint, there, np.vstack([slopes, 0.0 * slopes[:1]])
 
-    def of_matter(self, inertia: np.ndarray) -> np.ndarray | None:
-        """See `Operator.of_matter`: a base has no other mass of which it could be a share."""
-        return None
-
     def parameters(
         self, values: Mapping[str, tuple[float, float]]
     ) -> dict[str, tuple[float, float, str]]:
@@ -68,9 +53,6 @@ class Foundation(AddedMass):
         mass = super().parameters({n: v for n, v in values.items() if n not in springs})
         told = Operator.parameters(self, springs) | mass
         return told | {"height": (*values["height"], "m")}
-
-    def _heavy(self, sds: float) -> np.ndarray:
-        return np.array([sds, *self.mean[1:]])
 
     @property
     def box(self) -> tuple[np.ndarray, np.ndarray]:

@@ -149,9 +149,6 @@ class OneMore:
         if off is not None and motion.by_angle is not None:
             by = np.einsum("nj,nj...->n...", off, motion.by_angle)
             own[:, 0] = base.through_chain(self.at.x, by)
-        if self.effect.levers:
-            slope = there.lever_slope(self.effect, motion, self.whole(x))
-            own[:, -1] = base.through_chain(self.at.x, slope)
         factor = self.effect.chain(s, psi)
         if factor is not None:
             shown = base.through_chain(self.at.x, h)

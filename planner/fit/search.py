@@ -180,9 +180,9 @@ class Search(Trials):
     def freed(self, known: RobotBelief | None = None) -> StructureFit:
         """With every spring that there may be; of operators those that are `known`, from there."""
         data, every = self.data(SEARCHED), self.prior.effect_library.effects
-        effects = [e for e in every if e.springs]
+        effects = [e for e in every if e.frees_only]
         if known is not None:
-            effects += [e for e in known.structure.effects if not (e.springs or e.stated)]
+            effects += [e for e in known.structure.effects if not (e.frees_only or e.stated)]
         stated = self.prior.stated(data.sensors)
         structure = replace(stated, effects=(*stated.effects, *effects))
         x, own = structure.mean.copy(), slice(structure.inertial.stop, structure.chain.start)
@@ -231,7 +231,7 @@ class Search(Trials):
         of these explains.
         """
         effects, costs = added(best), removal_costs(best)
-        yield [one for effect in effects for one in self._lesser(best, effect)]
+        yield list(self._more_or_less(best))
         for effect in sorted(effects, key=lambda e: costs[e]):
             known = pool.get(_less(best, effect))
             # What was met from elsewhere and is worse than by first order from here is stuck there.
@@ -264,14 +264,20 @@ class Search(Trials):
         afar = converged(self.begun(best.misfit.data, structure, x))
         return afar if bent is None else max(bent, afar, key=evidence_of)
 
-    def _lesser(self, best: StructureFit, effect: Operator) -> Iterator[StructureFit]:
-        """With springs alone in the place of an effect that is more than its springs."""
-        free = () if effect.frees_only else effects_free(best.structure)
-        parts = [e for e in free if e.frees_only and set(e.springs) < set(effect.springs)]
-        for kept in (*([e] for e in parts), parts) if parts else ():
-            fewer = without(best, [effect], kept=kept)
-            if fewer is not None:
-                yield settled(fewer.misfit, fewer.at)
+    def _more_or_less(self, best: StructureFit) -> Iterator[StructureFit]:
+        """With what is more than its springs in the place of effects that free some of them, and
+        the other way round."""
+        every, there = self.prior.effect_library.effects, {e.label for e in best.structure.effects}
+        for whole in (e for e in every if e.widens):
+            parts = [e for e in every if e.frees_only and set(e.springs) < set(whole.springs)]
+            here = [e for e in parts if e.label in there]
+            exchanged = [(here, [whole])] if here and whole.label not in there else []
+            if whole.label in there:
+                exchanged += [([whole, *here], kept) for kept in (*([e] for e in parts), parts)]
+            for left, kept in exchanged:
+                other = without(best, left, kept=kept)
+                if other is not None:
+                    yield settled(other.misfit, other.at)
 
     def _further(self, base: StructureFit) -> list[StructureFit]:
         """With one effect more, settled, likeliest first."""

@@ -53,15 +53,18 @@ def _carried_by(structure: RobotStructure, x: np.ndarray) -> list[np.ndarray]:
 
 def from_stated(structure: RobotStructure, start: Start) -> Iterable[np.ndarray]:
     """Where a fit from afar begins: as stated, new springs as expected and softer."""
-    effect, begun = structure.effects[-1], list[np.ndarray]()
-    for psi in (start.psi, *effect.beside(start.psi)):
-        begun.append(structure.mean.copy())
-        begun[-1][structure.own[-1]] = psi
+    effect, x = structure.effects[-1], structure.mean.copy()
+    if not effect.springs:
+        begun = []
+        for psi in (start.psi, *effect.beside(start.psi)):
+            begun.append(x.copy())
+            begun[-1][structure.own[-1]] = psi
+        return begun
     new = [i for i in range(structure.stiffnesses) if not structure.parameters[i].stated]
     mine = [i for i in new if set(structure.parameters[i].blocks) & set(effect.springs)]
-    softer = np.zeros(structure.size)
-    softer[mine] = 1.2 * structure.sd[mine]
-    return begun + [x - softer for x in begun if mine]
+    softer = x.copy()
+    softer[mine] -= 1.2 * structure.sd[mine]
+    return x, softer
 
 
 def pulled(base: StructureFit, effect: Operator) -> bool:
