@@ -88,8 +88,8 @@ def _drawn(simulation: Simulation, q: np.ndarray, frf: Frf) -> np.ndarray:
     solved = solve_poles(many[0], c, k + m.geometric, many[1], many[2])
     each = (s**2 / (s - solved.poles[..., None])) @ _width(at)
     drawn = np.imag(np.einsum("nmij,nm->nij", solved.residues, each))
-    # With a mode more, of which the simulation knows nothing.
-    size = np.sqrt(np.abs(np.diagonal(drawn, axis1=1, axis2=2)))
+    # With a mode more, of which the simulation knows nothing: not even along which axis it moves.
+    size = np.sqrt(np.abs(np.diagonal(drawn, axis1=1, axis2=2)).mean(axis=1, keepdims=True))
     more = MORE * np.random.default_rng(SEED + 1).standard_normal((len(drawn), 3)) * size
     return drawn + more[:, :, None] * more[:, None]
 

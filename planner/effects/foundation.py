@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.dynamics.gradient import Impedance
 from planner.effects.added_mass import AddedMass
-from planner.effects.effect import Operator, PosedBodies
+from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
 from planner.effects.springs import stiffness_told
 from planner.words import with_sd
 
@@ -20,8 +20,9 @@ class Foundation(AddedMass):
     """The base's springs (about x, y, z, along x, y, z) and the mass that moves on them with it.
 
     They come together: without its springs such a mass stands still, and without the mass the
-    springs explain less than what imitates both. ψ as an added mass's, and the height in m of the
-    axes about which the base tilts: of what rocks on its foot, that of the foot.
+    springs explain less than what imitates both. ψ as an added mass's, but of the mass the
+    logarithm, and the height in m of the axes about which the base tilts: of what rocks on its
+    foot, that of the foot.
     """
 
     kind = "foundation"
@@ -37,13 +38,31 @@ class Foundation(AddedMass):
 
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """The mass's; what the height changes, the springs show."""
-        mass = super().impedance(poses, psi[:-1])
+        mass = super().impedance(poses, psi)
         return replace(mass, slope=(*mass.slope, ((0, 0.0 * poses.s),)))
 
     def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray, np.ndarray]:
         """See `Operator.inertia`."""
-        joint, there, slopes = super().inertia(psi[:-1])
+        joint, there, slopes = super().inertia(psi)
         return joint, there, np.vstack([slopes, 0.0 * slopes[:1]])
+
+    def _body(self, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        mass = float(np.exp(psi[0]))
+        there, slopes = super()._body(np.array([mass, *psi[1:-1]]))
+        slopes[0] *= mass
+        return there, slopes
+
+    def vanishing(self, psi: np.ndarray) -> np.ndarray:
+        """See `Operator.vanishing`."""
+        return np.array([-1.0])  # of ln mass
+
+    def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
+        """It is tried as springs are."""
+        return (Start(self, self.mean, np.inf),)
+
+    def of_matter(self, inertia: np.ndarray) -> np.ndarray | None:
+        """See `Operator.of_matter`: a base has no other mass of which it could be a share."""
+        return None
 
     def parameters(
         self, values: Mapping[str, tuple[float, float]]
@@ -54,12 +73,10 @@ class Foundation(AddedMass):
         told = Operator.parameters(self, springs) | mass
         return told | {"height": (*values["height"], "m")}
 
-    @property
-    def box(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `Operator.box`: no floor takes mass away."""
-        low, high = super().box
-        low[0] = 0.0
-        return low, high
+    def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
+        """See `Operator.beside`."""
+        step = self.sd[0] * np.eye(psi.size)[0]
+        return psi - step, psi + step
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""

@@ -39,8 +39,9 @@ DAMPING_S = 1e-4, 3e-3
 ALONG = 0.5  # cosine above which a stated axis already covers this one
 SHORT, BEND = 0.1, 0.3  # of the longest link: does not bend; of the joint's stiffness: a link's
 ADDED_MASS, ADDED_PLACE = 0.22, 0.35  # sds: of the links' mean mass, of the longest link
-# Of what moves with a base: sds, of the robot's mass and of its reach.
-FOUNDATION_MASS, FOUNDATION_SIZE = 2.0, 0.4
+# Of what moves with a base: median in the robot's mass and sd of its logarithm; sd of its place in
+# the robot's reach.
+FOUNDATION_MASS, FOUNDATION_MASS_SD, FOUNDATION_SIZE = 0.7, 1.1, 0.4
 # Radius of gyration of an added mass: median, in its place's sd, and its logarithm's sd.
 RADIUS, RADIUS_SD = 0.25, 0.7
 RESONATOR_MASS, RESONATOR_DAMPING = 0.05, 0.03  # medians: of the links' mean mass; ratio
@@ -232,11 +233,12 @@ def _foundation(widest: Simulation, springs: Sequence[Operator]) -> list[Operato
     mine = tuple(i for e in springs if e.at == BASE for i in e.springs)
     if len(mine) < 6:
         return []
-    moving = sum(float(b[0]) for b in widest.elastic.inertia)
+    usual = FOUNDATION_MASS * sum(float(b[0]) for b in widest.elastic.inertia)
     size = FOUNDATION_SIZE * widest.robot.reach_m
-    sized = FOUNDATION_MASS * moving, size
-    numbers = *_mass_numbers(size), Number("height", "m", 0.0, size)
-    return [Foundation(BASE, mine, numbers, BASE, (0.0, 0.0, 0.0), *sized)]
+    _, *placed = _mass_numbers(size)
+    mass = Number("mass", "kg", float(np.log(usual)), FOUNDATION_MASS_SD, True)
+    numbers = mass, *placed, Number("height", "m", 0.0, size)
+    return [Foundation(BASE, mine, numbers, BASE, (0.0, 0.0, 0.0), 1.0, size)]
 
 
 def _stated_resonators(robot: Robot) -> tuple[Operator, ...]:

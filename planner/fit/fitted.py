@@ -1,6 +1,6 @@
 """A structure fitted to FRFs: its discrepancy by evidence, and what its effects are worth."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -191,16 +191,24 @@ def removal_costs(found: StructureFit) -> dict[Operator, float]:
     return costs
 
 
-def without(
-    best: StructureFit, effects: Sequence[Operator], steps: int = 5, kept: Sequence[Operator] = ()
-) -> StructureFit | None:
+def without(best: StructureFit, effects: Sequence[Operator], steps: int = 5) -> StructureFit | None:
+    """A few steps from where the others are; None where such a robot can't be."""
+    return max(exchanged(best, effects, (), steps), key=evidence_of, default=None)
+
+
+def exchanged(
+    best: StructureFit, left: Sequence[Operator], new: Sequence[Operator], steps: int = 5
+) -> Iterator[StructureFit]:
+    """With `new` effects in the place of some, a few steps from wherever the last may begin."""
     structure = best.structure
-    for effect in effects:
+    for effect in left:
         structure = structure.without(effect)
-    for effect in kept:
+    for effect in new:
         structure = structure.with_effect(effect)
     misfit = replace(best.misfit, structure=structure)
     x = np.maximum(structure.carried(best.structure, best.at.x), structure.least)
-    if not misfit.possible(x):
-        return None
-    return stepped(misfit, x, steps, best.at.own)
+    begun = [x]
+    for psi in new[-1].beside(new[-1].mean) if new else ():
+        begun.append(x.copy())
+        begun[-1][structure.own[-1]] = psi
+    return (stepped(misfit, one, steps, best.at.own) for one in begun if misfit.possible(one))

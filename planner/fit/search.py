@@ -28,6 +28,7 @@ from planner.fit.fitted import (
     StructureFit,
     converged,
     evidence_of,
+    exchanged,
     explains_all,
     removal_costs,
     settled,
@@ -55,6 +56,7 @@ SEARCHED, SCREENED, LAST = 24, 48, 44  # lines a pose: while searching, for oper
 SETTLED = 4  # of those that compete
 MOST = 6  # effects
 COMPLETIONS = 2  # rounds
+SOFTER = 1.2  # prior sds of springs that may be softer than expected
 STIFF_AT_FIRST = 3.0  # prior sds of springs that may be there
 AGAIN = 0.03  # least size with which what was found before goes on
 
@@ -247,6 +249,8 @@ class Search(Trials):
             yield self._exchanged(best, effect, near, pool, extended)
         if first and all(size_of(one) > FAR_OFF for one in (best, *more)):
             yield self._from_afar(best)
+        if first and not explained(best):
+            yield list(self._afresh(best))
 
     def _fewer(self, best: StructureFit, effect: Operator, near: bool) -> StructureFit:
         """Without an effect: from where it is, and, where much is left then and not only what is
@@ -271,13 +275,38 @@ class Search(Trials):
         for whole in (e for e in every if e.widens):
             parts = [e for e in every if e.frees_only and set(e.springs) < set(whole.springs)]
             here = [e for e in parts if e.label in there]
-            exchanged = [(here, [whole])] if here and whole.label not in there else []
+            pairs = [(here, [whole])] if here and whole.label not in there else []
             if whole.label in there:
-                exchanged += [([whole, *here], kept) for kept in (*([e] for e in parts), parts)]
-            for left, kept in exchanged:
-                other = without(best, left, kept=kept)
+                pairs += [([whole, *here], new) for new in (*([e] for e in parts), parts)]
+            for left, new in pairs:
+                other = max(exchanged(best, left, new), key=evidence_of, default=None)
                 if other is not None:
                     yield settled(other.misfit, other.at)
+
+    def _afresh(self, best: StructureFit) -> Iterator[StructureFit]:
+        """The same from what is stated, wherever what is more than its springs may begin: mass and
+        springs together can be wrong in many ways."""
+        data, s = best.misfit.data, best.structure
+        for number, effect in enumerate(s.effects):
+            if effect.widens:
+                begun = self._anywhere(best, number)
+                ends = parallel_map(lambda x: self.begun(data, s, x).tried, begun)
+                yield converged(self._from(max(ends, key=evidence_of), data))
+
+    def _anywhere(self, best: StructureFit, number: int) -> list[np.ndarray]:
+        """As stated, but for the effects' numbers; of one from all places, springs softer, too."""
+        s, effect, kept = best.structure, best.structure.effects[number], best.structure.own
+        springs = enumerate(s.parameters[: s.stiffnesses])
+        mine = [i for i, p in springs if set(p.blocks) & set(effect.springs)]
+        found = []
+        for psi in (effect.mean, *effect.beside(effect.mean)):
+            for softer in (0.0, SOFTER):
+                x = s.mean.copy()
+                x[kept[0].start : s.chain.start] = best.at.x[kept[0].start : s.chain.start]
+                x[kept[number]] = psi
+                x[mine] -= softer * s.sd[mine]
+                found.append(x)
+        return found
 
     def _further(self, base: StructureFit) -> list[StructureFit]:
         """With one effect more, settled, likeliest first."""
