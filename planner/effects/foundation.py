@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.dynamics.gradient import Impedance
 from planner.effects.added_mass import AddedMass
-from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
+from planner.effects.effect import Operator, PosedBodies
 from planner.effects.springs import stiffness_told
 from planner.words import with_sd
 
@@ -55,10 +55,6 @@ class Foundation(AddedMass):
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """See `Operator.vanishing`."""
         return np.array([-1.0])  # of ln mass
-
-    def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
-        """It is tried as springs are."""
-        return (Start(self, self.mean, np.inf),)
 
     def of_matter(self, inertia: np.ndarray) -> np.ndarray | None:
         """See `Operator.of_matter`: a base has no other mass of which it could be a share."""

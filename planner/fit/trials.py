@@ -125,7 +125,7 @@ class Trials:
         free, every = effects_free(base.structure), self.prior.effect_library.effects
         again = (e for e in every if e.several and e not in free)  # more may hang on a link
         far = not explained(base)
-        tried = (e for e in (*free, *again) if far or pulled(base, e))
+        tried = (e for e in (*free, *again) if (far or pulled(base, e)) and not e.widens)
         kept = leaders([s for e in tried for s in e.starts(motions, gain)], least)
         # Of all joints at all poses the first order tells which it is.
         mine = (e for e in self.free(base.structure) if e not in free)
