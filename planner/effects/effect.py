@@ -165,7 +165,7 @@ class Operator(ABC):
 
     @property
     def widens(self) -> bool:
-        """Whether it is more than its springs: it is looked for where some of them are."""
+        """Whether it is more than its springs."""
         return bool(self.springs and self.numbers)
 
     @property

@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.dynamics.gradient import Impedance
 from planner.effects.added_mass import AddedMass
-from planner.effects.effect import Operator, PosedBodies
+from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
 from planner.effects.springs import stiffness_told
 from planner.words import with_sd
 
@@ -51,6 +51,10 @@ class Foundation(AddedMass):
         there, slopes = super()._body(np.array([mass, *psi[1:-1]]))
         slopes[0] *= mass
         return there, slopes
+
+    def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
+        """It is tried as springs are."""
+        return (Start(self, self.mean, np.inf),)
 
     def vanishing(self, psi: np.ndarray) -> np.ndarray:
         """See `Operator.vanishing`."""

@@ -12,7 +12,7 @@ import numpy as np
 from planner.effects.effect import Operator, Start, gain_of
 from planner.fit.data import FrfData
 from planner.fit.departures import departed
-from planner.fit.explanations import RARE
+from planner.fit.explanations import RARE, added
 from planner.fit.fitted import (
     SIZES,
     FitRecord,
@@ -125,7 +125,9 @@ class Trials:
         free, every = effects_free(base.structure), self.prior.effect_library.effects
         again = (e for e in every if e.several and e not in free)  # more may hang on a link
         far = not explained(base)
-        tried = (e for e in (*free, *again) if (far or pulled(base, e)) and not e.widens)
+        # What is more than its springs comes first, or in the place of springs (`exchanged`).
+        first = not added(base)
+        tried = [e for e in (*free, *again) if (far or pulled(base, e)) and (first or not e.widens)]
         kept = leaders([s for e in tried for s in e.starts(motions, gain)], least)
         # Of all joints at all poses the first order tells which it is.
         mine = (e for e in self.free(base.structure) if e not in free)
