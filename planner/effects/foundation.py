@@ -74,9 +74,9 @@ class Foundation(AddedMass):
         return told | {"height": (*values["height"], "m")}
 
     def beside(self, psi: np.ndarray) -> tuple[np.ndarray, ...]:
-        """See `Operator.beside`."""
+        """See `Operator.beside`: next to nothing, where what moves is stated, and a heavy block."""
         step = self.sd[0] * np.eye(psi.size)[0]
-        return psi - step, psi + step
+        return psi - 3 * step, psi + step
 
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
