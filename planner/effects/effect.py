@@ -164,12 +164,12 @@ class Operator(ABC):
         return self.effect or self.kind, self.at.split("#")[0]
 
     @property
-    def widens(self) -> bool:
+    def more_than_springs(self) -> bool:
         """Whether it is more than its springs."""
         return bool(self.springs and self.numbers)
 
     @property
-    def frees_only(self) -> bool:
+    def springs_only(self) -> bool:
         """Whether it is nothing but springs."""
         return bool(self.springs) and not self.numbers
 

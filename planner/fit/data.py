@@ -103,7 +103,7 @@ class FrfData:
         to = np.eye(self.matrices.mass.shape[-1])
         for slide, turn, lever in levers:
             to[slide, turn] = lever
-        moved = moving(self.matrices, to), self.jacobians @ to
+        moved = in_coordinates(self.matrices, to), self.jacobians @ to
         other = replace(self, matrices=moved[0], jacobians=moved[1], levers=levers)
         vars(other).update((n, v) for n, v in vars(self).items() if n == "weights")
         return other
@@ -118,10 +118,11 @@ class FrfData:
             None if self.order is None else self.order[poses],
             self.off if isinstance(self.off, float) else self.off[poses],
             self.multiples if isinstance(self.multiples, float) else self.multiples[poses],
+            self.levers,
         )
 
 
-def moving(m: Matrices, to: np.ndarray) -> Matrices:
+def in_coordinates(m: Matrices, to: np.ndarray) -> Matrices:
     """Matrices of other coordinates, of which `to` (e, e) tells how they move those of `m`."""
     by = m.by_angle
     if by is not None:

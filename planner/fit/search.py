@@ -38,6 +38,7 @@ from planner.fit.fitted import (
 from planner.fit.gauss_newton import minimised
 from planner.fit.misfit import FrfMisfit
 from planner.fit.posterior import RobotBelief
+from planner.fit.starts import anywhere
 from planner.fit.structure import RobotStructure, effects_free, exported
 from planner.fit.trials import (
     FAR,
@@ -56,7 +57,6 @@ SEARCHED, SCREENED, LAST = 24, 48, 44  # lines a pose: while searching, for oper
 SETTLED = 4  # of those that compete
 MOST = 6  # effects
 COMPLETIONS = 2  # rounds
-SOFTER = 1.2  # prior sds of springs that may be softer than expected
 STIFF_AT_FIRST = 3.0  # prior sds of springs that may be there
 AGAIN = 0.03  # least size with which what was found before goes on
 
@@ -182,9 +182,9 @@ class Search(Trials):
     def freed(self, known: RobotBelief | None = None) -> StructureFit:
         """With every spring that there may be; of operators those that are `known`, from there."""
         data, every = self.data(SEARCHED), self.prior.effect_library.effects
-        effects = [e for e in every if e.frees_only]
+        effects = [e for e in every if e.springs_only]
         if known is not None:
-            effects += [e for e in known.structure.effects if not (e.frees_only or e.stated)]
+            effects += [e for e in known.structure.effects if not (e.springs_only or e.stated)]
         stated = self.prior.stated(data.sensors)
         structure = replace(stated, effects=(*stated.effects, *effects))
         x, own = structure.mean.copy(), slice(structure.inertial.stop, structure.chain.start)
@@ -233,7 +233,7 @@ class Search(Trials):
         of these explains.
         """
         effects, costs = added(best), removal_costs(best)
-        yield list(self._more_or_less(best))
+        yield list(self._whole_or_parts(best))
         for effect in sorted(effects, key=lambda e: costs[e]):
             known = pool.get(_less(best, effect))
             # What was met from elsewhere and is worse than by first order from here is stuck there.
@@ -268,12 +268,12 @@ class Search(Trials):
         afar = converged(self.begun(best.misfit.data, structure, x))
         return afar if bent is None else max(bent, afar, key=evidence_of)
 
-    def _more_or_less(self, best: StructureFit) -> Iterator[StructureFit]:
+    def _whole_or_parts(self, best: StructureFit) -> Iterator[StructureFit]:
         """With what is more than its springs in the place of effects that free some of them, and
         the other way round."""
         every, there = self.prior.effect_library.effects, {e.label for e in best.structure.effects}
-        for whole in (e for e in every if e.widens):
-            parts = [e for e in every if e.frees_only and set(e.springs) < set(whole.springs)]
+        for whole in (e for e in every if e.more_than_springs):
+            parts = [e for e in every if e.springs_only and set(e.springs) < set(whole.springs)]
             here = [e for e in parts if e.label in there]
             pairs = [(here, [whole])] if here and whole.label not in there else []
             if whole.label in there:
@@ -288,25 +288,11 @@ class Search(Trials):
         springs together can be wrong in many ways."""
         data, s = best.misfit.data, best.structure
         for number, effect in enumerate(s.effects):
-            if effect.widens:
-                begun = self._anywhere(best, number)
+            if effect.more_than_springs:
+                begun = [x for x in anywhere(best, number) if best.misfit.possible(x)]
                 ends = parallel_map(lambda x: self.begun(data, s, x).tried, begun)
-                yield converged(self._from(max(ends, key=evidence_of), data))
-
-    def _anywhere(self, best: StructureFit, number: int) -> list[np.ndarray]:
-        """As stated, but for the effects' numbers; of one from all places, springs softer, too."""
-        s, effect, kept = best.structure, best.structure.effects[number], best.structure.own
-        springs = enumerate(s.parameters[: s.stiffnesses])
-        mine = [i for i, p in springs if set(p.blocks) & set(effect.springs)]
-        found = []
-        for psi in (effect.mean, *effect.beside(effect.mean)):
-            for softer in (0.0, SOFTER):
-                x = s.mean.copy()
-                x[kept[0].start : s.chain.start] = best.at.x[kept[0].start : s.chain.start]
-                x[kept[number]] = psi
-                x[mine] -= softer * s.sd[mine]
-                found.append(x)
-        return found
+                if ends:
+                    yield converged(self._from(max(ends, key=evidence_of), data))
 
     def _further(self, base: StructureFit) -> list[StructureFit]:
         """With one effect more, settled, likeliest first."""
@@ -374,7 +360,7 @@ class Search(Trials):
         What poses not measured may show is open as it is here: few poses tell no structure.
         """
         misfit, x = found.misfit, found.at.x
-        for effect in [e for e in effects_free(found.structure) if e.frees_only]:
+        for effect in [e for e in effects_free(found.structure) if e.springs_only]:
             wider = replace(misfit, structure=misfit.structure.with_effect(effect))
             begun = _stiff_at_first(wider.structure, misfit.structure, x)
             if wider.possible(begun):

@@ -11,6 +11,7 @@ from planner.fit.structure import RobotStructure
 KEPT = 6  # operators by first order beside the best of each kind
 PULLED = 1.5  # prior sds, from which another prior may pay
 STRAYED = 1.5  # prior sds softer than stated
+SOFTER = 1.2  # prior sds by which springs may be softer than expected
 
 
 def in_place_of(base: StructureFit, structure: RobotStructure) -> list[np.ndarray]:
@@ -63,8 +64,25 @@ def from_stated(structure: RobotStructure, start: Start) -> Iterable[np.ndarray]
     new = [i for i in range(structure.stiffnesses) if not structure.parameters[i].stated]
     mine = [i for i in new if set(structure.parameters[i].blocks) & set(effect.springs)]
     softer = x.copy()
-    softer[mine] -= 1.2 * structure.sd[mine]
+    softer[mine] -= SOFTER * structure.sd[mine]
     return x, softer
+
+
+def anywhere(best: StructureFit, number: int) -> list[np.ndarray]:
+    """As stated, but for the numbers of effects that are there; one of them, by its `number`, and
+    its springs from all places where they may begin."""
+    s, effect, kept = best.structure, best.structure.effects[number], best.structure.own
+    springs = enumerate(s.parameters[: s.stiffnesses])
+    mine = [i for i, p in springs if set(p.blocks) & set(effect.springs)]
+    found = []
+    for psi in (effect.mean, *effect.beside(effect.mean)):
+        for softer in (0.0, SOFTER):
+            x = s.mean.copy()
+            x[kept[0].start : s.chain.start] = best.at.x[kept[0].start : s.chain.start]
+            x[kept[number]] = psi
+            x[mine] -= softer * s.sd[mine]
+            found.append(x)
+    return found
 
 
 def pulled(base: StructureFit, effect: Operator) -> bool:

@@ -127,7 +127,11 @@ class Trials:
         far = not explained(base)
         # What is more than its springs comes first, or in the place of springs (`exchanged`).
         first = not added(base)
-        tried = [e for e in (*free, *again) if (far or pulled(base, e)) and (first or not e.widens)]
+        tried = [
+            e
+            for e in (*free, *again)
+            if (far or pulled(base, e)) and (first or not e.more_than_springs)
+        ]
         kept = leaders([s for e in tried for s in e.starts(motions, gain)], least)
         # Of all joints at all poses the first order tells which it is.
         mine = (e for e in self.free(base.structure) if e not in free)
