@@ -34,8 +34,9 @@ from planner.robot.config import BASE, Compliance
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import massless_base
 
-# Damping of what is not stated, in s of stiffness: 0.1 to 3 % of critical at 5 to 30 Hz.
-DAMPING_S = 1e-4, 3e-3
+# Damping of what is not stated, in s of stiffness: 0.1 to 3 % of critical at 5 to 30 Hz; and its
+# loss factor.
+DAMPING_S, LOSS = (1e-4, 3e-3), (0.004, 0.1)
 ALONG = 0.5  # cosine above which a stated axis already covers this one
 SHORT, BEND = 0.1, 0.3  # of the longest link: does not bend; of the joint's stiffness: a link's
 ADDED_MASS, ADDED_PLACE = 0.22, 0.35  # sds: of the links' mean mass, of the longest link
@@ -174,13 +175,18 @@ def _spring(joint: str, axis: np.ndarray, scale: float, slide: bool = False) -> 
     low, high = (scale * factor for factor in STIFFNESS)
     stiffness, damping = np.sqrt(low * high), np.sqrt(low * DAMPING_S[0] * high * DAMPING_S[1])
     x, y, z = map(float, axis)
-    return Compliance(joint, (x, y, z), float(stiffness), float(damping), slide=slide)
+    numbers = float(stiffness), float(damping), float(np.sqrt(LOSS[0] * LOSS[1]))
+    return Compliance(joint, (x, y, z), *numbers, slide=slide)
 
 
 def _bounds(block: Compliance, scale: float) -> dict[str, tuple[float, float]]:
     place, (low, high) = place_name(block), (scale * factor for factor in STIFFNESS)
     damping = low * DAMPING_S[0], high * DAMPING_S[1]
-    return {f"stiffness of {place}": (low, high), f"damping of {place}": damping}
+    return {
+        f"stiffness of {place}": (low, high),
+        f"damping of {place}": damping,
+        f"loss_factor of {place}": LOSS,
+    }
 
 
 def across(axis: np.ndarray) -> np.ndarray:

@@ -348,19 +348,17 @@ def exported(structure: RobotStructure, x: np.ndarray) -> tuple[Simulation, Sequ
             tables[key] += rows
         losses |= effect.losses(x[own])
     # Loss factors are those of stiffnesses as stated: of the springs as found they are less.
-    factors = {
-        spring: eta * blocks[k].stiffness / elasticity.stiffness[k]
-        for k, spring in enumerate(structure.springs) if (eta := losses.get(spring))
-    }  # fmt: skip
+    factors = elasticity.loss_factor.copy()
+    for k, spring in enumerate(structure.springs):
+        if spring in losses:
+            factors[k] = losses[spring] * blocks[k].stiffness / elasticity.stiffness[k]
     pairs = zip(structure.effects, structure.own, strict=True)
     heights = {turn: float(x[own.stop - 1]) for e, own in pairs for _, turn, _ in e.levers}
     blocks = [
         msgspec.structs.replace(
-            b,
-            loss_factor=float(min(factors.get(i, b.loss_factor), MOST_LOSS)),
-            height_m=heights.get(i, b.height_m),
+            b, loss_factor=float(min(eta, MOST_LOSS)), height_m=heights.get(i, b.height_m)
         )
-        for i, b in zip(structure.springs, blocks, strict=True)
+        for i, b, eta in zip(structure.springs, blocks, factors, strict=True)
     ]
     resonators, harmonics = (
         tuple(msgspec.convert(row, kind) for row in tables[name])
