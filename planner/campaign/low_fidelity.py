@@ -10,9 +10,9 @@ from threadpoolctl import threadpool_limits
 from planner.campaign.state import Measurement
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
-from planner.effects.misread_angle import misread_angles
+from planner.effects.one_visit import of_one_visit
 from planner.effects.parameters import CAD_INERTIAS
-from planner.effects.table import EffectLibrary
+from planner.effects.table import EffectLibrary, diagnosed
 from planner.fit.fitted import FitRecord
 from planner.fit.identified_robot import PLACED, IdentifiedRobot
 from planner.fit.search import Search
@@ -191,14 +191,14 @@ def identify_low_fidelity(
     nominal = before.nominal
     if nominal is None or not frfs:
         return before
-    prior = before.prior
+    prior, others = before.prior, diagnosed(nominal)
 
     def search(count: int, known: FitRecord | None) -> Search:
         first, few = frfs[:count], count < FEW_POSES
         if straighten is not None:
             first = straighten(exported(*as_found(prior, known))[0] if known else nominal, count)
         poses = [m.pose for m in used[:count]] if count >= PLACED else []
-        read = misread_angles(nominal.robot.joints, q[: len(poses)], poses)
+        read = of_one_visit(nominal.robot.joints, q[: len(poses)], poses, others)
         return Search(
             prior, tuple(first), q[:count], band_hz, before.tolerances, widen=few, readings=read
         )

@@ -95,6 +95,16 @@ class Motions:
     measured: np.ndarray
     by_angle: np.ndarray | None = None
 
+    def of(self, some: slice) -> "Motions":
+        """Of some of the poses."""
+        p = self.poses
+        each = (p.q, p.s, p.jacobians, p.order, p.readback)
+        q, s, jacobians, order, readback = (values[some] for values in each)
+        poses = PosedBodies(q, s, jacobians, p.bodies, p.springs, order, readback)
+        angles = None if self.by_angle is None else self.by_angle[some]
+        here = (v[some] for v in (self.x_hit, self.x_sensor, self.accelerance, self.measured))
+        return Motions(poses, *here, angles)
+
     def at(self, ports: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Motions (n, p, c, F) and (n, p, r, F) of ports (n, p, e)."""
         return times_real(ports, self.x_hit), times_real(ports, self.x_sensor)

@@ -36,7 +36,7 @@ from planner.robot.virtual_joints import massless_base
 
 # Damping of what is not stated, in s of stiffness: 0.1 to 3 % of critical at 5 to 30 Hz; and its
 # loss factor, from next to none on.
-DAMPING_S, LOSS = (1e-4, 3e-3), (3e-4, 0.2)
+DAMPING_S, LOSS = (1e-4, 3e-3), (1e-3, 0.1)
 ALONG = 0.5  # cosine above which a stated axis already covers this one
 SHORT, BEND = 0.1, 0.3  # of the longest link: does not bend; of the joint's stiffness: a link's
 ADDED_MASS, ADDED_PLACE = 0.22, 0.35  # sds: of the links' mean mass, of the longest link

@@ -166,6 +166,7 @@ def _beside(
     weight = np.sqrt(2 / (columns.variance[group] + (RELATIVE * np.abs(h)) ** 2))
     rows = (weight[:, None] * moved).reshape(len(group), OF_HIT, -1).view(float)
     left = (weight * apart).reshape(len(group), 1, -1).view(float)
-    normal = rows @ np.swapaxes(rows, 1, 2) + np.eye(OF_HIT)
-    covariance = np.linalg.inv(normal)
+    # Not by normal equations: where the simulation is far off, these are singular to rounding.
+    u, s, _ = np.linalg.svd(rows, full_matrices=False)
+    covariance = (u / (1 + s[:, None] ** 2)) @ np.swapaxes(u, 1, 2)
     return (covariance @ (rows @ np.swapaxes(left, 1, 2)))[..., 0], covariance

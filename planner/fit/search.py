@@ -160,7 +160,7 @@ class Search(Trials):
         return replace(found, wider=self._widened(found)) if self.widen else found
 
     def _believed(self, best: StructureFit) -> StructureFit:
-        """Without misread angles where something is left."""
+        """Without what was otherwise at one pose where something is left."""
         labels = {e.label for e in self.readings}
         read = [e for e in best.structure.effects if e.label in labels]
         if not read or explains_all(best):

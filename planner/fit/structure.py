@@ -14,6 +14,7 @@ import numpy as np
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.effects.effect import Operator, SpringPrior
 from planner.effects.parameters import Parameter, Parametrisation, parametrise
+from planner.effects.structural_damping import MOST as MOST_LOSSY
 from planner.effects.table import EffectLibrary
 from planner.fit.inertias import BodyNumbers, body_numbers, pseudo_inertia
 from planner.fit.linearised import Numbers
@@ -202,8 +203,11 @@ class RobotStructure:
 
     @cached_property
     def most(self) -> np.ndarray:
-        """Where it ends above."""
+        """Where it ends above; what dissipates more than any spring does would flatten peaks."""
         high = self.mean + REACH * self.sd
+        for i, p in enumerate(self.parameters):
+            if p.kind == "loss_factor":
+                high[i] = min(high[i], max(np.log(MOST_LOSSY), self.mean[i]))
         for effect, own in zip(self.effects, self.own, strict=True):
             high[own] = np.minimum(high[own], effect.box[1])
         return high

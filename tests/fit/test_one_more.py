@@ -5,7 +5,7 @@ import pytest
 
 from planner.dynamics.simulation import Simulation
 from planner.effects.effect import Operator
-from planner.effects.misread_angle import misread_angles
+from planner.effects.one_visit import of_one_visit
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import EffectLibrary, diagnosed
 from planner.fit.fitted import StructureFit, converged, settled, size_of
@@ -23,7 +23,7 @@ LINES = 14
 KINDS = (
     "transverse_compliance", "joint_stiffness", "local_resonator", "added_mass", "ground_contact",
     "between_links", "angle_dependent_stiffness", "frequency_dependent_joint", "sensor_gain",
-    "sensor_rotation", "channel_delay", "misread_angle",
+    "sensor_rotation", "channel_delay", "misread_angle", "other_tool", "touched",
 )  # fmt: skip
 
 
@@ -33,7 +33,8 @@ def search(tmp_path_factory) -> Search:
     simulation = Simulation(Robot.load(case.toml))
     prior = RobotPrior(EffectLibrary.of(simulation, CAD_INERTIAS, diagnosed(simulation)))
     q = case.q[:3]
-    read = misread_angles(simulation.robot.joints, q, ("P1", "P2", "P3"))
+    last = diagnosed(simulation)
+    read = of_one_visit(simulation.robot.joints, q, ("P1", "P2", "P3"), last)
     return Search(prior, case.frfs[:3], q, case.band_hz, Tolerances(), readings=read)
 
 
@@ -52,7 +53,7 @@ def one_of(search: Search, base: StructureFit, kind: str) -> Operator:
     return next(e for e in search.free(base.structure) if e.kind == kind)
 
 
-# By an angle they are as exact as changed inertias let them be (`test_misread_angles`).
+# By an angle they are as exact as changed inertias let them be (`test_one_visit`).
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "misread_angle"])
 def test_slopes_are_derivatives(search, base, kind):
     more = OneMore(base, one_of(search, base, kind))
@@ -79,4 +80,4 @@ def test_what_it_promises_the_whole_fit_keeps(search, base, kind):
     promised, there = minimised(more, own, 12).value, more.tried(own, 12).record
     misfit, x = search.again(there, base.misfit.data, there.size)
     reached = minimised(misfit, x, 12, own=there.own).value - base.at.value
-    assert promised == pytest.approx(reached, abs=2.0, rel=0.2)
+    assert promised == pytest.approx(reached, abs=3.0, rel=0.2)

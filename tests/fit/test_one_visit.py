@@ -1,13 +1,16 @@
-"""A joint misread at one of the poses: what it does to FRFs, and that it is found where it is."""
+"""What was otherwise at one pose: what it does to FRFs, and that it is found where it is."""
+
+import tomllib
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from planner.campaign.low_fidelity import LowFidelity
 from planner.dynamics.simulation import Simulation
-from planner.effects.misread_angle import MisreadAngle, misread_angles
+from planner.effects.one_visit import MisreadAngle, OfOneVisit, OtherTool, of_one_visit
 from planner.effects.parameters import CAD_INERTIAS
-from planner.effects.table import EffectLibrary
+from planner.effects.table import EffectLibrary, diagnosed
 from planner.fit.data import FrfData
 from planner.fit.identified_robot import IdentifiedRobot
 from planner.fit.misfit import FrfMisfit
@@ -15,7 +18,8 @@ from planner.fit.search import Search
 from planner.fit.structure import RobotPrior
 from planner.measurement.nuisances import Tolerances
 from planner.robot.robot import Robot
-from tests.support.fitted_cases import COUNTED, Case, everyday
+from tests.support.faulty_robots import mass_that_moves
+from tests.support.fitted_cases import COUNTED, HEAVIER, Case, everyday
 
 POSE, JOINT, OFF_DEG = 0, 2, 5.0
 NAMES = "P001", "P002", "P003"
@@ -32,11 +36,12 @@ def prior(case) -> RobotPrior:
     return RobotPrior(EffectLibrary.of(Simulation(Robot.load(case.toml)), CAD_INERTIAS))
 
 
-def read(prior: RobotPrior, q: np.ndarray) -> tuple[MisreadAngle, ...]:
-    return misread_angles(prior.effect_library.stiff.robot.joints, q, NAMES[: len(q)])
+def read(prior: RobotPrior, q: np.ndarray) -> tuple[OfOneVisit, ...]:
+    stiff = prior.effect_library.stiff
+    return of_one_visit(stiff.robot.joints, q, NAMES[: len(q)], diagnosed(stiff))
 
 
-def one(prior: RobotPrior, q: np.ndarray) -> MisreadAngle:
+def one(prior: RobotPrior, q: np.ndarray) -> OfOneVisit:
     return next(e for e in read(prior, q) if e.at == f"joint_{JOINT + 1} of {NAMES[POSE]}")
 
 
@@ -72,8 +77,11 @@ def test_frfs_are_those_of_where_the_joint_stood(case, prior, angle):
     np.testing.assert_allclose(both[0], both[1], rtol=0, atol=1e-9 * np.abs(both[1]).max())
 
 
-def found(case: Case, prior: RobotPrior, q: np.ndarray, readings: tuple[MisreadAngle, ...]):
-    frfs = tuple(frf.within(case.band_hz) for frf in case.frfs[:3])
+def found(
+    case: Case, prior: RobotPrior, q: np.ndarray, readings: tuple[OfOneVisit, ...], other=None
+):
+    measured = (*case.frfs[:3],) if other is None else other
+    frfs = tuple(frf.within(case.band_hz) for frf in measured)
     robot = prior.effect_library.stiff.robot
     tolerances = Tolerances.of(robot.config, robot.joints.slides)
     search = Search(prior, frfs, q, case.band_hz, tolerances, readings=readings)
@@ -100,11 +108,30 @@ def test_a_joint_five_degrees_off_is_found_and_no_other(case, prior):
     np.testing.assert_array_equal(stood, wrong)
 
 
+def test_a_heavier_tool_at_one_pose_is_found_with_its_mass(case, prior):
+    q, pose = case.q[:3], 1
+    frfs = [*case.frfs[:3]]
+    frfs[pose] = case.heavier[pose].one_hit_frf
+    low = found(case, prior, q, read(prior, q), frfs)
+    assert low.identified_robot is not None
+    told = low.identified_robot.posterior
+    (effect,) = [e for e in told.structure.effects if isinstance(e, OfOneVisit)]
+    assert isinstance(effect, OtherTool)
+    assert effect.pose == NAMES[pose]
+    mass, sd, _ = effect.parameters(told.values(effect))["mass"]
+    urdf = case.toml.parent / tomllib.loads(case.toml.read_text())["urdf"]
+    more = HEAVIER * mass_that_moves(ElementTree.parse(urdf).getroot())
+    assert mass == pytest.approx(more, abs=3 * sd)
+    assert sd < 0.2 * mass
+    (text,) = told.misread
+    assert f"At {NAMES[pose]} the last link carried" in text
+
+
 def test_none_is_found_where_all_are_right(case, prior):
     low = found(case, prior, case.q[:3], read(prior, case.q[:3]))
     assert low.identified_robot is not None
     right = low.identified_robot.posterior
-    assert not [e for e in right.structure.effects if isinstance(e, MisreadAngle)]
+    assert not [e for e in right.structure.effects if isinstance(e, OfOneVisit)]
     assert right.misread == ()
     np.testing.assert_array_equal(low.stood(case.q[:3]), case.q[:3])
 
