@@ -91,7 +91,7 @@ class AddedMass(Operator):
         """See `Operator.beside`: far off, the first order may have even the sign wrong."""
         return (np.array([LEAST, 0.0, 0.0, 0.0, *self.mean[4:]]),)
 
-    def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray, np.ndarray]:
+    def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray, np.ndarray] | None:
         """See `Operator.inertia`."""
         return self.joint, *self._body(psi)
 

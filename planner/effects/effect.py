@@ -102,8 +102,9 @@ class Motions:
         q, s, jacobians, order, readback = (values[some] for values in each)
         poses = PosedBodies(q, s, jacobians, p.bodies, p.springs, order, readback)
         angles = None if self.by_angle is None else self.by_angle[some]
-        here = (v[some] for v in (self.x_hit, self.x_sensor, self.accelerance, self.measured))
-        return Motions(poses, *here, angles)
+        fields = self.x_hit, self.x_sensor, self.accelerance, self.measured
+        x_hit, x_sensor, accelerance, measured = (values[some] for values in fields)
+        return Motions(poses, x_hit, x_sensor, accelerance, measured, angles)
 
     def at(self, ports: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Motions (n, p, c, F) and (n, p, r, F) of ports (n, p, e)."""

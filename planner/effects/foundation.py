@@ -43,8 +43,8 @@ class Foundation(AddedMass):
 
     def inertia(self, psi: np.ndarray) -> tuple[str, np.ndarray, np.ndarray]:
         """See `Operator.inertia`."""
-        joint, there, slopes = super().inertia(psi)
-        return joint, there, np.vstack([slopes, 0.0 * slopes[:1]])
+        there, slopes = self._body(psi)
+        return self.joint, there, np.vstack([slopes, 0.0 * slopes[:1]])
 
     def _body(self, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         mass = float(np.exp(psi[0]))

@@ -87,8 +87,8 @@ class OtherImpedance(OfOneVisit):
         """By its columns at its pose."""
         here = self._among(motions.poses.readback)
 
-        def of_pose(columns: np.ndarray, sd: np.ndarray, _: slice = here) -> list:
-            return gain(columns, sd, here)
+        def of_pose(columns: np.ndarray, sd: np.ndarray, poses: slice = here):
+            return gain(columns, sd, poses)
 
         return super().starts(motions.of(here), of_pose)
 
