@@ -257,6 +257,10 @@ class Operator(ABC):
         """
         return False
 
+    def taken(self, psi: np.ndarray) -> dict[int, float]:
+        """By how much in N·m/rad it lessens springs where that is most, by their numbers."""
+        return {}
+
     def losses(self, psi: np.ndarray) -> dict[int, float]:
         """Loss factors that it gives springs, by their numbers."""
         return {}

@@ -5,7 +5,7 @@ All are k Σ ψᵢ φᵢ beside the spring as fitted, with φ of another covaria
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,8 @@ import numpy as np
 from planner.dynamics.gradient import Impedance
 from planner.effects.effect import Gain, Motions, Operator, PosedBodies, Start
 from planner.words import significant
+
+MOST = 0.8  # share of a spring that its waves have at a start
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,16 @@ class AngleSpring(VaryingSpring):
         angle = poses.q[:, self.number, None]
         return [[f(order * angle) for order in self.orders for f in (np.cos, np.sin)]]
 
+    def starts(self, motions: Motions, gain: Gain) -> tuple[Start, ...]:
+        """By its columns, with a spring that keeps some stiffness."""
+        [start] = super().starts(motions, gain)
+        amplitude = _amplitude(start.psi)
+        return (replace(start, psi=start.psi * min(1.0, MOST / max(amplitude, MOST))),)
+
+    def taken(self, psi: np.ndarray) -> dict[int, float]:
+        """See `Operator.taken`."""
+        return {self.spring[0]: self.stiffness[0] * _amplitude(psi)}
+
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
         share = np.sqrt(sum(v**2 for v, _ in values.values()))
@@ -83,6 +95,11 @@ class AngleSpring(VaryingSpring):
             waves = {f: self.stiffness[0] * values[name][0] for f, name in names.items()}
             found.append({"joint": self.joint, "order": order, **waves})
         return {"harmonic": found}
+
+
+def _amplitude(psi: np.ndarray) -> float:
+    """Of all waves together, cosine and sine of each in turn."""
+    return float(np.linalg.norm(psi.reshape(-1, 2), axis=1).sum())
 
 
 @dataclass(frozen=True)

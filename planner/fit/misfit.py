@@ -127,7 +127,8 @@ class FrfMisfit:
         s = self.structure
         if np.any(np.abs((x - s.mean) / s.sd) > REACH + 0.5):
             return False
-        if not np.isfinite(s.bodies.barrier(x[s.inertial])[0]) or not s.massive(x):
+        matter = np.isfinite(s.bodies.barrier(x[s.inertial])[0]) and s.massive(x)
+        if not (matter and s.stiff(x)):
             return False
         try:
             np.linalg.cholesky(self.mass(x))

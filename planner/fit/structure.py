@@ -308,6 +308,14 @@ class RobotStructure:
         there = self.bodies.nominal + self.bodies.difference(x[self.inertial]) + added
         return bool(np.linalg.eigvalsh(pseudo_inertia(there[changed])).min() > 0)
 
+    def stiff(self, x: np.ndarray) -> bool:
+        """Whether springs that vary keep some stiffness wherever they are."""
+        left = dict(zip(self.springs, self.elasticity(x).stiffness, strict=True))
+        for effect, own in zip(self.effects, self.own, strict=True):
+            for spring, most in effect.taken(x[own]).items():
+                left[spring] -= most
+        return min(left.values()) > 0
+
     def carried(self, other: "RobotStructure", x: np.ndarray) -> np.ndarray:
         """Numbers x of another structure in this one; what that lacks is as expected."""
         known = dict(zip(other.names, x, strict=True))
