@@ -198,7 +198,7 @@ def identify_low_fidelity(
         if straighten is not None:
             first = straighten(exported(*as_found(prior, known))[0] if known else nominal, count)
         poses = [m.pose for m in used[:count]] if count >= PLACED else []
-        read = of_one_visit(nominal.robot.joints, q[: len(poses)], poses, others)
+        read = of_one_visit(nominal.robot, q[: len(poses)], poses, others)
         return Search(
             prior, tuple(first), q[:count], band_hz, before.tolerances, widen=few, readings=read
         )

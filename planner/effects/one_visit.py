@@ -9,7 +9,8 @@ from planner.dynamics.gradient import Impedance
 from planner.effects.added_mass import AddedMass
 from planner.effects.effect import Gain, Motions, Number, Operator, PosedBodies, Start
 from planner.effects.links import GroundContact
-from planner.recording.joints import SCALES, JointUnits
+from planner.recording.joints import SCALES
+from planner.robot.robot import Robot
 from planner.words import with_sd
 
 MISREAD = 0.1, 0.05  # sd: rad of a joint that turns, m of one that slides; a mistyped digit
@@ -134,10 +135,11 @@ class Touched(OtherImpedance, GroundContact):
 
 
 def of_one_visit(
-    joints: JointUnits, q: np.ndarray, poses: Sequence[str], effects: Iterable[Operator]
+    robot: Robot, q: np.ndarray, poses: Sequence[str], effects: Iterable[Operator]
 ) -> tuple[OfOneVisit, ...]:
     """Every joint at every pose q (n, dof) in rad or m, by the poses' names, and what may have been
-    otherwise on the last link that `effects` have."""
+    otherwise on the last link that `effects` have; it is touched where hits go."""
+    joints, tip = robot.joints, robot.model.frames[robot.tcp_id].placement.translation
     found: list[OfOneVisit] = []
     # Of links from the base on: the last is what carries the tool.
     last = {OtherTool if isinstance(e, AddedMass) else Touched: e for e in effects
@@ -149,6 +151,7 @@ def of_one_visit(
             found.append(MisreadAngle(at, (), (number,), tuple(row), pose, name, k, slides))
         for kind, effect in last.items():
             given = {f.name: getattr(effect, f.name) for f in fields(effect)}
-            at = f"{effect.at} of {pose}"
-            found.append(kind(**(given | {"at": at, "q": tuple(row), "pose": pose})))
+            given |= {"at": f"{effect.at} of {pose}", "q": tuple(row), "pose": pose}
+            given |= {"place_m": tuple(tip.tolist())} if kind is Touched else {}
+            found.append(kind(**given))
     return tuple(found)

@@ -34,7 +34,7 @@ def search(tmp_path_factory) -> Search:
     prior = RobotPrior(EffectLibrary.of(simulation, CAD_INERTIAS, diagnosed(simulation)))
     q = case.q[:3]
     last = diagnosed(simulation)
-    read = of_one_visit(simulation.robot.joints, q, ("P1", "P2", "P3"), last)
+    read = of_one_visit(simulation.robot, q, ("P1", "P2", "P3"), last)
     return Search(prior, case.frfs[:3], q, case.band_hz, Tolerances(), readings=read)
 
 

@@ -38,7 +38,7 @@ def prior(case) -> RobotPrior:
 
 def read(prior: RobotPrior, q: np.ndarray) -> tuple[OfOneVisit, ...]:
     stiff = prior.effect_library.stiff
-    return of_one_visit(stiff.robot.joints, q, NAMES[: len(q)], diagnosed(stiff))
+    return of_one_visit(stiff.robot, q, NAMES[: len(q)], diagnosed(stiff))
 
 
 def one(prior: RobotPrior, q: np.ndarray) -> OfOneVisit:
