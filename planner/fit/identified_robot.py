@@ -134,7 +134,7 @@ class IdentifiedRobot:
         )
         if self.poses == 1:  # many sets of causes explain a single pose
             return said
-        return f"{said} This together explains it, each may be on another joint or link: {found}"
+        return f"{said} One explanation of both poses, of several that there may be: {found}"
 
 
 def _same(every_hz: np.ndarray, hertz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
