@@ -211,7 +211,7 @@ def _link_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[UnusableShape
     """Collision shapes of the links, and those of the URDF that are left out."""
     root = ElementTree.fromstring(robot.urdf_text)
     left = (*robot.left_out, *leave_out_unreadable(root))
-    return build_geometry(robot.model, root, "collision"), left
+    return build_geometry(robot.model, root), left
 
 
 def _obstacles(robot: Robot) -> list[pin.GeometryObject]:

@@ -18,7 +18,7 @@ from planner.robot.config import Compliance, LinkTable
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.link_bodies import BodyShape, bodies
 from planner.robot.robot import Robot
-from planner.robot.shapes import build_geometry
+from planner.robot.shapes import shapes_of
 from planner.robot.urdf_elements import link_inertia
 
 # Small parts are denser, gears and bearings to their covers: mass goes with volume to this power.
@@ -130,19 +130,14 @@ def link_solids(robot: Robot) -> dict[str, pin.Inertia]:
     Of collision shapes, or of visual ones where a link has no others. Of a mesh its convex hull is
     filled: hardly any published mesh closes, and volumes of those that do not mean nothing.
     """
-    root = ElementTree.fromstring(robot.urdf_text)
     found: dict[str, pin.Inertia] = {}
-    for kind in ("collision", "visual"):
-        for link in root.findall("link"):  # visual meshes are large, and read where needed alone
-            if kind == "visual" and link.get("name", "") in found:
-                for part in link.findall(kind):
-                    link.remove(part)
-        for shape in build_geometry(robot.model, root, kind).geometryObjects:
-            frame, solid = robot.model.frames[shape.parentFrame], _solid(shape.geometry)
-            if solid is not None:
-                solid = (frame.placement.inverse() * shape.placement).act(solid)
-                name = str(frame.name)
-                found[name] = found[name] + solid if name in found else solid
+    for link in ElementTree.fromstring(robot.urdf_text).findall("link"):
+        for kind in ("collision", "visual"):  # which are large, and read where needed alone
+            each = [(place, _solid(shape)) for place, shape in shapes_of(link, kind)]
+            solids = [place.act(solid) for place, solid in each if solid is not None]
+            if solids:
+                found[link.get("name", "")] = sum(solids[1:], solids[0])
+                break
     return found
 
 

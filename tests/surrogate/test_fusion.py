@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.surrogate import gp
-from planner.surrogate.ar1 import OutputPrior, fit_ar1
+from planner.surrogate.ar1 import FusionData, OutputPrior, fit_ar1
 from planner.surrogate.kernels import KERNELS
 from planner.surrogate.modal_surrogate import fit_surrogate
 from planner.surrogate.training_data import TrainingData, pad, thinned
@@ -30,7 +30,8 @@ def data(n, m=3, seed=0, noise=0.002):
 
 def fit(training, samples=64, kept=8, **options):
     m = training.y.shape[1]
-    return fit_ar1(training, (PRIOR,) * m, (PRIOR,) * m, np.zeros(m), samples, kept, **options)
+    given = FusionData(training, (PRIOR,) * m, (PRIOR,) * m, np.zeros(m))
+    return fit_ar1(given, samples, kept, **options)
 
 
 @pytest.mark.parametrize("kernel", ["rbf", "matern52"])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.surrogate.ar1 import fit_ar1
+from planner.surrogate.ar1 import FusionData, fit_ar1
 from planner.surrogate.average import fit_hedged
 from planner.surrogate.modal_surrogate import FREQUENCY_PRIOR, FREQUENCY_PRIOR_ALONE
 from planner.surrogate.training_data import TrainingData
@@ -33,19 +33,18 @@ SIMULATIONS = {
 }
 
 
+def given(values, centre):
+    return FusionData(values, (FREQUENCY_PRIOR,) * 2, (FREQUENCY_PRIOR_ALONE,) * 2, centre)
+
+
 def errors(simulation, n, seed):
     """RMSE of AR1, of the GP and of both together; share of the test values inside ± 1.96 sd."""
     rng = np.random.default_rng([seed, n])
     x = rng.random((n, 3))
     y = truth(x) + 1e-3 * rng.standard_normal((n, 2))
     sd, low, grid_low = np.full((n, 2), 1e-3), simulation(x), simulation(GRID)
-    priors, centre = ((FREQUENCY_PRIOR,) * 2, (FREQUENCY_PRIOR_ALONE,) * 2), low.mean(axis=0)
-    data, nothing = TrainingData(x, y, sd, low), np.full((n, 2), np.nan)
-    models = [
-        fit_ar1(data, *priors, centre),
-        fit_ar1(TrainingData(x, y, sd, nothing), *priors, np.full(2, np.nan)),
-        fit_hedged(data, *priors, centre),
-    ]
+    data = given(TrainingData(x, y, sd, low), low.mean(axis=0))
+    models = fit_ar1(data), fit_ar1(data.alone), fit_hedged(data)
     answers = [m.predict(GRID, grid_low) for m in models]
     off = [np.sqrt(np.mean((mean - truth(GRID)) ** 2)) for mean, _ in answers]
     mean, spread = answers[2]
@@ -68,9 +67,7 @@ def test_outputs_are_weighed_one_by_one():
     x = rng.random((12, 3))
     low = np.stack([SIMULATIONS["right"](x)[:, 0], SIMULATIONS["irrelevant"](x)[:, 1]], axis=1)
     data = TrainingData(x, truth(x), np.full((12, 2), 1e-3), low)
-    fitted = fit_hedged(
-        data, (FREQUENCY_PRIOR,) * 2, (FREQUENCY_PRIOR_ALONE,) * 2, low.mean(axis=0)
-    )
+    fitted = fit_hedged(given(data, low.mean(axis=0)))
     assert fitted.most_probable.uses_low.tolist() == [True, False]
     assert (fitted.weights.max(axis=0) > 0.9).all()
 
@@ -78,11 +75,6 @@ def test_outputs_are_weighed_one_by_one():
 def test_before_a_measurement_the_simulation_is_believed():
     none = np.zeros((0, 2))
     nowhere = np.zeros((0, 3))
-    fitted = fit_hedged(
-        TrainingData(nowhere, none, none, none),
-        (FREQUENCY_PRIOR,) * 2,
-        (FREQUENCY_PRIOR_ALONE,) * 2,
-        np.array([2.0, 2.5]),
-    )  # fmt: skip
+    fitted = fit_hedged(given(TrainingData(nowhere, none, none, none), np.array([2.0, 2.5])))
     mean, _ = fitted.predict(GRID[:4], np.full((4, 2), 2.2))
     np.testing.assert_allclose(mean, 2.2, atol=1e-9)

@@ -8,7 +8,7 @@ import pytest
 
 from planner.campaign.model_status import left_out
 from planner.surrogate import gp, likelihood
-from planner.surrogate.ar1 import OutputPrior, fit_ar1
+from planner.surrogate.ar1 import FusionData, OutputPrior, fit_ar1
 from planner.surrogate.average import fit_hedged, fit_shapes
 from planner.surrogate.kernels import parse
 from planner.surrogate.leave_one_out import leave_one_out, report
@@ -16,6 +16,11 @@ from planner.surrogate.training_data import TrainingData
 
 GRID = np.random.default_rng(8).random((30, 2))
 PRIOR = OutputPrior(bias_sd=0.5, slope_sd=0.5, amplitude=0.3, nugget=0.02)
+
+
+def given(values, centre=np.nan, prior=PRIOR):
+    m = values.y.shape[1]
+    return FusionData(values, (prior,) * m, (prior,) * m, np.full(m, centre))
 
 
 def samples(n, seed=0):
@@ -51,9 +56,9 @@ def test_jitter_that_was_needed_is_told(monkeypatch):
     x = np.repeat(samples(1)[0], 3, axis=0)
     data = TrainingData(x, np.ones((3, 1)), np.zeros((3, 1)), np.full((3, 1), np.nan))
     certain = OutputPrior(bias_sd=0.5, slope_sd=0.0, amplitude=0.3, nugget=1e-12, spread=1e-9)
-    fitted = fit_ar1(data, (certain,), (certain,), np.full(1, np.nan))
+    fitted = fit_ar1(given(data, prior=certain))
     assert gp.remarks(fitted.outputs) == (gp.SINGULAR_REMARK.format(1e-7),)
-    plain = fit_ar1(training(4), (PRIOR,), (PRIOR,), np.full(1, np.nan))
+    plain = fit_ar1(given(training(4)))
     assert gp.remarks(plain.outputs) == ()
 
 
@@ -63,7 +68,7 @@ def test_what_the_kernels_are_averaged_over_follows_the_data():
     noise = 0.02 * np.random.default_rng(2).standard_normal((20, 2))
     y = np.stack([np.full(20, 0.3), np.sin(7 * x[:, 0])], axis=1) + noise
     data = TrainingData(x, y, np.full((20, 2), 0.02), np.full((20, 2), np.nan))
-    found = fit_shapes(data, (PRIOR,) * 2, (PRIOR,) * 2, np.full(2, np.nan), kernels)
+    found = fit_shapes(given(data), kernels)
     best = [kernels[i] for i in np.argmax(found.weights, axis=0)]
     assert best == ["bias", "matern52"]
     np.testing.assert_allclose(found.weights.sum(axis=0), 1)
@@ -73,10 +78,8 @@ def test_what_the_kernels_are_averaged_over_follows_the_data():
 
 
 def test_without_a_simulation_the_hedge_is_a_gp():
-    data, nothing = training(7), np.full(1, np.nan)
-    low = np.full((30, 1), np.nan)
-    hedged = fit_hedged(data, (PRIOR,), (PRIOR,), nothing).predict(GRID, low)
-    plain = fit_ar1(data, (PRIOR,), (PRIOR,), nothing).predict(GRID, low)
+    data, low = given(training(7)), np.full((30, 1), np.nan)
+    hedged, plain = (fit(data).predict(GRID, low) for fit in (fit_hedged, fit_ar1))
     np.testing.assert_allclose(hedged, plain, atol=1e-12)
 
 
@@ -94,7 +97,7 @@ def data(n, seed=0, wrong=None):
 
 
 def fit(training):
-    return fit_ar1(training, (PRIOR,), (PRIOR,), np.zeros(1))
+    return fit_ar1(given(training, 0.0))
 
 
 def test_it_is_what_refits_without_the_measurement_say():

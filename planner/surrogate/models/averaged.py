@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import elementwise
 from scipy.special import ndtr
 
-from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
+from planner.surrogate.ar1 import AR1, FusionData, OutputPrior, fit_ar1
 from planner.surrogate.models.likelihood_gp import (
     Exact,
     Normalisation,
@@ -85,7 +85,7 @@ def fit_averaged(
     )
     middle = np.full(1, np.nan if low is None else 0.0)
     counts = (256, 32) if n <= MANY or low is not None else (32, 4)
-    model = fit_ar1(data, (prior,), (prior,), middle, *counts, kernel=kernel, thorough=True)
+    model = fit_ar1(FusionData(data, (prior,), (prior,), middle), *counts, kernel, thorough=True)
     return AveragedModel(low, model, low_units, units, sees_low)
 
 

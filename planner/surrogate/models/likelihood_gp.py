@@ -17,7 +17,7 @@ a linear kernel in l is one GP.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
@@ -317,11 +317,8 @@ def fit_nargp(
     measured: Samples,
     low: FidelityLevel,
     low_units: Normalisation,
-    noise: float | None = None,
-    units: Normalisation | None = None,
-    starts: int = STARTS,
-    isotropic: bool = False,
     kernel: Callable[[int], str] = perdikaris,
+    **how: Any,
 ) -> NARGP:
     """NARGP of the measured samples over a cheap level, which is fitted already or exact.
 
@@ -329,13 +326,12 @@ def fit_nargp(
         measured: expensive values at x (n, d).
         low: the cheap level.
         low_units: by what the cheap level's value is normalised as an input.
-        noise, units, starts, isotropic: as of `fit_likelihood`.
         kernel: `perdikaris`, or `kennedy_ohagan` for AR1.
+        how: as of `fit_likelihood`.
     """
     below, _ = low.predict(measured.x)
     wide = Samples(widened(measured.x, below, low_units), measured.y, measured.sd)
-    expression = kernel(measured.x.shape[1])
-    high = fit_likelihood(wide, expression, noise, units, starts, isotropic)
+    high = fit_likelihood(wide, kernel(measured.x.shape[1]), **how)
     return NARGP(low, high, low_units)
 
 

@@ -293,7 +293,7 @@ def fit_deep(seen: FrequencyData, ar1: AR1) -> DeepOutputs | None:
     """None where an output has too few values, or the simulation none of it."""
     if seen.elsewhere is None:
         return None
-    data, (x, low) = seen.data, seen.elsewhere
+    data, (x, low) = seen.values, seen.elsewhere
     cheap = [Samples.of(x, column) for column in low.T]
     measured = [Samples.of(data.x, y, sd) for y, sd in zip(data.y.T, data.sd.T, strict=True)]
     if min(len(s.y) for s in (*cheap, *measured)) < FEWEST:

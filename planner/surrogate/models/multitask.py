@@ -255,7 +255,7 @@ class TaskedDeviations:
 
 def fit_tasks(seen: FrequencyData, ar1: AR1) -> TaskedDeviations | None:
     """At poses where every output is known; None where these are fewer than FEWEST."""
-    data = seen.data
+    data = seen.values
     off = data.y - ar1.split(data.low)[0]
     blind = (ar1.uses_low & ~np.isfinite(data.low)).any(axis=1)
     whole = np.isfinite(off).all(axis=1) & ~blind
