@@ -103,7 +103,7 @@ class _Predicted:
         lines = np.linspace(measured.frequency_hz.min(), measured.frequency_hz.max(), LINES)
         layout = Layout((TCP,), (*measured.layout.sensors, *more))
         structure = replace(posterior.structure, sensors=len(layout.sensors))
-        sloped = structure.prior.carried.with_slopes(q, layout)
+        sloped = structure.prior.carried.matrices(q, layout=layout, slopes=True)
         data = replace(posterior.at(q[None], lines, layout), matrices=sloped)
         misfit = FrfMisfit(structure, data, posterior.tolerances, posterior.size)
         # Of a sensor that is new nothing is known but its tolerances.

@@ -69,6 +69,11 @@ class Simulation:
         other.robot = replace(self.robot, config=config)
         return other
 
+    @property
+    def law_springs(self) -> list[int]:
+        """Numbers of the joints' own springs beside which its laws are."""
+        return [self.elastic.own_spring(law.joint) for law in self.robot.config.law]
+
     @cached_property
     def stiffness(self) -> np.ndarray:
         """K (e, e) without gravity's part; complex where there is structural damping."""

@@ -6,13 +6,13 @@ gravity is stronger than the springs (ω² < 0) a mode does not oscillate either
 damping K is complex; FRFs then hold for positive frequencies, as they are measured.
 """
 
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from planner.inference.covariance import eigen
+from planner.inference.per_pose import PerPose
 
 PROPORTIONAL = 1e-10  # off-diagonal modal damping below this is rounding
 # A critically damped mode has a double pole, for which there is no residue: split by this share
@@ -37,7 +37,7 @@ class Poles:
 
 
 @dataclass(frozen=True, eq=False)
-class SimulatedModes:
+class SimulatedModes(PerPose):
     """Oscillatory modes of n poses, lowest first, NaN where there are fewer than `count`.
 
     frequency_hz (n, count), damping_ratio (n, count), residue (n, count, 3, 3) in m/(N·s).
@@ -46,18 +46,6 @@ class SimulatedModes:
     frequency_hz: np.ndarray
     damping_ratio: np.ndarray
     residue: np.ndarray
-
-    def __getitem__(self, poses: np.ndarray | slice | int) -> "SimulatedModes":
-        return SimulatedModes(*(values[poses] for values in vars(self).values()))
-
-    @classmethod
-    def joined(cls, parts: "Sequence[SimulatedModes]") -> "SimulatedModes":
-        """Of the poses of all parts, in their order."""
-        return cls(*map(np.concatenate, zip(*(vars(part).values() for part in parts), strict=True)))
-
-    def lowest(self, count: int) -> "SimulatedModes":
-        """The `count` lowest of them."""
-        return SimulatedModes(*(values[:, :count] for values in vars(self).values()))
 
     @property
     def shape(self) -> np.ndarray:

@@ -6,7 +6,6 @@ gears of 50 to 3,000 N·m rated torque are between 0.9 and 1.1 mrad (rated torqu
 stiffness, as their catalogues state both).
 """
 
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 
 import coal
@@ -39,8 +38,7 @@ NO_BODY = 20.0
 
 def total_stated(robot: Robot) -> float:
     """What the URDF's <inertial>s add up to, in kg."""
-    links = ElementTree.fromstring(robot.urdf_text).findall("link")
-    return sum(link_inertia(link).mass for link in links)
+    return sum(link_inertia(link).mass for link in robot.links.values())
 
 
 def nothing_stated(robot: Robot) -> bool:
@@ -131,12 +129,12 @@ def link_solids(robot: Robot) -> dict[str, pin.Inertia]:
     filled: hardly any published mesh closes, and volumes of those that do not mean nothing.
     """
     found: dict[str, pin.Inertia] = {}
-    for link in ElementTree.fromstring(robot.urdf_text).findall("link"):
+    for name, link in robot.links.items():
         for kind in ("collision", "visual"):  # which are large, and read where needed alone
             each = [(place, _solid(shape)) for place, shape in shapes_of(link, kind)]
             solids = [place.act(solid) for place, solid in each if solid is not None]
             if solids:
-                found[link.get("name", "")] = sum(solids[1:], solids[0])
+                found[name] = sum(solids[1:], solids[0])
                 break
     return found
 
@@ -191,8 +189,7 @@ def default_springs(robot: Robot, payload_kg: float, joints: tuple[str, ...]) ->
         for block in _springs(robot, name, axis, float(load))
     ]
     elastic = _with(robot, blocks)
-    middle = (robot.lower_rad + robot.upper_rad) / 2
-    inertia = np.diagonal(ElasticModel(elastic).matrices(middle).mass[0])
+    inertia = np.diagonal(ElasticModel(elastic).matrices(robot.middle_rad).mass[0])
     damped = [
         msgspec.structs.replace(b, damping=_rounded(2 * DAMPING_RATIO * np.sqrt(b.stiffness * i)))
         for b, i in zip(blocks, _alike(blocks, inertia), strict=True)

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from planner.robot.mesh_files import find_mesh
 from planner.robot.urdf import quiet
-from planner.robot.urdf_elements import numbers, place_of
+from planner.robot.urdf_elements import Links, numbers, place_of
 
 LARGEST_M = 1e4  # of a shape
 FEW = 3  # names in a sentence
@@ -30,26 +30,26 @@ class UnusableShape:
     why: str
 
 
-def leave_out_unusable(root: ElementTree.Element, urdf: Path) -> tuple[UnusableShape, ...]:
+def leave_out_unusable(links: Links, urdf: Path) -> tuple[UnusableShape, ...]:
     """Name the files of all meshes in full; remove shapes without a file or a size."""
-    return _leave_out(root, ("collision", "visual"), lambda part: _fault(part, urdf))
+    return _leave_out(links, ("collision", "visual"), lambda part: _fault(part, urdf))
 
 
-def leave_out_unreadable(root: ElementTree.Element) -> tuple[UnusableShape, ...]:
+def leave_out_unreadable(links: Links) -> tuple[UnusableShape, ...]:
     """Remove collision shapes whose mesh cannot be read."""
-    return _leave_out(root, ("collision",), _unreadable)
+    return _leave_out(links, ("collision",), _unreadable)
 
 
 def _leave_out(
-    root: ElementTree.Element, kinds: Sequence[str], fault: Callable[[ElementTree.Element], str]
+    links: Links, kinds: Sequence[str], fault: Callable[[ElementTree.Element], str]
 ) -> tuple[UnusableShape, ...]:
     """Remove the links' shapes of these kinds that have a fault."""
     found = []
-    for link in root.findall("link"):
+    for name, link in links.items():
         for part in [part for kind in kinds for part in link.findall(kind)]:
             if why := fault(part):
                 link.remove(part)
-                found.append(UnusableShape(link.get("name", "?"), part.tag, why))
+                found.append(UnusableShape(name, part.tag, why))
     return tuple(found)
 
 
@@ -66,17 +66,15 @@ def shapes_of(link: ElementTree.Element, kind: str) -> list[tuple[pin.SE3, coal.
     return [(place, shape) for place, shape in each if shape is not None]
 
 
-def build_geometry(model: pin.Model, root: ElementTree.Element) -> pin.GeometryModel:
+def build_geometry(model: pin.Model, links: Links) -> pin.GeometryModel:
     """Collision shapes that can be used."""
     geometry = pin.GeometryModel()
-    for link in root.findall("link"):
-        name = link.get("name", "")
-        if model.existFrame(name, pin.FrameType.BODY):
-            number = model.getFrameId(name, pin.FrameType.BODY)
-            frame = model.frames[number]
-            for k, (place, shape) in enumerate(shapes_of(link, "collision")):
-                at = frame.parentJoint, number, frame.placement * place
-                geometry.addGeometryObject(pin.GeometryObject(f"{name}_{k}", *at, shape))
+    for name, link in links.items():
+        number = model.getFrameId(name, pin.FrameType.BODY)
+        frame = model.frames[number]
+        for k, (place, shape) in enumerate(shapes_of(link, "collision")):
+            at = frame.parentJoint, number, frame.placement * place
+            geometry.addGeometryObject(pin.GeometryObject(f"{name}_{k}", *at, shape))
     return geometry
 
 
@@ -95,17 +93,16 @@ def unchecked_sentence(left: Sequence[UnusableShape]) -> str:
     )
 
 
-def shape_corners(root: ElementTree.Element) -> dict[str, list[np.ndarray]]:
+def shape_corners(links: Links) -> dict[str, list[np.ndarray]]:
     """Corners (3,) of boxes around the shapes of each link, in its frame, eight each.
 
-    Collision shapes; visual ones where a link has no others. `root` names its meshes in full.
+    Collision shapes; visual ones where a link has no others. Meshes are named in full.
     """
     found: dict[str, list[np.ndarray]] = {}
-    for link in root.findall("link"):
-        corners = found.setdefault(link.get("name", ""), [])
-        for place, shape in shapes_of(
-            link, "visual" if link.find("collision") is None else "collision"
-        ):
+    for name, link in links.items():
+        corners = found.setdefault(name, [])
+        kind = "visual" if link.find("collision") is None else "collision"
+        for place, shape in shapes_of(link, kind):
             shape.computeLocalAABB()
             low, high = np.array(shape.aabb_local.min_), np.array(shape.aabb_local.max_)
             corners += [place.act(np.where(s, high, low)) for s in np.ndindex(2, 2, 2)]

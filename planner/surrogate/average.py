@@ -36,11 +36,6 @@ class Average:
     weights: np.ndarray
     log_evidence: np.ndarray
 
-    @classmethod
-    def of_one(cls, model: AR1) -> "Average":
-        """One model alone."""
-        return cls((model,), np.ones((1, len(model.outputs))), model.log_evidence)
-
     @property
     def counted(self) -> list[int]:
         """Which of the models are not negligible for every output."""

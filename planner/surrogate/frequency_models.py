@@ -66,18 +66,15 @@ def _default(seen: FrequencyData) -> Average:
     return fit_hedged(seen, SAMPLES, KEPT, seen.belief, fit_plain_or_free, seen.kernel)
 
 
-def _gp(seen: FrequencyData) -> Average:
-    return _ar1(seen.alone)
-
-
-def _ar1(seen: FrequencyData) -> Average:
-    return Average.of_one(fit_ar1(seen, SAMPLES, KEPT, seen.kernel))
+def _ar1(seen: FrequencyData, **how: bool) -> Average:
+    model = fit_ar1(seen, SAMPLES, KEPT, seen.kernel, **how)
+    return Average((model,), np.ones((1, len(model.outputs))), model.log_evidence)
 
 
 def _nargp(seen: FrequencyData) -> Average:
     poses, dimensions = seen.values.x.shape
-    product = perdikaris(dimensions, seen.kernel)
-    return Average.of_one(fit_ar1(seen, SAMPLES, KEPT, product, poses > 1, sees_low=True))
+    seen = replace(seen, kernel=perdikaris(dimensions, seen.kernel))
+    return _ar1(seen, thorough=poses > 1, sees_low=True)
 
 
 def _none(seen: FrequencyData) -> Average:
@@ -123,7 +120,11 @@ MODELS: dict[str, FrequencyModel] = {
     DEFAULT: FrequencyModel(
         _default, "AR1s and a GP that ignores the simulation, averaged by their evidence", False
     ),
-    "gp": FrequencyModel(_gp, "a GP of the measurements alone, without the simulation", False),
+    "gp": FrequencyModel(
+        lambda seen: _ar1(seen.alone),
+        "a GP of the measurements alone, without the simulation",
+        False,
+    ),
     "ar1": FrequencyModel(
         _ar1, "the simulation times a factor, plus a GP (Kennedy & O'Hagan 2000)"
     ),

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.frf import synthesis
+from planner.inference.per_pose import PerPose
 
 FREQUENCY_REACH = 5.0  # sds of a frequency over which is integrated
 FREQUENCY_STEP = 0.5  # at most, in sds and in half widths of the resonance
@@ -20,7 +21,7 @@ LARGEST_DAMPING = 0.95  # of a mode; beyond it there would be no oscillation
 
 
 @dataclass(frozen=True, eq=False)
-class ModalPrediction:
+class ModalPrediction(PerPose):
     """Predicted modes at q poses with their sd; shapes (q, k) and (q, k, 3, 3).
 
     `residue_sd` is that of the real and of the imaginary part each (their mean square).

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
+from planner.inference.per_pose import PerPose
 from planner.surrogate.ar1 import FusionData, OutputPrior
 from planner.surrogate.average import PRIOR_BELIEF, Average, fit_hedged, fit_shapes
 from planner.surrogate.frequency_models import DEFAULT, KERNEL, MODELS, FrequencyData
@@ -41,7 +42,7 @@ RESIDUE_SAMPLES, RESIDUE_KEPT = 64, 8
 
 
 @dataclass(frozen=True, eq=False)
-class ModalObservations:
+class ModalObservations(PerPose):
     """Measured modes by label at n poses, x (n, d); NaN where a mode or a column is missing."""
 
     x: np.ndarray
@@ -52,10 +53,6 @@ class ModalObservations:
     residue: np.ndarray  # (n, k, 3, 3)
     residue_sd: np.ndarray
     simulated: SimulatedModes
-
-    def at(self, poses: np.ndarray | slice) -> "ModalObservations":
-        """Those of some poses."""
-        return ModalObservations(*(values[poses] for values in vars(self).values()))
 
 
 @dataclass(frozen=True, eq=False)

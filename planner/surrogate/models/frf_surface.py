@@ -109,8 +109,8 @@ class Grid:
 
     def scaled(self, origin: np.ndarray, extent: np.ndarray) -> "Grid":
         """Frequency and pose less their `origin` (2,), over their `extent` (2,)."""
-        axes = zip((self.frequency_hz, self.pose), origin, extent, strict=True)
-        return Grid(*((values - first) / size for values, first, size in axes), self.amplitude)
+        lines = (self.frequency_hz - origin[0]) / extent[0]
+        return Grid(lines, (self.pose - origin[1]) / extent[1], self.amplitude)
 
     @property
     def points(self) -> np.ndarray:
@@ -158,10 +158,10 @@ def fit_surface(
     points = np.vstack([measured.points, simulated.points])
     origin, extent = points.min(axis=0), np.ptp(points, axis=0)
     extent = np.where(extent > 0, extent, 1.0)
-    both = (grid.scaled(origin, extent) for grid in (measured, simulated))
+    seen, low = (grid.scaled(origin, extent) for grid in (measured, simulated))
     if logarithm:
-        both = (replace(grid, amplitude=np.log(grid.amplitude)) for grid in both)
-    return Surface(_fitted(model, *both, training), origin, extent, logarithm)
+        seen, low = (replace(grid, amplitude=np.log(grid.amplitude)) for grid in (seen, low))
+    return Surface(_fitted(model, seen, low, training), origin, extent, logarithm)
 
 
 def _fitted(model: str, measured: Grid, simulated: Grid, training: Training) -> FidelityLevel:
