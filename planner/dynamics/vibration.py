@@ -156,20 +156,21 @@ def _eigen(state: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def oscillatory(solved: Poles, count: int) -> SimulatedModes:
     """The `count` lowest oscillatory modes, by natural frequency |λ|."""
-    poles, n = solved.poles, len(solved.poles)
+    poles = solved.poles
     least = STRUCTURAL if solved.structural else 1e-9
     natural = np.where(poles.imag > least * np.abs(poles), np.abs(poles), np.inf)
     order = np.argsort(natural, axis=1, kind="stable")[:, :count]
-    chosen = np.take_along_axis(natural, order, axis=1)
-    frequency = np.full((n, count), np.nan)
-    damping = np.full((n, count), np.nan)
-    residue = np.full((n, count, *solved.residues.shape[2:]), np.nan + 1j * np.nan)
-    row, column = np.nonzero(np.isfinite(chosen))
-    source = order[row, column]
-    frequency[row, column] = chosen[row, column] / (2 * np.pi)
-    damping[row, column] = -poles[row, source].real / chosen[row, column]
-    residue[row, column] = solved.residues[row, source]
-    return SimulatedModes(frequency, damping, residue)
+    known = np.isfinite(np.take_along_axis(natural, order, axis=1))
+    place = np.full((len(poles), count), -1)
+    place[:, : order.shape[1]] = np.where(known, order, -1)
+    every = SimulatedModes(natural / (2 * np.pi), -poles.real / natural, solved.residues)
+    return picked(every, place)
+
+
+def picked(modes: SimulatedModes, place: np.ndarray) -> SimulatedModes:
+    """Each pose's modes at `place` (n, count) in their order, NaN where that is −1."""
+    each = (np.concatenate([v, np.nan * v[:, :1]], axis=1) for v in vars(modes).values())
+    return SimulatedModes(*(values[np.arange(len(place))[:, None], place] for values in each))
 
 
 def receptance(solved: Poles, frequency_hz: np.ndarray) -> np.ndarray:

@@ -86,8 +86,10 @@ class Robot:
         joints = JointUnits(linkage.leading(linkage.names), linkage.leading(linkage.slides))
         joints = with_axes(config.controller, joints, robot_toml)
         ranges = model.lowerPositionLimit, model.upperPositionLimit, model.velocityLimit
-        own = (np.array(values)[list(linkage.leads)] for values in ranges)
-        robot = cls(config, robot_toml, urdf, text, model, linkage, joints, *own, left_out)
+        low, high, speed = (np.array(values)[list(linkage.leads)] for values in ranges)
+        robot = cls(
+            config, robot_toml, urdf, text, model, linkage, joints, low, high, speed, left_out
+        )
         check_points(config.point, robot_toml)
         add_points(model, config.point, (robot._link_of_point(p) for p in config.point))
         check_entries(robot)

@@ -89,19 +89,19 @@ class AR1:
         `outputs` (indices) asks for some of the columns only; for `nugget` see
         `Posterior.predict`.
         """
-        base, offset = self.split(low)
-        blind = (self.uses_low[None, :] & ~np.isfinite(low)) * self.unknown_sd[None, :]
+        base, offset, blind = self.split(low)
         asked = np.arange(len(self.outputs)) if outputs is None else outputs
         mean, sd = np.empty((2, len(x), len(asked)))
         for i, j in enumerate(asked):
             mean[:, i], sd[:, i] = self.outputs[j].predict(x, offset[:, j], nugget)
         return mean + base[:, asked], np.hypot(sd, blind[:, asked])
 
-    def split(self, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What ρ = 1 predicts, and the centred value that ρ − 1 multiplies; (q, m) each."""
-        known = np.where(np.isfinite(low), low, self.centre[None, :])
-        base = np.where(self.uses_low[None, :], known, 0.0)
-        return base, np.where(self.uses_low[None, :], known - self.centre[None, :], 0.0)
+    def split(self, low: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What ρ = 1 predicts, the centred value that ρ − 1 multiplies, and by how much (sd) the
+        former is not known; (q, m) each."""
+        known = np.where(np.isfinite(low), low, self.centre)
+        blind = (self.uses_low & ~np.isfinite(low)) * self.unknown_sd
+        return known * self.uses_low, (known - self.centre) * self.uses_low, blind
 
 
 def fit_ar1(
@@ -123,10 +123,10 @@ def fit_ar1(
     unknown_sd = _unknown_sd(data.low, given.without_low)
     either = zip(given.with_low, given.without_low, uses_low, strict=True)
     priors = [fused if uses else alone for fused, alone, uses in either]
-    blind = uses_low[None, :] & ~np.isfinite(data.low)
-    low = np.where(uses_low[None, :], np.where(blind, centre[None, :], data.low), 0.0)
-    sd = np.hypot(np.where(np.isnan(data.sd), 0.0, data.sd), blind * unknown_sd[None, :])
-    padded = pad(TrainingData(data.x, data.y - low, sd, low - centre[None, :]), uses_low)
+    model = AR1((), uses_low, centre, unknown_sd)
+    base, offset, blind = model.split(data.low)
+    sd = np.hypot(np.where(np.isnan(data.sd), 0.0, data.sd), blind)
+    padded = pad(TrainingData(data.x, data.y - base, sd, offset), uses_low)
     prior = _stack(priors, uses_low, parse(kernel, data.x.shape[1] + sees_low))
     scale, start = unknown_sd if sees_low else None, None
     if thorough:
@@ -134,7 +134,7 @@ def fit_ar1(
 
         start = laplace(kernel, padded if scale is None else padded.widened(scale), prior)
     outputs = fit(padded, prior, samples, kept, kernel, 2 if thorough else 1, start, scale)
-    return AR1(outputs, uses_low, centre, unknown_sd)
+    return replace(model, outputs=outputs)
 
 
 def _uses_low(data: TrainingData, centre: np.ndarray) -> np.ndarray:

@@ -49,18 +49,15 @@ def rbf(xp: Any, xa: Any, xb: Any) -> Any:
     return xp.exp(-_squared_distance(xp, xa, xb) / 2)
 
 
-def _distance(xp: Any, xa: Any, xb: Any) -> Any:
-    squared = _squared_distance(xp, xa, xb)
-    if xp is np:
-        return np.sqrt(squared)
-    # √ has no slope at 0, so gradients there would be undefined. Asking twice whether r² is 0 will
-    # not do: XLA computes it anew in each place, by fused operations that leave 1e-33 in one.
-    return xp.sqrt(xp.maximum(squared, 1e-30))
-
-
 def matern52(xp: Any, xa: Any, xb: Any) -> Any:
     """Matérn 5/2."""
-    r = 5.0**0.5 * _distance(xp, xa, xb)
+    squared = _squared_distance(xp, xa, xb)
+    if xp is not np:
+        # √ has no slope at 0, so gradients there would be undefined. Asking twice whether r² is 0
+        # will not do: XLA computes it anew in each place, by fused operations that leave 1e-33 in
+        # one.
+        squared = xp.maximum(squared, 1e-30)
+    r = 5.0**0.5 * xp.sqrt(squared)
     return (1 + r * (1 + r * (1 / 3))) * xp.exp(-r)  # XLA would divide every time
 
 

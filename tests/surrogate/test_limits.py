@@ -247,7 +247,7 @@ def test_posterior_is_the_textbook_one(kernel):
     fitted = fitted_to(training, kernel=kernel)
     rng = np.random.default_rng(3)
     xq, low = rng.random((20, 2)), rng.random((20, 3))
-    base, offset = fitted.split(low)
+    base, offset, _ = fitted.split(low)
     mean, sd = fitted.predict(xq, low)
     for j in range(3):
         means, variances = [], []

@@ -46,7 +46,7 @@ class AveragedModel:
         stray far.
         """
         below = np.full(len(x), np.nan) if self.low is None else self.low.predict(x)[0]
-        base, offset = self.model.split(self.low_units.normalised(below)[:, None])
+        base, offset, _ = self.model.split(self.low_units.normalised(below)[:, None])
         x = widened(x, below, self.low_units) if self.sees_low else x
         means, variances = self.model.outputs[0].predictive(x, offset[:, 0])
         sds = np.sqrt(np.maximum(variances, np.finfo(float).tiny))

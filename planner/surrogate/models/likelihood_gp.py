@@ -24,6 +24,7 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.stats import qmc
 
 from planner.errors import InputError
+from planner.inference.per_pose import PerPose
 from planner.surrogate.kernels import parse, perdikaris
 from planner.surrogate.likelihood import RELATIVE_TOLERANCE, Peak, log_likelihood, maximise
 from planner.surrogate.training_data import capacity
@@ -50,7 +51,7 @@ STARTS = 5  # "five optimization runs" (Busch et al. 2022, section 2.3.1)
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class Samples(PerPose):
     """n values of one output: x (n, d), scaled to about [0, 1], y (n,) and its sd (n,)."""
 
     x: np.ndarray
@@ -65,8 +66,7 @@ class Samples:
         if x.shape[0] != len(y):
             raise InputError(f"{len(y)} values at {x.shape[0]} poses: give one value per pose.")
         sd = np.broadcast_to(np.nan_to_num(np.asarray(sd, dtype=float)), y.shape)
-        known = np.isfinite(y) & np.isfinite(x).all(axis=1)
-        return cls(x[known], y[known], sd[known])
+        return cls(x, y, sd)[np.isfinite(y) & np.isfinite(x).all(axis=1)]
 
 
 class FidelityLevel(Protocol):
@@ -175,9 +175,7 @@ def fit_growing(
     order, units = np.random.default_rng(0).permutation(len(samples.y)), Normalisation.of(samples.y)
     peaks: list[Peak] = []
     for count in (*counts, len(order)):
-        some = order[:count]
-        part = Samples(samples.x[some], samples.y[some], samples.sd[some])
-        hill = _Hill.of(part, kernel, None, units, isotropic=False)
+        hill = _Hill.of(samples[order[:count]], kernel, None, units, isotropic=False)
         if not peaks:
             ends = [hill.climb(z, *ROUGHLY) for z in hill.everywhere(starts)]
         else:
