@@ -115,7 +115,7 @@ def measurements_left(model: "Model") -> int | None:
     outputs, poses = model.deciding
     for count in range(1, AHEAD + 1):
         best = int(np.argmax(stability(outputs, poses)))
-        outputs = outputs.planning(poses.one(best))
+        outputs = outputs.planning(poses[[best]])
         if decision.shrunk(share_left(outputs), probability):
             return count
     return None

@@ -61,7 +61,7 @@ def _told(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (count,) at pose i and sds of ln f; NaN where they are not told."""
     count, known = len(modes.frequency_hz), np.isfinite(modes.frequency_hz)
-    own = SimulatedModes(*(values[known] for values in vars(modes).values()))
+    own = modes[known]
     rest = h - _sum_of(own, measured.s[i])
     change, sd, wrong = _change(own, measured, rest, open_, i)
     for _ in range(ROUNDS):

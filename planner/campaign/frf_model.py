@@ -105,7 +105,7 @@ def _log_likelihoods(model: "Model", edges_hz: np.ndarray) -> Iterator[np.ndarra
         measured = stack(frfs, common_band(frfs, band), lines, MODEL_ERROR)
         fused = left_out_modes(model.with_residues, model.seen_exactly)
     for i, (hertz, s) in enumerate(zip(measured.frequency_hz, measured.s, strict=True)):
-        one = ModalPrediction(*(values[i : i + 1] for values in vars(fused).values()))
+        one = fused[i : i + 1]
         mean, sd = frf_moments(_windowed(one, float(s.real[0])), hertz)
         above = model.low.above(model.labelled[i].q[None], hertz)[0]
         predicted = mean[0] * (s / (1j * s.imag)) ** 2 + above

@@ -1,7 +1,6 @@
 """A campaign from a maker's URDF alone: robot.toml and campaign.toml by guesses that are named."""
 
 import tempfile
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -141,15 +140,14 @@ def _tool(tcp: str, mass: float, robot: Robot) -> Payload:
 
 def _off_the_arm(robot: Robot) -> np.ndarray:
     """Direction (3,) in the tcp frame in which the tool points."""
-    q = (robot.lower_rad + robot.upper_rad) / 2
+    q = robot.middle_rad
     return robot.forward(q)[0].T @ tool_direction(robot, q)
 
 
 def _floor(robot: Robot) -> Obstacle:
     """A box below the lowest corner of the base, and of what its first joint moves."""
     first = robot.joint_names[min(robot.tool_joints)]
-    q = (robot.lower_rad + robot.upper_rad) / 2
-    top = min(0.0, lowest_m(robot, q, ("", first))) - BELOW_M
+    top = min(0.0, lowest_m(robot, robot.middle_rad, ("", first))) - BELOW_M
     center = (0.0, 0.0, round(top - 0.05, 4))
     size = float(np.ceil(2 * robot.reach_m + 1))
     return Obstacle("floor", center, (size, size, 0.1))
@@ -225,8 +223,7 @@ def _mass_conflict(robot: Robot, mass_kg: float | None, stated_kg: float) -> Ite
     if mass_kg is None or not stated_kg or abs(mass_kg / stated_kg - 1) < SAME_MASS:
         return
     guessed = [table.link for table in robot.config.link]
-    links = ElementTree.fromstring(robot.urdf_text).findall("link")
-    stated = [link for link in links if link_inertia(link).mass > 0]
+    stated = [link for link in robot.links.values() if link_inertia(link).mass > 0]
     name = robot.urdf_path.name
     both = f"The links of {name} weigh {stated_kg:.4g} kg together, --mass-kg says {mass_kg:g} kg: "
     if not guessed:

@@ -59,7 +59,7 @@ def label(
     guide = Guide(simulated.frequency_hz, simulated.shape)
     if not np.any(np.isfinite(simulated.frequency_hz)):
         guide = Guide.by_example(modes, count + ABOVE)
-    lowest = simulated.lowest(count)
+    lowest = simulated[:, :count]
     tracks = track(modes, guide, cell.features(q), ordered=True)
     return tuple(
         LabelledPose(

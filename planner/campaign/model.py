@@ -164,7 +164,7 @@ class Model:
         """The candidate (n = 1) that gains most, with what hits there tell of the simulation."""
         outputs, poses = self.acquisition_inputs
         index = int(np.argmax(mixed(outputs, poses[:CONSIDERED])))
-        return self._told_by(poses.one(index), self.cell.candidates.q[index : index + 1])
+        return self._told_by(poses[[index]], self.cell.candidates.q[index : index + 1])
 
     def _told_by(self, poses: Poses, q: np.ndarray) -> Poses:
         """The poses with what hits there, q (n, dof) in rad, tell of the simulation."""

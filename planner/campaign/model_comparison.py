@@ -80,9 +80,9 @@ def _without(
     (name, left), started = item, time.perf_counter()
     kept = np.arange(len(seen.x)) != left
     primary = fit_primary(
-        seen.at(kept), discrepancy, belief, model=name, kernel=kernel, elsewhere=points[name]
+        seen[kept], discrepancy, belief, model=name, kernel=kernel, elsewhere=points[name]
     )
-    there = seen.at(slice(max(left, 0), max(left, 0) + 1))
+    there = seen[max(left, 0) : max(left, 0) + 1]
     mean, sd = primary.predict(there.x, np.log(there.simulated.frequency_hz), nugget=True)
     evidence = float(primary.log_evidence.sum()) if type(primary) is Average else None
     return mean[0], sd[0], evidence, time.perf_counter() - started

@@ -93,9 +93,8 @@ def parameter_information(outputs: FrequencyOutputs, poses: Poses) -> np.ndarray
     """
     values, vectors = np.linalg.eigh(_matters(outputs, outputs.workspace))
     moving = vectors[:, values > 1e-6 * np.sum(values)]  # make up the target's variance
-    left = _left(outputs, poses, ALL_AXES)
-    parts = [-0.5 * np.linalg.slogdet(moving.T @ part @ moving)[1] for part in left]
-    return np.concatenate([np.zeros(0), *parts])
+    left = moving.T @ _left(outputs, poses, ALL_AXES) @ moving
+    return -0.5 * np.linalg.slogdet(left)[1]
 
 
 def stability(outputs: FrequencyOutputs, poses: Poses) -> np.ndarray:
@@ -195,16 +194,16 @@ def parameter_reduction(
     if not poses.information.shape[-1]:
         return np.zeros(len(poses))
     matters = _matters(outputs, target)
-    left = [np.einsum("ij,nji->n", matters, part) for part in _left(outputs, poses, axes)]
-    return np.trace(matters) - np.concatenate([np.zeros(0), *left])
+    return np.trace(matters) - np.einsum("ij,nji->n", matters, _left(outputs, poses, axes))
 
 
-def _left(outputs: FrequencyOutputs, poses: Poses, axes: Axes) -> list[np.ndarray]:
-    """(I + G)⁻¹ (n, p, p), part by part: what is left of each parameter's variance, units of L."""
+def _left(outputs: FrequencyOutputs, poses: Poses, axes: Axes) -> np.ndarray:
+    """(I + G)⁻¹ (n, p, p): what is left of each parameter's variance, in units of L."""
     root = outputs.covariance_root
     starts = range(0, len(poses), POSES_PER_CHUNK)
     parts = (poses.information[i : i + POSES_PER_CHUNK, list(axes)].sum(axis=1) for i in starts)
-    return [np.linalg.inv(np.eye(len(root)) + root.T @ part @ root) for part in parts]
+    left = (np.linalg.inv(np.eye(len(root)) + root.T @ part @ root) for part in parts)
+    return np.concatenate([np.zeros((0, *root.shape)), *left])
 
 
 def _matters(outputs: FrequencyOutputs, target: Target) -> np.ndarray:
@@ -218,40 +217,36 @@ def _matters(outputs: FrequencyOutputs, target: Target) -> np.ndarray:
 def with_margins(outputs: FrequencyOutputs, margins: Margins) -> FrequencyOutputs:
     """The same, asked for margins whose `variance` is found here."""
     asked = replace(outputs, margins=margins)
-    return replace(asked, margins=replace(margins, variance=_variances(asked, margins)[1]))
+    now = _variances(asked, margins, margins.poses[:0])[1]
+    return replace(asked, margins=replace(margins, variance=now))
 
 
 def share_left(outputs: FrequencyOutputs, poses: Poses | None = None) -> np.ndarray:
     """Share (u,) of each margin's first variance after what is planned; (n, u): and each pose."""
     margins = outputs.margins
     assert margins is not None
-    after, now = _variances(outputs, margins, poses)
+    asked = margins.poses[:0] if poses is None else poses
+    after, now = _variances(outputs, margins, asked)
     left = (now if poses is None else after) / np.where(margins.variance > 0, margins.variance, 1.0)
     return np.clip(np.where(margins.variance > 0, left, 1.0), LEAST_SHARE, 1.0)
 
 
 def _variances(
-    outputs: FrequencyOutputs, margins: Margins, poses: Poses | None = None
+    outputs: FrequencyOutputs, margins: Margins, poses: Poses
 ) -> tuple[np.ndarray, np.ndarray]:
     """Of margins: (n, u) after measuring at each pose, and (u,) without; frequencies alone."""
-    asked = margins.poses[:0] if poses is None else poses
     gains = margins.slope[..., None] * outputs.trust[:, None] * margins.poses.slope
     along = gains.sum(axis=1) @ outputs.covariance_root
     now = np.sum(along**2, axis=-1)
-    after = np.tile(now, (len(asked), 1))
-    if asked.information.shape[-1] and len(asked):
-        left = np.concatenate(_left(outputs, asked, ALL_AXES))
-        after = np.einsum("up,npq,uq->nu", along, left, along)
-    for k in range(outputs.count):
+    after = np.tile(now, (len(poses), 1))
+    if poses.information.shape[-1]:
+        after = np.einsum("up,npq,uq->nu", along, _left(outputs, poses, ALL_AXES), along)
+    for k in np.flatnonzero(margins.slope.any(axis=0)).tolist():
         square = margins.slope[:, k] ** 2
-        if not square.any():
-            continue
-        there = asked if len(asked) else margins.poses[:1]
-        cross, own, variance = outputs.covariance(k, there, margins.poses)
+        cross, own, variance = outputs.covariance(k, poses, margins.poses)
+        told = cross**2 / (own + outputs.noise[k])[..., None]
         now = now + square * np.mean(variance, axis=0)
-        if len(asked):
-            told = cross**2 / (own + outputs.noise[k])[..., None]
-            after = after + square * np.mean(variance[:, None] - told, axis=0)
+        after = after + square * np.mean(variance[:, None] - told, axis=0)
     return after, now
 
 

@@ -103,7 +103,7 @@ class _Predicted:
         lines = np.linspace(measured.frequency_hz.min(), measured.frequency_hz.max(), LINES)
         layout = Layout((TCP,), (*measured.layout.sensors, *more))
         structure = replace(posterior.structure, sensors=len(layout.sensors))
-        sloped = structure.prior.carried.with_slopes(q, layout)
+        sloped = structure.prior.carried.matrices(q, layout=layout, slopes=True)
         data = replace(posterior.at(q[None], lines, layout), matrices=sloped)
         misfit = FrfMisfit(structure, data, posterior.tolerances, posterior.size)
         # Of a sensor that is new nothing is known but its tolerances.
@@ -227,9 +227,13 @@ def next_hit(
     if not offered or len(tied) < 2:
         return None
     poses = _evenly(offered, MOST_POSES)
-    # All explanations answer in proportion: the harder, the less noise.
-    hardest = [float(found.recorded.level_n[-1])] if found.recorded.visits else []
-    force_n = tuple(_at_most(force) for force in hardest)
+    force_n: tuple[float, ...] = ()
+    if found.recorded.visits:
+        # All explanations answer in proportion: the harder, the less noise. In two digits, rounded
+        # down: nobody is asked to hit harder than before.
+        hardest = float(found.recorded.level_n[-1])
+        unit = 10.0 ** (np.floor(np.log10(hardest)) - 1)
+        force_n = (float(np.floor(hardest / unit) * unit),)
     joints = found.search.prior.effect_library.stiff.robot.joints
     return NextHit.best(tied, joints, poses, separation(tied, poses[1]), force_n=force_n)
 
@@ -264,12 +268,6 @@ def _evenly(poses: Mapping[str, np.ndarray], most: int) -> tuple[list[str], np.n
     names = list(poses)
     kept = np.unique(np.linspace(0, len(names) - 1, most).round().astype(int))
     return [names[i] for i in kept], np.array([poses[names[i]] for i in kept])
-
-
-def _at_most(force_n: float) -> float:
-    """Two digits of it, rounded down: nobody is asked to hit harder than before."""
-    unit = 10.0 ** (np.floor(np.log10(force_n)) - 1)
-    return float(np.floor(force_n / unit) * unit)
 
 
 def in_words(places: Sequence[tuple[str, str | None]], probability: float) -> str:

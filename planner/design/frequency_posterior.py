@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.inference.covariance import eigen
+from planner.inference.per_pose import PerPose
 from planner.surrogate.gp import Posterior
 from planner.surrogate.modal_surrogate import Surrogate
 
@@ -19,7 +20,7 @@ ALL_AXES = (0, 1, 2)
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
+class Poses(PerPose):
     """n poses: model coordinates x (n, d) and centred low fidelity (n, k).
 
     `slope` (n, k, p) is ∂ ln f by the simulation's parameters, `information` (n, 3, p, p) the
@@ -40,17 +41,10 @@ class Poses:
     def __len__(self) -> int:
         return len(self.x)
 
-    def __getitem__(self, which: slice | np.ndarray) -> "Poses":
-        return Poses(self.x[which], self.low[which], self.slope[which], self.information[which])
-
     @property
     def uninformed(self) -> "Poses":
         """The same without what hits would tell of parameters."""
         return replace(self, information=np.zeros((len(self), AXES, 0, 0)))
-
-    def one(self, index: int) -> "Poses":
-        """The pose at `index`, as n = 1."""
-        return self[np.array([index])]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,8 +134,7 @@ class FrequencyOutputs:
     def planning(self, pose: Poses, axes: tuple[int, ...] = ALL_AXES) -> "FrequencyOutputs":
         """The same once a pose (n = 1) has been hit along `axes` too."""
         root = self.covariance_root
-        pairs = zip(vars(self.planned).values(), vars(pose.uninformed).values(), strict=True)
-        planned = Poses(*(np.concatenate(pair) for pair in pairs))
+        planned = Poses.joined([self.planned, pose.uninformed])
         if not pose.information.shape[-1]:
             return replace(self, planned=planned)
         gained = root.T @ pose.information[0, list(axes)].sum(axis=0) @ root

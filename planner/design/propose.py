@@ -140,11 +140,11 @@ def _one_after_another(
         index, axes, spent = int(free[best]), ALL_AXES, float(minutes[best])
         if travel.shares is not None:
             there = float(travel.cost.travel(travel.q[[index]], at)[0])
-            axes = best_axes(outputs, poses.one(index), travel.shares[index], travel.cost, there)
+            axes = best_axes(outputs, poses[[index]], travel.shares[index], travel.cost, there)
             spent = there + travel.cost.per_pose + travel.cost.hitting(axes)
         picks.append(Pick(index, float(gain[best]), spent, axes))
         at = travel.q[index]
-        outputs = outputs.planning(poses.one(index), axes)
+        outputs = outputs.planning(poses[[index]], axes)
         free = free[np.linalg.norm(poses.x[free] - poses.x[index], axis=1) > LEAST_DISTANCE]
     return tuple(picks)
 

@@ -15,7 +15,7 @@ LHS_ITERATIONS = 200  # random Latin hypercubes of which scikit-optimize keeps t
 
 def random(x: np.ndarray, taken: np.ndarray, count: int, seed: int) -> np.ndarray:
     """`count` indices into x (n, d), at random; the same for the same seed."""
-    return nested_random(x, count, seed)
+    return np.random.default_rng(seed).permutation(len(x))[:count]
 
 
 def sobol(x: np.ndarray, taken: np.ndarray, count: int, seed: int) -> np.ndarray:
@@ -32,11 +32,6 @@ def maximin_lhs(x: np.ndarray, taken: np.ndarray, count: int, seed: int) -> np.n
     for place in taken:
         points = np.delete(points, np.argmin(np.sum((points - place) ** 2, axis=1)), axis=0)
     return nearest(x, points, count)
-
-
-def nested_random(x: np.ndarray, count: int, seed: int) -> np.ndarray:
-    """`count` indices into x (n, d), in random order."""
-    return np.random.default_rng(seed).permutation(len(x))[:count]
 
 
 def nested_sobol(x: np.ndarray, count: int, seed: int) -> np.ndarray:
@@ -59,7 +54,7 @@ Design = Callable[[np.ndarray, np.ndarray, int, int], np.ndarray]
 NestedDesign = Callable[[np.ndarray, int, int], np.ndarray]
 DESIGNS: dict[str, Design] = {"random": random, "sobol": sobol, "maximin_lhs": maximin_lhs}
 NESTED: dict[str, NestedDesign] = {
-    "random": nested_random,
+    "random": lambda x, count, seed: random(x, x[:0], count, seed),
     "sobol": nested_sobol,
     "maximin_lhs": nested_maximin_lhs,
 }

@@ -44,7 +44,7 @@ def accelerance_at_force(
     Raises InputError where a joint has no stiffness left at a force.
     """
     m, n = simulation.elastic.matrices(q), len(q)
-    each = replace(m.at(np.repeat(np.arange(n), 3)), hit=m.hit.reshape(3 * n, 1, -1))
+    each = replace(m[np.repeat(np.arange(n), 3)], hit=m.hit.reshape(3 * n, 1, -1))
     springs = springs_at_force(simulation, each, np.repeat(force_n, 3))
     solved = _poles(each, springs, each.sensor)
     return np.moveaxis(accelerance(solved, frequency_hz).reshape(n, 3, 3, -1), 1, 2)
@@ -63,8 +63,8 @@ def with_possible_laws(simulation: Simulation) -> Simulation:
     """Without laws that would take away more than the spring of their joint has."""
     config, stiffness = simulation.robot.config, simulation.elasticity.stiffness
     possible = [
-        law for law in config.law
-        if stiffness[simulation.elastic.own_spring(law.joint)] + law.weakest > 0
+        law for law, spring in zip(config.law, simulation.law_springs, strict=True)
+        if stiffness[spring] + law.weakest > 0
     ]  # fmt: skip
     return simulation.with_laws(possible, config.hammer)
 
@@ -73,13 +73,11 @@ def springs_at_force(simulation: Simulation, m: Matrices, force_n: np.ndarray) -
     """Stiffness and damping (n, e) that laws come nearest to after hits of peak force_n (n,)."""
     if len(force_n) > TOGETHER:
         parts = np.array_split(np.arange(len(force_n)), -(-len(force_n) // TOGETHER))
-        each = [springs_at_force(simulation, m.at(part), force_n[part]) for part in parts]
+        each = [springs_at_force(simulation, m[part], force_n[part]) for part in parts]
         stiffness = np.concatenate([one.stiffness for one in each])
         damping = np.concatenate([one.damping for one in each])
         return Elasticity(stiffness, damping, simulation.elasticity.loss_factor)
-    laws = simulation.robot.config.law
-    own = [simulation.elastic.own_spring(law.joint) for law in laws]
-    config, each = simulation.robot.config, simulation.elasticity
+    config, each, own = simulation.robot.config, simulation.elasticity, simulation.law_springs
     stiffness, damping = (np.tile(v, (len(force_n), 1)) for v in (each.stiffness, each.damping))
     springs = stated = Elasticity(stiffness, damping, each.loss_factor)
     ports = _ports(m.mass.shape[1], own, len(force_n))
@@ -87,7 +85,7 @@ def springs_at_force(simulation: Simulation, m: Matrices, force_n: np.ndarray) -
     for _ in range(ROUNDS):
         before, (swing, speed) = springs, _swings(_poles(m, springs, ports), *hammer)
         stiffness, damping = stated.stiffness.copy(), stated.damping.copy()
-        for j, (law, spring) in enumerate(zip(laws, own, strict=True)):
+        for j, (law, spring) in enumerate(zip(config.law, own, strict=True)):
             shares = _solved(*_products(law, swing[:, j], speed[:, j]))
             stiffness[:, spring] += law.k * (shares[:, 0] - law.in_spring)
             damping[:, spring] += law.k * (shares[:, 1] - law.in_damper_s)
@@ -108,12 +106,12 @@ def with_average(
     do beside their springs is less then at such hits, so that an error in these matters less.
     """
     robot, count = simulation.robot, len(force_n)
-    m = simulation.elastic.matrices(q).at(np.zeros(count, dtype=int))
+    m = simulation.elastic.matrices(q)[np.zeros(count, dtype=int)]
     m = replace(m, hit=m.hit[np.arange(count), axes][:, None])
     there, stated = springs_at_force(simulation, m, force_n), simulation.elasticity
-    blocks, laws = list(robot.config.compliance), list(robot.config.law)
-    own = [simulation.elastic.own_spring(law.joint) for law in laws]
+    blocks, laws, own = list(robot.config.compliance), [], simulation.law_springs
     for number, (i, law) in enumerate(zip(own, robot.config.law, strict=True)):
+        laws.append(law)
         if blocks[i].tie or i in own[:number]:  # what a spring has of all its laws, the first has
             continue
         k = float(there.stiffness[:, i].mean())
@@ -215,10 +213,9 @@ def measured_at_force(
     Of the hit point and the sensors of a layout.
     """
     config, m = simulation.robot.config, simulation.elastic.matrices(q, layout=layout)
-    own = [simulation.elastic.own_spring(law.joint) for law in config.law]
-    ports = _ports(m.mass.shape[1], own, len(q))
+    ports = _ports(m.mass.shape[1], simulation.law_springs, len(q))
     rows = (np.concatenate([one, ports], axis=1) for one in (m.hit, m.sensor))
-    base = _without_laws(simulation, own).solved(replace(m, hit=next(rows), sensor=next(rows)))
+    base = _without_laws(simulation).solved(replace(m, hit=next(rows), sensor=next(rows)))
     step_s = 1 / (PER_PERIOD * config.band_hz[1])
     torque, pulse = _marched(simulation, base, force_n, step_s)
     *torques, force = _spectrum([*torque.reshape(-1, len(pulse)), pulse], frequency_hz, step_s)
@@ -228,11 +225,11 @@ def measured_at_force(
     return answers[:, :, :3] - np.einsum("nslf,nlhf->nshf", answers[:, :, 3:], shares)
 
 
-def _without_laws(simulation: Simulation, own: list[int]) -> Simulation:
+def _without_laws(simulation: Simulation) -> Simulation:
     """The springs and dampers beside the laws."""
     e = simulation.elasticity
     stiffness, damping = e.stiffness.copy(), e.damping.copy()
-    for law, spring in zip(simulation.robot.config.law, own, strict=True):
+    for law, spring in zip(simulation.robot.config.law, simulation.law_springs, strict=True):
         stiffness[spring] -= law.k * law.in_spring
         damping[spring] -= law.k * law.in_damper_s
     return simulation.changed(Elasticity(stiffness, np.maximum(damping, 0.0), e.loss_factor))

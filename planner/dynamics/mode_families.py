@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from planner.dynamics.vibration import SimulatedModes, normal_modes
+from planner.dynamics.vibration import SimulatedModes, normal_modes, picked
 from planner.inference.assignment import least_cost
 
 # Between poses whose shapes are compared. Modes that exchange their shapes over less than this
@@ -102,26 +102,15 @@ def rearranged(
     `place` (n, e) from `Families.places`, undamped_hz (n, e). The family of an overdamped
     mode, which does not oscillate, is NaN.
     """
-    n = len(modes.frequency_hz)
-    frequency, damping = np.full((n, count), np.nan), np.full((n, count), np.nan)
-    residue = np.full((n, count, 3, 3), np.nan + 1j * np.nan)
-    for i in range(n):
-        partner = _partners(modes.frequency_hz[i], undamped_hz[i])[place[i, :count]]
-        known = np.flatnonzero(partner >= 0)
-        frequency[i, known] = modes.frequency_hz[i, partner[known]]
-        damping[i, known] = modes.damping_ratio[i, partner[known]]
-        residue[i, known] = modes.residue[i, partner[known]]
-    return SimulatedModes(frequency, damping, residue)
-
-
-def _partners(damped_hz: np.ndarray, undamped_hz: np.ndarray) -> np.ndarray:
-    """For each undamped mode the damped one nearest in frequency, −1 without; one to one."""
-    known = np.flatnonzero(np.isfinite(damped_hz))
-    out = np.full(len(undamped_hz), -1)
-    apart = np.abs(np.log(undamped_hz[:, None] / damped_hz[known]))
-    rows, columns = least_cost(apart)
-    out[rows] = known[columns]
-    return out
+    partner = np.full((len(place), count), -1)  # of each family, among the damped modes
+    for i in range(len(place)):
+        damped = np.flatnonzero(np.isfinite(modes.frequency_hz[i]))
+        apart = np.log(undamped_hz[i, :, None] / modes.frequency_hz[i, damped])
+        rows, columns = least_cost(np.abs(apart))  # the nearest in frequency, one to one
+        nearest = np.full(undamped_hz.shape[1], -1)
+        nearest[rows] = damped[columns]
+        partner[i, : len(nearest)] = nearest[place[i, :count]]
+    return picked(modes, partner)
 
 
 def undamped_modes(mass: np.ndarray, stiffness: np.ndarray) -> Modes:

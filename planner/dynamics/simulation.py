@@ -3,7 +3,6 @@
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import msgspec
 import numpy as np
@@ -53,8 +52,6 @@ class Simulation:
         The change is counted from the robot's own inertias (`ElasticModel.inertia`).
         """
         other = copy.copy(self)
-        for cached in ("stiffness", "damping"):
-            other.__dict__.pop(cached, None)
         other.elasticity = elasticity
         elastic = self.elastic
         if inertia_change is not None:
@@ -69,13 +66,18 @@ class Simulation:
         other.robot = replace(self.robot, config=config)
         return other
 
-    @cached_property
+    @property
+    def law_springs(self) -> list[int]:
+        """Numbers of the joints' own springs beside which its laws are."""
+        return [self.elastic.own_spring(law.joint) for law in self.robot.config.law]
+
+    @property
     def stiffness(self) -> np.ndarray:
         """K (e, e) without gravity's part; complex where there is structural damping."""
         k, eta = self.elasticity.stiffness, self.elasticity.loss_factor
         return np.diag(k * (1 + 1j * eta) if eta.any() else k)
 
-    @cached_property
+    @property
     def damping(self) -> np.ndarray:
         """C (e, e)."""
         return np.diag(self.elasticity.damping)

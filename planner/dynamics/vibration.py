@@ -6,13 +6,13 @@ gravity is stronger than the springs (ω² < 0) a mode does not oscillate either
 damping K is complex; FRFs then hold for positive frequencies, as they are measured.
 """
 
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from planner.inference.covariance import eigen
+from planner.inference.per_pose import PerPose
 
 PROPORTIONAL = 1e-10  # off-diagonal modal damping below this is rounding
 # A critically damped mode has a double pole, for which there is no residue: split by this share
@@ -37,7 +37,7 @@ class Poles:
 
 
 @dataclass(frozen=True, eq=False)
-class SimulatedModes:
+class SimulatedModes(PerPose):
     """Oscillatory modes of n poses, lowest first, NaN where there are fewer than `count`.
 
     frequency_hz (n, count), damping_ratio (n, count), residue (n, count, 3, 3) in m/(N·s).
@@ -46,18 +46,6 @@ class SimulatedModes:
     frequency_hz: np.ndarray
     damping_ratio: np.ndarray
     residue: np.ndarray
-
-    def __getitem__(self, poses: np.ndarray | slice | int) -> "SimulatedModes":
-        return SimulatedModes(*(values[poses] for values in vars(self).values()))
-
-    @classmethod
-    def joined(cls, parts: "Sequence[SimulatedModes]") -> "SimulatedModes":
-        """Of the poses of all parts, in their order."""
-        return cls(*map(np.concatenate, zip(*(vars(part).values() for part in parts), strict=True)))
-
-    def lowest(self, count: int) -> "SimulatedModes":
-        """The `count` lowest of them."""
-        return SimulatedModes(*(values[:, :count] for values in vars(self).values()))
 
     @property
     def shape(self) -> np.ndarray:
@@ -168,20 +156,21 @@ def _eigen(state: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def oscillatory(solved: Poles, count: int) -> SimulatedModes:
     """The `count` lowest oscillatory modes, by natural frequency |λ|."""
-    poles, n = solved.poles, len(solved.poles)
+    poles = solved.poles
     least = STRUCTURAL if solved.structural else 1e-9
     natural = np.where(poles.imag > least * np.abs(poles), np.abs(poles), np.inf)
     order = np.argsort(natural, axis=1, kind="stable")[:, :count]
-    chosen = np.take_along_axis(natural, order, axis=1)
-    frequency = np.full((n, count), np.nan)
-    damping = np.full((n, count), np.nan)
-    residue = np.full((n, count, *solved.residues.shape[2:]), np.nan + 1j * np.nan)
-    row, column = np.nonzero(np.isfinite(chosen))
-    source = order[row, column]
-    frequency[row, column] = chosen[row, column] / (2 * np.pi)
-    damping[row, column] = -poles[row, source].real / chosen[row, column]
-    residue[row, column] = solved.residues[row, source]
-    return SimulatedModes(frequency, damping, residue)
+    known = np.isfinite(np.take_along_axis(natural, order, axis=1))
+    place = np.full((len(poles), count), -1)
+    place[:, : order.shape[1]] = np.where(known, order, -1)
+    every = SimulatedModes(natural / (2 * np.pi), -poles.real / natural, solved.residues)
+    return picked(every, place)
+
+
+def picked(modes: SimulatedModes, place: np.ndarray) -> SimulatedModes:
+    """Each pose's modes at `place` (n, count) in their order, NaN where that is −1."""
+    each = (np.concatenate([v, np.nan * v[:, :1]], axis=1) for v in vars(modes).values())
+    return SimulatedModes(*(values[np.arange(len(place))[:, None], place] for values in each))
 
 
 def receptance(solved: Poles, frequency_hz: np.ndarray) -> np.ndarray:

@@ -89,7 +89,9 @@ class FrfData:
     def _moved(self, off: np.ndarray, elastic: ElasticModel) -> "FrfData":
         rows = np.flatnonzero(np.any(off != 0, axis=1))
         q, measured = (self.q + off)[rows], self.measured.at(rows)
-        found = measured.loaded(elastic.with_slopes(q, measured.layout), elastic.robot)
+        found = measured.loaded(
+            elastic.matrices(q, layout=measured.layout, slopes=True), elastic.robot
+        )
         jacobians = self.jacobians.copy()
         jacobians[rows] = elastic.body_jacobians(q)
         other = replace(
@@ -113,7 +115,7 @@ class FrfData:
         return FrfData(
             self.q[poses],
             self.measured.at(poses),
-            self.matrices.at(poses),
+            self.matrices[poses],
             self.jacobians[poses],
             None if self.order is None else self.order[poses],
             self.off if isinstance(self.off, float) else self.off[poses],

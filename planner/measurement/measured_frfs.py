@@ -117,7 +117,7 @@ def matrices_at(
     `sloped`: with slopes by the joint angles, for readbacks may err.
     """
     layout = together([frf.layout for frf in frfs])
-    found = elastic.with_slopes(q, layout) if sloped else elastic.matrices(q, layout=layout)
+    found = elastic.matrices(q, layout=layout, slopes=sloped)
     there = np.array([[name in f.layout.sensors for name in layout.sensors] for f in frfs])
     return with_sensors(found, elastic.robot, layout, there)
 

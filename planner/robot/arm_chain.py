@@ -50,7 +50,7 @@ def arm_chain(root: ElementTree.Element) -> ArmChain | None:
         tuple(j.get("name", "") for j in joints),
         tree.tool(path[last]),
         tree.sensor(path[last]),
-        {_entry(j): _place(j) for j in others},
+        dict(_held(j) for j in others),
         tuple(j.get("name", "") for j in others),
     )
 
@@ -151,12 +151,8 @@ def _limits(joint: ElementTree.Element) -> tuple[float, float]:
     return limits_of(joint) or ((-np.pi, np.pi) if turns_on else (0.0, 0.0))
 
 
-def _entry(joint: ElementTree.Element) -> str:
-    return f"{joint.get('name', '')}{'_m' if joint.get('type') in SLIDING else '_deg'}"
-
-
-def _place(joint: ElementTree.Element) -> float:
-    """Where a joint is held, in degrees or m: at 0, or at its limit nearest to that."""
-    low, high = _limits(joint)
-    at = float(np.clip(0.0, low, high))
-    return at if joint.get("type") in SLIDING else float(np.rad2deg(at))
+def _held(joint: ElementTree.Element) -> tuple[str, float]:
+    """Entry and place of a joint in [held]: at 0, or at its limit nearest to that."""
+    name, at = joint.get("name", ""), float(np.clip(0.0, *_limits(joint)))
+    slides = joint.get("type") in SLIDING
+    return (f"{name}_m", at) if slides else (f"{name}_deg", float(np.rad2deg(at)))

@@ -1,6 +1,5 @@
 """Joint limits, self-collision and obstacles of a pose."""
 
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from functools import cached_property, lru_cache
 from itertools import combinations
@@ -17,6 +16,7 @@ from planner.robot.shapes import (
     leave_out_unreadable,
     unchecked_sentence,
 )
+from planner.robot.urdf_elements import placed
 
 LIMIT_TOLERANCE = 1e-9  # rad or m
 NAMED = 3  # obstacles in a sentence
@@ -142,7 +142,7 @@ class Collisions:
         if not len(geometry.collisionPairs):
             return ()
         robot, data = self.robot, self._data(geometry)
-        middle = robot.linkage.at((robot.lower_rad + robot.upper_rad) / 2)
+        middle = robot.linkage.at(robot.middle_rad)
         pin.computeCollisions(robot.model, robot.model.createData(), geometry, data, middle, False)
         # Numbers: the model's own list moves up under its elements when one of them is removed.
         pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
@@ -209,17 +209,16 @@ def _with_pairs(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]]:
 @lru_cache(maxsize=KEPT)
 def _link_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[UnusableShape, ...]]:
     """Collision shapes of the links, and those of the URDF that are left out."""
-    root = ElementTree.fromstring(robot.urdf_text)
-    left = (*robot.left_out, *leave_out_unreadable(root))
-    return build_geometry(robot.model, root, "collision"), left
+    links = robot.links
+    left = (*robot.left_out, *leave_out_unreadable(links))
+    return build_geometry(robot.model, links), left
 
 
 def _obstacles(robot: Robot) -> list[pin.GeometryObject]:
     made = []
     for block in robot.config.obstacle:
-        rotation = pin.rpy.rpyToMatrix(*np.deg2rad(block.rpy_deg))
-        placement = pin.SE3(rotation, np.array(block.center_m, dtype=float))
-        made.append(pin.GeometryObject(block.name, 0, placement, coal.Box(*block.size_m)))
+        at = placed(block.center_m, block.rpy_deg)
+        made.append(pin.GeometryObject(block.name, 0, at, coal.Box(*block.size_m)))
     return made
 
 
@@ -232,7 +231,7 @@ def _link_lines(robot: Robot, of_tool_alone: bool) -> list[pin.GeometryObject]:
     """
     model, found = robot.model, []
     for number in range(1, model.njoints):
-        frame = model.getFrameId(robot.body_frames(number)[0].name, pin.FrameType.BODY)
+        frame = robot.frame_id("link", robot.body_frames(number)[0].name)
         for place, (a, b) in enumerate(_lines(robot, number, of_tool_alone)):
             name = f"{model.names[number]}_line_{place}"
             found.append(pin.GeometryObject(name, number, frame, *_rod(a, b)))

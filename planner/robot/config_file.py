@@ -132,20 +132,18 @@ def _check_compliances(config: RobotConfig, path: Path) -> None:
                 )
 
 
-def check_own_springs(
-    config: RobotConfig, joints: JointUnits, axes: Sequence[np.ndarray], path: Path
-) -> None:
+def check_own_springs(robot: "Robot") -> None:
     """A joint that slides gives along its axis, in N/m; InputError where it is told to turn only.
 
     Beside its own spring its carriage may roll about that axis.
     """
-    for name, slides, axis in zip(joints.names, joints.slides, axes, strict=True):
-        blocks = [b for b in config.compliance if b.joint == name and slides]
+    for name, axis in zip(robot.joint_names, robot.joint_axes, strict=True):
+        blocks = [b for b in robot.config.compliance if b.joint == name and robot.slides(name)]
         own = [b.slide for b in blocks if abs(np.array(b.axis) @ axis) > 0.9]
         if own and not any(own):
             raise InputError(
-                f"{path}: joint {name} slides, but its [[compliance]] turns about its axis, in "
-                f"N·m/rad; state its own spring along that axis with stiffness_n_m (N/m) and "
+                f"{robot.path}: joint {name} slides, but its [[compliance]] turns about its axis, "
+                f"in N·m/rad; state its own spring along that axis with stiffness_n_m (N/m) and "
                 f"damping_n_s_m (N·s/m)."
             )
 

@@ -6,7 +6,6 @@ gears of 50 to 3,000 N·m rated torque are between 0.9 and 1.1 mrad (rated torqu
 stiffness, as their catalogues state both).
 """
 
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 
 import coal
@@ -18,7 +17,7 @@ from planner.robot.config import Compliance, LinkTable
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.link_bodies import BodyShape, bodies
 from planner.robot.robot import Robot
-from planner.robot.shapes import build_geometry
+from planner.robot.shapes import shapes_of
 from planner.robot.urdf_elements import link_inertia
 
 # Small parts are denser, gears and bearings to their covers: mass goes with volume to this power.
@@ -39,8 +38,7 @@ NO_BODY = 20.0
 
 def total_stated(robot: Robot) -> float:
     """What the URDF's <inertial>s add up to, in kg."""
-    links = ElementTree.fromstring(robot.urdf_text).findall("link")
-    return sum(link_inertia(link).mass for link in links)
+    return sum(link_inertia(link).mass for link in robot.links.values())
 
 
 def nothing_stated(robot: Robot) -> bool:
@@ -130,19 +128,14 @@ def link_solids(robot: Robot) -> dict[str, pin.Inertia]:
     Of collision shapes, or of visual ones where a link has no others. Of a mesh its convex hull is
     filled: hardly any published mesh closes, and volumes of those that do not mean nothing.
     """
-    root = ElementTree.fromstring(robot.urdf_text)
     found: dict[str, pin.Inertia] = {}
-    for kind in ("collision", "visual"):
-        for link in root.findall("link"):  # visual meshes are large, and read where needed alone
-            if kind == "visual" and link.get("name", "") in found:
-                for part in link.findall(kind):
-                    link.remove(part)
-        for shape in build_geometry(robot.model, root, kind).geometryObjects:
-            frame, solid = robot.model.frames[shape.parentFrame], _solid(shape.geometry)
-            if solid is not None:
-                solid = (frame.placement.inverse() * shape.placement).act(solid)
-                name = str(frame.name)
-                found[name] = found[name] + solid if name in found else solid
+    for name, link in robot.links.items():
+        for kind in ("collision", "visual"):  # which are large, and read where needed alone
+            each = [(place, _solid(shape)) for place, shape in shapes_of(link, kind)]
+            solids = [place.act(solid) for place, solid in each if solid is not None]
+            if solids:
+                found[name] = sum(solids[1:], solids[0])
+                break
     return found
 
 
@@ -196,8 +189,7 @@ def default_springs(robot: Robot, payload_kg: float, joints: tuple[str, ...]) ->
         for block in _springs(robot, name, axis, float(load))
     ]
     elastic = _with(robot, blocks)
-    middle = (robot.lower_rad + robot.upper_rad) / 2
-    inertia = np.diagonal(ElasticModel(elastic).matrices(middle).mass[0])
+    inertia = np.diagonal(ElasticModel(elastic).matrices(robot.middle_rad).mass[0])
     damped = [
         msgspec.structs.replace(b, damping=_rounded(2 * DAMPING_RATIO * np.sqrt(b.stiffness * i)))
         for b, i in zip(blocks, _alike(blocks, inertia), strict=True)

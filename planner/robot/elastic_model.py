@@ -14,12 +14,12 @@ leaves the others as they are.
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
+from planner.inference.per_pose import PerPose
 from planner.recording.points import TOOL, Layout
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import inertia_basis, virtual_model
@@ -29,7 +29,7 @@ SAG_STEPS = 4  # each gains three digits or more where sagging is small at all
 
 
 @dataclass(frozen=True, eq=False)
-class AngleSlopes:
+class AngleSlopes(PerPose):
     """By each of `dof` joint angles, of n poses and e elastic degrees of freedom.
 
     `mass` (n, dof, e, e) in kg·m²/rad, `hit` (n, dof, 3h, e) and `sensor` (n, dof, 3s, e) in
@@ -42,12 +42,9 @@ class AngleSlopes:
     sensor: np.ndarray
     stiffness: np.ndarray
 
-    def __getitem__(self, poses: slice | np.ndarray) -> "AngleSlopes":
-        return AngleSlopes(*(values[poses] for values in vars(self).values()))
-
 
 @dataclass(frozen=True, eq=False)
-class Matrices:
+class Matrices(PerPose):
     """Of n poses and e elastic degrees of freedom: M (n, e, e) in kg·m²; Jacobians in m/rad.
 
     `hit` (n, 3h, e) moves the h hit points, each in its own frame, and `sensor` (n, 3s, e) the
@@ -66,28 +63,14 @@ class Matrices:
     sensor_turn: np.ndarray
     by_angle: AngleSlopes | None = None
 
-    def at(self, poses: slice | np.ndarray) -> "Matrices":
-        """Of some of the poses."""
-        return Matrices(**{name: v[poses] for name, v in vars(self).items() if v is not None})
-
-    def replaced(self, poses: np.ndarray, other: "Matrices") -> "Matrices":
-        """With those of `other` at some of the poses."""
-
-        def put(these: Matrices | AngleSlopes, others: Matrices | AngleSlopes) -> dict[str, Any]:
-            arrays = vars(these).items()
-            out = {name: v.copy() for name, v in arrays if isinstance(v, np.ndarray)}
-            for name, values in out.items():
-                values[poses] = getattr(others, name)
-            return out
-
-        slopes = None
-        if self.by_angle is not None and other.by_angle is not None:
-            slopes = AngleSlopes(**put(self.by_angle, other.by_angle))
-        return Matrices(**put(self, other), by_angle=slopes)
-
 
 class ElasticModel:
     """A robot with its elastic degrees of freedom. Raises InputError if there are none.
+
+    `size` is their number e, in the order of robot.toml. `bodies` are what moves: all links that
+    turn with a joint, by the joint's name; "base" if elastic. `inertia` (bodies, 10) is m in kg,
+    m·c in kg·m, moments xx xy yy xz yz zz in kg·m² about the joint that carries the body, in its
+    frame, payloads included.
 
     `inertia_change` (bodies, 10) is added to the inertias (see `inertia`), so that M is linear in
     it: the weight under which the robot sags stays that of its URDF. Its springs there are those of
@@ -105,21 +88,25 @@ class ElasticModel:
         small = robot.config.resonator
         springs = [r.mass * (2 * np.pi * r.frequency_hz) ** 2 for r in small]
         dampers = [4 * np.pi * r.damping_ratio * r.mass * r.frequency_hz for r in small]
+        self.size = len(blocks) + len(small)
         self.stiffness = np.array([c.stiffness for c in blocks] + springs)
         self._carrying = self.stiffness
         self.damping = np.array([c.damping for c in blocks] + dampers)
         self.loss_factor = np.array([c.loss_factor for c in blocks] + [0.0] * len(small))
-        self._waves = tuple((self.own_spring(w.joint), w) for w in robot.config.harmonic)
+        self._waves = tuple(
+            (robot.joint_names.index(wave.joint), self.own_spring(wave.joint), wave)
+            for wave in robot.config.harmonic
+        )
         self._virtual = virtual_model(robot, inertia_change)
         weighed = self._virtual if inertia_change is None else virtual_model(robot)
         self._model, self._weighed = self._virtual.model, weighed.model
-        self._elastic = self._virtual.elastic
+        self._elastic, self.bodies = self._virtual.elastic, self._virtual.bodies
+        self.inertia = self._virtual.inertia
         self._check_mass()
 
     def _check_mass(self) -> None:
         """Every elastic rotation must move inertia of its own; otherwise no M⁻¹ exists."""
-        middle = (self.robot.lower_rad + self.robot.upper_rad) / 2
-        mass = self.matrices(middle).mass[0]
+        mass = self.matrices(self.robot.middle_rad).mass[0]
         mass = np.where(np.isfinite(mass), mass, 0.0)  # of bodies that no matter can form
         own = np.diagonal(mass)
         least = np.finfo(float).eps * (np.abs(own).max() or 1.0)  # less is rounding, and singular
@@ -146,24 +133,6 @@ class ElasticModel:
             f"[[compliance]] about its own axis; add that."
         )
 
-    @property
-    def size(self) -> int:
-        """Number e of elastic degrees of freedom, in the order of robot.toml."""
-        return len(self.stiffness)
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        """What moves: all links that turn with a joint, by the joint's name; "base" if elastic."""
-        return self._virtual.bodies
-
-    @property
-    def inertia(self) -> np.ndarray:
-        """(bodies, 10): m in kg, m·c in kg·m, moments xx xy yy xz yz zz in kg·m² about the joint.
-
-        In the frame of the joint that carries the body, payloads included.
-        """
-        return self._virtual.inertia
-
     def carried_by(self, stiffness: np.ndarray) -> "ElasticModel":
         """The same robot where springs of stiffness (e,) in N·m/rad carry its weight."""
         other = copy.copy(self)
@@ -180,8 +149,8 @@ class ElasticModel:
     ) -> Matrices:
         """Matrices of poses q (n, dof) in rad, between named frames or points.
 
-        Where none are named, between the points of a layout; `slopes` are asked for by
-        `with_slopes`. Raises InputError where a frame does not exist.
+        Where none are named, between the points of a layout; with `slopes` also how they change
+        with the joint angles. Raises InputError where a frame does not exist.
         """
         q = np.atleast_2d(q)
         n, e, robot = len(q), self.size, self.robot
@@ -197,7 +166,7 @@ class ElasticModel:
             full = self._standing(row, weight)
             if robot.config.geometric_stiffness:
                 geometric[i] = self._gravity_stiffness(full, weight)
-            geometric[i, own_axis, own_axis] += self._with_angle(row)
+            geometric[i, own_axis, own_axis] += self._with_angle(row)[0]
             whole[i] = pin.crba(self._model, data, full)
             for group, jacobians in zip(ids, out, strict=True):
                 for k, number in enumerate(group):
@@ -214,10 +183,6 @@ class ElasticModel:
         hit_turn, sensor_turn = (jacobians[:, :, 3:].reshape(n, -1, e) for jacobians in out)
         return Matrices(mass, hit, sensor, geometric, hit_turn, sensor_turn, by_angle)
 
-    def with_slopes(self, q: np.ndarray, layout: Layout = TOOL) -> Matrices:
-        """Matrices of poses q (n, dof) in rad, and how they change with the joint angles."""
-        return self.matrices(q, layout=layout, slopes=True)
-
     def _slopes(self, q: np.ndarray, hits: np.ndarray, sensors: np.ndarray) -> AngleSlopes:
         """Of Jacobians (n, points, 6, v) of hits and sensors."""
         places = self._virtual.rigid, self._elastic
@@ -227,7 +192,7 @@ class ElasticModel:
         n, _, dof, _, e = slope.shape
         rows = np.moveaxis(slope, (2, 4), (1, 2)).reshape(n, dof * e, -1)
         half = (rows @ momentum.reshape(n, -1, e)).reshape(n, dof, e, e)
-        stiffness = np.array([self._angle_slope(row) for row in q])
+        stiffness = np.array([self._with_angle(row)[1] for row in q])
         # (n, points, dof, 3, e), the points side by side with their axes.
         moved = (np.moveaxis(turned(ends, *places)[..., :3, :], 1, 2) for ends in (hits, sensors))
         hit, sensor = (one.reshape(n, dof, -1, e) for one in moved)
@@ -260,14 +225,14 @@ class ElasticModel:
         out = np.empty((len(q), self.size))
         for i, row in enumerate(q):
             weight = pin.computeGeneralizedGravity(self._weighed, data, self._upright(row))
-            out[i] = -(weight @ self._elastic) / (self._carrying + self._with_angle(row))
+            out[i] = -(weight @ self._elastic) / (self._carrying + self._with_angle(row)[0])
         return out
 
     def _standing(self, q: np.ndarray, data: pin.Data) -> np.ndarray:
         """Coordinates of the virtual model at q (dof,), sagged unless robot.toml says otherwise."""
         full = upright = self._upright(q)
         if self.robot.config.geometric_stiffness:
-            stiffness = self._carrying + self._with_angle(q)
+            stiffness = self._carrying + self._with_angle(q)[0]
             for _ in range(SAG_STEPS):  # K δ = −g(q + δ)
                 weight = pin.computeGeneralizedGravity(self._weighed, data, full)
                 full = upright - self._elastic @ ((weight @ self._elastic) / stiffness)
@@ -277,23 +242,14 @@ class ElasticModel:
         """Coordinates of the virtual model at q (dof,), without weight."""
         return self._virtual.rigid @ q + self._virtual.offset
 
-    def _with_angle(self, q: np.ndarray) -> np.ndarray:
-        """What harmonics of the joint angles q (dof,) add to the stiffness (e,)."""
-        change = np.zeros(self.size)
-        for number, wave in self._waves:
-            angle = wave.order * q[self.robot.joint_names.index(wave.joint)]
-            change[number] += wave.cosine * np.cos(angle) + wave.sine * np.sin(angle)
-        return change
-
-    def _angle_slope(self, q: np.ndarray) -> np.ndarray:
-        """Derivatives (dof, e) of the same by the joint angles q (dof,)."""
-        change = np.zeros((len(q), self.size))
-        for number, wave in self._waves:
-            joint = self.robot.joint_names.index(wave.joint)
-            angle = wave.order * q[joint]
-            slope = wave.sine * np.cos(angle) - wave.cosine * np.sin(angle)
-            change[joint, number] += wave.order * slope
-        return change
+    def _with_angle(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What harmonics of q (dof,) add to the stiffness (e,), and its slopes (dof, e)."""
+        change, slope = np.zeros(self.size), np.zeros((len(q), self.size))
+        for joint, spring, wave in self._waves:
+            cosine, sine = np.cos(wave.order * q[joint]), np.sin(wave.order * q[joint])
+            change[spring] += wave.cosine * cosine + wave.sine * sine
+            slope[joint, spring] += wave.order * (wave.sine * cosine - wave.cosine * sine)
+        return change, slope
 
     def _gravity_stiffness(self, full: np.ndarray, data: pin.Data) -> np.ndarray:
         """Second derivative of the potential energy of the weight, (e, e)."""

@@ -41,8 +41,7 @@ def solve(
         return _unreached(beyond)
     target = pin.SE3(np.asarray(rotation, dtype=float), np.asarray(position_m, dtype=float))
     rng = np.random.default_rng(seed)
-    middle = (robot.lower_rad + robot.upper_rad) / 2
-    at = middle if start is None else np.asarray(start, dtype=float)
+    at = robot.middle_rad if start is None else np.asarray(start, dtype=float)
     contact = limit = ""
     miss_m = np.inf
     for attempt in range(restarts + 1):
@@ -90,8 +89,7 @@ def _beyond_limits(
     q, _ = _descend(robot, target, start, bounded=False)
     if q is None:
         return None, ""
-    middle = (robot.lower_rad + robot.upper_rad) / 2
-    whole = 2 * np.pi * np.round((q - middle) / (2 * np.pi))
+    whole = 2 * np.pi * np.round((q - robot.middle_rad) / (2 * np.pi))
     q = q - np.where(robot.linkage.comes_round(robot.tool_chain), whole, 0.0)
     broken = Collisions(robot).limits(q)
     return (None, broken[0]) if broken else (q, "")

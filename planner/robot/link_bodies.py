@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from planner.robot.robot import Robot
 from planner.robot.shapes import leave_out_unreadable, shape_corners
-from planner.robot.urdf_elements import link_inertia, vector
+from planner.robot.urdf_elements import link_inertia, placed, vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +47,13 @@ class LinkBody:
 
 def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
     """All links of the URDF in its order."""
-    root = ElementTree.fromstring(robot.urdf_text)
-    left = (*robot.left_out, *leave_out_unreadable(root))
-    shapes, tables = shape_corners(root), {table.link: table for table in robot.config.link}
-    joints = root.findall("joint")
+    links, joints = robot.links, ElementTree.fromstring(robot.urdf_text).findall("joint")
+    left = (*robot.left_out, *leave_out_unreadable(links))
+    shapes, tables = shape_corners(links), {table.link: table for table in robot.config.link}
     names, lacking = ("", *robot.linkage.names), {one.link for one in left}
     found = []
-    for link in root.findall("link"):
-        name = link.get("name", "")
-        if not robot.model.existFrame(name, pin.FrameType.BODY):
-            continue
-        frame = robot.model.frames[robot.model.getFrameId(name, pin.FrameType.BODY)]
-        joint = names[frame.parentJoint]
+    for name, link in links.items():
+        joint = names[robot.model.frames[robot.frame_id("link", name)].parentJoint]
         inertia = link_inertia(link)
         carried = (j for j in joints if any(p.get("link") == name for p in j.findall("parent")))
         ends = [vector(j, "origin", "xyz") for j in carried]
@@ -97,15 +92,12 @@ def guessed_masses(links: Sequence[LinkBody]) -> str:
 
 def lowest_m(robot: Robot, q: np.ndarray, joints: Sequence[str]) -> float:
     """How low in the world anything is at q (dof,) that these joints move directly; inf: none."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, robot.linkage.at(q))
-    corners = shape_corners(ElementTree.fromstring(robot.urdf_text))
-    found = [np.inf]
-    for body in link_bodies(robot):
-        place = data.oMf[robot.model.getFrameId(body.name, pin.FrameType.BODY)]
-        if body.joint in joints:
-            found += [float(place.act(corner)[2]) for corner in corners[body.name]]
-    return min(found)
+    corners = shape_corners(robot.links)
+    moved = [body.name for body in link_bodies(robot) if body.joint in joints]
+    stand = placements(robot, q, [robot.frame_id("link", name) for name in moved])
+    each = zip(moved, *stand, strict=True)
+    heights = (turn[2] @ v + place[2] for name, turn, place in each for v in corners[name])
+    return float(min(heights, default=np.inf))
 
 
 APART_M = 1e-6  # joints nearer than this lie at one point
@@ -199,11 +191,11 @@ class RobotLines:
 
 def robot_lines(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> RobotLines:
     """The robot at q (dof,) in rad."""
-    model, data = robot.model, robot.model.createData()
-    pin.framesForwardKinematics(model, data, robot.linkage.at(q))
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, robot.linkage.at(q))
 
     def place_of(name: str) -> pin.SE3:
-        return data.oMf[model.getFrameId(name, pin.FrameType.BODY)]
+        return data.oMf[robot.frame_id("link", name)]
 
     lines = [
         (data.oMi[number].translation.copy(), data.oMi[number].act(np.asarray(end)))
@@ -217,22 +209,13 @@ def robot_lines(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Rob
     masses = [(b.mass, place_of(b.name).act(b.com_m)) for b in links if b.joint and b.mass > 0]
     shapes = [
         np.array([place_of(name).act(corner) for corner in box])
-        for name, corners in shape_corners(ElementTree.fromstring(robot.urdf_text)).items()
+        for name, corners in shape_corners(robot.links).items()
         for box in np.array(corners).reshape(-1, 8, 3)
     ]
-    return RobotLines(
-        lines,
-        [(name, *placed) for name, placed in stand],
-        list(zip(named, places, rotations, strict=True)),
-        masses,
-        shapes,
-        _obstacles(robot),
-    )
-
-
-def _obstacles(robot: Robot) -> list[np.ndarray]:
-    found, signs = [], np.array(list(np.ndindex(2, 2, 2))) - 0.5
+    joints = [(name, *place) for name, place in stand]
+    frames = list(zip(named, places, rotations, strict=True))
+    signs, obstacles = np.array(list(np.ndindex(2, 2, 2))) - 0.5, []
     for block in robot.config.obstacle:
-        rotation = pin.rpy.rpyToMatrix(*np.deg2rad(block.rpy_deg))
-        found.append(np.array(block.center_m) + (signs * block.size_m) @ rotation.T)
-    return found
+        at = placed(block.center_m, block.rpy_deg)
+        obstacles.append(np.array([at.act(corner) for corner in signs * block.size_m]))
+    return RobotLines(lines, joints, frames, masses, shapes, obstacles)

@@ -9,6 +9,7 @@ import pinocchio as pin
 from planner.errors import InputError
 from planner.recording.points import AXES, SENSOR, TCP, PointNames
 from planner.robot.config import PointTable
+from planner.robot.urdf_elements import placed
 
 PREFIX = "point "  # of the frames' names, so that a point may be called like a link
 SAME_M, SAME_RAD = 1e-6, 1e-6  # two frames are one: as exactly as files state places
@@ -44,8 +45,7 @@ def add_points(model: pin.Model, points: Sequence[PointTable], ids: Iterable[int
     """New frames of the model, at the points; `ids` are the numbers of their links' frames."""
     for point, number in zip(points, ids, strict=True):
         frame = model.frames[number]
-        turn = pin.rpy.rpyToMatrix(*np.deg2rad(point.rpy_deg))
-        place = frame.placement * pin.SE3(turn, np.array(point.position_m, dtype=float))
+        place = frame.placement * placed(point.position_m, point.rpy_deg)
         added = pin.Frame(
             PREFIX + point.name, frame.parentJoint, number, place, pin.FrameType.OP_FRAME
         )

@@ -22,7 +22,7 @@ from planner.robot.config_file import (
 from planner.robot.points import PREFIX, add_points, check_points, is_one_place, names_of
 from planner.robot.shapes import UnusableShape, leave_out_unusable
 from planner.robot.urdf import build_model, read_urdf
-from planner.robot.urdf_elements import state_inertias
+from planner.robot.urdf_elements import Links, links_of, state_inertias
 from planner.robot.urdf_joints import Linkage
 
 LEVER_M = 0.3  # half the length of a carriage, chosen
@@ -51,6 +51,9 @@ class Robot:
     model: pin.Model
     linkage: Linkage
     joints: JointUnits
+    lower_rad: np.ndarray  # limits of the joints (dof,) in rad, of those that slide in m
+    upper_rad: np.ndarray
+    velocity_rad_s: np.ndarray  # their speeds (dof,)
     left_out: tuple[UnusableShape, ...] = ()  # shapes of the URDF that cannot be used
 
     def __repr__(self) -> str:
@@ -75,18 +78,22 @@ class Robot:
                 f"entry urdf."
             ) from None
         root = read_urdf(urdf, robot_toml, config.held)
-        left_out = leave_out_unusable(root, urdf)
-        state_inertias(root, config.link)
+        left_out = leave_out_unusable(links_of(root), urdf)
+        state_inertias(links_of(root), config.link)
         text = ElementTree.tostring(root, encoding="unicode")
         model = build_model(text, urdf)
         linkage = Linkage.of(root, tuple(model.names)[1:])
         joints = JointUnits(linkage.leading(linkage.names), linkage.leading(linkage.slides))
         joints = with_axes(config.controller, joints, robot_toml)
-        robot = cls(config, robot_toml, urdf, text, model, linkage, joints, left_out)
+        ranges = model.lowerPositionLimit, model.upperPositionLimit, model.velocityLimit
+        low, high, speed = (np.array(values)[list(linkage.leads)] for values in ranges)
+        robot = cls(
+            config, robot_toml, urdf, text, model, linkage, joints, low, high, speed, left_out
+        )
         check_points(config.point, robot_toml)
         add_points(model, config.point, (robot._link_of_point(p) for p in config.point))
         check_entries(robot)
-        check_own_springs(config, joints, robot.joint_axes, robot_toml)
+        check_own_springs(robot)
         check_laws(robot)
         _ = robot.points
         return robot
@@ -96,6 +103,11 @@ class Robot:
         if not point.link and point.name in (TCP, SENSOR):
             return self.tcp_id if point.name == TCP else self.sensor_id
         return self.frame_id(f"[[point]] {point.name}: link", point.link)
+
+    @property
+    def links(self) -> Links:
+        """Elements of the URDF's links, as it is used; new ones each time."""
+        return links_of(ElementTree.fromstring(self.urdf_text))
 
     @property
     def name(self) -> str:
@@ -155,19 +167,9 @@ class Robot:
         return None
 
     @cached_property
-    def lower_rad(self) -> np.ndarray:
-        """Lower joint limits (dof,) in rad, of joints that slide in m."""
-        return np.array(self.model.lowerPositionLimit)[list(self.linkage.leads)]
-
-    @cached_property
-    def upper_rad(self) -> np.ndarray:
-        """Upper joint limits (dof,) in rad, of joints that slide in m."""
-        return np.array(self.model.upperPositionLimit)[list(self.linkage.leads)]
-
-    @cached_property
-    def velocity_rad_s(self) -> np.ndarray:
-        """Joint speeds (dof,) of the URDF in rad/s, of joints that slide in m/s."""
-        return np.array(self.model.velocityLimit)[list(self.linkage.leads)]
+    def middle_rad(self) -> np.ndarray:
+        """The middle (dof,) of all ranges in rad, of joints that slide in m."""
+        return (self.lower_rad + self.upper_rad) / 2
 
     @cached_property
     def _data(self) -> pin.Data:
@@ -202,11 +204,9 @@ class Robot:
 
     def layout_ids(self, layout: Layout) -> tuple[list[int], list[int]]:
         """Pinocchio's frame numbers of a layout's hit points and of its sensors."""
-        own = {p.name: self.frame_id("[[point]]", PREFIX + p.name) for p in self.config.point}
-        hits, sensors = {**own, TCP: self.tcp_id}, {**own, SENSOR: self.sensor_id}
-        hits.setdefault(SENSOR, self.sensor_id)
-        sensors.setdefault(TCP, self.tcp_id)
-        return [hits[n] for n in layout.hits], [sensors[n] for n in layout.sensors]
+        ids = {p.name: self.frame_id("[[point]]", PREFIX + p.name) for p in self.config.point}
+        ids |= {TCP: self.tcp_id, SENSOR: self.sensor_id}  # where points of these names are, too
+        return [ids[n] for n in layout.hits], [ids[n] for n in layout.sensors]
 
     @cached_property
     def sensor_mass_kg(self) -> dict[str, float]:

@@ -2,8 +2,8 @@
 
 import hashlib
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from planner.robot.mesh_files import find_mesh
 from planner.robot.urdf import quiet
-from planner.robot.urdf_elements import numbers, place_of
+from planner.robot.urdf_elements import Links, numbers, place_of
 
 LARGEST_M = 1e4  # of a shape
 FEW = 3  # names in a sentence
@@ -30,47 +30,51 @@ class UnusableShape:
     why: str
 
 
-def leave_out_unusable(root: ElementTree.Element, urdf: Path) -> tuple[UnusableShape, ...]:
+def leave_out_unusable(links: Links, urdf: Path) -> tuple[UnusableShape, ...]:
     """Name the files of all meshes in full; remove shapes without a file or a size."""
-    found = []
-    for link in root.findall("link"):
-        for part in [*link.findall("collision"), *link.findall("visual")]:
-            why = _fault(part, urdf)
-            if why:
-                link.remove(part)
-                found.append(UnusableShape(link.get("name", "?"), part.tag, why))
-    return tuple(found)
+    return _leave_out(links, ("collision", "visual"), lambda part: _fault(part, urdf))
 
 
-def leave_out_unreadable(root: ElementTree.Element) -> tuple[UnusableShape, ...]:
+def leave_out_unreadable(links: Links) -> tuple[UnusableShape, ...]:
     """Remove collision shapes whose mesh cannot be read."""
+    return _leave_out(links, ("collision",), _unreadable)
+
+
+def _leave_out(
+    links: Links, kinds: Sequence[str], fault: Callable[[ElementTree.Element], str]
+) -> tuple[UnusableShape, ...]:
+    """Remove the links' shapes of these kinds that have a fault."""
     found = []
-    for link in root.findall("link"):
-        for part in link.findall("collision"):
-            mesh = part.find("geometry/mesh")
-            if mesh is not None and load_mesh(mesh) is None:
+    for name, link in links.items():
+        for part in [part for kind in kinds for part in link.findall(kind)]:
+            if why := fault(part):
                 link.remove(part)
-                why = f"{mesh.get('filename', '')} is no mesh that can be read"
-                found.append(UnusableShape(link.get("name", "?"), part.tag, why))
+                found.append(UnusableShape(name, part.tag, why))
     return tuple(found)
 
 
-def build_geometry(model: pin.Model, root: ElementTree.Element, kind: str) -> pin.GeometryModel:
-    """Shapes of a kind, "collision" or "visual", that can be used."""
+def _unreadable(part: ElementTree.Element) -> str:
+    mesh = part.find("geometry/mesh")
+    if mesh is None or load_mesh(mesh) is not None:
+        return ""
+    return f"{mesh.get('filename', '')} is no mesh that can be read"
+
+
+def shapes_of(link: ElementTree.Element, kind: str) -> list[tuple[pin.SE3, coal.CollisionGeometry]]:
+    """Shapes of a kind, "collision" or "visual", that can be used; where they are in the link."""
+    each = ((place_of(part), _shape(part)) for part in link.findall(kind))
+    return [(place, shape) for place, shape in each if shape is not None]
+
+
+def build_geometry(model: pin.Model, links: Links) -> pin.GeometryModel:
+    """Collision shapes that can be used."""
     geometry = pin.GeometryModel()
-    for link in root.findall("link"):
-        name = link.get("name", "")
-        if not model.existFrame(name, pin.FrameType.BODY):
-            continue
+    for name, link in links.items():
         number = model.getFrameId(name, pin.FrameType.BODY)
         frame = model.frames[number]
-        for place, part in enumerate(link.findall(kind)):
-            shape = _shape(part)
-            if shape is not None:
-                at = frame.placement * place_of(part)
-                named = f"{name}_{place}"
-                made = pin.GeometryObject(named, frame.parentJoint, number, at, shape)
-                geometry.addGeometryObject(made)
+        for k, (place, shape) in enumerate(shapes_of(link, "collision")):
+            at = frame.parentJoint, number, frame.placement * place
+            geometry.addGeometryObject(pin.GeometryObject(f"{name}_{k}", *at, shape))
     return geometry
 
 
@@ -89,21 +93,19 @@ def unchecked_sentence(left: Sequence[UnusableShape]) -> str:
     )
 
 
-def shape_corners(root: ElementTree.Element) -> dict[str, list[np.ndarray]]:
+def shape_corners(links: Links) -> dict[str, list[np.ndarray]]:
     """Corners (3,) of boxes around the shapes of each link, in its frame, eight each.
 
-    Collision shapes; visual ones where a link has no others. `root` names its meshes in full.
+    Collision shapes; visual ones where a link has no others. Meshes are named in full.
     """
     found: dict[str, list[np.ndarray]] = {}
-    for link in root.findall("link"):
-        corners = found.setdefault(link.get("name", ""), [])
-        for part in link.findall("collision") or link.findall("visual"):
-            shape = _shape(part)
-            if shape is not None:
-                shape.computeLocalAABB()
-                low, high = np.array(shape.aabb_local.min_), np.array(shape.aabb_local.max_)
-                for signs in np.ndindex(2, 2, 2):
-                    corners.append(place_of(part).act(np.where(signs, high, low)))
+    for name, link in links.items():
+        corners = found.setdefault(name, [])
+        kind = "visual" if link.find("collision") is None else "collision"
+        for place, shape in shapes_of(link, kind):
+            shape.computeLocalAABB()
+            low, high = np.array(shape.aabb_local.min_), np.array(shape.aabb_local.max_)
+            corners += [place.act(np.where(s, high, low)) for s in np.ndindex(2, 2, 2)]
     return found
 
 
@@ -114,23 +116,15 @@ def load_mesh(mesh: ElementTree.Element) -> coal.BVHModelBase | None:
         digest = hashlib.sha256(file.read_bytes()).digest()
     except OSError:
         return None
-    return _read(_MeshFile(digest, tuple(scale.tolist()), file))
-
-
-@dataclass(frozen=True)
-class _MeshFile:
-    """What a mesh is read from; copies of a file are one mesh."""
-
-    digest: bytes
-    scale: tuple[float, ...]
-    file: Path = field(compare=False)
+    return _read(file, digest, tuple(scale.tolist()))
 
 
 @lru_cache(maxsize=KEPT)
-def _read(given: _MeshFile) -> coal.BVHModelBase | None:
+def _read(file: Path, digest: bytes, scale: tuple[float, ...]) -> coal.BVHModelBase | None:
+    """Read again where what the file holds, by its `digest`, is other than before."""
     with quiet():
         try:
-            mesh = coal.MeshLoader().load(str(given.file), np.array(given.scale))
+            mesh = coal.MeshLoader().load(str(file), np.array(scale))
         except (ValueError, RuntimeError):
             return None
     if not isinstance(mesh, coal.BVHModelBase) or not mesh.num_tris:

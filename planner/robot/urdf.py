@@ -29,14 +29,11 @@ def read_urdf(urdf: Path, robot_toml: Path, held: Mapping[str, float]) -> Elemen
     """
     try:
         text = urdf_source(urdf)
-    except FileNotFoundError:
-        raise InputError(
-            f"{robot_toml}: its URDF {urdf} does not exist; correct the entry urdf."
-        ) from None
     except OSError as error:
+        missing = isinstance(error, FileNotFoundError)
+        fault = "does not exist" if missing else f"cannot be read ({error.strerror})"
         raise InputError(
-            f"{robot_toml}: its URDF {urdf} cannot be read ({error.strerror}); correct the entry "
-            f"urdf."
+            f"{robot_toml}: its URDF {urdf} {fault}; correct the entry urdf."
         ) from None
     root = _root(text, urdf)
     if not settle_joints(root, urdf, held):

@@ -11,7 +11,17 @@ from planner.robot.config import STATED, LinkTable, symmetric
 TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
 ENTRIES = dict(zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), STATED, strict=True))
 
-Joints = Mapping[str, ElementTree.Element]  # by name
+Joints = Links = Mapping[str, ElementTree.Element]  # by name
+
+
+def links_of(root: ElementTree.Element) -> Links:
+    """The links of a URDF."""
+    return {link.get("name", "?"): link for link in root.findall("link")}
+
+
+def placed(position_m: Sequence[float], rpy_deg: Sequence[float]) -> pin.SE3:
+    """A place as robot.toml states it."""
+    return pin.SE3(pin.rpy.rpyToMatrix(*np.deg2rad(rpy_deg)), np.array(position_m, dtype=float))
 
 
 def numbers(text: str) -> np.ndarray:
@@ -90,9 +100,8 @@ def write_inertia(link: ElementTree.Element, inertia: pin.Inertia) -> None:
         ElementTree.SubElement(inertial, name, attributes).tail = tail
 
 
-def state_inertias(root: ElementTree.Element, tables: Sequence[LinkTable]) -> None:
+def state_inertias(links: Links, tables: Sequence[LinkTable]) -> None:
     """Put what [[link]] of robot.toml states before the links' own <inertial>."""
-    links = {link.get("name"): link for link in root.findall("link")}
     for table in tables:
         if table.mass_kg is not None and table.link in links:
             moments = symmetric(table.inertia_kg_m2 or (0.0,) * 6, STATED)

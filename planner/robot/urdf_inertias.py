@@ -9,7 +9,7 @@ import pinocchio as pin
 from planner.robot.config import BASE, STATED, Payload
 from planner.robot.mesh_files import urdf_source
 from planner.robot.robot import Robot
-from planner.robot.urdf_elements import link_inertia, state_inertias, write_inertia
+from planner.robot.urdf_elements import link_inertia, links_of, state_inertias, write_inertia
 from planner.robot.virtual_joints import (
     OUTER,
     SMALL,
@@ -54,8 +54,8 @@ def with_inertias(robot: Robot, bodies: tuple[str, ...], change: np.ndarray) -> 
     text = urdf_source(robot.urdf_path).decode("utf-8")
     keep = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
     root = ElementTree.fromstring(text[text.index("<robot") :], keep)
-    state_inertias(root, robot.config.link)
-    links = {link.get("name", ""): link for link in root.findall("link")}
+    links = links_of(root)
+    state_inertias(links, robot.config.link)
     payload, unchanged = list(robot.config.payload), []
     for body, values in _whole(robot, bodies, change).items():
         joint = _joint_of(robot, body)
@@ -108,8 +108,9 @@ def _as_payload(link: str, inertia: pin.Inertia) -> Payload:
 
 def _of_whole(robot: Robot, link: str, values: np.ndarray) -> tuple[str, np.ndarray]:
     """The joint that moves a link, and a change (10,) of its outer half as one of the link's."""
-    there = pin.SE3(np.eye(3), -cut_at(robot, link))
-    return str(robot.model.names[ends_of(robot, link)[0]]), _seen_from(there, values)
+    toward = pin.SE3(np.eye(3), cut_at(robot, link)).homogeneous
+    whole = pin.PseudoInertia.FromMatrix(toward @ _spread(values) @ toward.T)
+    return str(robot.model.names[ends_of(robot, link)[0]]), whole.toDynamicParameters()
 
 
 def _joint_of(robot: Robot, body: str) -> int:
@@ -130,19 +131,13 @@ def stated_shares(robot: Robot, body: str) -> tuple[tuple[float, float], ...]:
     if body.endswith(OUTER):
         body, _ = _of_whole(robot, body.removesuffix(OUTER), np.zeros(10))
     joint = _joint_of(robot, body)
-    carried = {frame.name for frame in robot.body_frames(joint)}
-    whole, found = float(body_inertia(robot, joint)[0]), []
-    for link in ElementTree.fromstring(robot.urdf_text).findall("link"):
-        name = link.get("name", "")
-        if name in stated and name in carried and whole > 0:
-            found.append((link_inertia(link).mass / whole, stated[name]))
-    return tuple(found)
-
-
-def _seen_from(placement: pin.SE3, values: np.ndarray) -> np.ndarray:
-    """Inertial numbers (10,), or a change of them, in a frame that is placed in theirs."""
-    toward = placement.inverse().homogeneous
-    return pin.PseudoInertia.FromMatrix(toward @ _spread(values) @ toward.T).toDynamicParameters()
+    whole = float(body_inertia(robot, joint)[0])
+    carried = {frame.name for frame in robot.body_frames(joint)} if whole > 0 else set()
+    return tuple(
+        (link_inertia(link).mass / whole, stated[name])
+        for name, link in robot.links.items()
+        if name in stated and name in carried
+    )
 
 
 def _spread(values: np.ndarray) -> np.ndarray:

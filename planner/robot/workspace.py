@@ -257,42 +257,34 @@ def workspace_in_front(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     return best
 
 
-def _middle(robot: Robot) -> np.ndarray:
-    """0 where the limits allow it, else the middle between them; of slides the middle."""
-    middle = (robot.lower_rad + robot.upper_rad) / 2
-    zero = (robot.lower_rad <= 0) & (robot.upper_rad >= 0) & ~np.array(robot.joints.slides)
-    return np.where(zero, 0.0, middle)
-
-
 def _by_nearness(robot: Robot) -> np.ndarray:
-    """Poses (n, dof) within a third of a turn of the middle, the most suitable first."""
-    rng, first, middle = np.random.default_rng(0), min(robot.tool_joints), _middle(robot)
-    turns = next((k for k in robot.tool_joints if not robot.joints.slides[k]), first)
-    away = np.where(robot.joints.slides, (robot.upper_rad - robot.lower_rad) / 4, 2 * np.pi / 3)
-    away[turns] = min(away[turns], np.deg2rad(15.0))
+    """Poses (n, dof) within a third of a turn of the middle, the most suitable first.
+
+    The middle is 0 where a joint turns and its limits allow it.
+    """
+    slides, joint = np.array(robot.joints.slides), _shoulder(robot)
+    zero = (robot.lower_rad <= 0) & (robot.upper_rad >= 0) & ~slides
+    middle = np.where(zero, 0.0, robot.middle_rad)
+    away = np.where(slides, (robot.upper_rad - robot.lower_rad) / 4, 2 * np.pi / 3)
+    away[joint] = min(away[joint], np.deg2rad(15.0))
     low, high = (np.clip(middle + s * away, robot.lower_rad, robot.upper_rad) for s in (-1, 1))
-    q = rng.uniform(low, high, (POSES, len(middle)))
-    arm = robot.arm_m or 1.0
+    q = np.random.default_rng(0).uniform(low, high, (POSES, len(middle)))
+    arm, shoulder = robot.arm_m or 1.0, robot.joint_places(middle)[joint][0]
     _, place = robot.forward_batch(q)
-    target = _shoulder(robot, middle) + arm * AHEAD * _ahead(robot, middle)
+    ahead = (robot.forward(middle)[1] - shoulder) * [1, 1, 0]
+    far = float(np.linalg.norm(ahead))  # where the tool is above the base, x is ahead
+    ahead = ahead / far if far > 0.1 * robot.arm_m and far > 0 else np.array([1.0, 0.0, 0.0])
+    target = shoulder + arm * AHEAD * ahead
     down = np.array([tool_direction(robot, one) @ -UP for one in q])
     bent = np.mean(np.abs(q - middle) / np.maximum(away, 1e-9), axis=1)
     cost = np.linalg.norm(place - target, axis=1) / arm + DOWN * (1 - down) + BENT * bent
     return q[np.argsort(cost, kind="stable")]
 
 
-def _shoulder(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Where the first turning joint of the tool's chain is (3,) at q (dof,)."""
-    places = robot.joint_places(q)
+def _shoulder(robot: Robot) -> int:
+    """Place in q of the first joint of the tool's chain that turns, or else the first."""
     turning = [k for k in robot.tool_joints if not robot.joints.slides[k]]
-    return places[min(turning or robot.tool_joints)][0]
-
-
-def _ahead(robot: Robot, q: np.ndarray) -> np.ndarray:
-    """Horizontal direction (3,) in which the tool is at q (dof,); x where it is above the base."""
-    away = (robot.forward(q)[1] - _shoulder(robot, q)) * [1, 1, 0]
-    far = float(np.linalg.norm(away))
-    return away / far if far > 0.1 * robot.arm_m and far > 0 else np.array([1.0, 0.0, 0.0])
+    return min(turning or robot.tool_joints)
 
 
 def tool_direction(robot: Robot, q: np.ndarray) -> np.ndarray:

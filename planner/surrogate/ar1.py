@@ -5,7 +5,8 @@ simulation is deterministic and costs milliseconds, so the low-fidelity level is
 modelled. An output without simulation is a plain GP: the same with no ρ·y_L.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -34,6 +35,24 @@ class OutputPrior:
     length_spread: float = 0.8
     nugget_spread: float | None = None
     nugget_shared: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class FusionData:
+    """What m outputs are fitted to: `values`, per output its prior with and without simulation,
+    and the `centre` (m,) of the simulation's, NaN where there is none.
+    """
+
+    values: TrainingData
+    with_low: tuple[OutputPrior, ...]
+    without_low: tuple[OutputPrior, ...]
+    centre: np.ndarray
+
+    @property
+    def alone(self) -> Self:
+        """The same without the simulation."""
+        values = replace(self.values, low=np.full_like(self.values.low, np.nan))
+        return replace(self, values=values, centre=np.full(len(self.centre), np.nan))
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,46 +89,44 @@ class AR1:
         `outputs` (indices) asks for some of the columns only; for `nugget` see
         `Posterior.predict`.
         """
-        base, offset = self.split(low)
-        blind = (self.uses_low[None, :] & ~np.isfinite(low)) * self.unknown_sd[None, :]
+        base, offset, blind = self.split(low)
         asked = np.arange(len(self.outputs)) if outputs is None else outputs
         mean, sd = np.empty((2, len(x), len(asked)))
         for i, j in enumerate(asked):
             mean[:, i], sd[:, i] = self.outputs[j].predict(x, offset[:, j], nugget)
         return mean + base[:, asked], np.hypot(sd, blind[:, asked])
 
-    def split(self, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What ρ = 1 predicts, and the centred value that ρ − 1 multiplies; (q, m) each."""
-        known = np.where(np.isfinite(low), low, self.centre[None, :])
-        base = np.where(self.uses_low[None, :], known, 0.0)
-        return base, np.where(self.uses_low[None, :], known - self.centre[None, :], 0.0)
+    def split(self, low: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What ρ = 1 predicts, the centred value that ρ − 1 multiplies, and by how much (sd) the
+        former is not known; (q, m) each."""
+        known = np.where(np.isfinite(low), low, self.centre)
+        blind = (self.uses_low & ~np.isfinite(low)) * self.unknown_sd
+        return known * self.uses_low, (known - self.centre) * self.uses_low, blind
 
 
 def fit_ar1(
-    data: TrainingData,
-    with_low: tuple[OutputPrior, ...],
-    without_low: tuple[OutputPrior, ...],
-    centre: np.ndarray,
+    given: FusionData,
     samples: int = 256,
     kept: int = 32,
     kernel: str = "matern52",
     thorough: bool = False,
     sees_low: bool = False,
 ) -> AR1:
-    """Fit m outputs; per output its prior with and without simulation, and y_L's `centre` (m,).
+    """Fit m outputs.
 
     `thorough` looks for each output's most probable hyperparameters first: tens of milliseconds
     an output, which pays where there are many hyperparameters or many points. With `sees_low` the
     kernel's last column is the centred y_L over its sd.
     """
-    uses_low = _uses_low(data, centre)
-    centre = np.where(uses_low, np.nan_to_num(centre), 0.0)
-    unknown_sd = _unknown_sd(data.low, without_low)
-    priors = [a if u else b for a, b, u in zip(with_low, without_low, uses_low, strict=True)]
-    blind = uses_low[None, :] & ~np.isfinite(data.low)
-    low = np.where(uses_low[None, :], np.where(blind, centre[None, :], data.low), 0.0)
-    sd = np.hypot(np.where(np.isnan(data.sd), 0.0, data.sd), blind * unknown_sd[None, :])
-    padded = pad(TrainingData(data.x, data.y - low, sd, low - centre[None, :]), uses_low)
+    data, uses_low = given.values, _uses_low(given.values, given.centre)
+    centre = np.where(uses_low, np.nan_to_num(given.centre), 0.0)
+    unknown_sd = _unknown_sd(data.low, given.without_low)
+    either = zip(given.with_low, given.without_low, uses_low, strict=True)
+    priors = [fused if uses else alone for fused, alone, uses in either]
+    model = AR1((), uses_low, centre, unknown_sd)
+    base, offset, blind = model.split(data.low)
+    sd = np.hypot(np.where(np.isnan(data.sd), 0.0, data.sd), blind)
+    padded = pad(TrainingData(data.x, data.y - base, sd, offset), uses_low)
     prior = _stack(priors, uses_low, parse(kernel, data.x.shape[1] + sees_low))
     scale, start = unknown_sd if sees_low else None, None
     if thorough:
@@ -117,7 +134,7 @@ def fit_ar1(
 
         start = laplace(kernel, padded if scale is None else padded.widened(scale), prior)
     outputs = fit(padded, prior, samples, kept, kernel, 2 if thorough else 1, start, scale)
-    return AR1(outputs, uses_low, centre, unknown_sd)
+    return replace(model, outputs=outputs)
 
 
 def _uses_low(data: TrainingData, centre: np.ndarray) -> np.ndarray:

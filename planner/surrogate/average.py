@@ -14,9 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from planner.inference.log_space import log_sum, shares
-from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
+from planner.surrogate.ar1 import AR1, FusionData, fit_ar1
 from planner.surrogate.gp import Posterior
-from planner.surrogate.training_data import TrainingData
 
 PRIOR_BELIEF = 0.5  # in the simulation, before anything is measured
 NEGLIGIBLE_WEIGHT = 1e-3  # up to which a model is not evaluated for an output
@@ -24,8 +23,6 @@ GENTLE_SLOPE_SD = 0.05  # of ρ': a simulation of the same robot; chosen on gene
 NO_DISCREPANCY = 1e-9  # amplitude, in the outputs' own unit
 PLAIN_SAMPLES = 64  # of a nugget alone
 GOLDEN_RATIO = (5**0.5 - 1) / 2  # multiples of it, less their integers, fill [0, 1) evenly
-
-Priors = tuple[OutputPrior, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +35,6 @@ class Average:
     models: tuple[AR1, ...]
     weights: np.ndarray
     log_evidence: np.ndarray
-
-    @classmethod
-    def of_one(cls, model: AR1) -> "Average":
-        """One model alone."""
-        return cls((model,), np.ones((1, len(model.outputs))), model.log_evidence)
 
     @property
     def counted(self) -> list[int]:
@@ -87,10 +79,7 @@ def mixed(weights: np.ndarray, means: np.ndarray, sds: np.ndarray) -> tuple[np.n
 
 
 def fit_hedged(
-    data: TrainingData,
-    with_low: Priors,
-    without_low: Priors,
-    centre: np.ndarray,
+    given: FusionData,
     samples: int = 256,
     kept: int = 32,
     belief: float = PRIOR_BELIEF,
@@ -103,60 +92,33 @@ def fit_hedged(
     `fit_fused` fits with the simulation, arguments as of `fit_ar1`.
     """
     how = samples, kept, kernel
-    fused = fit_fused(data, with_low, without_low, centre, *how)
-    nothing = np.full(len(centre), np.nan)
-    alone = fit_ar1(unsimulated(data), with_low, without_low, nothing, *how)
+    fused, alone = fit_fused(given, *how), fit_ar1(given.alone, *how)
     evidence = np.array([m.log_evidence for m in (fused, alone)])
     odds = evidence + np.log([[belief], [1 - belief]])
     odds[1, ~fused.asked] = -np.inf
     return Average((fused, alone), shares(odds, axis=0), log_sum(evidence, axis=0))
 
 
-def fit_shapes(
-    data: TrainingData,
-    with_low: Priors,
-    without_low: Priors,
-    centre: np.ndarray,
-    kernels: tuple[str, ...],
-    blind: bool = False,
-) -> Average:
-    """A fit with every kernel; the other arguments as of `fit_ar1`.
+def fit_shapes(given: FusionData, kernels: tuple[str, ...], blind: bool = False) -> Average:
+    """A fit with every kernel.
 
     With `blind` those that ignore the simulation stand beside them, as likely before the data.
     """
-    sides = [(data, centre)]
-    sides += [(unsimulated(data), np.full(len(centre), np.nan))] if blind else []
-    models = tuple(
-        fit_ar1(seen, with_low, without_low, there, 64, 16, kernel)
-        for seen, there in sides
-        for kernel in kernels
-    )
+    sides = (given, given.alone) if blind else (given,)
+    models = tuple(fit_ar1(side, 64, 16, kernel) for side in sides for kernel in kernels)
     evidence = np.array([m.log_evidence for m in models])
     whole = log_sum(evidence, axis=0) - np.log(len(models))
     return Average(models, shares(evidence, axis=0), whole)
 
 
-def unsimulated(data: TrainingData) -> TrainingData:
-    """The data without the simulation."""
-    return replace(data, low=np.full_like(data.low, np.nan))
-
-
-def fit_plain_or_free(
-    data: TrainingData,
-    with_low: Priors,
-    without_low: Priors,
-    centre: np.ndarray,
-    samples: int = 256,
-    kept: int = 32,
-    kernel: str = "matern52",
-) -> AR1:
+def fit_plain_or_free(given: FusionData, samples: int, kept: int, kernel: str) -> AR1:
     """AR1 averaged over how plain the discrepancy is; arguments as of `fit_ar1`.
 
     A simulation that is off by an offset alone needs no discrepancy that depends on the pose and no
     slope. Outputs without simulation are GPs as ever.
     """
-    how = samples, kept, kernel
-    free = fit_ar1(data, with_low, without_low, centre, *how)
+    how, with_low = (samples, kept, kernel), given.with_low
+    free = fit_ar1(given, *how)
     if not free.asked.any():
         return free
     plain = tuple(
@@ -164,10 +126,10 @@ def fit_plain_or_free(
                 nugget_spread=p.spread if p.nugget_spread is None else p.nugget_spread)
         for p in with_low
     )  # fmt: skip
-    models = [free, fit_ar1(data, plain, without_low, centre, PLAIN_SAMPLES, kept, "bias")]
+    models = [free, fit_ar1(replace(given, with_low=plain), PLAIN_SAMPLES, kept, "bias")]
     if max(prior.slope_sd for prior in with_low) > GENTLE_SLOPE_SD:
         gentle = tuple(replace(p, slope_sd=min(p.slope_sd, GENTLE_SLOPE_SD)) for p in with_low)
-        models.append(fit_ar1(data, gentle, without_low, centre, *how))
+        models.append(fit_ar1(replace(given, with_low=gentle), *how))
     each = zip(free.asked, *(model.outputs for model in models), strict=True)
     outputs = tuple(_samples_of_all(of) if asked else of[0] for asked, *of in each)
     return replace(free, outputs=outputs)

@@ -11,18 +11,15 @@ from typing import Protocol
 import numpy as np
 
 from planner.errors import InputError
-from planner.surrogate.ar1 import AR1, fit_ar1
+from planner.surrogate.ar1 import AR1, FusionData, fit_ar1
 from planner.surrogate.average import (
     NO_DISCREPANCY,
     PRIOR_BELIEF,
     Average,
-    Priors,
     fit_hedged,
     fit_plain_or_free,
-    unsimulated,
 )
 from planner.surrogate.kernels import KERNELS, perdikaris
-from planner.surrogate.training_data import TrainingData
 
 DEFAULT = "default"
 KERNEL = "matern52"
@@ -31,25 +28,16 @@ FEWEST = 3  # poses from which models with likeliest hyperparameters take over f
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyData:
-    """What a model is fitted to: `data` of n poses, and the simulation at others.
+class FrequencyData(FusionData):
+    """What a model is fitted to: values of n poses, and the simulation at others.
 
-    `elsewhere` are their coordinates (N, d) and the simulation's ln f (N, m). Priors and `centre`
-    are as of `fit_ar1`; `belief` is the simulation's probability before these data.
+    `elsewhere` are their coordinates (N, d) and the simulation's ln f (N, m); `belief` is the
+    simulation's probability before these data.
     """
 
-    data: TrainingData
-    with_low: Priors
-    without_low: Priors
-    centre: np.ndarray
     elsewhere: tuple[np.ndarray, np.ndarray] | None = None
     belief: float = PRIOR_BELIEF
     kernel: str = KERNEL
-
-    def ar1(self, data: TrainingData, kernel: str = "", **how: bool) -> AR1:
-        """AR1 of these priors."""
-        priors = self.with_low, self.without_low
-        return fit_ar1(data, *priors, self.centre, SAMPLES, KEPT, kernel or self.kernel, **how)
 
 
 class Predictor(Protocol):
@@ -75,30 +63,24 @@ class Predicting(Average):
 
 
 def _default(seen: FrequencyData) -> Average:
-    priors = seen.with_low, seen.without_low, seen.centre
-    how = SAMPLES, KEPT, seen.belief, fit_plain_or_free, seen.kernel
-    return fit_hedged(seen.data, *priors, *how)
+    return fit_hedged(seen, SAMPLES, KEPT, seen.belief, fit_plain_or_free, seen.kernel)
 
 
-def _gp(seen: FrequencyData) -> Average:
-    nothing = replace(seen, centre=np.full_like(seen.centre, np.nan))
-    return Average.of_one(nothing.ar1(unsimulated(seen.data)))
-
-
-def _ar1(seen: FrequencyData) -> Average:
-    return Average.of_one(seen.ar1(seen.data))
+def _ar1(seen: FrequencyData, **how: bool) -> Average:
+    model = fit_ar1(seen, SAMPLES, KEPT, seen.kernel, **how)
+    return Average((model,), np.ones((1, len(model.outputs))), model.log_evidence)
 
 
 def _nargp(seen: FrequencyData) -> Average:
-    product = perdikaris(seen.data.x.shape[1], seen.kernel)
-    many = len(seen.data.x) > 1
-    return Average.of_one(seen.ar1(seen.data, product, sees_low=True, thorough=many))
+    poses, dimensions = seen.values.x.shape
+    seen = replace(seen, kernel=perdikaris(dimensions, seen.kernel))
+    return _ar1(seen, thorough=poses > 1, sees_low=True)
 
 
 def _none(seen: FrequencyData) -> Average:
     exact = {"bias_sd": NO_DISCREPANCY, "slope_sd": 0.0, "amplitude": NO_DISCREPANCY}
     plain = tuple(replace(prior, **exact) for prior in seen.with_low)
-    return Average.of_one(replace(seen, with_low=plain).ar1(seen.data, "bias"))
+    return _ar1(replace(seen, with_low=plain, kernel="bias"))
 
 
 def _multitask(seen: FrequencyData) -> Average:
@@ -117,7 +99,7 @@ def _predicting(
     seen: FrequencyData, fit: Callable[[FrequencyData, AR1], Predictor | None]
 ) -> Average:
     ar1 = _ar1(seen)
-    found = fit(seen, ar1.models[0]) if len(seen.data.x) >= FEWEST else None
+    found = fit(seen, ar1.models[0]) if len(seen.values.x) >= FEWEST else None
     return ar1 if found is None else Predicting(**vars(ar1), other=found)
 
 
@@ -138,7 +120,11 @@ MODELS: dict[str, FrequencyModel] = {
     DEFAULT: FrequencyModel(
         _default, "AR1s and a GP that ignores the simulation, averaged by their evidence", False
     ),
-    "gp": FrequencyModel(_gp, "a GP of the measurements alone, without the simulation", False),
+    "gp": FrequencyModel(
+        lambda seen: _ar1(seen.alone),
+        "a GP of the measurements alone, without the simulation",
+        False,
+    ),
     "ar1": FrequencyModel(
         _ar1, "the simulation times a factor, plus a GP (Kennedy & O'Hagan 2000)"
     ),

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.frf import synthesis
+from planner.inference.per_pose import PerPose
 
 FREQUENCY_REACH = 5.0  # sds of a frequency over which is integrated
 FREQUENCY_STEP = 0.5  # at most, in sds and in half widths of the resonance
@@ -20,7 +21,7 @@ LARGEST_DAMPING = 0.95  # of a mode; beyond it there would be no oscillation
 
 
 @dataclass(frozen=True, eq=False)
-class ModalPrediction:
+class ModalPrediction(PerPose):
     """Predicted modes at q poses with their sd; shapes (q, k) and (q, k, 3, 3).
 
     `residue_sd` is that of the real and of the imaginary part each (their mean square).
@@ -45,14 +46,13 @@ def frf_moments(
     mean = np.empty((q, 3, 3, lines), dtype=complex)
     sd = np.empty((q, 3, 3, lines))
     for i in range(q):
-        half_width = prediction.damping_ratio[i] * prediction.frequency_hz[i]
-        zf, zd, weights = _nodes(float(np.max(prediction.frequency_sd_hz[i] / half_width)))
-        f = log_normal(prediction.frequency_hz[i], prediction.frequency_sd_hz[i], zf[:, None])
-        zeta = log_normal(prediction.damping_ratio[i], prediction.damping_sd[i], zd[:, None])
+        one = prediction[i]
+        half_width = one.damping_ratio * one.frequency_hz
+        zf, zd, weights = _nodes(float(np.max(one.frequency_sd_hz / half_width)))
+        f = log_normal(one.frequency_hz, one.frequency_sd_hz, zf[:, None])
+        zeta = log_normal(one.damping_ratio, one.damping_sd, zd[:, None])
         poles = synthesis.pole(f, np.minimum(zeta, LARGEST_DAMPING))  # (nodes, k)
-        mean[i], sd[i] = _modal_sum(
-            prediction.residue[i], prediction.residue_sd[i], poles, weights, frequency_hz
-        )
+        mean[i], sd[i] = _modal_sum(one.residue, one.residue_sd, poles, weights, frequency_hz)
     return mean, sd
 
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
-from planner.surrogate.ar1 import OutputPrior
+from planner.inference.per_pose import PerPose
+from planner.surrogate.ar1 import FusionData, OutputPrior
 from planner.surrogate.average import PRIOR_BELIEF, Average, fit_hedged, fit_shapes
 from planner.surrogate.frequency_models import DEFAULT, KERNEL, MODELS, FrequencyData
 from planner.surrogate.frf_bands import ModalPrediction
@@ -41,7 +42,7 @@ RESIDUE_SAMPLES, RESIDUE_KEPT = 64, 8
 
 
 @dataclass(frozen=True, eq=False)
-class ModalObservations:
+class ModalObservations(PerPose):
     """Measured modes by label at n poses, x (n, d); NaN where a mode or a column is missing."""
 
     x: np.ndarray
@@ -52,10 +53,6 @@ class ModalObservations:
     residue: np.ndarray  # (n, k, 3, 3)
     residue_sd: np.ndarray
     simulated: SimulatedModes
-
-    def at(self, poses: np.ndarray | slice) -> "ModalObservations":
-        """Those of some poses."""
-        return ModalObservations(*(values[poses] for values in vars(self).values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +89,18 @@ class Surrogate:
 
     def with_residues(self, seen: ModalObservations, identified: bool = False) -> "Surrogate":
         """The same with the residues fitted too, which may be exacter than those it has `seen`."""
-        scale = _scale(seen)
-        return replace(self, residue=_fit_residues(seen, scale, identified), scale=scale)
+        k, scale = self.count, _scale(seen)
+        wide = np.repeat(scale, 18)
+        parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
+        low = residue_parts(seen.simulated.residue) / wide
+        given = FusionData(
+            TrainingData(seen.x, residue_parts(seen.residue) / wide, parts_sd / wide, low),
+            (RESIDUE_PRIOR_IDENTIFIED if identified else RESIDUE_PRIOR,) * (18 * k),
+            (RESIDUE_PRIOR_ALONE,) * (18 * k),
+            np.zeros(18 * k),
+        )
+        residue = fit_hedged(given, RESIDUE_SAMPLES, RESIDUE_KEPT)
+        return replace(self, residue=residue, scale=scale)
 
     def frequency_inputs(self, simulated: SimulatedModes) -> np.ndarray:
         """Centred low fidelity (q, k) of the frequency outputs."""
@@ -202,14 +209,14 @@ def fit_damping(
     """
     y = _log(seen.damping_ratio)
     low = _log(seen.simulated.damping_ratio) if identified else np.full_like(y, np.nan)
-    return fit_shapes(
+    given = FusionData(
         TrainingData(seen.x, y, seen.damping_sd / np.exp(y), low),
         (DAMPING_PRIOR_IDENTIFIED,) * y.shape[1],
         (DAMPING_PRIOR,) * y.shape[1],
         _centre(low, np.full(y.shape[1], np.nan)),
-        (kernel,) if kernel else DAMPING_KERNELS,
-        blind=identified and bool(np.isfinite(y).any()),  # nothing measured is no reason to doubt
     )
+    doubted = identified and bool(np.isfinite(y).any())  # nothing measured is no reason to doubt
+    return fit_shapes(given, (kernel,) if kernel else DAMPING_KERNELS, doubted)
 
 
 def fit_surrogate(
@@ -231,24 +238,9 @@ def fit_surrogate(
     """
     if primary is None:
         primary = fit_primary(seen, kernel=kernel)
-    scale = _scale(seen)
-    residue = _fit_residues(seen, scale, identified) if residues else None
-    return Surrogate(primary, fit_damping(seen, identified, kernel), residue, scale)
-
-
-def _fit_residues(seen: ModalObservations, scale: np.ndarray, identified: bool) -> Average:
-    """Fit the real and imaginary parts of every label's residues, in units of `scale`."""
-    k, wide = len(scale), np.repeat(scale, 18)
-    parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
-    low = residue_parts(seen.simulated.residue) / wide
-    return fit_hedged(
-        TrainingData(seen.x, residue_parts(seen.residue) / wide, parts_sd / wide, low),
-        (RESIDUE_PRIOR_IDENTIFIED if identified else RESIDUE_PRIOR,) * (18 * k),
-        (RESIDUE_PRIOR_ALONE,) * (18 * k),
-        np.zeros(18 * k),
-        RESIDUE_SAMPLES,
-        RESIDUE_KEPT,
-    )
+    damping = fit_damping(seen, identified, kernel)
+    found = Surrogate(primary, damping, None, np.ones(seen.frequency_hz.shape[1]))
+    return found.with_residues(seen, identified) if residues else found
 
 
 def _centre(low: np.ndarray, default: np.ndarray) -> np.ndarray:

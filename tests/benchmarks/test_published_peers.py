@@ -87,7 +87,7 @@ def own_nargp(d: Design, theta_low=None, theta_high=None) -> tuple[NARGP, float]
     if theta_low is None or theta_high is None:
         # Its noise is held, as in emukit, whose intermediate levels have a variance of 1e-4.
         low = fit_likelihood(cheap, "rbf", NOISE, starts=LOW_STARTS)
-        model = fit_nargp(measured, low, same, NOISE, same, STARTS)
+        model = fit_nargp(measured, low, same, noise=NOISE, units=same, starts=STARTS)
     else:
         low = at_hyperparameters(cheap, "rbf", theta_low, same)
         below = np.column_stack([d.x_high, low.predict(d.x_high)[0]])

@@ -39,7 +39,7 @@ def test_integrated_variance_is_that_of_an_actual_refit(surrogate, weights):
 
 def test_planned_poses_count_as_if_measured(surrogate):
     outputs, poses = over(surrogate, X, 30)
-    outputs, low = outputs.planning(poses.one(40)), poses.low
+    outputs, low = outputs.planning(poses[[40]]), poses.low
     _, _, variance = outputs.covariance(1, poses[:1], outputs.workspace.poses)
     assert np.mean(variance) == pytest.approx(
         conditioned_variance(outputs, 1, X[40], low[40, 1]), rel=1e-6

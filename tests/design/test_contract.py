@@ -1,22 +1,27 @@
-"""Closed forms against what they claim: refits, determinants, finite differences, brute force."""
+"""Closed forms against what they claim: refits, determinants, differences, brute force, trials."""
 
 import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from planner.design.acquisitions import (
     SUBSETS,
+    _wrong,
     goal,
     mixed,
     mutual_information,
     parameter_reduction,
     reduction,
     repeat_gain,
+    share_left,
+    stability,
+    with_margins,
 )
 from planner.design.cost import Cost, axis_shares, best_axes, shortest_tour
-from planner.design.frequency_posterior import FrequencyOutputs, Target
+from planner.design.frequency_posterior import FrequencyOutputs, Margins, Target
 from planner.design.parameter_sensitivity import FrfNoise, UncertainParameters
 from planner.design.propose import ACQUISITIONS, Travel
 from planner.design.stopping import forecast, left_out, mean_squares
@@ -60,7 +65,7 @@ def test_planning_a_pose_leaves_less_to_gain_there(surrogate, name):
     score = ACQUISITIONS[name](outputs, poses)
     assert score.shape == (len(X),)
     assert np.isfinite(score).all()
-    best = poses.one(int(np.argmax(score)))
+    best = poses[[int(np.argmax(score))]]
     after = ACQUISITIONS[name](outputs.planning(best), best)
     assert after[0] < score.max()
 
@@ -83,7 +88,7 @@ def test_parameters_are_refitted_as_foretold(surrogate):
         # Six parameters move four modes at twenty poses: the whole determinant counts.
         ratio = np.linalg.slogdet(sigma)[1] - np.linalg.slogdet(refit)[1]
         assert told[i] == pytest.approx(ratio / 2, rel=1e-6)
-        planned = outputs.planning(poses.one(i))
+        planned = outputs.planning(poses[[i]])
         np.testing.assert_allclose(
             planned.covariance_root @ planned.covariance_root.T, refit, atol=1e-9
         )
@@ -91,7 +96,7 @@ def test_parameters_are_refitted_as_foretold(surrogate):
 
 def test_more_axes_tell_more(surrogate):
     outputs, poses = with_parameters(surrogate, X)
-    pose = poses.one(3)
+    pose = poses[[3]]
     gain = [parameter_reduction(outputs, pose, outputs.workspace, axes)[0] for axes in SUBSETS]
     for i, a in enumerate(SUBSETS):
         for j, b in enumerate(SUBSETS):
@@ -111,7 +116,7 @@ def test_mixed_and_goal_add_up(surrogate):
 
 def test_a_goal_draws_the_proposal_to_itself(surrogate):
     outputs, poses = over(surrogate, X, 30)
-    there = Target.evenly(poses.one(77))
+    there = Target.evenly(poses[[77]])
     at_goal = FrequencyOutputs.of(surrogate, outputs.workspace, there)
     best = int(np.argmax(goal(at_goal, poses)))
     assert np.linalg.norm(X[best] - X[77]) < 0.15
@@ -226,7 +231,7 @@ def test_forecast_speaks_of_its_own_samples(surrogate):
     squares = mean_squares(outputs)
     total = np.sum([outputs.variance(k, poses[:64]) / 64 / 4 for k in range(4)])
     assert np.mean(squares) >= 0.8 * total  # and the doubt about hyperparameters besides
-    best = poses.one(int(np.argmax(mixed(outputs, poses))))
+    best = poses[[int(np.argmax(mixed(outputs, poses)))]]
     found = forecast(outputs, best, 1.0, 0.95)
     assert 0 < found.rmse_percent < found.bound_percent
     assert found.gain_percent > 0
@@ -281,10 +286,10 @@ def test_axes_are_saved_where_one_shows_every_mode(surrogate):
     along_x = np.tile([0.8, 0.1, 0.1], (4, 1))
     hidden = along_x.copy()
     hidden[2] = [0.01, 0.5, 0.49]  # mode 3 does not show along x
-    assert best_axes(outputs, poses.one(60), along_x, cost, 0.0) == (0,)
-    assert best_axes(outputs, poses.one(60), hidden, cost, 0.0) in ((1,), (2,))
+    assert best_axes(outputs, poses[[60]], along_x, cost, 0.0) == (0,)
+    assert best_axes(outputs, poses[[60]], hidden, cost, 0.0) in ((1,), (2,))
     free = Cost(np.ones(6), per_pose=1.0, per_hit=1e-9)
-    assert best_axes(outputs, poses.one(60), along_x, free, 0.0) == (0, 1, 2)
+    assert best_axes(outputs, poses[[60]], along_x, free, 0.0) == (0, 1, 2)
 
 
 def test_shares_of_the_axes_add_up():
@@ -292,3 +297,58 @@ def test_shares_of_the_axes_add_up():
     residue = rng.standard_normal((5, 2, 3, 3)) + 1j * rng.standard_normal((5, 2, 3, 3))
     residue[1, 1] = np.nan
     np.testing.assert_allclose(axis_shares(residue).sum(axis=2), 1.0)
+
+
+PATH = np.array([100, 105, 110])
+
+
+def asked(surrogate, margin, sd=0.1, parameters=True):
+    """Outputs with margins at three of the candidates, which hang on two labels."""
+    outputs, poses = with_parameters(surrogate, X) if parameters else over(surrogate, X, 20)
+    slope = np.tile([2.0, -1.0, 0.0, 0.0], (3, 1))
+    there = Margins(poses[PATH], np.array(margin), np.full(3, sd), slope, np.zeros(3))
+    return with_margins(outputs, there), poses
+
+
+def test_what_is_foretold_of_a_pose_is_what_planning_it_leaves(surrogate):
+    outputs, poses = asked(surrogate, [0.1, -0.1, 0.0])
+    assert share_left(outputs) == pytest.approx(np.ones(3))
+    foretold = share_left(outputs, poses)
+    for i in (3, 50, 105):
+        planned = share_left(outputs.planning(poses[[i]]))
+        assert planned == pytest.approx(foretold[i], rel=1e-6)
+        assert np.all(planned < 1)
+
+
+def test_wrong_answers_are_those_of_trials(surrogate):
+    """Draw what is measured, answer by the new mean, and count against what is true."""
+    outputs, _ = asked(surrogate, [0.05, -0.12, 0.3])
+    margins, left = outputs.margins, np.array([0.3, 0.6, 0.9])
+    assert margins is not None
+    rng = np.random.default_rng(1)
+    mean = margins.margin + margins.sd * np.sqrt(1 - left) * rng.standard_normal((200_000, 3))
+    true = mean + margins.sd * np.sqrt(left) * rng.standard_normal(mean.shape)
+    wrong = np.mean((mean > 0) != (true > 0), axis=0)
+    assert _wrong(margins, left) == pytest.approx(wrong, abs=0.01)  # by 15 nodes, over a kink
+    nothing = _wrong(margins, np.ones(3))
+    assert nothing == pytest.approx(norm.cdf(-np.abs(margins.margin) / margins.sd))
+
+
+def test_it_measures_where_the_answer_is_open(surrogate):
+    """Where poses tell little of each other: the one whose margin is about zero."""
+    for pose in range(3):
+        margin = np.where(np.arange(3) == pose, 0.01, 2.0)
+        outputs, poses = asked(surrogate, margin, parameters=False)
+        score = stability(outputs, poses[PATH])
+        assert np.argmax(score) == pose
+        assert np.all(score >= 0)
+
+
+def test_more_measurements_do_not_make_more_mistakes(surrogate):
+    outputs, poses = asked(surrogate, [0.05, -0.05, 0.1])
+    first = stability(outputs, poses)
+    after = stability(outputs.planning(poses[[int(np.argmax(first))]]), poses)
+    assert np.all(first > -1e-9)
+    assert after.max() < first.max()
+    without = replace(outputs, margins=None)
+    assert np.all(stability(without, poses) > 0)

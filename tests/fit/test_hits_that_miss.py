@@ -87,7 +87,10 @@ def test_hits_beside_their_points_under_a_chain_that_errs_are_those_of_the_truth
     aim = HitError(np.array([0.03, -0.02, 0.0]), np.array([0.004, 0.003, 0.0]))
     place, mixing = (0.004, -0.006, 0.005), np.eye(3) + 0.02 * np.arange(9.0).reshape(3, 3) / 9
     moved_ = replace(truth, sensor_offset_m=place)
-    s, matrices = np.tile(2j * np.pi * LINES, (2, 1)), simulation.elastic.with_slopes(Q[:2])
+    s, matrices = (
+        np.tile(2j * np.pi * LINES, (2, 1)),
+        simulation.elastic.matrices(Q[:2], slopes=True),
+    )
     h = moved(matrices, simulation.elasticity, s).accelerance
     numbers = NuisanceCounts.of(h)
     eta = np.zeros((2, numbers.known + 6))
@@ -118,7 +121,7 @@ def test_misses_are_told(folder):
     simulation = Simulation(Robot.load(folder))
     rng = np.random.default_rng(2)
     s = np.tile(2j * np.pi * HZ + RATE, (len(POSES), 1))
-    matrices = simulation.elastic.with_slopes(POSES)
+    matrices = simulation.elastic.matrices(POSES, slopes=True)
     motion = moved(matrices, simulation.elasticity, s)
     h = motion.accelerance
     changes = basis(h, motion, s, T)

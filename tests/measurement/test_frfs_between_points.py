@@ -87,7 +87,7 @@ def test_slopes_by_joint_angles_hold_between_points(toml: Path) -> None:
         matrices = simulation.elastic.matrices(q + off, layout=WIDE)
         return response(matrices, simulation.elasticity, s)
 
-    matrices = simulation.elastic.with_slopes(q, WIDE)
+    matrices = simulation.elastic.matrices(q, layout=WIDE, slopes=True)
     by_angle = moved(matrices, simulation.elasticity, s).by_angle
     assert by_angle is not None
     for joint, unit in list(enumerate(np.eye(4)))[1:]:  # turning about the vertical changes nothing

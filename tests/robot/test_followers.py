@@ -167,7 +167,7 @@ def test_mass_and_gravity_are_those_of_all_that_moves(folder, seed):
 def test_slopes_by_angles_and_sag_know_of_followers(folder, seed):
     robot, _, _ = both(folder, seed)
     q, model = drawn_pose(robot, seed)[None], ElasticModel(robot)
-    told = model.with_slopes(q).by_angle
+    told = model.matrices(q, slopes=True).by_angle
     inertia = model.body_jacobians(q)
     assert inertia.shape[1] == LEADS + FOLLOWERS
     for joint, step in enumerate(1e-5 * np.eye(LEADS)):

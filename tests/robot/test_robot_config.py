@@ -31,7 +31,7 @@ LAW = """[[law]]
 joint = "{}"
 kind = "{}"
 {}
-[[obstacle]]"""
+"""
 BENT = "stiffness_n_m_rad = {}\nangle_rad = {}"
 INERTIA = "inertia_kg_m2 = [0.01, 0, 0, 0.01, 0, {}]\n"
 
@@ -65,73 +65,58 @@ WRONG_TOML = {
         ["loss_factor"],
     ),
     "a huge loss factor": ("damping = 18.0", "damping = 18.0\nloss_factor = 5.0", ["below 2"]),
-    "ties of unequals": (
-        "[[obstacle]]",
-        TIED.format(1, 2.0e4) + TIED.format(2, 3.0e4) + "[[obstacle]]",
-        ["number 8", "joint_a2", '"all"', "stiffness", "30000"],
-    ),
-    "a payload without mass": (
-        "[[obstacle]]",
-        PAYLOAD.format(0.0, 0.1) + "[[obstacle]]",
-        ["[[payload]]", "above 0 kg"],
-    ),
-    "a payload in mm": (
-        "[[obstacle]]",
-        PAYLOAD.format(2.0, 150.0) + "[[obstacle]]",
-        ["number 1", "com_m", "in m"],
-    ),
-    "an impossible payload": (
-        "[[obstacle]]",
-        PAYLOAD.format(2.0, 0.1) + INERTIA.format(-1.0) + "[[obstacle]]",
-        ["inertia", "no body can have"],
-    ),
-    "a payload on nothing": (
-        "[[obstacle]]",
-        PAYLOAD.format(2.0, 0.1).replace("tool", "hook") + "[[obstacle]]",
-        ["[[payload]]", '"hook"'],
-    ),
-    **{
-        f"a law, {name}": ("[[obstacle]]", LAW.format(joint, kind, numbers), ["[[law]]", *words])
-        for name, joint, kind, numbers, words in (
-            ("of no joint", "elbow", "hardening", BENT.format(1e4, 1e-3), ["elbow", "joint_a1"]),
-            (
-                "with the numbers of another",
-                "joint_a1",
-                "friction",
-                BENT.format(1e4, 1e-3),
-                ["friction", "angle_rad", "coulomb_torque_n_m"],
-            ),
-            (
-                "of a joint that slides",
-                "joint_a1",
-                "backlash",
-                "stiffness_n_m = 1.0\nshift_m = 1.0",
-                ["backlash", "shift_m", "give stiffness_n_m_rad and angle_rad"],
-            ),
-            ("without numbers", "joint_a1", "softening", "", ["neither"]),
-            ("below 0", "joint_a1", "hardening", BENT.format(-1e4, 1e-3), ["above 0"]),
-            ("no number", "joint_a1", "hardening", BENT.format(1e4, "nan"), ["angle_rad"]),
-            ("more than the spring", "joint_a1", "softening", BENT.format(7e4, 1e-3), ["6e+04"]),
-            (
-                "endless in the spring",
-                "joint_a1",
-                "hardening",
-                BENT.format(1e4, 1e-3) + "\nin_spring = inf",
-                ["in_spring"],
-            ),
-        )
-    },
-    "a law of no kind": (
-        "[[obstacle]]",
-        LAW.format("joint_a1", "rubber", ""),
-        ["rubber", "law", "softening", "backlash"],
-    ),
-    "a pulse of none": ("[[obstacle]]", "[hammer]\npulse_ms = 0\n[[obstacle]]", ["pulse_ms"]),
     "a flat obstacle": (SIZES, "size_m = [4, 4, 0]", ["floor", "above 0 m"]),
     "a tool unknown": ('tcp_frame = "tool"', 'tcp_frame = "tol"', ["tcp_frame", '"tol"']),
     "a sensor unknown": ('"accelerometer"', '"adxl"', ["sensor_frame", '"adxl"']),
     "a URDF that is missing": ('"arm.urdf"', '"leg.urdf"', ["leg.urdf", "does not exist"]),
     "a folder for a URDF": ('"arm.urdf"', '"."', ["cannot be read"]),
+}
+# What is wrong in a block that is added: (the block, words that the sentence has to hold).
+ADDED = {
+    "ties of unequals": (
+        TIED.format(1, 2.0e4) + TIED.format(2, 3.0e4),
+        ["number 8", "joint_a2", '"all"', "stiffness", "30000"],
+    ),
+    "a payload without mass": (PAYLOAD.format(0.0, 0.1), ["[[payload]]", "above 0 kg"]),
+    "a payload in mm": (PAYLOAD.format(2.0, 150.0), ["number 1", "com_m", "in m"]),
+    "an impossible payload": (
+        PAYLOAD.format(2.0, 0.1) + INERTIA.format(-1.0),
+        ["inertia", "no body can have"],
+    ),
+    "a payload on nothing": (
+        PAYLOAD.format(2.0, 0.1).replace("tool", "hook"),
+        ["[[payload]]", '"hook"'],
+    ),
+    "a law of no joint": (
+        LAW.format("elbow", "hardening", BENT.format(1e4, 1e-3)),
+        ["[[law]]", "elbow", "joint_a1"],
+    ),
+    "a law with the numbers of another": (
+        LAW.format("joint_a1", "friction", BENT.format(1e4, 1e-3)),
+        ["[[law]]", "friction", "angle_rad", "coulomb_torque_n_m"],
+    ),
+    "a law of a joint that slides": (
+        LAW.format("joint_a1", "backlash", "stiffness_n_m = 1.0\nshift_m = 1.0"),
+        ["[[law]]", "backlash", "shift_m", "give stiffness_n_m_rad and angle_rad"],
+    ),
+    "a law without numbers": (LAW.format("joint_a1", "softening", ""), ["[[law]]", "neither"]),
+    **{
+        f"a law, {words[0]}": (LAW.format("joint_a1", kind, numbers), ["[[law]]", *words])
+        for kind, numbers, words in (
+            ("hardening", BENT.format(-1e4, 1e-3), ["above 0"]),
+            ("hardening", BENT.format(1e4, "nan"), ["angle_rad"]),
+            ("softening", BENT.format(7e4, 1e-3), ["6e+04"]),
+            ("hardening", BENT.format(1e4, 1e-3) + "\nin_spring = inf", ["in_spring"]),
+        )
+    },
+    "a law of no kind": (
+        LAW.format("joint_a1", "rubber", ""),
+        ["rubber", "law", "softening", "backlash"],
+    ),
+    "a pulse of none": ("[hammer]\npulse_ms = 0\n", ["pulse_ms"]),
+}
+WRONG_TOML |= {
+    name: ("[[obstacle]]", f"{block}[[obstacle]]", words) for name, (block, words) in ADDED.items()
 }
 WRONG_URDF = {
     "cut off": ("</robot>", "", ["not a readable URDF"]),

@@ -3,13 +3,15 @@
 `pytest -m slow tests/surrogate/test_averaging.py` takes more points.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
 
 from planner.errors import InputError
 from planner.surrogate import gp
-from planner.surrogate.ar1 import OutputPrior, fit_ar1
+from planner.surrogate.ar1 import FusionData, OutputPrior, fit_ar1
 from planner.surrogate.importance import normal_points, sample
 from planner.surrogate.likelihood import maximise
 from planner.surrogate.training_data import Padded, Prior, TrainingData
@@ -69,7 +71,7 @@ def brute_force(training, samples=20000):
 @pytest.mark.parametrize(("n", "seed"), [(3, 1), pytest.param(6, 2, marks=pytest.mark.slow)])
 def test_few_samples_stand_for_twenty_thousand(n, seed):
     training = problem(n, seed)
-    fitted = fit_ar1(training, (PRIOR,), (PRIOR,), np.zeros(1), 256, 32)
+    fitted = fit_ar1(FusionData(training, (PRIOR,), (PRIOR,), np.zeros(1)), 256, 32)
     mean, sd = (a[:, 0] for a in fitted.predict(QUERY, low(QUERY)))
     exact_mean, exact_sd, effective, inside = brute_force(training)
     assert effective > 300  # else brute force itself would prove nothing
@@ -102,7 +104,7 @@ def test_what_no_jitter_mends_is_said_in_words():
     broken = problem(3, 0)
     x = np.where(np.arange(3)[:, None] == 1, np.nan, broken.x)  # a pose without coordinates
     with pytest.raises(InputError, match="withdraw"):
-        fit_ar1(TrainingData(x, broken.y, broken.sd, broken.low), (PRIOR,), (PRIOR,), np.zeros(1))
+        fit_ar1(FusionData(replace(broken, x=x), (PRIOR,), (PRIOR,), np.zeros(1)))
 
 
 CENTRES = np.array([[0.5, -0.3, 0.2], [-1.0, 1.5, 0.8]])

@@ -1,11 +1,20 @@
-"""What every averaged model of one output has to do, and what each becomes in the right limit."""
+"""Models of one output, averaged and of the greatest likelihood: limits, integrals, what bends."""
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
-from planner.surrogate.kernels import perdikaris
+from planner.surrogate.kernels import parse, perdikaris
 from planner.surrogate.models.averaged import fit_averaged
-from planner.surrogate.models.likelihood_gp import Exact, Samples
+from planner.surrogate.models.likelihood_gp import (
+    Exact,
+    Normalisation,
+    Samples,
+    at_hyperparameters,
+    fit_growing,
+    fit_likelihood,
+    fit_nargp,
+)
 
 GRID = np.random.default_rng(8).random((40, 2))
 SPREAD = 0.5
@@ -98,3 +107,101 @@ def test_evidence_is_the_integral_over_the_prior():
         logs.append(-0.5 * (y @ np.linalg.solve(k, y) + np.linalg.slogdet(2 * np.pi * k)[1]))
     expected = np.log(np.mean(np.exp(logs)))
     assert fit_averaged(s).model.log_evidence[0] == pytest.approx(expected, abs=0.1)
+
+
+def points(n, seed=0):
+    x = np.random.default_rng(seed).random((n, 2))
+    return Samples.of(x, np.sin(5 * x[:, 0]) + x[:, 1] ** 2 + 7.0)
+
+
+def test_the_likelihood_is_that_of_one_normal_distribution():
+    s = points(9)
+    fitted = fit_likelihood(s, "rbf", starts=1)
+    k = fitted.units.scale**2 * parse("rbf", 2).covariance(np, fitted.theta, s.x, s.x)
+    k += np.exp(2 * fitted.theta[1]) * fitted.units.scale**2 * np.eye(9)
+    mean = np.full(9, fitted.units.centre)
+    direct = multivariate_normal(mean, k, allow_singular=True).logpdf(s.y)
+    np.testing.assert_allclose(fitted.log_likelihood, direct, rtol=1e-4)
+
+
+def test_many_points_are_fitted_as_likely_as_if_all_were_climbed_from_afar():
+    rng = np.random.default_rng(4)
+    x = rng.random((90, 2))
+    s = Samples.of(x, np.sin(9 * x[:, 0]) * x[:, 1] + 0.05 * rng.standard_normal(90))
+    grown, whole = fit_growing(s, (30, 60)), fit_likelihood(s)
+    assert grown.log_likelihood > whole.log_likelihood - 0.1
+    # The peak of a few points is not theirs.
+    few = fit_likelihood(Samples.of(x[:30], s.y[:30]))
+    there = at_hyperparameters(s, "rbf", few.theta, grown.units)
+    assert grown.log_likelihood > there.log_likelihood + 1
+
+
+def test_no_neighbour_of_the_hyperparameters_is_likelier():
+    s = points(12)
+    fitted = fit_likelihood(s, "rbf", noise=0.1)
+    y = (s.y - fitted.units.centre) / fitted.units.scale
+
+    def value(theta):
+        k = parse("rbf", 2).covariance(np, theta, s.x, s.x) + 0.01 * np.eye(12)
+        return multivariate_normal(np.zeros(12), k).logpdf(y)
+
+    best = value(fitted.theta)
+    for i in (0, 2, 3):
+        for step in (-0.05, 0.05):
+            assert value(fitted.theta + step * (np.arange(4) == i)) < best
+
+
+def test_an_isotropic_kernel_has_one_length_scale_and_a_lower_peak():
+    s = points(14)
+    free, tied = (fit_likelihood(s, noise=0.1, isotropic=isotropic) for isotropic in (False, True))
+    assert tied.theta[2] == tied.theta[3]
+    assert free.theta[2] != free.theta[3]
+    assert tied.log_likelihood < free.log_likelihood
+    only_length = points(14)
+    only_length.x[:, 1] = 0.5  # nothing varies along it: both find the same peak
+    free, tied = (
+        fit_likelihood(only_length, noise=0.1, isotropic=isotropic) for isotropic in (False, True)
+    )
+    np.testing.assert_allclose(tied.log_likelihood, free.log_likelihood, atol=1e-3)
+
+
+def test_the_level_below_is_integrated_over():
+    """By quadrature as by a great many points of it."""
+
+    class Unsure(Exact):
+        def predict(self, x):
+            return self.function(x), np.full(len(x), 0.2)
+
+    rng = np.random.default_rng(0)
+    x = rng.random((12, 1))
+    low = Unsure(lambda x: np.sin(6 * x[:, 0]))
+    model = fit_nargp(Samples.of(x, np.sin(6 * x[:, 0]) ** 2 + x[:, 0]), low, Normalisation(0, 1))
+    at = np.linspace(0.1, 0.9, 5)[:, None]
+    mean, sd = model.predict(at)
+    draws = low.function(at)[:, None] + 0.2 * rng.standard_normal((5, 40_000))
+    wide = np.column_stack([np.repeat(at, 40_000, axis=0), draws.reshape(-1)])
+    each, spread = (part.reshape(5, -1) for part in model.high.predict(wide))
+    np.testing.assert_allclose(mean, each.mean(axis=1), atol=0.01)
+    total = np.sqrt(np.mean(spread**2, axis=1) + np.var(each, axis=1))
+    np.testing.assert_allclose(sd, total, rtol=0.02)
+
+
+def test_it_bends_where_a_line_cannot():
+    """Perdikaris et al. 2017, section 3.1: y = (x − √2) l²."""
+
+    def wave(x):
+        return np.sin(8 * np.pi * x[:, 0])
+
+    def bent(x):
+        return (x[:, 0] - 2**0.5) * wave(x) ** 2
+
+    cheap, x = np.linspace(0, 1, 50)[:, None], np.linspace(0, 1, 14)[:, None]
+    low = fit_likelihood(Samples.of(cheap, wave(cheap)), noise=1e-3)
+    model = fit_nargp(Samples.of(x, bent(x)), low, low.units, noise=1e-3)
+    grid = np.linspace(0, 1, 101)[:, None]
+    mean, sd = model.predict(grid)
+    alone = fit_likelihood(Samples.of(x, bent(x)), noise=1e-3).predict(grid)[0]
+    off = np.sqrt(np.mean((mean - bent(grid)) ** 2))
+    assert off < 0.1 * np.sqrt(np.mean((alone - bent(grid)) ** 2))
+    assert off < 0.03
+    assert np.all(sd >= 0)

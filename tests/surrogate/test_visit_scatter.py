@@ -1,4 +1,4 @@
-"""The scatter from visit to visit is learned, by all modes together, and is in predicted sds.
+"""The scatter from visit to visit is learned, and is in predicted sds; what damping is believed.
 
 Frequencies of true robots (MuJoCo): a visit's ln f is the pose's plus scatter, half of its variance
 common to all modes, half each mode's own; EMA adds a noise whose sd it states.
@@ -17,7 +17,12 @@ from planner.proof.arms import ARMS
 from planner.proof.deviation import Deviation, Spring
 from planner.proof.load import load_truth
 from planner.surrogate.importance import normal_points, sample
-from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, fit_surrogate
+from planner.surrogate.modal_surrogate import (
+    ModalObservations,
+    fit_damping,
+    fit_primary,
+    fit_surrogate,
+)
 from tests.support.surrogates import observed, simulated, true_hz
 
 MODES, POOL, NEW_VISITS = 4, 150, 100
@@ -182,3 +187,45 @@ def test_further_poses_narrow_the_mean_and_not_a_visit():
     assert (share < 0.02).all()
     off = np.log(visit.frequency_hz / true_hz(x, 1.12))
     assert np.sqrt(np.mean(off**2)) < 0.02
+
+
+MEASURED, ASKED = 10, 60
+
+
+def cell(seed, follows):
+    """Poses, the simulation's damping (n, 3), and the robot's, which follows it or does not."""
+    rng = np.random.default_rng(seed)
+    x = rng.random((MEASURED + ASKED, 2))
+    over = np.exp(1.2 * (x[:, :1] - 0.5) + 0.5 * np.sin(4 * x[:, 1:]))
+    simulated = 0.03 * over * np.array([1.0, 1.2, 1.5])
+    true = 1.05 * simulated if follows else np.full_like(simulated, 0.035)
+    scatter = 0.02 if follows else 0.35
+    return x, simulated, true * np.exp(scatter * rng.standard_normal(true.shape))
+
+
+def predicted(x, simulated, zeta):
+    """ln ζ (ASKED, 3) and its sd by a simulation that was identified from the measured poses."""
+    n = MEASURED
+    f = np.broadcast_to(np.array([10.0, 20.0, 30.0]), (n, 3))
+    residue = np.ones((n, 3, 3, 3))
+    modes = SimulatedModes(f, simulated[:n], residue.astype(complex))
+    seen = ModalObservations(
+        x[:n], f, 0.01 * f, zeta[:n], 0.02 * zeta[:n], residue.astype(complex), residue, modes
+    )
+    return fit_damping(seen, identified=True).predict(x[n:], np.log(simulated[n:]))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("follows", [False, True])
+def test_damping_is_predicted_by_the_simulation_only_where_it_follows_it(seed, follows):
+    x, simulated, zeta = cell(seed, follows)
+    mean, sd = predicted(x, simulated, zeta)
+    true = np.log(zeta[MEASURED:])
+    off = np.sqrt(np.mean((mean - true) ** 2))
+    if follows:
+        assert off < 0.05
+        assert sd.max() < 0.1
+    else:
+        constant = np.log(zeta[:MEASURED]).mean(axis=0)
+        same = np.sqrt(np.mean((constant - true) ** 2))
+        assert off < 1.1 * same  # 1.3 to 1.7 times, where the simulation is believed

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import elementwise
 from scipy.special import ndtr
 
-from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
+from planner.surrogate.ar1 import AR1, FusionData, OutputPrior, fit_ar1
 from planner.surrogate.models.likelihood_gp import (
     Exact,
     Normalisation,
@@ -46,7 +46,7 @@ class AveragedModel:
         stray far.
         """
         below = np.full(len(x), np.nan) if self.low is None else self.low.predict(x)[0]
-        base, offset = self.model.split(self.low_units.normalised(below)[:, None])
+        base, offset, _ = self.model.split(self.low_units.normalised(below)[:, None])
         x = widened(x, below, self.low_units) if self.sees_low else x
         means, variances = self.model.outputs[0].predictive(x, offset[:, 0])
         sds = np.sqrt(np.maximum(variances, np.finfo(float).tiny))
@@ -85,7 +85,7 @@ def fit_averaged(
     )
     middle = np.full(1, np.nan if low is None else 0.0)
     counts = (256, 32) if n <= MANY or low is not None else (32, 4)
-    model = fit_ar1(data, (prior,), (prior,), middle, *counts, kernel=kernel, thorough=True)
+    model = fit_ar1(FusionData(data, (prior,), (prior,), middle), *counts, kernel, thorough=True)
     return AveragedModel(low, model, low_units, units, sees_low)
 
 

@@ -107,31 +107,25 @@ class Grid:
     pose: np.ndarray
     amplitude: np.ndarray
 
+    def scaled(self, origin: np.ndarray, extent: np.ndarray) -> "Grid":
+        """Frequency and pose less their `origin` (2,), over their `extent` (2,)."""
+        lines = (self.frequency_hz - origin[0]) / extent[0]
+        return Grid(lines, (self.pose - origin[1]) / extent[1], self.amplitude)
 
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """Frequency and pose as the models want them, 0 to 1."""
-
-    origin: np.ndarray
-    extent: np.ndarray
-
-    def axes(self, frequency_hz: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Scaled lines (f,) and poses (p,)."""
-        (first, lowest), (lines, poses) = self.origin, self.extent
-        return (frequency_hz - first) / lines, (pose - lowest) / poses
-
-    def points(self, frequency_hz: np.ndarray, pose: np.ndarray) -> np.ndarray:
-        """All pairs (f·p, 2) of them."""
-        a, b = self.axes(frequency_hz, pose)
-        return np.column_stack([np.repeat(a, len(b)), np.tile(b, len(a))])
+    @property
+    def points(self) -> np.ndarray:
+        """All pairs (f·p, 2) of frequency and pose."""
+        f, p = len(self.frequency_hz), len(self.pose)
+        return np.column_stack([np.repeat(self.frequency_hz, p), np.tile(self.pose, f)])
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Fitted; `model` gives the amplitude, or its `logarithm`, over scaled coordinates."""
+    """Fitted; `model` gives the amplitude, or its `logarithm`, over scaled coordinates, 0 to 1."""
 
     model: FidelityLevel
-    frame: Frame
+    origin: np.ndarray
+    extent: np.ndarray
     logarithm: bool = False
 
     def predict(self, frequency_hz: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +133,8 @@ class Surface:
 
         Of the logarithm: median amplitude, and the logarithm's sd.
         """
-        mean, sd = self.model.predict(self.frame.points(frequency_hz, pose))
+        asked = Grid(frequency_hz, pose, np.empty(0)).scaled(self.origin, self.extent)
+        mean, sd = self.model.predict(asked.points)
         shape = len(frequency_hz), len(pose)
         return (np.exp(mean) if self.logarithm else mean).reshape(shape), sd.reshape(shape)
 
@@ -160,29 +155,22 @@ def fit_surface(
     for grid in (measured, simulated):
         if not (grid.amplitude > 0).all():
             raise InputError("An amplitude is missing or not positive: leave its line out.")
-    lines = np.concatenate([measured.frequency_hz, simulated.frequency_hz])
-    poses = np.concatenate([measured.pose, simulated.pose])
-    extent = np.array([np.ptp(lines), np.ptp(poses)])
-    frame = Frame(np.array([lines.min(), poses.min()]), np.where(extent > 0, extent, 1.0))
+    points = np.vstack([measured.points, simulated.points])
+    origin, extent = points.min(axis=0), np.ptp(points, axis=0)
+    extent = np.where(extent > 0, extent, 1.0)
+    seen, low = (grid.scaled(origin, extent) for grid in (measured, simulated))
     if logarithm:
-        measured, simulated = (
-            replace(grid, amplitude=np.log(grid.amplitude)) for grid in (measured, simulated)
-        )
-    return Surface(_fitted(model, frame, measured, simulated, training), frame, logarithm)
+        seen, low = (replace(grid, amplitude=np.log(grid.amplitude)) for grid in (seen, low))
+    return Surface(_fitted(model, seen, low, training), origin, extent, logarithm)
 
 
-def _fitted(
-    model: str, frame: Frame, measured: Grid, simulated: Grid, training: Training
-) -> FidelityLevel:
+def _fitted(model: str, measured: Grid, simulated: Grid, training: Training) -> FidelityLevel:
     if model == "GP":
-        return fit_grid(*frame.axes(measured.frequency_hz, measured.pose), measured.amplitude)
-    cheap, seen = (
-        Samples.of(frame.points(grid.frequency_hz, grid.pose), grid.amplitude.ravel())
-        for grid in (simulated, measured)
-    )
+        return fit_grid(*vars(measured).values())
+    seen, cheap = (Samples.of(g.points, g.amplitude.ravel()) for g in (measured, simulated))
     if model == "MFDGP":
         return fit_mfdgp(cheap, seen, training)
-    low = fit_grid(*frame.axes(simulated.frequency_hz, simulated.pose), simulated.amplitude)
+    low = fit_grid(*vars(simulated).values())
     units = Normalisation.of(cheap.y)
     wide = Samples(widened(seen.x, low.predict(seen.x)[0], units), seen.y, seen.sd)
     return NARGP(low, fit_growing(wide, SOME_POINTS, perdikaris(2), STARTS), units)

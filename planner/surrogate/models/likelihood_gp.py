@@ -17,13 +17,14 @@ a linear kernel in l is one GP.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 from scipy.stats import qmc
 
 from planner.errors import InputError
+from planner.inference.per_pose import PerPose
 from planner.surrogate.kernels import parse, perdikaris
 from planner.surrogate.likelihood import RELATIVE_TOLERANCE, Peak, log_likelihood, maximise
 from planner.surrogate.training_data import capacity
@@ -50,7 +51,7 @@ STARTS = 5  # "five optimization runs" (Busch et al. 2022, section 2.3.1)
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class Samples(PerPose):
     """n values of one output: x (n, d), scaled to about [0, 1], y (n,) and its sd (n,)."""
 
     x: np.ndarray
@@ -65,8 +66,7 @@ class Samples:
         if x.shape[0] != len(y):
             raise InputError(f"{len(y)} values at {x.shape[0]} poses: give one value per pose.")
         sd = np.broadcast_to(np.nan_to_num(np.asarray(sd, dtype=float)), y.shape)
-        known = np.isfinite(y) & np.isfinite(x).all(axis=1)
-        return cls(x[known], y[known], sd[known])
+        return cls(x, y, sd)[np.isfinite(y) & np.isfinite(x).all(axis=1)]
 
 
 class FidelityLevel(Protocol):
@@ -175,9 +175,7 @@ def fit_growing(
     order, units = np.random.default_rng(0).permutation(len(samples.y)), Normalisation.of(samples.y)
     peaks: list[Peak] = []
     for count in (*counts, len(order)):
-        some = order[:count]
-        part = Samples(samples.x[some], samples.y[some], samples.sd[some])
-        hill = _Hill.of(part, kernel, None, units, isotropic=False)
+        hill = _Hill.of(samples[order[:count]], kernel, None, units, isotropic=False)
         if not peaks:
             ends = [hill.climb(z, *ROUGHLY) for z in hill.everywhere(starts)]
         else:
@@ -317,11 +315,8 @@ def fit_nargp(
     measured: Samples,
     low: FidelityLevel,
     low_units: Normalisation,
-    noise: float | None = None,
-    units: Normalisation | None = None,
-    starts: int = STARTS,
-    isotropic: bool = False,
     kernel: Callable[[int], str] = perdikaris,
+    **how: Any,
 ) -> NARGP:
     """NARGP of the measured samples over a cheap level, which is fitted already or exact.
 
@@ -329,13 +324,12 @@ def fit_nargp(
         measured: expensive values at x (n, d).
         low: the cheap level.
         low_units: by what the cheap level's value is normalised as an input.
-        noise, units, starts, isotropic: as of `fit_likelihood`.
         kernel: `perdikaris`, or `kennedy_ohagan` for AR1.
+        how: as of `fit_likelihood`.
     """
     below, _ = low.predict(measured.x)
     wide = Samples(widened(measured.x, below, low_units), measured.y, measured.sd)
-    expression = kernel(measured.x.shape[1])
-    high = fit_likelihood(wide, expression, noise, units, starts, isotropic)
+    high = fit_likelihood(wide, kernel(measured.x.shape[1]), **how)
     return NARGP(low, high, low_units)
 
 

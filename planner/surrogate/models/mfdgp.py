@@ -40,16 +40,10 @@ MOST_TO_BEGIN = 1500  # points from which q(u) begins
 
 
 @dataclass(frozen=True, eq=False)
-class TiedKernel:
-    """A kernel whose θ is `rows` times fewer numbers, some of which stand in it several times."""
+class TiedKernel(Kernel):
+    """A kernel of fewer θ, some of which stand in its own several times, as `rows` say."""
 
-    whole: Kernel
     rows: np.ndarray
-
-    @classmethod
-    def of(cls, expression: str, d: int) -> "TiedKernel":
-        """A plain kernel over d columns."""
-        return cls(parse(expression, d), np.eye(parse(expression, d).size))
 
     @classmethod
     def cutajar(cls, d: int) -> "TiedKernel":
@@ -61,15 +55,11 @@ class TiedKernel:
         text = f"rbf[:{d}]*linear{below}+rbf[:{d}]*rbf{below}+rbf[:{d}]"
         shared = one[2 : d + 2]
         rows = [one[0] + one[d + 2], one[1], *shared, 0 * one[0], one[0], *shared, *one[d + 3 :]]
-        return cls(parse(text, d + 1), np.array(rows))
+        return cls(**vars(parse(text, d + 1)), rows=np.array(rows))
 
     def covariance(self, xp: Any, theta: Any, xa: Any, xb: Any) -> Any:
         """See `Kernel.covariance`."""
-        return self.whole.covariance(xp, self.rows @ theta, xa, xb)
-
-    def variance(self, xp: Any, theta: Any, x: Any) -> Any:
-        """See `Kernel.variance`."""
-        return self.whole.variance(xp, self.rows @ theta, x)
+        return super().covariance(xp, theta @ self.rows.T, xa, xb)
 
 
 class Layer(NamedTuple):
@@ -133,8 +123,8 @@ def fit_mfdgp(cheap: Samples, measured: Samples, how: Training) -> MFDGP:
     # The cheap value nearest to a measured point begins as its f_1.
     near = np.argmin(np.sum((measured.x[:, None] - cheap.x[None]) ** 2, axis=-1), axis=1)
     wide = np.column_stack([measured.x, y_low[near]])
-    one, two = TiedKernel.of("rbf", d), TiedKernel.cutajar(d)
-    first = one.whole.prior(1.0, START_NOISE, LENGTH, 0.0, 0.0)[0]
+    one, two = parse("rbf", d), TiedKernel.cutajar(d)
+    first = one.prior(1.0, START_NOISE, LENGTH, 0.0, 0.0)[0]
     starts = first, np.array([*first, 0.0, 0.0, np.log(START_OWN), *first[2:]])
     z_low = choose_inducing(one, starts[0], cheap.x, how.inducing)
     z_high = choose_inducing(two, starts[1], wide, how.inducing)
@@ -149,7 +139,7 @@ def fit_mfdgp(cheap: Samples, measured: Samples, how: Training) -> MFDGP:
     return MFDGP(layers, data, high_units)
 
 
-def choose_inducing(k: TiedKernel, theta: np.ndarray, x: np.ndarray, count: int) -> np.ndarray:
+def choose_inducing(k: Kernel, theta: np.ndarray, x: np.ndarray, count: int) -> np.ndarray:
     """`count` rows of x at most, each where those before leave most variance unexplained.
 
     See Burt et al. 2020.
@@ -170,7 +160,7 @@ def choose_inducing(k: TiedKernel, theta: np.ndarray, x: np.ndarray, count: int)
 
 
 def _at_the_data(
-    k: TiedKernel, theta: np.ndarray, z: np.ndarray, x: np.ndarray, y: np.ndarray
+    k: Kernel, theta: np.ndarray, z: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> Layer:
     """A layer whose q(u) begins where the data are: m = L⁻¹ K_zx (K_xx + τ²I)⁻¹ y.
 
@@ -185,7 +175,7 @@ def _at_the_data(
     return Layer(theta, np.linalg.solve(root, smooth), START_SPREAD * np.eye(len(z)))
 
 
-def _marginal(kernel: TiedKernel, layer: Layer, z: Array, x: Array) -> tuple[Array, Array]:
+def _marginal(kernel: Kernel, layer: Layer, z: Array, x: Array) -> tuple[Array, Array]:
     """Mean and variance (q,) of f at x (q, d) under q(u)."""
     own = kernel.variance(jnp, layer.theta, x)
     covariance = kernel.covariance(jnp, layer.theta, z, z)
@@ -219,7 +209,7 @@ def bound(
     """The bound from a batch `low` (b,) and `high` (b',) of points and ε (s, b')."""
     first, second = layers
     d = data.x_low.shape[1]
-    one, two = TiedKernel.of("rbf", d), TiedKernel.cutajar(d)
+    one, two = parse("rbf", d), TiedKernel.cutajar(d)
     mean, variance = _marginal(one, first, data.z_low, data.x_low[low])
     total = jnp.mean(_expected(first, data.y_low[low], mean, variance)) * len(data.y_low)
     x = data.x_high[high]
@@ -268,7 +258,7 @@ def _climbed(
 def _predicted(layers: tuple[Layer, Layer], data: TwoLevelData, x: Array) -> tuple[Array, Array]:
     """Mean and variance (q,) of f_2, integrated over f_1(x)."""
     d = data.x_low.shape[1]
-    below, unsure = _marginal(TiedKernel.of("rbf", d), layers[0], data.z_low, x)
+    below, unsure = _marginal(parse("rbf", d), layers[0], data.z_low, x)
     nodes = below[None, :] + jnp.sqrt(unsure)[None, :] * NODES[:, None]
     wide = jnp.column_stack([jnp.tile(x, (len(NODES), 1)), nodes.reshape(-1)])
     parts = _marginal(TiedKernel.cutajar(d), layers[1], data.z_high, wide)
@@ -293,7 +283,7 @@ def fit_deep(seen: FrequencyData, ar1: AR1) -> DeepOutputs | None:
     """None where an output has too few values, or the simulation none of it."""
     if seen.elsewhere is None:
         return None
-    data, (x, low) = seen.data, seen.elsewhere
+    data, (x, low) = seen.values, seen.elsewhere
     cheap = [Samples.of(x, column) for column in low.T]
     measured = [Samples.of(data.x, y, sd) for y, sd in zip(data.y.T, data.sd.T, strict=True)]
     if min(len(s.y) for s in (*cheap, *measured)) < FEWEST:

@@ -249,16 +249,16 @@ class TaskedDeviations:
     def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) at x (q, d), simulation low (q, m)."""
         mean, sd = self.gp.predict(x)
-        unknown = (self.ar1.uses_low & ~np.isfinite(low)) * self.ar1.unknown_sd
-        return mean + self.ar1.split(low)[0], np.hypot(sd, unknown)
+        base, _, blind = self.ar1.split(low)
+        return mean + base, np.hypot(sd, blind)
 
 
 def fit_tasks(seen: FrequencyData, ar1: AR1) -> TaskedDeviations | None:
     """At poses where every output is known; None where these are fewer than FEWEST."""
-    data = seen.data
-    off = data.y - ar1.split(data.low)[0]
-    blind = (ar1.uses_low & ~np.isfinite(data.low)).any(axis=1)
-    whole = np.isfinite(off).all(axis=1) & ~blind
+    data = seen.values
+    base, _, blind = ar1.split(data.low)
+    off = data.y - base
+    whole = np.isfinite(off).all(axis=1) & ~blind.any(axis=1)
     if whole.sum() < FEWEST:
         return None
     return TaskedDeviations(ar1, fit_multitask(data.x[whole], off[whole], seen.kernel))
