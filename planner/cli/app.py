@@ -236,9 +236,10 @@ def replay(
 
     with progress_bar("replaying", quiet=as_json) as progress:
         answer = replayed(Campaign(directory), until, rrd, viewer, progress, acquisition)
-    if not answer.reproduced:
+    reproduced = answer.keys["reproduced"]
+    if not reproduced:
         warn("The log was not reproduced; see the steps that differ.")
-    return respond(answer, as_json, 0 if answer.reproduced else 1)
+    return respond(answer, as_json, 0 if reproduced else 1)
 
 
 for _command in (

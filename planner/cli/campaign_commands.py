@@ -40,7 +40,8 @@ def new(
     from planner.campaign.campaign import Campaign
     from planner.campaign.from_urdf import StatedMasses, new_from_urdf
     from planner.campaign.store import write_example
-    from planner.report.campaign_changes import ExampleFolder, NewCampaign
+    from planner.report.campaign_changes import begun
+    from planner.report.campaign_changes import example as example_folder
 
     if (robot is not None) + example + (urdf is not None) != 1:
         raise InputError(
@@ -50,11 +51,10 @@ def new(
     if urdf is None and weights != StatedMasses():
         raise InputError("--mass-kg, --payload-kg and --tool-mass-kg go with --urdf; give that.")
     if urdf is not None:
-        begun, guessed = new_from_urdf(directory, urdf, weights, campaign)
-        return respond(NewCampaign(begun, guessed), as_json)
+        return respond(begun(*new_from_urdf(directory, urdf, weights, campaign)), as_json)
     if robot is not None:
-        return respond(NewCampaign(Campaign.new(directory, robot, campaign)), as_json)
-    return respond(ExampleFolder(*write_example(directory)), as_json)
+        return respond(begun(Campaign.new(directory, robot, campaign)), as_json)
+    return respond(example_folder(*write_example(directory)), as_json)
 
 
 PoseArgument = Annotated[str, argument("Name of the pose.", "POSE")]

@@ -15,7 +15,7 @@ from planner.measurement.agreement import NO_SIMILARITY, Similarity, fit_similar
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.pictures import Pictures, entitle
 from planner.report.springs import IdentifiedSpring, identified_springs
-from planner.report.text import remarks, table
+from planner.report.text import ending, remarks, table
 
 if TYPE_CHECKING:
     from planner.dataset.dataset import Dataset
@@ -151,7 +151,7 @@ class IdentificationReport(Answer):
         if self.out and isinstance(self.written, Similarity):
             frac = 100 * self.written.frac
             parts.append(Text(f"Written: {self.out} (FRAC {frac:.2f} %), {self.urdf}"))
-        return Group(*parts, *self.end)
+        return Group(*parts, *ending(vars(self)))
 
     def _agreement(self) -> RenderableType:
         aside = self.held_out

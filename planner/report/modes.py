@@ -17,7 +17,7 @@ from planner.modal.modes import Homogeneity, Mode
 from planner.recording.dof import Dof
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.predictions import ExpectedMode
-from planner.report.text import remarks, table, with_sd
+from planner.report.text import ending, remarks, table, with_sd
 from planner.words import counted
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ class ModesReport(Answer):
         parts += remarks(self.remarks)
         if isinstance(self.exports, tuple) and self.exports:
             parts.append(Text("\n  ".join(["Files:", *self.exports])))
-        return Group(*parts, *self.end)
+        return Group(*parts, *ending(vars(self)))
 
     def _table(self) -> Table:
         what = "Modes" if isinstance(self.tones_hz, Unset) else "Operating modes"

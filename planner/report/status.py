@@ -21,7 +21,7 @@ from planner.report.imports import asked_of
 from planner.report.proposals import forecast_json, standing, unanswered
 from planner.report.saved_diagnosis import diagnosis_of, read_diagnosis, two_answers
 from planner.report.springs import COLUMNS, NOT_KNOWN, RefittedSpring, refitted_springs
-from planner.report.text import sds_over_workspace, table
+from planner.report.text import ending, sds_over_workspace, table
 from planner.words import by_reason, counted, local_time, significant
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ class StatusReport(ModelStatus, Answer):
             each = (spring.cells for spring in self.springs)
             parts += [table(title, *COLUMNS, rows=each), Text(f"  {NOT_KNOWN}")]
         parts += [] if self.models is msgspec.UNSET else models_text(self.models)
-        return Group(*parts, Text("\n".join(self._lines())), *self.end)
+        return Group(*parts, Text("\n".join(self._lines())), *ending(vars(self)))
 
     def _counts(self) -> str:
         """How many poses the model uses, as report and predict count them, and others."""

@@ -225,7 +225,7 @@ def undo(session: Session, state: SessionState) -> SessionState:
     taken = session.campaign.undo(decisions_only=True)
     session.rerun_queue.note()
     session.screen.forget()
-    session.say(undone(taken).text())
+    session.say(str(undone(taken).said))
     return state.undone(session.campaign.state)
 
 
@@ -234,7 +234,7 @@ def _redo(session: Session, state: SessionState) -> SessionState:
     again = session.campaign.redo()
     session.rerun_queue.note()
     session.screen.forget()
-    session.say(redone(again).text())
+    session.say(str(redone(again).said))
     event = again[0].event
     if isinstance(event, Imported | Confirmed):
         return measured(session, state, event.pose)
