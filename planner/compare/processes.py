@@ -69,7 +69,8 @@ def _hold(*sent: Any) -> None:
 
 
 def _answer(item: Any) -> Any:
-    return attempt(*_held, item)
+    function, shared = _held
+    return attempt(function, shared, item)
 
 
 def attempt(function: Callable[[Any, Any], Any], shared: Any, item: Any) -> Any:

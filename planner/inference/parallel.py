@@ -147,7 +147,7 @@ def _helper() -> tuple[ProcessPoolExecutor, Future[None]]:
     return pool, pool.submit(_nothing)
 
 
-def process(begun: Callable[..., None] | None = None, *given: Any) -> ProcessPoolExecutor:
+def process(begun: Callable[..., object] | None = None, *given: Any) -> ProcessPoolExecutor:
     """Another process, which ends with this one; it first calls `begun`, if named, with `given`."""
     # Of loky: others run a script that has no guard for its main part once more.
     started = begun or _nothing, given
@@ -158,7 +158,7 @@ def _nothing() -> None:
     """What a helper does first."""
 
 
-def _begin(begun: Callable[..., None], given: tuple) -> None:
+def _begin(begun: Callable[..., object], given: tuple) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the other process's to handle
     threadpool_limits(1)
     begun(*given)

@@ -1,8 +1,8 @@
-"""Answer of `compare`: learning curves of sampling strategies, and how they differ."""
+"""Answer of `compare`: learning curves of sampling strategies, drawn, and how they differ."""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Group
@@ -21,8 +21,10 @@ from planner.report.pictures import Pictures
 from planner.report.text import ending, table
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+MARKS = "osv^DPX*<>"
 PICTURE, TABLE = "learning_curves", "comparison.json"
 SHOWN = 8  # columns of measurements that fit
 CURVES = (
@@ -50,11 +52,6 @@ def comparison(
     title = f"Pool of {size} poses, {study.repeats} repeats, simulation {fidelity}"
     simulated, name = any(p.simulated for p in poses), bench.robot.name
 
-    def draw() -> "dict[str, Figure]":
-        from planner.report.learning_curves import learning_figure
-
-        return {PICTURE: learning_figure(curves, title)}
-
     note, own = f"{title}\n\nPool {bench.key}.", bench.config.surrogate.model
     keys = {
         "strategies": medians,
@@ -68,7 +65,9 @@ def comparison(
                    for task, why in failed.items()],
         "refused": [file for pose in poses for file in pose.refused], "remarks": told,
         "simulated": simulated, "out": None if out is None else str(out.absolute()),
-        **pictures.write(draw, name, note, simulated=simulated),
+        **pictures.write(
+            lambda: {PICTURE: _figure(curves, title)}, name, note, simulated=simulated
+        ),
         "seconds": time.perf_counter() - started,
     }  # fmt: skip
     head = (
@@ -136,3 +135,51 @@ def _goals(
 def _interval(value: float, interval: np.ndarray, form: str) -> str:
     low, high = interval
     return f"{value:{form}} ({low:{form}}, {high:{form}})"
+
+
+def _figure(strategies: Mapping[str, Curves], title: str) -> "Figure":
+    """Medians with quartiles over repeats; RMSE on a logarithmic axis with the 1 % line."""
+    from planner.report.plot_marks import empty
+
+    figure = empty((11.0, 4.6), title)
+    panels = figure.subplot_mosaic([["rmse", "r2"], ["rmse", "coverage"]], width_ratios=(1.5, 1))
+    for i, (name, curve) in enumerate(strategies.items()):
+        style: dict[str, Any] = {
+            "color": f"C{i % 10}",
+            "marker": MARKS[i % len(MARKS)],
+            "label": name,
+        }
+        low, median, high = np.percentile(curve.frequency_rmse_percent, (25, 50, 75), axis=0)
+        panels["rmse"].fill_between(curve.n, low, high, color=style["color"], alpha=0.15, lw=0)
+        medians = {"rmse": median, "r2": np.median(curve.r2, axis=0)}
+        medians["coverage"] = np.median(curve.coverage95, axis=0)
+        for key, values in medians.items():
+            panels[key].plot(curve.n, values, ms=4, lw=1.4, **style)
+    _finish(panels, strategies)
+    return figure
+
+
+def _finish(panels: "Mapping[str, Axes]", strategies: Mapping[str, Curves]) -> None:
+    from matplotlib.ticker import MaxNLocator, ScalarFormatter
+
+    rmse, r2, coverage = panels["rmse"], panels["r2"], panels["coverage"]
+    rmse.set_yscale("log")
+    rmse.yaxis.set_major_formatter(ScalarFormatter())
+    rmse.yaxis.set_minor_formatter(ScalarFormatter())
+    rmse.tick_params(axis="y", which="minor", labelsize=7)
+    rmse.axhline(1.0, color="black", lw=0.8, ls="--")
+    rmse.annotate("1 %", (1.0, 1.0), xycoords=("axes fraction", "data"), fontsize=8,
+                  xytext=(-4, 3), textcoords="offset points", ha="right")  # fmt: skip
+    rmse.set_ylabel("frequency RMSE at unused poses (%)")
+    # One bad start must not squeeze all the rest into a line.
+    worst = min(float(np.min(np.median(c.r2, axis=0))) for c in strategies.values())
+    r2.set(ylim=(max(worst - 0.05, -0.5), 1.02), ylabel="R²")
+    coverage.axhline(0.95, color="black", lw=0.8, ls="--")
+    coverage.set_ylim(min(0.8, coverage.get_ylim()[0]), 1.02)
+    coverage.set_ylabel("share in 95 % interval")
+    for panel in panels.values():
+        panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+        panel.grid(True, which="both", alpha=0.25)
+    for panel in (rmse, coverage):
+        panel.set_xlabel("measurements")
+    rmse.legend(fontsize=8, title="median, band: quartiles", title_fontsize=8)

@@ -91,9 +91,9 @@ def _table(steps: Sequence[Step], joints: JointUnits) -> Table:
 
 
 def _curves(other: OtherAcquisition) -> Table:
-    counts = next(iter(other.runs.values())).n
+    counts = next(iter(other.runs.values()))["n"]
     title = "Frequency RMSE (%) on poses not yet used, by measurements"
     made = table(title, "order", *map(str, counts))
     for name, run in other.runs.items():
-        made.add_row(name, *(f"{v:.2f}" for v in run.frequency_rmse_percent))
+        made.add_row(name, *(f"{v:.2f}" for v in run["frequency_rmse_percent"]))
     return made
