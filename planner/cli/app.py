@@ -109,13 +109,13 @@ def status_(
     from planner.report.pictures import Pictures
     from planner.report.status import status
 
-    campaign, pictures = Campaign(directory), Pictures(plot, format_)
-    answer = status(campaign)
-    answer = answer.with_figures(pictures, answer.drawings, campaign.directory.name)
+    campaign, pictures, compared = Campaign(directory), Pictures(plot, format_), None
     if models:
+        from planner.campaign.model_comparison import compared_models
+
         with progress_bar("models", quiet=as_json) as progress:
-            answer = answer.with_models(progress)
-    return respond(answer, as_json)
+            compared = compared_models(campaign.model, progress=progress)
+    return respond(status(campaign, None, pictures, compared), as_json)
 
 
 @app.command()

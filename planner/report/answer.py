@@ -2,17 +2,13 @@
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Self
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from rich.console import RenderableType
-
-    from planner.report.pictures import Pictures
-    from planner.report.rerun.figures import More
 
 # Metadata of a field for what an answer was made of; None where it came from another process.
 NOT_IN_JSON = {"json": False}
@@ -32,19 +28,6 @@ class Answer:
     def text(self) -> "RenderableType | None":
         """For the engineer, units in every column; None where there is nothing to say."""
         return None
-
-    def with_figures(
-        self,
-        pictures: "Pictures",
-        draw: "Callable[[], dict[str, Figure]]",
-        name: str,
-        note: str = "",
-        more: "More | None" = None,
-    ) -> Self:
-        """The same with what `Pictures.write` answers."""
-        simulated = getattr(self, "simulated", False)
-        written = pictures.write(draw, name, note, more, simulated)
-        return dataclasses.replace(self, **written)  # pyrefly: ignore[bad-specialization]
 
     def _repr_html_(self) -> str:
         """What notebooks show."""

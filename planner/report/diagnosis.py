@@ -200,10 +200,12 @@ class DiagnosisReport(Answer):
         made = write_robot(folder / "robot.toml", linear.simulation.robot, result, found.laws)
         again, search = Simulation(Robot.load(made.robot_toml)), found.search
         alone = fit_similarity(again, search.frfs, search.q, search.band_hz)
-        drawn = self.with_figures(Pictures(folder), lambda: diagnosis_figures(found), robot.name)
+        drawn = Pictures(folder).write(
+            lambda: diagnosis_figures(found), robot.name, simulated=self.simulated
+        )
         said = *self.remarks, *made.remarks, *_unwritten(found)
         written = replace(
-            drawn, robot=str(made.robot_toml), urdf=made.urdf, written=alone, remarks=said
+            self, robot=str(made.robot_toml), urdf=made.urdf, written=alone, remarks=said, **drawn
         )
         (folder / "diagnosis.json").write_bytes(encoded(written))  # for planner report
         return written

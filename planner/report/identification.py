@@ -78,7 +78,7 @@ class IdentificationReport(Answer):
             return self
         compared, name, more = self._compared(), self.nominal.robot.name, None
         if compared is None:
-            return self.with_figures(pictures, dict, name)
+            return replace(self, **pictures.write(dict, name, simulated=self.simulated))
         if pictures.rrd is not None:
             from planner.report.rerun.figures import one_by_one
 
@@ -86,7 +86,8 @@ class IdentificationReport(Answer):
             more = one_by_one("pose", "FRFs, pose by pose", each)
         first = sorted(range(len(compared.roles)), key=lambda k: compared.roles[k] == "used")
         note = "Those held out are shown with what was identified without them."
-        return self.with_figures(pictures, lambda: compared.figures(first), name, note, more)
+        given = name, note, more, self.simulated
+        return replace(self, **pictures.write(lambda: compared.figures(first), *given))
 
     def _compared(self) -> "ComparedFrfs | None":
         """FRFs before and after it, pose by pose; None where the tool was not measured."""
