@@ -87,9 +87,9 @@ def undo(directory: Directory, as_json: AsJson = False) -> int:
     Example: planner undo cell7
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_changes import undone
+    from planner.report.campaign_changes import taken_back
 
-    return respond(undone(Campaign(directory).undo()), as_json)
+    return respond(taken_back(Campaign(directory).undo(), "undone"), as_json)
 
 
 def redo(directory: Directory, as_json: AsJson = False) -> int:
@@ -98,9 +98,9 @@ def redo(directory: Directory, as_json: AsJson = False) -> int:
     Example: planner redo cell7
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_changes import redone
+    from planner.report.campaign_changes import taken_back
 
-    return respond(redone(Campaign(directory).redo()), as_json)
+    return respond(taken_back(Campaign(directory).redo(), "redone"), as_json)
 
 
 def withdraw(

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import msgspec
 from rich.console import Group
@@ -81,25 +80,15 @@ def kind_of(entry: Entry) -> str:
     return msgspec.to_builtins(entry.event)["kind"]
 
 
-def undone(entries: Sequence[Entry]) -> Done:
-    """Answer of `undo`: the log's entry that was taken back, and those that went with it."""
-    keys, words = _told(entries, "undone")
-    return Done(keys, f"Undone: {words} (entry {keys['undone']} of the log).")
-
-
-def redone(entries: Sequence[Entry]) -> Done:
-    """Answer of `redo`: the log's entry that holds again, and those that came with it."""
-    keys, words = _told(entries, "redone")
-    return Done(keys, f"Redone: {words} (entry {keys['redone']} of the log).")
-
-
-def _told(entries: Sequence[Entry], what: str) -> tuple[dict[str, Any], str]:
-    """Number, kind and words of the first entry, the others' words; and all words in one."""
+def taken_back(entries: Sequence[Entry], what: str) -> Done:
+    """Answer of `undo` and `redo` (`what`: "undone", "redone"): the log's entry that was taken back
+    or holds again, and those that went with it.
+    """
     entry, *others = entries
-    said = [in_words(other) for other in others]
-    follow = f"; with it: {', '.join(said)}" if said else ""
-    keys = {what: entry.seq, "event": kind_of(entry), "what": in_words(entry), "with_it": said}
-    return keys, f"{in_words(entry)}{follow}"
+    said, words = in_words(entry), [in_words(other) for other in others]
+    follow = f"; with it: {', '.join(words)}" if words else ""
+    keys = {what: entry.seq, "event": kind_of(entry), "what": said, "with_it": words}
+    return Done(keys, f"{what.capitalize()}: {said}{follow} (entry {entry.seq} of the log).")
 
 
 def withdrawn(directory: Path, pose: str, reason: str, held: bool) -> Done:

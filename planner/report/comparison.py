@@ -11,7 +11,7 @@ from rich.text import Text
 
 from planner.campaign.journal import write_synced
 from planner.compare.bench import Bench
-from planner.compare.curves import Curves, StrategyCurve, StrategyDifference, baseline_of, paired
+from planner.compare.curves import Curves, baseline_of, medians, paired
 from planner.compare.pool import PoolPose
 from planner.compare.processes import Failure
 from planner.compare.tasks import Run, Study, Task
@@ -48,13 +48,13 @@ def comparison(
     base, size, out = baseline_of(list(curves)), len(bench.measurements), pictures.folder
     others = {name: curve for name, curve in curves.items() if name != base}
     against = {name: paired(curve, curves[base]) for name, curve in others.items()}
-    medians = {name: StrategyCurve.of(curve) for name, curve in curves.items()}
+    middle = {name: medians(curve) for name, curve in curves.items()}
     title = f"Pool of {size} poses, {study.repeats} repeats, simulation {fidelity}"
     simulated, name = any(p.simulated for p in poses), bench.robot.name
 
     note, own = f"{title}\n\nPool {bench.key}.", bench.config.surrogate.model
     keys = {
-        "strategies": medians,
+        "strategies": middle,
         "measurements_to_one_percent": {name: curve.to_goal for name, curve in curves.items()},
         "minutes_to_one_percent": {name: curve.minutes_to_goal for name, curve in curves.items()},
         "paired": {"baseline": base, "against": against}, "acquisitions": study.strategies,
@@ -74,9 +74,9 @@ def comparison(
         f"{name}: pool of {size} poses, {study.repeats} repeats from {study.initial} to "
         f"{study.budget} measurements, simulation {fidelity}; medians, on poses not used."
     )
-    goals = _goals(curves, medians, against, study.budget)
+    goals = _goals(curves, middle, against, study.budget)
     answer = Done(keys, Group(
-        Text(head), *_tables(medians), goals, *map(Text, told), *ending(keys)
+        Text(head), *_tables(middle), goals, *map(Text, told), *ending(keys)
     ))  # fmt: skip
     if out is not None:
         write_synced(out / TABLE, encoded(answer))
@@ -97,20 +97,20 @@ def _curves(
     return curves
 
 
-def _tables(medians: Mapping[str, StrategyCurve]) -> Iterator[Table]:
+def _tables(middle: Mapping[str, dict[str, Any]]) -> Iterator[Table]:
     """Curves; up to SHOWN columns, first and last among them."""
-    n = next(iter(medians.values())).n
+    n = next(iter(middle.values()))["n"]
     columns = np.unique(np.linspace(0, len(n) - 1, min(len(n), SHOWN)).round().astype(int)).tolist()
     for key, title, form in CURVES:
         made = table(f"{title} by measurements", "strategy", *(str(n[i]) for i in columns))
-        for name, curve in medians.items():
-            made.add_row(name, *(format(float(getattr(curve, key)[i]), form) for i in columns))
+        for name, curve in middle.items():
+            made.add_row(name, *(format(float(curve[key][i]), form) for i in columns))
         yield made
 
 
 def _goals(
-    curves: Mapping[str, Curves], medians: Mapping[str, StrategyCurve],
-    against: Mapping[str, StrategyDifference | None], budget: int,
+    curves: Mapping[str, Curves], middle: Mapping[str, dict[str, Any]],
+    against: Mapping[str, dict[str, Any] | None], budget: int,
 ) -> Table:  # fmt: skip
     """What each strategy needs to reach 1 %, and how it differs from the baseline."""
     made = table(
@@ -123,12 +123,12 @@ def _goals(
         d, reached = against.get(name), (curve.to_goal, curve.minutes_to_goal)
         goal = after = "–"
         if d is not None:
-            to_goal = d.measurements_to_one_percent, d.measurements_to_one_percent_interval95
+            to_goal = d["measurements_to_one_percent"], d["measurements_to_one_percent_interval95"]
             goal = _interval(*to_goal, "+.1f")
-            last = d.difference_percent[-1], d.difference_percent_interval95[-1]
+            last = d["difference_percent"][-1], d["difference_percent_interval95"][-1]
             after = _interval(*last, "+.3f")
         cells = ("–" if v is None else f"{v:.0f}" for v in reached)
-        made.add_row(name, *cells, goal, after, f"{medians[name].wall_seconds:.1f}")
+        made.add_row(name, *cells, goal, after, f"{middle[name]['wall_seconds']:.1f}")
     return made
 
 
