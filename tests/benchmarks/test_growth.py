@@ -1,22 +1,15 @@
 """How a fit grows with the campaign, a peer in the same run: pytest -m slow tests/benchmarks -s"""
 
-import time
-
 import numpy as np
 import pytest
 
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.surrogates import observed, simulated, true_hz
+from tests.support.timing import spent
 
 pytestmark = pytest.mark.slow
 
 SCALE = 1.12
-
-
-def spent(act):
-    """What it returns, and its processor time in s."""
-    started = time.process_time()
-    return act(), time.process_time() - started
 
 
 @pytest.mark.filterwarnings("ignore")  # the peer's optimiser meets its bounds
@@ -28,8 +21,8 @@ def test_fit_and_prediction_against_scikit_learn(poses):
 
     seen = observed(poses, 0, SCALE)
     x = np.random.default_rng(1).random((500, 2))
-    fitted, ours = spent(lambda: fit_surrogate(seen, residues=False))
-    found, asked = spent(lambda: fitted.predict(x, simulated(x)))
+    fitted, _, ours = spent(lambda: fit_surrogate(seen, residues=False))
+    found, _, asked = spent(lambda: fitted.predict(x, simulated(x)))
     targets = [np.log(seen.frequency_hz), np.log(seen.damping_ratio)]
 
     def peer():
@@ -40,7 +33,7 @@ def test_fit_and_prediction_against_scikit_learn(poses):
             predicted.append(model.predict(x, return_std=True)[0])
         return np.exp(np.array(predicted[:4]).T)
 
-    theirs, took = spent(peer)
+    theirs, _, took = spent(peer)
     truth = true_hz(x, SCALE)
     rmse = [100 * np.sqrt(np.mean((f / truth - 1) ** 2)) for f in (found.frequency_hz, theirs)]
     print(
