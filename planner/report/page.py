@@ -170,7 +170,7 @@ def _measured(campaign: Campaign, state: CampaignState, now: Mapping[str, Any]) 
         "stood": stood,
         "stood_says": said,
         "refused": [list(refused.values()) for refused in now["refused"]],
-        "held": [(h.pose, h.question["text"]) for h in now["held"]],
+        "held": [(h["pose"], h["question"]["text"]) for h in now["held"]],
         "skipped": [(s["pose"], s["reason"] or "–") for s in now["skipped"]],
         "remarks": [(m.pose, text) for m in state.recorded for text in m.remarks],
     }

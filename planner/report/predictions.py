@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import UNSET
@@ -55,23 +55,15 @@ class ExpectedMode:
         return with_sd(self.frequency_hz, self.sd_hz), damping
 
 
-@dataclass(frozen=True)
-class PosePrediction:
-    """The modes expected at a pose, from the lowest; whether it lies `outside` the workspace.
+def _pose(
+    name: str, modes: tuple[ExpectedMode, ...], force_n: float, outside: bool = False
+) -> dict[str, Any]:
+    """The modes expected at a pose, from the lowest; whether it lies outside the workspace.
 
-    `peak_force_n` is that of the hits that were asked for.
+    Of hits of such a peak force; NaN: none was asked for.
     """
-
-    pose: str
-    modes: tuple[ExpectedMode, ...]
-    outside: bool = False
-    peak_force_n: float | Unset = UNSET
-
-    @property
-    def title(self) -> str:
-        """Its name, and what is special."""
-        force = "" if self.peak_force_n is UNSET else f", {self.peak_force_n:g} N"
-        return f"{self.pose}{force} (outside)" if self.outside else f"{self.pose}{force}"
+    force = UNSET if np.isnan(force_n) else float(force_n)
+    return {"pose": name, "modes": modes, "outside": outside, "peak_force_n": force}
 
 
 def predictions(
@@ -102,8 +94,8 @@ def predictions(
     outside, robot = ~campaign.cell.inside(angles), campaign.cell.robot
     save_frfs(npz, lines, mean, sd, names, robot, angles, outside, force_n if asked else None)
     poses = [
-        PosePrediction(name, ExpectedMode.all_of(prediction, i), bool(outside[i]), force)
-        for i, (name, force) in enumerate(zip(names, _stated(force_n), strict=True))
+        _pose(name, ExpectedMode.all_of(prediction, i), force, bool(outside[i]))
+        for i, (name, force) in enumerate(zip(names, force_n, strict=True))
     ]
     return _answer(poses, npz, said, measurements=len(campaign.state.used))
 
@@ -135,15 +127,15 @@ def robot_predictions(
     save_frfs(npz, lines, mean, None, names, robot, q, None, force_n if asked.any() else None)
     said = () if robot.config.law or not asked.any() else (UNCHANGED,)
     shown = []
-    for name, force, *own in zip(names, _stated(force_n), f, ratio, strict=True):
+    for name, force, *own in zip(names, force_n, f, ratio, strict=True):
         inside = ((hz, z) for hz, z in zip(*own, strict=True) if band[0] <= hz <= band[1])
         expected = tuple(ExpectedMode(float(hz), None, float(z), None) for hz, z in inside)
-        shown.append(PosePrediction(name, expected, False, force))
+        shown.append(_pose(name, expected, force))
     return _answer(shown, npz, said, robot=str(robot.path.absolute()))
 
 
 def _answer(
-    poses: Sequence[PosePrediction], npz: Path, told: tuple[str, ...], measurements: int = 0,
+    poses: Sequence[dict[str, Any]], npz: Path, told: tuple[str, ...], measurements: int = 0,
     robot: str | Unset = UNSET,
 ) -> Done:  # fmt: skip
     """Of so many measured poses, or of a `robot`.toml that was asked alone."""
@@ -156,18 +148,19 @@ def _answer(
     if alone:
         title = f"As {robot} states the robot"
     rows = (
-        (pose.title if k == 0 else "", str(k + 1), *mode.cells)
+        (_title(pose) if k == 0 else "", str(k + 1), *mode.cells)
         for pose in poses
-        for k, mode in enumerate(pose.modes)
+        for k, mode in enumerate(pose["modes"])
     )
     made = table(title, "pose", "mode", "frequency (Hz)", "damping (%)", rows=rows)
     # Nobody asked the model to be good there.
-    said = outside_remark([pose.pose for pose in poses if pose.outside])
+    said = outside_remark([pose["pose"] for pose in poses if pose["outside"]])
     lines = [*([Text(said, style="yellow")] if said else []), *remarks(told)]
     file = Text(f"FRFs (m/s²/N){'' if alone else ' with sd'}: {keys['npz']}")
     return Done(keys, Group(made, *lines, file))
 
 
-def _stated(force_n: np.ndarray) -> list[float | Unset]:
-    """Forces (n,) in N that were asked for; NaN is none."""
-    return [UNSET if np.isnan(force) else float(force) for force in force_n]
+def _title(pose: dict[str, Any]) -> str:
+    """Its name, and what is special."""
+    force = "" if pose["peak_force_n"] is UNSET else f", {pose['peak_force_n']:g} N"
+    return f"{pose['pose']}{force}{' (outside)' if pose['outside'] else ''}"

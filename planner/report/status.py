@@ -32,41 +32,6 @@ if TYPE_CHECKING:
     from planner.campaign.state import CampaignState
 
 
-@dataclass(frozen=True)
-class MeasuredPoseStatus:
-    """A measured pose: how many hits are in use and refused, frequencies of its modes."""
-
-    pose: str
-    joints_deg: tuple[float, ...]
-    hits: int
-    refused: int
-    frequency_hz: tuple[float, ...]
-    withdrawn: bool
-    starred: bool
-    simulated: bool
-    time: str
-    remarks: tuple[str, ...]
-    # Of held hits, until it is answered.
-    question: dict[str, Any] | msgspec.UnsetType = msgspec.UNSET
-
-    @classmethod
-    def of(cls, m: Measurement, starred: bool, held: bool = False) -> "MeasuredPoseStatus":
-        """Of a measurement."""
-        found = tuple(mode.frequency_hz for mode in m.modes if mode.likely)
-        asked = asked_of(m.pose, m.question) if held else None
-        return cls(
-            m.pose, m.joints_deg, len(m.accepted), len(m.refused), found, m.withdrawn, starred,
-            m.simulated, m.time, m.remarks, asked or msgspec.UNSET,
-        )  # fmt: skip
-
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """A row of the table."""
-        mark = (" ★" if self.starred else "") + (" withdrawn" if self.withdrawn else "")
-        found = "  ".join(f"{f:.2f}" for f in self.frequency_hz) or "none"
-        return self.pose + mark, str(self.hits), str(self.refused), found, local_time(self.time)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModelStatus:
     """What `status` says of the model; sds (count,) in % are over the workspace, mode by mode."""
@@ -137,13 +102,13 @@ def status(
         "forecast": forecast_json(believed.forecast),
         "decision": believed.decision or msgspec.UNSET,
         "campaign": str(directory), "simulated": state.simulated,
-        "measurements": [MeasuredPoseStatus.of(m, m.pose in state.starred) for m in state.measured],
+        "measurements": [_pose(m, m.pose in state.starred) for m in state.measured],
         "open": [state.proposals[pose] for pose in state.open],
         "skipped": [{"pose": pose, "reason": why} for pose, why in state.skipped.items()],
         "refused": _still_refused(state),
         "log": {"entries": state.events, "torn_bytes": campaign.torn_bytes},
         "stored_but_not_imported": campaign.orphans(),
-        "held": [MeasuredPoseStatus.of(m, m.pose in state.starred, held=True)
+        "held": [_pose(m, m.pose in state.starred) | {"question": asked_of(m.pose, m.question)}
                  for m in state.held.values() if m.question],
         "used": len(state.used), "models": msgspec.UNSET if models is None else models, **written,
     }  # fmt: skip
@@ -155,7 +120,7 @@ def _tables(keys: Mapping[str, Any]) -> list[RenderableType]:
     measured = table(
         f"{keys['campaign']}: {_counts(keys['measurements'], keys['used'])}",
         *("pose", "hits", "refused", "frequencies (Hz)", "time"),
-        rows=(pose.cells for pose in keys["measurements"]),
+        rows=map(_cells, keys["measurements"]),
     )
     parts: list[RenderableType] = [measured]
     if keys["springs"]:
@@ -165,9 +130,28 @@ def _tables(keys: Mapping[str, Any]) -> list[RenderableType]:
     return parts + ([] if keys["models"] is msgspec.UNSET else models_text(keys["models"]))
 
 
-def _counts(measured: Sequence[MeasuredPoseStatus], used: int) -> str:
+def _pose(m: Measurement, starred: bool) -> dict[str, Any]:
+    """How many hits of a measured pose are in use and refused, frequencies of its modes."""
+    return {
+        "pose": m.pose, "joints_deg": m.joints_deg, "hits": len(m.accepted),
+        "refused": len(m.refused),
+        "frequency_hz": [mode.frequency_hz for mode in m.modes if mode.likely],
+        "withdrawn": m.withdrawn, "starred": starred, "simulated": m.simulated, "time": m.time,
+        "remarks": m.remarks,
+    }  # fmt: skip
+
+
+def _cells(pose: Mapping[str, Any]) -> tuple[str, ...]:
+    """A row of the table."""
+    mark = (" ★" if pose["starred"] else "") + (" withdrawn" if pose["withdrawn"] else "")
+    found = "  ".join(f"{f:.2f}" for f in pose["frequency_hz"]) or "none"
+    counts = str(pose["hits"]), str(pose["refused"])
+    return pose["pose"] + mark, *counts, found, local_time(pose["time"])
+
+
+def _counts(measured: Sequence[Mapping[str, Any]], used: int) -> str:
     """How many poses the model uses, as report and predict count them, and others."""
-    away = sum(pose.withdrawn for pose in measured)
+    away = sum(pose["withdrawn"] for pose in measured)
     without = len(measured) - used - away
     more = f", {away} withdrawn" if away else ""
     more += f", {without} without modes" if without else ""
@@ -175,7 +159,7 @@ def _counts(measured: Sequence[MeasuredPoseStatus], used: int) -> str:
 
 
 def _lines(believed: ModelStatus, keys: Mapping[str, Any]) -> list[str]:
-    held = ", ".join(h.pose for h in keys["held"])
+    held = ", ".join(h["pose"] for h in keys["held"])
     waiting = f"; hit, and waiting for your answer: {held}" if held else ""
     lines = [
         "open: " + (", ".join(p.pose for p in keys["open"]) or "none") + waiting,
@@ -195,7 +179,7 @@ def _lines(believed: ModelStatus, keys: Mapping[str, Any]) -> list[str]:
             f"{counted(len(keys['stored_but_not_imported']), 'recording')} stored, but the "
             f"program stopped before the import: import again."
         )
-    lines += [unanswered(h.question["text"]) for h in keys["held"]]
+    lines += [unanswered(h["question"]["text"]) for h in keys["held"]]
     lines += [believed.decision.text] if believed.decision else []
     lines += [*keys["remarks"], *believed.leave_one_out.text]
     told = by_reason((r["file"], r["reason"]) for r in keys["refused"])
