@@ -155,5 +155,5 @@ def couple(
         fitted = fitted_contact(tip, target, tested, contact_from, pose)
         target, contact = fitted.tool, fitted.to_json()
     both = coupling(tip, None), coupling(tip, target, tested)
-    tools = target.name, None if tested is None else tested.name
+    tools = None if tested is None else tested.name, target.name
     return respond(coupling_report(both, tools, name, out, contact, pictures), as_json)

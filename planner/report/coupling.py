@@ -35,18 +35,6 @@ def _amplified(coupled: CoupledFrf) -> dict[str, Any]:
             "above_limit_hz": bands}  # fmt: skip
 
 
-def _to_mind(bands: list[tuple[float, float]]) -> str:
-    """What the engineer should mind; empty where nothing is above the limit."""
-    if not bands:
-        return ""
-    where = ", ".join(f"{low:.4g} to {high:.4g} Hz" for low, high in bands[:3])
-    more = ", …" if len(bands) > 3 else ""
-    return (
-        f"Errors of the measured FRFs grow more than {AMPLIFICATION_LIMIT:g} times at "
-        f"{where}{more}: do not rely on the coupled FRFs there."
-    )
-
-
 def _contact_sentence(contact: dict[str, Any]) -> str:
     numbers = [
         f"{name} = {contact[name]['value']:.4g} "
@@ -64,15 +52,15 @@ def _contact_sentence(contact: dict[str, Any]) -> str:
 
 
 def coupling_report(
-    both: tuple[CoupledFrf, CoupledFrf], names: tuple[str, str | None], pose: str, npz: Path,
+    both: tuple[CoupledFrf, CoupledFrf], names: tuple[str | None, str], pose: str, npz: Path,
     contact: dict[str, Any] | msgspec.UnsetType, pictures: Pictures,
 ) -> Done:  # fmt: skip
     """Answer of `couple`, once the npz is written; receptances in m/N, FRFs of `npz` in m/s²/N.
 
-    `both` are the tip with the tested tool and with the one put on, whose `names` come the other
-    way round. "frequency_hz" is the band of so many "lines", "motions" are those that are known.
+    `both` are the tip with the tested tool and with the one put on, `names` those of the tools;
+    None: none was stated to be on. "frequency_hz" is the band of so many "lines", "motions" are those that are known.
     """
-    (before, coupled), (tool, reference) = both, names
+    (before, coupled), (reference, tool) = both, names
     save_coupled(npz, coupled, pose)
     peaks, verify, grown = resonances(coupled), verifying_hit(coupled), _amplified(coupled)
     told = _remarks(coupled, grown["above_limit_hz"])
@@ -109,6 +97,14 @@ def coupling_report(
 
 def _remarks(coupled: CoupledFrf, bands: list[tuple[float, float]]) -> list[str]:
     """What the engineer should mind; `bands` (Hz) are those above the limit."""
+    told = list(coupled.remarks)
+    if bands:
+        where = ", ".join(f"{low:.4g} to {high:.4g} Hz" for low, high in bands[:3])
+        told.append(
+            f"Errors of the measured FRFs grow more than {AMPLIFICATION_LIMIT:g} times at "
+            f"{where}{', …' if len(bands) > 3 else ''}: do not rely on the coupled FRFs there."
+        )
     held = ", ".join(MOTIONS[k] for k in range(3) if k not in coupled.kept)
-    none = f"Nothing was measured along the tool's own {held}: FRFs there are NaN."
-    return list(filter(None, (*coupled.remarks, _to_mind(bands), none if held else "")))
+    if held:
+        told.append(f"Nothing was measured along the tool's own {held}: FRFs there are NaN.")
+    return told

@@ -82,7 +82,8 @@ class IdentificationReport(Answer):
         if pictures.rrd is not None:
             from planner.report.rerun.figures import one_by_one
 
-            each = (entitle(f, name, self.simulated) for f in compared.overlays())
+            numbers = range(len(compared.names))
+            each = (entitle(compared.overlay(k), name, self.simulated) for k in numbers)
             more = one_by_one("pose", "FRFs, pose by pose", each)
         first = sorted(range(len(compared.roles)), key=lambda k: compared.roles[k] == "used")
         note = "Those held out are shown with what was identified without them."
