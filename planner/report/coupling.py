@@ -58,7 +58,8 @@ def coupling_report(
     """Answer of `couple`, once the npz is written; receptances in m/N, FRFs of `npz` in m/s²/N.
 
     `both` are the tip with the tested tool and with the one put on, `names` those of the tools;
-    None: none was stated to be on. "frequency_hz" is the band of so many "lines", "motions" are those that are known.
+    None: none was stated to be on. "frequency_hz" is the band of so many "lines", "motions" are
+    those that are known.
     """
     (before, coupled), (reference, tool) = both, names
     save_coupled(npz, coupled, pose)
