@@ -51,7 +51,6 @@ def comparison(
     middle = {name: medians(curve) for name, curve in curves.items()}
     title = f"Pool of {size} poses, {study.repeats} repeats, simulation {fidelity}"
     simulated, name = any(p.simulated for p in poses), bench.robot.name
-
     note, own = f"{title}\n\nPool {bench.key}.", bench.config.surrogate.model
     keys = {
         "strategies": middle,
@@ -70,17 +69,21 @@ def comparison(
         ),
         "seconds": time.perf_counter() - started,
     }  # fmt: skip
-    head = (
-        f"{name}: pool of {size} poses, {study.repeats} repeats from {study.initial} to "
-        f"{study.budget} measurements, simulation {fidelity}; medians, on poses not used."
-    )
     goals = _goals(curves, middle, against, study.budget)
     answer = Done(keys, Group(
-        Text(head), *_tables(middle), goals, *map(Text, told), *ending(keys)
+        _head(keys), *_tables(middle), goals, *map(Text, told), *ending(keys)
     ))  # fmt: skip
     if out is not None:
         write_synced(out / TABLE, encoded(answer))
     return answer
+
+
+def _head(keys: Mapping[str, Any]) -> Text:
+    return Text(
+        f"{keys['robot']}: pool of {keys['pool']} poses, {keys['repeats']} repeats from "
+        f"{keys['initial']} to {keys['budget']} measurements, simulation {keys['simulation']}; "
+        f"medians, on poses not used."
+    )
 
 
 def _curves(

@@ -51,19 +51,13 @@ def stability_of(
     structure = cut_source.structure_of(asked, cut)
     machine, samples = structure.machine(cut), structure.samples(cut, asked.samples)
     found = lobes.stability_limits(machine, part_of(progress, 0.0, LOBES_SHARE if samples else 1.0))
-    depth = robust = lobes.depths_of(found)
+    robust, drawn = lobes.depths_of(found), None
     outside = out_of_band_remark(structure, np.array([loss.chatter_hz for loss in found]))
-    told, drawn = [*structure.remarks, *([outside] if outside else [])], None
+    told = [*structure.remarks, *([outside] if outside else [])]
     if samples:
         drawn = lobes.sampled_limits(samples, found, part_of(progress, LOBES_SHARE, 1.0))
-        robust, off = drawn.robust(), drawn.robust_sd()
-        off = off[np.isfinite(off)]
-        if off.size:
-            told.append(
-                f"Depths at {100 * lobes.PROBABILITY:.0f} % are from {len(drawn.depth_m)} samples, "
-                f"known to ± {100 * np.median(off):.1f} % (median over speeds)."
-            )
-        told += limit_remarks(structure, cut, depth, ~drawn.open(depth))
+        told += [*_how_sure(drawn), *limit_remarks(structure, cut, robust, ~drawn.open(robust))]
+        robust = drawn.robust()
 
     def draw() -> "dict[str, Figure]":
         from planner.report.milling_plots import lobes_figure
@@ -85,6 +79,17 @@ def stability_of(
     more |= pictures.write(draw, name, LOBES, simulated=simulated)
     made = _table(cut, found, robust, "First loss of stability", "kind", kinds)
     return _answer(cut, found, robust, told, simulated, more, made, *map(Text, lines))
+
+
+def _how_sure(drawn: lobes.SampledLimits) -> list[str]:
+    off = drawn.robust_sd()
+    off = off[np.isfinite(off)]
+    if not off.size:
+        return []
+    return [
+        f"Depths at {100 * lobes.PROBABILITY:.0f} % are from {len(drawn.depth_m)} samples, "
+        f"known to ± {100 * np.median(off):.1f} % (median over speeds)."
+    ]
 
 
 def _answer(
@@ -137,13 +142,10 @@ def path_report(
     "tightest_pose" is per speed (n,) the one that allows the least, "best_depth_m_at_95" what the
     whole path allows at "best_spindle_rpm".
     """
-    travelled = None
-    if asked.source.is_dir():
-        travelled = toolpath_poses.PathPoses.of(asked, way, cut)
-        poses = travelled.structures(cut)
-    else:
+    travelled = toolpath_poses.PathPoses.of(asked, way, cut) if asked.source.is_dir() else None
+    if travelled is None:
         way.check_none(asked.source)
-        poses = cut_source.structures_of_file(asked, cut)
+    poses = travelled.structures(cut) if travelled else cut_source.structures_of_file(asked, cut)
     limits = limits_along(poses, cut, asked.samples, part_of(progress, 0, 0.5 if way.turns else 1))
     robust, at = np.min(limits.robust_m, axis=0), limits.best_speed
     rpm, depth, turn = float(cut.speeds_rpm[at]), float(robust[at]), None
@@ -168,14 +170,14 @@ def path_report(
     known = zip(tightest, losses, strict=True)
     cells = [pose if np.isfinite(loss.depth_m) else "–" for pose, loss in known]
     made = _table(cut, losses, robust, f"{len(poses)} poses", "tightest pose", cells)
-    said = (
+    best = (
         f"Best speed for the whole path: {rpm:.0f} rpm allows {depth_mm(depth, EVERY, ' mm')} "
         f"with 95 % probability."
     )
-    advice = turn.text(limits.names) if turn is not None else ""
-    said = Text(" ".join(filter(None, (said, feed.text, advice))))
+    said = best, feed.text, turn.text(limits.names) if turn is not None else ""
     told = _of_poses(poses, limits, cut, travelled)
-    return _answer(cut, losses, robust, told, simulated, more, made, said)
+    best = Text(" ".join(filter(None, said)))
+    return _answer(cut, losses, robust, told, simulated, more, made, best)
 
 
 def _path_figures(

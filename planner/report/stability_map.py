@@ -41,21 +41,14 @@ def map_report(
     probability. "wanted_share": of the poses that allow the wanted depth with it, if one is named.
     "left_out": poses where the cut would chatter outside the FRFs' lines; they are in no list else.
     """
-    if not asked.source.is_dir():
-        raise InputError(f"{asked.source} knows no workspace; --map needs a campaign.")
-    if cut.feed_in == "path":
-        raise InputError(
-            f'{asked.cut}: feed_in = "path" means nothing all over a workspace; state it in "base".'
-        )
     campaign, kept, poses, left_out = _in_band(asked, count, cut)
     wanted, first = asked.wanted, part_of(progress, 0.0, 0.5)
     rpm = wanted[0] if wanted else best_speed_of(poses, cut, MOST_SPEEDS, first)
     limits = limits_along(poses, cut.at_speed(rpm), asked.samples, part_of(progress, 0.5, 1.0))
     robust, depth = limits.robust_m[:, 0], None if wanted is None else wanted[1]
     share = None if depth is None else float(np.mean(robust > depth))
-    joints, names = campaign.cell.robot.joints, tuple(name for name, _ in poses)
+    names, candidates = tuple(name for name, _ in poses), campaign.cell.candidates
     told = *cut_source.beyond_the_tip(campaign, cut), *_left_out(left_out, campaign.frequency_lines)
-    candidates = campaign.cell.candidates
     position_m, features = candidates.position_m[kept], candidates.features[kept]
 
     def draw() -> "dict[str, Figure]":
@@ -68,11 +61,11 @@ def map_report(
     simulated = campaign.state.simulated
     keys = {
         "spindle_rpm": rpm, "poses": names, "position_m": position_m,
-        "joints_deg": joints.shown(candidates.q[kept]),
+        "joints_deg": campaign.cell.robot.joints.shown(candidates.q[kept]),
         "depth_limit_m": limits.depth_m[:, 0], "depth_limit_m_at_95": robust,
         "tightest_pose": names[int(np.argmin(robust))], "wanted_depth_m": depth,
         "wanted_share": share, "left_out": left_out, "remarks": told,
-        "simulated": simulated, "joint_units": joints.declared,
+        "simulated": simulated, "joint_units": campaign.cell.robot.joints.declared,
         **pictures.write(draw, asked.source.name, note, simulated=simulated),
     }  # fmt: skip
     return Done(keys, Group(*_said(keys), *remarks(told), *ending(keys)))
@@ -81,7 +74,16 @@ def map_report(
 def _in_band(
     asked: cut_source.StabilityRequest, count: int, cut: Cut
 ) -> tuple[Campaign, list[int], list[tuple[str, Structure]], tuple[str, ...]]:
-    """Candidates where the cut chatters within the FRFs' lines, by number and name; the others."""
+    """Candidates where the cut chatters within the FRFs' lines, by number and name; the others.
+
+    InputError where a file is asked, or a cut along a path.
+    """
+    if not asked.source.is_dir():
+        raise InputError(f"{asked.source} knows no workspace; --map needs a campaign.")
+    if cut.feed_in == "path":
+        raise InputError(
+            f'{asked.cut}: feed_in = "path" means nothing all over a workspace; state it in "base".'
+        )
     change, campaign = cut_source.ToolChange.of(asked, cut), asked.campaign
     count = min(count, campaign.cell.spread)
     names, q = tuple(f"W{i + 1:03d}" for i in range(count)), campaign.cell.candidates.q[:count]
