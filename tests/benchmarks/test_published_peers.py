@@ -3,9 +3,8 @@
 NARGP beside emukit's: same kernels, noise and data. At emukit's hyperparameters both must say the
 same. Each finds hyperparameters by its own climb: ours must never end lower, and where both end on
 the same peak, predict the same; where ours ends higher, emukit's is not the greatest likelihood.
-`pytest -m slow -s tests/benchmarks/test_published_peers.py`
-prints the tables; the peers run in the interpreter that PEERS_PYTHON names (see
-`test_fusion_peers`). PEERS_SEEDS (10) says how many designs per problem.
+`pytest -m slow -s tests/benchmarks/test_published_peers.py` prints the tables; the peers run in the
+interpreter that PEERS_PYTHON names. PEERS_SEEDS (10) says how many designs per problem.
 """
 
 import os
