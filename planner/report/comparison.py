@@ -51,13 +51,14 @@ def comparison(
     middle = {name: medians(curve) for name, curve in curves.items()}
     title = f"Pool of {size} poses, {study.repeats} repeats, simulation {fidelity}"
     simulated, name = any(p.simulated for p in poses), bench.robot.name
-    note, own = f"{title}\n\nPool {bench.key}.", bench.config.surrogate.model
+    note, usual = f"{title}\n\nPool {bench.key}.", bench.config.surrogate.model
     keys = {
         "strategies": middle,
         "measurements_to_one_percent": {name: curve.to_goal for name, curve in curves.items()},
         "minutes_to_one_percent": {name: curve.minutes_to_goal for name, curve in curves.items()},
-        "paired": {"baseline": base, "against": against}, "acquisitions": study.strategies,
-        "models": {name: model or own for name, model in study.models.items()}, "robot": name,
+        "paired": {"baseline": base, "against": against}, "robot": name,
+        "acquisitions": {name: own for name, (own, _) in study.strategies.items()},
+        "models": {name: model or usual for name, (_, model) in study.strategies.items()},
         "pool": size, "repeats": study.repeats, "initial": study.initial, "budget": study.budget,
         "simulation": fidelity,
         "failed": [{"strategy": task.strategy, "seed": task.seed, "reason": why.reason}
@@ -91,8 +92,8 @@ def _curves(
 ) -> dict[str, Curves]:
     """By strategy, as the user named them."""
     runs, curves = [run for run in found.values() if isinstance(run, Run)], {}
-    for name, strategy in study.strategies.items():
-        own = [run for run in runs if (run.strategy, run.model) == (strategy, study.models[name])]
+    for name, asked in study.strategies.items():
+        own = [run for run in runs if (run.strategy, run.model) == asked]
         if not own:
             why = next(iter(failed.values())).reason
             raise InputError(f"Every run of {name} failed: {why}")
