@@ -109,13 +109,13 @@ def status_(
     from planner.report.pictures import Pictures
     from planner.report.status import status
 
-    campaign, pictures = Campaign(directory), Pictures(plot, format_)
-    answer = status(campaign)
-    answer = answer.with_figures(pictures, answer.drawings, campaign.directory.name)
+    campaign, pictures, compared = Campaign(directory), Pictures(plot, format_), None
     if models:
+        from planner.campaign.model_comparison import compared_models
+
         with progress_bar("models", quiet=as_json) as progress:
-            answer = answer.with_models(progress)
-    return respond(answer, as_json)
+            compared = compared_models(campaign.model, progress=progress)
+    return respond(status(campaign, None, pictures, compared), as_json)
 
 
 @app.command()
@@ -236,9 +236,10 @@ def replay(
 
     with progress_bar("replaying", quiet=as_json) as progress:
         answer = replayed(Campaign(directory), until, rrd, viewer, progress, acquisition)
-    if not answer.reproduced:
+    reproduced = answer.keys["reproduced"]
+    if not reproduced:
         warn("The log was not reproduced; see the steps that differ.")
-    return respond(answer, as_json, 0 if answer.reproduced else 1)
+    return respond(answer, as_json, 0 if reproduced else 1)
 
 
 for _command in (

@@ -40,7 +40,8 @@ def new(
     from planner.campaign.campaign import Campaign
     from planner.campaign.from_urdf import StatedMasses, new_from_urdf
     from planner.campaign.store import write_example
-    from planner.report.campaign_changes import ExampleFolder, NewCampaign
+    from planner.report.campaign_changes import begun
+    from planner.report.campaign_changes import example as example_folder
 
     if (robot is not None) + example + (urdf is not None) != 1:
         raise InputError(
@@ -50,11 +51,10 @@ def new(
     if urdf is None and weights != StatedMasses():
         raise InputError("--mass-kg, --payload-kg and --tool-mass-kg go with --urdf; give that.")
     if urdf is not None:
-        begun, guessed = new_from_urdf(directory, urdf, weights, campaign)
-        return respond(NewCampaign(begun, guessed), as_json)
+        return respond(begun(*new_from_urdf(directory, urdf, weights, campaign)), as_json)
     if robot is not None:
-        return respond(NewCampaign(Campaign.new(directory, robot, campaign)), as_json)
-    return respond(ExampleFolder(*write_example(directory)), as_json)
+        return respond(begun(Campaign.new(directory, robot, campaign)), as_json)
+    return respond(example_folder(*write_example(directory)), as_json)
 
 
 PoseArgument = Annotated[str, argument("Name of the pose.", "POSE")]
@@ -87,9 +87,9 @@ def undo(directory: Directory, as_json: AsJson = False) -> int:
     Example: planner undo cell7
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_changes import undone
+    from planner.report.campaign_changes import taken_back
 
-    return respond(undone(Campaign(directory).undo()), as_json)
+    return respond(taken_back(Campaign(directory).undo(), "undone"), as_json)
 
 
 def redo(directory: Directory, as_json: AsJson = False) -> int:
@@ -98,9 +98,9 @@ def redo(directory: Directory, as_json: AsJson = False) -> int:
     Example: planner redo cell7
     """
     from planner.campaign.campaign import Campaign
-    from planner.report.campaign_changes import redone
+    from planner.report.campaign_changes import taken_back
 
-    return respond(redone(Campaign(directory).redo()), as_json)
+    return respond(taken_back(Campaign(directory).redo(), "redone"), as_json)
 
 
 def withdraw(

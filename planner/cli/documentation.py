@@ -25,16 +25,15 @@ def check(
     """
     from planner.campaign.cell import examine_robot
     from planner.report.pictures import Pictures
-    from planner.report.robot_check import RobotCheckReport
+    from planner.report.robot_check import robot_check
 
     pictures = Pictures(plot, format_)
-    answer = RobotCheckReport(examine_robot(robot, campaign))
-    answer = answer.with_figures(pictures, answer.drawings, answer.found.robot.name)
+    found = examine_robot(robot, campaign)
+    answer = robot_check(found, pictures)
     if as_json:  # the text says them itself
-        for finding in answer.found.remarks:
-            if finding.severity == "error":
-                warn(finding.sentence)
-    return respond(answer, as_json, 0 if answer.ok else 2)
+        for finding in found.errors:
+            warn(finding.sentence)
+    return respond(answer, as_json, 2 if found.errors else 0)
 
 
 def schema(

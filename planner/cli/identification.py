@@ -165,6 +165,7 @@ def compare(
     from planner.compare.resume import conduct, recorded
     from planner.compare.tasks import Study
     from planner.report.comparison import comparison
+    from planner.report.pictures import Pictures
 
     started = time.perf_counter()
     if simulation not in (None, *SIMULATIONS):
@@ -186,11 +187,7 @@ def compare(
         study = Study.plan(bench, strategies, models, repeats, initial, budget)
         found, damaged = conduct(bench, study, folder, scheduler, workers, progress)
     told = (*given.unlisted(listed), *remarks, *damaged)
-    answer = comparison(bench, study, found, poses, told)
-    answer = answer.with_pictures(out, rrd)
-    answer = replace(answer, seconds=time.perf_counter() - started)
-    if out is not None:
-        answer.write(out)
-    for task, why in answer.failed.items():
-        warn(f"The run of {task.strategy} with seed {task.seed} failed: {why.reason}")
+    answer = comparison(bench, study, found, poses, told, Pictures(out, rrd=rrd), started)
+    for one in answer.keys["failed"]:
+        warn(f"The run of {one['strategy']} with seed {one['seed']} failed: {one['reason']}")
     return respond(answer, as_json)

@@ -69,9 +69,8 @@ def modes(
             raise InputError(f"{paths[0]} holds several poses; leave {for_points[0]} out.")
         given = paths[0], band_hz, robot, estimator, window_rate_1_s
         with progress_bar("identifying", quiet=as_json) as progress:
-            answer = survey_report(survey(*given, progress))
-            answer = answer.with_figures(pictures, answer.drawings, paths[0].name)
-        return respond(answer, as_json, refusals(answer.refused))
+            answer = survey_report(survey(*given, progress), pictures, paths[0].name)
+        return respond(answer, as_json, refusals(answer.keys["refused"]))
     if operating:
         return respond(modal_analysis.operating_report(paths, band_hz, pictures), as_json)
     sources = modal_analysis.sources_of(paths, from_names)
@@ -89,4 +88,4 @@ def modes(
         answer = modal_analysis.modal_report(
             sources, band_hz, force, estimator, pictures, window_rate_1_s
         )
-    return respond(answer, as_json, refusals(answer.refused))
+    return respond(answer, as_json, refusals(answer.keys["refused"]))

@@ -1,8 +1,9 @@
 """Cuts and tools (`planner stability`, `planner couple`)."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
+
+import msgspec
 
 from planner.cli.answer import AsJson, FromNames, PictureFormat, Rrd, argument, option, respond
 from planner.cli.progress import progress_bar
@@ -149,14 +150,10 @@ def couple(
     tested = None if reference is None else load_tool(reference)
     tip, name = tip_of(source, tested, pose, robot, noise / 100, from_names)
     tip = within(tip, band_hz, source)
-    contact = None
+    contact = msgspec.UNSET
     if contact_from is not None:
-        contact = fitted_contact(tip, target, tested, contact_from, pose)
-        target = contact.tool
-    before, coupled = coupling(tip, None), coupling(tip, target, tested)
-    tested_name = None if tested is None else tested.name
-    answer = coupling_report(before, coupled, target.name, tested_name, name, out)
-    if contact is not None:
-        answer = replace(answer, contact=contact.to_json())
-    name = f"{answer.tool} at {answer.pose}"
-    return respond(answer.with_figures(pictures, answer.drawings, name), as_json)
+        fitted = fitted_contact(tip, target, tested, contact_from, pose)
+        target, contact = fitted.tool, fitted.to_json()
+    both = coupling(tip, None), coupling(tip, target, tested)
+    tools = None if tested is None else tested.name, target.name
+    return respond(coupling_report(both, tools, name, out, contact, pictures), as_json)

@@ -1,6 +1,7 @@
 """What another strategy would have saved in a campaign: played on the poses that were measured."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
@@ -15,29 +16,21 @@ from planner.design.space_filling import NESTED
 from planner.errors import InputError
 
 LEAST_POSES = 2 + LEFT  # measured: one to begin with, one to choose, and some to judge by
-
-
-@dataclass(frozen=True)
-class LearningRun:
-    """One order of the measured poses: RMSE and robot time after n measurements each."""
-
-    poses: tuple[str, ...]
-    n: tuple[int, ...]
-    frequency_rmse_percent: tuple[float, ...]
-    minutes: tuple[float, ...]
+KEYS = "poses", "n", "frequency_rmse_percent", "minutes"  # of a run that are told
 
 
 @dataclass(frozen=True)
 class OtherAcquisition:
-    """What another acquisition would have saved among the poses measured; `runs` by name.
+    """What another acquisition would have saved among the poses measured; KEYS of `runs` by name.
 
     The campaign in the order in which it was measured, and as the acquisition would have chosen:
-    both begin with the pose measured first and are judged on the poses not yet used.
+    both begin with the pose measured first and are judged on the poses not yet used, after n
+    measurements each.
     """
 
     acquisition: str
     text: str
-    runs: dict[str, LearningRun]
+    runs: dict[str, dict[str, Any]]
 
     @classmethod
     def of(cls, campaign: Campaign, acquisition: str) -> "OtherAcquisition | None":
@@ -63,7 +56,7 @@ class OtherAcquisition:
             "poses measured)."
         )
         runs = {
-            name: LearningRun(run.poses, run.n, run.frequency_rmse_percent, run.minutes)
+            name: {key: getattr(run, key) for key in KEYS}
             for name, run in (("campaign", was), (acquisition, other))
         }
         return cls(acquisition, text, runs)

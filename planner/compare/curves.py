@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -101,24 +101,14 @@ class Curves:
         return Curves(tuple(seeds), self.n, *columns)
 
 
-@dataclass(frozen=True, eq=False)
-class StrategyDifference:
-    """A strategy less the baseline over the seeds (initial poses) of both; 95 % intervals.
+def paired(strategy: Curves, baseline: Curves) -> dict[str, Any] | None:
+    """A strategy less the baseline, seed by seed; None if they share none; 95 % intervals.
 
-    `difference_percent` (t,) is the median difference of the RMSE in percentage points, its
-    interval (t, 2) a bootstrap's over seeds; `measurements_to_one_percent` is the mean difference,
-    where a run that did not get there counts as one more than the budget.
+    "seeds" says how many (initial poses) both have; "difference_percent" (t,) is the median
+    difference of the RMSE in percentage points, its interval (t, 2) a bootstrap's over seeds;
+    "measurements_to_one_percent" is the mean difference, where a run that did not get there counts
+    as one more than the budget.
     """
-
-    seeds: int
-    difference_percent: np.ndarray
-    difference_percent_interval95: np.ndarray
-    measurements_to_one_percent: float
-    measurements_to_one_percent_interval95: np.ndarray
-
-
-def paired(strategy: Curves, baseline: Curves) -> StrategyDifference | None:
-    """The difference of two strategies seed by seed; None if they share no seed."""
     shared = [seed for seed in strategy.seeds if seed in baseline.seeds]
     if not shared:
         return None
@@ -127,9 +117,15 @@ def paired(strategy: Curves, baseline: Curves) -> StrategyDifference | None:
     saved = (a.each_to_goal - b.each_to_goal).astype(float)
     picks = np.random.default_rng(0).integers(len(shared), size=(BOOTSTRAP_RESAMPLES, len(shared)))
     interval = np.percentile(np.median(apart[picks], axis=1), (2.5, 97.5), axis=0).T
-    goal = np.percentile(np.mean(saved[picks], axis=1), (2.5, 97.5))
-    middle, sooner = np.median(apart, axis=0), float(saved.mean())
-    return StrategyDifference(len(shared), middle, interval, sooner, goal)
+    return {
+        "seeds": len(shared),
+        "difference_percent": np.median(apart, axis=0),
+        "difference_percent_interval95": interval,
+        "measurements_to_one_percent": float(saved.mean()),
+        "measurements_to_one_percent_interval95": np.percentile(
+            np.mean(saved[picks], axis=1), (2.5, 97.5)
+        ),
+    }
 
 
 def baseline_of(strategies: Sequence[str]) -> str:
@@ -137,40 +133,23 @@ def baseline_of(strategies: Sequence[str]) -> str:
     return BASELINE if BASELINE in strategies else strategies[0]
 
 
-@dataclass(frozen=True, eq=False)
-class StrategyCurve:
-    """Medians over runs, on poses not used, after n (t,) measurements; quartiles (2, t).
+def medians(curve: Curves) -> dict[str, Any]:
+    """Over runs, on poses not used, after "n" (t,) measurements; quartiles (2, t).
 
-    `minutes` (t,) of robot time; the seconds are of all runs together.
+    "minutes" (t,) of robot time; the seconds are of all runs together.
     """
-
-    n: np.ndarray
-    frequency_rmse_percent: np.ndarray
-    frequency_rmse_percent_quartiles: np.ndarray
-    frequency_rmse_percent_worst: np.ndarray
-    r2: np.ndarray
-    coverage95: np.ndarray
-    coverage95_mean: np.ndarray
-    minutes: np.ndarray
-    wall_seconds: float
-    process_seconds: float
-    runs: int
-
-    @classmethod
-    def of(cls, curve: Curves) -> "StrategyCurve":
-        """Of one strategy's runs."""
-        rmse = curve.frequency_rmse_percent
-        low, middle, high = np.percentile(rmse, (25, 50, 75), axis=0)
-        return cls(
-            n=curve.n,
-            frequency_rmse_percent=middle,
-            frequency_rmse_percent_quartiles=np.array([low, high]),
-            frequency_rmse_percent_worst=rmse.max(axis=0),
-            r2=np.median(curve.r2, axis=0),
-            coverage95=np.median(curve.coverage95, axis=0),
-            coverage95_mean=np.mean(curve.coverage95, axis=0),
-            minutes=np.median(curve.minutes, axis=0),
-            wall_seconds=float(curve.wall_seconds.sum()),
-            process_seconds=float(curve.process_seconds.sum()),
-            runs=len(curve.seeds),
-        )
+    rmse = curve.frequency_rmse_percent
+    low, middle, high = np.percentile(rmse, (25, 50, 75), axis=0)
+    return {
+        "n": curve.n,
+        "frequency_rmse_percent": middle,
+        "frequency_rmse_percent_quartiles": np.array([low, high]),
+        "frequency_rmse_percent_worst": rmse.max(axis=0),
+        "r2": np.median(curve.r2, axis=0),
+        "coverage95": np.median(curve.coverage95, axis=0),
+        "coverage95_mean": np.mean(curve.coverage95, axis=0),
+        "minutes": np.median(curve.minutes, axis=0),
+        "wall_seconds": float(curve.wall_seconds.sum()),
+        "process_seconds": float(curve.process_seconds.sum()),
+        "runs": len(curve.seeds),
+    }

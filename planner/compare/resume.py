@@ -5,7 +5,7 @@ from pathlib import Path
 
 from planner.campaign.config import ModesTable
 from planner.campaign.journal import read_checked, write_checked
-from planner.compare import cluster, pool, processes
+from planner.compare import pool, processes
 from planner.compare.bench import Bench
 from planner.compare.pool import PoolPose
 from planner.compare.processes import Failure
@@ -59,11 +59,7 @@ def conduct(
     damaged = [paths[task].name for task in todo if paths[task].exists()]
     _count(progress, "runs", len(found), len(paths))
     if todo:
-        if scheduler is not None:
-            answers = cluster.each(run, bench, todo, scheduler)
-        else:
-            answers = processes.each(run, bench, todo, workers)
-        for k, answer in answers:
+        for k, answer in processes.each(run, bench, todo, workers, scheduler):
             if isinstance(answer, Run):
                 write_checked(paths[todo[k]], answer)
             found[todo[k]] = answer

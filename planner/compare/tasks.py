@@ -54,10 +54,9 @@ class Run(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class Study:
-    """Strategies by the names that the user gave, with the acquisition and model of each."""
+    """Acquisition and model ("": the campaign's) of each strategy, by the names that users gave."""
 
-    strategies: dict[str, str]
-    models: dict[str, str]
+    strategies: dict[str, tuple[str, str]]
     repeats: int
     initial: int
     budget: int
@@ -100,18 +99,15 @@ class Study:
             raise InputError(
                 f"--initial {initial} is more than --budget {budget}; give fewer initial poses."
             )
-        strategies_of = {name: acquisition for name, (acquisition, _) in pairs.items()}
-        models_of = {name: model for name, (_, model) in pairs.items()}
-        return cls(strategies_of, models_of, repeats, initial, budget)
+        return cls(pairs, repeats, initial, budget)
 
     @property
     def tasks(self) -> tuple[Task, ...]:
         """All runs, seed by seed; strategies that are the same acquisition share theirs."""
-        pairs = dict.fromkeys((self.strategies[n], self.models[n]) for n in self.strategies)
         return tuple(
             Task(name, seed, self.initial, self.budget, model)
             for seed in range(self.repeats)
-            for name, model in pairs
+            for name, model in dict.fromkeys(self.strategies.values())
         )
 
 

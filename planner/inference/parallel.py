@@ -143,18 +143,25 @@ def _has_cores() -> bool:
 @cache
 def _helper() -> tuple[ProcessPoolExecutor, Future[None]]:
     """The process, and what is done once it has started."""
-    # Of loky: others run a script that has no guard for its main part once more.
-    pool = ProcessPoolExecutor(1, timeout=None, initializer=_begin, env=NO_LEAK)
+    pool = process()
     return pool, pool.submit(_nothing)
+
+
+def process(begun: Callable[..., object] | None = None, *given: Any) -> ProcessPoolExecutor:
+    """Another process, which ends with this one; it first calls `begun`, if named, with `given`."""
+    # Of loky: others run a script that has no guard for its main part once more.
+    started = begun or _nothing, given
+    return ProcessPoolExecutor(1, timeout=None, initializer=_begin, initargs=started, env=NO_LEAK)
 
 
 def _nothing() -> None:
     """What a helper does first."""
 
 
-def _begin() -> None:
+def _begin(begun: Callable[..., object], given: tuple) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the other process's to handle
     threadpool_limits(1)
+    begun(*given)
     threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
 
 

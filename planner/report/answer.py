@@ -2,17 +2,13 @@
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Self
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from rich.console import RenderableType
-
-    from planner.report.pictures import Pictures
-    from planner.report.rerun.figures import More
 
 # Metadata of a field for what an answer was made of; None where it came from another process.
 NOT_IN_JSON = {"json": False}
@@ -33,33 +29,6 @@ class Answer:
         """For the engineer, units in every column; None where there is nothing to say."""
         return None
 
-    @property
-    def end(self) -> "list[RenderableType]":
-        """The last lines of a text: where pictures are, and whether recordings are simulated."""
-        from rich.text import Text
-
-        from planner.report.text import SIMULATED
-
-        plots, rrd = getattr(self, "plots", ()), getattr(self, "rrd", None)
-        made = [Text("\n  ".join(["Pictures:", *plots]))] if plots else []
-        made += [Text(f"Rerun recording: {rrd}")] if rrd else []
-        return [*made, *([SIMULATED] if getattr(self, "simulated", False) else [])]
-
-    def with_figures(
-        self,
-        pictures: "Pictures",
-        draw: "Callable[[], dict[str, Figure]]",
-        name: str,
-        note: str = "",
-        more: "More | None" = None,
-    ) -> Self:
-        """The same once what `draw` gives is written, if wanted; others as in `Pictures.write`."""
-        if not pictures.wanted:
-            return self
-        simulated = getattr(self, "simulated", False)
-        written = pictures.write(draw(), name, note, more, simulated)
-        return dataclasses.replace(self, **written)  # pyrefly: ignore[bad-specialization]
-
     def _repr_html_(self) -> str:
         """What notebooks show."""
         import io
@@ -73,18 +42,18 @@ class Answer:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Done(Answer):
-    """Answer of an act that needs one sentence; `keys` are those of its JSON."""
+    """Answer of keys, which are those of its JSON, and of what the engineer is told."""
 
     keys: Mapping[str, Any]
-    sentence: str
+    said: "RenderableType"
 
     def to_json(self) -> dict[str, Any]:
         """The keys alone."""
         return plain(self.keys)
 
-    def text(self) -> str:
-        """The sentence."""
-        return self.sentence
+    def text(self) -> "RenderableType":
+        """What is said."""
+        return self.said
 
 
 def plain(value: Any) -> Any:
@@ -97,7 +66,7 @@ def plain(value: Any) -> Any:
         value = msgspec.to_builtins(value)
     if hasattr(value, "tolist"):
         value = value.tolist()
-    if isinstance(value, dict):
+    if isinstance(value, Mapping):
         return {str(k): plain(item) for k, item in value.items() if item is not msgspec.UNSET}
     if isinstance(value, list | tuple | set | frozenset):
         return [plain(item) for item in value]

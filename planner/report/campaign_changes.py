@@ -1,9 +1,7 @@
 """Answers of the acts on a campaign: `new`, `undo`, `withdraw`, `skip`, `confirm`."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 from rich.console import Group
@@ -14,52 +12,36 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import Entry
 from planner.campaign.from_urdf import Guess, Guessed
 from planner.campaign.undo import in_words
-from planner.check.description import CheckRemark
-from planner.report.answer import Answer, Done, plain
+from planner.report.answer import Done
 from planner.report.text import command_line, table
 from planner.words import command
 
 
-@dataclass(frozen=True, eq=False)
-class NewCampaign(Answer):
-    """Answer of `new`: a campaign that was just started, from a URDF alone where `guessed`."""
+def begun(started: Campaign, guessed: Guessed | None = None) -> Done:
+    """Answer of `new`: a campaign that was just started, from a URDF alone where `guessed`.
 
-    started: Campaign
-    guessed: Guessed | None = None
-
-    @property
-    def findings(self) -> tuple[CheckRemark, ...]:
-        """What a check of the robot warns of and the campaign itself does not."""
-        cell = self.started.cell
-        warned = (r for r in cell.examined.remarks if r.severity == "warning")
-        return tuple(r for r in warned if r.what not in cell.remarks)
-
-    def to_json(self) -> dict[str, Any]:
-        """All that was "guessed", and what to know of that ("told")."""
-        cell, guessed = self.started.cell, self.guessed
-        joints = cell.robot.joints
-        said = {
-            "campaign": str(self.started.directory), "robot": cell.robot.name,
-            "joints": joints.names, "modes": cell.config.modes.count,
-            "acquisition": cell.config.acquisition.name, "remarks": cell.remarks,
-            "findings": self.findings, "guessed": guessed.guesses if guessed else (),
-            "told": guessed.remarks if guessed else (), "joint_units": joints.declared,
-        }  # fmt: skip
-        return plain(said)
-
-    def text(self) -> Group:
-        """What was started, and how it goes on."""
-        cell, config, folder = self.started.cell, self.started.cell.config, self.started.directory
-        warned = (f"Check: {finding.sentence}" for finding in self.findings)
-        told = self.guessed.remarks if self.guessed else ()
-        said = (
-            f"Campaign in {folder}: robot {cell.robot.name}, {config.modes.count} modes, chosen by "
-            f"{config.acquisition.name}."
-        )
-        parts = [Text("\n".join([said, *warned, *cell.remarks, *told]).rstrip())]
-        parts.append(command_line("Next: ", "planner", "next", folder))
-        guesses = [_guesses(self.guessed.guesses)] if self.guessed and self.guessed.guesses else []
-        return Group(*guesses, *parts)
+    "findings" are what a check of the robot warns of and the campaign itself does not, "guessed"
+    is all that was, "told" what to know of that.
+    """
+    cell, config, folder = started.cell, started.cell.config, started.directory
+    joints, guesses = cell.robot.joints, guessed.guesses if guessed else ()
+    warned = (r for r in cell.examined.remarks if r.severity == "warning")
+    findings = [r for r in warned if r.what not in cell.remarks]
+    told = guessed.remarks if guessed else ()
+    keys = {
+        "campaign": str(folder), "robot": cell.robot.name, "joints": joints.names,
+        "modes": config.modes.count, "acquisition": config.acquisition.name,
+        "remarks": cell.remarks, "findings": findings, "guessed": guesses, "told": told,
+        "joint_units": joints.declared,
+    }  # fmt: skip
+    said = (
+        f"Campaign in {folder}: robot {cell.robot.name}, {config.modes.count} modes, chosen by "
+        f"{config.acquisition.name}."
+    )
+    lines = [said, *(f"Check: {one.sentence}" for one in findings), *cell.remarks, *told]
+    parts = [_guesses(guesses)] if guesses else []
+    then = command_line("Next: ", "planner", "next", folder)
+    return Done(keys, Group(*parts, Text("\n".join(lines).rstrip()), then))
 
 
 def _guesses(guessed: tuple[Guess, ...]) -> Table:
@@ -80,26 +62,17 @@ def _guesses(guessed: tuple[Guess, ...]) -> Table:
     return made
 
 
-@dataclass(frozen=True)
-class ExampleFolder(Answer):
+def example(folder: str, robot: str, campaign: str, files: Sequence[str]) -> Done:
     """Answer of `new --example`: the folder, and the files in it to begin with."""
-
-    example: str
-    robot: str
-    campaign: str
-    files: tuple[str, ...]
-
-    def text(self) -> Group:
-        """What to do with it."""
-        toml, folder = self.robot, self.example
-        cell = f"{folder}/cell"
-        said = (
-            f"An example of one's own to change is in {folder}: robot/robot.toml, "
-            f"robot/robot.urdf and campaign.toml, with comments; ask_tell.py is a script."
-        )
-        new = "planner", "new", cell, "--robot", toml, "--campaign", self.campaign
-        commands = ("planner", "check", toml), new, ("planner", "next", cell)
-        return Group(Text(said), *(command_line("  ", *words) for words in commands))
+    cell = f"{folder}/cell"
+    said = (
+        f"An example of one's own to change is in {folder}: robot/robot.toml, "
+        f"robot/robot.urdf and campaign.toml, with comments; ask_tell.py is a script."
+    )
+    new = "planner", "new", cell, "--robot", robot, "--campaign", campaign
+    commands = ("planner", "check", robot), new, ("planner", "next", cell)
+    keys = {"example": folder, "robot": robot, "campaign": campaign, "files": files}
+    return Done(keys, Group(Text(said), *(command_line("  ", *words) for words in commands)))
 
 
 def kind_of(entry: Entry) -> str:
@@ -107,25 +80,15 @@ def kind_of(entry: Entry) -> str:
     return msgspec.to_builtins(entry.event)["kind"]
 
 
-def undone(entries: Sequence[Entry]) -> Done:
-    """Answer of `undo`: the log's entry that was taken back, and those that went with it."""
-    keys, words = _told(entries, "undone")
-    return Done(keys, f"Undone: {words} (entry {keys['undone']} of the log).")
-
-
-def redone(entries: Sequence[Entry]) -> Done:
-    """Answer of `redo`: the log's entry that holds again, and those that came with it."""
-    keys, words = _told(entries, "redone")
-    return Done(keys, f"Redone: {words} (entry {keys['redone']} of the log).")
-
-
-def _told(entries: Sequence[Entry], what: str) -> tuple[dict[str, Any], str]:
-    """Number, kind and words of the first entry, the others' words; and all words in one."""
+def taken_back(entries: Sequence[Entry], what: str) -> Done:
+    """Answer of `undo` and `redo` (`what`: "undone", "redone"): the log's entry that was taken back
+    or holds again, and those that went with it.
+    """
     entry, *others = entries
-    said = [in_words(other) for other in others]
-    follow = f"; with it: {', '.join(said)}" if said else ""
-    keys = {what: entry.seq, "event": kind_of(entry), "what": in_words(entry), "with_it": said}
-    return keys, f"{in_words(entry)}{follow}"
+    said, words = in_words(entry), [in_words(other) for other in others]
+    follow = f"; with it: {', '.join(words)}" if words else ""
+    keys = {what: entry.seq, "event": kind_of(entry), "what": said, "with_it": words}
+    return Done(keys, f"{what.capitalize()}: {said}{follow} (entry {entry.seq} of the log).")
 
 
 def withdrawn(directory: Path, pose: str, reason: str, held: bool) -> Done:

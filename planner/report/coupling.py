@@ -1,6 +1,5 @@
 """Answer of `couple`: the FRFs of another tool, how sure they are, and the hit that would tell."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +17,9 @@ from planner.milling.coupling import (
     verifying_hit,
 )
 from planner.milling.tool import NUMBERS
-from planner.report.answer import Answer, plain
-from planner.report.text import remarks, table
+from planner.report.answer import Done
+from planner.report.pictures import Pictures
+from planner.report.text import ending, remarks, table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,88 +33,6 @@ def _amplified(coupled: CoupledFrf) -> dict[str, Any]:
     bands = [(float(f[part.start]), float(f[part.stop - 1])) for part in over]
     return {"worst": float(values[worst]), "at_hz": float(f[worst]), "limit": AMPLIFICATION_LIMIT,
             "above_limit_hz": bands}  # fmt: skip
-
-
-def _to_mind(bands: list[tuple[float, float]]) -> str:
-    """What the engineer should mind; empty where nothing is above the limit."""
-    if not bands:
-        return ""
-    where = ", ".join(f"{low:.4g} to {high:.4g} Hz" for low, high in bands[:3])
-    more = ", …" if len(bands) > 3 else ""
-    return (
-        f"Errors of the measured FRFs grow more than {AMPLIFICATION_LIMIT:g} times at "
-        f"{where}{more}: do not rely on the coupled FRFs there."
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class CouplingReport(Answer):
-    """Answer of `couple`; receptances in m/N, FRFs of `npz` in m/s²/N.
-
-    `before` is the tip with the tested tool, whose name `reference` is.
-    """
-
-    tool: str
-    reference: str | None
-    pose: str
-    npz: str
-    before: CoupledFrf
-    coupled: CoupledFrf
-    contact: "dict[str, object] | msgspec.UnsetType" = msgspec.UNSET
-    plots: tuple[str, ...] = ()
-    rrd: str | None = None
-
-    @property
-    def simulated(self) -> bool:
-        """Whether the FRFs are of simulated recordings."""
-        return self.coupled.simulated
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What the engineer should mind."""
-        held = ", ".join(MOTIONS[k] for k in range(3) if k not in self.coupled.kept)
-        none = f"Nothing was measured along the tool's own {held}: FRFs there are NaN."
-        grown = _to_mind(_amplified(self.coupled)["above_limit_hz"])
-        return tuple(filter(None, (*self.coupled.remarks, grown, none if held else "")))
-
-    def to_json(self) -> dict[str, Any]:
-        """With the band (Hz) of so many lines, and which motions are known."""
-        made = self.coupled
-        return plain({
-            "tool": self.tool, "reference": self.reference, "pose": self.pose, "npz": self.npz,
-            "frequency_hz": made.frequency_hz[[0, -1]], "lines": len(made.frequency_hz),
-            "motions": [MOTIONS[k] for k in made.kept], "resonances": resonances(made),
-            "amplification": _amplified(made), "verify": verifying_hit(made),
-            "contact": self.contact, "simulated": self.simulated, "remarks": self.remarks,
-            "plots": self.plots, "rrd": self.rrd,
-        })  # fmt: skip
-
-    def text(self) -> Group:
-        """A table of resonances, then what to mind and what to hit."""
-        made = table(
-            f"{self.tool} at {self.pose}",
-            *("direction", "peak (Hz)", "receptance (µm/N)", "sd (%)", "amplification"),
-        )
-        for peak in resonances(self.coupled):
-            size = f"{1e6 * peak.receptance_m_n:.3g}"
-            sd, grown = f"{peak.sd_percent:.1f}", f"{peak.amplification:.2f}"
-            made.add_row(peak.direction, f"{peak.frequency_hz:.4g}", size, sd, grown)
-        most = _amplified(self.coupled)
-        lines = [
-            Text(f"Errors grow at most {most['worst']:.3g} times, at {most['at_hz']:.4g} Hz."),
-            Text(verifying_hit(self.coupled).sentence),
-            Text(f"FRFs (m/s²/N) with sd: {self.npz}"),
-        ]
-        if isinstance(self.contact, dict):
-            lines.append(Text(_contact_sentence(self.contact)))
-        return Group(made, *lines, *remarks(self.remarks), *self.end)
-
-    def drawings(self) -> "dict[str, Figure]":
-        """Receptances before and after, and how errors grow."""
-        from planner.report.milling_plots import coupling_figure
-
-        before = "as measured" if self.reference is None else f"measured: {self.reference}"
-        return {"coupling": coupling_figure(self.before, self.coupled, before)}
 
 
 def _contact_sentence(contact: dict[str, Any]) -> str:
@@ -134,8 +52,60 @@ def _contact_sentence(contact: dict[str, Any]) -> str:
 
 
 def coupling_report(
-    before: CoupledFrf, coupled: CoupledFrf, tool: str, reference: str | None, pose: str, npz: Path
-) -> CouplingReport:
-    """Write the npz and say what it holds; `before` is the tested tool's tip."""
+    both: tuple[CoupledFrf, CoupledFrf], names: tuple[str | None, str], pose: str, npz: Path,
+    contact: dict[str, Any] | msgspec.UnsetType, pictures: Pictures,
+) -> Done:  # fmt: skip
+    """Answer of `couple`, once the npz is written; receptances in m/N, FRFs of `npz` in m/s²/N.
+
+    `both` are the tip with the tested tool and with the one put on, `names` those of the tools;
+    None: none was stated to be on. "frequency_hz" is the band of so many "lines", "motions" are
+    those that are known.
+    """
+    (before, coupled), (reference, tool) = both, names
     save_coupled(npz, coupled, pose)
-    return CouplingReport(tool, reference, pose, str(npz.resolve()), before, coupled)
+    peaks, verify, grown = resonances(coupled), verifying_hit(coupled), _amplified(coupled)
+    told = _remarks(coupled, grown["above_limit_hz"])
+
+    def draw() -> "dict[str, Figure]":
+        from planner.report.milling_plots import coupling_figure
+
+        said = "as measured" if reference is None else f"measured: {reference}"
+        return {"coupling": coupling_figure(before, coupled, said)}
+
+    keys = {
+        "tool": tool, "reference": reference, "pose": pose, "npz": str(npz.resolve()),
+        "frequency_hz": coupled.frequency_hz[[0, -1]], "lines": len(coupled.frequency_hz),
+        "motions": [MOTIONS[k] for k in coupled.kept], "resonances": peaks,
+        "amplification": grown, "verify": verify, "contact": contact,
+        "simulated": coupled.simulated, "remarks": told,
+        **pictures.write(draw, f"{tool} at {pose}", simulated=coupled.simulated),
+    }  # fmt: skip
+    columns = "direction", "peak (Hz)", "receptance (µm/N)", "sd (%)", "amplification"
+    rows = [
+        (p.direction, f"{p.frequency_hz:.4g}", f"{1e6 * p.receptance_m_n:.3g}",
+         f"{p.sd_percent:.1f}", f"{p.amplification:.2f}")
+        for p in peaks
+    ]  # fmt: skip
+    lines = [
+        f"Errors grow at most {grown['worst']:.3g} times, at {grown['at_hz']:.4g} Hz.",
+        verify.sentence,
+        f"FRFs (m/s²/N) with sd: {keys['npz']}",
+        *([_contact_sentence(contact)] if isinstance(contact, dict) else []),
+    ]
+    made = table(f"{tool} at {pose}", *columns, rows=rows)
+    return Done(keys, Group(made, *map(Text, lines), *remarks(told), *ending(keys)))
+
+
+def _remarks(coupled: CoupledFrf, bands: list[tuple[float, float]]) -> list[str]:
+    """What the engineer should mind; `bands` (Hz) are those above the limit."""
+    told = list(coupled.remarks)
+    if bands:
+        where = ", ".join(f"{low:.4g} to {high:.4g} Hz" for low, high in bands[:3])
+        told.append(
+            f"Errors of the measured FRFs grow more than {AMPLIFICATION_LIMIT:g} times at "
+            f"{where}{', …' if len(bands) > 3 else ''}: do not rely on the coupled FRFs there."
+        )
+    held = ", ".join(MOTIONS[k] for k in range(3) if k not in coupled.kept)
+    if held:
+        told.append(f"Nothing was measured along the tool's own {held}: FRFs there are NaN.")
+    return told

@@ -19,7 +19,7 @@ from planner.fit.departures import departures_text, masses_text
 from planner.fit.posterior import RobotPosterior
 from planner.measurement.agreement import Similarity, fit_similarity
 from planner.report.answer import NOT_IN_JSON, Answer, encoded, plain
-from planner.report.text import command_line, remarks, table
+from planner.report.text import command_line, ending, remarks, table
 from planner.robot.place_names import place_names, with_names
 from planner.words import probable
 
@@ -200,10 +200,12 @@ class DiagnosisReport(Answer):
         made = write_robot(folder / "robot.toml", linear.simulation.robot, result, found.laws)
         again, search = Simulation(Robot.load(made.robot_toml)), found.search
         alone = fit_similarity(again, search.frfs, search.q, search.band_hz)
-        drawn = self.with_figures(Pictures(folder), lambda: diagnosis_figures(found), robot.name)
+        drawn = Pictures(folder).write(
+            lambda: diagnosis_figures(found), robot.name, simulated=self.simulated
+        )
         said = *self.remarks, *made.remarks, *_unwritten(found)
         written = replace(
-            drawn, robot=str(made.robot_toml), urdf=made.urdf, written=alone, remarks=said
+            self, robot=str(made.robot_toml), urdf=made.urdf, written=alone, remarks=said, **drawn
         )
         (folder / "diagnosis.json").write_bytes(encoded(written))  # for planner report
         return written
@@ -225,7 +227,7 @@ class DiagnosisReport(Answer):
         parts += remarks(self.remarks)
         parts += [Text(f"Predictions: {self.npz}")] if self.npz else []
         parts += self._robot_text()
-        return Group(*parts, *self.end)
+        return Group(*parts, *ending(vars(self)))
 
     def to_json(self) -> dict[str, Any]:
         """With the verdict, and what is said of a pose, in words."""

@@ -1,48 +1,38 @@
 """Every entry of the TOML files that a user writes (`schema`), and the manual."""
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
-from typing import Any
+from dataclasses import astuple
 
 import msgspec
-from rich.console import Group
+from rich.console import Group, RenderableType
 from rich.text import Text
 
-from planner.campaign.file_entries import FILES, SchemaTable, tables_of
+from planner.campaign.file_entries import FILES, tables_of
 from planner.campaign.store import EXAMPLE
 from planner.errors import InputError
-from planner.report.answer import Answer
+from planner.report.answer import Done
 from planner.report.html import rendered
 from planner.report.text import table
 
 
-@dataclass(frozen=True)
-class SchemaReport(Answer):
-    """Answer of `schema`: tables in the file's order; `json_schema` is for editors."""
+def schema(file: str) -> Done:
+    """Tables of one of FILES in the file's order, and a JSON Schema for editors.
 
-    file: str
-    tables: tuple[SchemaTable, ...]
-    json_schema: dict[str, Any]
-
-    def text(self) -> Group:
-        """One table after the other."""
-        parts: list[Any] = []
-        for one in self.tables:
-            columns, title = ("entry", "takes", "if left out"), one.name or self.file
-            rows = (map(Text, astuple(entry)) for entry in one.entries)
-            made = table(Text(title, style="bold"), *columns, rows=rows, words=True)
-            parts += [made, Text(one.about)]
-            parts += [Text(f"  {choice.name}: {choice.about}") for choice in one.choices]
-            parts.append(Text(""))
-        return Group(*parts)
-
-
-def schema(file: str) -> SchemaReport:
-    """Of one of FILES; InputError for others."""
+    InputError for others.
+    """
     if file not in FILES:
         raise InputError(f"There is no file {file}; name one of {', '.join(FILES)}.")
-    kind = FILES[file]
-    return SchemaReport(f"{file}.toml", tuple(tables_of(kind)), msgspec.json.schema(kind))
+    kind, parts = FILES[file], list[RenderableType]()
+    tables, name = tuple(tables_of(kind)), f"{file}.toml"
+    for one in tables:
+        columns, title = ("entry", "takes", "if left out"), one.name or name
+        rows = (map(Text, astuple(entry)) for entry in one.entries)
+        made = table(Text(title, style="bold"), *columns, rows=rows, words=True)
+        parts += [made, Text(one.about)]
+        parts += [Text(f"  {choice.name}: {choice.about}") for choice in one.choices]
+        parts.append(Text(""))
+    keys = {"file": name, "tables": tables, "json_schema": msgspec.json.schema(kind)}
+    return Done(keys, Group(*parts))
 
 
 def manual(commands: Sequence[tuple[str, str]]) -> str:

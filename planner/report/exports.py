@@ -1,7 +1,6 @@
 """Answer of `export`: a campaign's results or proposals in another program's format."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from planner.export.model_file import LOADER, model_arrays
 from planner.export.tables import frfs_csv, mat_arrays, modes_csv
 from planner.recording.folder import read_poses
 from planner.recording.records import PoseRow
-from planner.report.answer import Answer
+from planner.report.answer import Done
 from planner.robot.collision import Collisions
 from planner.robot.config import ControllerTable
 from planner.robot.controller_program import (
@@ -38,31 +37,8 @@ AS_URDF = (
 )
 
 
-@dataclass(frozen=True)
-class ExportedFiles(Answer):
-    """Answer of `export`: the files, and the poses in them; `loader` reads a model's file."""
-
-    kind: str
-    files: tuple[str, ...]
-    poses: tuple[str, ...]
-    simulated: bool
-    loader: str | None = None
-    error_percent: tuple[float, ...] | None = None
-    remarks: tuple[str, ...] = ()
-
-    def text(self) -> Group:
-        """The files, and how well a model's holds."""
-        lines = [Text("\n  ".join([f"Exported as {self.kind}:", *self.files]))]
-        if self.error_percent:
-            each = ", ".join(f"mode {k} {e:.2g} %" for k, e in enumerate(self.error_percent, 1))
-            lines.append(Text(f"Interpolating errs by (rms; part of the sds): {each}."))
-        return Group(*lines, *map(Text, self.remarks))
-
-
-def export(
-    campaign: Campaign, kind: str, out: Path | None, poses_csv: Path | None
-) -> ExportedFiles:
-    """Write a campaign as one of KINDS into a folder, by default DIR/export.
+def export(campaign: Campaign, kind: str, out: Path | None, poses_csv: Path | None) -> Done:
+    """Answer of `export`: a campaign as one of KINDS is in a folder, by default DIR/export.
 
     Those of PROGRAMS drive the robot to the open proposals, or to other poses, which predictions
     are for, too. InputError where there is nothing to export, or a file cannot be written.
@@ -93,9 +69,8 @@ def export(
         files = {f"{identifier(found.name)}.mat": mat_arrays(found)}
     else:
         files = {"modes.csv": modes_csv(found), "frfs.csv": frfs_csv(found)}
-    written = _write(folder, files)
     poses = dict.fromkeys([*(m.pose for m in found.measured), *found.poses])
-    return ExportedFiles(kind, written, tuple(poses), found.simulated, loader, errors)
+    return _written(kind, folder, files, list(poses), found.simulated, loader, errors)
 
 
 def _refuse_contacts(robot: Robot, file: Path | None, rows: Sequence[PoseRow]) -> None:
@@ -109,7 +84,7 @@ def _refuse_contacts(robot: Robot, file: Path | None, rows: Sequence[PoseRow]) -
             )
 
 
-def _program(campaign: Campaign, kind: str, folder: Path, rows: Sequence[PoseRow]) -> ExportedFiles:
+def _program(campaign: Campaign, kind: str, folder: Path, rows: Sequence[PoseRow]) -> Done:
     state, name = campaign.state, campaign.directory.name
     drive = [PoseToDrive(r.pose, tuple(r.joints_deg)) for r in rows]
     open_ = [state.proposals[pose] for pose in state.open]
@@ -120,9 +95,8 @@ def _program(campaign: Campaign, kind: str, folder: Path, rows: Sequence[PoseRow
         )
     text = program(kind, campaign.cell.robot, f"planner_{name}", drive, state.simulated)
     files = {f"{identifier(f'planner_{name}', 'C_')}{SUFFIXES[kind]}": text}
-    names = tuple(d.pose for d in drive)
     told = (AS_URDF,) if campaign.cell.robot.config.controller == ControllerTable() else ()
-    return ExportedFiles(kind, _write(folder, files), names, state.simulated, remarks=told)
+    return _written(kind, folder, files, [d.pose for d in drive], state.simulated, told=told)
 
 
 def _uff(found: ExportData) -> dict[str, Any]:
@@ -140,6 +114,23 @@ def _uff(found: ExportData) -> dict[str, Any]:
         sets = uff.tool_frfs(found.frequency_hz, found.frf_mean[i], title)
         files[f"{unique(identifier(pose), used)}_predicted.unv"] = sets
     return files
+
+
+def _written(
+    kind: str, folder: Path, files: dict[str, Any], poses: Sequence[str], simulated: bool,
+    loader: str | None = None, errors: Sequence[float] | None = None, told: Sequence[str] = (),
+) -> Done:  # fmt: skip
+    """The files, once written, and the poses in them; what reads a model, how well it holds."""
+    paths = _write(folder, files)
+    keys = {
+        "kind": kind, "files": paths, "poses": poses, "simulated": simulated, "loader": loader,
+        "error_percent": errors, "remarks": told,
+    }  # fmt: skip
+    lines = ["\n  ".join([f"Exported as {kind}:", *paths])]
+    if errors:
+        each = ", ".join(f"mode {k} {e:.2g} %" for k, e in enumerate(errors, 1))
+        lines.append(f"Interpolating errs by (rms; part of the sds): {each}.")
+    return Done(keys, Group(*map(Text, (*lines, *told))))
 
 
 def _write(folder: Path, files: dict[str, Any]) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """FRFs measured and simulated over each other, maps of them along poses, and a diagnosis' ones."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,10 +88,6 @@ class ComparedFrfs:
             panel.grid(True, which="both", alpha=0.25)
         marks.name_axes(figure, grid, "frequency (Hz)")
         return figure
-
-    def overlays(self) -> Iterator[Figure]:
-        """Of all poses, one after the other."""
-        return map(self.overlay, range(len(self.names)))
 
 
 def frf_map(

@@ -15,7 +15,7 @@ from planner.measurement.agreement import NO_SIMILARITY, Similarity, fit_similar
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.pictures import Pictures, entitle
 from planner.report.springs import IdentifiedSpring, identified_springs
-from planner.report.text import remarks, table
+from planner.report.text import ending, remarks, table
 
 if TYPE_CHECKING:
     from planner.dataset.dataset import Dataset
@@ -78,15 +78,17 @@ class IdentificationReport(Answer):
             return self
         compared, name, more = self._compared(), self.nominal.robot.name, None
         if compared is None:
-            return self.with_figures(pictures, dict, name)
+            return replace(self, **pictures.write(dict, name, simulated=self.simulated))
         if pictures.rrd is not None:
             from planner.report.rerun.figures import one_by_one
 
-            each = (entitle(f, name, self.simulated) for f in compared.overlays())
+            numbers = range(len(compared.names))
+            each = (entitle(compared.overlay(k), name, self.simulated) for k in numbers)
             more = one_by_one("pose", "FRFs, pose by pose", each)
         first = sorted(range(len(compared.roles)), key=lambda k: compared.roles[k] == "used")
         note = "Those held out are shown with what was identified without them."
-        return self.with_figures(pictures, lambda: compared.figures(first), name, note, more)
+        given = name, note, more, self.simulated
+        return replace(self, **pictures.write(lambda: compared.figures(first), *given))
 
     def _compared(self) -> "ComparedFrfs | None":
         """FRFs before and after it, pose by pose; None where the tool was not measured."""
@@ -151,7 +153,7 @@ class IdentificationReport(Answer):
         if self.out and isinstance(self.written, Similarity):
             frac = 100 * self.written.frac
             parts.append(Text(f"Written: {self.out} (FRAC {frac:.2f} %), {self.urdf}"))
-        return Group(*parts, *self.end)
+        return Group(*parts, *ending(vars(self)))
 
     def _agreement(self) -> RenderableType:
         aside = self.held_out

@@ -1,5 +1,6 @@
 """Answer of `import`: which hits were accepted, the modes they give, and what changed."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +12,7 @@ from rich.text import Text
 from planner.campaign.events import Question
 from planner.errors import RefusedFile
 from planner.report.answer import Answer, plain
-from planner.report.modes import ModeAnswer
+from planner.report.modes import mode_keys
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, remarks, table, with_sd
 from planner.words import command, counted, significant
@@ -22,15 +23,14 @@ if TYPE_CHECKING:
     from planner.campaign.model import Model
 
 
-def _cells(mode: ModeAnswer, other: str) -> tuple[str, ...]:
+def _cells(mode: Mapping[str, Any], other: str) -> tuple[str, ...]:
     """A row of the table; `other` where the mode is none that is predicted."""
-    expected = mode.expected
-    known = isinstance(expected, ExpectedMode)
+    expected = mode["expected"]
     return (
-        other if mode.label is None else str(mode.label),
-        with_sd(mode.frequency_hz, mode.frequency_sd_hz, ".3f"),
-        with_sd(expected.frequency_hz, expected.sd_hz) if known else with_sd(None, None),
-        with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd),
+        other if mode["label"] is None else str(mode["label"]),
+        with_sd(mode["frequency_hz"], mode["frequency_sd_hz"], ".3f"),
+        with_sd(expected.frequency_hz, expected.sd_hz) if expected else "–",
+        with_sd(100 * mode["damping_ratio"], 100 * mode["damping_sd"]),
     )
 
 
@@ -90,11 +90,11 @@ class PoseImport(Answer):
         return tuple(ExpectedMode.all_of(self.report.model_before.predict(q), 0))
 
     @cached_property
-    def modes(self) -> tuple[ModeAnswer, ...]:
+    def modes(self) -> list[dict[str, Any]]:
         """Those of the pose with label and expectation; unlikely ones only where labelled."""
         report = self.report
         if report.measurement is None:
-            return ()
+            return []
         labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
         named = enumerate(labelled.modes if labelled else ())
         labels = {mode.frequency_hz: k for k, mode in named if mode}
@@ -106,8 +106,8 @@ class PoseImport(Answer):
                 known = k + 1, float(labelled.probability[k]), self.expected[k]
             if k is not None or mode.likely:
                 said = dict(zip(("label", "label_probability", "expected"), known, strict=True))
-                found.append(ModeAnswer.of(mode, **said))
-        return tuple(found)
+                found.append(mode_keys(mode, **said))
+        return found
 
     def parts(self) -> list[RenderableType]:
         """Modes beside what was expected, remarks, and the change of the model, if there is any."""
@@ -140,7 +140,7 @@ class PoseImport(Answer):
         count, refit = len(change), f"refit {report.refit_seconds:.2f} s"
         said = Text(f"  sd of the frequencies of modes 1 to {count}: {', '.join(change)} ({refit})")
         others = Text(f"  other: measured too, none of the {count} modes that are predicted")
-        beside = [] if all(mode.label for mode in self.modes) else [others]
+        beside = [] if all(mode["label"] for mode in self.modes) else [others]
         return [made, *beside, *remarks(told), said]
 
     def _copied(self) -> str:

@@ -29,7 +29,8 @@ from planner.recording.hits import without_unit
 from planner.recording.points import ANYWHERE, PointNames
 from planner.recording.read import READERS, read
 from planner.recording.records import TimeRecord
-from planner.report.modes import ModeAnswer, ModesReport, named
+from planner.report.answer import Done
+from planner.report.modes import mode_keys, modes_answer, named
 from planner.report.pictures import Pictures
 
 ESTIMATORS = ("h1", "h2", "hv")
@@ -100,15 +101,15 @@ def _titled(files: Sequence[str]) -> str:
     return f"{Path(files[0]).name[-LONGEST_NAME:]}{others}"
 
 
-def _of_model(modal: ModalModel, **others: Any) -> ModesReport:
+def _of_model(modal: ModalModel, **others: Any) -> Done:
     own = {name: getattr(modal, name) for name in ("band_hz", "fit_error", "order", "remarks")}
-    return ModesReport(modes=tuple(map(ModeAnswer.of, modal.modes)), **(own | others))
+    return modes_answer(modes=list(map(mode_keys, modal.modes)), **(own | others))
 
 
 def modal_report(
     sources: tuple[Source, ...], band_hz: tuple[float, float] | None, force: str | None,
     estimator: str, pictures: Pictures, window_rate_1_s: float,
-) -> ModesReport:  # fmt: skip
+) -> Done:  # fmt: skip
     """Of files of one pose; `force` names the channel of a long record that is not labelled.
 
     Raises RefusedError if no file could be used.
@@ -125,36 +126,37 @@ def modal_report(
     assert frf is not None
     hits = [hit for own in measured.files.hits for hit in own]
     window = None if window_rate_1_s else screen_window(hits)
-    answer = _of_model(
+    accepted = tuple(v.source.name for v in verdicts if v.accepted)
+    simulated = any(v.simulated for v in verdicts)
+    return _of_model(
         modal,
         refused=refused,
-        accepted=tuple(v.source.name for v in verdicts if v.accepted),
+        accepted=accepted,
         hits=frf.hits,
         usable_band_hz=frf.usable_band_hz,
         remarks=(*told_of_files(verdicts), *measured.remarks, *([window.text] if window else [])),
         amplitude=measured.homogeneity,
-        simulated=any(v.simulated for v in verdicts),
+        simulated=simulated,
+        **_drawn(pictures, frf, lambda: identification(frf, band), modal, accepted, simulated),
     )
-    return _drawn(answer, pictures, frf, lambda: identification(frf, band), modal)
 
 
 def _drawn(
-    answer: ModesReport, pictures: Pictures, frf: Frf | None,
-    found: Callable[[], PoleIdentification | None], modal: ModalModel,
-) -> ModesReport:  # fmt: skip
-    def figures():
+    pictures: Pictures, frf: Frf | None, found: Callable[[], PoleIdentification | None],
+    modal: ModalModel, files: tuple[str, ...], simulated: bool,
+) -> dict[str, Any]:  # fmt: skip
+    def draw():
         from planner.report.modal_plots import modal_figures
 
         poles = found()
         return modal_figures(frf, poles, modal) if poles else {}
 
-    accepted = answer.accepted if isinstance(answer.accepted, tuple) else ()
-    return answer.with_figures(pictures, figures, _titled(accepted))
+    return pictures.write(draw, _titled(files), simulated=simulated)
 
 
 def _by_channel(
     sources: tuple[Source, ...], band_hz: tuple[float, float] | None, force: str, pictures: Pictures
-) -> ModesReport:
+) -> Done:
     """Long records with unlabelled channels: the user names the force channel."""
     from planner.modal.free_decays import analyse_record
 
@@ -164,11 +166,12 @@ def _by_channel(
     if not records:
         raise InputError(f"{sources[0].name} holds no time histories; leave out --force.")
     modal, found = analyse_record(records[0], force_channel=force, band_hz=band_hz)
-    answer = _of_model(modal, accepted=(sources[0].name,), simulated=records[0].simulated)
-    return _drawn(answer, pictures, None, lambda: found, modal)
+    accepted, simulated = (sources[0].name,), records[0].simulated
+    written = _drawn(pictures, None, lambda: found, modal, accepted, simulated)
+    return _of_model(modal, accepted=accepted, simulated=simulated, **written)
 
 
-def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -> ModesReport:
+def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -> Done:
     """Of FRFs without nodes and directions: poles and unscaled shapes, an entry per FRF.
 
     In the order of the files. Raises InputError or RefusedError in one sentence.
@@ -178,22 +181,21 @@ def unlabelled_report(given: FrfSet, quantity: str | None, pictures: Pictures) -
     record = joined(given.records)
     modal = modes_from_transfer_functions(record, quantity, given.band_hz)
 
-    def figures():
+    def draw():
         from planner.report.modal_plots import unlabelled_figures
 
         return unlabelled_figures(record, modal)
 
-    answer = _of_model(
-        modal, fit_error=None, accepted=given.accepted, refused=given.refused,
-        simulated=record.simulated,
-    )  # fmt: skip
     name = _titled((record.source.name, *given.accepted[1:]))
-    return answer.with_figures(pictures, figures, name)
+    return _of_model(
+        modal, fit_error=None, accepted=given.accepted, refused=given.refused,
+        simulated=record.simulated, **pictures.write(draw, name, simulated=record.simulated),
+    )  # fmt: skip
 
 
 def matrix_report(
     given: FrfSet, quantity: str | None, pictures: Pictures, real: bool, files_to: Path | None
-) -> ModesReport:
+) -> Done:
     """Of FRFs between any points.
 
     With `real` the shapes are the real normal modes behind the complex ones; `files_to` is a folder
@@ -209,8 +211,26 @@ def matrix_report(
         paths = export(Exported(matrix, found, geometry, real), files_to.absolute())
         exports = tuple(map(str, paths))
 
-    answer = ModesReport(
-        modes=tuple(map(ModeAnswer.of, found.modes)),
+    name, note, more = _titled([file.name for file in given.files]), "", None
+    if geometry is not None and pictures.rrd is not None:
+        from planner.report.rerun.modes import moving_shapes
+
+        more = moving_shapes(found, geometry)
+        note = "On the timeline shapes move, exaggerated; grey: at rest."
+
+    def draw():
+        from planner.report.matrix_plots import matrix_figures
+
+        return matrix_figures(matrix, found, geometry)
+
+    written = pictures.write(draw, name, note, more, matrix.simulated)
+    if geometry is not None and pictures.folder is not None:
+        from planner.report.matrix_plots import animate
+
+        moving = animate(found, geometry, pictures.folder.absolute(), matrix.simulated)
+        written["plots"] = (*written["plots"], *map(str, moving))
+    return modes_answer(
+        modes=list(map(mode_keys, found.modes)),
         dofs=tuple(map(named, found.dofs)),
         responses=tuple(map(named, matrix.responses)),
         references=tuple(map(named, matrix.references)),
@@ -223,31 +243,13 @@ def matrix_report(
         remarks=(*given.remarks, *found.remarks),
         simulated=matrix.simulated,
         exports=exports,
+        **written,
     )
-    name, note, more = _titled([file.name for file in given.files]), "", None
-    if geometry is not None and pictures.rrd is not None:
-        from planner.report.rerun.modes import moving_shapes
-
-        more = moving_shapes(found, geometry)
-        note = "On the timeline shapes move, exaggerated; grey: at rest."
-
-    def figures():
-        from planner.report.matrix_plots import matrix_figures
-
-        return matrix_figures(matrix, found, geometry)
-
-    answer = answer.with_figures(pictures, figures, name, note, more)
-    if geometry is not None and pictures.folder is not None:
-        from planner.report.shape_motion import animate
-
-        moving = animate(found, geometry, pictures.folder.absolute(), matrix.simulated)
-        answer = replace(answer, plots=(*answer.plots, *map(str, moving)))
-    return answer
 
 
 def operating_report(
     paths: Sequence[Path], band_hz: tuple[float, float] | None, pictures: Pictures
-) -> ModesReport:
+) -> Done:
     """Analyse the responses of one record. Raises InputError where a file holds none."""
     check_options(band_hz)
     sources = sources_of(paths)
@@ -275,14 +277,14 @@ def operating_report(
         tones = ", ".join(f"{hz:.4g}" for hz in found.tones_hz)
         told.append(f"Tones, not modes, at {tones} Hz: what turns or hums there was left out.")
 
-    def figures():
+    def draw():
         from planner.report.modal_plots import operating_figures
 
         return operating_figures(found)
 
     note = "Responses alone give no scale: neither FRFs nor modal masses follow."
-    return ModesReport(
-        modes=tuple(ModeAnswer.of(m, modal_mass_kg=UNSET, scatter_hz=UNSET) for m in found.modes),
+    return modes_answer(
+        modes=[mode_keys(m, modal_mass_kg=UNSET, scatter_hz=UNSET) for m in found.modes],
         dofs=tuple(named(dof.positive) for dof in dofs),
         scaled=False,
         band_hz=found.band_hz,
@@ -290,4 +292,5 @@ def operating_report(
         accepted=(sources[0].name,),
         remarks=tuple(told),
         simulated=record.simulated,
-    ).with_figures(pictures, figures, _titled([path.name]), note)
+        **pictures.write(draw, _titled([path.name]), note, simulated=record.simulated),
+    )

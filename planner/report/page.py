@@ -1,7 +1,7 @@
 """The report of a campaign: one HTML file, from the template `report.html`."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ from planner.report.html import rendered, write_page
 from planner.report.proposals import standing
 from planner.report.saved_diagnosis import chapter, diagnosis_of
 from planner.report.springs import COLUMNS, NOT_KNOWN
-from planner.report.status import StatusReport, status
+from planner.report.status import status
 from planner.report.text import SIMULATED, number, with_sd
 from planner.robot.link_bodies import guessed_masses
 from planner.words import command, counted, local_time
@@ -67,10 +67,11 @@ def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -
 
 def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
     """The report; `kept_diagnosis` is the answer of a diagnosis in JSON."""
-    state, now, cell = campaign.state, status(campaign, kept_diagnosis), campaign.cell
+    state, cell, model = campaign.state, campaign.cell, campaign.model
+    now, forecast = status(campaign, kept_diagnosis).keys, model.forecast
     found = chapter(kept_diagnosis) if kept_diagnosis else None
     without = {"diagnosis"} if found is None else set()
-    without |= set() if now.springs else {"learned"}
+    without |= set() if now["springs"] else {"learned"}
     folder = campaign.directory
     nothing = "Nothing is measured yet: all that is said is the simulation's."
     return rendered(
@@ -81,22 +82,22 @@ def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
         status=now,
         simulated=SIMULATED.plain,
         state=state,
-        rmse=percent(now.forecast.rmse_percent) if now.forecast.measurements else "–",
+        rmse=percent(forecast.rmse_percent) if forecast.measurements else "–",
         chapters=[(id_, text) for id_, text in CHAPTERS.items() if id_ not in without],
         asked=_asked(cell, state),
         findings=[(CLASSES[r.severity], r.sentence) for r in cell.examined.remarks
                   if r.severity in CLASSES],
         **_measured(campaign, state, now),
-        forecast=standing(now.forecast, now.waits_for, now.not_predicted)
+        forecast=standing(forecast, model.waits_for, model.not_predicted)
         if state.used
         else nothing,
-        over_workspace=campaign.model.workspace_prediction,
-        left_out=left_out_figure(*found_without(campaign.model))
-        if now.leave_one_out.values
+        over_workspace=model.workspace_prediction,
+        left_out=left_out_figure(*found_without(model))
+        if now["leave_one_out"].values
         else None,
         **map_pictures(campaign),
-        **frf_pictures(campaign, now.leave_one_out.worst),
-        springs=[spring.cells for spring in now.springs],
+        **frf_pictures(campaign, now["leave_one_out"].worst),
+        springs=[spring.cells for spring in now["springs"]],
         spring_columns=COLUMNS,
         springs_say=NOT_KNOWN,
         diagnosis=found,
@@ -154,7 +155,7 @@ def _workspace(config: CampaignConfig, joints: JointUnits) -> str:
     return f"{place}; tool axis ({axes}){turn}"
 
 
-def _measured(campaign: Campaign, state: CampaignState, now: StatusReport) -> dict[str, Any]:
+def _measured(campaign: Campaign, state: CampaignState, now: Mapping[str, Any]) -> dict[str, Any]:
     """What was measured and refused, and why; where the robot stood."""
     stood, said = [], "Joints as proposed: nothing was read back"
     for m in state.measured:
@@ -168,9 +169,9 @@ def _measured(campaign: Campaign, state: CampaignState, now: StatusReport) -> di
         "joints": campaign.cell.robot.joints.headings,
         "stood": stood,
         "stood_says": said,
-        "refused": [(r.pose, r.file, r.reason) for r in now.refused],
-        "held": [(h.pose, h.question["text"]) for h in now.held if isinstance(h.question, dict)],
-        "skipped": [(s.pose, s.reason or "–") for s in now.skipped],
+        "refused": [list(refused.values()) for refused in now["refused"]],
+        "held": [(h["pose"], h["question"]["text"]) for h in now["held"]],
+        "skipped": [(s["pose"], s["reason"] or "–") for s in now["skipped"]],
         "remarks": [(m.pose, text) for m in state.recorded for text in m.remarks],
     }
 

@@ -3,7 +3,7 @@
 import io
 import re
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,17 +36,21 @@ class Pictures:
 
     def write(
         self,
-        figures: dict[str, "Figure"],
+        draw: "Callable[[], dict[str, Figure]]",
         name: str,
         note: str = "",
         more: "More | None" = None,
         simulated: bool = False,
     ) -> dict[str, Any]:
-        """Write every figure; answers where they are. Raises InputError if that is impossible.
+        """Write every figure that `draw` gives, if wanted; the keys that say where they are.
 
         `name` says of what they are. In the Rerun file a `note` says what is what, and `more` draws
-        what is no figure. Of `simulated` recordings titles and note say so.
+        what is no figure. Of `simulated` recordings titles and note say so. Raises InputError where
+        they cannot be written.
         """
+        if not self.wanted:
+            return {"plots": (), "rrd": None}
+        figures = draw()
         if simulated:
             note = f"{SIMULATED_TITLE} · {note}" if note else SIMULATED_TITLE
         for figure in figures.values():

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import UNSET
@@ -15,7 +15,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.model_status import outside_remark
 from planner.export.npz import save_frfs
 from planner.frf.synthesis import frequency_lines
-from planner.report.answer import Answer
+from planner.report.answer import Done
 from planner.report.text import number, remarks, table, with_sd
 from planner.words import counted
 
@@ -55,54 +55,15 @@ class ExpectedMode:
         return with_sd(self.frequency_hz, self.sd_hz), damping
 
 
-@dataclass(frozen=True)
-class PosePrediction:
-    """The modes expected at a pose, from the lowest; whether it lies `outside` the workspace.
+def _pose(
+    name: str, modes: tuple[ExpectedMode, ...], force_n: float, outside: bool = False
+) -> dict[str, Any]:
+    """The modes expected at a pose, from the lowest; whether it lies outside the workspace.
 
-    `peak_force_n` is that of the hits that were asked for.
+    Of hits of such a peak force; NaN: none was asked for.
     """
-
-    pose: str
-    modes: tuple[ExpectedMode, ...]
-    outside: bool = False
-    peak_force_n: float | Unset = UNSET
-
-    @property
-    def title(self) -> str:
-        """Its name, and what is special."""
-        force = "" if self.peak_force_n is UNSET else f", {self.peak_force_n:g} N"
-        return f"{self.pose}{force} (outside)" if self.outside else f"{self.pose}{force}"
-
-
-@dataclass(frozen=True)
-class PredictionReport(Answer):
-    """Answer of `predict`; `npz` is the file with the FRFs, `measurements` how many poses count.
-
-    `robot` is the robot.toml that was asked alone, without a campaign.
-    """
-
-    poses: tuple[PosePrediction, ...]
-    npz: str
-    measurements: int
-    remarks: tuple[str, ...] = ()
-    robot: str | Unset = UNSET
-
-    def text(self) -> Group:
-        """A table of modes, and which poses lie where nobody asked the model to be good."""
-        title = f"After {counted(self.measurements, 'measured pose')}"
-        if self.robot is not UNSET:
-            title = f"As {self.robot} states the robot"
-        rows = (
-            (pose.title if k == 0 else "", str(k + 1), *mode.cells)
-            for pose in self.poses
-            for k, mode in enumerate(pose.modes)
-        )
-        made = table(title, "pose", "mode", "frequency (Hz)", "damping (%)", rows=rows)
-        said = outside_remark([pose.pose for pose in self.poses if pose.outside])
-        told = [Text(said, style="yellow")] if said else []
-        told += remarks(self.remarks)
-        sd = " with sd" if self.robot is UNSET else ""
-        return Group(made, *told, Text(f"FRFs (m/s²/N){sd}: {self.npz}"))
+    force = UNSET if np.isnan(force_n) else float(force_n)
+    return {"pose": name, "modes": modes, "outside": outside, "peak_force_n": force}
 
 
 def predictions(
@@ -111,11 +72,11 @@ def predictions(
     q: Sequence[np.ndarray],
     npz: Path,
     force_n: np.ndarray,
-) -> PredictionReport:
-    """Predict at n poses q, (dof,) in rad each; FRFs go to the npz file, or InputError is raised.
+) -> Done:
+    """Answer of `predict`: modes at n poses q, (dof,) in rad each; FRFs are in the npz file.
 
     Of hits of peak force_n (n,), where joints are not linear: FRFs as such hits measure them, modes
-    linearised. NaN is as those of the campaign.
+    linearised. NaN is as those of the campaign. Raises InputError where the file cannot be written.
     """
     # status needs none of what these import
     from planner.campaign.frf_model import UNCHANGED, struck_modes
@@ -132,11 +93,11 @@ def predictions(
             mean = mean + change_at_force(struck, angles, force_n, lines)
     outside, robot = ~campaign.cell.inside(angles), campaign.cell.robot
     save_frfs(npz, lines, mean, sd, names, robot, angles, outside, force_n if asked else None)
-    poses = tuple(
-        PosePrediction(name, ExpectedMode.all_of(prediction, i), bool(outside[i]), force)
-        for i, (name, force) in enumerate(zip(names, _stated(force_n), strict=True))
-    )
-    return PredictionReport(poses, str(npz.resolve()), len(campaign.state.used), said)
+    poses = [
+        _pose(name, ExpectedMode.all_of(prediction, i), force, bool(outside[i]))
+        for i, (name, force) in enumerate(zip(names, force_n, strict=True))
+    ]
+    return _answer(poses, npz, said, measurements=len(campaign.state.used))
 
 
 def robot_predictions(
@@ -145,7 +106,7 @@ def robot_predictions(
     poses: Sequence[np.ndarray],
     npz: Path,
     force_n: np.ndarray,
-) -> PredictionReport:
+) -> Done:
     """The same of a robot.toml alone: nothing tells how sure that is.
 
     Raises InputError where its simulation is not possible there, or the file cannot be written.
@@ -166,14 +127,40 @@ def robot_predictions(
     save_frfs(npz, lines, mean, None, names, robot, q, None, force_n if asked.any() else None)
     said = () if robot.config.law or not asked.any() else (UNCHANGED,)
     shown = []
-    for name, force, *own in zip(names, _stated(force_n), f, ratio, strict=True):
+    for name, force, *own in zip(names, force_n, f, ratio, strict=True):
         inside = ((hz, z) for hz, z in zip(*own, strict=True) if band[0] <= hz <= band[1])
         expected = tuple(ExpectedMode(float(hz), None, float(z), None) for hz, z in inside)
-        shown.append(PosePrediction(name, expected, False, force))
-    there = str(robot.path.absolute())
-    return PredictionReport(tuple(shown), str(npz.resolve()), 0, said, there)
+        shown.append(_pose(name, expected, force))
+    return _answer(shown, npz, said, robot=str(robot.path.absolute()))
 
 
-def _stated(force_n: np.ndarray) -> list[float | Unset]:
-    """Forces (n,) in N that were asked for; NaN is none."""
-    return [UNSET if np.isnan(force) else float(force) for force in force_n]
+def _answer(
+    poses: Sequence[dict[str, Any]], npz: Path, told: tuple[str, ...], measurements: int = 0,
+    robot: str | Unset = UNSET,
+) -> Done:  # fmt: skip
+    """Of so many measured poses, or of a `robot`.toml that was asked alone."""
+    keys = {
+        "poses": poses, "npz": str(npz.resolve()), "measurements": measurements,
+        "remarks": told, "robot": robot,
+    }  # fmt: skip
+    alone = robot is not UNSET
+    title = f"After {counted(measurements, 'measured pose')}"
+    if alone:
+        title = f"As {robot} states the robot"
+    rows = (
+        (_title(pose) if k == 0 else "", str(k + 1), *mode.cells)
+        for pose in poses
+        for k, mode in enumerate(pose["modes"])
+    )
+    made = table(title, "pose", "mode", "frequency (Hz)", "damping (%)", rows=rows)
+    # Nobody asked the model to be good there.
+    said = outside_remark([pose["pose"] for pose in poses if pose["outside"]])
+    lines = [*([Text(said, style="yellow")] if said else []), *remarks(told)]
+    file = Text(f"FRFs (m/s²/N){'' if alone else ' with sd'}: {keys['npz']}")
+    return Done(keys, Group(made, *lines, file))
+
+
+def _title(pose: dict[str, Any]) -> str:
+    """Its name, and what is special."""
+    force = "" if pose["peak_force_n"] is UNSET else f", {pose['peak_force_n']:g} N"
+    return f"{pose['pose']}{force}{' (outside)' if pose['outside'] else ''}"

@@ -1,80 +1,21 @@
 """Answer of `replay`: each step of the log and whether computing it again gave the same."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from rich.console import Group
+from rich.table import Table
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.compare.counterfactual import OtherAcquisition
 from planner.progress import ProgressCallback
+from planner.recording.joints import JointUnits
 from planner.replay import Step, replay
-from planner.report.answer import Answer, plain
+from planner.report.answer import Done
 from planner.report.campaign_changes import kind_of
 from planner.report.text import table
-
-
-@dataclass(frozen=True, eq=False)
-class ReplayReport(Answer):
-    """Answer of `replay`; "check" of a step: "identical", "close", "differs" or "kept"."""
-
-    campaign: Campaign
-    steps: tuple[Step, ...]
-    rrd: Path | None
-    otherwise: OtherAcquisition | None
-
-    @property
-    def reproduced(self) -> bool:
-        """Whether no step differs."""
-        return all(step.check != "differs" for step in self.steps)
-
-    def to_json(self) -> dict[str, Any]:
-        """Step by step; sds (count,) in % are over the workspace."""
-        steps = [
-            {
-                "seq": one.entry.seq, "time": one.entry.time,
-                "event": kind_of(one.entry), "check": one.check, "detail": one.detail,
-                "measurements": len(one.model.labelled),
-                "frequency_sd_percent": one.model.frequency_sd_percent, "instead": one.instead,
-            }
-            for one in self.steps
-        ]  # fmt: skip
-        said = {
-            "campaign": str(self.campaign.directory), "steps": steps,
-            "reproduced": self.reproduced, "rrd": str(self.rrd.resolve()) if self.rrd else None,
-            "frequency_sd_percent": steps[-1]["frequency_sd_percent"] if steps else None,
-            "otherwise": self.otherwise, "joint_units": self.campaign.cell.robot.joints.declared,
-        }  # fmt: skip
-        return plain(said)
-
-    def text(self) -> Group:
-        """The steps, the verdict, and what another acquisition would have saved."""
-        asked = any(step.instead for step in self.steps)
-        more = ["instead, joints at"] if asked else []
-        made = table("Replay", "entry", "event", "check", "what", "sd of frequencies (%)", *more)
-        for step in self.steps:
-            sd = "  ".join(f"{v:.2f}" for v in step.model.frequency_sd_percent)
-            joints = self.campaign.cell.robot.joints
-            poses = [joints.listed(pose.joints_deg, 0) for pose in step.instead]
-            made.add_row(
-                str(step.entry.seq), kind_of(step.entry), step.check, step.detail, sd,
-                *(["\n".join(poses)] if asked else []),
-                style="red" if step.check == "differs" else None,
-            )  # fmt: skip
-        lines = [f"The log was {'' if self.reproduced else 'NOT '}reproduced."]
-        if self.rrd:
-            lines.append(f"Rerun recording: {self.rrd.resolve()}")
-        other = self.otherwise
-        if other is None:
-            return Group(made, Text("\n".join(lines)))
-        counts = next(iter(other.runs.values())).n
-        curves = table("Frequency RMSE (%) on poses not yet used, by measurements", "order",
-                       *map(str, counts))  # fmt: skip
-        for name, run in other.runs.items():
-            curves.add_row(name, *(f"{v:.2f}" for v in run.frequency_rmse_percent))
-        return Group(made, curves, Text("\n".join([*lines, other.text])))
 
 
 def replayed(
@@ -84,11 +25,12 @@ def replayed(
     viewer: bool,
     progress: ProgressCallback,
     acquisition: str | None = None,
-) -> ReplayReport:
-    """Compute every step of the log again, up to entry `until`, and show it in Rerun.
+) -> Done:
+    """Answer of `replay`: compute every step again, up to entry `until`, and show it in Rerun.
 
-    With an `acquisition` also what that would have proposed, and saved. Raises InputError where
-    a recording is missing or changed.
+    "check" of a step: "identical", "close", "differs" or "kept"; with an `acquisition` also what
+    that would have proposed, and saved. Sds (count,) in % are over the workspace. Raises InputError
+    where a recording is missing or changed.
     """
     from planner.report.rerun.event_logger import EventLogger
 
@@ -103,4 +45,55 @@ def replayed(
     if acquisition is not None:
         progress(f"playing {acquisition} on what was measured", 1.0)
     otherwise = OtherAcquisition.of(campaign, acquisition) if acquisition else None
-    return ReplayReport(campaign, tuple(steps), rrd, otherwise)
+    return _answer(campaign, steps, str(rrd.resolve()) if rrd else None, otherwise)
+
+
+def _answer(
+    campaign: Campaign, steps: Sequence[Step], file: str | None, otherwise: OtherAcquisition | None
+) -> Done:
+    told = [
+        {
+            "seq": one.entry.seq, "time": one.entry.time,
+            "event": kind_of(one.entry), "check": one.check, "detail": one.detail,
+            "measurements": len(one.model.labelled),
+            "frequency_sd_percent": one.model.frequency_sd_percent, "instead": one.instead,
+        }
+        for one in steps
+    ]  # fmt: skip
+    joints, reproduced = campaign.cell.robot.joints, all(one.check != "differs" for one in steps)
+    keys = {
+        "campaign": str(campaign.directory), "steps": told, "reproduced": reproduced, "rrd": file,
+        "frequency_sd_percent": told[-1]["frequency_sd_percent"] if told else None,
+        "otherwise": otherwise, "joint_units": joints.declared,
+    }  # fmt: skip
+    parts = [_table(steps, joints)]
+    lines = [f"The log was {'' if reproduced else 'NOT '}reproduced."]
+    lines += [f"Rerun recording: {file}"] if file else []
+    if otherwise is not None:
+        parts.append(_curves(otherwise))
+        lines.append(otherwise.text)
+    return Done(keys, Group(*parts, Text("\n".join(lines))))
+
+
+def _table(steps: Sequence[Step], joints: JointUnits) -> Table:
+    asked = any(step.instead for step in steps)
+    more = ["instead, joints at"] if asked else []
+    made = table("Replay", "entry", "event", "check", "what", "sd of frequencies (%)", *more)
+    for step in steps:
+        sd = "  ".join(f"{v:.2f}" for v in step.model.frequency_sd_percent)
+        poses = [joints.listed(pose.joints_deg, 0) for pose in step.instead]
+        made.add_row(
+            str(step.entry.seq), kind_of(step.entry), step.check, step.detail, sd,
+            *(["\n".join(poses)] if asked else []),
+            style="red" if step.check == "differs" else None,
+        )  # fmt: skip
+    return made
+
+
+def _curves(other: OtherAcquisition) -> Table:
+    counts = next(iter(other.runs.values()))["n"]
+    title = "Frequency RMSE (%) on poses not yet used, by measurements"
+    made = table(title, "order", *map(str, counts))
+    for name, run in other.runs.items():
+        made.add_row(name, *(f"{v:.2f}" for v in run["frequency_rmse_percent"]))
+    return made

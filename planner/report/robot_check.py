@@ -1,19 +1,21 @@
 """Answer of `check`: what a robot's description says, and what looks wrong in it."""
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 import numpy as np
 from rich.console import Group
+from rich.table import Table
 from rich.text import Text
 
 from planner.check.description import SEVERITIES, CheckRemark
 from planner.check.examine import Examination
-from planner.report.answer import Answer, plain
-from planner.report.text import number, table
+from planner.report.answer import Done
+from planner.report.pictures import Pictures
+from planner.report.text import ending, number, table
 from planner.robot.joint_laws import NUMBER_ENTRIES, LawTable
 from planner.robot.link_bodies import LinkBody, mounted
+from planner.robot.robot import Robot
 from planner.words import counted, listed
 
 if TYPE_CHECKING:
@@ -22,103 +24,89 @@ if TYPE_CHECKING:
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
 
 
-@dataclass(frozen=True, eq=False)
-class RobotCheckReport(Answer):
-    """Answer of `check`: what was found."""
+def robot_check(found: Examination, pictures: Pictures) -> Done:
+    """Answer of `check`: what was found, errors first, and whether a campaign can begin ("ok")."""
+    robot, poses = found.robot, _poses(found)
 
-    found: Examination
-    plots: tuple[str, ...] = ()
-    rrd: str | None = None
-
-    @property
-    def ok(self) -> bool:
-        """Whether a campaign can begin."""
-        return not self.found.errors
-
-    @property
-    def masses_kg(self) -> tuple[float, float]:
-        """Of all links, and of those that move."""
-        links = self.found.links
-        return sum(b.mass for b in links), sum(b.mass for b in links if b.joint)
-
-    def to_json(self) -> dict[str, Any]:
-        """Errors come first in "findings", "ok" is whether a campaign can begin."""
-        found, robot, (mass, moving) = self.found, self.found.robot, self.masses_kg
-        said = {
-            "robot": robot.name, "robot_toml": str(robot.path.absolute()), "ok": self.ok,
-            "findings": found.remarks, "mass_kg": mass, "moving_mass_kg": moving,
-            "reach_m": robot.reach_m, "band_hz": robot.config.band_hz,
-            "links": [_link(body) for body in found.links], "joints": self._joints(),
-            "poses": self._poses(), "laws": robot.config.law, "plots": self.plots,
-            "rrd": self.rrd, "joint_units": robot.joints.declared,
-        }  # fmt: skip
-        return plain(said)
-
-    def _joints(self) -> list[dict[str, Any]]:
-        """Limits and speed of each, in degrees and degrees a second; a slide's in mm and mm/s."""
-        robot, keys = self.found.robot, ("lower_deg", "upper_deg", "speed_deg_s")
-        limits = robot.joints.shown([robot.lower_rad, robot.upper_rad, robot.velocity_rad_s]).T
-        return [
-            {"joint": name, **dict(zip(keys, row, strict=True)),
-             "unit": "mm" if robot.slides(name) else msgspec.UNSET}
-            for name, row in zip(robot.joint_names, limits, strict=True)
-        ]  # fmt: skip
-
-    def _poses(self) -> list[dict[str, Any]]:
-        """What the simulation says at the poses looked at: their modes, from the lowest."""
-        found, joints = self.found, self.found.robot.joints
-        if not found.frequency_hz.size:
-            return []
-        position, known = found.robot.forward_batch(found.q)[1], np.isfinite(found.frequency_hz)
-        return [
-            {"pose": pose, "joints_deg": joints.shown(found.q[i]).round(4),
-             "position_m": position[i], "frequency_hz": found.frequency_hz[i, known[i]],
-             "damping_ratio": found.damping_ratio[i, known[i]]}
-            for i, pose in enumerate(found.poses)
-        ]  # fmt: skip
-
-    def drawings(self) -> "dict[str, Figure]":
-        """The robot at home."""
+    def draw() -> "dict[str, Figure]":
         from planner.report.robot_picture import robot_figure
 
-        return {"robot": robot_figure(self.found.robot, self.found.q[0], self.found.links)}
+        return {"robot": robot_figure(robot, found.q[0], found.links)}
 
-    def text(self) -> Group:
-        """Masses, modes, then what was found, worst first."""
-        found, robot, (mass, moving) = self.found, self.found.robot, self.masses_kg
-        masses = table(
-            f"{robot.name}: {moving:.4g} kg move{self._carried()}, {mass - moving:.4g} kg "
-            f"stand still, reach at most {robot.reach_m:.3g} m",
-            *("link", "moved by", "mass (kg)", "centre of mass (m)", "collision shapes"),
-        )
-        for link in found.links:
-            if link.stated or link.shapes:
-                place = ", ".join(f"{v:z.3f}" for v in link.com_m) if link.mass else "–"
-                weight = f"{link.mass:.4g}" if link.stated else "–"
-                weight += f" ± {_mass_sd(link):.2g}" if _mass_sd(link) else ""
-                masses.add_row(Text(link.name), link.joint or "–", weight, place, str(link.shapes))
-        low, high = robot.config.band_hz
-        most = 2 * high  # the others stand in the JSON
-        asked = f"frequency in Hz (damping in %), up to {most:g} Hz"
-        modes, poses = table("simulated modes", "pose", asked), self._poses()
-        for pose in poses:
-            at = ", ".join(robot.joints.text(i, v, 0) for i, v in enumerate(pose["joints_deg"]))
-            modes.add_row(f"{pose['pose']}: {at}", _cell(pose, most))
-        said = [Text(f"band_hz is {low:g} to {high:g} Hz."), *map(_law, robot.config.law)]
-        said += [Text(f"{r.severity}: {r.sentence}", COLOURS[r.severity]) for r in found.remarks]
-        parts = [masses, *([modes] if poses else []), *said, _summary(found.remarks)]
-        return Group(*parts, *self.end)
+    written = pictures.write(draw, robot.name)
+    mass, moving = (sum(b.mass for b in found.links if b.joint or not own) for own in (False, True))
+    keys = {
+        "robot": robot.name, "robot_toml": str(robot.path.absolute()), "ok": not found.errors,
+        "findings": found.remarks, "mass_kg": mass, "moving_mass_kg": moving,
+        "reach_m": robot.reach_m, "band_hz": robot.config.band_hz,
+        "links": [_link(body) for body in found.links], "joints": _joints(robot), "poses": poses,
+        "laws": robot.config.law, **written, "joint_units": robot.joints.declared,
+    }  # fmt: skip
+    low, high = robot.config.band_hz
+    most = 2 * high  # the others stand in the JSON
+    asked = f"frequency in Hz (damping in %), up to {most:g} Hz"
+    modes = table("simulated modes", "pose", asked)
+    for pose in poses:
+        at = ", ".join(robot.joints.text(i, v, 0) for i, v in enumerate(pose["joints_deg"]))
+        modes.add_row(f"{pose['pose']}: {at}", _cell(pose, most))
+    said = [Text(f"band_hz is {low:g} to {high:g} Hz."), *map(_law, robot.config.law)]
+    said += [Text(f"{r.severity}: {r.sentence}", COLOURS[r.severity]) for r in found.remarks]
+    parts = [_masses(found, mass, moving), *([modes] if poses else []), *said]
+    return Done(keys, Group(*parts, _summary(found.remarks), *ending(written)))
 
-    def _carried(self) -> str:
-        """What [[payload]] of robot.toml adds to the links that move, in words."""
-        mass = sum(body.mass for body in self.found.robot.config.payload)
-        if mass:
-            return f", and {mass:.4g} kg of [[payload]]"
-        tool = mounted(self.found.robot, self.found.links)
-        if tool:
-            own = sum(link.mass for link in tool)
-            return f", {own:.4g} kg of it the URDF's {listed([link.name for link in tool])}"
-        return ", no tool ([[payload]]) stated"
+
+def _masses(found: Examination, mass: float, moving: float) -> Table:
+    """Links that have a mass or a shape; `mass` and what of it moves in kg."""
+    robot = found.robot
+    made = table(
+        f"{robot.name}: {moving:.4g} kg move{_carried(found)}, {mass - moving:.4g} kg "
+        f"stand still, reach at most {robot.reach_m:.3g} m",
+        *("link", "moved by", "mass (kg)", "centre of mass (m)", "collision shapes"),
+    )
+    for link in found.links:
+        if link.stated or link.shapes:
+            place = ", ".join(f"{v:z.3f}" for v in link.com_m) if link.mass else "–"
+            weight = f"{link.mass:.4g}" if link.stated else "–"
+            weight += f" ± {_mass_sd(link):.2g}" if _mass_sd(link) else ""
+            made.add_row(Text(link.name), link.joint or "–", weight, place, str(link.shapes))
+    return made
+
+
+def _joints(robot: Robot) -> list[dict[str, Any]]:
+    """Limits and speed of each, in degrees and degrees a second; a slide's in mm and mm/s."""
+    keys = "lower_deg", "upper_deg", "speed_deg_s"
+    limits = robot.joints.shown([robot.lower_rad, robot.upper_rad, robot.velocity_rad_s]).T
+    return [
+        {"joint": name, **dict(zip(keys, row, strict=True)),
+         "unit": "mm" if robot.slides(name) else msgspec.UNSET}
+        for name, row in zip(robot.joint_names, limits, strict=True)
+    ]  # fmt: skip
+
+
+def _poses(found: Examination) -> list[dict[str, Any]]:
+    """What the simulation says at the poses looked at: their modes, from the lowest."""
+    joints = found.robot.joints
+    if not found.frequency_hz.size:
+        return []
+    position, known = found.robot.forward_batch(found.q)[1], np.isfinite(found.frequency_hz)
+    return [
+        {"pose": pose, "joints_deg": joints.shown(found.q[i]).round(4),
+         "position_m": position[i], "frequency_hz": found.frequency_hz[i, known[i]],
+         "damping_ratio": found.damping_ratio[i, known[i]]}
+        for i, pose in enumerate(found.poses)
+    ]  # fmt: skip
+
+
+def _carried(found: Examination) -> str:
+    """What [[payload]] of robot.toml adds to the links that move, in words."""
+    mass = sum(body.mass for body in found.robot.config.payload)
+    if mass:
+        return f", and {mass:.4g} kg of [[payload]]"
+    tool = mounted(found.robot, found.links)
+    if tool:
+        own = sum(link.mass for link in tool)
+        return f", {own:.4g} kg of it the URDF's {listed([link.name for link in tool])}"
+    return ", no tool ([[payload]]) stated"
 
 
 def _link(body: LinkBody) -> dict[str, Any]:

@@ -2,7 +2,8 @@
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
@@ -71,6 +72,14 @@ def with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:
 def remarks(lines: Sequence[str]) -> list[Text]:
     """What the engineer should mind, one line each."""
     return [Text(f"  {line}", style="yellow") for line in lines]
+
+
+def ending(made: Mapping[str, Any]) -> list[Text]:
+    """The last lines of an answer of such keys: where pictures are, what is simulated."""
+    plots, rrd = made.get("plots"), made.get("rrd")
+    lines = [Text("\n  ".join(["Pictures:", *plots]))] if plots else []
+    lines += [Text(f"Rerun recording: {rrd}")] if rrd else []
+    return [*lines, *([SIMULATED] if made.get("simulated") else [])]
 
 
 def command_line(before: str, *words: object) -> Text:

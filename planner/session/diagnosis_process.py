@@ -57,8 +57,7 @@ class DiagnosisProcess:
             return
         self._due = False
         if self._pool is None:
-            # Of loky: others run a script that has no guard for its main part once more.
-            self._pool = ProcessPoolExecutor(1, timeout=None, initializer=_begin)
+            self._pool = parallel.process(os.nice, 10)  # the session goes first
         self._running = self._pool.submit(diagnose_measured, self._directory)
 
     def _text(self, ended: "Future[DiagnosisReport]") -> str:
@@ -83,8 +82,3 @@ def diagnose_measured(directory: Path) -> DiagnosisReport:
     from planner.campaign.recordings_source import recordings_source
 
     return replace(diagnose_source(recordings_source(directory, None, 0.0)), diagnosis=None)
-
-
-def _begin() -> None:
-    os.nice(10)  # the session goes first
-    parallel._begin()

@@ -13,7 +13,7 @@ from planner.campaign.state import fold
 from planner.campaign.undo import in_words, last_acts
 from planner.dataset.screened_files import Source
 from planner.errors import NoPoseLeftError, PlannerError
-from planner.report.campaign_changes import redone, undone
+from planner.report.campaign_changes import taken_back
 from planner.session import session_text
 from planner.session.diagnosis_process import LEAST
 from planner.session.pose_screen import page_with_hits, page_without_hits
@@ -225,7 +225,7 @@ def undo(session: Session, state: SessionState) -> SessionState:
     taken = session.campaign.undo(decisions_only=True)
     session.rerun_queue.note()
     session.screen.forget()
-    session.say(undone(taken).text())
+    session.say(str(taken_back(taken, "undone").said))
     return state.undone(session.campaign.state)
 
 
@@ -234,7 +234,7 @@ def _redo(session: Session, state: SessionState) -> SessionState:
     again = session.campaign.redo()
     session.rerun_queue.note()
     session.screen.forget()
-    session.say(redone(again).text())
+    session.say(str(taken_back(again, "redone").said))
     event = again[0].event
     if isinstance(event, Imported | Confirmed):
         return measured(session, state, event.pose)

@@ -45,7 +45,7 @@ def run_study(
     )  # fmt: skip
     if folder is not None:
         files += [_write_table(each, folder) for each in (*told.tables, answer.claims)]
-        files += Pictures(folder).write(told.pictures, name, simulated=True)["plots"]
+        files += Pictures(folder).write(lambda: told.pictures, name, simulated=True)["plots"]
         files.append(str(write_page(_page(answer), folder / f"{name}.html")))
     return answer
 

@@ -3,11 +3,6 @@
 `PEERS_PYTHON=… pytest -m slow -s tests/benchmarks/test_acquisition_speed.py` prints the times.
 """
 
-import importlib.util
-import os
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +12,9 @@ from planner.design.acquisitions import reduction
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.surrogate.gp import Posterior
 from planner.surrogate.kernels import matern52
-from tests import support
+from tests.support.peers import ask, peers_needed
+from tests.support.timing import spent
 
-PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)
-HAS_PEERS = "PEERS_PYTHON" in os.environ or importlib.util.find_spec("emukit") is not None
 LONG = pytest.mark.timeout(1200)
 D, N, NOISE = 4, 15, 1e-4
 JITTER = 1e-8  # that GPy adds to the diagonal of the training covariance
@@ -54,9 +48,7 @@ def problem(outputs: int, points: int, candidates: int):
 
 def timed(call):
     call()
-    start, own = time.perf_counter(), time.process_time()
-    value = call()
-    return value, time.perf_counter() - start, time.process_time() - own
+    return spent(call)
 
 
 def test_a_small_problem_by_the_formula():
@@ -75,7 +67,7 @@ def test_a_small_problem_by_the_formula():
 
 @pytest.mark.slow
 @LONG
-@pytest.mark.skipif(not HAS_PEERS, reason="pip install 'planner[peers]', or set PEERS_PYTHON")
+@peers_needed
 def test_beside_emukit(tmp_path: Path):
     seen, poses = problem(1, 1000, 10_000)
     post = seen.posteriors[0]
@@ -84,12 +76,7 @@ def test_beside_emukit(tmp_path: Path):
         tmp_path / "job.npz", x=post.x, y=y, variance=1.0, lengths=LENGTHS, noise=NOISE,
         candidates=poses.x, points=seen.workspace.poses.x,
     )  # fmt: skip
-    script = Path(support.__file__).with_name("acquisition_peers.py")
-    environment = {**os.environ, "PYTHONPATH": "", "OMP_NUM_THREADS": "1"}
-    subprocess.run(
-        [PYTHON, script, tmp_path / "job.npz", tmp_path / "answer.npz"],
-        check=True, env=environment, capture_output=True,
-    )  # fmt: skip
+    ask("acquisition_peers.py", tmp_path / "job.npz", tmp_path / "answer.npz")
     answer = np.load(tmp_path / "answer.npz")
     score, wall, own = timed(lambda: reduction(seen, poses, seen.workspace))
     theirs, theirs_own = float(answer["seconds"]), float(answer["processor"])

@@ -1,22 +1,23 @@
-"""How a fit grows with the campaign, a peer in the same run: pytest -m slow tests/benchmarks -s"""
+"""How long a fit takes at a start, and as the campaign grows, a peer in the same run.
 
-import time
+`pytest -m slow -s tests/benchmarks/test_growth.py` prints the times. Bounds are several times what
+is aimed at, so that a busy machine does not fail them.
+"""
+
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from planner.surrogate.modal_surrogate import fit_surrogate
+from tests.support.outside import with_tests
 from tests.support.surrogates import observed, simulated, true_hz
+from tests.support.timing import spent
 
 pytestmark = pytest.mark.slow
 
 SCALE = 1.12
-
-
-def spent(act):
-    """What it returns, and its processor time in s."""
-    started = time.process_time()
-    return act(), time.process_time() - started
 
 
 @pytest.mark.filterwarnings("ignore")  # the peer's optimiser meets its bounds
@@ -28,8 +29,8 @@ def test_fit_and_prediction_against_scikit_learn(poses):
 
     seen = observed(poses, 0, SCALE)
     x = np.random.default_rng(1).random((500, 2))
-    fitted, ours = spent(lambda: fit_surrogate(seen, residues=False))
-    found, asked = spent(lambda: fitted.predict(x, simulated(x)))
+    fitted, _, ours = spent(lambda: fit_surrogate(seen, residues=False))
+    found, _, asked = spent(lambda: fitted.predict(x, simulated(x)))
     targets = [np.log(seen.frequency_hz), np.log(seen.damping_ratio)]
 
     def peer():
@@ -40,7 +41,7 @@ def test_fit_and_prediction_against_scikit_learn(poses):
             predicted.append(model.predict(x, return_std=True)[0])
         return np.exp(np.array(predicted[:4]).T)
 
-    theirs, took = spent(peer)
+    theirs, _, took = spent(peer)
     truth = true_hz(x, SCALE)
     rmse = [100 * np.sqrt(np.mean((f / truth - 1) ** 2)) for f in (found.frequency_hz, theirs)]
     print(
@@ -49,3 +50,26 @@ def test_fit_and_prediction_against_scikit_learn(poses):
         f"{took / (ours + asked):.1f}"
     )
     assert rmse[0] < 1.1 * rmse[1]
+
+
+def test_times_of_a_start(tmp_path):
+    code = (
+        "import time; a = time.perf_counter()\n"
+        "from tests.support.surrogates import observed, simulated\n"
+        "from planner.surrogate.modal_surrogate import fit_surrogate\n"
+        "b = time.perf_counter()\n"
+        "x = observed(9, 1).x; fit_surrogate(observed(5, 0)).predict(x, simulated(x))\n"
+        "print(b - a, time.perf_counter() - b)"
+    )
+    environment = {**with_tests(), "XDG_CACHE_HOME": str(tmp_path)}
+    for what, bound in (("nothing cached", 6.0), ("cached", 3.0)):
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        imports, fit = (float(v) for v in done.stdout.split())
+        print(f"\n{what}: imports {imports:.2f} s, first fit and prediction {fit:.2f} s")
+        assert imports + fit < bound

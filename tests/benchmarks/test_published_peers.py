@@ -3,15 +3,11 @@
 NARGP beside emukit's: same kernels, noise and data. At emukit's hyperparameters both must say the
 same. Each finds hyperparameters by its own climb: ours must never end lower, and where both end on
 the same peak, predict the same; where ours ends higher, emukit's is not the greatest likelihood.
-`pytest -m slow -s tests/benchmarks/test_published_peers.py`
-prints the tables; the peers run in the interpreter that PEERS_PYTHON names (see
-`test_fusion_peers`). PEERS_SEEDS (10) says how many designs per problem.
+`pytest -m slow -s tests/benchmarks/test_published_peers.py` prints the tables; the peers run in the
+interpreter that PEERS_PYTHON names. PEERS_SEEDS (10) says how many designs per problem.
 """
 
-import importlib.util
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +27,7 @@ from planner.surrogate.models.likelihood_gp import (
     fit_likelihood,
     fit_nargp,
 )
-from tests.support import published_peers
+from tests.support import peers
 from tests.support.fusion_problems import PROBLEMS, Design, Problem, design
 
 SEEDS = int(os.environ.get("PEERS_SEEDS", "10"))
@@ -42,16 +38,8 @@ SAME_PEAK = 0.15  # difference of log-likelihoods of two climbs that say the sam
 # Of some hundred: 25 points on a line with next to no noise leave a nearly singular matrix.
 LIKELIHOODS = 0.03
 DRAWN = 0.02  # what emukit's 2,000 draws of the cheap level leave of an RMSE of 0.3 %
-PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.timeout(0),
-    pytest.mark.skipif(
-        "PEERS_PYTHON" not in os.environ and importlib.util.find_spec("emukit") is None,
-        reason="the peers are not installed: pip install 'planner[peers]', or set PEERS_PYTHON",
-    ),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(0), peers.peers_needed]
 
 
 def kr240(mode: int) -> Problem:
@@ -103,9 +91,7 @@ def ask(designs: dict[str, Design], folder: Path, name: str):
     if not answers.exists():
         jobs, fresh = folder / f"jobs{name}.npz", folder / f"new{name}.npz"
         np.savez(jobs, **{f"{k}/{p}": v for k, d in designs.items() for p, v in vars(d).items()})
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": ""}
-        script = published_peers.__file__ or ""
-        subprocess.run([PYTHON, script, jobs, fresh], check=True, env=environment)
+        peers.ask("published_peers.py", jobs, fresh)
         fresh.rename(answers)
     return np.load(answers)
 

@@ -1,7 +1,5 @@
 """How fast methods of stability converge, and what they cost at the same error."""
 
-import time
-
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
@@ -9,6 +7,7 @@ from threadpoolctl import threadpool_limits
 from planner.milling.machine import Machine, multipliers
 from planner.milling.period import Discretisation
 from tests.support.milling_cases import MULTIPLIERS, cut, one_mode, semi_growth
+from tests.support.timing import spent
 
 RPM, DEPTH_MM = 5000.0, 0.5
 
@@ -43,14 +42,9 @@ def test_orders_of_convergence():
     assert full_error(asked, 28, 1) < 1e-2 * full_error(asked, 22, 1)
 
 
-def cpu(work, repeats: int = 3) -> float:
-    """Least processor time of one call in s."""
-    spent = []
-    for _ in range(repeats):
-        begun = time.process_time()
-        work()
-        spent.append(time.process_time() - begun)
-    return min(spent)
+def cpu(work) -> float:
+    """Least processor time of three calls in s."""
+    return min(spent(work)[2] for _ in range(3))
 
 
 @pytest.mark.slow

@@ -84,7 +84,7 @@ def test_every_answer_marks_them(tmp_path):
     off_deg = {"here": [0.0] * 6, "read back": [0.02, *[0.0] * 5], "tilted": [0, 0, 0, 0, 3, 0]}
     q = [here + np.deg2rad(off) for off in off_deg.values()]
     report = predictions(campaign, list(off_deg), q, tmp_path / "p.npz", np.full(3, np.nan))
-    assert [pose.outside for pose in report.poses] == [False, False, True]
+    assert [pose["outside"] for pose in report.to_json()["poses"]] == [False, False, True]
     assert np.load(tmp_path / "p.npz")["outside"].tolist() == [False, False, True]
     rows, remark, *_ = report.text().renderables
     assert {"here", "tilted (outside)"} <= set(rows.columns[0].cells)

@@ -60,10 +60,10 @@ def test_differences_are_taken_seed_by_seed():
     slow = Curves.of([run(s, [level[s], level[s]]) for s in range(20)])
     quick = Curves.of([run(s, [level[s], level[s] - 0.2 - 0.01 * s]) for s in range(19, -1, -1)])
     found = paired(quick, slow)
-    assert found.seeds == 20
-    assert found.difference_percent[0] == 0
-    assert found.difference_percent[1] == pytest.approx(-0.295)
-    low, high = found.difference_percent_interval95[1]
+    assert found["seeds"] == 20
+    assert found["difference_percent"][0] == 0
+    assert found["difference_percent"][1] == pytest.approx(-0.295)
+    low, high = found["difference_percent_interval95"][1]
     assert -0.39 <= low < -0.295 < high <= -0.2
     assert low < high < 0
 
@@ -71,8 +71,8 @@ def test_differences_are_taken_seed_by_seed():
 def test_only_seeds_of_both_are_compared():
     a = Curves.of([run(0, [2, 1]), run(2, [4, 3])])
     b = Curves.of([run(1, [9, 9]), run(2, [5, 5])])
-    assert paired(a, b).seeds == 1
-    assert paired(a, b).difference_percent.tolist() == [-1, -2]
+    assert paired(a, b)["seeds"] == 1
+    assert paired(a, b)["difference_percent"].tolist() == [-1, -2]
     assert paired(a, Curves.of([run(7, [1, 1])])) is None
 
 
@@ -82,7 +82,7 @@ def test_the_interval_covers_the_true_difference_as_often_as_it_says():
         base = rng.uniform(2, 9, 20)
         other = base - 1 + rng.normal(0, 0.5, 20)
         made = (Curves.of([run(s, [x]) for s, x in enumerate(xs)]) for xs in (other, base))
-        low, high = paired(*made).difference_percent_interval95[0]
+        low, high = paired(*made)["difference_percent_interval95"][0]
         hits += low <= -1 <= high
     assert 0.88 <= hits / trials <= 0.99
 

@@ -31,7 +31,7 @@ def frfs_of(files: tuple[str, ...], kind: str) -> dict[str, FrfRecord]:
 
 def test_universal_files_read_back_as_they_were(named, tmp_path):
     found = export(named, "uff", tmp_path, None)
-    measured = frfs_of(found.files, "measured")
+    measured = frfs_of(found.keys["files"], "measured")
     assert len(measured) == 2
     for record, m in zip(measured.values(), named.state.used, strict=True):
         assert isinstance(record, FrfRecord)
@@ -44,7 +44,9 @@ def test_universal_files_read_back_as_they_were(named, tmp_path):
 
 
 def test_modes_are_dataset_55_that_others_read(named, tmp_path):
-    files = [f for f in export(named, "uff", tmp_path, None).files if f.endswith("_modes.unv")]
+    files = [
+        f for f in export(named, "uff", tmp_path, None).keys["files"] if f.endswith("_modes.unv")
+    ]
     for file, m in zip(files, named.state.used, strict=True):
         sets = pyuff.UFF(file).read_sets()
         modes = [mode for mode in m.modes if mode.likely]
@@ -59,7 +61,7 @@ def test_modes_are_dataset_55_that_others_read(named, tmp_path):
 
 def test_tables_and_mat_hold_the_same_numbers(named, tmp_path):
     export(named, "csv", tmp_path, None)
-    mat = loadmat(export(named, "mat", tmp_path, None).files[0], simplify_cells=True)
+    mat = loadmat(export(named, "mat", tmp_path, None).keys["files"][0], simplify_cells=True)
     with (tmp_path / "modes.csv").open() as file:
         modes = list(csv.DictReader(file))
     used = named.state.used
@@ -80,7 +82,7 @@ def test_tables_and_mat_hold_the_same_numbers(named, tmp_path):
 def test_the_models_file_says_what_the_campaign_says(named, tmp_path, monkeypatch):
     found = export(named, "model", tmp_path, None)
     monkeypatch.chdir(tmp_path)
-    script = next(f for f in found.files if f.endswith(".py"))
+    script = next(f for f in found.keys["files"] if f.endswith(".py"))
     loaded: dict = {}
     exec(Path(script).read_text(), loaded)
     q = named.cell.candidates.q[7:12]
@@ -91,8 +93,8 @@ def test_the_models_file_says_what_the_campaign_says(named, tmp_path, monkeypatc
     np.testing.assert_allclose(hz, expected.frequency_hz, rtol=0.01)
     np.testing.assert_allclose(sd, expected.frequency_sd_hz, rtol=0.15)
     np.testing.assert_allclose(damping, expected.damping_ratio, rtol=0.05)
-    assert max(found.error_percent) < 0.2
-    assert sum(Path(f).stat().st_size for f in found.files) < 200_000
+    assert max(found.keys["error_percent"]) < 0.2
+    assert sum(Path(f).stat().st_size for f in found.keys["files"]) < 200_000
 
 
 @pytest.fixture

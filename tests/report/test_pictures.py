@@ -89,7 +89,7 @@ def test_every_picture_says_what_it_shows_and_what_is_simulated(five, simulated,
     assert list(figures) == ["stabilisation", "frf", "coherence", "mac"]
     if not simulated:
         figures = {"mac": figures["mac"]}
-    Pictures(tmp_path).write(figures, "P001", simulated=simulated)
+    Pictures(tmp_path).write(lambda: figures, "P001", simulated=simulated)
     for figure in figures.values():
         assert ("SIMULATED" in figure.get_suptitle()) == simulated
         assert "P001" in figure.get_suptitle()
