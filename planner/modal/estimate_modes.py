@@ -137,7 +137,7 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
     shared_pole, shared_residue = shared_error(data.lines, fitted, errors)
     if data.step_s is None:
         scale = scale * inflation(data, fitted, shared_pole)
-    present = presences(data, fitted.poles, fitted.residues.residue)
+    present = presences(data, fitted.poles, fitted.residue)
     modes = []
     for k in range(m):
         if weak[k] > 1:
@@ -147,7 +147,7 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
         covariance = covariance + shared_pole[np.ix_(index, index)]
         pole = complex(fitted.poles[k])
         frequency, damping, sd = natural(pole, covariance)
-        residue = fitted.residues.residue[..., k]
+        residue = fitted.residue[..., k]
         variance = scale[k] * np.mean(fitted.residue_variance[..., k], axis=-1)
         variance = variance + np.mean(shared_residue[..., k], axis=-1)
         supported = support(pole - data.rate_1_s, sets)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.modal.residues import Lines, Residues, basis, basis_slope, stack, synthesize, unpack
+from planner.modal.residues import Lines, basis, basis_slope, complex_of, stack, unpack
 
 MAX_ITERATIONS = 30
 # Few lines around a resonance are fitted nearly quadratically: the damping may vanish at once.
@@ -191,7 +191,6 @@ class PoleFit:
     """
 
     poles: np.ndarray  # (m,)
-    residues: Residues  # (outputs, inputs, m)
     chi2: float
     degrees: int  # degrees of freedom left
     pole_covariance: np.ndarray  # (2m, 2m) of real parts (all modes), then imaginary parts
@@ -202,6 +201,12 @@ class PoleFit:
     sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
     variance: np.ndarray  # (outputs, inputs, F) that weighted the fit
     excess: np.ndarray
+
+    @property
+    def residue(self) -> np.ndarray:
+        """(outputs, inputs, m)."""
+        found = unpack(self.coefficients, self.poles.size)[0]
+        return found.reshape(*self.variance.shape[:2], -1)
 
 
 def refine(
@@ -275,12 +280,6 @@ def shared_error(lines: Lines, fit: PoleFit, errors: np.ndarray) -> tuple[np.nda
     return change.T @ change, residue.reshape(*shape, 2, m)
 
 
-def complex_of(parts: np.ndarray) -> np.ndarray:
-    """(…, m) of real, then imaginary parts (…, 2m)."""
-    real, imag = np.split(parts, 2, axis=-1)
-    return real + 1j * imag
-
-
 def scaled_inverse(
     normal: np.ndarray, rcond: float = 1e-15, least: np.ndarray | float = 1e-300
 ) -> np.ndarray:
@@ -307,7 +306,6 @@ def _finish(
     square = np.maximum(np.einsum("ekk->ek", inverse) + spread, 0.0)
     return PoleFit(
         poles,
-        unpack(coefficients.reshape(*shape, p), m),
         float(point.chi2),
         2 * count * entries - entries * p - 2 * m,
         covariance,
@@ -327,10 +325,8 @@ def fitted(
     """Residues (entries, m) and the responses (entries, F) that they make at `lines`."""
     m, entries = poles.shape[1], int(np.max(data.entries)) + 1
     residue, response = np.zeros((entries, m), complex), np.zeros((entries, lines.x.size), complex)
-    for k, own in enumerate(poles):
-        there = data.entries[k] >= 0
-        found = unpack(point.coefficients[k, there], m)
-        residue[data.entries[k, there]] = found.residue
-        made = Residues(found.residue[:, None], found.rest[:, None])
-        response[data.entries[k, there]] = synthesize(lines, own, made)[:, 0]
+    for chosen, coefficients, own in zip(data.entries, point.coefficients, poles, strict=True):
+        there = chosen >= 0
+        residue[chosen[there]] = unpack(coefficients[there], m)[0]
+        response[chosen[there]] = coefficients[there] @ basis(lines, own)
     return residue, response

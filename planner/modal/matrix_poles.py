@@ -256,7 +256,7 @@ def _tried(given: SetData, fit: SetPoles, variance: np.ndarray, pole: complex) -
     start = np.append(fit.poles[near], pole)
     together = np.broadcast_to(variance[:, None], local.response.shape)
     quick = refine(local.lines, local.response, together, start, local.allowed)
-    if presences(local, quick.poles, quick.residues.residue)[-1] < PRESENT_ADDED / 2:
+    if presences(local, quick.poles, quick.residue)[-1] < PRESENT_ADDED / 2:
         return None
     known = fit.own[:, near]
     own = np.column_stack([known, np.full(len(known), quick.poles[-1])])

@@ -10,7 +10,7 @@ import numpy as np
 from planner.frf.spectra import running_mean, window_sum
 from planner.modal.fit_data import Data
 from planner.modal.least_squares import PoleFit, refine
-from planner.modal.residues import basis, rank_one, synthesize, unit
+from planner.modal.residues import basis, rank_one, unit
 
 # Damping ratios of the atoms with which the error is searched.
 TRIAL_DAMPING = (0.003, 0.01, 0.03, 0.08)
@@ -134,7 +134,8 @@ def _error(data: Data, refined: PoleFit) -> np.ndarray:
 
 def model(data: Data, refined: PoleFit) -> np.ndarray:
     """Fitted responses (outputs, inputs, F)."""
-    return synthesize(data.lines, data.to_plane(refined.poles), refined.residues)
+    fitted = refined.coefficients @ basis(data.lines, data.to_plane(refined.poles))
+    return fitted.reshape(data.response.shape)
 
 
 def _in_rad_s(data: Data, refined: PoleFit, step_s: float) -> PoleFit:
@@ -198,7 +199,7 @@ def _twins(data: Data, current: PoleFit) -> tuple[int, int] | None:
     if data.response.shape[0] < 2:
         return None
     order = np.argsort(current.poles.imag)
-    shapes = [rank_one(current.residues.residue[..., k])[0] for k in range(order.size)]
+    shapes = [rank_one(current.residue[..., k])[0] for k in range(order.size)]
     for a, b in pairwise(order):
         apart = abs(current.poles[a] - current.poles[b])
         width = np.max(data.rate_1_s - current.poles[[a, b]].real)

@@ -16,13 +16,12 @@ from planner.modal.fit_data import Data
 from planner.modal.least_squares import (
     ReducedFit,
     WeightedSets,
-    complex_of,
     fitted,
     reduced,
     scaled_inverse,
     slope_turn,
 )
-from planner.modal.residues import Lines
+from planner.modal.residues import Lines, complex_of
 
 ROUNDS = 4  # each a Gauss-Newton step of every set and of what is common
 # Farther from the common pole no set's strays: share of its frequency; half bandwidths in damping.

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from planner.modal.fit_data import Data
-from planner.modal.least_squares import PoleFit, complex_of, scaled_inverse, slope_turn
+from planner.modal.least_squares import PoleFit, scaled_inverse, slope_turn
 from planner.modal.rank_one_fit import Entries, fit_shape
-from planner.modal.residues import Residues, basis, basis_slope, unpack
+from planner.modal.residues import basis, basis_slope, complex_of
 
 SURELY = 1 - 1e-6  # that χ² rises by less where all of it is nothing: else nothing is taken away
 STEPS, HALVED = 20, 6  # of Gauss and Newton, and how often one is shortened
@@ -38,11 +38,6 @@ class ShapeFit:
     chi2: float
 
     @property
-    def residues(self) -> Residues:
-        """Residues (e, m) and out-of-band terms (e, t)."""
-        return unpack(self.coefficients, self.poles.size)
-
-    @property
     def response(self) -> np.ndarray:
         """(e, F) of the fit."""
         return self.coefficients @ basis(self.data.lines, self.poles)
@@ -61,16 +56,15 @@ class ShapeFit:
             axis=1,
         )
 
-    def drawn(self, count: int, seed: int) -> list[tuple[np.ndarray, Residues]]:
-        """So many poles and residues that are as likely as each other."""
+    def drawn(self, count: int, seed: int) -> list[tuple[np.ndarray, np.ndarray]]:
+        """So many poles and coefficients that are as likely as each other."""
         m, found = self.poles.size, []
         at = np.concatenate([self.poles.real, self.poles.imag])
         for normal in np.random.default_rng(seed).standard_normal((count, self.root.shape[1])):
             by = self.root @ normal
             # Neither decay nor frequency is ever below zero, however unsure.
             poles = complex_of(at * np.exp(np.clip(by[: 2 * m] / at, -1.0, 1.0)))
-            moved = self.coefficients + by[2 * m :].reshape(self.coefficients.shape)
-            found.append((poles, unpack(moved, m)))
+            found.append((poles, self.coefficients + by[2 * m :].reshape(self.coefficients.shape)))
         return found
 
 
@@ -191,7 +185,7 @@ class _ShapeProblem:
     def start(self, fit: PoleFit) -> _ShapePoint:
         """Shapes that explain the free residues best."""
         m = self.modes
-        residue = fit.residues.residue.reshape(-1, m)
+        residue = fit.residue.reshape(-1, m)
         variance = np.mean(fit.residue_variance, axis=2).reshape(-1, m)
         shape = np.array(
             [fit_shape(self.entries, residue[:, k], variance[:, k], 0.5).shape for k in self.shaped]

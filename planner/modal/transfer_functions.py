@@ -88,7 +88,7 @@ def _part(frequency: np.ndarray, response: np.ndarray, part: tuple[float, float]
     if not chosen:
         return []
     poles = np.array([line.pole for line in chosen])
-    residues = lsfd(f, h, poles).residue
+    residues = lsfd(f, h, poles)
     present = presences(Data(f, h, None), poles, residues)
     modes = []
     for k, line in enumerate(chosen):
