@@ -102,7 +102,7 @@ def check(
     single, entries = odd_entries(sides) if enough else ([], [])
     faults += single
     odd = tuple((sides.rows[row], sides.columns[column]) for row, column in entries)
-    untied = tuple(dof for dof in sides.columns if swapped and swapped.concerns(dof))
+    untied = tuple(dof for dof in sides.columns if swapped and dof in swapped.dofs)
     told = () if faults else _remarks(reciprocity)
     if not driving:
         told = (*told, "No point was hit where it was felt: shapes are not scaled.")

@@ -94,7 +94,6 @@ class PoleIdentification:
     diagram: Diagram
     fit: PoleFit
     fit_error: float  # ‖H − fit‖/‖H‖
-    order: int
 
 
 def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | None:
@@ -115,7 +114,7 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | Non
     modes = modes_of_fit(data, fitted, sets)
     error = np.linalg.norm(data.response - model(data, fitted))
     relative = float(error / np.linalg.norm(data.response))
-    return PoleIdentification(modes, data, found, fitted, relative, top)
+    return PoleIdentification(modes, data, found, fitted, relative)
 
 
 def ladder(top: int) -> tuple[int, ...]:
@@ -217,7 +216,7 @@ def estimate_modes(frf: Frf, band_hz: tuple[float, float]) -> ModalModel:
             " with another tip, or check that the band holds a resonance."
         )
     remarks = _remarks(found, doubtful)
-    return ModalModel(modes, band_hz, found.fit_error, found.order, remarks, doubtful)
+    return ModalModel(modes, band_hz, found.fit_error, found.diagram.order, remarks, doubtful)
 
 
 def identification(frf: Frf, band_hz: tuple[float, float]) -> PoleIdentification | None:

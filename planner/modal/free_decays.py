@@ -53,7 +53,7 @@ def analyse_record(
         + ", ".join(names)
         + "; without a usable force they are not scaled."
     )
-    return ModalModel(modes, band, found.fit_error, found.order, tuple(remarks)), found
+    return ModalModel(modes, band, found.fit_error, found.diagram.order, tuple(remarks)), found
 
 
 def _nothing(record: TimeRecord, band: tuple[float, float]) -> str:

@@ -85,7 +85,7 @@ def _points(
     References whose column does not go with their row are points of their own, behind the others.
     A point that was only hit is among them where a driving point ties its size to the rest.
     """
-    responses, references = np.array(list(found.entries)).T
+    responses, references = found.places
     tied = [d for d in matrix.references if d not in checks.untied] if checks.driving else []
     seen = {matrix.responses[o] for o in responses}
     dofs = tuple(sorted({*seen, *tied}, key=by_number))
@@ -127,7 +127,7 @@ def _with_vectors(
     scales.
     """
     felt, hit = len(matrix.responses), len(matrix.references)
-    responses, references = np.array(list(found.entries)).T
+    responses, references = found.places
     entries = Entries(responses, felt + references, felt + hit)
     group, _ = entries.groups
     if len(np.unique(group[entries.rows])) > 1:

@@ -48,14 +48,12 @@ class MatrixPoles:
     scale: np.ndarray
     weak: np.ndarray
     presence: np.ndarray
-    order: int
     hit: bool
 
     @property
-    def entries(self) -> dict[tuple[int, int], int]:
-        """Which entry is that of a response and a reference (indices)."""
-        pairs = zip(self.rows.tolist(), self.columns.tolist(), strict=True)
-        return {pair[::-1] if self.hit else pair: e for e, pair in enumerate(pairs)}
+    def places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Response and reference (indices) of each entry."""
+        return (self.columns, self.rows) if self.hit else (self.rows, self.columns)
 
     @property
     def fit_error(self) -> float:
@@ -81,7 +79,7 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     data = Data(f[chosen], response, None, rate, tail_s=matrix.tail_s, near=True, above=True)
     # A record cut off while it rings leaves ripples, which polynomials take for poles.
     smooth = matrix.ended or matrix
-    orders, found = _diagram(smooth, chosen)
+    found = _diagram(smooth, chosen)
     start = np.array([line.pole for line in stable(found)]) + smooth.exponential_rate_1_s
     if not start.size:
         return None
@@ -92,12 +90,10 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     fit, variance = select_modes(SetData(data, sets, rows, columns), start)
     if not fit.poles.size:
         return None
-    scale, weak, presence = judged(data, fit, variance)
-    told = scale, weak, presence, orders[-1], hit
-    return MatrixPoles(data, fit, found, rows, columns, *told)
+    return MatrixPoles(data, fit, found, rows, columns, *judged(data, fit, variance), hit)
 
 
-def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Diagram]:
+def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> Diagram:
     """Poles of every model order, from the rows that hold all of the references used."""
     table, measured = matrix.accelerance[..., chosen], matrix.measured
     columns = _references(measured)
@@ -115,7 +111,7 @@ def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Di
         usual = max(float(np.median(errors)), 1e-300)
         changed = weight * np.minimum(1.0, ODD * usual / np.maximum(errors, 1e-300))[:, None] ** 2
     sets = plscf(frequency, block, orders, changed)
-    return orders, diagram(sets, (frequency[0] * 0.95, frequency[-1] * 1.05))
+    return diagram(sets, (frequency[0] * 0.95, frequency[-1] * 1.05))
 
 
 def _references(measured: np.ndarray) -> np.ndarray:

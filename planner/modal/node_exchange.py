@@ -148,51 +148,25 @@ FITS, BETTER = 0.3, 0.6
 
 @dataclass(frozen=True)
 class Exchange:
-    """Two points whose rows fit each other's places.
+    """Two points or nodes whose rows fit each other's places: a sentence, and whom it concerns."""
 
-    `stated` and `exchanged` are how much rows differ from columns, relatively; NaN where only the
-    neighbours tell: of nodes then, in all their directions.
-    """
-
-    first: Dof
-    second: Dof
-    stated: float
-    exchanged: float
-
-    def concerns(self, dof: Dof) -> bool:
-        """Whether the row of a point stands elsewhere."""
-        if np.isnan(self.stated):
-            return dof.node in (self.first.node, self.second.node)
-        return dof in (self.first, self.second)
-
-    @property
-    def text(self) -> str:
-        """One sentence for the engineer."""
-        a, b = self.first, self.second
-        if np.isnan(self.stated):
-            return (
-                f"Nodes {a.node} and {b.node} are probably swapped: as labelled they move against "
-                "the points around them in the modes, swapped they move with them. Check the "
-                "labels."
-            )
-        pair = f"Nodes {a.node} and {b.node} ({a.direction})"
-        if a.direction != b.direction:
-            pair = f"The channels {a.at} and {b.at}"
-        return (
-            f"{pair} are probably swapped: as labelled, hitting and listening there differ by "
-            f"{100 * self.stated:.0f} %, swapped by {100 * self.exchanged:.0f} %. Check the labels."
-        )
+    text: str
+    dofs: frozenset[Dof]
 
 
 def exchanged_by_neighbours(sides: RovingSides, geometry: Geometry | None) -> Exchange | None:
-    """Points that were exchanged, told by their neighbours."""
+    """Nodes that were exchanged, in all their directions, told by their neighbours."""
     if sides.motions is None or geometry is None:
         return None
     pair = exchanged_nodes(sides.rows, sides.motions[0].real, geometry)
     if pair is None:
         return None
-    first, second = (next(dof for dof in sides.rows if dof.node == node) for node in pair)
-    return Exchange(first, second, float("nan"), float("nan"))
+    text = (
+        f"Nodes {pair[0]} and {pair[1]} are probably swapped: as labelled they move against "
+        "the points around them in the modes, swapped they move with them. Check the labels."
+    )
+    concerned = (dof for dof in (*sides.rows, *sides.columns) if dof.node in pair)
+    return Exchange(text, frozenset(concerned))
 
 
 def turning_helps(sides: RovingSides, turned: tuple[Dof, ...]) -> bool:
@@ -225,7 +199,15 @@ def exchanged_by_columns(sides: RovingSides) -> Exchange | None:
         return None
     if len(ranked) > 1 and tried[ranked[1]] < tried[ranked[0]] / BETTER:
         return None
-    return Exchange(*ranked[0], stated, tried[ranked[0]])
+    a, b = ranked[0]
+    pair = f"Nodes {a.node} and {b.node} ({a.direction})"
+    if a.direction != b.direction:
+        pair = f"The channels {a.at} and {b.at}"
+    text = (
+        f"{pair} are probably swapped: as labelled, hitting and listening there differ by "
+        f"{100 * stated:.0f} %, swapped by {100 * tried[a, b]:.0f} %. Check the labels."
+    )
+    return Exchange(text, frozenset((a, b)))
 
 
 def _misfit(shape: np.ndarray, columns: np.ndarray, rows: list[int]) -> float:

@@ -218,6 +218,11 @@ class Diagram:
     sets: tuple[PoleSet, ...]
     lines: tuple[Line, ...]
 
+    @property
+    def order(self) -> int:
+        """The highest."""
+        return self.sets[-1].order
+
 
 def diagram(sets: tuple[PoleSet, ...], band_hz: tuple[float, float]) -> Diagram:
     """Join the poles of increasing orders to lines.

@@ -217,7 +217,7 @@ def matrix_report(
         frfs=matrix.count,
         band_hz=found.band_hz,
         fit_error=found.found.fit_error,
-        order=found.found.order,
+        order=found.found.diagram.order,
         refused=given.refused,
         accepted=given.accepted,
         remarks=(*given.remarks, *found.remarks),
