@@ -10,7 +10,7 @@ from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.least_squares import PoleFit, WeightedSets, reduced_together, shared_error
 from planner.modal.mode_selection import fit, model, presences, scales, strongest, weakness
 from planner.modal.modes import LEAST_PROBABILITY, ModalModel, Mode
-from planner.modal.plscf import Diagram, PoleSet, diagram, plscf, stable
+from planner.modal.plscf import Diagram, PoleSet, diagram, ladder, plscf, stable
 from planner.modal.residues import rank_one
 
 # Of the band's span, taken away above, then below; at most half of what lies beside a mode there,
@@ -98,9 +98,7 @@ class PoleIdentification:
 
 def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | None:
     """All modes that the lines of `data` carry, None where there is no pole."""
-    # At least as many lines as half the unknowns of one column need, and once that to spare.
-    top = max(2, min(max_order, data.frequency_hz.size // 3))
-    orders = ladder(top)
+    orders = ladder(max_order, data.frequency_hz.size)
     weight = None if data.variance is None else 1 / np.mean(data.variance, axis=1)
     sets = plscf(data.frequency_hz, data.response, orders, weight)
     reach = (data.frequency_hz[0] * 0.95, data.frequency_hz[-1] * 1.05)
@@ -115,16 +113,6 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | Non
     error = np.linalg.norm(data.response - model(data, fitted))
     relative = float(error / np.linalg.norm(data.response))
     return PoleIdentification(modes, data, found, fitted, relative)
-
-
-def ladder(top: int) -> tuple[int, ...]:
-    """Model orders of the diagram: all at first, then every second, then every fourth.
-
-    High orders cost most (their cube) and differ least from their neighbours.
-    """
-    steps = ((2, 20, 1), (20, 40, 2), (40, top, 4))
-    orders = {n for low, high, step in steps for n in range(low, min(high, top) + 1, step)}
-    return tuple(sorted(orders | {top}))
 
 
 def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Mode, ...]:

@@ -132,37 +132,22 @@ def _block(data: WeightedSets, poles: np.ndarray, which: slice) -> tuple[np.ndar
     off = (found @ gram[:, :p, p:] - cross[..., p:]) * norm[:, None, p:] * weight[..., None]
     chi2 = np.sum(weight * (np.sum(values**2, -1) - np.sum(found * cross[..., :p], -1)), axis=1)
     coefficients = found / norm[:, None, :p]
+    k, e = weight.shape
     real, imag = coefficients[..., :m], coefficients[..., m : 2 * m]
-    first, second = off[..., :m], off[..., m:]
-    by_real = np.sum(real * first + imag * second, axis=1)
-    by_imag = np.sum(real * second - imag * first, axis=1)
+    # How the slope basis (u) combines into slopes by Re λ and Im λ (p), as in `slope_turn`
+    turn = np.stack([real, -imag, imag, real], axis=2)
+    products = turn.reshape(k, e, 4 * m).transpose(0, 2, 1) * weight[:, None]
+    products = (products @ turn.reshape(k, e, 4 * m)).reshape(k, 2, 2, m, 2, 2, m)
+    normal = np.einsum("kupmvqn,kumvn->kpmqn", products, curve.reshape(k, 2, m, 2, m))
+    gradient = np.einsum("keupm,keum->kpm", turn.reshape(k, e, 2, 2, m), off.reshape(k, e, 2, m))
     return (
         coefficients,
         np.maximum(chi2, 0.0),
-        np.concatenate([by_real, by_imag], axis=-1),
-        _normal(real, imag, weight, curve),
+        gradient.reshape(k, 2 * m),
+        normal.reshape(k, 2 * m, 2 * m),
         inverse / norm[:, :p, None] / norm[:, None, :p],
         turned * norm[:, None, p:] / norm[:, :p, None],
     )
-
-
-def _normal(
-    real: np.ndarray, imag: np.ndarray, weight: np.ndarray, curve: np.ndarray
-) -> np.ndarray:
-    """Σ_e w TᵀPT (k, 2m, 2m) for T = [[Re R, −Im R], [Im R, Re R]] of each entry's residues."""
-    m = real.shape[-1]
-    aa, ab = curve[:, :m, :m], curve[:, :m, m:]
-    ba, bb = curve[:, m:, :m], curve[:, m:, m:]
-
-    def sums(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-        return (weight[..., None] * one).transpose(0, 2, 1) @ other
-
-    rr, ri, ii = sums(real, real), sums(real, imag), sums(imag, imag)
-    ir = ri.transpose(0, 2, 1)
-    top = rr * aa + ri * ab + ir * ba + ii * bb
-    side = rr * ab - ri * aa + ir * bb - ii * ba
-    low = ii * aa - ir * ab - ri * ba + rr * bb
-    return np.block([[top, side], [side.transpose(0, 2, 1), low]])
 
 
 def proportional(weight: np.ndarray) -> bool:

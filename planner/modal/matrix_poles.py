@@ -9,15 +9,15 @@ import numpy as np
 
 from planner.frf.matrix import FrfMatrix
 from planner.frf.spectra import running_mean
-from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.least_squares import refine
 from planner.modal.mode_selection import doubt, excess, falls, presences
-from planner.modal.plscf import Diagram, diagram, plscf, row_errors, stable
+from planner.modal.plscf import Diagram, diagram, ladder, plscf, row_errors, stable
 from planner.modal.set_poles import ROUNDS, DivergedPolesError, SetData, SetPoles, fit_sets
 from planner.modal.set_search import reestimated_sets
 from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
 
+MAX_ORDER = 36
 MARGIN = 0.05  # of the band, beyond its edges
 # Of rows that fit the denominator of all the worse than the median by more than this, the weight is
 # taken down, so many times over; fewer rows than these cannot tell.
@@ -101,8 +101,7 @@ def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> Diagram:
     block = table[complete][:, columns]
     level = np.mean(np.abs(block) ** 2, axis=(1, 2))
     weight = np.ones(block.shape[::2]) / np.maximum(level, 1e-300)[:, None]
-    # Max order.
-    orders = ladder(max(2, min(36, block.shape[-1] // 3)))
+    orders = ladder(MAX_ORDER, block.shape[-1])
     frequency = matrix.frequency_hz[chosen]
     # Rows that do not go with the others are taken down.
     changed = weight
