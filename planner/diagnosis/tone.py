@@ -94,7 +94,7 @@ class _Column:
         longest = max(len(hit.force_n) for visit in recorded.visits for hit in visit.hits)
         windows, axis = Windows(LAID, recorded.window_rate_1_s), hits[0].axis_index
         spectra = transform(tuple(hits), recorded.band_hz, windows, longest)
-        frf = of_spectra(spectra, recorded.band_hz, windows, by_scatter=False)
+        frf = of_spectra(spectra, recorded.band_hz, by_scatter=False)
         f, usable = frf.frequency_hz, frf.usable_band_hz[1]
         lines = (f >= low) & (f <= high)
         excited = (f < usable) | (usable == f[-1])

@@ -55,13 +55,15 @@ class HitSpectra:
 class Spectra:
     """Spectra of all hits of a pose at lines frequency_hz (F,).
 
-    `tail_s` as in `Frf`; `peak_s` is the time of the pulses' peaks, the same for all hits.
+    `tail_s` and `exponential_rate_1_s` as in `Frf`; `peak_s` is the time of the pulses' peaks, the
+    same for all hits.
     """
 
     frequency_hz: np.ndarray
     hits: tuple[HitSpectra, ...]
     tail_s: float
     peak_s: float
+    exponential_rate_1_s: float
     remarks: tuple[str, ...]
 
 
@@ -79,8 +81,8 @@ def running_mean(values: np.ndarray, half: int) -> np.ndarray:
 def transform(
     hits: tuple[Hit, ...],
     band_hz: tuple[float, float],
-    windows: Windows | None = None,
-    samples: int | None = None,
+    windows: Windows,
+    samples: int = 0,
 ) -> Spectra:
     """Spectra of hits that are cut so that all pulses lie at the same time.
 
@@ -100,15 +102,15 @@ def transform(
     remarks: tuple[str, ...] = ()
     if before + after < 0.9 * max(len(hit.force_n) for hit in hits):
         remarks = ("Records of different length were cut to the shortest.",)
-    length = max(before + after, samples or 0)
+    length = max(before + after, samples)
     frequency = np.fft.rfftfreq(length, 1 / rate)
     # Margin: lines beyond the band, so that modes at its edge are met from both sides
     # Nyquist share: beyond it anti-alias filters act
     chosen = (frequency > 0) & (frequency <= min(1.3 * band_hz[1], 0.45 * rate))
-    windows = windows or Windows()
     found = tuple(_transform(hit, before, after, length, chosen, windows) for hit in hits)
     tail = float(np.mean([_tail(hit, before, after) for hit in hits]))
-    return Spectra(frequency[chosen], found, tail, before / rate, remarks)
+    rate_1_s = windows.laid_1_s + windows.carried_1_s
+    return Spectra(frequency[chosen], found, tail, before / rate, rate_1_s, remarks)
 
 
 def _transform(

@@ -16,9 +16,15 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from planner.inference.parallel import parallel_map
-from planner.milling.machine import Machine, Monodromies, check_structure, limits, multipliers
+from planner.milling.machine import (
+    Machine,
+    Monodromies,
+    check_structure,
+    limits,
+    multipliers,
+    semi_monodromies,
+)
 from planner.milling.period import Period
-from planner.milling.semi_discretisation import semi_monodromies
 from planner.progress import ProgressCallback, no_progress
 
 LEAST_STEPS = 16  # of the scan in all
@@ -229,10 +235,6 @@ class SampledLimits:
         with np.errstate(invalid="ignore"):
             known = (high - low) / 2 <= OPEN * np.where(np.isinf(depth_m), np.nan, depth_m)
         return ~known & ~(np.isinf(low) & np.isinf(depth_m))
-
-    def probability(self, depths: np.ndarray) -> np.ndarray:
-        """(speeds, depths) of being stable at depths (b,) in m."""
-        return np.mean(self.depth_m[:, :, None] > depths, axis=0)
 
 
 def _quantile(values: np.ndarray, share: float) -> np.ndarray:

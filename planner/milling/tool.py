@@ -111,6 +111,15 @@ class Tool:
         parts[number] = replace(parts[number], contact=contact)
         return replace(self, parts=tuple(parts))
 
+    @property
+    def sd_away(self) -> "list[Tool]":
+        """The same with one number of one contact an sd away, for each whose sd is stated."""
+        return [
+            self.held(number, contact.scaled(name, 1 + contact.sd_percent / 100))
+            for number, contact in self.contacts()
+            for name in (NUMBERS if contact.sd_percent > 0 else ())
+        ]
+
 
 def frame_along(axis: np.ndarray) -> np.ndarray:
     """(3, 3): columns are the axes of a frame whose z is along an axis (3,)."""
