@@ -84,7 +84,6 @@ class _Points:
     angle: np.ndarray
     rows: np.ndarray  # (p, 2)
     columns: np.ndarray  # (p, 2)
-    teeth: tuple[tuple[int, ...], ...]
 
 
 def period(
@@ -136,7 +135,7 @@ def _points(
             shared, rows.reshape(-1, 2), columns.transpose(0, 2, 1).reshape(-1, 2),
         ))  # fmt: skip
     angle, element, place, shared, rows, columns = map(np.concatenate, zip(*parts, strict=True))
-    return _Points(angle / speed, element, place, shared, angle, rows, columns, found.teeth)
+    return _Points(angle / speed, element, place, shared, angle, rows, columns)
 
 
 def _build(

@@ -135,8 +135,7 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
         pole = complex(fitted.poles[k])
         frequency, damping, sd = natural(pole, covariance)
         residue = fitted.residue[..., k]
-        variance = scale[k] * np.mean(fitted.residue_variance[..., k], axis=-1)
-        variance = variance + np.mean(shared_residue[..., k], axis=-1)
+        variance = scale[k] * fitted.residue_variance[..., k] + shared_residue[..., k]
         supported = support(pole - data.rate_1_s, sets)
         residue_sd = np.sqrt(np.maximum(variance, 0.0))  # less by rounding alone
         modes.append(

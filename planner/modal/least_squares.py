@@ -177,9 +177,8 @@ class PoleFit:
 
     poles: np.ndarray  # (m,)
     chi2: float
-    degrees: int  # degrees of freedom left
     pole_covariance: np.ndarray  # (2m, 2m) of real parts (all modes), then imaginary parts
-    residue_variance: np.ndarray  # (outputs, inputs, 2, m) of real and imaginary parts
+    residue_variance: np.ndarray  # (outputs, inputs, m) of real and imaginary part each
     significance: np.ndarray  # (m,) rise of χ² if the mode were left out, poles of others held
     coefficients: np.ndarray  # (entries, columns) of `residues.basis`
     inverse: np.ndarray  # (entries, columns, columns) of their normal matrix, poles held
@@ -242,13 +241,13 @@ def shared_error(lines: Lines, fit: PoleFit, errors: np.ndarray) -> tuple[np.nda
     """Covariance of poles (2m, 2m) and variance of residues that errors common to lines add.
 
     errors (n, outputs, inputs, F): what each of n independent sources, at one standard deviation,
-    adds to the response. The residues' variance (outputs, inputs, 2, m) is that of real and
-    imaginary part.
+    adds to the response. The residues' variance (outputs, inputs, m) is that of real and imaginary
+    part each.
     """
     m, count = fit.poles.size, fit.variance.shape[-1]
     shape = fit.variance.shape[:2]
     if not len(errors):
-        return np.zeros((2 * m, 2 * m)), np.zeros((*shape, 2, m))
+        return np.zeros((2 * m, 2 * m)), np.zeros((*shape, m))
     p = fit.coefficients.shape[1]
     poles = fit.poles
     columns = np.concatenate([basis(lines, poles), basis_slope(lines, poles)])
@@ -261,8 +260,13 @@ def shared_error(lines: Lines, fit: PoleFit, errors: np.ndarray) -> tuple[np.nda
     change = gradient @ fit.pole_covariance
     moved = np.einsum("ekl,nel->nek", fit.inverse, cross[..., :p])
     moved += np.einsum("eka,na->nek", fit.sensitivity, change)
-    residue = np.sum(moved[..., : 2 * m] ** 2, axis=0)
-    return change.T @ change, residue.reshape(*shape, 2, m)
+    residue = of_each(np.sum(moved**2, axis=0), m)
+    return change.T @ change, residue.reshape(*shape, m)
+
+
+def of_each(square: np.ndarray, m: int) -> np.ndarray:
+    """(…, m) variance of residues' real and imaginary part each, from all coefficients' (…, c)."""
+    return (square[..., :m] + square[..., m : 2 * m]) / 2
 
 
 def scaled_inverse(
@@ -281,7 +285,7 @@ def _finish(
     data: WeightedSets, poles: np.ndarray, point: ReducedFit, variance: np.ndarray
 ) -> PoleFit:
     shape, count = variance.shape[:2], variance.shape[-1]
-    m, entries, p = poles.size, shape[0] * shape[1], point.inverse.shape[-1]
+    m, p = poles.size, point.inverse.shape[-1]
     covariance = np.linalg.pinv(point.normal, hermitian=True)
     coefficients = point.coefficients.reshape(-1, p)
     inverse = (point.inverse[:, None] / data.weight[..., None, None]).reshape(-1, p, p)
@@ -292,9 +296,8 @@ def _finish(
     return PoleFit(
         poles,
         float(point.chi2),
-        2 * count * entries - entries * p - 2 * m,
         covariance,
-        square[:, : 2 * m].reshape(*shape, 2, m),
+        of_each(square, m).reshape(*shape, m),
         point.significance(data.weight),
         coefficients,
         inverse,

@@ -12,7 +12,7 @@ from planner.modal.mac import phase_collinearity, phase_deviation_deg, real_norm
 from planner.modal.matrix_poles import MatrixPoles, identify_matrix
 from planner.modal.modes import UNSCALED, Eigenvectors, Mode
 from planner.modal.motion_fields import expected
-from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, fit_shape, row_gain
+from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, row_gain
 from planner.modal.residues import realign
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
@@ -103,17 +103,11 @@ def _shapes(found: MatrixPoles, modes: list[int], entries: Entries) -> list[Fitt
 
     Points that are rows and columns tell it, at first fitted with their gains left free.
     """
-
-    def fitted(k: int, gain: float, near: np.ndarray | None) -> FittedShape:
-        residue = found.fit.residue[:, k]
-        variance = found.scale[k] * found.fit.residue_variance[:, k]
-        return fit_shape(entries, residue, variance, found.fit.poles[k].imag, gain, near)
-
     if np.intersect1d(entries.rows, entries.columns).size < 2:
-        return [fitted(k, 0.0, None) for k in modes]
-    free = [fitted(k, FREE_GAIN, None) for k in modes]
+        return [found.shape(k, entries) for k in modes]
+    free = [found.shape(k, entries, FREE_GAIN) for k in modes]
     gain = row_gain(free)
-    return [fitted(k, gain, one.shape) for k, one in zip(modes, free, strict=True)]
+    return [found.shape(k, entries, gain, one.shape) for k, one in zip(modes, free, strict=True)]
 
 
 def _with_vectors(
@@ -136,8 +130,7 @@ def _with_vectors(
     o, i = np.array(there, int).reshape(-1, 2).T
 
     def apart(k: int, mode: Mode) -> Eigenvectors:
-        variance = found.scale[k] * found.fit.residue_variance[:, k]
-        fitted = fit_shape(entries, found.fit.residue[:, k], variance, found.fit.poles[k].imag)
+        fitted = found.shape(k, entries)
         right, left = fitted.shape[:felt], fitted.shape[felt:]
         alike = np.sum(left[i] * right[o].conj()) / max(np.sum(np.abs(right[o]) ** 2), 1e-300)
         factor = np.sqrt(alike) if abs(alike) > 0 else realign(right)

@@ -13,6 +13,7 @@ from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.least_squares import refine
 from planner.modal.mode_selection import doubt, excess, falls, presences
 from planner.modal.plscf import Diagram, diagram, ladder, plscf, row_errors, stable
+from planner.modal.rank_one_fit import Entries, FittedShape, fit_shape
 from planner.modal.set_poles import ROUNDS, DivergedPolesError, SetData, SetPoles, fit_sets
 from planner.modal.set_search import reestimated_sets
 from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
@@ -54,6 +55,14 @@ class MatrixPoles:
     def places(self) -> tuple[np.ndarray, np.ndarray]:
         """Response and reference (indices) of each entry."""
         return (self.columns, self.rows) if self.hit else (self.rows, self.columns)
+
+    def shape(
+        self, k: int, entries: Entries, gain: float = 0.0, near: np.ndarray | None = None
+    ) -> FittedShape:
+        """Of a mode (index); `entries` have the fit's order, the rest is as in `fit_shape`."""
+        variance = self.scale[k] * self.fit.residue_variance[:, k]
+        damped_1_s = self.fit.poles[k].imag
+        return fit_shape(entries, self.fit.residue[:, k], variance, damped_1_s, gain, near)
 
     @property
     def fit_error(self) -> float:
@@ -213,8 +222,7 @@ def judged(
 def _excess(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
     """(F,) χ² per degree of freedom around each line, at least 1."""
     error = (data.response[:, 0] - fit.fitted)[:, None]
-    m, each = fit.poles.size, fit.poles.size + len(data.lines.rest)
-    return excess(data, error, variance[:, None], 2 * (error.size - m - data.entries * each))
+    return excess(data, error, variance[:, None], fit.poles.size)
 
 
 def _missing(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:

@@ -104,7 +104,7 @@ def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
     for _ in range(0 if known else 2 if before is None else 1):
         variance = _scatter(data, refined)
         refined = fitted(refined.poles)
-    beyond = excess(data, _error(data, refined), variance, refined.degrees)
+    beyond = excess(data, _error(data, refined), variance, refined.poles.size)
     return replace(refined, excess=beyond)
 
 
@@ -147,14 +147,14 @@ def _in_rad_s(data: Data, refined: PoleFit, step_s: float) -> PoleFit:
     return replace(refined, poles=data.to_poles(refined.poles), pole_covariance=covariance)
 
 
-def excess(data: Data, error: np.ndarray, variance: np.ndarray, degrees: int) -> np.ndarray:
+def excess(data: Data, error: np.ndarray, variance: np.ndarray, modes: int) -> np.ndarray:
     """(F,) χ² per degree of freedom in a window of lines, at least 1 and the overall one.
 
-    error and variance (outputs, inputs, F); `degrees` of freedom that the fit left.
+    error and variance (outputs, inputs, F) of a fit of so many modes.
     """
     error = np.mean(np.abs(error) ** 2 / variance, axis=(0, 1))
     lines = error.size
-    freedom = degrees / (2 * lines * data.entries)
+    freedom = 1 - (modes + len(data.lines.rest) + modes / data.entries) / lines
     half = max(5, lines // 40)
     count = window_sum(np.ones(lines), half)
     local = running_mean(error, half) / max(freedom, 0.1)

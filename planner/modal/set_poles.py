@@ -17,6 +17,7 @@ from planner.modal.least_squares import (
     ReducedFit,
     WeightedSets,
     fitted,
+    of_each,
     reduced,
     scaled_inverse,
     slope_turn,
@@ -215,7 +216,7 @@ def _finish(
     parts = alone / np.maximum(data.weight, 1e-300)[..., None] + spent
     there = data.entries >= 0
     residue_variance = np.zeros(residue.shape)
-    residue_variance[data.entries[there]] = ((parts[..., :m] + parts[..., m:]) / 2)[there]
+    residue_variance[data.entries[there]] = of_each(parts, m)[there]
     factor = _student(point, spread)
     return SetPoles(
         complex_of(common), complex_of(own), factor[:, None] * covariance * factor, spread, residue,

@@ -186,7 +186,7 @@ class _ShapeProblem:
         """Shapes that explain the free residues best."""
         m = self.modes
         residue = fit.residue.reshape(-1, m)
-        variance = np.mean(fit.residue_variance, axis=2).reshape(-1, m)
+        variance = fit.residue_variance.reshape(-1, m)
         shape = np.array(
             [fit_shape(self.entries, residue[:, k], variance[:, k], 0.5).shape for k in self.shaped]
         ).reshape(self.shaped.size, 1, self.entries.points)
