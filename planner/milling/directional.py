@@ -74,13 +74,12 @@ class Rule:
     """Lobatto points (s+1,) of a polynomial of degree s on [0, 1], and its integrals.
 
     `points` (q,) and `values` (s+1, q, s+1): Gauss points of every [0, c_i], as shares of c_i, with
-    the Lagrange polynomials there times the weights. `weights` (s+1,) integrate over [0, 1].
+    the Lagrange polynomials there times the weights.
     """
 
     nodes: np.ndarray
     points: np.ndarray
     values: np.ndarray
-    weights: np.ndarray
 
 
 @cache
@@ -91,8 +90,7 @@ def lobatto(degree: int) -> Rule:
     x, w = legendre.leggauss(degree + 12)  # polynomial times an exponential over one element
     x, w = (x + 1) / 2, w / 2
     values = lagrange(nodes, nodes[:, None] * x[None, :]) * w[None, :, None]
-    whole = np.einsum("qj,q->j", lagrange(nodes, x), w)
-    return Rule(nodes, x, values, whole)
+    return Rule(nodes, x, values)
 
 
 def lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
