@@ -305,16 +305,3 @@ def _finish(
         variance,
         np.ones(count),
     )
-
-
-def fitted(
-    data: WeightedSets, point: ReducedFit, poles: np.ndarray, lines: Lines
-) -> tuple[np.ndarray, np.ndarray]:
-    """Residues (entries, m) and the responses (entries, F) that they make at `lines`."""
-    m, entries = poles.shape[1], int(np.max(data.entries)) + 1
-    residue, response = np.zeros((entries, m), complex), np.zeros((entries, lines.x.size), complex)
-    for chosen, coefficients, own in zip(data.entries, point.coefficients, poles, strict=True):
-        there = chosen >= 0
-        residue[chosen[there]] = unpack(coefficients[there], m)[0]
-        response[chosen[there]] = coefficients[there] @ basis(lines, own)
-    return residue, response

@@ -8,10 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
-from planner.frf.spectra import running_mean
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.least_squares import refine
-from planner.modal.mode_selection import doubt, excess, falls, presences
+from planner.modal.mode_selection import (
+    doubt,
+    excess,
+    falls,
+    first_variance,
+    presences,
+    scatter,
+)
 from planner.modal.plscf import Diagram, diagram, ladder, plscf, row_errors, stable
 from planner.modal.rank_one_fit import Entries, FittedShape, fit_shape
 from planner.modal.set_poles import ROUNDS, DivergedPolesError, SetData, SetPoles, fit_sets
@@ -136,23 +142,17 @@ def _references(measured: np.ndarray) -> np.ndarray:
 
 def _variance(data: Data, fit: SetPoles) -> np.ndarray:
     """(e, F) from the error of a fit: a level for each entry times one profile of lines."""
-    square = np.abs(data.response[:, 0] - fit.fitted) ** 2
-    flat = np.mean(square, axis=-1, keepdims=True)
-    lines = square.shape[1]
-    floor = 1e-20 * np.mean(np.abs(data.response[:, 0]) ** 2, axis=-1, keepdims=True)
-    profile = running_mean(np.mean(square / np.maximum(flat, floor), axis=0), max(10, lines // 20))
-    lost = max(0.1, 1 - (fit.poles.size + len(data.lines.rest)) / lines)
-    return flat * (0.9 * profile + 0.1) / lost + floor
+    error = data.response - fit.fitted[:, None]
+    return scatter(data, error, fit.poles.size, alike=True)[:, 0]
 
 
 def select_modes(given: SetData, poles: np.ndarray) -> tuple[SetPoles, np.ndarray]:
     """Fit with every set's own poles, weak modes left out and missing ones added."""
-    data, response = given.data, given.data.response[:, 0]
-    power = np.mean(np.abs(response) ** 2, axis=-1, keepdims=True)
+    data = given.data
     # At first all entries share poles that stay as they are: poles that were refined so would leave
     # weak modes to imitate how strong ones drift.
-    together = replace(given, sets=(np.arange(len(power)),))
-    fit = fit_sets(together, np.broadcast_to(power, response.shape), poles, rounds=0)
+    together = replace(given, sets=(np.arange(data.entries),))
+    fit = fit_sets(together, first_variance(data)[:, 0], poles, rounds=0)
     fit = _fit(given, variance := _variance(data, fit), poles, rounds=0)
     # Rough rounds of the first fit, whose weights do not know yet how sets differ
     fit = _fit(given, variance, fit.poles, fit.own, 2)

@@ -93,7 +93,7 @@ def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
 def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
     """The fit from poles; an unknown variance is taken from the error itself."""
     known = data.variance is not None
-    variance = _first_variance(data) if known or before is None else before.variance
+    variance = first_variance(data) if known or before is None else before.variance
 
     def fitted(start: np.ndarray) -> PoleFit:
         plane = data.to_plane(start)
@@ -102,13 +102,13 @@ def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
 
     refined = fitted(poles)
     for _ in range(0 if known else 2 if before is None else 1):
-        variance = _scatter(data, refined)
+        variance = scatter(data, _error(data, refined), refined.poles.size)
         refined = fitted(refined.poles)
     beyond = excess(data, _error(data, refined), variance, refined.poles.size)
     return replace(refined, excess=beyond)
 
 
-def _first_variance(data: Data) -> np.ndarray:
+def first_variance(data: Data) -> np.ndarray:
     """The known variance, or the power of each response."""
     if data.variance is not None:
         return data.variance
@@ -116,16 +116,22 @@ def _first_variance(data: Data) -> np.ndarray:
     return np.broadcast_to(power, data.response.shape)
 
 
-def _scatter(data: Data, refined: PoleFit) -> np.ndarray:
-    """Variance from the error of the fit, a running mean over a tenth of the lines."""
-    square = np.abs(_error(data, refined)) ** 2
-    lines = data.frequency_hz.size
-    lost = 1 - (2 * refined.poles.size + 2 * len(data.lines.rest)) / (2 * lines)
-    local = running_mean(square, max(10, lines // 20))
+def scatter(data: Data, error: np.ndarray, modes: int, alike: bool = False) -> np.ndarray:
+    """Variance from the error (outputs, inputs, F) of a fit of so many modes.
+
+    A running mean over a tenth of the lines, with `alike` a level for each response times that of
+    all of them.
+    """
+    square, lines = np.abs(error) ** 2, data.frequency_hz.size
     flat = np.mean(square, axis=-1, keepdims=True)
-    # A little of the overall level keeps quiet stretches from being trusted without limit.
     # Least noise relative to the FRF: below it rounding rules.
-    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + 1e-10**2 * _first_variance(data)
+    floor = 1e-10**2 * first_variance(data)
+    if alike:
+        square = flat * np.mean(square / np.maximum(flat, floor), axis=(0, 1))
+    lost = 1 - (modes + len(data.lines.rest)) / lines
+    local = running_mean(square, max(10, lines // 20))
+    # A little of the overall level keeps quiet stretches from being trusted without limit.
+    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + floor
 
 
 def _error(data: Data, refined: PoleFit) -> np.ndarray:
@@ -252,7 +258,7 @@ def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:
 
 def strongest(data: Data) -> np.ndarray:
     """(0 or 1,) pole of the atom that explains most of the responses, alone."""
-    found = _best_atom(data, _first_variance(data), data.response)
+    found = _best_atom(data, first_variance(data), data.response)
     return np.array([] if found is None else [found], complex)
 
 

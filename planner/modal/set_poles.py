@@ -16,13 +16,12 @@ from planner.modal.fit_data import Data
 from planner.modal.least_squares import (
     ReducedFit,
     WeightedSets,
-    fitted,
     of_each,
     reduced,
     scaled_inverse,
     slope_turn,
 )
-from planner.modal.residues import Lines, complex_of
+from planner.modal.residues import Lines, basis, complex_of, unpack
 
 ROUNDS = 4  # each a Gauss-Newton step of every set and of what is common
 # Farther from the common pole no set's strays: share of its frequency; half bandwidths in damping.
@@ -203,9 +202,13 @@ def _finish(
     data: WeightedSets, lines: Lines, own: np.ndarray, common: np.ndarray,
     spread: np.ndarray, covariance: np.ndarray,
 ) -> SetPoles:  # fmt: skip
-    m = common.size // 2
-    point = reduced(data, complex_of(own))
-    residue, response = fitted(data, point, complex_of(own), lines)
+    poles, m, count = complex_of(own), common.size // 2, int(np.max(data.entries)) + 1
+    point = reduced(data, poles)
+    residue, response = np.zeros((count, m), complex), np.zeros((count, lines.x.size), complex)
+    for chosen, coefficients, pole in zip(data.entries, point.coefficients, poles, strict=True):
+        measured = chosen >= 0
+        residue[chosen[measured]] = unpack(coefficients[measured], m)[0]
+        response[chosen[measured]] = coefficients[measured] @ basis(lines, pole)
     # Own poles are as sure as the set and the others make them: a set that tells its own poles
     # hardly depends on what is common.
     held = _held(point, spread)
@@ -219,6 +222,6 @@ def _finish(
     residue_variance[data.entries[there]] = of_each(parts, m)[there]
     factor = _student(point, spread)
     return SetPoles(
-        complex_of(common), complex_of(own), factor[:, None] * covariance * factor, spread, residue,
+        complex_of(common), poles, factor[:, None] * covariance * factor, spread, residue,
         residue_variance, response, point.significance(data.weight),
     )  # fmt: skip
