@@ -210,7 +210,7 @@ class CutterFit:
     @property
     def noise(self) -> np.ndarray:
         """(F,) in m/N: root of E‖δH‖² at each line."""
-        square = np.sum(self.found.fit.variance, axis=(0, 1))
+        square = np.sum(self.found.fit.variance, axis=0)
         return np.sqrt(square) / (2 * np.pi * self.frf.frequency_hz) ** 2
 
 

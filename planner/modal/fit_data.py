@@ -87,11 +87,11 @@ class Data:
     def force_errors(self, response: np.ndarray) -> np.ndarray:
         """What noise of the force adds to responses (outputs, inputs, F), one sd of each source.
 
-        Returns (n, outputs, inputs, F): white noise of the window is a sum of independent pulses,
+        Returns (n, e, F): white noise of the window is a sum of independent pulses,
         as many as tell its spectra apart in the band, each of which scales one input's column.
         """
         if self.force_share is None:
-            return np.zeros((0, *response.shape), complex)
+            return np.zeros((0, *self.rows.shape), complex)
         count = int(np.ceil(2 * self.force_window_s * self.frequency_hz[-1])) + 4
         times = self.force_window_s * ((np.arange(count) + 0.5) / count - 0.5)
         pulses = np.exp(-2j * np.pi * times[:, None] * self.frequency_hz) / np.sqrt(count)
@@ -100,11 +100,16 @@ class Data:
         for j, share in enumerate(self.force_share):
             scale = np.sqrt(share) * pulses
             errors[j, :, :, j] = -scale[:, None] * response[:, j]
-        return errors.reshape(-1, *response.shape)
+        return errors.reshape(-1, *self.rows.shape)
 
     @property
     def entries(self) -> int:
         return self.response.shape[0] * self.response.shape[1]
+
+    @property
+    def rows(self) -> np.ndarray:
+        """(e, F) responses, one entry after the other."""
+        return self.response.reshape(self.entries, -1)
 
     @property
     def threshold(self) -> float:

@@ -9,7 +9,6 @@ from planner.errors import InputError, RefusedError
 from planner.modal.estimate_modes import PoleIdentification, identify
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped, mac
-from planner.modal.mode_selection import model
 from planner.modal.modes import UNSCALED, ModalModel, Mode
 from planner.modal.residues import rank_one
 from planner.recording.records import Channel, TimeRecord
@@ -190,8 +189,8 @@ def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarr
     """Share of each channel's energy in the band that the modes explain."""
     data = found.data
     inside = (data.frequency_hz >= band[0]) & (data.frequency_hz <= band[1])
-    fitted = model(data, found.fit)
-    error = np.sum(np.abs(data.response - fitted)[..., inside] ** 2, axis=(1, 2))
+    error = found.fit.error.reshape(data.response.shape)
+    error = np.sum(np.abs(error[..., inside]) ** 2, axis=(1, 2))
     return 1 - error / np.sum(np.abs(data.response[..., inside]) ** 2, axis=(1, 2))
 
 

@@ -1,26 +1,19 @@
-"""Least squares over poles in the frequency domain, by maximum likelihood.
+"""The linear part of a fit of poles: residues at their best, and how χ² goes on from there.
 
 The residues enter linearly and are eliminated (variable projection, Golub and Pereyra 1973, in
 Kaufman's form), so that Gauss–Newton runs over the poles only. The noise of a line is circular
-complex normal with the stated variance E|δH|²; at the solution the linearised equations give the
-covariance of poles and residues (Pintelon and Schoukens, System Identification, 2012, ch. 9).
+complex normal with the stated variance E|δH|².
 
 Entries whose variance is a level for each times one profile of lines share one matrix: they are a
 set. Sets of few entries are computed together; a loop over them would spend most of its time
 between the sums.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.modal.residues import Lines, basis, basis_slope, complex_of, stack, unpack
-
-MAX_ITERATIONS = 30
-# Few lines around a resonance are fitted nearly quadratically: the damping may vanish at once.
-# At first, by how much less after a step that gained and more after one that did not, at most.
-DAMPING, LIGHTER, HEAVIER, MOST = 1e-3, 0.1, 10.0, 1e8
+from planner.modal.residues import Lines, basis, basis_slope, stack
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,109 +159,6 @@ def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:
     return turn
 
 
-@dataclass(frozen=True, eq=False)
-class PoleFit:
-    """Poles and residues at the minimum of χ² = Σ 2|H − fit|²/variance, and their covariance.
-
-    Poles and their covariance are in the plane of the lines, of `mode_selection.fit` in rad/s.
-    `excess` (F,) ≥ 1 is χ² per degree of freedom (and of information) around a line, 1 where that
-    was not asked for.
-    """
-
-    poles: np.ndarray  # (m,)
-    chi2: float
-    pole_covariance: np.ndarray  # (2m, 2m) of real parts (all modes), then imaginary parts
-    residue_variance: np.ndarray  # (outputs, inputs, m) of real and imaginary part each
-    significance: np.ndarray  # (m,) rise of χ² if the mode were left out, poles of others held
-    coefficients: np.ndarray  # (entries, columns) of `residues.basis`
-    inverse: np.ndarray  # (entries, columns, columns) of their normal matrix, poles held
-    sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
-    variance: np.ndarray  # (outputs, inputs, F) that weighted the fit
-    excess: np.ndarray
-
-    @property
-    def residue(self) -> np.ndarray:
-        """(outputs, inputs, m)."""
-        found = unpack(self.coefficients, self.poles.size)[0]
-        return found.reshape(*self.variance.shape[:2], -1)
-
-
-def refine(
-    lines: Lines,
-    response: np.ndarray,
-    variance: np.ndarray,
-    poles: np.ndarray,
-    allowed: Callable[[np.ndarray], bool],
-) -> PoleFit:
-    """Minimise the weighted error over poles and residues, starting from `poles`.
-
-    response and variance (outputs, inputs, F), finite, variance > 0, at `lines`; poles (m,),
-    m ≥ 1, in the plane of `lines`; a step to poles that are not `allowed` is shortened.
-    """
-    count = response.shape[-1]
-    data = WeightedSets.of(lines, response.reshape(-1, count), variance.reshape(-1, count))
-    poles = np.asarray(poles, complex)
-    point, damping = reduced_together(data, poles), DAMPING
-    # Damped Gauss-Newton steps (Levenberg-Marquardt)
-    for _ in range(MAX_ITERATIONS):
-        # In units in which the diagonal is 1: the damping is relative to it.
-        diagonal = np.diagonal(point.normal)
-        unit = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
-        damped = point.normal * np.outer(unit, unit) + damping * np.eye(len(unit))
-        step = -unit * np.linalg.lstsq(damped, unit * point.gradient)[0]
-        there = poles + complex_of(step)
-        tried = reduced_together(data, there) if allowed(there) else None
-        settled = tried is not None and damping < DAMPING and _still(point, tried, step)
-        if tried is not None and tried.chi2 < point.chi2:
-            poles, point, damping = there, tried, LIGHTER * damping
-        else:
-            damping *= HEAVIER
-        if settled or damping > MOST:
-            break
-    return _finish(data, poles, point, variance)
-
-
-def _still(before: ReducedFit, after: ReducedFit, step: np.ndarray) -> bool:
-    """Whether a step changed nothing: far below a standard deviation, or by rounding alone.
-
-    A short step tells nothing as long as damping keeps it short.
-    """
-    sds = np.abs(step) * np.sqrt(np.maximum(np.diag(before.normal), 0.0))
-    return bool(np.max(sds) < 1e-3 or abs(before.chi2 - after.chi2) < 1e-9 * before.chi2)
-
-
-def shared_error(lines: Lines, fit: PoleFit, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Covariance of poles (2m, 2m) and variance of residues that errors common to lines add.
-
-    errors (n, outputs, inputs, F): what each of n independent sources, at one standard deviation,
-    adds to the response. The residues' variance (outputs, inputs, m) is that of real and imaginary
-    part each.
-    """
-    m, count = fit.poles.size, fit.variance.shape[-1]
-    shape = fit.variance.shape[:2]
-    if not len(errors):
-        return np.zeros((2 * m, 2 * m)), np.zeros((*shape, m))
-    p = fit.coefficients.shape[1]
-    poles = fit.poles
-    columns = np.concatenate([basis(lines, poles), basis_slope(lines, poles)])
-    both = np.concatenate([columns.real, columns.imag], axis=1)
-    weighted = (errors * 2 / fit.variance).reshape(len(errors), -1, count)
-    cross = np.concatenate([weighted.real, weighted.imag], axis=-1) @ both.T
-    turn = slope_turn(fit.coefficients, m)
-    gradient = np.einsum("eka,nek->na", turn, cross[..., p:])
-    gradient += np.einsum("eka,nek->na", fit.sensitivity, cross[..., :p])
-    change = gradient @ fit.pole_covariance
-    moved = np.einsum("ekl,nel->nek", fit.inverse, cross[..., :p])
-    moved += np.einsum("eka,na->nek", fit.sensitivity, change)
-    residue = of_each(np.sum(moved**2, axis=0), m)
-    return change.T @ change, residue.reshape(*shape, m)
-
-
-def of_each(square: np.ndarray, m: int) -> np.ndarray:
-    """(…, m) variance of residues' real and imaginary part each, from all coefficients' (…, c)."""
-    return (square[..., :m] + square[..., m : 2 * m]) / 2
-
-
 def scaled_inverse(
     normal: np.ndarray, rcond: float = 1e-15, least: np.ndarray | float = 1e-300
 ) -> np.ndarray:
@@ -279,29 +169,3 @@ def scaled_inverse(
     unit = np.sqrt(np.maximum(np.diag(normal).real, least))
     inverse = np.linalg.pinv(normal / unit[:, None] / unit, rcond=rcond, hermitian=True)
     return inverse / unit[:, None] / unit
-
-
-def _finish(
-    data: WeightedSets, poles: np.ndarray, point: ReducedFit, variance: np.ndarray
-) -> PoleFit:
-    shape, count = variance.shape[:2], variance.shape[-1]
-    m, p = poles.size, point.inverse.shape[-1]
-    covariance = np.linalg.pinv(point.normal, hermitian=True)
-    coefficients = point.coefficients.reshape(-1, p)
-    inverse = (point.inverse[:, None] / data.weight[..., None, None]).reshape(-1, p, p)
-    sensitivity = point.sensitivity.reshape(-1, p, 2 * m)
-    spread = np.einsum("eka,ab,ekb->ek", sensitivity, covariance, sensitivity)
-    # Of rounding, where lines without noise leave curvatures almost singular, variances below 0
-    square = np.maximum(np.einsum("ekk->ek", inverse) + spread, 0.0)
-    return PoleFit(
-        poles,
-        float(point.chi2),
-        covariance,
-        of_each(square, m).reshape(*shape, m),
-        point.significance(data.weight),
-        coefficients,
-        inverse,
-        sensitivity,
-        variance,
-        np.ones(count),
-    )

@@ -72,9 +72,8 @@ def _put_right(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> Ma
     sign = np.where(turned, -1.0, 1.0)[:, None]
     # A residue that does not fit the others counts with so many times its variance.
     doubt = np.where([pair in checks.odd for pair in named], 1e8, 1.0)[:, None]
-    fit = found.fit
-    residue, variance = fit.residue * sign, fit.residue_variance * doubt
-    return replace(found, fit=replace(fit, residue=residue, residue_variance=variance))
+    own, variance = found.fit.coefficients * sign, found.fit.residue_variance * doubt
+    return replace(found, fit=replace(found.fit, coefficients=own, residue_variance=variance))
 
 
 def _points(

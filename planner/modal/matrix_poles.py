@@ -9,7 +9,6 @@ import numpy as np
 
 from planner.frf.matrix import FrfMatrix
 from planner.modal.fit_data import Data, too_few_lines
-from planner.modal.least_squares import refine
 from planner.modal.mode_selection import (
     doubt,
     excess,
@@ -19,8 +18,15 @@ from planner.modal.mode_selection import (
     scatter,
 )
 from planner.modal.plscf import Diagram, diagram, ladder, plscf, row_errors, stable
+from planner.modal.pole_fit import (
+    ROUNDS,
+    DivergedPolesError,
+    PoleFit,
+    SetData,
+    fit_sets,
+    refine,
+)
 from planner.modal.rank_one_fit import Entries, FittedShape, fit_shape
-from planner.modal.set_poles import ROUNDS, DivergedPolesError, SetData, SetPoles, fit_sets
 from planner.modal.set_search import reestimated_sets
 from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
 
@@ -48,7 +54,7 @@ class MatrixPoles:
     """
 
     data: Data
-    fit: SetPoles
+    fit: PoleFit
     diagram: Diagram
     rows: np.ndarray
     columns: np.ndarray
@@ -73,8 +79,7 @@ class MatrixPoles:
     @property
     def fit_error(self) -> float:
         """‖H − fit‖/‖H‖."""
-        error = np.linalg.norm(self.data.response[:, 0] - self.fit.fitted)
-        return float(error / np.linalg.norm(self.data.response))
+        return float(np.linalg.norm(self.fit.error) / np.linalg.norm(self.data.response))
 
 
 def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPoles | None:
@@ -140,26 +145,20 @@ def _references(measured: np.ndarray) -> np.ndarray:
     return np.array(best)
 
 
-def _variance(data: Data, fit: SetPoles) -> np.ndarray:
-    """(e, F) from the error of a fit: a level for each entry times one profile of lines."""
-    error = data.response - fit.fitted[:, None]
-    return scatter(data, error, fit.poles.size, alike=True)[:, 0]
-
-
-def select_modes(given: SetData, poles: np.ndarray) -> tuple[SetPoles, np.ndarray]:
+def select_modes(given: SetData, poles: np.ndarray) -> tuple[PoleFit, np.ndarray]:
     """Fit with every set's own poles, weak modes left out and missing ones added."""
     data = given.data
     # At first all entries share poles that stay as they are: poles that were refined so would leave
     # weak modes to imitate how strong ones drift.
     together = replace(given, sets=(np.arange(data.entries),))
-    fit = fit_sets(together, first_variance(data)[:, 0], poles, rounds=0)
-    fit = _fit(given, variance := _variance(data, fit), poles, rounds=0)
+    fit = fit_sets(together, first_variance(data), poles, rounds=0)
+    fit = _fit(given, variance := scatter(data, fit, alike=True), poles, rounds=0)
     # Rough rounds of the first fit, whose weights do not know yet how sets differ
     fit = _fit(given, variance, fit.poles, fit.own, 2)
     searched = False
     # Passes of leaving out and adding
     for _ in range(4):
-        variance = _variance(data, fit)
+        variance = scatter(data, fit, alike=True)
         # Not before: sets would be moved to where they imitate the modes that a fit lacks.
         if searched:
             fit, variance = _settled(given, fit)
@@ -181,23 +180,23 @@ def select_modes(given: SetData, poles: np.ndarray) -> tuple[SetPoles, np.ndarra
         fit = _fit(given, variance, poles, own)
     fit, variance = _settled(given, fit)
     fit = _fit(given, variance, fit.poles, fit.own, SETTLING, every=True)
-    return fit, _variance(data, fit)
+    return fit, scatter(data, fit, alike=True)
 
 
-def _settled(given: SetData, fit: SetPoles) -> tuple[SetPoles, np.ndarray]:
+def _settled(given: SetData, fit: PoleFit) -> tuple[PoleFit, np.ndarray]:
     """The fit, and its variance, after those sets have been searched again that fit badly."""
-    variance = _variance(given.data, fit)
+    variance = scatter(given.data, fit, alike=True)
     own = reestimated_sets(given, fit, variance)
     if own is None:
         return fit, variance
     fit = _fit(given, variance, fit.poles, own, SETTLING)
-    return fit, _variance(given.data, fit)
+    return fit, scatter(given.data, fit, alike=True)
 
 
 def _fit(
     given: SetData, variance: np.ndarray, poles: np.ndarray, known: np.ndarray | None = None,
     rounds: int = ROUNDS, every: bool = False,
-) -> SetPoles:  # fmt: skip
+) -> PoleFit:  # fmt: skip
     """Fit on thinned lines (or `every` one near a mode); poles that stray are left out."""
     while True:
         try:
@@ -208,30 +207,20 @@ def _fit(
 
 
 def judged(
-    data: Data, fit: SetPoles, variance: np.ndarray
+    data: Data, fit: PoleFit, variance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(m,) noise beyond its variance, weakness (above 1: not established) and presence."""
     frequency = np.abs(fit.poles) / (2 * np.pi)
-    scale = np.interp(frequency, data.frequency_hz, _excess(data, fit, variance))
-    # How the sets differ does not blur a mode: each has a pole of its own.
-    alone = np.diag(fit.covariance) - fit.spread / len(fit.own)
-    weak = doubt(data, fit.poles, alone, fit.significance, scale)
-    return scale, weak, presences(data, fit.poles, fit.residue)
+    scale = np.interp(frequency, data.frequency_hz, excess(data, fit, variance))
+    return scale, doubt(data, fit, scale), presences(data, fit.poles, fit.residue)
 
 
-def _excess(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
-    """(F,) χ² per degree of freedom around each line, at least 1."""
-    error = (data.response[:, 0] - fit.fitted)[:, None]
-    return excess(data, error, variance[:, None], fit.poles.size)
-
-
-def _missing(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
+def _missing(given: SetData, fit: PoleFit, variance: np.ndarray) -> np.ndarray:
     """Poles that the error still tells of, each tried on the lines around it."""
     data = given.data
     added: list[complex] = []
-    error = data.response[:, 0] - fit.fitted
-    weight = 2 / variance / _excess(data, fit, variance)
-    poles, fall = falls(data, weight, weight * error)
+    weight = 2 / variance / excess(data, fit, variance)
+    poles, fall = falls(data, weight, weight * fit.error)
     failed, step = 0, data.frequency_hz[1] - data.frequency_hz[0]
     fall[poles.imag / (2 * np.pi) < LINES_BELOW * step] = 0.0
     # Most added.
@@ -252,13 +241,12 @@ def _missing(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
     return np.array(added, complex)
 
 
-def _tried(given: SetData, fit: SetPoles, variance: np.ndarray, pole: complex) -> complex | None:
+def _tried(given: SetData, fit: PoleFit, variance: np.ndarray, pole: complex) -> complex | None:
     """The pole after a fit of the lines around it, where it is a mode; None where it is not."""
     some, lines, near = around(given, fit, pole)
     local, variance = some.data, variance[:, lines]
     start = np.append(fit.poles[near], pole)
-    together = np.broadcast_to(variance[:, None], local.response.shape)
-    quick = refine(local.lines, local.response, together, start, local.allowed)
+    quick = refine(local, variance, start)
     if presences(local, quick.poles, quick.residue)[-1] < PRESENT_ADDED / 2:
         return None
     known = fit.own[:, near]
@@ -274,4 +262,4 @@ def _tried(given: SetData, fit: SetPoles, variance: np.ndarray, pole: complex) -
         before = fit_sets(some, variance, fit.poles[near], SETTLING, known)
     except DivergedPolesError:
         return None
-    return complex(new) if explains(some, before, after, variance) else None
+    return complex(new) if explains(some, before, after) else None

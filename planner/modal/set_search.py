@@ -13,8 +13,8 @@ import numpy as np
 
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped
+from planner.modal.pole_fit import FARTHEST, PoleFit, SetData
 from planner.modal.residues import Lines, basis, stack, unit
-from planner.modal.set_poles import FARTHEST, SetData, SetPoles
 
 # Poles are looked for up to so many sds of the sets' poles, and half bandwidths, from the common
 # ones; the lines looked at reach so many half bandwidths farther.
@@ -22,7 +22,7 @@ FAR, FAR_HALVES, REACH = 4.0, 2.0, 4.0
 FINE = (0.2, 0.06, 0.02)  # half bandwidths: steps of the refinement
 
 
-def reestimated_sets(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray | None:
+def reestimated_sets(given: SetData, fit: PoleFit, variance: np.ndarray) -> np.ndarray | None:
     """Poles (k, m) of all sets, those of badly fitted sets as found anew; None where none are."""
     shares = _participation(given, fit)[given.columns]
     off = _off(given, fit, variance) | _apart(given, fit, shares)
@@ -36,7 +36,7 @@ def reestimated_sets(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.
     return own if moved else None
 
 
-def _participation(given: SetData, fit: SetPoles) -> np.ndarray:
+def _participation(given: SetData, fit: PoleFit) -> np.ndarray:
     """(columns, m) how modes take part at the references, of unit length.
 
     Most sets agree on it: rows count the less the worse they fit.
@@ -55,20 +55,20 @@ def _participation(given: SetData, fit: SetPoles) -> np.ndarray:
     return found
 
 
-def _reach(fit: SetPoles) -> np.ndarray:
+def _reach(fit: PoleFit) -> np.ndarray:
     """(m,) how far (rad/s) a set's pole is looked for."""
     m = fit.poles.size
     far = FAR * np.sqrt(fit.spread[m:]) + FAR_HALVES * np.abs(fit.poles.real)
     return np.minimum(far, FARTHEST * fit.poles.imag)
 
 
-def _near(data: Data, fit: SetPoles, mode: int) -> np.ndarray:
+def _near(data: Data, fit: PoleFit, mode: int) -> np.ndarray:
     """(F,) bool: lines around a mode, wherever a set may have it."""
     far = _reach(fit)[mode] + REACH * np.abs(fit.poles[mode].real)
     return np.abs(2 * np.pi * data.frequency_hz - fit.poles[mode].imag) < far
 
 
-def _together(data: Data, fit: SetPoles) -> list[np.ndarray]:
+def _together(data: Data, fit: PoleFit) -> list[np.ndarray]:
     """Modes (indices) among the lines, in groups whose peaks may overlap."""
     omega, far = 2 * np.pi * data.frequency_hz[[0, -1]], _reach(fit)
     inside = (fit.poles.imag > omega[0]) & (fit.poles.imag < omega[1])
@@ -77,9 +77,9 @@ def _together(data: Data, fit: SetPoles) -> list[np.ndarray]:
     return [np.array(group) for group in groups]
 
 
-def _off(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
+def _off(given: SetData, fit: PoleFit, variance: np.ndarray) -> np.ndarray:
     """(k, m) bool: sets whose error around a mode is half as much again as that of the usual."""
-    square = np.abs(given.data.response[:, 0] - fit.fitted) ** 2 / variance
+    square = np.abs(fit.error) ** 2 / variance
     off = np.zeros((len(given.sets), fit.poles.size), bool)
     for j in range(fit.poles.size):
         lines = _near(given.data, fit, j)
@@ -90,7 +90,7 @@ def _off(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
     return off
 
 
-def _apart(given: SetData, fit: SetPoles, theirs: np.ndarray) -> np.ndarray:
+def _apart(given: SetData, fit: PoleFit, theirs: np.ndarray) -> np.ndarray:
     """(k, m) bool: sets whose residues do not go with how the mode takes part (e, m)."""
     rows = given.rows
     weight = 1 / np.maximum(2 * fit.residue_variance, 1e-300)
@@ -129,7 +129,7 @@ class _Neighbourhood:
 
     @classmethod
     def of(
-        cls, given: SetData, fit: SetPoles, variance: np.ndarray, shares: np.ndarray, s: int,
+        cls, given: SetData, fit: PoleFit, variance: np.ndarray, shares: np.ndarray, s: int,
         modes: np.ndarray,
     ) -> "_Neighbourhood":  # fmt: skip
         """Of set s around some modes (indices), which take part in all entries by shares (e, m)."""
@@ -138,7 +138,7 @@ class _Neighbourhood:
         lines, common = data.lines.part(chosen), fit.poles[modes]
         others = np.setdiff1d(np.arange(fit.poles.size), modes)
         residue, own = fit.residue[np.ix_(entries, others)], fit.own[s, others]
-        response = data.response[:, 0][np.ix_(entries, chosen)] - residue @ unit(lines, own)
+        response = data.rows[np.ix_(entries, chosen)] - residue @ unit(lines, own)
         response = response - residue.conj() @ unit(lines, own.conj())
         variance = variance[np.ix_(entries, chosen)]
         # In any case a pole may move by half its bandwidth.

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from planner.modal.fit_data import Data
-from planner.modal.least_squares import PoleFit, scaled_inverse, slope_turn
+from planner.modal.least_squares import scaled_inverse, slope_turn
+from planner.modal.pole_fit import PoleFit
 from planner.modal.rank_one_fit import Entries, fit_shape
 from planner.modal.residues import basis, basis_slope, complex_of
 
@@ -86,7 +87,7 @@ def shape_fit(
     problem = _ShapeProblem.of(data, fit, entries)
     point = problem.settled(problem.start(fit), np.ones(problem.size, bool))
     unshaped = replace(problem, shaped=problem.shaped[:0])
-    if surely_worse(fit.chi2, point.chi2, unshaped.size - problem.size):
+    if surely_worse(float(np.sum(fit.chi2)), point.chi2, unshaped.size - problem.size):
         problem, point = unshaped, unshaped.start(fit)
     every = np.ones(problem.size, bool)
     plain, kept = problem.without_nothings(point)
@@ -145,8 +146,7 @@ class _ShapeProblem:
         alone = np.all(apart > wide / 2, axis=1)
         alone &= np.abs(poles) < 2 * np.pi * data.frequency_hz[-1]
         alone &= count > entries.points  # or nothing would tie the points
-        response, weight = data.response.reshape(count, -1), 2 / fit.variance.reshape(count, -1)
-        return cls(data, response, weight, entries, poles.size, np.flatnonzero(alone))
+        return cls(data, data.rows, 2 / fit.variance, entries, poles.size, np.flatnonzero(alone))
 
     @cached_property
     def left(self) -> np.ndarray:
@@ -184,9 +184,7 @@ class _ShapeProblem:
 
     def start(self, fit: PoleFit) -> _ShapePoint:
         """Shapes that explain the free residues best."""
-        m = self.modes
-        residue = fit.residue.reshape(-1, m)
-        variance = fit.residue_variance.reshape(-1, m)
+        residue, variance = fit.residue, fit.residue_variance
         shape = np.array(
             [fit_shape(self.entries, residue[:, k], variance[:, k], 0.5).shape for k in self.shaped]
         ).reshape(self.shaped.size, 1, self.entries.points)

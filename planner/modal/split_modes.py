@@ -6,8 +6,8 @@ import numpy as np
 
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped
+from planner.modal.pole_fit import DivergedPolesError, PoleFit, SetData, fit_sets
 from planner.modal.residues import unit
-from planner.modal.set_poles import DivergedPolesError, SetData, SetPoles, fit_sets
 from planner.modal.set_search import reestimated_sets
 
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
@@ -40,7 +40,7 @@ def thinned(data: Data, poles: np.ndarray, every: bool = False) -> np.ndarray:
     return np.flatnonzero(kept)
 
 
-def around(given: SetData, fit: SetPoles, pole: complex) -> tuple[SetData, np.ndarray, np.ndarray]:
+def around(given: SetData, fit: PoleFit, pole: complex) -> tuple[SetData, np.ndarray, np.ndarray]:
     """The lines around a pole less the modes far from it, their indices, which modes are near."""
     data = given.data
     step, centre = data.frequency_hz[1] - data.frequency_hz[0], pole.imag / (2 * np.pi)
@@ -60,29 +60,22 @@ def around(given: SetData, fit: SetPoles, pole: complex) -> tuple[SetData, np.nd
     return replace(given, data=part), lines, near
 
 
-def _chi2(local: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
-    """(e,) of each entry."""
-    return np.sum(2 / variance * np.abs(local.data.response[:, 0] - fit.fitted) ** 2, axis=1)
-
-
-def explains(
-    local: SetData, less: SetPoles, more: SetPoles, variance: np.ndarray, margin: float = 1.0
-) -> bool:
+def explains(local: SetData, less: PoleFit, more: PoleFit, margin: float = 1.0) -> bool:
     """Whether a fit with more modes is better than chance makes it, `margin` times over."""
-    before, after = (float(np.sum(_chi2(local, fit, variance))) for fit in (less, more))
+    before, after = (float(np.sum(fit.chi2)) for fit in (less, more))
     scale = max(1.0, after / (2 * local.data.response.size))
     return before - after > margin * local.data.threshold * scale
 
 
-def _in_most(local: SetData, less: SetPoles, more: SetPoles, variance: np.ndarray) -> bool:
+def _in_most(local: SetData, less: PoleFit, more: PoleFit) -> bool:
     """Whether a fit with one mode more is clearly better than chance makes it in most sets."""
-    fall = _chi2(local, less, variance) - _chi2(local, more, variance)
+    fall = less.chi2 - more.chi2
     each = [np.sum(fall[chosen]) / (2 * len(chosen) + 2) for chosen in local.sets]
     return bool(np.median(each) > APART)
 
 
 def merged_modes(
-    given: SetData, fit: SetPoles, variance: np.ndarray
+    given: SetData, fit: PoleFit, variance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Poles (m,) and those of every set (k, m), with those made one that are one mode.
 
@@ -103,7 +96,7 @@ def merged_modes(
     return poles[order], own[:, order]
 
 
-def _groups(given: SetData, fit: SetPoles, order: np.ndarray) -> list[np.ndarray]:
+def _groups(given: SetData, fit: PoleFit, order: np.ndarray) -> list[np.ndarray]:
     """Indices of poles, increasing, that lie together and take part alike."""
 
     def together(last: int, k: int) -> bool:
@@ -114,7 +107,7 @@ def _groups(given: SetData, fit: SetPoles, order: np.ndarray) -> list[np.ndarray
     return [np.array(group) for group in grouped(order, together) if len(group) > 1]
 
 
-def _alike(given: SetData, fit: SetPoles, first: int, second: int) -> bool:
+def _alike(given: SetData, fit: PoleFit, first: int, second: int) -> bool:
     """Whether two modes take part at the references alike; always so at a single one."""
     tables = np.moveaxis(given.table(fit.residue[:, [first, second]]), -1, 0)
     vectors = np.linalg.svd(tables, full_matrices=False)[2][:, 0]
@@ -122,7 +115,7 @@ def _alike(given: SetData, fit: SetPoles, first: int, second: int) -> bool:
 
 
 def _as_one(
-    given: SetData, fit: SetPoles, variance: np.ndarray, group: np.ndarray
+    given: SetData, fit: PoleFit, variance: np.ndarray, group: np.ndarray
 ) -> tuple[complex, np.ndarray] | None:
     """Common pole and the sets' own of one mode instead of a group; None if that is worse."""
     share = fit.significance[group] / np.sum(fit.significance[group])
@@ -139,14 +132,14 @@ def _as_one(
     try:
         one = fit_sets(local, variance, poles, MERGED_ROUNDS, own)
         more = fit_sets(local, variance, fit.poles[near], known=fit.own[:, near])
-        if explains(local, one, more, variance, APART):
+        if explains(local, one, more, APART):
             # Where it is one mode, only sets that fitted it badly are explained better by two.
             found = reestimated_sets(local, one, variance)
-            if _in_most(local, one, more, variance) or found is None:
+            if _in_most(local, one, more) or found is None:
                 return None
             one = fit_sets(local, variance, one.poles, MERGED_ROUNDS, found)
     except DivergedPolesError:
         return None
-    if explains(local, one, more, variance, APART):
+    if explains(local, one, more, APART):
         return None
     return complex(one.poles[-1]), one.own[:, -1]

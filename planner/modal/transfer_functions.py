@@ -88,7 +88,7 @@ def _part(frequency: np.ndarray, response: np.ndarray, part: tuple[float, float]
         return []
     poles = np.array([line.pole for line in chosen])
     residues = lsfd(f, h, poles)
-    present = presences(Data(f, h, None), poles, residues)
+    present = presences(Data(f, h, None), poles, residues[:, 0])
     modes = []
     for k, line in enumerate(chosen):
         presence = float(present[k])

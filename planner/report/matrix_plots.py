@@ -85,8 +85,8 @@ def driving_figure(matrix: FrfMatrix, found: MatrixModes) -> Figure:
     figure, grid = panels((12.0, 2.6 * len(pairs) + 1.2), "Driving points", len(pairs))
     data, (felt, hit) = found.found.data, found.found.places
     for panel, (o, i) in zip(grid[:, 0], pairs, strict=True):
-        (fitted,) = found.found.fit.fitted[(felt == o) & (hit == i)]
-        measured = matrix.accelerance[o, i]
+        measured, (entry,) = matrix.accelerance[o, i], np.flatnonzero((felt == o) & (hit == i))
+        fitted = data.rows[entry] - found.found.fit.error[entry]
         magnitude(panel, matrix.frequency_hz, measured, color=MEASURED, lw=1.0, label="measured")
         magnitude(panel, data.frequency_hz, fitted, color=MODEL, lw=1.0, label="fit")
         panel.set_xlim(data.frequency_hz[0], data.frequency_hz[-1])

@@ -276,10 +276,10 @@ def spoiled(
     Every row is fitted by itself and the poles do not know names: what would be found in the
     spoiled matrix is what was found, spoiled.
     """
-    table = np.full((*sign.shape, found.fit.poles.size), np.nan + 0j)
-    table[found.rows, found.columns] = found.fit.residue
+    table = np.full((*sign.shape, found.fit.coefficients.shape[1]), np.nan)
+    table[found.rows, found.columns] = found.fit.coefficients
     table = table[order] * sign[..., None]
     matrix = replace(case.matrix, accelerance=case.matrix.accelerance[order] * sign[..., None])
     rows, columns = np.nonzero(matrix.measured)
-    fit = replace(found.fit, residue=table[rows, columns])
+    fit = replace(found.fit, coefficients=table[rows, columns])
     return matrix, replace(found, rows=rows, columns=columns, fit=fit)
