@@ -15,6 +15,7 @@ from planner.modal.mode_selection import (
     falls,
     first_variance,
     presences,
+    scales,
     scatter,
 )
 from planner.modal.plscf import Diagram, diagram, ladder, plscf, row_errors, stable
@@ -107,10 +108,11 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     # Entries measured together: those of one node of the side that roved
     nodes = np.array([matrix.responses[k].node for k in rows])
     sets = tuple(np.flatnonzero(nodes == node) for node in dict.fromkeys(nodes.tolist()))
-    fit, variance = select_modes(SetData(data, sets, rows, columns), start)
+    fit = select_modes(SetData(data, sets, rows, columns), start)
     if not fit.poles.size:
         return None
-    return MatrixPoles(data, fit, found, rows, columns, *judged(data, fit, variance), hit)
+    told = scales(data, fit), doubt(data, fit), presences(data, fit.poles, fit.residue)
+    return MatrixPoles(data, fit, found, rows, columns, *told, hit)
 
 
 def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> Diagram:
@@ -145,81 +147,71 @@ def _references(measured: np.ndarray) -> np.ndarray:
     return np.array(best)
 
 
-def select_modes(given: SetData, poles: np.ndarray) -> tuple[PoleFit, np.ndarray]:
+def select_modes(given: SetData, poles: np.ndarray) -> PoleFit:
     """Fit with every set's own poles, weak modes left out and missing ones added."""
     data = given.data
     # At first all entries share poles that stay as they are: poles that were refined so would leave
     # weak modes to imitate how strong ones drift.
     together = replace(given, sets=(np.arange(data.entries),))
-    fit = fit_sets(together, first_variance(data), poles, rounds=0)
-    fit = _fit(given, variance := scatter(data, fit, alike=True), poles, rounds=0)
+    begun = scatter(data, fit_sets(together, first_variance(data), poles, rounds=0), alike=True)
+    fit = _fit(given, begun, poles, rounds=0)
     # Rough rounds of the first fit, whose weights do not know yet how sets differ
-    fit = _fit(given, variance, fit.poles, fit.own, 2)
+    fit = _fit(given, begun, fit.poles, fit.own, 2)
     searched = False
     # Passes of leaving out and adding
     for _ in range(4):
-        variance = scatter(data, fit, alike=True)
         # Not before: sets would be moved to where they imitate the modes that a fit lacks.
-        if searched:
-            fit, variance = _settled(given, fit)
-        _, weak, presence = judged(data, fit, variance)
+        fit = _settled(given, fit) if searched else fit
+        present = presences(data, fit.poles, fit.residue) >= PRESENT
         # Poles above the last line stand for all modes there.
-        left = fit.part(data.is_above(fit.poles) | (weak <= 1) & (presence >= PRESENT))
-        poles, own = merged_modes(given, left, variance)
+        left = fit.part(data.is_above(fit.poles) | (doubt(data, fit) <= 1) & present)
+        poles, own = merged_modes(given, left)
         # What a fit lacks is looked for where it has no mode too many.
         if poles.size == fit.poles.size:
             if searched:
                 break
-            added, searched = _missing(given, fit, variance), True
+            added, searched = _missing(given, fit), True
             poles = np.append(poles, added)
             own = np.column_stack([own, np.tile(added, (len(own), 1))])
             if not added.size:
                 continue
         if not poles.size:
-            return replace(left, poles=poles), variance
-        fit = _fit(given, variance, poles, own)
-    fit, variance = _settled(given, fit)
-    fit = _fit(given, variance, fit.poles, fit.own, SETTLING, every=True)
-    return fit, scatter(data, fit, alike=True)
+            return left
+        fit = _fit(given, fit.variance, poles, own)
+    fit = _settled(given, fit)
+    return _fit(given, fit.variance, fit.poles, fit.own, SETTLING, every=True)
 
 
-def _settled(given: SetData, fit: PoleFit) -> tuple[PoleFit, np.ndarray]:
-    """The fit, and its variance, after those sets have been searched again that fit badly."""
-    variance = scatter(given.data, fit, alike=True)
-    own = reestimated_sets(given, fit, variance)
-    if own is None:
-        return fit, variance
-    fit = _fit(given, variance, fit.poles, own, SETTLING)
-    return fit, scatter(given.data, fit, alike=True)
+def _settled(given: SetData, fit: PoleFit) -> PoleFit:
+    """The fit after those sets have been searched again that fit badly."""
+    own = reestimated_sets(given, fit)
+    return fit if own is None else _fit(given, fit.variance, fit.poles, own, SETTLING)
 
 
 def _fit(
     given: SetData, variance: np.ndarray, poles: np.ndarray, known: np.ndarray | None = None,
     rounds: int = ROUNDS, every: bool = False,
 ) -> PoleFit:  # fmt: skip
-    """Fit on thinned lines (or `every` one near a mode); poles that stray are left out."""
+    """Fit on thinned lines (or `every` one near a mode); poles that stray are left out.
+
+    Its variance is that of its own error, by which what follows is judged and weighted.
+    """
     while True:
         try:
             lines = thinned(given.data, poles, every)
-            return fit_sets(given, variance, poles, rounds, known, lines)
+            found = fit_sets(given, variance, poles, rounds, known, lines)
         except DivergedPolesError as error:
             poles, known = poles[~error.astray], None
+        else:
+            found = replace(found, variance=scatter(given.data, found, alike=True))
+            return replace(found, excess=excess(given.data, found))
 
 
-def judged(
-    data: Data, fit: PoleFit, variance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(m,) noise beyond its variance, weakness (above 1: not established) and presence."""
-    frequency = np.abs(fit.poles) / (2 * np.pi)
-    scale = np.interp(frequency, data.frequency_hz, excess(data, fit, variance))
-    return scale, doubt(data, fit, scale), presences(data, fit.poles, fit.residue)
-
-
-def _missing(given: SetData, fit: PoleFit, variance: np.ndarray) -> np.ndarray:
+def _missing(given: SetData, fit: PoleFit) -> np.ndarray:
     """Poles that the error still tells of, each tried on the lines around it."""
     data = given.data
     added: list[complex] = []
-    weight = 2 / variance / excess(data, fit, variance)
+    weight = 2 / fit.variance / fit.excess
     poles, fall = falls(data, weight, weight * fit.error)
     failed, step = 0, data.frequency_hz[1] - data.frequency_hz[0]
     fall[poles.imag / (2 * np.pi) < LINES_BELOW * step] = 0.0
@@ -230,7 +222,7 @@ def _missing(given: SetData, fit: PoleFit, variance: np.ndarray) -> np.ndarray:
         if fall[best] <= data.threshold or failed == 2:
             break
         pole = complex(poles[best])
-        found = _tried(given, fit, variance, pole)
+        found = _tried(given, fit, pole)
         fall[np.abs(poles - pole) < REACH * abs(pole.real)] = 0.0
         if found is not None and any(abs(found - p) < abs(p.real) for p in added):
             found = None
@@ -241,10 +233,10 @@ def _missing(given: SetData, fit: PoleFit, variance: np.ndarray) -> np.ndarray:
     return np.array(added, complex)
 
 
-def _tried(given: SetData, fit: PoleFit, variance: np.ndarray, pole: complex) -> complex | None:
+def _tried(given: SetData, fit: PoleFit, pole: complex) -> complex | None:
     """The pole after a fit of the lines around it, where it is a mode; None where it is not."""
     some, lines, near = around(given, fit, pole)
-    local, variance = some.data, variance[:, lines]
+    local, variance = some.data, fit.variance[:, lines]
     start = np.append(fit.poles[near], pole)
     quick = refine(local, variance, start)
     if presences(local, quick.poles, quick.residue)[-1] < PRESENT_ADDED / 2:

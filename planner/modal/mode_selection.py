@@ -97,7 +97,7 @@ def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
     for _ in range(0 if known else 2 if before is None else 1):
         variance = scatter(data, refined)
         refined = refine(data, variance, refined.poles)
-    return replace(refined, excess=excess(data, refined, variance))
+    return replace(refined, excess=excess(data, refined))
 
 
 def first_variance(data: Data) -> np.ndarray:
@@ -125,12 +125,9 @@ def scatter(data: Data, fit: PoleFit, alike: bool = False) -> np.ndarray:
     return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + floor
 
 
-def excess(data: Data, fit: PoleFit, variance: np.ndarray) -> np.ndarray:
-    """(F,) χ² per degree of freedom in a window of lines, at least 1 and the overall one.
-
-    Of the error of a fit over a variance (e, F).
-    """
-    error, m = np.mean(np.abs(fit.error) ** 2 / variance, axis=0), fit.poles.size
+def excess(data: Data, fit: PoleFit) -> np.ndarray:
+    """(F,) χ² per degree of freedom in a window of lines, at least 1 and the overall one."""
+    error, m = np.mean(np.abs(fit.error) ** 2 / fit.variance, axis=0), fit.poles.size
     lines = error.size
     freedom = 1 - (m + len(data.lines.rest) + m / data.entries) / lines
     half = max(5, lines // 40)
@@ -190,15 +187,12 @@ def _twins(data: Data, current: PoleFit) -> tuple[int, int] | None:
 
 def weakness(data: Data, fit: PoleFit) -> np.ndarray:
     """(m,) above 1 where a mode is not established, 0 for the pole above the lines."""
-    return np.where(data.is_above(fit.poles), 0.0, doubt(data, fit, scales(data, fit)))
+    return np.where(data.is_above(fit.poles), 0.0, doubt(data, fit))
 
 
-def doubt(data: Data, fit: PoleFit, scale: np.ndarray) -> np.ndarray:
-    """(m,) above 1 where a mode is not established: no fall of χ², blurred, or too damped.
-
-    `scale` (m,) of the poles' variance.
-    """
-    poles, m = fit.poles, fit.poles.size
+def doubt(data: Data, fit: PoleFit) -> np.ndarray:
+    """(m,) above 1 where a mode is not established: no fall of χ², blurred, or too damped."""
+    poles, m, scale = fit.poles, fit.poles.size, scales(data, fit)
     # How the sets differ does not blur a mode: each has a pole of its own.
     sd = np.sqrt(np.maximum(np.diag(fit.covariance) - fit.spread / len(fit.own), 0.0))
     decay = np.maximum(data.rate_1_s - poles.real, 1e-12 * np.abs(poles))

@@ -22,14 +22,14 @@ FAR, FAR_HALVES, REACH = 4.0, 2.0, 4.0
 FINE = (0.2, 0.06, 0.02)  # half bandwidths: steps of the refinement
 
 
-def reestimated_sets(given: SetData, fit: PoleFit, variance: np.ndarray) -> np.ndarray | None:
+def reestimated_sets(given: SetData, fit: PoleFit) -> np.ndarray | None:
     """Poles (k, m) of all sets, those of badly fitted sets as found anew; None where none are."""
     shares = _participation(given, fit)[given.columns]
-    off = _off(given, fit, variance) | _apart(given, fit, shares)
+    off = _off(given, fit) | _apart(given, fit, shares)
     own, moved = fit.own.copy(), False
     for modes in _together(given.data, fit):
         for s in np.flatnonzero(off[:, modes].any(axis=1)):
-            found = _Neighbourhood.of(given, fit, variance, shares, int(s), modes).best()
+            found = _Neighbourhood.of(given, fit, shares, int(s), modes).best()
             if found is not None:
                 own[s, modes] = found
                 moved = True
@@ -77,9 +77,9 @@ def _together(data: Data, fit: PoleFit) -> list[np.ndarray]:
     return [np.array(group) for group in groups]
 
 
-def _off(given: SetData, fit: PoleFit, variance: np.ndarray) -> np.ndarray:
+def _off(given: SetData, fit: PoleFit) -> np.ndarray:
     """(k, m) bool: sets whose error around a mode is half as much again as that of the usual."""
-    square = np.abs(fit.error) ** 2 / variance
+    square = np.abs(fit.error) ** 2 / fit.variance
     off = np.zeros((len(given.sets), fit.poles.size), bool)
     for j in range(fit.poles.size):
         lines = _near(given.data, fit, j)
@@ -129,9 +129,8 @@ class _Neighbourhood:
 
     @classmethod
     def of(
-        cls, given: SetData, fit: PoleFit, variance: np.ndarray, shares: np.ndarray, s: int,
-        modes: np.ndarray,
-    ) -> "_Neighbourhood":  # fmt: skip
+        cls, given: SetData, fit: PoleFit, shares: np.ndarray, s: int, modes: np.ndarray
+    ) -> "_Neighbourhood":
         """Of set s around some modes (indices), which take part in all entries by shares (e, m)."""
         data, entries = given.data, given.sets[s]
         chosen = np.flatnonzero(np.any([_near(data, fit, j) for j in modes], axis=0))
@@ -140,7 +139,7 @@ class _Neighbourhood:
         residue, own = fit.residue[np.ix_(entries, others)], fit.own[s, others]
         response = data.rows[np.ix_(entries, chosen)] - residue @ unit(lines, own)
         response = response - residue.conj() @ unit(lines, own.conj())
-        variance = variance[np.ix_(entries, chosen)]
+        variance = fit.variance[np.ix_(entries, chosen)]
         # In any case a pole may move by half its bandwidth.
         spread = np.maximum(fit.spread[fit.poles.size + modes], common.real**2)
         profile = np.sqrt(variance[0, 0] / variance[0])

@@ -74,9 +74,7 @@ def _in_most(local: SetData, less: PoleFit, more: PoleFit) -> bool:
     return bool(np.median(each) > APART)
 
 
-def merged_modes(
-    given: SetData, fit: PoleFit, variance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def merged_modes(given: SetData, fit: PoleFit) -> tuple[np.ndarray, np.ndarray]:
     """Poles (m,) and those of every set (k, m), with those made one that are one mode.
 
     What one pole for all sets cannot follow, several poles near it imitate; they excite and are
@@ -87,7 +85,7 @@ def merged_modes(
     for group in _groups(given, fit, order):
         pairs = [group[k : k + 2] for k in range(len(group) - 1)] if len(group) > 2 else []
         for tried in (group, *pairs):
-            one = _as_one(given, fit, variance, tried)
+            one = _as_one(given, fit, tried)
             if one is not None:
                 poles[tried[0]], own[:, tried[0]] = one
                 kept[tried[1:]] = False
@@ -114,14 +112,12 @@ def _alike(given: SetData, fit: PoleFit, first: int, second: int) -> bool:
     return bool(np.abs(np.vdot(*vectors)) ** 2 > ALIKE)
 
 
-def _as_one(
-    given: SetData, fit: PoleFit, variance: np.ndarray, group: np.ndarray
-) -> tuple[complex, np.ndarray] | None:
+def _as_one(given: SetData, fit: PoleFit, group: np.ndarray) -> tuple[complex, np.ndarray] | None:
     """Common pole and the sets' own of one mode instead of a group; None if that is worse."""
     share = fit.significance[group] / np.sum(fit.significance[group])
     middle = complex(np.sum(share * fit.poles[group]))
     local, lines, near = around(given, fit, middle)
-    variance = variance[:, lines]
+    variance = fit.variance[:, lines]
     if not np.all(near[group]):
         return None
     start = fit.own[:, group] @ share
@@ -134,7 +130,7 @@ def _as_one(
         more = fit_sets(local, variance, fit.poles[near], known=fit.own[:, near])
         if explains(local, one, more, APART):
             # Where it is one mode, only sets that fitted it badly are explained better by two.
-            found = reestimated_sets(local, one, variance)
+            found = reestimated_sets(local, one)
             if _in_most(local, one, more) or found is None:
                 return None
             one = fit_sets(local, variance, one.poles, MERGED_ROUNDS, found)
