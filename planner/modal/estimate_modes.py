@@ -67,7 +67,7 @@ def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndar
     Linearised where all lines have them: poles that a part does not hold would stray in a fit, to
     where their variance is that of another place.
     """
-    sets = WeightedSets.of(data.lines.part(part), data.rows[:, part], fitted.variance[:, part])
+    sets = WeightedSets.of(data.lines.part(part), data.values[:, part], fitted.variance[:, part])
     point = reduced_together(sets, fitted.poles)
     unit = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
     turned = np.outer(unit, unit)
@@ -118,7 +118,7 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
     m = fitted.poles.size
     scale = scales(data, fitted)
     weak = weakness(data, fitted)
-    errors = data.force_errors((data.rows - fitted.error).reshape(data.response.shape))
+    errors = data.force_errors((data.values - fitted.error).reshape(data.response.shape))
     shared_pole, shared_residue = shared_error(data, fitted, errors)
     if data.step_s is None:
         scale = scale * inflation(data, fitted, shared_pole)

@@ -37,13 +37,13 @@ class WeightedSets:
         lines: Lines,
         response: np.ndarray,
         variance: np.ndarray,
-        sets: tuple[np.ndarray, ...] | None = None,
+        sets: tuple[np.ndarray, ...] = (),
     ) -> "WeightedSets":
         """From responses and variance (entries, F), in each set a level times a profile.
 
         Without `sets` all entries are one, or one each where their profiles differ.
         """
-        if sets is None:
+        if not sets:
             every = np.arange(len(response))
             sets = (every,) if proportional(variance) else tuple(every[:, None])
         entries = np.full((len(sets), max(map(len, sets))), -1)

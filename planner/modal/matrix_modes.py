@@ -67,7 +67,7 @@ def modes_of_matrix(
 def _put_right(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> MatrixPoles:
     """With residues of turned points as they should be; odd ones count for nothing."""
     roved, stayed = matrix.roved.responses, matrix.roved.references
-    named = [(roved[r], stayed[c]) for r, c in zip(found.rows, found.columns, strict=True)]
+    named = [(roved[r], stayed[c]) for r, c in zip(found.data.row, found.data.column, strict=True)]
     turned = [(r in checks.turned_rows) != (s in checks.turned) for r, s in named]
     sign = np.where(turned, -1.0, 1.0)[:, None]
     # A residue that does not fit the others counts with so many times its variance.

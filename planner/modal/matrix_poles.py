@@ -23,7 +23,6 @@ from planner.modal.pole_fit import (
     ROUNDS,
     DivergedPolesError,
     PoleFit,
-    SetData,
     fit_sets,
     refine,
 )
@@ -46,19 +45,16 @@ SETTLING = 2  # rounds of a fit that has been fitted before, to other lines or b
 
 @dataclass(frozen=True, eq=False)
 class MatrixPoles:
-    """Poles common to all FRFs and what they came from; entries by `rows` and `columns`.
+    """Poles common to all FRFs and what they came from.
 
-    Rows are the points of the longer side (which roved), `hit` or felt; columns those that stayed.
-
-    `fit.residue` (e, m) of each entry; `scale` (m,) by which noise around a mode exceeds its
+    Rows of `data` are the points of the longer side (which roved), `hit` or felt; columns those
+    that stayed. `scale` (m,) by which noise around a mode exceeds its
     variance; `weak` (m,) as `mode_selection.weakness`, `presence` (m,) share of the response.
     """
 
     data: Data
     fit: PoleFit
     diagram: Diagram
-    rows: np.ndarray
-    columns: np.ndarray
     scale: np.ndarray
     weak: np.ndarray
     presence: np.ndarray
@@ -67,7 +63,8 @@ class MatrixPoles:
     @property
     def places(self) -> tuple[np.ndarray, np.ndarray]:
         """Response and reference (indices) of each entry."""
-        return (self.columns, self.rows) if self.hit else (self.rows, self.columns)
+        row, column = self.data.row, self.data.column
+        return (column, row) if self.hit else (row, column)
 
     def shape(
         self, k: int, entries: Entries, gain: float = 0.0, near: np.ndarray | None = None
@@ -97,7 +94,13 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     rows, columns = np.nonzero(matrix.measured)
     response = matrix.accelerance[rows, columns][:, None, chosen]
     rate = matrix.exponential_rate_1_s
-    data = Data(f[chosen], response, None, rate, tail_s=matrix.tail_s, near=True, above=True)
+    # Entries measured together: those of one node of the side that roved
+    nodes = np.array([matrix.responses[k].node for k in rows])
+    sets = tuple(np.flatnonzero(nodes == node) for node in dict.fromkeys(nodes.tolist()))
+    data = Data(
+        f[chosen], response, None, rate, tail_s=matrix.tail_s, near=True, above=True, sets=sets,
+        row=rows, column=columns,
+    )  # fmt: skip
     # A record cut off while it rings leaves ripples, which polynomials take for poles.
     smooth = matrix.ended or matrix
     found = _diagram(smooth, chosen)
@@ -105,14 +108,11 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     if not start.size:
         return None
     start = data.with_one_above(start)
-    # Entries measured together: those of one node of the side that roved
-    nodes = np.array([matrix.responses[k].node for k in rows])
-    sets = tuple(np.flatnonzero(nodes == node) for node in dict.fromkeys(nodes.tolist()))
-    fit = select_modes(SetData(data, sets, rows, columns), start)
+    fit = select_modes(data, start)
     if not fit.poles.size:
         return None
     told = scales(data, fit), doubt(data, fit), presences(data, fit.poles, fit.residue)
-    return MatrixPoles(data, fit, found, rows, columns, *told, hit)
+    return MatrixPoles(data, fit, found, *told, hit)
 
 
 def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> Diagram:
@@ -147,49 +147,48 @@ def _references(measured: np.ndarray) -> np.ndarray:
     return np.array(best)
 
 
-def select_modes(given: SetData, poles: np.ndarray) -> PoleFit:
+def select_modes(data: Data, poles: np.ndarray) -> PoleFit:
     """Fit with every set's own poles, weak modes left out and missing ones added."""
-    data = given.data
     # At first all entries share poles that stay as they are: poles that were refined so would leave
     # weak modes to imitate how strong ones drift.
-    together = replace(given, sets=(np.arange(data.entries),))
+    together = replace(data, sets=(np.arange(data.entries),))
     begun = scatter(data, fit_sets(together, first_variance(data), poles, rounds=0), alike=True)
-    fit = _fit(given, begun, poles, rounds=0)
+    fit = _fit(data, begun, poles, rounds=0)
     # Rough rounds of the first fit, whose weights do not know yet how sets differ
-    fit = _fit(given, begun, fit.poles, fit.own, 2)
+    fit = _fit(data, begun, fit.poles, fit.own, 2)
     searched = False
     # Passes of leaving out and adding
     for _ in range(4):
         # Not before: sets would be moved to where they imitate the modes that a fit lacks.
-        fit = _settled(given, fit) if searched else fit
+        fit = _settled(data, fit) if searched else fit
         present = presences(data, fit.poles, fit.residue) >= PRESENT
         # Poles above the last line stand for all modes there.
         left = fit.part(data.is_above(fit.poles) | (doubt(data, fit) <= 1) & present)
-        poles, own = merged_modes(given, left)
+        poles, own = merged_modes(data, left)
         # What a fit lacks is looked for where it has no mode too many.
         if poles.size == fit.poles.size:
             if searched:
                 break
-            added, searched = _missing(given, fit), True
+            added, searched = _missing(data, fit), True
             poles = np.append(poles, added)
             own = np.column_stack([own, np.tile(added, (len(own), 1))])
             if not added.size:
                 continue
         if not poles.size:
             return left
-        fit = _fit(given, fit.variance, poles, own)
-    fit = _settled(given, fit)
-    return _fit(given, fit.variance, fit.poles, fit.own, SETTLING, every=True)
+        fit = _fit(data, fit.variance, poles, own)
+    fit = _settled(data, fit)
+    return _fit(data, fit.variance, fit.poles, fit.own, SETTLING, every=True)
 
 
-def _settled(given: SetData, fit: PoleFit) -> PoleFit:
+def _settled(data: Data, fit: PoleFit) -> PoleFit:
     """The fit after those sets have been searched again that fit badly."""
-    own = reestimated_sets(given, fit)
-    return fit if own is None else _fit(given, fit.variance, fit.poles, own, SETTLING)
+    own = reestimated_sets(data, fit)
+    return fit if own is None else _fit(data, fit.variance, fit.poles, own, SETTLING)
 
 
 def _fit(
-    given: SetData, variance: np.ndarray, poles: np.ndarray, known: np.ndarray | None = None,
+    data: Data, variance: np.ndarray, poles: np.ndarray, known: np.ndarray | None = None,
     rounds: int = ROUNDS, every: bool = False,
 ) -> PoleFit:  # fmt: skip
     """Fit on thinned lines (or `every` one near a mode); poles that stray are left out.
@@ -198,18 +197,17 @@ def _fit(
     """
     while True:
         try:
-            lines = thinned(given.data, poles, every)
-            found = fit_sets(given, variance, poles, rounds, known, lines)
+            lines = thinned(data, poles, every)
+            found = fit_sets(data, variance, poles, rounds, known, lines)
         except DivergedPolesError as error:
             poles, known = poles[~error.astray], None
         else:
-            found = replace(found, variance=scatter(given.data, found, alike=True))
-            return replace(found, excess=excess(given.data, found))
+            found = replace(found, variance=scatter(data, found, alike=True))
+            return replace(found, excess=excess(data, found))
 
 
-def _missing(given: SetData, fit: PoleFit) -> np.ndarray:
+def _missing(data: Data, fit: PoleFit) -> np.ndarray:
     """Poles that the error still tells of, each tried on the lines around it."""
-    data = given.data
     added: list[complex] = []
     weight = 2 / fit.variance / fit.excess
     poles, fall = falls(data, weight, weight * fit.error)
@@ -222,7 +220,7 @@ def _missing(given: SetData, fit: PoleFit) -> np.ndarray:
         if fall[best] <= data.threshold or failed == 2:
             break
         pole = complex(poles[best])
-        found = _tried(given, fit, pole)
+        found = _tried(data, fit, pole)
         fall[np.abs(poles - pole) < REACH * abs(pole.real)] = 0.0
         if found is not None and any(abs(found - p) < abs(p.real) for p in added):
             found = None
@@ -233,10 +231,10 @@ def _missing(given: SetData, fit: PoleFit) -> np.ndarray:
     return np.array(added, complex)
 
 
-def _tried(given: SetData, fit: PoleFit, pole: complex) -> complex | None:
+def _tried(data: Data, fit: PoleFit, pole: complex) -> complex | None:
     """The pole after a fit of the lines around it, where it is a mode; None where it is not."""
-    some, lines, near = around(given, fit, pole)
-    local, variance = some.data, fit.variance[:, lines]
+    local, lines, near = around(data, fit, pole)
+    variance = fit.variance[:, lines]
     start = np.append(fit.poles[near], pole)
     quick = refine(local, variance, start)
     if presences(local, quick.poles, quick.residue)[-1] < PRESENT_ADDED / 2:
@@ -245,13 +243,13 @@ def _tried(given: SetData, fit: PoleFit, pole: complex) -> complex | None:
     own = np.column_stack([known, np.full(len(known), quick.poles[-1])])
     start = np.append(fit.poles[near], quick.poles[-1])
     try:
-        after = fit_sets(some, variance, start, known=own)
+        after = fit_sets(local, variance, start, known=own)
         new = after.poles[-1]
         inside = local.frequency_hz[0] < new.imag / (2 * np.pi) < local.frequency_hz[-1]
         present = presences(local, after.poles, after.residue)[-1]
         if not (inside and present >= PRESENT_ADDED and -new.real < DAMPING_ADDED * abs(new)):
             return None
-        before = fit_sets(some, variance, fit.poles[near], SETTLING, known)
+        before = fit_sets(local, variance, fit.poles[near], SETTLING, known)
     except DivergedPolesError:
         return None
-    return complex(new) if explains(some, before, after) else None
+    return complex(new) if explains(local, before, after) else None

@@ -104,8 +104,8 @@ def first_variance(data: Data) -> np.ndarray:
     """(e, F) known variance, or the power of each response."""
     if data.variance is not None:
         return data.variance.reshape(data.entries, -1)
-    power = np.mean(np.abs(data.rows) ** 2, axis=-1, keepdims=True)
-    return np.broadcast_to(power, data.rows.shape)
+    power = np.mean(np.abs(data.values) ** 2, axis=-1, keepdims=True)
+    return np.broadcast_to(power, data.values.shape)
 
 
 def scatter(data: Data, fit: PoleFit, alike: bool = False) -> np.ndarray:
@@ -220,7 +220,7 @@ def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:
 
 def strongest(data: Data) -> np.ndarray:
     """(0 or 1,) pole of the atom that explains most of the responses, alone."""
-    found = _best_atom(data, first_variance(data), data.rows)
+    found = _best_atom(data, first_variance(data), data.values)
     return np.array([] if found is None else [found], complex)
 
 
@@ -243,5 +243,5 @@ def presences(data: Data, poles: np.ndarray, residue: np.ndarray) -> np.ndarray:
     """
     lines = [int(np.argmin(np.abs(data.frequency_hz - p.imag / (2 * np.pi)))) for p in poles]
     ones = unit(data.lines, data.to_plane(poles))[np.arange(poles.size), lines]
-    whole = np.linalg.norm(data.rows[:, np.array(lines, int)], axis=0)
+    whole = np.linalg.norm(data.values[:, np.array(lines, int)], axis=0)
     return np.linalg.norm(residue * ones, axis=0) / np.maximum(whole, 1e-300)

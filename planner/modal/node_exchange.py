@@ -39,7 +39,7 @@ class RovingSides:
         """From residues of the modes (indices)."""
         values, side = found.fit.residue[:, modes] * 2j * found.fit.poles[modes].imag, matrix.roved
         table = np.full((*side.measured.shape, modes.size), np.nan + 0j)
-        table[found.rows, found.columns] = values
+        table[found.data.row, found.data.column] = values
         return cls(side.responses, side.references, table, matrix.hit, side.driving)
 
     @cached_property

@@ -43,25 +43,6 @@ class DivergedPolesError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class SetData:
-    """What is fitted, responses (e, 1, F), and the entries (indices) of each set.
-
-    `rows` and `columns` (e,) of each entry, columns being those of the few references.
-    """
-
-    data: Data
-    sets: tuple[np.ndarray, ...]
-    rows: np.ndarray
-    columns: np.ndarray
-
-    def table(self, values: np.ndarray) -> np.ndarray:
-        """(r, c, …) of values (e, …), 0 where nothing was measured."""
-        out = np.zeros((self.rows.max() + 1, self.columns.max() + 1, *values.shape[1:]), complex)
-        out[self.rows, self.columns] = values
-        return out
-
-
-@dataclass(frozen=True, eq=False)
 class PoleFit:
     """Common poles (m,) in rad/s and those of every set (k, m), with coefficients of all entries.
 
@@ -117,7 +98,7 @@ def refine(data: Data, variance: np.ndarray, start: np.ndarray) -> PoleFit:
 
     From `start` (m,) in rad/s, m ≥ 1; a step to poles that are not allowed is shortened.
     """
-    sets = WeightedSets.of(data.lines, data.rows, variance)
+    sets = WeightedSets.of(data.lines, data.values, variance)
     poles = data.to_plane(np.asarray(start, complex))
     point, damping = reduced_together(sets, poles), DAMPING
     # Damped Gauss-Newton steps (Levenberg-Marquardt)
@@ -169,7 +150,7 @@ def shared_error(data: Data, fit: PoleFit, errors: np.ndarray) -> tuple[np.ndarr
     m, count = fit.poles.size, data.entries
     if not len(errors):
         return np.zeros((2 * m, 2 * m)), np.zeros((count, m))
-    sets = WeightedSets.of(data.lines, data.rows, fit.variance)
+    sets = WeightedSets.of(data.lines, data.values, fit.variance)
     point, p = reduced_together(sets, fit.poles), fit.coefficients.shape[1]
     inverse = (point.inverse[:, None] / sets.weight[..., None, None]).reshape(-1, p, p)
     sensitivity = point.sensitivity.reshape(-1, p, 2 * m)
@@ -190,21 +171,20 @@ def of_each(square: np.ndarray, m: int) -> np.ndarray:
 
 
 def fit_sets(
-    given: SetData, variance: np.ndarray, start: np.ndarray, rounds: int = ROUNDS,
+    data: Data, variance: np.ndarray, start: np.ndarray, rounds: int = ROUNDS,
     known: np.ndarray | None = None, lines: np.ndarray | None = None,
 ) -> PoleFit:  # fmt: skip
-    """Fit from common poles `start` (m,) in rad/s, with variance (e, F).
+    """Fit sets from common poles `start` (m,) in rad/s, with variance (e, F).
 
     `known` (k, m) are the sets' own poles to go on from; only some `lines` (indices) are fitted,
     where stated. Raises DivergedPolesError where the data do not hold the poles.
     """
-    m, data, sets = start.size, given.data, given.sets
-    common = stack(start)
-    own = np.tile(common, (len(sets), 1)) if known is None else stack(known)
+    m, common = start.size, stack(start)
+    own = np.tile(common, (len(data.sets), 1)) if known is None else stack(known)
     spread, covariance = np.zeros(2 * m), np.zeros((2 * m, 2 * m))
     chosen = slice(None) if lines is None else lines
-    some = data.lines.part(chosen), data.rows[:, chosen], variance[:, chosen]
-    part = WeightedSets.of(*some, sets)
+    some = data.lines.part(chosen), data.values[:, chosen], variance[:, chosen]
+    part = WeightedSets.of(*some, data.sets)
     for _ in range(rounds):
         point = reduced(part, complex_of(own))
         spread = _spread(point, own, common)
@@ -306,7 +286,7 @@ def _finish(
     poles, m = complex_of(own), common.size // 2
     point = reduced(sets, poles)
     coefficients = np.zeros((data.entries, point.coefficients.shape[-1]))
-    error, every = data.rows.copy(), np.broadcast_to(poles, (len(sets.entries), m))
+    error, every = data.values.copy(), np.broadcast_to(poles, (len(sets.entries), m))
     for chosen, found, pole in zip(sets.entries, point.coefficients, every, strict=True):
         there = chosen[chosen >= 0]
         coefficients[there] = found[: there.size]

@@ -146,7 +146,7 @@ class _ShapeProblem:
         alone = np.all(apart > wide / 2, axis=1)
         alone &= np.abs(poles) < 2 * np.pi * data.frequency_hz[-1]
         alone &= count > entries.points  # or nothing would tie the points
-        return cls(data, data.rows, 2 / fit.variance, entries, poles.size, np.flatnonzero(alone))
+        return cls(data, data.values, 2 / fit.variance, entries, poles.size, np.flatnonzero(alone))
 
     @cached_property
     def left(self) -> np.ndarray:

@@ -86,7 +86,7 @@ def driving_figure(matrix: FrfMatrix, found: MatrixModes) -> Figure:
     data, (felt, hit) = found.found.data, found.found.places
     for panel, (o, i) in zip(grid[:, 0], pairs, strict=True):
         measured, (entry,) = matrix.accelerance[o, i], np.flatnonzero((felt == o) & (hit == i))
-        fitted = data.rows[entry] - found.found.fit.error[entry]
+        fitted = data.values[entry] - found.found.fit.error[entry]
         magnitude(panel, matrix.frequency_hz, measured, color=MEASURED, lw=1.0, label="measured")
         magnitude(panel, data.frequency_hz, fitted, color=MODEL, lw=1.0, label="fit")
         panel.set_xlim(data.frequency_hz[0], data.frequency_hz[-1])

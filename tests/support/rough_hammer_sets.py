@@ -277,9 +277,9 @@ def spoiled(
     spoiled matrix is what was found, spoiled.
     """
     table = np.full((*sign.shape, found.fit.coefficients.shape[1]), np.nan)
-    table[found.rows, found.columns] = found.fit.coefficients
+    table[found.data.row, found.data.column] = found.fit.coefficients
     table = table[order] * sign[..., None]
     matrix = replace(case.matrix, accelerance=case.matrix.accelerance[order] * sign[..., None])
     rows, columns = np.nonzero(matrix.measured)
     fit = replace(found.fit, coefficients=table[rows, columns])
-    return matrix, replace(found, rows=rows, columns=columns, fit=fit)
+    return matrix, replace(found, data=replace(found.data, row=rows, column=columns), fit=fit)
