@@ -118,8 +118,7 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
     m = fitted.poles.size
     scale = scales(data, fitted)
     weak = weakness(data, fitted)
-    errors = data.force_errors((data.values - fitted.error).reshape(data.response.shape))
-    shared_pole, shared_residue = shared_error(data, fitted, errors)
+    shared_pole, shared_residue = shared_error(data, fitted)
     if data.step_s is None:
         scale = scale * inflation(data, fitted, shared_pole)
     present = presences(data, fitted.poles, fitted.residue)

@@ -89,17 +89,16 @@ class Data:
         return float(lines / np.tanh(lines)) if lines > 1e-6 else 1.0
 
     def force_errors(self, response: np.ndarray) -> np.ndarray:
-        """What noise of the force adds to responses (outputs, inputs, F), one sd of each source.
+        """What noise of the force adds to responses (e, F), one sd of each source.
 
         Returns (n, e, F): white noise of the window is a sum of independent pulses,
         as many as tell its spectra apart in the band, each of which scales one input's column.
         """
-        if self.force_share is None:
-            return np.zeros((0, *self.values.shape), complex)
+        assert self.force_share is not None
         count = int(np.ceil(2 * self.force_window_s * self.frequency_hz[-1])) + 4
         times = self.force_window_s * ((np.arange(count) + 0.5) / count - 0.5)
         pulses = np.exp(-2j * np.pi * times[:, None] * self.frequency_hz) / np.sqrt(count)
-        inputs = response.shape[1]
+        response, inputs = response.reshape(self.response.shape), self.response.shape[1]
         errors = np.zeros((inputs, count, *response.shape), complex)
         for j, share in enumerate(self.force_share):
             scale = np.sqrt(share) * pulses

@@ -140,16 +140,16 @@ def _in_rad_s(data: Data, found: PoleFit, step_s: float) -> PoleFit:
     return replace(found, poles=poles, own=poles[None], covariance=covariance)
 
 
-def shared_error(data: Data, fit: PoleFit, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Covariance of poles (2m, 2m) and variance of residues that errors common to lines add.
+def shared_error(data: Data, fit: PoleFit) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance of poles (2m, 2m) and variance of residues that the force's noise adds.
 
-    Of a fit by `refine` in the s-plane. errors (n, e, F): what each of n independent sources, at
-    one standard deviation, adds to the response. The residues' variance (e, m) is that of real and
-    imaginary part each.
+    Of a fit by `refine` in the s-plane. The residues' variance (e, m) is that of real and imaginary
+    part each.
     """
-    m, count = fit.poles.size, data.entries
-    if not len(errors):
-        return np.zeros((2 * m, 2 * m)), np.zeros((count, m))
+    m = fit.poles.size
+    if data.force_share is None:
+        return np.zeros((2 * m, 2 * m)), np.zeros((data.entries, m))
+    errors = data.force_errors(data.values - fit.error)
     sets = WeightedSets.of(data.lines, data.values, fit.variance)
     point, p = reduced_together(sets, fit.poles), fit.coefficients.shape[1]
     inverse = (point.inverse[:, None] / sets.weight[..., None, None]).reshape(-1, p, p)
