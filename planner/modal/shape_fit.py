@@ -125,14 +125,13 @@ class _ShapePoint:
 
 @dataclass(frozen=True, eq=False)
 class _ShapeProblem:
-    """Responses and weights 2/variance (e, F); `shaped` are the modes that have one shape each.
+    """Weights 2/variance (e, F) of the responses; `shaped` are the modes that have one shape each.
 
     Values: Re and Im of the poles, Re φ and Im φ mode by mode, then entry by entry the coefficients
     that are `left` free: residues of other modes, out-of-band terms.
     """
 
     data: Data
-    response: np.ndarray
     weight: np.ndarray
     entries: Entries
     modes: int
@@ -146,7 +145,7 @@ class _ShapeProblem:
         alone = np.all(apart > wide / 2, axis=1)
         alone &= np.abs(poles) < 2 * np.pi * data.frequency_hz[-1]
         alone &= count > entries.points  # or nothing would tie the points
-        return cls(data, data.values, 2 / fit.variance, entries, poles.size, np.flatnonzero(alone))
+        return cls(data, 2 / fit.variance, entries, poles.size, np.flatnonzero(alone))
 
     @cached_property
     def left(self) -> np.ndarray:
@@ -162,7 +161,7 @@ class _ShapeProblem:
     @property
     def size(self) -> int:
         """Number of all values."""
-        return self.end + self.left.size * len(self.response)
+        return self.end + self.left.size * len(self.weight)
 
     def poles(self, values: np.ndarray) -> np.ndarray:
         """(m,) in rad/s."""
@@ -176,7 +175,7 @@ class _ShapeProblem:
     def coefficients(self, values: np.ndarray) -> np.ndarray:
         """(e, c) of all modes."""
         shape, e, m = self._shapes(values), self.entries, self.modes
-        out = np.zeros((len(self.response), self.left.size + 2 * self.shaped.size))
+        out = np.zeros((len(self.weight), self.left.size + 2 * self.shaped.size))
         out[:, self.left] = values[self.end :].reshape(len(out), -1)
         residue = -1j * (shape[:, e.rows] * shape[:, e.columns]).T
         out[:, self.shaped], out[:, m + self.shaped] = residue.real, residue.imag
@@ -202,7 +201,7 @@ class _ShapeProblem:
         normal, gradient, square = np.zeros((size, size)), np.zeros(size), 0.0
         for e, (c, w) in enumerate(zip(own, self.weight, strict=True)):
             part = np.concatenate([slope_turn(c, m).T @ slope, columns])
-            off = self.response[e] - c @ columns
+            off = self.data.values[e] - c @ columns
             index = np.r_[: 2 * m, 2 * m + e * each : 2 * m + (e + 1) * each]
             weighted = part.conj() * w
             normal[np.ix_(index, index)] += (weighted @ part.T).real
@@ -213,7 +212,7 @@ class _ShapeProblem:
 
     def tangent(self, values: np.ndarray) -> np.ndarray:
         """(2m + e·c, u) change of poles and all coefficients with the values."""
-        m, e, count = self.modes, self.entries, len(self.response)
+        m, e, count = self.modes, self.entries, len(self.weight)
         index, each = np.arange(count), self.left.size + 2 * self.shaped.size
         out = np.zeros((2 * m + count * each, self.size))
         out[: 2 * m, : 2 * m] = np.eye(2 * m)
@@ -269,7 +268,7 @@ class _ShapeProblem:
 
         Out-of-band terms, each and all of their phases; then mode by mode the phases.
         """
-        own = self.end + np.arange(self.size - self.end).reshape(len(self.response), -1)
+        own = self.end + np.arange(self.size - self.end).reshape(len(self.weight), -1)
         terms = len(self.data.lines.rest)
         real, imag = own[:, -2 * terms : -terms], own[:, -terms:]
         found = [np.r_[real[:, k], imag[:, k]] for k in range(terms)]
