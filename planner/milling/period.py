@@ -102,7 +102,7 @@ def period(
 
 
 def _points(found: Engagement, cut: Cut, speed: float, degree: int, depth_m: float) -> _Points:
-    nodes = lobatto(degree).nodes
+    nodes, *_ = lobatto(degree)
     parts: list[tuple[np.ndarray, ...]] = []
     number = -1
     for e, teeth in enumerate(found.teeth):
@@ -146,7 +146,7 @@ def _build(
     to_end = np.exp(modes.poles[:, None] * (duration - end[points.element])) * whole
     over = seen * np.exp(modes.poles[:, None] * points.time)
     first, together = _joined(points.shared)
-    whole_rule = lobatto(degree).values[-1].sum(axis=0)
+    whole_rule = lobatto(degree)[2][-1].sum(axis=0)
     e = np.exp(modes.poles * duration)  # of states as real and imaginary parts
     return Period(
         duration_s=float(duration),
@@ -164,10 +164,10 @@ def _build(
 
 def _integrals(poles: np.ndarray, length_s: np.ndarray, degree: int) -> np.ndarray:
     """(k, e, i, j): state at point i of an element from the polynomial of point j."""
-    rule = lobatto(degree)
-    span = rule.nodes * length_s[:, None]  # (e, i)
-    decay = np.exp(poles[:, None, None, None] * span[..., None] * (1 - rule.points))
-    return np.einsum("keiq,iqj->keij", decay, rule.values) * span[None, ..., None]
+    nodes, points, values = lobatto(degree)
+    span = nodes * length_s[:, None]  # (e, i)
+    decay = np.exp(poles[:, None, None, None] * span[..., None] * (1 - points))
+    return np.einsum("keiq,iqj->keij", decay, values) * span[None, ..., None]
 
 
 def _joined(shared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -190,7 +190,7 @@ def _uneven(
     before = np.zeros_like(now)
     angle, element = points.angle[first], points.element[first]
     delay = cut.pitches_rad  # to the tooth ahead, which cut before
-    nodes = lobatto(degree).nodes
+    nodes, *_ = lobatto(degree)
     for p in range(0, len(first), 2):
         for tooth in found.teeth[element[p]]:
             matrix = each_tooth(cut, tooth, angle[p : p + 1] + found.offset, depth_m)[0]

@@ -295,7 +295,7 @@ def _finish(
     # hardly depends on what is common.
     held = _held(point, spread)
     total = held * spread + held @ covariance @ held.transpose(0, 2, 1)
-    change = point.turned[:, None, : 2 * m] @ slope_turn(point.coefficients, m)
+    change = point.sensitivity[:, :, : 2 * m]
     spent = np.sum((change @ total[:, None]) * change, axis=-1)
     alone = np.einsum("kcc->kc", point.inverse)[:, None, : 2 * m]
     # Of rounding, where lines without noise leave curvatures almost singular, variances below 0
