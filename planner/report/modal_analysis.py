@@ -13,8 +13,8 @@ from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.diagnosis.exponential_window import screen_window
 from planner.errors import InputError, RefusedError, RefusedFile
-from planner.frf.exported import joined
 from planner.frf.frf import Frf
+from planner.frf.matrix import joined
 from planner.frf.quantities import DERIVATIVE
 from planner.modal.estimate_modes import PoleIdentification, identification
 from planner.modal.matrix_modes import modes_of_matrix, with_normal_modes

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.errors import InputError, RefusedError
-from planner.frf.exported import from_records, labelled_frfs
-from planner.frf.matrix import matrix_of
+from planner.frf.matrix import from_records, labelled_frfs, matrix_of
 from planner.frf.quantities import DERIVATIVE, convert
 from planner.milling import cutter_frf, tip_files
 from planner.milling.tool import Point, Tool

@@ -8,7 +8,7 @@ import pytest
 
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
-from planner.frf.exported import from_records
+from planner.frf.matrix import from_records
 from planner.recording.records import End, FrfRecord, Hit
 from tests.support.simulated_hits import RATE_HZ, exact_accelerance, make_hit
 
