@@ -48,8 +48,8 @@ class MatrixPoles:
     """Poles common to all FRFs and what they came from.
 
     Rows of `data` are the points of the longer side (which roved), `hit` or felt; columns those
-    that stayed. `scale` (m,) by which noise around a mode exceeds its
-    variance; `weak` (m,) as `mode_selection.weakness`, `presence` (m,) share of the response.
+    that stayed. `scale` (m,) by which noise around a mode exceeds its variance; `weak` (m,) as
+    `mode_selection.doubt`, `presence` (m,) share of the response.
     """
 
     data: Data

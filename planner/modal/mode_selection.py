@@ -62,21 +62,18 @@ def _atoms(data: Data) -> list[np.ndarray]:
     return atoms
 
 
-MAX_ROUNDS = 12
+MOST_TRIED = 12  # modes beside those of the start
 MAX_DAMPING = 0.3
 # Neighbours closer than this (half bandwidths, share of frequency) and alike by MAC are one mode.
 TWIN_WIDTHS, TWIN_SHARE, TWIN_MAC = 1.5, 0.02, 0.95
 
 
-def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
-    """Fit from starting poles (m,), leaving out and adding modes until neither helps.
-
-    `rounds` is how many modes may be tried beside those of the start.
-    """
+def fit(data: Data, start: np.ndarray) -> PoleFit:
+    """Fit from starting poles (m,), leaving out and adding modes until neither helps."""
     current = _refine(data, start, None)
     current = _prune(data, current)
     tried: list[complex] = []
-    for _ in range(rounds):
+    for _ in range(MOST_TRIED):
         variance = current.variance * current.excess
         candidate = _best_atom(data, variance, current.error, tried)
         if candidate is None:

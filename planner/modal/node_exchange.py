@@ -53,11 +53,9 @@ class RovingSides:
         # Least complete: rows measured at all columns, that tell how the columns move
         if np.count_nonzero(complete) < 3:
             return None
-        _, count, modes = self.table.shape
-        columns = np.zeros((count, modes), complex)
-        for k in range(modes):
-            right = np.linalg.svd(self.table[complete, :, k], full_matrices=False)[2][0]
-            columns[:, k] = right * realign(right)
+        each = np.moveaxis(self.table[complete], -1, 0)
+        rights = np.linalg.svd(each, full_matrices=False)[2][:, 0]
+        columns = np.array([right * realign(right) for right in rights]).T
         there = np.isfinite(self.table)
         power = np.sum(there * np.abs(columns) ** 2, axis=1)
         along = np.sum(np.where(there, self.table, 0.0) * columns.conj(), axis=1)
