@@ -41,18 +41,15 @@ def _participation(data: Data, fit: PoleFit) -> np.ndarray:
 
     Most sets agree on it: rows count the less the worse they fit.
     """
-    table = data.table(fit.residue)
-    found = np.zeros(table.shape[1:], complex)
-    for k, each in enumerate(np.moveaxis(table, -1, 0)):
-        usual = float(np.median(np.linalg.norm(each, axis=1)))
-        weight, right = np.ones(len(each)), found[:, k]
-        # Robust rounds.
-        for _ in range(5):
-            right = np.linalg.svd(weight[:, None] * each, full_matrices=False)[2][0]
-            left = np.linalg.norm(each - np.outer(each @ right.conj(), right), axis=1)
-            weight = 1 / np.sqrt(left + 0.1 * usual + 1e-300)
-        found[:, k] = right
-    return found
+    tables = np.moveaxis(data.table(fit.residue), -1, 0)
+    usual = np.median(np.linalg.norm(tables, axis=2), axis=1, keepdims=True)
+    weight, right = np.ones(tables.shape[:2]), np.zeros(tables.shape[::2], complex)
+    # Robust rounds.
+    for _ in range(5):
+        right = np.linalg.svd(weight[..., None] * tables, full_matrices=False)[2][:, 0]
+        off = tables - (tables @ right[..., None].conj()) * right[:, None]
+        weight = 1 / np.sqrt(np.linalg.norm(off, axis=2) + 0.1 * usual + 1e-300)
+    return right.T
 
 
 def _reach(fit: PoleFit) -> np.ndarray:
@@ -92,13 +89,10 @@ def _off(data: Data, fit: PoleFit) -> np.ndarray:
 
 def _apart(data: Data, fit: PoleFit, theirs: np.ndarray) -> np.ndarray:
     """(k, m) bool: sets whose residues do not go with how the mode takes part (e, m)."""
-    rows = data.row
     weight = 1 / np.maximum(2 * fit.residue_variance, 1e-300)
-    shape = int(rows.max()) + 1, fit.poles.size
-    along, power = np.zeros(shape, complex), np.zeros(shape)
-    np.add.at(along, rows, weight * theirs.conj() * fit.residue)
-    np.add.at(power, rows, weight * np.abs(theirs) ** 2)
-    left = fit.residue - (along / np.maximum(power, 1e-300))[rows] * theirs
+    along = data.table(weight * theirs.conj() * fit.residue).sum(axis=1)
+    power = data.table(weight * np.abs(theirs) ** 2).sum(axis=1).real
+    left = fit.residue - (along / np.maximum(power, 1e-300))[data.row] * theirs
     square = weight * np.abs(left) ** 2
     apart = np.array([np.mean(square[chosen], axis=0) for chosen in data.sets])
     # Beyond so many times their variance, and what is usual.
