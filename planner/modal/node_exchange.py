@@ -171,9 +171,8 @@ def turning_helps(sides: RovingSides, turned: tuple[Dof, ...]) -> bool:
     """Whether columns and rows of the same points agree once turned columns are turned back."""
     if sides.motions is None or not turned:
         return False
-    shape, columns = sides.motions
+    (shape, columns), (rows, stayed) = sides.motions, np.array(sides.driving).T
     sign = np.array([-1.0 if dof in turned else 1.0 for dof in sides.columns])
-    rows, stayed = (list(each) for each in zip(*sides.driving, strict=True))
     return _misfit(shape, (sign[:, None] * columns)[stayed], rows) < FITS
 
 
@@ -181,15 +180,14 @@ def exchanged_by_columns(sides: RovingSides) -> Exchange | None:
     """Points that were exchanged, told by rows and columns of the same points."""
     if sides.motions is None or len(sides.driving) < 2:
         return None
-    shape, columns = sides.motions
-    rows, stayed = (list(each) for each in zip(*sides.driving, strict=True))
+    (shape, columns), (rows, stayed) = sides.motions, np.array(sides.driving).T
     weights = columns[stayed]
     stated = _misfit(shape, weights, rows)
     tried: dict[tuple[Dof, Dof], float] = {}
-    for row in rows:
+    for row in rows.tolist():
         for other, dof in enumerate(sides.rows):
             if other != row and dof.direction == sides.rows[row].direction:
-                places = [other if r == row else row if r == other else r for r in rows]
+                places = np.where(rows == row, other, np.where(rows == other, row, rows))
                 pair = sides.rows[min(row, other)], sides.rows[max(row, other)]
                 tried[pair] = _misfit(shape, weights, places)
     ranked = sorted(tried, key=lambda pair: tried[pair])
@@ -198,17 +196,15 @@ def exchanged_by_columns(sides: RovingSides) -> Exchange | None:
     if len(ranked) > 1 and tried[ranked[1]] < tried[ranked[0]] / BETTER:
         return None
     a, b = ranked[0]
-    pair = f"Nodes {a.node} and {b.node} ({a.direction})"
-    if a.direction != b.direction:
-        pair = f"The channels {a.at} and {b.at}"
     text = (
-        f"{pair} are probably swapped: as labelled, hitting and listening there differ by "
-        f"{100 * stated:.0f} %, swapped by {100 * tried[a, b]:.0f} %. Check the labels."
+        f"Nodes {a.node} and {b.node} ({a.direction}) are probably swapped: as labelled, hitting "
+        f"and listening there differ by {100 * stated:.0f} %, swapped by {100 * tried[a, b]:.0f} %."
+        " Check the labels."
     )
     return Exchange(text, frozenset((a, b)))
 
 
-def _misfit(shape: np.ndarray, columns: np.ndarray, rows: list[int]) -> float:
+def _misfit(shape: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> float:
     """Relative difference between how points move as columns and as rows, over all modes.
 
     The scale of each mode is free and positive up to a common phase: a shape of unit mass.
