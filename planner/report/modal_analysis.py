@@ -163,7 +163,7 @@ def _by_channel(
     records = [r for r in read(sources[0].path) if isinstance(r, TimeRecord)]
     if not records:
         raise InputError(f"{sources[0].name} holds no time histories; leave out --force.")
-    modal, found = analyse_record(records[0], force_channel=force, band_hz=band_hz)
+    modal, found = analyse_record(records[0], force, band_hz)
     answer = _of_model(modal, accepted=(sources[0].name,), simulated=records[0].simulated)
     return _drawn(answer, pictures, None, lambda: found, modal)
 
