@@ -129,15 +129,14 @@ class FrfMatrix:
 
     `accelerance[o, i]` is the response at `responses[o]` to a force at `references[i]`, both along
     positive axes: what was measured along negative ones is turned. In m/s²/N where `scaled`.
-    `coherence` is NaN where the files state none. `exponential_rate_1_s` and `tail_s` as in `Frf`;
-    `ended` are the same FRFs under a window by which decays are over, None where there is none.
+    `exponential_rate_1_s` and `tail_s` as in `Frf`; `ended` are the same FRFs under a window by
+    which decays are over, None where there is none.
     """
 
     frequency_hz: np.ndarray  # (F,) increasing, > 0
     responses: tuple[Dof, ...]
     references: tuple[Dof, ...]
     accelerance: np.ndarray  # (o, i, F) complex
-    coherence: np.ndarray  # (o, i, F)
     scaled: bool
     remarks: tuple[str, ...] = ()
     simulated: bool = False
@@ -171,11 +170,9 @@ class FrfMatrix:
         """The same with the longer side as responses, be they felt or hit."""
         if not self.hit:
             return self
-        values, coherence = (np.swapaxes(v, 0, 1) for v in (self.accelerance, self.coherence))
-        ended = self.ended and self.ended.roved
         return replace(
-            self, responses=self.references, references=self.responses, accelerance=values,
-            coherence=coherence, ended=ended,
+            self, responses=self.references, references=self.responses,
+            accelerance=np.swapaxes(self.accelerance, 0, 1), ended=self.ended and self.ended.roved,
         )  # fmt: skip
 
     def index(self, dof: Dof) -> int:
@@ -183,8 +180,8 @@ class FrfMatrix:
         return self.responses.index(dof)
 
 
-# Where an FRF was felt and hit, along which signed directions, its values and coherence (F,).
-Entry = tuple[Dof, Dof, np.ndarray, np.ndarray]
+# Where an FRF was felt and hit, along which signed directions, and its values (F,).
+Entry = tuple[Dof, Dof, np.ndarray]
 
 
 def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfMatrix:
@@ -202,8 +199,8 @@ def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfM
         kind, known = _kind(record, quantity, remarks)
         scaled &= known
         values = convert(frequency[keep], record.values[:, keep], kind, "accelerance")
-        each = zip(record.places, values, record.coherence[:, keep], strict=True)
-        entries += [(Dof.of_uff(*felt), Dof.of_uff(*hit), *held) for (felt, hit), *held in each]
+        each = zip(record.places, values, strict=True)
+        entries += [(Dof.of_uff(*felt), Dof.of_uff(*hit), held) for (felt, hit), held in each]
     found = _matrix(frequency[keep], entries, remarks, records[0].source)
     simulated = any(record.simulated for record in records)
     return replace(found, scaled=scaled, simulated=simulated)
@@ -213,7 +210,7 @@ def matrix_of_hits(frf: Frf, source: Path, simulated: bool) -> FrfMatrix:
     """The same of FRFs that were estimated here; `source` is named where they are refused."""
     entries: list[Entry] = [
         (_place(frf.layout.sensors, o, SENSOR), _place(frf.layout.hits, i, TCP),
-         frf.accelerance[o, i], frf.coherence[o, i])
+         frf.accelerance[o, i])
         for o, i in np.argwhere(np.isfinite(frf.accelerance).all(axis=-1)).tolist()
     ]  # fmt: skip
     found = _matrix(frf.frequency_hz, entries, list(frf.remarks), source)
@@ -232,14 +229,14 @@ def _place(points: tuple[str, ...], at: int, unnamed: str) -> Dof:
 def _matrix(
     frequency: np.ndarray, entries: Sequence[Entry], remarks: list[str], source: Path
 ) -> FrfMatrix:
-    seen: dict[tuple[Dof, Dof], list[tuple[np.ndarray, np.ndarray]]] = {}
-    for felt, hit, values, coherence in entries:
+    seen: dict[tuple[Dof, Dof], list[np.ndarray]] = {}
+    for felt, hit, values in entries:
         if np.any(values):
             turned = felt.sign * hit.sign * values
-            seen.setdefault((felt.positive, hit.positive), []).append((turned, coherence))
+            seen.setdefault((felt.positive, hit.positive), []).append(turned)
     if not seen:
         raise RefusedError(f"{source}: all FRFs are zero; export them again.")
-    dead = [f"{felt} hit at {hit}" for felt, hit, values, _ in entries if not np.any(values)]
+    dead = [f"{felt} hit at {hit}" for felt, hit, values in entries if not np.any(values)]
     if dead:
         named = ", ".join(dead[:3]) + (" …" if len(dead) > 3 else "")
         remarks.append(f"{len(dead)} FRFs are zero throughout and were left out: {named}.")
@@ -252,13 +249,11 @@ def _matrix(
     responses, references = (
         tuple(sorted(set(side), key=by_number)) for side in zip(*seen, strict=True)
     )
-    shape = len(responses), len(references), frequency.size
-    h, coherence = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
+    h = np.full((len(responses), len(references), frequency.size), np.nan + 0j)
     for (felt, hit), found in seen.items():
-        at = responses.index(felt), references.index(hit)
-        h[at], coherence[at] = np.mean([values for values, _ in found], axis=0), found[-1][1]
+        h[responses.index(felt), references.index(hit)] = np.mean(found, axis=0)
     told = tuple(dict.fromkeys(remarks))
-    return FrfMatrix(frequency, responses, references, h, coherence, True, told)
+    return FrfMatrix(frequency, responses, references, h, True, told)
 
 
 def by_number(dof: Dof) -> tuple[int, int, str, int]:

@@ -87,7 +87,7 @@ def exported(path, tip, nodes):
     ends, f = np.array(list(places.values())), tip.frequency_hz
     h = np.einsum("oa,fab,ib->oif", ends, tip.receptance, ends) * (2j * np.pi * f) ** 2
     dofs = tuple(places)
-    return write_matrix(path, FrfMatrix(f, dofs, dofs, h, np.full(h.shape, np.nan), True))
+    return write_matrix(path, FrfMatrix(f, dofs, dofs, h, True))
 
 
 def rod(path):
@@ -188,7 +188,7 @@ def postures(tmp_path_factory):
     for i, angle in enumerate(np.linspace(-0.7, 0.7, 13)):
         h = receptance(angle) * (2j * np.pi * HZ) ** 2
         h *= 1 + 0.007 * (rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape))
-        matrix = FrfMatrix(HZ, POINTS, POINTS, h, np.full(h.shape, np.nan), True)
+        matrix = FrfMatrix(HZ, POINTS, POINTS, h, True)
         write_matrix(folder / f"{i}.uff", matrix)
         rows.append(f"P{i:02d},{np.rad2deg(angle):.6f},5,+x,{i}.uff")
     table = "\n".join(["pose,a_deg,b_deg,hit,file", *rows, ""])
@@ -227,7 +227,7 @@ def test_the_command_and_what_makes_no_sense(postures, tmp_path):
 def test_postures_of_one_point_are_refused(postures, tmp_path):
     folder, file = postures
     h = receptance(0.0)[:2, :2]
-    one = FrfMatrix(HZ, POINTS[:2], POINTS[:2], h, np.full(h.shape, np.nan), True)
+    one = FrfMatrix(HZ, POINTS[:2], POINTS[:2], h, True)
     for name in ("recordings.csv", "predict.csv"):
         (tmp_path / name).write_text((folder / name).read_text())
     for i in range(13):

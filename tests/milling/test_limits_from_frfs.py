@@ -88,7 +88,7 @@ class Tap:
         h = h + self.noise * np.abs(h).max() * (parts[0] + 1j * parts[1])
         frfs, modes, cut = folder / "tap.uff", folder / "modes.toml", folder / "cut.toml"
         ends = Dof("1", "x"), Dof("1", "y")
-        write_matrix(frfs, FrfMatrix(lines, ends, ends, h, np.full(h.shape, np.nan), True))
+        write_matrix(frfs, FrfMatrix(lines, ends, ends, h, True))
         modes.write_text("".join(
             f"[[mode]]\nfrequency_hz = {f!r}\ndamping_ratio = {z!r}\nmass_kg = {m!r}\n"
             f"direction = {d.tolist()}\n"

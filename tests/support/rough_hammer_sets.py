@@ -107,7 +107,7 @@ def _struck(
     h[gone] = np.nan
     felt = tuple(dof_of(structure, o) for o in range(len(structure.nodes)))
     hit = tuple(dof_of(structure, i) for i in references)
-    return FrfMatrix(frequency_hz, felt, hit, h, np.full(h.shape, np.nan), True)
+    return FrfMatrix(frequency_hz, felt, hit, h, True)
 
 
 def _damped(structure: Structure, rng: np.random.Generator) -> Structure:
