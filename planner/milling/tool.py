@@ -82,11 +82,6 @@ class Tool:
         return sum(part.length for part in self.parts)
 
     @property
-    def mass(self) -> float:
-        """In kg."""
-        return sum(part.weight for part in self.parts)
-
-    @property
     def frame(self) -> np.ndarray:
         """(3, 3): columns are the tool's own x, y, z in the axes of the FRFs."""
         return frame_along(np.array(self.axis))

@@ -163,7 +163,7 @@ def _mode(found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, sca
     return Mode(
         frequency, float(sd[0]), damping, float(sd[1]), *UNSCALED, shape,
         likely, shape_sd, scaled, phase_collinearity(shape), phase_deviation_deg(shape),
-        fitted.misfit, float(spread),
+        float(spread),
     )  # fmt: skip
 
 
