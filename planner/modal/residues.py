@@ -138,18 +138,14 @@ def stack(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
-def rank_one(residue: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Shape φ (unit length, as real as possible), participation γ with R ≈ φγᵀ, and the share.
+def rank_one(residue: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shape φ (unit length, as real as possible) and participation γ with R ≈ φγᵀ.
 
-    residue (outputs, inputs) complex without NaN. The share in (0, 1] is the part of ‖R‖² that
-    one mode can explain: 1 for a single mode, less where two are lumped together or noise rules.
+    residue (outputs, inputs) complex without NaN.
     """
     left, singular, right = np.linalg.svd(residue, full_matrices=False)
     rotation = realign(left[:, 0])
-    shape = left[:, 0] * rotation
-    total = float(np.sum(singular**2))
-    share = float(singular[0] ** 2 / total) if total > 0 else 1.0
-    return shape, singular[0] * right[0] / rotation, share
+    return left[:, 0] * rotation, singular[0] * right[0] / rotation
 
 
 def realign(shape: np.ndarray) -> complex:
