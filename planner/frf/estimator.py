@@ -18,7 +18,6 @@ from planner.frf.frf import Frf
 from planner.frf.spectra import (
     HitSpectra,
     Spectra,
-    Windows,
     running_mean,
     transform,
     window_sum,
@@ -62,8 +61,8 @@ def estimate(
     Raises:
         RefusedError: The hits do not fit together.
     """
-    windows = Windows(exponential_rate_1_s, window_rate_1_s)
-    return of_spectra(transform(hits, band_hz, windows), band_hz, estimator)
+    spectra = transform(hits, band_hz, exponential_rate_1_s, window_rate_1_s)
+    return of_spectra(spectra, band_hz, estimator)
 
 
 def of_spectra(

@@ -20,18 +20,6 @@ FADED = 1e-3  # of the noise that a window leaves: fainter noise is the digits' 
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
-    """Exponential windows e^(−rate·t), t from the pulse's peak, rates in 1/s.
-
-    `laid_1_s` is laid over force and responses here, before the pulse too (there it is above 1):
-    the FRF is then exactly H at iω + rate. `carried_1_s` is in the records already.
-    """
-
-    laid_1_s: float = 0.0
-    carried_1_s: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
 class HitSpectra:
     """Transforms of one hit: force (F,) in N and responses (r, F) in m/s², summed over samples.
 
@@ -81,11 +69,15 @@ def running_mean(values: np.ndarray, half: int) -> np.ndarray:
 def transform(
     hits: tuple[Hit, ...],
     band_hz: tuple[float, float],
-    windows: Windows,
+    laid_1_s: float = 0.0,
+    carried_1_s: float = 0.0,
     samples: int = 0,
 ) -> Spectra:
     """Spectra of hits that are cut so that all pulses lie at the same time.
 
+    `laid_1_s` is the rate in 1/s of an exponential window e^(−rate·t), t from the pulse's peak,
+    laid over force and responses here, before the pulse too (there it is above 1): the FRF is then
+    exactly H at iω + rate. `carried_1_s` is that of one which is in the records already.
     Records are filled up with zeros to `samples`, where stated, so that poses share their lines.
     Raises RefusedError if the hits do not fit together.
     """
@@ -107,22 +99,26 @@ def transform(
     # Margin: lines beyond the band, so that modes at its edge are met from both sides
     # Nyquist share: beyond it anti-alias filters act
     chosen = (frequency > 0) & (frequency <= min(1.3 * band_hz[1], 0.45 * rate))
-    found = tuple(_transform(hit, before, after, length, chosen, windows) for hit in hits)
+    found = tuple(
+        _transform(hit, before, after, length, chosen, laid_1_s, carried_1_s) for hit in hits
+    )
     tail = float(np.mean([_tail(hit, before, after) for hit in hits]))
-    rate_1_s = windows.laid_1_s + windows.carried_1_s
-    return Spectra(frequency[chosen], found, tail, before / rate, rate_1_s, remarks)
+    return Spectra(
+        frequency[chosen], found, tail, before / rate, laid_1_s + carried_1_s, remarks
+    )  # fmt: skip
 
 
 def _transform(
-    hit: Hit, before: int, after: int, length: int, chosen: np.ndarray, windows: Windows
-) -> HitSpectra:
+    hit: Hit, before: int, after: int, length: int, chosen: np.ndarray, laid_1_s: float,
+    carried_1_s: float,
+) -> HitSpectra:  # fmt: skip
     pulse, samples = hit.pulse, len(hit.force_n)
     start = pulse.peak - before
     used = slice(start, pulse.peak + after)
     t = (np.arange(samples) - pulse.peak) / hit.sampling_rate_hz
-    laid = np.exp(-windows.laid_1_s * t)
+    laid = np.exp(-laid_1_s * t)
     # The window that the records carry has made the noise after the pulse smaller than it was.
-    carried = np.exp(-windows.carried_1_s * np.maximum(t, 0))
+    carried = np.exp(-carried_1_s * np.maximum(t, 0))
     known = pulse.quiet - start >= LEAST_QUIET
     quiet = slice(start, pulse.quiet)
     force, response = hit.force_n - pulse.offset_n, hit.acceleration_m_s2

@@ -16,7 +16,7 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
-from planner.frf.spectra import Windows, transform
+from planner.frf.spectra import transform
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac
 from planner.modal.modes import ForceLevel, Homogeneity, ModalModel, Mode
@@ -112,8 +112,7 @@ def _chance(
     """That hits, which miss as hands do, differ so much from level to level; None: no repeats."""
     hits = [hit for group in groups for hit in group]
     level = np.array([number for number, group in enumerate(groups) for _ in group])
-    windows = Windows(0.0, window_rate_1_s)
-    spectra = transform(tuple(hits), band_hz, windows)
+    spectra = transform(tuple(hits), band_hz, 0.0, window_rate_1_s)
     f = spectra.frequency_hz
     lines = (f >= band_hz[0]) & (f <= band_hz[1])
     frfs = np.array([(s.response / s.force)[:, lines].ravel() for s in spectra.hits])
