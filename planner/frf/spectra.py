@@ -99,13 +99,10 @@ def transform(
     # Margin: lines beyond the band, so that modes at its edge are met from both sides
     # Nyquist share: beyond it anti-alias filters act
     chosen = (frequency > 0) & (frequency <= min(1.3 * band_hz[1], 0.45 * rate))
-    found = tuple(
-        _transform(hit, before, after, length, chosen, laid_1_s, carried_1_s) for hit in hits
-    )
+    rates = laid_1_s, carried_1_s
+    found = tuple(_transform(hit, before, after, length, chosen, *rates) for hit in hits)
     tail = float(np.mean([_tail(hit, before, after) for hit in hits]))
-    return Spectra(
-        frequency[chosen], found, tail, before / rate, laid_1_s + carried_1_s, remarks
-    )  # fmt: skip
+    return Spectra(frequency[chosen], found, tail, before / rate, sum(rates), remarks)
 
 
 def _transform(
