@@ -15,13 +15,7 @@ would show another mean miss, which no single hit explains.
 import numpy as np
 
 from planner.frf.frf import Frf
-from planner.frf.spectra import (
-    HitSpectra,
-    Spectra,
-    running_mean,
-    transform,
-    window_sum,
-)
+from planner.frf.spectra import HitSpectra, Spectra, running_mean, transform, window_sum
 from planner.recording.points import Layout, together
 from planner.recording.records import Hit
 

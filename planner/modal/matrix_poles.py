@@ -19,13 +19,7 @@ from planner.modal.mode_selection import (
     scatter,
 )
 from planner.modal.plscf import Diagram, diagram, ladder, plscf, row_errors, stable
-from planner.modal.pole_fit import (
-    ROUNDS,
-    DivergedPolesError,
-    PoleFit,
-    fit_sets,
-    refine,
-)
+from planner.modal.pole_fit import ROUNDS, DivergedPolesError, PoleFit, fit_sets, refine
 from planner.modal.rank_one_fit import Entries, FittedShape, fit_shape
 from planner.modal.set_search import reestimated_sets
 from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
