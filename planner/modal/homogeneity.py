@@ -128,7 +128,9 @@ def _chance(
         possible *= ways(level[own])
         real, random = between(seen.view(float), level[own], SHARED_OUT, rng)
         measured, shared = measured + real, shared + random
-    return chance(measured, shared) if 1 / possible <= CHANCE else None
+    # Of a sum as large as that measured, from those shared out at random
+    larger = int(np.count_nonzero(shared >= measured - 1e-9))
+    return (1 + larger) / (1 + SHARED_OUT) if 1 / possible <= CHANCE else None
 
 
 def _level(
@@ -171,7 +173,7 @@ def between(
 ) -> tuple[float, np.ndarray]:
     """n/2 ln of all scatter of values (n, m) over that within groups: as it is, and at random.
 
-    Sums over independent sets of members say more; the chance of so much is `chance`.
+    Sums over independent sets of members say more.
     """
     off = values - values.mean(axis=0)
     gram = off @ off.T
@@ -184,8 +186,3 @@ def between(
         within -= gram[own[:, :, None], own[:, None, :]].sum(axis=(1, 2)) / own.shape[1]
     told = -len(off) / 2 * np.log(np.maximum(within, 1e-12 * whole) / whole)
     return float(told[0]), told[1:]
-
-
-def chance(measured: float, shared: np.ndarray) -> float:
-    """Of a sum as large as `measured`, from those shared out at random (draws,)."""
-    return (1 + int(np.count_nonzero(shared >= measured - 1e-9))) / (1 + len(shared))
