@@ -262,7 +262,12 @@ def diagram(sets: tuple[PoleSet, ...], band_hz: tuple[float, float]) -> Diagram:
         growing += [
             [(index, poles[k], participation[k])] for k in range(len(poles)) if k not in taken
         ]
-    lines = [_line(g, sets) for g in growing]
+    lines = []
+    for members in growing:
+        index, poles, participation = map(np.array, zip(*members, strict=True))
+        orders = np.array([sets[i].order for i in index])
+        share = len(members) / (len(sets) - int(index[0]))
+        lines.append(Line(orders, poles, participation, share))
     return Diagram(sets, tuple(sorted(lines, key=lambda line: line.frequency_hz)))
 
 
@@ -292,13 +297,3 @@ def _pair(lines: list, poles: np.ndarray, participation: np.ndarray) -> list[tup
         cost[i] = np.inf
         cost[:, k] = np.inf
     return pairs
-
-
-def _line(members: list[tuple[int, complex, np.ndarray]], sets: tuple[PoleSet, ...]) -> Line:
-    index = np.array([m[0] for m in members])
-    return Line(
-        np.array([sets[i].order for i in index]),
-        np.array([m[1] for m in members]),
-        np.array([m[2] for m in members]),
-        len(members) / (len(sets) - int(index[0])),
-    )
