@@ -117,7 +117,7 @@ def test_unknown_force_channel_is_an_input_error():
 
 def hit_first(name: str, *channels: Channel) -> TimeRecord:
     """A record that begins with a hit."""
-    force = Channel("HAMMER", "voltage", "V", 0, np.eye(1, channels[0].samples.size)[0])
+    force = Channel("HAMMER", "voltage", "V", 0, np.eye(2, channels[0].samples.size)[1])
     return TimeRecord(Path(name), RATE, (*channels, force))
 
 
