@@ -213,7 +213,7 @@ def _parameters(poles: np.ndarray, residues: np.ndarray) -> HitParameters:
     n, modes = poles.shape[:2]
     left, right = np.full((2, n, modes, 4), np.nan + 0j)
     for i, k in zip(*np.nonzero(np.isfinite(poles[..., 0])), strict=True):
-        right[i, k], left[i, k], _ = rank_one(residues[i, k])
+        right[i, k], left[i, k] = rank_one(residues[i, k])
     size = np.abs(left) / np.linalg.norm(left, axis=2, keepdims=True)
     with np.errstate(all="ignore"):  # as before
         least = np.nanmin(np.where(np.isfinite(size), size, np.inf), axis=0)

@@ -89,10 +89,9 @@ def _shapes(frf: Frf, poles: np.ndarray) -> list[np.ndarray]:
     for row, block, axis in itertools.product(range(rows), blocks, range(3)):
         entry = frf.accelerance[row, block + axis]
         if np.all(np.isfinite(entry)) and not np.any(np.isfinite(residue[row, axis])):
-            of_entry = lsfd(
+            residue[row, axis] = lsfd(
                 frf.frequency_hz, entry[None, None], poles, rate_1_s=frf.exponential_rate_1_s
-            )
-            residue[row, axis] = of_entry.residue[0, 0]
+            )[0, 0]
     known = np.isfinite(residue[..., 0])
     columns = known.sum(axis=0) == known.sum(axis=0).max()
     heard = known[:, columns].all(axis=1)

@@ -11,7 +11,7 @@ from planner.dataset.screened_files import Source
 from planner.dataset.store import user_store
 from planner.frf.estimator import usable_band
 from planner.frf.frf import Frf
-from planner.frf.spectra import Windows, transform
+from planner.frf.spectra import transform
 from planner.recording.channel_faults import by_good_sensors
 from planner.recording.points import TOOL
 from planner.recording.records import Hit
@@ -80,7 +80,7 @@ def hit_columns(
     `window_rate_1_s`: of an exponential window that the analyser laid. Raises RefusedError where
     the hits do not fit together.
     """
-    spectra = transform(hits, band_hz, Windows(LAID, window_rate_1_s))
+    spectra = transform(hits, band_hz, LAID, window_rate_1_s)
     frequency = spectra.frequency_hz
     high = min(band_hz[1], usable_band(spectra, band_hz)[1])
     inside = np.flatnonzero((frequency >= band_hz[0]) & (frequency <= high))

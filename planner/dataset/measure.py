@@ -260,7 +260,7 @@ def frf_of(
 ) -> Frf:
     """The average of good hits, or exported FRFs where there are none; raises RefusedError."""
     from planner.frf.estimator import estimate
-    from planner.frf.exported import from_records
+    from planner.frf.matrix import from_records
 
     if hits:
         return estimate(hits, band_hz, estimator, window_rate_1_s=window_rate_1_s)

@@ -13,7 +13,7 @@ from planner.fit.data import FrfData
 from planner.fit.fitted import StructureFit
 from planner.fit.misfit import FrfMisfit
 from planner.fit.weights import ELL, SHARE
-from planner.frf.spectra import Spectra, Windows, transform
+from planner.frf.spectra import Spectra, transform
 from planner.measurement.measured_frfs import Measured
 from planner.measurement.nuisances import hit_basis
 
@@ -121,10 +121,9 @@ def own_ports(found: StructureFit) -> tuple[JointPort, ...]:
 def hit_groups(recorded: Dataset, found: StructureFit) -> tuple[HitGroup, ...]:
     """Of all visits, axes that were hit more than once."""
     length = max((len(h.force_n) for v in recorded.visits for h in v.hits), default=0)
-    windows = Windows(LAID, recorded.window_rate_1_s)
     springs, out = [p.spring for p in own_ports(found)], []
     for visit in recorded.visits:
-        spectra = transform(visit.hits, recorded.band_hz, windows, length)
+        spectra = transform(visit.hits, recorded.band_hz, LAID, recorded.window_rate_1_s, length)
         out += _groups(recorded, found, springs, visit, spectra, length)
     return tuple(g for g in out if g.clock == out[0].clock)
 

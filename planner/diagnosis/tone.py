@@ -8,7 +8,7 @@ from planner.dataset.dataset import LAID, Dataset
 from planner.dataset.visits import Visit
 from planner.diagnosis.finding import Finding
 from planner.frf.estimator import of_spectra
-from planner.frf.spectra import Windows, transform
+from planner.frf.spectra import transform
 from planner.recording.records import Hit
 
 WIDTH_HZ = 1.0  # half of what a tone takes up under the window
@@ -92,9 +92,9 @@ class _Column:
         """Of the hits of a level; the longest record makes the lines common to all."""
         low, high = recorded.band_hz
         longest = max(len(hit.force_n) for visit in recorded.visits for hit in visit.hits)
-        windows, axis = Windows(LAID, recorded.window_rate_1_s), hits[0].axis_index
-        spectra = transform(tuple(hits), recorded.band_hz, windows, longest)
-        frf = of_spectra(spectra, recorded.band_hz, windows, by_scatter=False)
+        carried, axis = recorded.window_rate_1_s, hits[0].axis_index
+        spectra = transform(tuple(hits), recorded.band_hz, LAID, carried, longest)
+        frf = of_spectra(spectra, recorded.band_hz, by_scatter=False)
         f, usable = frf.frequency_hz, frf.usable_band_hz[1]
         lines = (f >= low) & (f <= high)
         excited = (f < usable) | (usable == f[-1])

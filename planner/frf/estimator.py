@@ -15,14 +15,7 @@ would show another mean miss, which no single hit explains.
 import numpy as np
 
 from planner.frf.frf import Frf
-from planner.frf.spectra import (
-    HitSpectra,
-    Spectra,
-    Windows,
-    running_mean,
-    transform,
-    window_sum,
-)
+from planner.frf.spectra import HitSpectra, Spectra, running_mean, transform, window_sum
 from planner.recording.points import Layout, together
 from planner.recording.records import Hit
 
@@ -62,14 +55,13 @@ def estimate(
     Raises:
         RefusedError: The hits do not fit together.
     """
-    windows = Windows(exponential_rate_1_s, window_rate_1_s)
-    return of_spectra(transform(hits, band_hz, windows), band_hz, windows, estimator)
+    spectra = transform(hits, band_hz, exponential_rate_1_s, window_rate_1_s)
+    return of_spectra(spectra, band_hz, estimator)
 
 
 def of_spectra(
     spectra: Spectra,
     band_hz: tuple[float, float],
-    windows: Windows,
     estimator: str = "h1",
     by_scatter: bool = True,
 ) -> Frf:
@@ -104,7 +96,7 @@ def of_spectra(
         coherence,
         tuple(counts),
         usable_band(spectra, band_hz),
-        windows.laid_1_s + windows.carried_1_s,
+        spectra.exponential_rate_1_s,
         spectra.remarks,
         spectra.tail_s,
         share,
@@ -132,20 +124,20 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
     force_share = np.array([s.force_noise for s in group])[:, None] / square  # (n, F)
     share = np.mean(np.sum(told**2 * force_share[:, None], axis=0), axis=0)
     alone = np.sum(told**2 * noise[..., None] / square[:, None], axis=0)
-    unknown = np.full(h.shape, np.nan)
+    unknown, of_force = np.full(h.shape, np.nan), np.abs(h) ** 2 * share
     if estimator == "one_hit":
-        return h, alone + np.abs(h) ** 2 * share, unknown, share
+        return h, alone + of_force, unknown, share
     if not by_scatter:
-        variance = alone + np.abs(h) ** 2 * share
+        variance = alone + of_force
     elif len(group) == 1:
         variance = alone if group[0].noise_known else unknown
-        variance = variance + (np.abs(h) ** 2 * share if estimator == "weighted" else 0.0)
+        variance = variance + (of_force if estimator == "weighted" else 0.0)
     else:
         left = np.abs(response - h * force[:, None]) ** 2
         if estimator == "weighted":
             expected = noise[..., None] + np.abs(h) ** 2 * (force_share * square)[:, None]
             level = _level(np.sum(left / expected, axis=0), len(group) - 1)
-            variance = alone * level + np.abs(h) ** 2 * share
+            variance = alone * level + of_force
         else:
             # Noise may grow with the hit: each counts with its own error (White's, HC2).
             error = left / np.maximum(1 - told, 1e-6)

@@ -20,18 +20,6 @@ FADED = 1e-3  # of the noise that a window leaves: fainter noise is the digits' 
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
-    """Exponential windows e^(−rate·t), t from the pulse's peak, rates in 1/s.
-
-    `laid_1_s` is laid over force and responses here, before the pulse too (there it is above 1):
-    the FRF is then exactly H at iω + rate. `carried_1_s` is in the records already.
-    """
-
-    laid_1_s: float = 0.0
-    carried_1_s: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
 class HitSpectra:
     """Transforms of one hit: force (F,) in N and responses (r, F) in m/s², summed over samples.
 
@@ -55,13 +43,15 @@ class HitSpectra:
 class Spectra:
     """Spectra of all hits of a pose at lines frequency_hz (F,).
 
-    `tail_s` as in `Frf`; `peak_s` is the time of the pulses' peaks, the same for all hits.
+    `tail_s` and `exponential_rate_1_s` as in `Frf`; `peak_s` is the time of the pulses' peaks, the
+    same for all hits.
     """
 
     frequency_hz: np.ndarray
     hits: tuple[HitSpectra, ...]
     tail_s: float
     peak_s: float
+    exponential_rate_1_s: float
     remarks: tuple[str, ...]
 
 
@@ -79,11 +69,15 @@ def running_mean(values: np.ndarray, half: int) -> np.ndarray:
 def transform(
     hits: tuple[Hit, ...],
     band_hz: tuple[float, float],
-    windows: Windows | None = None,
-    samples: int | None = None,
+    laid_1_s: float = 0.0,
+    carried_1_s: float = 0.0,
+    samples: int = 0,
 ) -> Spectra:
     """Spectra of hits that are cut so that all pulses lie at the same time.
 
+    `laid_1_s` is the rate in 1/s of an exponential window e^(−rate·t), t from the pulse's peak,
+    laid over force and responses here, before the pulse too (there it is above 1): the FRF is then
+    exactly H at iω + rate. `carried_1_s` is that of one which is in the records already.
     Records are filled up with zeros to `samples`, where stated, so that poses share their lines.
     Raises RefusedError if the hits do not fit together.
     """
@@ -100,27 +94,28 @@ def transform(
     remarks: tuple[str, ...] = ()
     if before + after < 0.9 * max(len(hit.force_n) for hit in hits):
         remarks = ("Records of different length were cut to the shortest.",)
-    length = max(before + after, samples or 0)
+    length = max(before + after, samples)
     frequency = np.fft.rfftfreq(length, 1 / rate)
     # Margin: lines beyond the band, so that modes at its edge are met from both sides
     # Nyquist share: beyond it anti-alias filters act
     chosen = (frequency > 0) & (frequency <= min(1.3 * band_hz[1], 0.45 * rate))
-    windows = windows or Windows()
-    found = tuple(_transform(hit, before, after, length, chosen, windows) for hit in hits)
+    rates = laid_1_s, carried_1_s
+    found = tuple(_transform(hit, before, after, length, chosen, *rates) for hit in hits)
     tail = float(np.mean([_tail(hit, before, after) for hit in hits]))
-    return Spectra(frequency[chosen], found, tail, before / rate, remarks)
+    return Spectra(frequency[chosen], found, tail, before / rate, sum(rates), remarks)
 
 
 def _transform(
-    hit: Hit, before: int, after: int, length: int, chosen: np.ndarray, windows: Windows
-) -> HitSpectra:
+    hit: Hit, before: int, after: int, length: int, chosen: np.ndarray, laid_1_s: float,
+    carried_1_s: float,
+) -> HitSpectra:  # fmt: skip
     pulse, samples = hit.pulse, len(hit.force_n)
     start = pulse.peak - before
     used = slice(start, pulse.peak + after)
     t = (np.arange(samples) - pulse.peak) / hit.sampling_rate_hz
-    laid = np.exp(-windows.laid_1_s * t)
+    laid = np.exp(-laid_1_s * t)
     # The window that the records carry has made the noise after the pulse smaller than it was.
-    carried = np.exp(-windows.carried_1_s * np.maximum(t, 0))
+    carried = np.exp(-carried_1_s * np.maximum(t, 0))
     known = pulse.quiet - start >= LEAST_QUIET
     quiet = slice(start, pulse.quiet)
     force, response = hit.force_n - pulse.offset_n, hit.acceleration_m_s2

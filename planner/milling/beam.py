@@ -97,13 +97,6 @@ class Segment:
             self.diameter + place * (self.end_diameter - self.diameter), self.bore, self.material
         )
 
-    @property
-    def weight(self) -> float:
-        """Mass in kg, that at its end included."""
-        d, e, b = self.diameter, self.end_diameter, self.bore
-        volume = np.pi / 4 * self.length * ((d * d + d * e + e * e) / 3 - b * b)
-        return float(self.material.density_kg_m3 * volume + self.mass)
-
 
 @dataclass(frozen=True)
 class Section:

@@ -113,7 +113,9 @@ def couple(tip: TipReceptance, target: Tool | None, reference: Tool | None = Non
     coupled, left, right = _coupled(tip, target, reference)
     variance = _measured(left @ tip.left, tip, tip.right @ right)
     variance += _carried(left, tip.offset_sd**2, right)
-    for other in _uncertain(target, reference):
+    others = [(tool, reference) for tool in target.sd_away] if target else []
+    others += [(target, tool) for tool in reference.sd_away] if reference else []
+    for other in others:
         variance += np.abs(_coupled(tip, *other)[0] - coupled) ** 2
     own = tuple(k for k, motion in enumerate(tip.kept) if motion < 3)
     noise = _carried(left @ tip.left, np.abs(tip.measured) ** 2, tip.right @ right)
@@ -173,23 +175,6 @@ def _measured(left: np.ndarray, tip: TipReceptance, right: np.ndarray) -> np.nda
     if tip.errors is None:
         return _carried(left, tip.sd**2, right)
     return np.sum([np.abs(left @ error @ right) ** 2 for error in tip.errors], axis=0)
-
-
-def _uncertain(
-    target: Tool | None, reference: Tool | None
-) -> list[tuple[Tool | None, Tool | None]]:
-    """Target and reference with one number of one contact an sd away."""
-    out: list[tuple[Tool | None, Tool | None]] = []
-    for which, tool in enumerate((target, reference)):
-        if tool is None:
-            continue
-        for number, contact in tool.contacts():
-            if contact.sd_percent <= 0:
-                continue
-            for name in NUMBERS:
-                moved = tool.held(number, contact.scaled(name, 1 + contact.sd_percent / 100))
-                out.append((moved, reference) if which == 0 else (target, moved))
-    return out
 
 
 def _whole(values: np.ndarray, kept: tuple[int, ...], frame: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.frf.exported import labelled_frfs
+from planner.frf.matrix import labelled_frfs
 from planner.frf.quantities import convert
 from planner.milling.cut import Cut
 from planner.recording.read import read_frfs

@@ -20,7 +20,7 @@ from planner.modal.estimate_modes import PoleIdentification, identify, inflation
 from planner.modal.fit_data import Data
 from planner.modal.mode_selection import scales, weakness
 from planner.modal.rank_one_fit import Entries
-from planner.modal.residues import Residues
+from planner.modal.residues import unpack
 from planner.modal.shape_fit import ShapeFit, shape_fit
 from planner.toml_file import load_toml
 
@@ -172,7 +172,7 @@ class CutterFit:
     @cached_property
     def modes(self) -> CutterModes:
         """Those that are established, and what modes above the lines give way."""
-        return self._as_modes(self.shaped.poles, self.shaped.residues)
+        return self._as_modes(self.shaped.poles, self.shaped.coefficients)
 
     def drawn(self, count: int, seed: int) -> list[CutterModes]:
         """So many sets of modes that are as likely as each other, by the noise of the FRFs."""
@@ -184,12 +184,12 @@ class CutterFit:
         out[self.there] = values
         return out
 
-    def _as_modes(self, fitted: np.ndarray, residues: Residues) -> CutterModes:
+    def _as_modes(self, fitted: np.ndarray, coefficients: np.ndarray) -> CutterModes:
         """With two shapes and drives where a pole may stand for several modes.
 
         Predicted FRFs hold no noise: all their poles count, however damped.
         """
-        residue, upper = self._whole(residues.residue), self._whole(residues.rest)[..., -1]
+        residue, rest = (self._whole(part) for part in unpack(coefficients, fitted.size))
         weak = weakness(self.found.data, self.found.fit)
         kept = np.flatnonzero((weak <= 1) | (self.frf.sd is not None))
         which = np.repeat(kept, np.where(np.isin(kept, self.shaped.shaped), 1, 2))
@@ -197,19 +197,20 @@ class CutterFit:
         left, sizes, right = np.linalg.svd(np.moveaxis(residue, -1, 0)[which])
         number = np.arange(which.size)
         shapes = left[number, :, part] * sizes[number, part][:, None]
-        return CutterModes(fitted[which], shapes, right[number, part], upper.real)
+        return CutterModes(fitted[which], shapes, right[number, part], rest[..., -1].real)
 
     def receptance(self, told: np.ndarray) -> np.ndarray:
         """(F, 2, 2) in m/N of the modes; of others below too at lines (F,) that tell of these."""
         s = 2j * np.pi * self.frf.frequency_hz[told, None, None]
         found = self.modes.receptance(self.frf.frequency_hz)
-        found[told] += self._whole(self.shaped.residues.rest)[..., 0] / s**2
+        _, rest = unpack(self.shaped.coefficients, self.shaped.poles.size)
+        found[told] += self._whole(rest)[..., 0] / s**2
         return found
 
     @property
     def noise(self) -> np.ndarray:
         """(F,) in m/N: root of E‖δH‖² at each line."""
-        square = np.sum(self.found.fit.variance, axis=(0, 1))
+        square = np.sum(self.found.fit.variance, axis=0)
         return np.sqrt(square) / (2 * np.pi * self.frf.frequency_hz) ** 2
 
 

@@ -69,30 +69,18 @@ def tooth_matrix(cut: Cut, tip_rad: np.ndarray, depth_m: float) -> np.ndarray:
 APART = 1e-9  # rad: breakpoints closer than this are one
 
 
-@dataclass(frozen=True, eq=False)
-class Rule:
-    """Lobatto points (s+1,) of a polynomial of degree s on [0, 1], and its integrals.
-
-    `points` (q,) and `values` (s+1, q, s+1): Gauss points of every [0, c_i], as shares of c_i, with
-    the Lagrange polynomials there times the weights. `weights` (s+1,) integrate over [0, 1].
-    """
-
-    nodes: np.ndarray
-    points: np.ndarray
-    values: np.ndarray
-    weights: np.ndarray
-
-
 @cache
-def lobatto(degree: int) -> Rule:
-    """The rule of a polynomial degree, 1 or more."""
+def lobatto(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lobatto points (s+1,) of a polynomial of degree s ≥ 1 on [0, 1], and its integrals.
+
+    By Gauss points (q,) of every [0, c_i], as shares of c_i, and the Lagrange polynomials there
+    times the weights, (s+1, q, s+1).
+    """
     inner = legendre.legroots(legendre.legder([0.0] * degree + [1.0])) if degree > 1 else []
     nodes = (np.concatenate([[-1.0], np.sort(np.real(inner)), [1.0]]) + 1) / 2
     x, w = legendre.leggauss(degree + 12)  # polynomial times an exponential over one element
     x, w = (x + 1) / 2, w / 2
-    values = lagrange(nodes, nodes[:, None] * x[None, :]) * w[None, :, None]
-    whole = np.einsum("qj,q->j", lagrange(nodes, x), w)
-    return Rule(nodes, x, values, whole)
+    return nodes, x, lagrange(nodes, nodes[:, None] * x[None, :]) * w[None, :, None]
 
 
 def lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:

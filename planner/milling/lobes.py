@@ -16,9 +16,15 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from planner.inference.parallel import parallel_map
-from planner.milling.machine import Machine, Monodromies, check_structure, limits, multipliers
+from planner.milling.machine import (
+    Machine,
+    Monodromies,
+    check_structure,
+    limits,
+    multipliers,
+    semi_monodromies,
+)
 from planner.milling.period import Period
-from planner.milling.semi_discretisation import semi_monodromies
 from planner.progress import ProgressCallback, no_progress
 
 LEAST_STEPS = 16  # of the scan in all
@@ -87,7 +93,7 @@ def refined(at: Monodromies, low: Level, high: Level, width: float = 1e-6) -> fl
     return float(root_scalar(size, bracket=(low[0], high[0]), xtol=width * high[0]).root)
 
 
-MANY, BLOCK = 60, 10  # speeds from which two processes share them, in blocks of so many
+MANY = 60  # speeds from which two processes share them
 
 
 @dataclass(frozen=True)
@@ -122,15 +128,14 @@ def stability_limits(
         )
     scan = scanned_depths(machine.floor().floor_m, cut.depth_m[1])
     speeds = [float(rpm) for rpm in cut.speeds_rpm]
+
+    def at_speed(rpm: float) -> StabilityLimit:
+        return discretised_limit(machine, rpm, scan)
+
     if len(speeds) < MANY:
-        return tuple(discretised_limit(machine, rpm, scan) for rpm in speeds)
-    blocks = [speeds[i : i + BLOCK] for i in range(0, len(speeds), BLOCK)]
-
-    def limits_of(block: list[float]) -> list[StabilityLimit]:
-        return [discretised_limit(machine, rpm, scan) for rpm in block]
-
-    found = parallel_map(limits_of, blocks, lambda _, n: progress("lobes", n / len(blocks)))
-    return tuple(loss for block in found for loss in block)
+        return tuple(map(at_speed, speeds))
+    told = parallel_map(at_speed, speeds, lambda _, n: progress("lobes", n / len(speeds)))
+    return tuple(told)
 
 
 def monodromies(machine: Machine, rpm: float, factor: float = 1.0) -> Monodromies:
@@ -229,10 +234,6 @@ class SampledLimits:
         with np.errstate(invalid="ignore"):
             known = (high - low) / 2 <= OPEN * np.where(np.isinf(depth_m), np.nan, depth_m)
         return ~known & ~(np.isinf(low) & np.isinf(depth_m))
-
-    def probability(self, depths: np.ndarray) -> np.ndarray:
-        """(speeds, depths) of being stable at depths (b,) in m."""
-        return np.mean(self.depth_m[:, :, None] > depths, axis=0)
 
 
 def _quantile(values: np.ndarray, share: float) -> np.ndarray:

@@ -136,12 +136,9 @@ def decide(structure: Structure, cut: Cut, rpm: float, depth_m: float) -> PoseDe
     # About the margin of what is expected: samples are not centred where it bends.
     sd = float(np.sqrt(np.mean((np.array(found) - margin) ** 2))) if found else 0.0
     poles = np.unique(machine.modes.poles)
-    slope = np.empty(len(poles))
-    for i in range(len(poles)):
-        by = np.zeros(3 * len(poles) + 1)
-        by[i] = STEP
-        shifted = Machine(moved(machine.modes, by), cut)
-        slope[i] = (_margin(shifted, rpm, depth_m) - margin) / STEP
+    ways = STEP * np.eye(len(poles), 3 * len(poles) + 1)
+    shifted = (Machine(moved(machine.modes, by), cut) for by in ways)
+    slope = np.array([(_margin(one, rpm, depth_m) - margin) / STEP for one in shifted])
     # Least sd of log |µ|: where nothing is uncertain
     return PoseDecision(margin, max(sd, 1e-6), np.abs(poles) / (2 * np.pi), slope)
 

@@ -84,7 +84,6 @@ class _Points:
     angle: np.ndarray
     rows: np.ndarray  # (p, 2)
     columns: np.ndarray  # (p, 2)
-    teeth: tuple[tuple[int, ...], ...]
 
 
 def period(
@@ -97,32 +96,18 @@ def period(
     """Of modes in the cut's plane at a speed; `depth_m` counts where the cutter has a helix."""
     speed = rpm * 2 * np.pi / 60
     found = contact(cut, depth_m, grid.element_rad)
-    seen = _seen(modes) if cut.even else None
-    points = _points(found, cut, speed, grid.degree, depth_m, seen)
+    points = _points(found, cut, speed, grid.degree, depth_m)
     built = _build(modes, found, points, speed, grid.degree)
     return built if cut.even else _uneven(built, found, points, cut, grid.degree, depth_m)
 
 
-def _seen(modes: CutterModes) -> np.ndarray | None:
-    """(2,): the only direction in which the structure moves, None if it moves in both."""
-    moved = np.concatenate([modes.shapes.real, modes.shapes.imag, modes.residual.T])
-    _, sizes, rows = np.linalg.svd(moved)
-    return rows[0] if sizes[1] < 1e-12 * sizes[0] else None
-
-
-def _points(
-    found: Engagement, cut: Cut, speed: float, degree: int, depth_m: float,
-    seen: np.ndarray | None,
-) -> _Points:  # fmt: skip
-    nodes = lobatto(degree).nodes
+def _points(found: Engagement, cut: Cut, speed: float, degree: int, depth_m: float) -> _Points:
+    nodes, *_ = lobatto(degree)
     parts: list[tuple[np.ndarray, ...]] = []
     number = -1
     for e, teeth in enumerate(found.teeth):
         angle = found.start[e] + nodes * (found.end[e] - found.start[e])
         rows, columns = directions(cut, teeth, angle + found.offset, depth_m)
-        if seen is not None and rows.shape[1] == 2:
-            columns = np.einsum("mij,mjk,k->mi", columns, rows, seen)[:, :, None]
-            rows = np.broadcast_to(seen, (len(nodes), 1, 2))
         if not cut.even:
             rows = columns = np.broadcast_to(np.eye(2), (len(nodes), 2, 2))
         rank = rows.shape[1]
@@ -136,7 +121,7 @@ def _points(
             shared, rows.reshape(-1, 2), columns.transpose(0, 2, 1).reshape(-1, 2),
         ))  # fmt: skip
     angle, element, place, shared, rows, columns = map(np.concatenate, zip(*parts, strict=True))
-    return _Points(angle / speed, element, place, shared, angle, rows, columns, found.teeth)
+    return _Points(angle / speed, element, place, shared, angle, rows, columns)
 
 
 def _build(
@@ -161,6 +146,7 @@ def _build(
     to_end = np.exp(modes.poles[:, None] * (duration - end[points.element])) * whole
     over = seen * np.exp(modes.poles[:, None] * points.time)
     first, together = _joined(points.shared)
+    whole_rule = lobatto(degree)[2][-1].sum(axis=0)
     e = np.exp(modes.poles * duration)  # of states as real and imaginary parts
     return Period(
         duration_s=float(duration),
@@ -171,17 +157,17 @@ def _build(
         now=np.eye(len(first)),
         before=np.eye(len(first)),
         time_s=points.time[first],
-        weight_s=(lobatto(degree).weights[points.place] * length[points.element]) @ together,
+        weight_s=(whole_rule[points.place] * length[points.element]) @ together,
         force=points.columns[first],
     )
 
 
 def _integrals(poles: np.ndarray, length_s: np.ndarray, degree: int) -> np.ndarray:
     """(k, e, i, j): state at point i of an element from the polynomial of point j."""
-    rule = lobatto(degree)
-    span = rule.nodes * length_s[:, None]  # (e, i)
-    decay = np.exp(poles[:, None, None, None] * span[..., None] * (1 - rule.points))
-    return np.einsum("keiq,iqj->keij", decay, rule.values) * span[None, ..., None]
+    nodes, points, values = lobatto(degree)
+    span = nodes * length_s[:, None]  # (e, i)
+    decay = np.exp(poles[:, None, None, None] * span[..., None] * (1 - points))
+    return np.einsum("keiq,iqj->keij", decay, values) * span[None, ..., None]
 
 
 def _joined(shared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -204,7 +190,7 @@ def _uneven(
     before = np.zeros_like(now)
     angle, element = points.angle[first], points.element[first]
     delay = cut.pitches_rad  # to the tooth ahead, which cut before
-    nodes = lobatto(degree).nodes
+    nodes, *_ = lobatto(degree)
     for p in range(0, len(first), 2):
         for tooth in found.teeth[element[p]]:
             matrix = each_tooth(cut, tooth, angle[p : p + 1] + found.offset, depth_m)[0]

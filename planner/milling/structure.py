@@ -50,11 +50,8 @@ def explaining(modes: CutterModes, frf: CutterFrf) -> tuple[np.ndarray, float]:
     every = max(1, len(frf.frequency_hz) // 300)
     hertz, sd = frf.frequency_hz[::every], frf.sd[..., ::every].transpose(2, 0, 1)
     here = modes.receptance(hertz)
-    columns = []
-    for i in range(3 * count + 1):
-        by = np.zeros(3 * count + 1)
-        by[i] = STEP
-        columns.append(np.abs((moved(modes, by).receptance(hertz) - here) / STEP) ** 2)
+    each = (moved(modes, by).receptance(hertz) for by in STEP * np.eye(3 * count + 1))
+    columns = [np.abs((there - here) / STEP) ** 2 for there in each]
     scale = np.sum(np.abs(here) ** 2, axis=(1, 2))[:, None, None]
     wanted = sd**2 / scale
     # Line by line alike: few lines of which hardly anything is known say nothing of the others.

@@ -27,7 +27,7 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import receptance, solve_poles
 from planner.errors import InputError
 from planner.frf import synthesis
-from planner.frf.exported import labelled_frfs
+from planner.frf.matrix import labelled_frfs
 from planner.milling.coupling import TipReceptance
 from planner.milling.cutter_frf import CutterFrf, read_npz, row_of
 from planner.milling.tool import Point, Tool

@@ -82,11 +82,6 @@ class Tool:
         return sum(part.length for part in self.parts)
 
     @property
-    def mass(self) -> float:
-        """In kg."""
-        return sum(part.weight for part in self.parts)
-
-    @property
     def frame(self) -> np.ndarray:
         """(3, 3): columns are the tool's own x, y, z in the axes of the FRFs."""
         return frame_along(np.array(self.axis))
@@ -97,12 +92,9 @@ class Tool:
 
     def above(self, from_tip: float) -> "Tool":
         """The part of it between the tip and a section so many m away."""
-        parts = _split(self.parts, from_tip)
-        ends = np.cumsum([part.length for part in parts[::-1]])
-        own = list(parts[len(parts) - int(np.sum(ends < from_tip + SAME_PLACE)) :])
-        if own:  # what holds the lowest is below the section
-            own[0] = replace(own[0], contact=None)
-        return replace(self, parts=tuple(own))
+        own = _cut(self.parts, from_tip)[1]
+        # What holds the lowest is below the section.
+        return replace(self, parts=(*(replace(part, contact=None) for part in own[:1]), *own[1:]))
 
     def contacts(self) -> list[tuple[int, ToolContact]]:
         """Contacts, and the number of the part that each holds."""
@@ -114,6 +106,15 @@ class Tool:
         parts[number] = replace(parts[number], contact=contact)
         return replace(self, parts=tuple(parts))
 
+    @property
+    def sd_away(self) -> "list[Tool]":
+        """The same with one number of one contact an sd away, for each whose sd is stated."""
+        return [
+            self.held(number, contact.scaled(name, 1 + contact.sd_percent / 100))
+            for number, contact in self.contacts()
+            for name in (NUMBERS if contact.sd_percent > 0 else ())
+        ]
+
 
 def frame_along(axis: np.ndarray) -> np.ndarray:
     """(3, 3): columns are the axes of a frame whose z is along an axis (3,)."""
@@ -124,30 +125,29 @@ def frame_along(axis: np.ndarray) -> np.ndarray:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def _split(parts: tuple[Segment, ...], from_tip: float) -> tuple[Segment, ...]:
-    """Parts with an end so many m from the tip."""
-    out, left = list(parts), from_tip
+Parts = tuple[Segment, ...]
+
+
+def _cut(parts: Parts, from_tip: float) -> tuple[Parts, Parts]:
+    """Parts on the holder's side of a section so many m from the tip, and on the tip's side."""
     for k in range(len(parts) - 1, -1, -1):
         s = parts[k]
-        if left <= SAME_PLACE:
-            break
-        if left < s.length - SAME_PLACE:
-            width = s.end_diameter + left / s.length * (s.diameter - s.end_diameter)
-            below = replace(s, length=s.length - left, end_diameter=width, mass=0.0)
-            out[k : k + 1] = [below, replace(s, length=left, diameter=width, contact=None)]
-            break
-        left -= s.length
-    return tuple(out)
+        if from_tip <= SAME_PLACE:
+            return parts[: k + 1], parts[k + 1 :]
+        if from_tip < s.length - SAME_PLACE:
+            width = s.end_diameter + from_tip / s.length * (s.diameter - s.end_diameter)
+            below = replace(s, length=s.length - from_tip, end_diameter=width, mass=0.0)
+            above = replace(s, length=from_tip, diameter=width, contact=None)
+            return (*parts[:k], below), (above, *parts[k + 1 :])
+        from_tip -= s.length
+    return (), parts
 
 
-def loaded(parts: tuple[Segment, ...], from_tip: float, mass: float) -> tuple[Segment, ...]:
-    """Parts with a mass (kg) so many m from the tip."""
-    parts, length = _split(parts, from_tip), 0.0
-    for k in range(len(parts) - 1, -1, -1):
-        if abs(length - from_tip) < 10 * SAME_PLACE:
-            return (*parts[:k], replace(parts[k], mass=parts[k].mass + mass), *parts[k + 1 :])
-        length += parts[k].length
-    return parts  # at the very lowest end: the holder's, not the tool's
+def loaded(parts: Parts, from_tip: float, mass: float) -> Parts:
+    """Parts with a mass (kg) so many m from the tip; at the very lowest end it is the holder's."""
+    below, above = _cut(parts, from_tip)
+    heavier = (replace(part, mass=part.mass + mass) for part in below[-1:])
+    return (*below[:-1], *heavier, *above)
 
 
 # Of the cutting diameter, as which flutes bend (Kops and Vo, CIRP Annals 39, 1990).

@@ -73,7 +73,7 @@ def check(
     sides, (low, high) = RovingSides.of(matrix, found, modes), found.data.frequency_hz[[0, -1]]
     lines = (matrix.frequency_hz >= low) & (matrix.frequency_hz <= high)
     driving = tuple(_driving(matrix, sides, lines, *pair) for pair in sides.driving)
-    reciprocity = _reciprocity(sides, found, modes)
+    reciprocity = _reciprocity(matrix, found, modes)
     # Least modes that tell of signs and places
     enough = modes.size >= 3
     # A sign is called wrong where less than this share of the modes' residues has the right one.
@@ -102,7 +102,7 @@ def check(
     single, entries = odd_entries(sides) if enough else ([], [])
     faults += single
     odd = tuple((sides.rows[row], sides.columns[column]) for row, column in entries)
-    untied = tuple(dof for dof in sides.columns if swapped and swapped.concerns(dof))
+    untied = tuple(dof for dof in sides.columns if swapped and dof in swapped.dofs)
     told = () if faults else _remarks(reciprocity)
     if not driving:
         told = (*told, "No point was hit where it was felt: shapes are not scaled.")
@@ -122,28 +122,29 @@ def _driving(
 
 
 def _reciprocity(
-    sides: RovingSides, found: MatrixPoles, modes: np.ndarray
+    matrix: FrfMatrix, found: MatrixPoles, modes: np.ndarray
 ) -> tuple[Reciprocity, ...]:
     """Of all pairs of points that were measured both ways."""
     # The heights of the peaks; the lines themselves differ wherever frequencies drift.
     decay, fit = np.abs(found.fit.poles[modes].real), found.fit
     height = fit.residue[:, modes] / decay
     noise = 2 * found.scale[modes] * fit.residue_variance[:, modes] / decay**2
-    entry = {pair: e for e, pair in enumerate(zip(found.rows, found.columns, strict=True))}
-    both = [(sides.rows.index(d), c) for c, d in enumerate(sides.columns) if d in sides.rows]
+    entry = {pair: e for e, pair in enumerate(zip(*found.places, strict=True))}
+    both = [
+        (d, matrix.index(d), i) for i, d in enumerate(matrix.references) if d in matrix.responses
+    ]
     out = []
-    for (row, column), (row_too, column_too) in combinations(both, 2):
+    for (dof, o, i), (dof_too, o_too, i_too) in combinations(both, 2):
         # Response at the second point to a hit at the first, and the other way round
-        pairs = [(row_too, column), (row, column_too)][:: -1 if sides.hit else 1]
-        if not all(pair in entry for pair in pairs):
+        e, other = entry.get((o_too, i)), entry.get((o, i_too))
+        if e is None or other is None:
             continue
-        e, other = (entry[pair] for pair in pairs)
         one, two = height[e], height[other]
         size = np.linalg.norm(one) * np.linalg.norm(two)
         ratio = float(np.real(np.vdot(one, two)) / max(np.linalg.norm(one) ** 2, 1e-300))
         beyond = np.linalg.norm(one - two) ** 2 - np.sum(noise[e] + noise[other])
         apart = float(np.sqrt(max(beyond, 0.0) / max(size, 1e-300)))
-        out.append(Reciprocity(sides.columns[column_too], sides.columns[column], apart, ratio))
+        out.append(Reciprocity(dof_too, dof, apart, ratio))
     return tuple(out)
 
 

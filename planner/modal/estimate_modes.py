@@ -7,10 +7,11 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.frf.frf import Frf
 from planner.modal.fit_data import Data, too_few_lines
-from planner.modal.least_squares import PoleFit, WeightedSets, reduced_together, shared_error
-from planner.modal.mode_selection import fit, model, presences, scales, strongest, weakness
+from planner.modal.least_squares import WeightedSets, reduced_together
+from planner.modal.mode_selection import fit, presences, scales, strongest, weakness
 from planner.modal.modes import LEAST_PROBABILITY, ModalModel, Mode
-from planner.modal.plscf import Diagram, PoleSet, diagram, plscf, stable
+from planner.modal.plscf import Diagram, PoleSet, diagram, ladder, plscf, stable
+from planner.modal.pole_fit import PoleFit, shared_error
 from planner.modal.residues import rank_one
 
 # Of the band's span, taken away above, then below; at most half of what lies beside a mode there,
@@ -27,7 +28,7 @@ def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
     """
     scale = scales(data, fitted)
     m = fitted.poles.size
-    own, common = _pairs(fitted.pole_covariance) * scale[:, None], _pairs(shared)
+    own, common = _pairs(fitted.covariance) * scale[:, None], _pairs(shared)
     factor = np.ones(m)
     for part, judged in _parts(data, fitted.poles).items():
         moved, covariance = _step(data, fitted, slice(*part))
@@ -66,11 +67,9 @@ def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndar
     Linearised where all lines have them: poles that a part does not hold would stray in a fit, to
     where their variance is that of another place.
     """
-    seen = data.response[..., part].reshape(data.entries, -1)
-    variance = fitted.variance[..., part].reshape(data.entries, -1)
-    sets = WeightedSets.of(data.lines.part(part), seen, variance)
+    sets = WeightedSets.of(data.lines.part(part), data.values[:, part], fitted.variance[:, part])
     point = reduced_together(sets, fitted.poles)
-    unit = np.sqrt(np.maximum(np.diag(fitted.pole_covariance), 1e-300))
+    unit = np.sqrt(np.maximum(np.diag(fitted.covariance), 1e-300))
     turned = np.outer(unit, unit)
     # Of the information on the best held pole: below, rounding rules
     covariance = np.linalg.pinv(point.normal * turned, rcond=1e-10, hermitian=True) * turned
@@ -94,14 +93,11 @@ class PoleIdentification:
     diagram: Diagram
     fit: PoleFit
     fit_error: float  # ‖H − fit‖/‖H‖
-    order: int
 
 
 def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | None:
     """All modes that the lines of `data` carry, None where there is no pole."""
-    # At least as many lines as half the unknowns of one column need, and once that to spare.
-    top = max(2, min(max_order, data.frequency_hz.size // 3))
-    orders = ladder(top)
+    orders = ladder(max_order, data.frequency_hz.size)
     weight = None if data.variance is None else 1 / np.mean(data.variance, axis=1)
     sets = plscf(data.frequency_hz, data.response, orders, weight)
     reach = (data.frequency_hz[0] * 0.95, data.frequency_hz[-1] * 1.05)
@@ -113,19 +109,8 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | Non
         return None
     fitted = fit(data, data.with_one_above(start))
     modes = modes_of_fit(data, fitted, sets)
-    error = np.linalg.norm(data.response - model(data, fitted))
-    relative = float(error / np.linalg.norm(data.response))
-    return PoleIdentification(modes, data, found, fitted, relative, top)
-
-
-def ladder(top: int) -> tuple[int, ...]:
-    """Model orders of the diagram: all at first, then every second, then every fourth.
-
-    High orders cost most (their cube) and differ least from their neighbours.
-    """
-    steps = ((2, 20, 1), (20, 40, 2), (40, top, 4))
-    orders = {n for low, high, step in steps for n in range(low, min(high, top) + 1, step)}
-    return tuple(sorted(orders | {top}))
+    relative = float(np.linalg.norm(fitted.error) / np.linalg.norm(data.response))
+    return PoleIdentification(modes, data, found, fitted, relative)
 
 
 def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Mode, ...]:
@@ -133,25 +118,23 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
     m = fitted.poles.size
     scale = scales(data, fitted)
     weak = weakness(data, fitted)
-    errors = data.force_errors(model(data, fitted))
-    shared_pole, shared_residue = shared_error(data.lines, fitted, errors)
+    shared_pole, shared_residue = shared_error(data, fitted)
     if data.step_s is None:
         scale = scale * inflation(data, fitted, shared_pole)
-    present = presences(data, fitted.poles, fitted.residues.residue)
+    present = presences(data, fitted.poles, fitted.residue)
     modes = []
     for k in range(m):
         if weak[k] > 1:
             continue
         index = [k, m + k]
-        covariance = scale[k] * fitted.pole_covariance[np.ix_(index, index)]
+        covariance = scale[k] * fitted.covariance[np.ix_(index, index)]
         covariance = covariance + shared_pole[np.ix_(index, index)]
         pole = complex(fitted.poles[k])
         frequency, damping, sd = natural(pole, covariance)
-        residue = fitted.residues.residue[..., k]
-        variance = scale[k] * np.mean(fitted.residue_variance[..., k], axis=-1)
-        variance = variance + np.mean(shared_residue[..., k], axis=-1)
+        residue = fitted.residue[:, k].reshape(data.response.shape[:2])
+        variance = scale[k] * fitted.residue_variance[:, k] + shared_residue[:, k]
         supported = support(pole - data.rate_1_s, sets)
-        residue_sd = np.sqrt(np.maximum(variance, 0.0))  # less by rounding alone
+        residue_sd = np.sqrt(variance).reshape(residue.shape)
         modes.append(
             Mode(
                 frequency, float(sd[0]), damping, float(sd[1]), residue, residue_sd,
@@ -217,7 +200,7 @@ def estimate_modes(frf: Frf, band_hz: tuple[float, float]) -> ModalModel:
             " with another tip, or check that the band holds a resonance."
         )
     remarks = _remarks(found, doubtful)
-    return ModalModel(modes, band_hz, found.fit_error, found.order, remarks, doubtful)
+    return ModalModel(modes, band_hz, found.fit_error, found.diagram.order, remarks, doubtful)
 
 
 def identification(frf: Frf, band_hz: tuple[float, float]) -> PoleIdentification | None:

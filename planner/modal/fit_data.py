@@ -1,6 +1,6 @@
 """What is fitted, and the plane in which its poles lie."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +21,8 @@ class Data:
     `force_window_s` say how the noise of the force spoils whole columns (see `Frf`). `near`:
     modes may lie close below the band. `above`: a pole above the lines stands for all modes there.
     `steady`: nothing changes between hits, so that poles close to each other are modes, however
-    alike.
+    alike. Of responses (e, 1, F) that were measured in several `sets` these are the entries
+    (indices) of each, `row` and `column` (e,) those of the matrix, columns of the few references.
     """
 
     frequency_hz: np.ndarray  # (F,)
@@ -35,6 +36,9 @@ class Data:
     near: bool = False
     above: bool = False
     steady: bool = False
+    sets: tuple[np.ndarray, ...] = ()
+    row: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    column: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
     @cached_property
     def lines(self) -> Lines:
@@ -85,26 +89,36 @@ class Data:
         return float(lines / np.tanh(lines)) if lines > 1e-6 else 1.0
 
     def force_errors(self, response: np.ndarray) -> np.ndarray:
-        """What noise of the force adds to responses (outputs, inputs, F), one sd of each source.
+        """What noise of the force adds to responses (e, F), one sd of each source.
 
-        Returns (n, outputs, inputs, F): white noise of the window is a sum of independent pulses,
+        Returns (n, e, F): white noise of the window is a sum of independent pulses,
         as many as tell its spectra apart in the band, each of which scales one input's column.
         """
-        if self.force_share is None:
-            return np.zeros((0, *response.shape), complex)
+        assert self.force_share is not None
         count = int(np.ceil(2 * self.force_window_s * self.frequency_hz[-1])) + 4
         times = self.force_window_s * ((np.arange(count) + 0.5) / count - 0.5)
         pulses = np.exp(-2j * np.pi * times[:, None] * self.frequency_hz) / np.sqrt(count)
-        inputs = response.shape[1]
+        response, inputs = response.reshape(self.response.shape), self.response.shape[1]
         errors = np.zeros((inputs, count, *response.shape), complex)
         for j, share in enumerate(self.force_share):
             scale = np.sqrt(share) * pulses
             errors[j, :, :, j] = -scale[:, None] * response[:, j]
-        return errors.reshape(-1, *response.shape)
+        return errors.reshape(-1, *self.values.shape)
 
     @property
     def entries(self) -> int:
         return self.response.shape[0] * self.response.shape[1]
+
+    @property
+    def values(self) -> np.ndarray:
+        """(e, F) responses, one entry after the other."""
+        return self.response.reshape(self.entries, -1)
+
+    def table(self, values: np.ndarray) -> np.ndarray:
+        """(r, c, …) of values (e, …), 0 where nothing was measured."""
+        out = np.zeros((self.row.max() + 1, self.column.max() + 1, *values.shape[1:]), complex)
+        out[self.row, self.column] = values
+        return out
 
     @property
     def threshold(self) -> float:

@@ -9,7 +9,6 @@ from planner.errors import InputError, RefusedError
 from planner.modal.estimate_modes import PoleIdentification, identify
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped, mac
-from planner.modal.mode_selection import model
 from planner.modal.modes import UNSCALED, ModalModel, Mode
 from planner.modal.residues import rank_one
 from planner.recording.records import Channel, TimeRecord
@@ -24,19 +23,15 @@ MARGIN, LEAST_LINES = 0.15, 6  # beyond the band that is fitted too; that suffic
 
 
 def analyse_record(
-    record: TimeRecord,
-    force_channel: str | None = None,
-    band_hz: tuple[float, float] | None = None,
+    record: TimeRecord, force_channel: str, band_hz: tuple[float, float] | None = None
 ) -> tuple[ModalModel, PoleIdentification]:
     """Modes of the free decays after each hit of a record; no use is made of the force's size.
 
-    The hits are found in `force_channel` (default: the channel of quantity force, else the only
-    one whose quantity differs from all others and that holds pulses; without one, the record is
-    one decay). `band_hz` defaults to what rate and length allow. Every mode's `shape` has one
-    entry per responding channel, in the order that the remarks name; residues are NaN because
-    nothing scales them. Remarks say which channels and pulses are faulty. Raises InputError for
-    an unknown force channel and RefusedError where no mode can be found. Returned beside the modes
-    is all that led to them (stabilisation diagram, fit).
+    The hits are found in `force_channel`. `band_hz` defaults to what rate and length allow. Every
+    mode's `shape` has one entry per responding channel, in the order that the remarks name;
+    residues are NaN because nothing scales them. Remarks say which channels and pulses are faulty.
+    Raises InputError for an unknown force channel and RefusedError where no mode can be found.
+    Returned beside the modes is all that led to them (stabilisation diagram, fit).
     """
     remarks = [*record.remarks, *(fault.text for fault in record.faults)]
     samples, names = _decays(record, _force(record, force_channel), remarks)
@@ -53,7 +48,7 @@ def analyse_record(
         + ", ".join(names)
         + "; without a usable force they are not scaled."
     )
-    return ModalModel(modes, band, found.fit_error, found.order, tuple(remarks)), found
+    return ModalModel(modes, band, found.fit_error, found.diagram.order, tuple(remarks)), found
 
 
 def _nothing(record: TimeRecord, band: tuple[float, float]) -> str:
@@ -63,21 +58,14 @@ def _nothing(record: TimeRecord, band: tuple[float, float]) -> str:
     )
 
 
-def _force(record: TimeRecord, name: str | None) -> Channel | None:
+def _force(record: TimeRecord, name: str) -> Channel:
     names = [channel.name for channel in record.channels]
-    if name is not None:
-        if name not in names:
-            raise InputError(f"{record.source} has no channel {name!r}; it has {', '.join(names)}.")
-        return record.channels[names.index(name)]
-    forces = [channel for channel in record.channels if channel.quantity == "force"]
-    if forces:
-        return forces[0]
-    kinds = [channel.quantity for channel in record.channels]
-    odd = [c for c in record.channels if kinds.count(c.quantity) == 1 and len(kinds) > 2]
-    return odd[0] if len(odd) == 1 and _hits(odd[0].samples).size else None
+    if name not in names:
+        raise InputError(f"{record.source} has no channel {name!r}; it has {', '.join(names)}.")
+    return record.channels[names.index(name)]
 
 
-def _hits(force: np.ndarray, apart: int = 1) -> np.ndarray:
+def _hits(force: np.ndarray, apart: int) -> np.ndarray:
     """Samples at which pulses peak, `apart` samples from each other at least."""
     size = np.abs(force - np.median(force))
     most = float(np.max(size, initial=0.0))
@@ -87,7 +75,7 @@ def _hits(force: np.ndarray, apart: int = 1) -> np.ndarray:
 
 
 def _decays(
-    record: TimeRecord, force: Channel | None, remarks: list[str]
+    record: TimeRecord, force: Channel, remarks: list[str]
 ) -> tuple[np.ndarray, tuple[str, ...]]:
     """Responses (channels, decays, n) from the end of each pulse on, and the channels' names."""
     rate = record.sampling_rate_hz
@@ -95,17 +83,15 @@ def _decays(
     values = np.array([c.samples for c in responses], float)
     if values.size == 0:
         raise RefusedError(f"{record.source} holds no response channel; record accelerations.")
-    starts = [0]
-    if force is not None:
-        apart = round(LEAST_DECAY_S * rate)
-        hits = _hits(force.samples, apart)
-        hits = hits[hits < values.shape[1] - apart]
-        if not hits.size:
-            raise RefusedError(
-                f"{record.source}: no hit stands out of channel {force.name}; hit harder."
-            )
-        starts = [_pulse_end(force.samples, int(hit), rate) for hit in hits]
-        _remark_on_pulse(force, hits, rate, remarks)
+    apart = round(LEAST_DECAY_S * rate)
+    hits = _hits(force.samples, apart)
+    hits = hits[hits < values.shape[1] - apart]
+    if not hits.size:
+        raise RefusedError(
+            f"{record.source}: no hit stands out of channel {force.name}; hit harder."
+        )
+    starts = [_pulse_end(force.samples, int(hit), rate) for hit in hits]
+    _remark_on_pulse(force, hits, rate, remarks)
     ends = [*starts[1:], values.shape[1]]
     margin = round(0.05 * rate)  # the foot of the next pulse
     length = min(e - s for s, e in zip(starts, ends, strict=True)) - margin
@@ -190,8 +176,8 @@ def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarr
     """Share of each channel's energy in the band that the modes explain."""
     data = found.data
     inside = (data.frequency_hz >= band[0]) & (data.frequency_hz <= band[1])
-    fitted = model(data, found.fit)
-    error = np.sum(np.abs(data.response - fitted)[..., inside] ** 2, axis=(1, 2))
+    error = found.fit.error.reshape(data.response.shape)
+    error = np.sum(np.abs(error[..., inside]) ** 2, axis=(1, 2))
     return 1 - error / np.sum(np.abs(data.response[..., inside]) ** 2, axis=(1, 2))
 
 

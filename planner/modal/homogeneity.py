@@ -16,7 +16,7 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
-from planner.frf.spectra import Windows, transform
+from planner.frf.spectra import transform
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac
 from planner.modal.modes import ForceLevel, Homogeneity, ModalModel, Mode
@@ -112,8 +112,7 @@ def _chance(
     """That hits, which miss as hands do, differ so much from level to level; None: no repeats."""
     hits = [hit for group in groups for hit in group]
     level = np.array([number for number, group in enumerate(groups) for _ in group])
-    windows = Windows(0.0, window_rate_1_s)
-    spectra = transform(tuple(hits), band_hz, windows)
+    spectra = transform(tuple(hits), band_hz, 0.0, window_rate_1_s)
     f = spectra.frequency_hz
     lines = (f >= band_hz[0]) & (f <= band_hz[1])
     frfs = np.array([(s.response / s.force)[:, lines].ravel() for s in spectra.hits])
@@ -129,7 +128,9 @@ def _chance(
         possible *= ways(level[own])
         real, random = between(seen.view(float), level[own], SHARED_OUT, rng)
         measured, shared = measured + real, shared + random
-    return chance(measured, shared) if 1 / possible <= CHANCE else None
+    # Of a sum as large as that measured, from those shared out at random
+    larger = int(np.count_nonzero(shared >= measured - 1e-9))
+    return (1 + larger) / (1 + SHARED_OUT) if 1 / possible <= CHANCE else None
 
 
 def _level(
@@ -172,7 +173,7 @@ def between(
 ) -> tuple[float, np.ndarray]:
     """n/2 ln of all scatter of values (n, m) over that within groups: as it is, and at random.
 
-    Sums over independent sets of members say more; the chance of so much is `chance`.
+    Sums over independent sets of members say more.
     """
     off = values - values.mean(axis=0)
     gram = off @ off.T
@@ -185,8 +186,3 @@ def between(
         within -= gram[own[:, :, None], own[:, None, :]].sum(axis=(1, 2)) / own.shape[1]
     told = -len(off) / 2 * np.log(np.maximum(within, 1e-12 * whole) / whole)
     return float(told[0]), told[1:]
-
-
-def chance(measured: float, shared: np.ndarray) -> float:
-    """Of a sum as large as `measured`, from those shared out at random (draws,)."""
-    return (1 + int(np.count_nonzero(shared >= measured - 1e-9))) / (1 + len(shared))

@@ -1,26 +1,19 @@
-"""Least squares over poles in the frequency domain, by maximum likelihood.
+"""The linear part of a fit of poles: residues at their best, and how χ² goes on from there.
 
 The residues enter linearly and are eliminated (variable projection, Golub and Pereyra 1973, in
 Kaufman's form), so that Gauss–Newton runs over the poles only. The noise of a line is circular
-complex normal with the stated variance E|δH|²; at the solution the linearised equations give the
-covariance of poles and residues (Pintelon and Schoukens, System Identification, 2012, ch. 9).
+complex normal with the stated variance E|δH|².
 
 Entries whose variance is a level for each times one profile of lines share one matrix: they are a
 set. Sets of few entries are computed together; a loop over them would spend most of its time
 between the sums.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.modal.residues import Lines, Residues, basis, basis_slope, stack, synthesize, unpack
-
-MAX_ITERATIONS = 30
-# Few lines around a resonance are fitted nearly quadratically: the damping may vanish at once.
-# At first, by how much less after a step that gained and more after one that did not, at most.
-DAMPING, LIGHTER, HEAVIER, MOST = 1e-3, 0.1, 10.0, 1e8
+from planner.modal.residues import Lines, basis, basis_slope, stack
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +37,13 @@ class WeightedSets:
         lines: Lines,
         response: np.ndarray,
         variance: np.ndarray,
-        sets: tuple[np.ndarray, ...] | None = None,
+        sets: tuple[np.ndarray, ...] = (),
     ) -> "WeightedSets":
         """From responses and variance (entries, F), in each set a level times a profile.
 
         Without `sets` all entries are one, or one each where their profiles differ.
         """
-        if sets is None:
+        if not sets:
             every = np.arange(len(response))
             sets = (every,) if proportional(variance) else tuple(every[:, None])
         entries = np.full((len(sets), max(map(len, sets))), -1)
@@ -132,37 +125,22 @@ def _block(data: WeightedSets, poles: np.ndarray, which: slice) -> tuple[np.ndar
     off = (found @ gram[:, :p, p:] - cross[..., p:]) * norm[:, None, p:] * weight[..., None]
     chi2 = np.sum(weight * (np.sum(values**2, -1) - np.sum(found * cross[..., :p], -1)), axis=1)
     coefficients = found / norm[:, None, :p]
+    k, e = weight.shape
     real, imag = coefficients[..., :m], coefficients[..., m : 2 * m]
-    first, second = off[..., :m], off[..., m:]
-    by_real = np.sum(real * first + imag * second, axis=1)
-    by_imag = np.sum(real * second - imag * first, axis=1)
+    # How the slope basis (u) combines into slopes by Re λ and Im λ (p), as in `slope_turn`
+    turn = np.stack([real, -imag, imag, real], axis=2)
+    products = turn.reshape(k, e, 4 * m).transpose(0, 2, 1) * weight[:, None]
+    products = (products @ turn.reshape(k, e, 4 * m)).reshape(k, 2, 2, m, 2, 2, m)
+    normal = np.einsum("kupmvqn,kumvn->kpmqn", products, curve.reshape(k, 2, m, 2, m))
+    gradient = np.einsum("keupm,keum->kpm", turn.reshape(k, e, 2, 2, m), off.reshape(k, e, 2, m))
     return (
         coefficients,
         np.maximum(chi2, 0.0),
-        np.concatenate([by_real, by_imag], axis=-1),
-        _normal(real, imag, weight, curve),
+        gradient.reshape(k, 2 * m),
+        normal.reshape(k, 2 * m, 2 * m),
         inverse / norm[:, :p, None] / norm[:, None, :p],
         turned * norm[:, None, p:] / norm[:, :p, None],
     )
-
-
-def _normal(
-    real: np.ndarray, imag: np.ndarray, weight: np.ndarray, curve: np.ndarray
-) -> np.ndarray:
-    """Σ_e w TᵀPT (k, 2m, 2m) for T = [[Re R, −Im R], [Im R, Re R]] of each entry's residues."""
-    m = real.shape[-1]
-    aa, ab = curve[:, :m, :m], curve[:, :m, m:]
-    ba, bb = curve[:, m:, :m], curve[:, m:, m:]
-
-    def sums(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-        return (weight[..., None] * one).transpose(0, 2, 1) @ other
-
-    rr, ri, ii = sums(real, real), sums(real, imag), sums(imag, imag)
-    ir = ri.transpose(0, 2, 1)
-    top = rr * aa + ri * ab + ir * ba + ii * bb
-    side = rr * ab - ri * aa + ir * bb - ii * ba
-    low = ii * aa - ir * ab - ri * ba + rr * bb
-    return np.block([[top, side], [side.transpose(0, 2, 1), low]])
 
 
 def proportional(weight: np.ndarray) -> bool:
@@ -181,106 +159,6 @@ def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:
     return turn
 
 
-@dataclass(frozen=True, eq=False)
-class PoleFit:
-    """Poles and residues at the minimum of χ² = Σ 2|H − fit|²/variance, and their covariance.
-
-    Poles and their covariance are in the plane of the lines, of `mode_selection.fit` in rad/s.
-    `excess` (F,) ≥ 1 is χ² per degree of freedom (and of information) around a line, 1 where that
-    was not asked for.
-    """
-
-    poles: np.ndarray  # (m,)
-    residues: Residues  # (outputs, inputs, m)
-    chi2: float
-    degrees: int  # degrees of freedom left
-    pole_covariance: np.ndarray  # (2m, 2m) of real parts (all modes), then imaginary parts
-    residue_variance: np.ndarray  # (outputs, inputs, 2, m) of real and imaginary parts
-    significance: np.ndarray  # (m,) rise of χ² if the mode were left out, poles of others held
-    coefficients: np.ndarray  # (entries, columns) of `residues.basis`
-    inverse: np.ndarray  # (entries, columns, columns) of their normal matrix, poles held
-    sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
-    variance: np.ndarray  # (outputs, inputs, F) that weighted the fit
-    excess: np.ndarray
-
-
-def refine(
-    lines: Lines,
-    response: np.ndarray,
-    variance: np.ndarray,
-    poles: np.ndarray,
-    allowed: Callable[[np.ndarray], bool],
-) -> PoleFit:
-    """Minimise the weighted error over poles and residues, starting from `poles`.
-
-    response and variance (outputs, inputs, F), finite, variance > 0, at `lines`; poles (m,),
-    m ≥ 1, in the plane of `lines`; a step to poles that are not `allowed` is shortened.
-    """
-    count = response.shape[-1]
-    data = WeightedSets.of(lines, response.reshape(-1, count), variance.reshape(-1, count))
-    poles = np.asarray(poles, complex)
-    point, damping = reduced_together(data, poles), DAMPING
-    # Damped Gauss-Newton steps (Levenberg-Marquardt)
-    for _ in range(MAX_ITERATIONS):
-        # In units in which the diagonal is 1: the damping is relative to it.
-        diagonal = np.diagonal(point.normal)
-        unit = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
-        damped = point.normal * np.outer(unit, unit) + damping * np.eye(len(unit))
-        step = -unit * np.linalg.lstsq(damped, unit * point.gradient)[0]
-        there = poles + complex_of(step)
-        tried = reduced_together(data, there) if allowed(there) else None
-        settled = tried is not None and damping < DAMPING and _still(point, tried, step)
-        if tried is not None and tried.chi2 < point.chi2:
-            poles, point, damping = there, tried, LIGHTER * damping
-        else:
-            damping *= HEAVIER
-        if settled or damping > MOST:
-            break
-    return _finish(data, poles, point, variance)
-
-
-def _still(before: ReducedFit, after: ReducedFit, step: np.ndarray) -> bool:
-    """Whether a step changed nothing: far below a standard deviation, or by rounding alone.
-
-    A short step tells nothing as long as damping keeps it short.
-    """
-    sds = np.abs(step) * np.sqrt(np.maximum(np.diag(before.normal), 0.0))
-    return bool(np.max(sds) < 1e-3 or abs(before.chi2 - after.chi2) < 1e-9 * before.chi2)
-
-
-def shared_error(lines: Lines, fit: PoleFit, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Covariance of poles (2m, 2m) and variance of residues that errors common to lines add.
-
-    errors (n, outputs, inputs, F): what each of n independent sources, at one standard deviation,
-    adds to the response. The residues' variance (outputs, inputs, 2, m) is that of real and
-    imaginary part.
-    """
-    m, count = fit.poles.size, fit.variance.shape[-1]
-    shape = fit.variance.shape[:2]
-    if not len(errors):
-        return np.zeros((2 * m, 2 * m)), np.zeros((*shape, 2, m))
-    p = fit.coefficients.shape[1]
-    poles = fit.poles
-    columns = np.concatenate([basis(lines, poles), basis_slope(lines, poles)])
-    both = np.concatenate([columns.real, columns.imag], axis=1)
-    weighted = (errors * 2 / fit.variance).reshape(len(errors), -1, count)
-    cross = np.concatenate([weighted.real, weighted.imag], axis=-1) @ both.T
-    turn = slope_turn(fit.coefficients, m)
-    gradient = np.einsum("eka,nek->na", turn, cross[..., p:])
-    gradient += np.einsum("eka,nek->na", fit.sensitivity, cross[..., :p])
-    change = gradient @ fit.pole_covariance
-    moved = np.einsum("ekl,nel->nek", fit.inverse, cross[..., :p])
-    moved += np.einsum("eka,na->nek", fit.sensitivity, change)
-    residue = np.sum(moved[..., : 2 * m] ** 2, axis=0)
-    return change.T @ change, residue.reshape(*shape, 2, m)
-
-
-def complex_of(parts: np.ndarray) -> np.ndarray:
-    """(…, m) of real, then imaginary parts (…, 2m)."""
-    real, imag = np.split(parts, 2, axis=-1)
-    return real + 1j * imag
-
-
 def scaled_inverse(
     normal: np.ndarray, rcond: float = 1e-15, least: np.ndarray | float = 1e-300
 ) -> np.ndarray:
@@ -291,46 +169,3 @@ def scaled_inverse(
     unit = np.sqrt(np.maximum(np.diag(normal).real, least))
     inverse = np.linalg.pinv(normal / unit[:, None] / unit, rcond=rcond, hermitian=True)
     return inverse / unit[:, None] / unit
-
-
-def _finish(
-    data: WeightedSets, poles: np.ndarray, point: ReducedFit, variance: np.ndarray
-) -> PoleFit:
-    shape, count = variance.shape[:2], variance.shape[-1]
-    m, entries, p = poles.size, shape[0] * shape[1], point.inverse.shape[-1]
-    covariance = np.linalg.pinv(point.normal, hermitian=True)
-    coefficients = point.coefficients.reshape(-1, p)
-    inverse = (point.inverse[:, None] / data.weight[..., None, None]).reshape(-1, p, p)
-    sensitivity = point.sensitivity.reshape(-1, p, 2 * m)
-    spread = np.einsum("eka,ab,ekb->ek", sensitivity, covariance, sensitivity)
-    # Of rounding, where lines without noise leave curvatures almost singular, variances below 0
-    square = np.maximum(np.einsum("ekk->ek", inverse) + spread, 0.0)
-    return PoleFit(
-        poles,
-        unpack(coefficients.reshape(*shape, p), m),
-        float(point.chi2),
-        2 * count * entries - entries * p - 2 * m,
-        covariance,
-        square[:, : 2 * m].reshape(*shape, 2, m),
-        point.significance(data.weight),
-        coefficients,
-        inverse,
-        sensitivity,
-        variance,
-        np.ones(count),
-    )
-
-
-def fitted(
-    data: WeightedSets, point: ReducedFit, poles: np.ndarray, lines: Lines
-) -> tuple[np.ndarray, np.ndarray]:
-    """Residues (entries, m) and the responses (entries, F) that they make at `lines`."""
-    m, entries = poles.shape[1], int(np.max(data.entries)) + 1
-    residue, response = np.zeros((entries, m), complex), np.zeros((entries, lines.x.size), complex)
-    for k, own in enumerate(poles):
-        there = data.entries[k] >= 0
-        found = unpack(point.coefficients[k, there], m)
-        residue[data.entries[k, there]] = found.residue
-        made = Residues(found.residue[:, None], found.rest[:, None])
-        response[data.entries[k, there]] = synthesize(lines, own, made)[:, 0]
-    return residue, response

@@ -12,7 +12,7 @@ from planner.modal.mac import phase_collinearity, phase_deviation_deg, real_norm
 from planner.modal.matrix_poles import MatrixPoles, identify_matrix
 from planner.modal.modes import UNSCALED, Eigenvectors, Mode
 from planner.modal.motion_fields import expected
-from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, fit_shape, row_gain
+from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, row_gain
 from planner.modal.residues import realign
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
@@ -67,14 +67,13 @@ def modes_of_matrix(
 def _put_right(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> MatrixPoles:
     """With residues of turned points as they should be; odd ones count for nothing."""
     roved, stayed = matrix.roved.responses, matrix.roved.references
-    named = [(roved[r], stayed[c]) for r, c in zip(found.rows, found.columns, strict=True)]
+    named = [(roved[r], stayed[c]) for r, c in zip(found.data.row, found.data.column, strict=True)]
     turned = [(r in checks.turned_rows) != (s in checks.turned) for r, s in named]
     sign = np.where(turned, -1.0, 1.0)[:, None]
     # A residue that does not fit the others counts with so many times its variance.
     doubt = np.where([pair in checks.odd for pair in named], 1e8, 1.0)[:, None]
-    fit = found.fit
-    residue, variance = fit.residue * sign, fit.residue_variance * doubt
-    return replace(found, fit=replace(fit, residue=residue, residue_variance=variance))
+    own, variance = found.fit.coefficients * sign, found.fit.residue_variance * doubt
+    return replace(found, fit=replace(found.fit, coefficients=own, residue_variance=variance))
 
 
 def _points(
@@ -85,7 +84,7 @@ def _points(
     References whose column does not go with their row are points of their own, behind the others.
     A point that was only hit is among them where a driving point ties its size to the rest.
     """
-    responses, references = np.array(list(found.entries)).T
+    responses, references = found.places
     tied = [d for d in matrix.references if d not in checks.untied] if checks.driving else []
     seen = {matrix.responses[o] for o in responses}
     dofs = tuple(sorted({*seen, *tied}, key=by_number))
@@ -103,17 +102,11 @@ def _shapes(found: MatrixPoles, modes: list[int], entries: Entries) -> list[Fitt
 
     Points that are rows and columns tell it, at first fitted with their gains left free.
     """
-
-    def fitted(k: int, gain: float, near: np.ndarray | None) -> FittedShape:
-        residue = found.fit.residue[:, k]
-        variance = found.scale[k] * found.fit.residue_variance[:, k]
-        return fit_shape(entries, residue, variance, found.fit.poles[k].imag, gain, near)
-
     if np.intersect1d(entries.rows, entries.columns).size < 2:
-        return [fitted(k, 0.0, None) for k in modes]
-    free = [fitted(k, FREE_GAIN, None) for k in modes]
+        return [found.shape(k, entries) for k in modes]
+    free = [found.shape(k, entries, FREE_GAIN) for k in modes]
     gain = row_gain(free)
-    return [fitted(k, gain, one.shape) for k, one in zip(modes, free, strict=True)]
+    return [found.shape(k, entries, gain, one.shape) for k, one in zip(modes, free, strict=True)]
 
 
 def _with_vectors(
@@ -127,7 +120,7 @@ def _with_vectors(
     scales.
     """
     felt, hit = len(matrix.responses), len(matrix.references)
-    responses, references = np.array(list(found.entries)).T
+    responses, references = found.places
     entries = Entries(responses, felt + references, felt + hit)
     group, _ = entries.groups
     if len(np.unique(group[entries.rows])) > 1:
@@ -136,8 +129,7 @@ def _with_vectors(
     o, i = np.array(there, int).reshape(-1, 2).T
 
     def apart(k: int, mode: Mode) -> Eigenvectors:
-        variance = found.scale[k] * found.fit.residue_variance[:, k]
-        fitted = fit_shape(entries, found.fit.residue[:, k], variance, found.fit.poles[k].imag)
+        fitted = found.shape(k, entries)
         right, left = fitted.shape[:felt], fitted.shape[felt:]
         alike = np.sum(left[i] * right[o].conj()) / max(np.sum(np.abs(right[o]) ** 2), 1e-300)
         factor = np.sqrt(alike) if abs(alike) > 0 else realign(right)
@@ -171,7 +163,7 @@ def _mode(found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, sca
     return Mode(
         frequency, float(sd[0]), damping, float(sd[1]), *UNSCALED, shape,
         likely, shape_sd, scaled, phase_collinearity(shape), phase_deviation_deg(shape),
-        fitted.misfit, float(spread),
+        float(spread),
     )  # fmt: skip
 
 

@@ -8,16 +8,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
-from planner.frf.spectra import running_mean
-from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
-from planner.modal.least_squares import refine
-from planner.modal.mode_selection import doubt, excess, falls, presences
-from planner.modal.plscf import Diagram, diagram, plscf, row_errors, stable
-from planner.modal.set_poles import ROUNDS, DivergedPolesError, SetData, SetPoles, fit_sets
+from planner.modal.mode_selection import (
+    doubt,
+    excess,
+    falls,
+    first_variance,
+    presences,
+    scales,
+    scatter,
+)
+from planner.modal.plscf import Diagram, diagram, ladder, plscf, row_errors, stable
+from planner.modal.pole_fit import ROUNDS, DivergedPolesError, PoleFit, fit_sets, refine
+from planner.modal.rank_one_fit import Entries, FittedShape, fit_shape
 from planner.modal.set_search import reestimated_sets
 from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
 
+MAX_ORDER = 36
 MARGIN = 0.05  # of the band, beyond its edges
 # Of rows that fit the denominator of all the worse than the median by more than this, the weight is
 # taken down, so many times over; fewer rows than these cannot tell.
@@ -32,36 +39,39 @@ SETTLING = 2  # rounds of a fit that has been fitted before, to other lines or b
 
 @dataclass(frozen=True, eq=False)
 class MatrixPoles:
-    """Poles common to all FRFs and what they came from; entries by `rows` and `columns`.
+    """Poles common to all FRFs and what they came from.
 
-    Rows are the points of the longer side (which roved), `hit` or felt; columns those that stayed.
-
-    `fit.residue` (e, m) of each entry; `scale` (m,) by which noise around a mode exceeds its
-    variance; `weak` (m,) as `mode_selection.weakness`, `presence` (m,) share of the response.
+    Rows of `data` are the points of the longer side (which roved), `hit` or felt; columns those
+    that stayed. `scale` (m,) by which noise around a mode exceeds its variance; `weak` (m,) as
+    `mode_selection.doubt`, `presence` (m,) share of the response.
     """
 
     data: Data
-    fit: SetPoles
+    fit: PoleFit
     diagram: Diagram
-    rows: np.ndarray
-    columns: np.ndarray
     scale: np.ndarray
     weak: np.ndarray
     presence: np.ndarray
-    order: int
     hit: bool
 
     @property
-    def entries(self) -> dict[tuple[int, int], int]:
-        """Which entry is that of a response and a reference (indices)."""
-        pairs = zip(self.rows.tolist(), self.columns.tolist(), strict=True)
-        return {pair[::-1] if self.hit else pair: e for e, pair in enumerate(pairs)}
+    def places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Response and reference (indices) of each entry."""
+        row, column = self.data.row, self.data.column
+        return (column, row) if self.hit else (row, column)
+
+    def shape(
+        self, k: int, entries: Entries, gain: float = 0.0, near: np.ndarray | None = None
+    ) -> FittedShape:
+        """Of a mode (index); `entries` have the fit's order, the rest is as in `fit_shape`."""
+        variance = self.scale[k] * self.fit.residue_variance[:, k]
+        damped_1_s = self.fit.poles[k].imag
+        return fit_shape(entries, self.fit.residue[:, k], variance, damped_1_s, gain, near)
 
     @property
     def fit_error(self) -> float:
         """‖H − fit‖/‖H‖."""
-        error = np.linalg.norm(self.data.response[:, 0] - self.fit.fitted)
-        return float(error / np.linalg.norm(self.data.response))
+        return float(np.linalg.norm(self.fit.error) / np.linalg.norm(self.data.response))
 
 
 def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPoles | None:
@@ -78,26 +88,28 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     rows, columns = np.nonzero(matrix.measured)
     response = matrix.accelerance[rows, columns][:, None, chosen]
     rate = matrix.exponential_rate_1_s
-    data = Data(f[chosen], response, None, rate, tail_s=matrix.tail_s, near=True, above=True)
+    # Entries measured together: those of one node of the side that roved
+    nodes = np.array([matrix.responses[k].node for k in rows])
+    sets = tuple(np.flatnonzero(nodes == node) for node in dict.fromkeys(nodes.tolist()))
+    data = Data(
+        f[chosen], response, None, rate, tail_s=matrix.tail_s, near=True, above=True, sets=sets,
+        row=rows, column=columns,
+    )  # fmt: skip
     # A record cut off while it rings leaves ripples, which polynomials take for poles.
     smooth = matrix.ended or matrix
-    orders, found = _diagram(smooth, chosen)
+    found = _diagram(smooth, chosen)
     start = np.array([line.pole for line in stable(found)]) + smooth.exponential_rate_1_s
     if not start.size:
         return None
     start = data.with_one_above(start)
-    # Entries measured together: those of one node of the side that roved
-    nodes = np.array([matrix.responses[k].node for k in rows])
-    sets = tuple(np.flatnonzero(nodes == node) for node in dict.fromkeys(nodes.tolist()))
-    fit, variance = select_modes(SetData(data, sets, rows, columns), start)
+    fit = select_modes(data, start)
     if not fit.poles.size:
         return None
-    scale, weak, presence = judged(data, fit, variance)
-    told = scale, weak, presence, orders[-1], hit
-    return MatrixPoles(data, fit, found, rows, columns, *told)
+    told = scales(data, fit), doubt(data, fit), presences(data, fit.poles, fit.residue)
+    return MatrixPoles(data, fit, found, *told, hit)
 
 
-def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Diagram]:
+def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> Diagram:
     """Poles of every model order, from the rows that hold all of the references used."""
     table, measured = matrix.accelerance[..., chosen], matrix.measured
     columns = _references(measured)
@@ -105,8 +117,7 @@ def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Di
     block = table[complete][:, columns]
     level = np.mean(np.abs(block) ** 2, axis=(1, 2))
     weight = np.ones(block.shape[::2]) / np.maximum(level, 1e-300)[:, None]
-    # Max order.
-    orders = ladder(max(2, min(36, block.shape[-1] // 3)))
+    orders = ladder(MAX_ORDER, block.shape[-1])
     frequency = matrix.frequency_hz[chosen]
     # Rows that do not go with the others are taken down.
     changed = weight
@@ -115,7 +126,7 @@ def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Di
         usual = max(float(np.median(errors)), 1e-300)
         changed = weight * np.minimum(1.0, ODD * usual / np.maximum(errors, 1e-300))[:, None] ** 2
     sets = plscf(frequency, block, orders, changed)
-    return orders, diagram(sets, (frequency[0] * 0.95, frequency[-1] * 1.05))
+    return diagram(sets, (frequency[0] * 0.95, frequency[-1] * 1.05))
 
 
 def _references(measured: np.ndarray) -> np.ndarray:
@@ -130,105 +141,70 @@ def _references(measured: np.ndarray) -> np.ndarray:
     return np.array(best)
 
 
-def _variance(data: Data, fit: SetPoles) -> np.ndarray:
-    """(e, F) from the error of a fit: a level for each entry times one profile of lines."""
-    square = np.abs(data.response[:, 0] - fit.fitted) ** 2
-    flat = np.mean(square, axis=-1, keepdims=True)
-    lines = square.shape[1]
-    floor = 1e-20 * np.mean(np.abs(data.response[:, 0]) ** 2, axis=-1, keepdims=True)
-    profile = running_mean(np.mean(square / np.maximum(flat, floor), axis=0), max(10, lines // 20))
-    lost = max(0.1, 1 - (fit.poles.size + len(data.lines.rest)) / lines)
-    return flat * (0.9 * profile + 0.1) / lost + floor
-
-
-def select_modes(given: SetData, poles: np.ndarray) -> tuple[SetPoles, np.ndarray]:
+def select_modes(data: Data, poles: np.ndarray) -> PoleFit:
     """Fit with every set's own poles, weak modes left out and missing ones added."""
-    data, response = given.data, given.data.response[:, 0]
-    power = np.mean(np.abs(response) ** 2, axis=-1, keepdims=True)
     # At first all entries share poles that stay as they are: poles that were refined so would leave
     # weak modes to imitate how strong ones drift.
-    together = replace(given, sets=(np.arange(len(power)),))
-    fit = fit_sets(together, np.broadcast_to(power, response.shape), poles, rounds=0)
-    fit = _fit(given, variance := _variance(data, fit), poles, rounds=0)
+    together = replace(data, sets=(np.arange(data.entries),))
+    begun = scatter(data, fit_sets(together, first_variance(data), poles, rounds=0), alike=True)
+    fit = _fit(data, begun, poles, rounds=0)
     # Rough rounds of the first fit, whose weights do not know yet how sets differ
-    fit = _fit(given, variance, fit.poles, fit.own, 2)
+    fit = _fit(data, begun, fit.poles, fit.own, 2)
     searched = False
     # Passes of leaving out and adding
     for _ in range(4):
-        variance = _variance(data, fit)
         # Not before: sets would be moved to where they imitate the modes that a fit lacks.
-        if searched:
-            fit, variance = _settled(given, fit)
-        _, weak, presence = judged(data, fit, variance)
+        fit = _settled(data, fit) if searched else fit
+        present = presences(data, fit.poles, fit.residue) >= PRESENT
         # Poles above the last line stand for all modes there.
-        left = fit.part(data.is_above(fit.poles) | (weak <= 1) & (presence >= PRESENT))
-        poles, own = merged_modes(given, left, variance)
+        left = fit.part(data.is_above(fit.poles) | (doubt(data, fit) <= 1) & present)
+        poles, own = merged_modes(data, left)
         # What a fit lacks is looked for where it has no mode too many.
         if poles.size == fit.poles.size:
             if searched:
                 break
-            added, searched = _missing(given, fit, variance), True
+            added, searched = _missing(data, fit), True
             poles = np.append(poles, added)
             own = np.column_stack([own, np.tile(added, (len(own), 1))])
             if not added.size:
                 continue
         if not poles.size:
-            return replace(left, poles=poles), variance
-        fit = _fit(given, variance, poles, own)
-    fit, variance = _settled(given, fit)
-    fit = _fit(given, variance, fit.poles, fit.own, SETTLING, every=True)
-    return fit, _variance(data, fit)
+            return left
+        fit = _fit(data, fit.variance, poles, own)
+    fit = _settled(data, fit)
+    return _fit(data, fit.variance, fit.poles, fit.own, SETTLING, every=True)
 
 
-def _settled(given: SetData, fit: SetPoles) -> tuple[SetPoles, np.ndarray]:
-    """The fit, and its variance, after those sets have been searched again that fit badly."""
-    variance = _variance(given.data, fit)
-    own = reestimated_sets(given, fit, variance)
-    if own is None:
-        return fit, variance
-    fit = _fit(given, variance, fit.poles, own, SETTLING)
-    return fit, _variance(given.data, fit)
+def _settled(data: Data, fit: PoleFit) -> PoleFit:
+    """The fit after those sets have been searched again that fit badly."""
+    own = reestimated_sets(data, fit)
+    return fit if own is None else _fit(data, fit.variance, fit.poles, own, SETTLING)
 
 
 def _fit(
-    given: SetData, variance: np.ndarray, poles: np.ndarray, known: np.ndarray | None = None,
+    data: Data, variance: np.ndarray, poles: np.ndarray, known: np.ndarray | None = None,
     rounds: int = ROUNDS, every: bool = False,
-) -> SetPoles:  # fmt: skip
-    """Fit on thinned lines (or `every` one near a mode); poles that stray are left out."""
+) -> PoleFit:  # fmt: skip
+    """Fit on thinned lines (or `every` one near a mode); poles that stray are left out.
+
+    Its variance is that of its own error, by which what follows is judged and weighted.
+    """
     while True:
         try:
-            lines = thinned(given.data, poles, every)
-            return fit_sets(given, variance, poles, rounds, known, lines)
+            lines = thinned(data, poles, every)
+            found = fit_sets(data, variance, poles, rounds, known, lines)
         except DivergedPolesError as error:
             poles, known = poles[~error.astray], None
+        else:
+            found = replace(found, variance=scatter(data, found, alike=True))
+            return replace(found, excess=excess(data, found))
 
 
-def judged(
-    data: Data, fit: SetPoles, variance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(m,) noise beyond its variance, weakness (above 1: not established) and presence."""
-    frequency = np.abs(fit.poles) / (2 * np.pi)
-    scale = np.interp(frequency, data.frequency_hz, _excess(data, fit, variance))
-    # How the sets differ does not blur a mode: each has a pole of its own.
-    alone = np.diag(fit.covariance) - fit.spread / len(fit.own)
-    weak = doubt(data, fit.poles, alone, fit.significance, scale)
-    return scale, weak, presences(data, fit.poles, fit.residue)
-
-
-def _excess(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
-    """(F,) χ² per degree of freedom around each line, at least 1."""
-    error = (data.response[:, 0] - fit.fitted)[:, None]
-    m, each = fit.poles.size, fit.poles.size + len(data.lines.rest)
-    return excess(data, error, variance[:, None], 2 * (error.size - m - data.entries * each))
-
-
-def _missing(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
+def _missing(data: Data, fit: PoleFit) -> np.ndarray:
     """Poles that the error still tells of, each tried on the lines around it."""
-    data = given.data
     added: list[complex] = []
-    error = data.response[:, 0] - fit.fitted
-    weight = 2 / variance / _excess(data, fit, variance)
-    poles, fall = falls(data, weight, weight * error)
+    weight = 2 / fit.variance / fit.excess
+    poles, fall = falls(data, weight, weight * fit.error)
     failed, step = 0, data.frequency_hz[1] - data.frequency_hz[0]
     fall[poles.imag / (2 * np.pi) < LINES_BELOW * step] = 0.0
     # Most added.
@@ -238,7 +214,7 @@ def _missing(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
         if fall[best] <= data.threshold or failed == 2:
             break
         pole = complex(poles[best])
-        found = _tried(given, fit, variance, pole)
+        found = _tried(data, fit, pole)
         fall[np.abs(poles - pole) < REACH * abs(pole.real)] = 0.0
         if found is not None and any(abs(found - p) < abs(p.real) for p in added):
             found = None
@@ -249,26 +225,25 @@ def _missing(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
     return np.array(added, complex)
 
 
-def _tried(given: SetData, fit: SetPoles, variance: np.ndarray, pole: complex) -> complex | None:
+def _tried(data: Data, fit: PoleFit, pole: complex) -> complex | None:
     """The pole after a fit of the lines around it, where it is a mode; None where it is not."""
-    some, lines, near = around(given, fit, pole)
-    local, variance = some.data, variance[:, lines]
+    local, lines, near = around(data, fit, pole)
+    variance = fit.variance[:, lines]
     start = np.append(fit.poles[near], pole)
-    together = np.broadcast_to(variance[:, None], local.response.shape)
-    quick = refine(local.lines, local.response, together, start, local.allowed)
-    if presences(local, quick.poles, quick.residues.residue)[-1] < PRESENT_ADDED / 2:
+    quick = refine(local, variance, start)
+    if presences(local, quick.poles, quick.residue)[-1] < PRESENT_ADDED / 2:
         return None
     known = fit.own[:, near]
     own = np.column_stack([known, np.full(len(known), quick.poles[-1])])
     start = np.append(fit.poles[near], quick.poles[-1])
     try:
-        after = fit_sets(some, variance, start, known=own)
+        after = fit_sets(local, variance, start, known=own)
         new = after.poles[-1]
         inside = local.frequency_hz[0] < new.imag / (2 * np.pi) < local.frequency_hz[-1]
         present = presences(local, after.poles, after.residue)[-1]
         if not (inside and present >= PRESENT_ADDED and -new.real < DAMPING_ADDED * abs(new)):
             return None
-        before = fit_sets(some, variance, fit.poles[near], SETTLING, known)
+        before = fit_sets(local, variance, fit.poles[near], SETTLING, known)
     except DivergedPolesError:
         return None
-    return complex(new) if explains(some, before, after, variance) else None
+    return complex(new) if explains(local, before, after) else None

@@ -1,6 +1,5 @@
 """Which poles are modes: fit, leave out what the data do not need, add what they still miss."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -9,8 +8,8 @@ import numpy as np
 
 from planner.frf.spectra import running_mean, window_sum
 from planner.modal.fit_data import Data
-from planner.modal.least_squares import PoleFit, refine
-from planner.modal.residues import basis, rank_one, synthesize, unit
+from planner.modal.pole_fit import PoleFit, refine
+from planner.modal.residues import basis, rank_one, unit
 
 # Damping ratios of the atoms with which the error is searched.
 TRIAL_DAMPING = (0.003, 0.01, 0.03, 0.08)
@@ -63,23 +62,20 @@ def _atoms(data: Data) -> list[np.ndarray]:
     return atoms
 
 
-MAX_ROUNDS = 12
+MOST_TRIED = 12  # modes beside those of the start
 MAX_DAMPING = 0.3
 # Neighbours closer than this (half bandwidths, share of frequency) and alike by MAC are one mode.
 TWIN_WIDTHS, TWIN_SHARE, TWIN_MAC = 1.5, 0.02, 0.95
 
 
-def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
-    """Fit from starting poles (m,), leaving out and adding modes until neither helps.
-
-    `rounds` is how many modes may be tried beside those of the start.
-    """
+def fit(data: Data, start: np.ndarray) -> PoleFit:
+    """Fit from starting poles (m,), leaving out and adding modes until neither helps."""
     current = _refine(data, start, None)
     current = _prune(data, current)
     tried: list[complex] = []
-    for _ in range(rounds):
+    for _ in range(MOST_TRIED):
         variance = current.variance * current.excess
-        candidate = _best_atom(data, variance, _error(data, current), tried)
+        candidate = _best_atom(data, variance, current.error, tried)
         if candidate is None:
             break
         tried.append(candidate)
@@ -93,67 +89,44 @@ def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
 def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
     """The fit from poles; an unknown variance is taken from the error itself."""
     known = data.variance is not None
-    variance = _first_variance(data) if known or before is None else before.variance
-
-    def fitted(start: np.ndarray) -> PoleFit:
-        plane = data.to_plane(start)
-        found = refine(data.lines, data.response, variance, plane, data.allowed)
-        return found if data.step_s is None else _in_rad_s(data, found, data.step_s)
-
-    refined = fitted(poles)
+    variance = first_variance(data) if known or before is None else before.variance
+    refined = refine(data, variance, poles)
     for _ in range(0 if known else 2 if before is None else 1):
-        variance = _scatter(data, refined)
-        refined = fitted(refined.poles)
-    beyond = excess(data, _error(data, refined), variance, refined.degrees)
-    return replace(refined, excess=beyond)
+        variance = scatter(data, refined)
+        refined = refine(data, variance, refined.poles)
+    return replace(refined, excess=excess(data, refined))
 
 
-def _first_variance(data: Data) -> np.ndarray:
-    """The known variance, or the power of each response."""
+def first_variance(data: Data) -> np.ndarray:
+    """(e, F) known variance, or the power of each response."""
     if data.variance is not None:
-        return data.variance
-    power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
-    return np.broadcast_to(power, data.response.shape)
+        return data.variance.reshape(data.entries, -1)
+    power = np.mean(np.abs(data.values) ** 2, axis=-1, keepdims=True)
+    return np.broadcast_to(power, data.values.shape)
 
 
-def _scatter(data: Data, refined: PoleFit) -> np.ndarray:
-    """Variance from the error of the fit, a running mean over a tenth of the lines."""
-    square = np.abs(_error(data, refined)) ** 2
-    lines = data.frequency_hz.size
-    lost = 1 - (2 * refined.poles.size + 2 * len(data.lines.rest)) / (2 * lines)
-    local = running_mean(square, max(10, lines // 20))
-    flat = np.mean(square, axis=-1, keepdims=True)
-    # A little of the overall level keeps quiet stretches from being trusted without limit.
-    # Least noise relative to the FRF: below it rounding rules.
-    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + 1e-10**2 * _first_variance(data)
+def scatter(data: Data, fit: PoleFit, alike: bool = False) -> np.ndarray:
+    """(e, F) variance from the error of a fit, a running mean over a tenth of the lines.
 
-
-def _error(data: Data, refined: PoleFit) -> np.ndarray:
-    return data.response - model(data, refined)
-
-
-def model(data: Data, refined: PoleFit) -> np.ndarray:
-    """Fitted responses (outputs, inputs, F)."""
-    return synthesize(data.lines, data.to_plane(refined.poles), refined.residues)
-
-
-def _in_rad_s(data: Data, refined: PoleFit, step_s: float) -> PoleFit:
-    """Poles and their covariance carried from the z-plane to the s-plane."""
-    slope = 1 / (refined.poles * step_s)
-    real, imag = np.diag(slope.real), np.diag(slope.imag)
-    turn = np.block([[real, -imag], [imag, real]])
-    covariance = turn @ refined.pole_covariance @ turn.T
-    return replace(refined, poles=data.to_poles(refined.poles), pole_covariance=covariance)
-
-
-def excess(data: Data, error: np.ndarray, variance: np.ndarray, degrees: int) -> np.ndarray:
-    """(F,) χ² per degree of freedom in a window of lines, at least 1 and the overall one.
-
-    error and variance (outputs, inputs, F); `degrees` of freedom that the fit left.
+    With `alike` it is a level for each response times that of all of them.
     """
-    error = np.mean(np.abs(error) ** 2 / variance, axis=(0, 1))
+    square, lines = np.abs(fit.error) ** 2, data.frequency_hz.size
+    flat = np.mean(square, axis=-1, keepdims=True)
+    # Least noise relative to the FRF: below it rounding rules.
+    floor = 1e-10**2 * first_variance(data)
+    if alike:
+        square = flat * np.mean(square / np.maximum(flat, floor), axis=0)
+    lost = 1 - (fit.poles.size + len(data.lines.rest)) / lines
+    local = running_mean(square, max(10, lines // 20))
+    # A little of the overall level keeps quiet stretches from being trusted without limit.
+    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + floor
+
+
+def excess(data: Data, fit: PoleFit) -> np.ndarray:
+    """(F,) χ² per degree of freedom in a window of lines, at least 1 and the overall one."""
+    error, m = np.mean(np.abs(fit.error) ** 2 / fit.variance, axis=0), fit.poles.size
     lines = error.size
-    freedom = degrees / (2 * lines * data.entries)
+    freedom = 1 - (m + len(data.lines.rest) + m / data.entries) / lines
     half = max(5, lines // 40)
     count = window_sum(np.ones(lines), half)
     local = running_mean(error, half) / max(freedom, 0.1)
@@ -198,7 +171,8 @@ def _twins(data: Data, current: PoleFit) -> tuple[int, int] | None:
     if data.response.shape[0] < 2:
         return None
     order = np.argsort(current.poles.imag)
-    shapes = [rank_one(current.residues.residue[..., k])[0] for k in range(order.size)]
+    residue = current.residue.reshape(*data.response.shape[:2], -1)
+    shapes = [rank_one(residue[..., k])[0] for k in range(order.size)]
     for a, b in pairwise(order):
         apart = abs(current.poles[a] - current.poles[b])
         width = np.max(data.rate_1_s - current.poles[[a, b]].real)
@@ -208,25 +182,18 @@ def _twins(data: Data, current: PoleFit) -> tuple[int, int] | None:
     return None
 
 
-def weakness(data: Data, current: PoleFit) -> np.ndarray:
+def weakness(data: Data, fit: PoleFit) -> np.ndarray:
     """(m,) above 1 where a mode is not established, 0 for the pole above the lines."""
-    weak = doubt(
-        data, current.poles, np.diag(current.pole_covariance), current.significance,
-        scales(data, current),
-    )  # fmt: skip
-    return np.where(data.is_above(current.poles), 0.0, weak)
+    return np.where(data.is_above(fit.poles), 0.0, doubt(data, fit))
 
 
-def doubt(
-    data: Data, poles: np.ndarray, variance: np.ndarray, significance: np.ndarray, scale: np.ndarray
-) -> np.ndarray:
-    """(m,) above 1 where a mode is not established: no fall of χ², blurred, or too damped.
-
-    Poles (m,) in rad/s with variance (2m,) of real, then imaginary parts; `scale` (m,) on that.
-    """
-    m, sd = poles.size, np.sqrt(np.maximum(variance, 0.0))
+def doubt(data: Data, fit: PoleFit) -> np.ndarray:
+    """(m,) above 1 where a mode is not established: no fall of χ², blurred, or too damped."""
+    poles, m, scale = fit.poles, fit.poles.size, scales(data, fit)
+    # How the sets differ does not blur a mode: each has a pole of its own.
+    sd = np.sqrt(np.maximum(np.diag(fit.covariance) - fit.spread / len(fit.own), 0.0))
     decay = np.maximum(data.rate_1_s - poles.real, 1e-12 * np.abs(poles))
-    found = data.threshold * scale / np.maximum(significance, 1e-300)
+    found = data.threshold * scale / np.maximum(fit.significance, 1e-300)
     blurred = 2 * np.sqrt(scale) * np.maximum(sd[:m], sd[m:]) / decay
     damped = -poles.real / (MAX_DAMPING * np.abs(poles))
     return np.max([found, blurred, damped], axis=0)
@@ -240,8 +207,7 @@ def scales(data: Data, current: PoleFit) -> np.ndarray:
 
 def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:
     weight = 2 / before.variance
-    rise = np.sum(weight * np.abs(_error(data, before)) ** 2)
-    rise -= np.sum(weight * np.abs(_error(data, after)) ** 2)
+    rise = np.sum(weight * (np.abs(before.error) ** 2 - np.abs(after.error) ** 2))
     new = int(np.argmax(weakness(data, after)))
     scale = scales(data, after)[new]
     if data.variance is None:
@@ -251,7 +217,7 @@ def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:
 
 def strongest(data: Data) -> np.ndarray:
     """(0 or 1,) pole of the atom that explains most of the responses, alone."""
-    found = _best_atom(data, _first_variance(data), data.response)
+    found = _best_atom(data, first_variance(data), data.values)
     return np.array([] if found is None else [found], complex)
 
 
@@ -259,8 +225,8 @@ def _best_atom(
     data: Data, variance: np.ndarray, error: np.ndarray, tried: Sequence[complex] = ()
 ) -> complex | None:
     """Pole of the atom that explains most of an error, apart from those tried; None by chance."""
-    weight = (2 / variance).reshape(data.entries, -1)
-    poles, fall = falls(data, weight, weight * error.reshape(data.entries, -1))
+    weight = 2 / variance
+    poles, fall = falls(data, weight, weight * error)
     for pole in tried:
         fall[np.abs(poles - pole) < 0.5 * abs(pole.real)] = 0.0
     best = int(np.argmax(fall))
@@ -270,11 +236,9 @@ def _best_atom(
 def presences(data: Data, poles: np.ndarray, residue: np.ndarray) -> np.ndarray:
     """(m,) ‖response of a mode‖/‖response‖ at the line nearest its frequency.
 
-    poles (m,) in rad/s, residue (…, m) of all entries.
+    poles (m,) in rad/s, residue (e, m).
     """
     lines = [int(np.argmin(np.abs(data.frequency_hz - p.imag / (2 * np.pi)))) for p in poles]
     ones = unit(data.lines, data.to_plane(poles))[np.arange(poles.size), lines]
-    each = math.prod(residue.shape[:-1]), poles.size  # of no pole, too
-    whole = np.linalg.norm(data.response[..., lines].reshape(each), axis=0)
-    own = np.linalg.norm(residue.reshape(each) * ones, axis=0)
-    return own / np.maximum(whole, 1e-300)
+    whole = np.linalg.norm(data.values[:, np.array(lines, int)], axis=0)
+    return np.linalg.norm(residue * ones, axis=0) / np.maximum(whole, 1e-300)

@@ -37,9 +37,9 @@ class Mode:
     in m/(N·s); columns never hit are NaN, as are all where nothing scales them. `shape` (n,) is of
     unit modal mass (kg^-1/2) where `scaled`, else of unit length and as real as possible;
     `shape_sd` (n,), like `residue_sd`, is of real and imaginary part each. `collinearity` is the
-    MPC, `deviation_deg` the MPD. `misfit` is χ² per degree of freedom that one shape leaves in the
-    residues, `scatter_hz` the sd of the frequency from set to set of roving points beyond their
-    noise. `vectors` are of a matrix of FRFs. What an analysis does not tell is NaN or None.
+    MPC, `deviation_deg` the MPD. `scatter_hz` is the sd of the frequency from set to set of roving
+    points beyond their noise. `vectors` are of a matrix of FRFs. What an analysis does not tell is
+    NaN or None.
     """
 
     frequency_hz: float
@@ -54,7 +54,6 @@ class Mode:
     scaled: bool = False
     collinearity: float = float("nan")
     deviation_deg: float = float("nan")
-    misfit: float = float("nan")
     scatter_hz: float = 0.0
     vectors: Eigenvectors | None = None
 

@@ -39,7 +39,7 @@ class RovingSides:
         """From residues of the modes (indices)."""
         values, side = found.fit.residue[:, modes] * 2j * found.fit.poles[modes].imag, matrix.roved
         table = np.full((*side.measured.shape, modes.size), np.nan + 0j)
-        table[found.rows, found.columns] = values
+        table[found.data.row, found.data.column] = values
         return cls(side.responses, side.references, table, matrix.hit, side.driving)
 
     @cached_property
@@ -53,11 +53,9 @@ class RovingSides:
         # Least complete: rows measured at all columns, that tell how the columns move
         if np.count_nonzero(complete) < 3:
             return None
-        _, count, modes = self.table.shape
-        columns = np.zeros((count, modes), complex)
-        for k in range(modes):
-            right = np.linalg.svd(self.table[complete, :, k], full_matrices=False)[2][0]
-            columns[:, k] = right * realign(right)
+        each = np.moveaxis(self.table[complete], -1, 0)
+        rights = np.linalg.svd(each, full_matrices=False)[2][:, 0]
+        columns = np.array([right * realign(right) for right in rights]).T
         there = np.isfinite(self.table)
         power = np.sum(there * np.abs(columns) ** 2, axis=1)
         along = np.sum(np.where(there, self.table, 0.0) * columns.conj(), axis=1)
@@ -148,60 +146,33 @@ FITS, BETTER = 0.3, 0.6
 
 @dataclass(frozen=True)
 class Exchange:
-    """Two points whose rows fit each other's places.
+    """Two points or nodes whose rows fit each other's places: a sentence, and whom it concerns."""
 
-    `stated` and `exchanged` are how much rows differ from columns, relatively; NaN where only the
-    neighbours tell: of nodes then, in all their directions.
-    """
-
-    first: Dof
-    second: Dof
-    stated: float
-    exchanged: float
-
-    def concerns(self, dof: Dof) -> bool:
-        """Whether the row of a point stands elsewhere."""
-        if np.isnan(self.stated):
-            return dof.node in (self.first.node, self.second.node)
-        return dof in (self.first, self.second)
-
-    @property
-    def text(self) -> str:
-        """One sentence for the engineer."""
-        a, b = self.first, self.second
-        if np.isnan(self.stated):
-            return (
-                f"Nodes {a.node} and {b.node} are probably swapped: as labelled they move against "
-                "the points around them in the modes, swapped they move with them. Check the "
-                "labels."
-            )
-        pair = f"Nodes {a.node} and {b.node} ({a.direction})"
-        if a.direction != b.direction:
-            pair = f"The channels {a.at} and {b.at}"
-        return (
-            f"{pair} are probably swapped: as labelled, hitting and listening there differ by "
-            f"{100 * self.stated:.0f} %, swapped by {100 * self.exchanged:.0f} %. Check the labels."
-        )
+    text: str
+    dofs: frozenset[Dof]
 
 
 def exchanged_by_neighbours(sides: RovingSides, geometry: Geometry | None) -> Exchange | None:
-    """Points that were exchanged, told by their neighbours."""
+    """Nodes that were exchanged, in all their directions, told by their neighbours."""
     if sides.motions is None or geometry is None:
         return None
     pair = exchanged_nodes(sides.rows, sides.motions[0].real, geometry)
     if pair is None:
         return None
-    first, second = (next(dof for dof in sides.rows if dof.node == node) for node in pair)
-    return Exchange(first, second, float("nan"), float("nan"))
+    text = (
+        f"Nodes {pair[0]} and {pair[1]} are probably swapped: as labelled they move against "
+        "the points around them in the modes, swapped they move with them. Check the labels."
+    )
+    concerned = (dof for dof in (*sides.rows, *sides.columns) if dof.node in pair)
+    return Exchange(text, frozenset(concerned))
 
 
 def turning_helps(sides: RovingSides, turned: tuple[Dof, ...]) -> bool:
     """Whether columns and rows of the same points agree once turned columns are turned back."""
     if sides.motions is None or not turned:
         return False
-    shape, columns = sides.motions
+    (shape, columns), (rows, stayed) = sides.motions, np.array(sides.driving).T
     sign = np.array([-1.0 if dof in turned else 1.0 for dof in sides.columns])
-    rows, stayed = (list(each) for each in zip(*sides.driving, strict=True))
     return _misfit(shape, (sign[:, None] * columns)[stayed], rows) < FITS
 
 
@@ -209,15 +180,14 @@ def exchanged_by_columns(sides: RovingSides) -> Exchange | None:
     """Points that were exchanged, told by rows and columns of the same points."""
     if sides.motions is None or len(sides.driving) < 2:
         return None
-    shape, columns = sides.motions
-    rows, stayed = (list(each) for each in zip(*sides.driving, strict=True))
+    (shape, columns), (rows, stayed) = sides.motions, np.array(sides.driving).T
     weights = columns[stayed]
     stated = _misfit(shape, weights, rows)
     tried: dict[tuple[Dof, Dof], float] = {}
-    for row in rows:
+    for row in rows.tolist():
         for other, dof in enumerate(sides.rows):
             if other != row and dof.direction == sides.rows[row].direction:
-                places = [other if r == row else row if r == other else r for r in rows]
+                places = np.where(rows == row, other, np.where(rows == other, row, rows))
                 pair = sides.rows[min(row, other)], sides.rows[max(row, other)]
                 tried[pair] = _misfit(shape, weights, places)
     ranked = sorted(tried, key=lambda pair: tried[pair])
@@ -225,10 +195,16 @@ def exchanged_by_columns(sides: RovingSides) -> Exchange | None:
         return None
     if len(ranked) > 1 and tried[ranked[1]] < tried[ranked[0]] / BETTER:
         return None
-    return Exchange(*ranked[0], stated, tried[ranked[0]])
+    a, b = ranked[0]
+    text = (
+        f"Nodes {a.node} and {b.node} ({a.direction}) are probably swapped: as labelled, hitting "
+        f"and listening there differ by {100 * stated:.0f} %, swapped by {100 * tried[a, b]:.0f} %."
+        " Check the labels."
+    )
+    return Exchange(text, frozenset((a, b)))
 
 
-def _misfit(shape: np.ndarray, columns: np.ndarray, rows: list[int]) -> float:
+def _misfit(shape: np.ndarray, columns: np.ndarray, rows: np.ndarray) -> float:
     """Relative difference between how points move as columns and as rows, over all modes.
 
     The scale of each mode is free and positive up to a common phase: a shape of unit mass.

@@ -178,16 +178,12 @@ def _of_parts(
 def _mode(line: Line, parts: list[tuple[complex, np.ndarray]], size: np.ndarray) -> Mode:
     shape = line.participation[-1] * size
     shape = shape * realign(shape) / np.linalg.norm(shape)
-    hz_sd = damping_sd = float("nan")
-    shape_sd = np.full(shape.size, np.nan)
-    if len(parts) > 2:
-        poles = np.array([pole for pole, _ in parts])
-        root = np.sqrt(len(parts))
-        hz_sd = float(np.std(np.abs(poles), ddof=1) / (2 * np.pi) / root)
-        damping_sd = float(np.std(-poles.real / np.abs(poles), ddof=1) / root)
-        others = np.array([own * size for _, own in parts])
-        others = others * (others.conj() @ shape / np.sum(np.abs(others) ** 2, axis=1))[:, None]
-        shape_sd = np.sqrt(np.mean(np.abs(others - shape) ** 2, axis=0) / 2) / root
+    poles, root = np.array([pole for pole, _ in parts]), np.sqrt(len(parts))
+    hz_sd = float(np.std(np.abs(poles), ddof=1) / (2 * np.pi) / root)
+    damping_sd = float(np.std(-poles.real / np.abs(poles), ddof=1) / root)
+    others = np.array([own * size for _, own in parts])
+    others = others * (others.conj() @ shape / np.sum(np.abs(others) ** 2, axis=1))[:, None]
+    shape_sd = np.sqrt(np.mean(np.abs(others - shape) ** 2, axis=0) / 2) / root
     likely = float(np.clip(0.3 * line.share + 0.7 * len(parts) / SEGMENTS, 0.0, 1.0))
     return Mode(
         line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, *UNSCALED, shape, likely,

@@ -28,6 +28,18 @@ class PoleSet:
     participation: np.ndarray  # (k, inputs), unit length
 
 
+def ladder(most: int, lines: int) -> tuple[int, ...]:
+    """Model orders of the diagram: all at first, then every second, then every fourth.
+
+    High orders cost most (their cube) and differ least from their neighbours.
+    """
+    # At least as many lines as half the unknowns of one column need, and once that to spare.
+    top = max(2, min(most, lines // 3))
+    steps = ((2, 20, 1), (20, 40, 2), (40, top, 4))
+    orders = {n for low, high, step in steps for n in range(low, min(high, top) + 1, step)}
+    return tuple(sorted(orders | {top}))
+
+
 def plscf(
     frequency_hz: np.ndarray,
     frf: np.ndarray,
@@ -191,10 +203,14 @@ class Line:
     share: float  # orders present / orders tried since it first appeared
 
     @property
+    def late(self) -> np.ndarray:
+        """Those of the upper half of the orders, where bias has died out."""
+        return self.poles[len(self.poles) // 2 :]
+
+    @property
     def pole(self) -> complex:
-        """Median over the upper half of the orders, where bias has died out."""
-        late = self.poles[len(self.poles) // 2 :]
-        return complex(np.median(late.real), np.median(late.imag))
+        """The median of the late ones."""
+        return complex(np.median(self.late.real), np.median(self.late.imag))
 
     @property
     def frequency_hz(self) -> float:
@@ -206,9 +222,8 @@ class Line:
 
     @property
     def scatter(self) -> float:
-        """Spread of the pole over the upper half of the orders, relative to its bandwidth."""
-        late = self.poles[len(self.poles) // 2 :]
-        return float(np.sqrt(np.mean(np.abs(late - self.pole) ** 2)) / abs(self.pole.real))
+        """Spread of the late poles, relative to the bandwidth."""
+        return float(np.sqrt(np.mean(np.abs(self.late - self.pole) ** 2)) / abs(self.pole.real))
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,6 +232,11 @@ class Diagram:
 
     sets: tuple[PoleSet, ...]
     lines: tuple[Line, ...]
+
+    @property
+    def order(self) -> int:
+        """The highest."""
+        return self.sets[-1].order
 
 
 def diagram(sets: tuple[PoleSet, ...], band_hz: tuple[float, float]) -> Diagram:
@@ -242,7 +262,12 @@ def diagram(sets: tuple[PoleSet, ...], band_hz: tuple[float, float]) -> Diagram:
         growing += [
             [(index, poles[k], participation[k])] for k in range(len(poles)) if k not in taken
         ]
-    lines = [_line(g, sets) for g in growing]
+    lines = []
+    for members in growing:
+        index, poles, participation = map(np.array, zip(*members, strict=True))
+        orders = np.array([sets[i].order for i in index])
+        share = len(members) / (len(sets) - int(index[0]))
+        lines.append(Line(orders, poles, participation, share))
     return Diagram(sets, tuple(sorted(lines, key=lambda line: line.frequency_hz)))
 
 
@@ -272,13 +297,3 @@ def _pair(lines: list, poles: np.ndarray, participation: np.ndarray) -> list[tup
         cost[i] = np.inf
         cost[:, k] = np.inf
     return pairs
-
-
-def _line(members: list[tuple[int, complex, np.ndarray]], sets: tuple[PoleSet, ...]) -> Line:
-    index = np.array([m[0] for m in members])
-    return Line(
-        np.array([sets[i].order for i in index]),
-        np.array([m[1] for m in members]),
-        np.array([m[2] for m in members]),
-        len(members) / (len(sets) - int(index[0])),
-    )

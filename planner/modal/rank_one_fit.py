@@ -57,14 +57,12 @@ class Entries:
 class FittedShape:
     """A shape over all points, with what is left of the residues.
 
-    `sd` (points,) is of real and imaginary part each; `misfit` is χ² per degree of freedom of
-    the noise alone; NaN where no entry is left over to tell. `gains` (t,) are the relative errors
-    of the rows of the points `tied` (t,) that are rows and columns, with `gain_covariance` (t, t).
+    `sd` (points,) is of real and imaginary part each. `gains` (t,) are the relative errors of the
+    rows of the points `tied` (t,) that are rows and columns, with `gain_covariance` (t, t).
     """
 
     shape: np.ndarray  # (points,) complex
     sd: np.ndarray
-    misfit: float
     tied: np.ndarray
     gains: np.ndarray
     gain_covariance: np.ndarray
@@ -113,16 +111,14 @@ def fit_shape(
         if np.all(np.abs(spread / before - 1) < SETTLED):
             break
     found = _fitted(problem, 1 / spread, found)
-    left, jacobian = problem.left(found), problem.jacobian(found)
+    jacobian = problem.jacobian(found)
     # What errs in proportion errs in phase: all of it is in the real part, not half.
     covariance = problem.covariance(jacobian, 1 / (spread + proportional))
-    free = residue.size - int(np.linalg.matrix_rank(covariance, hermitian=True)) + tied.size
-    misfit = float(np.sum(np.abs(left) ** 2 / noise) / free) if free > 0 else float("nan")
     n = entries.points
     sd = np.sqrt(np.maximum(np.diag(covariance)[:n].real, 0.0) / 2)
     alone = np.setdiff1d(entries.rows, tied)
     sd[alone] = np.hypot(sd[alone], gain * np.abs(found[alone]))
-    return FittedShape(found[:n], sd, misfit, tied, found[n:], covariance[n:, n:].real / 2)
+    return FittedShape(found[:n], sd, tied, found[n:], covariance[n:, n:].real / 2)
 
 
 def _spread(

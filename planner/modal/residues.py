@@ -20,14 +20,6 @@ from planner.frf.frf import Frf
 
 
 @dataclass(frozen=True, eq=False)
-class Residues:
-    """Residues (outputs, inputs, m) in m/(N·s), out-of-band terms (outputs, inputs, terms)."""
-
-    residue: np.ndarray
-    rest: np.ndarray  # coefficients of `Lines.rest`; none: last axis 0
-
-
-@dataclass(frozen=True, eq=False)
 class Lines:
     """Where a model of poles is evaluated: factor · [R/(x−p) + R*/(x−p*)] + rest.
 
@@ -104,11 +96,16 @@ def basis_slope(lines: Lines, poles: np.ndarray) -> np.ndarray:
     return np.concatenate([up + down, 1j * (up - down)], axis=-2)
 
 
-def unpack(coefficients: np.ndarray, modes: int) -> Residues:
-    """Coefficients of `basis` (outputs, inputs, columns) as residues and out-of-band terms."""
-    residue = coefficients[..., :modes] + 1j * coefficients[..., modes : 2 * modes]
-    real, imag = np.split(coefficients[..., 2 * modes :], 2, axis=-1)
-    return Residues(residue, real + 1j * imag)
+def unpack(coefficients: np.ndarray, modes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of `basis` (…, columns) as residues (…, m) and those of `Lines.rest` (…, t)."""
+    own, rest = np.split(coefficients, [2 * modes], axis=-1)
+    return complex_of(own), complex_of(rest)
+
+
+def complex_of(parts: np.ndarray) -> np.ndarray:
+    """(…, m) of real, then imaginary parts (…, 2m)."""
+    real, imag = np.split(parts, 2, axis=-1)
+    return real + 1j * imag
 
 
 def lsfd(
@@ -118,8 +115,8 @@ def lsfd(
     weight: np.ndarray | None = None,
     rate_1_s: float = 0.0,
     tail_s: float = np.inf,
-) -> Residues:
-    """Residues of given poles.
+) -> np.ndarray:
+    """Residues (…, outputs, inputs, m) in m/(N·s) of given poles.
 
     frequency_hz (F,); accelerance (…, outputs, inputs, F) in m/s²/N; poles (m,) in rad/s; weight
     (outputs, inputs, F), usually 1/variance.
@@ -133,7 +130,7 @@ def lsfd(
         a, b = stack(columns * root[o, i]).T, stack(values[:, o, i] * root[o, i]).T
         norm = np.linalg.norm(a, axis=0)
         coefficients[:, o, i] = (np.linalg.lstsq(a / norm, b, rcond=None)[0] / norm[:, None]).T
-    return unpack(coefficients.reshape(*shape, -1), len(poles))
+    return unpack(coefficients.reshape(*shape, -1), len(poles))[0]
 
 
 def stack(values: np.ndarray) -> np.ndarray:
@@ -141,26 +138,14 @@ def stack(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
-def synthesize(lines: Lines, poles: np.ndarray, residues: Residues) -> np.ndarray:
-    """Response (outputs, inputs, F) of poles, residues and out-of-band terms."""
-    up, down = unit(lines, poles), unit(lines, poles.conj())
-    modal = residues.residue @ up + residues.residue.conj() @ down
-    rest = residues.rest @ lines.rest if residues.rest.shape[-1] else 0.0
-    return modal + rest
+def rank_one(residue: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shape φ (unit length, as real as possible) and participation γ with R ≈ φγᵀ.
 
-
-def rank_one(residue: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Shape φ (unit length, as real as possible), participation γ with R ≈ φγᵀ, and the share.
-
-    residue (outputs, inputs) complex without NaN. The share in (0, 1] is the part of ‖R‖² that
-    one mode can explain: 1 for a single mode, less where two are lumped together or noise rules.
+    residue (outputs, inputs) complex without NaN.
     """
     left, singular, right = np.linalg.svd(residue, full_matrices=False)
     rotation = realign(left[:, 0])
-    shape = left[:, 0] * rotation
-    total = float(np.sum(singular**2))
-    share = float(singular[0] ** 2 / total) if total > 0 else 1.0
-    return shape, singular[0] * right[0] / rotation, share
+    return left[:, 0] * rotation, singular[0] * right[0] / rotation
 
 
 def realign(shape: np.ndarray) -> complex:
@@ -199,5 +184,5 @@ def residue_changes(
     values = changes[:, :, hit][..., chosen]
     found = lsfd(f[chosen], values, every, weight, frf.exponential_rate_1_s, frf.tail_s)
     out = np.zeros((len(changes), m, 3, 3), dtype=complex)
-    out[..., hit] = np.moveaxis(found.residue[..., :m], -1, 1)
+    out[..., hit] = np.moveaxis(found[..., :m], -1, 1)
     return out

@@ -13,8 +13,8 @@ import numpy as np
 
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped
+from planner.modal.pole_fit import FARTHEST, PoleFit
 from planner.modal.residues import Lines, basis, stack, unit
-from planner.modal.set_poles import FARTHEST, SetData, SetPoles
 
 # Poles are looked for up to so many sds of the sets' poles, and half bandwidths, from the common
 # ones; the lines looked at reach so many half bandwidths farther.
@@ -22,53 +22,50 @@ FAR, FAR_HALVES, REACH = 4.0, 2.0, 4.0
 FINE = (0.2, 0.06, 0.02)  # half bandwidths: steps of the refinement
 
 
-def reestimated_sets(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray | None:
+def reestimated_sets(data: Data, fit: PoleFit) -> np.ndarray | None:
     """Poles (k, m) of all sets, those of badly fitted sets as found anew; None where none are."""
-    shares = _participation(given, fit)[given.columns]
-    off = _off(given, fit, variance) | _apart(given, fit, shares)
+    shares = _participation(data, fit)[data.column]
+    off = _off(data, fit) | _apart(data, fit, shares)
     own, moved = fit.own.copy(), False
-    for modes in _together(given.data, fit):
+    for modes in _together(data, fit):
         for s in np.flatnonzero(off[:, modes].any(axis=1)):
-            found = _Neighbourhood.of(given, fit, variance, shares, int(s), modes).best()
+            found = _Neighbourhood.of(data, fit, shares, int(s), modes).best()
             if found is not None:
                 own[s, modes] = found
                 moved = True
     return own if moved else None
 
 
-def _participation(given: SetData, fit: SetPoles) -> np.ndarray:
+def _participation(data: Data, fit: PoleFit) -> np.ndarray:
     """(columns, m) how modes take part at the references, of unit length.
 
     Most sets agree on it: rows count the less the worse they fit.
     """
-    table = given.table(fit.residue)
-    found = np.zeros(table.shape[1:], complex)
-    for k, each in enumerate(np.moveaxis(table, -1, 0)):
-        usual = float(np.median(np.linalg.norm(each, axis=1)))
-        weight, right = np.ones(len(each)), found[:, k]
-        # Robust rounds.
-        for _ in range(5):
-            right = np.linalg.svd(weight[:, None] * each, full_matrices=False)[2][0]
-            left = np.linalg.norm(each - np.outer(each @ right.conj(), right), axis=1)
-            weight = 1 / np.sqrt(left + 0.1 * usual + 1e-300)
-        found[:, k] = right
-    return found
+    tables = np.moveaxis(data.table(fit.residue), -1, 0)
+    usual = np.median(np.linalg.norm(tables, axis=2), axis=1, keepdims=True)
+    weight, right = np.ones(tables.shape[:2]), np.zeros(tables.shape[::2], complex)
+    # Robust rounds.
+    for _ in range(5):
+        right = np.linalg.svd(weight[..., None] * tables, full_matrices=False)[2][:, 0]
+        off = tables - (tables @ right[..., None].conj()) * right[:, None]
+        weight = 1 / np.sqrt(np.linalg.norm(off, axis=2) + 0.1 * usual + 1e-300)
+    return right.T
 
 
-def _reach(fit: SetPoles) -> np.ndarray:
+def _reach(fit: PoleFit) -> np.ndarray:
     """(m,) how far (rad/s) a set's pole is looked for."""
     m = fit.poles.size
     far = FAR * np.sqrt(fit.spread[m:]) + FAR_HALVES * np.abs(fit.poles.real)
     return np.minimum(far, FARTHEST * fit.poles.imag)
 
 
-def _near(data: Data, fit: SetPoles, mode: int) -> np.ndarray:
+def _near(data: Data, fit: PoleFit, mode: int) -> np.ndarray:
     """(F,) bool: lines around a mode, wherever a set may have it."""
     far = _reach(fit)[mode] + REACH * np.abs(fit.poles[mode].real)
     return np.abs(2 * np.pi * data.frequency_hz - fit.poles[mode].imag) < far
 
 
-def _together(data: Data, fit: SetPoles) -> list[np.ndarray]:
+def _together(data: Data, fit: PoleFit) -> list[np.ndarray]:
     """Modes (indices) among the lines, in groups whose peaks may overlap."""
     omega, far = 2 * np.pi * data.frequency_hz[[0, -1]], _reach(fit)
     inside = (fit.poles.imag > omega[0]) & (fit.poles.imag < omega[1])
@@ -77,30 +74,27 @@ def _together(data: Data, fit: SetPoles) -> list[np.ndarray]:
     return [np.array(group) for group in groups]
 
 
-def _off(given: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
+def _off(data: Data, fit: PoleFit) -> np.ndarray:
     """(k, m) bool: sets whose error around a mode is half as much again as that of the usual."""
-    square = np.abs(given.data.response[:, 0] - fit.fitted) ** 2 / variance
-    off = np.zeros((len(given.sets), fit.poles.size), bool)
+    square = np.abs(fit.error) ** 2 / fit.variance
+    off = np.zeros((len(data.sets), fit.poles.size), bool)
     for j in range(fit.poles.size):
-        lines = _near(given.data, fit, j)
+        lines = _near(data, fit, j)
         if lines.any():
             each = np.mean(square[:, lines], axis=1)
-            error = np.array([np.mean(each[chosen]) for chosen in given.sets])
+            error = np.array([np.mean(each[chosen]) for chosen in data.sets])
             off[:, j] = error > 1.5 * np.median(error)
     return off
 
 
-def _apart(given: SetData, fit: SetPoles, theirs: np.ndarray) -> np.ndarray:
+def _apart(data: Data, fit: PoleFit, theirs: np.ndarray) -> np.ndarray:
     """(k, m) bool: sets whose residues do not go with how the mode takes part (e, m)."""
-    rows = given.rows
     weight = 1 / np.maximum(2 * fit.residue_variance, 1e-300)
-    shape = int(rows.max()) + 1, fit.poles.size
-    along, power = np.zeros(shape, complex), np.zeros(shape)
-    np.add.at(along, rows, weight * theirs.conj() * fit.residue)
-    np.add.at(power, rows, weight * np.abs(theirs) ** 2)
-    left = fit.residue - (along / np.maximum(power, 1e-300))[rows] * theirs
+    along = data.table(weight * theirs.conj() * fit.residue).sum(axis=1)
+    power = data.table(weight * np.abs(theirs) ** 2).sum(axis=1).real
+    left = fit.residue - (along / np.maximum(power, 1e-300))[data.row] * theirs
     square = weight * np.abs(left) ** 2
-    apart = np.array([np.mean(square[chosen], axis=0) for chosen in given.sets])
+    apart = np.array([np.mean(square[chosen], axis=0) for chosen in data.sets])
     # Beyond so many times their variance, and what is usual.
     return apart > 9.0 * np.maximum(np.median(apart, axis=0), 1.0)
 
@@ -129,18 +123,17 @@ class _Neighbourhood:
 
     @classmethod
     def of(
-        cls, given: SetData, fit: SetPoles, variance: np.ndarray, shares: np.ndarray, s: int,
-        modes: np.ndarray,
-    ) -> "_Neighbourhood":  # fmt: skip
+        cls, data: Data, fit: PoleFit, shares: np.ndarray, s: int, modes: np.ndarray
+    ) -> "_Neighbourhood":
         """Of set s around some modes (indices), which take part in all entries by shares (e, m)."""
-        data, entries = given.data, given.sets[s]
+        entries = data.sets[s]
         chosen = np.flatnonzero(np.any([_near(data, fit, j) for j in modes], axis=0))
         lines, common = data.lines.part(chosen), fit.poles[modes]
         others = np.setdiff1d(np.arange(fit.poles.size), modes)
         residue, own = fit.residue[np.ix_(entries, others)], fit.own[s, others]
-        response = data.response[:, 0][np.ix_(entries, chosen)] - residue @ unit(lines, own)
+        response = data.values[np.ix_(entries, chosen)] - residue @ unit(lines, own)
         response = response - residue.conj() @ unit(lines, own.conj())
-        variance = variance[np.ix_(entries, chosen)]
+        variance = fit.variance[np.ix_(entries, chosen)]
         # In any case a pole may move by half its bandwidth.
         spread = np.maximum(fit.spread[fit.poles.size + modes], common.real**2)
         profile = np.sqrt(variance[0, 0] / variance[0])
@@ -149,7 +142,7 @@ class _Neighbourhood:
         values = stack(response * profile)
         return cls(
             lines, profile, variance[:, 0] / 2, values - values @ far @ far.T, far,
-            given.rows[entries], shares[np.ix_(entries, modes)], common, fit.own[s, modes],
+            data.row[entries], shares[np.ix_(entries, modes)], common, fit.own[s, modes],
             _reach(fit)[modes], spread,
         )  # fmt: skip
 

@@ -13,9 +13,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from planner.modal.fit_data import Data
-from planner.modal.least_squares import PoleFit, complex_of, scaled_inverse, slope_turn
+from planner.modal.least_squares import scaled_inverse, slope_turn
+from planner.modal.pole_fit import PoleFit
 from planner.modal.rank_one_fit import Entries, fit_shape
-from planner.modal.residues import Residues, basis, basis_slope, unpack
+from planner.modal.residues import basis, basis_slope, complex_of
 
 SURELY = 1 - 1e-6  # that χ² rises by less where all of it is nothing: else nothing is taken away
 STEPS, HALVED = 20, 6  # of Gauss and Newton, and how often one is shortened
@@ -38,11 +39,6 @@ class ShapeFit:
     chi2: float
 
     @property
-    def residues(self) -> Residues:
-        """Residues (e, m) and out-of-band terms (e, t)."""
-        return unpack(self.coefficients, self.poles.size)
-
-    @property
     def response(self) -> np.ndarray:
         """(e, F) of the fit."""
         return self.coefficients @ basis(self.data.lines, self.poles)
@@ -61,16 +57,15 @@ class ShapeFit:
             axis=1,
         )
 
-    def drawn(self, count: int, seed: int) -> list[tuple[np.ndarray, Residues]]:
-        """So many poles and residues that are as likely as each other."""
+    def drawn(self, count: int, seed: int) -> list[tuple[np.ndarray, np.ndarray]]:
+        """So many poles and coefficients that are as likely as each other."""
         m, found = self.poles.size, []
         at = np.concatenate([self.poles.real, self.poles.imag])
         for normal in np.random.default_rng(seed).standard_normal((count, self.root.shape[1])):
             by = self.root @ normal
             # Neither decay nor frequency is ever below zero, however unsure.
             poles = complex_of(at * np.exp(np.clip(by[: 2 * m] / at, -1.0, 1.0)))
-            moved = self.coefficients + by[2 * m :].reshape(self.coefficients.shape)
-            found.append((poles, unpack(moved, m)))
+            found.append((poles, self.coefficients + by[2 * m :].reshape(self.coefficients.shape)))
         return found
 
 
@@ -92,7 +87,7 @@ def shape_fit(
     problem = _ShapeProblem.of(data, fit, entries)
     point = problem.settled(problem.start(fit), np.ones(problem.size, bool))
     unshaped = replace(problem, shaped=problem.shaped[:0])
-    if surely_worse(fit.chi2, point.chi2, unshaped.size - problem.size):
+    if surely_worse(float(np.sum(fit.chi2)), point.chi2, unshaped.size - problem.size):
         problem, point = unshaped, unshaped.start(fit)
     every = np.ones(problem.size, bool)
     plain, kept = problem.without_nothings(point)
@@ -130,14 +125,13 @@ class _ShapePoint:
 
 @dataclass(frozen=True, eq=False)
 class _ShapeProblem:
-    """Responses and weights 2/variance (e, F); `shaped` are the modes that have one shape each.
+    """Weights 2/variance (e, F) of the responses; `shaped` are the modes that have one shape each.
 
     Values: Re and Im of the poles, Re φ and Im φ mode by mode, then entry by entry the coefficients
     that are `left` free: residues of other modes, out-of-band terms.
     """
 
     data: Data
-    response: np.ndarray
     weight: np.ndarray
     entries: Entries
     modes: int
@@ -151,8 +145,7 @@ class _ShapeProblem:
         alone = np.all(apart > wide / 2, axis=1)
         alone &= np.abs(poles) < 2 * np.pi * data.frequency_hz[-1]
         alone &= count > entries.points  # or nothing would tie the points
-        response, weight = data.response.reshape(count, -1), 2 / fit.variance.reshape(count, -1)
-        return cls(data, response, weight, entries, poles.size, np.flatnonzero(alone))
+        return cls(data, 2 / fit.variance, entries, poles.size, np.flatnonzero(alone))
 
     @cached_property
     def left(self) -> np.ndarray:
@@ -168,7 +161,7 @@ class _ShapeProblem:
     @property
     def size(self) -> int:
         """Number of all values."""
-        return self.end + self.left.size * len(self.response)
+        return self.end + self.left.size * len(self.weight)
 
     def poles(self, values: np.ndarray) -> np.ndarray:
         """(m,) in rad/s."""
@@ -182,7 +175,7 @@ class _ShapeProblem:
     def coefficients(self, values: np.ndarray) -> np.ndarray:
         """(e, c) of all modes."""
         shape, e, m = self._shapes(values), self.entries, self.modes
-        out = np.zeros((len(self.response), self.left.size + 2 * self.shaped.size))
+        out = np.zeros((len(self.weight), self.left.size + 2 * self.shaped.size))
         out[:, self.left] = values[self.end :].reshape(len(out), -1)
         residue = -1j * (shape[:, e.rows] * shape[:, e.columns]).T
         out[:, self.shaped], out[:, m + self.shaped] = residue.real, residue.imag
@@ -190,9 +183,7 @@ class _ShapeProblem:
 
     def start(self, fit: PoleFit) -> _ShapePoint:
         """Shapes that explain the free residues best."""
-        m = self.modes
-        residue = fit.residues.residue.reshape(-1, m)
-        variance = np.mean(fit.residue_variance, axis=2).reshape(-1, m)
+        residue, variance = fit.residue, fit.residue_variance
         shape = np.array(
             [fit_shape(self.entries, residue[:, k], variance[:, k], 0.5).shape for k in self.shaped]
         ).reshape(self.shaped.size, 1, self.entries.points)
@@ -210,7 +201,7 @@ class _ShapeProblem:
         normal, gradient, square = np.zeros((size, size)), np.zeros(size), 0.0
         for e, (c, w) in enumerate(zip(own, self.weight, strict=True)):
             part = np.concatenate([slope_turn(c, m).T @ slope, columns])
-            off = self.response[e] - c @ columns
+            off = self.data.values[e] - c @ columns
             index = np.r_[: 2 * m, 2 * m + e * each : 2 * m + (e + 1) * each]
             weighted = part.conj() * w
             normal[np.ix_(index, index)] += (weighted @ part.T).real
@@ -221,7 +212,7 @@ class _ShapeProblem:
 
     def tangent(self, values: np.ndarray) -> np.ndarray:
         """(2m + e·c, u) change of poles and all coefficients with the values."""
-        m, e, count = self.modes, self.entries, len(self.response)
+        m, e, count = self.modes, self.entries, len(self.weight)
         index, each = np.arange(count), self.left.size + 2 * self.shaped.size
         out = np.zeros((2 * m + count * each, self.size))
         out[: 2 * m, : 2 * m] = np.eye(2 * m)
@@ -277,7 +268,7 @@ class _ShapeProblem:
 
         Out-of-band terms, each and all of their phases; then mode by mode the phases.
         """
-        own = self.end + np.arange(self.size - self.end).reshape(len(self.response), -1)
+        own = self.end + np.arange(self.size - self.end).reshape(len(self.weight), -1)
         terms = len(self.data.lines.rest)
         real, imag = own[:, -2 * terms : -terms], own[:, -terms:]
         found = [np.r_[real[:, k], imag[:, k]] for k in range(terms)]

@@ -6,8 +6,8 @@ import numpy as np
 
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped
+from planner.modal.pole_fit import DivergedPolesError, PoleFit, fit_sets
 from planner.modal.residues import unit
-from planner.modal.set_poles import DivergedPolesError, SetData, SetPoles, fit_sets
 from planner.modal.set_search import reestimated_sets
 
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
@@ -40,9 +40,8 @@ def thinned(data: Data, poles: np.ndarray, every: bool = False) -> np.ndarray:
     return np.flatnonzero(kept)
 
 
-def around(given: SetData, fit: SetPoles, pole: complex) -> tuple[SetData, np.ndarray, np.ndarray]:
+def around(data: Data, fit: PoleFit, pole: complex) -> tuple[Data, np.ndarray, np.ndarray]:
     """The lines around a pole less the modes far from it, their indices, which modes are near."""
-    data = given.data
     step, centre = data.frequency_hz[1] - data.frequency_hz[0], pole.imag / (2 * np.pi)
     reach = max(REACH * abs(pole.real) / (2 * np.pi), LINES_AROUND * step)
     lines = thinned(data, np.append(fit.poles, pole))
@@ -54,36 +53,27 @@ def around(given: SetData, fit: SetPoles, pole: complex) -> tuple[SetData, np.nd
     near = np.abs(fit.poles.imag / (2 * np.pi) - centre) < reach
     own = fit.own[:, ~near]
     up, down = unit(part.lines, own), unit(part.lines, own.conj())
-    for k, chosen in enumerate(given.sets):
+    for k, chosen in enumerate(data.sets):
         far = fit.residue[np.ix_(chosen, ~near)]
         response[chosen, 0] -= far @ up[k] + far.conj() @ down[k]
-    return replace(given, data=part), lines, near
+    return part, lines, near
 
 
-def _chi2(local: SetData, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
-    """(e,) of each entry."""
-    return np.sum(2 / variance * np.abs(local.data.response[:, 0] - fit.fitted) ** 2, axis=1)
-
-
-def explains(
-    local: SetData, less: SetPoles, more: SetPoles, variance: np.ndarray, margin: float = 1.0
-) -> bool:
+def explains(local: Data, less: PoleFit, more: PoleFit, margin: float = 1.0) -> bool:
     """Whether a fit with more modes is better than chance makes it, `margin` times over."""
-    before, after = (float(np.sum(_chi2(local, fit, variance))) for fit in (less, more))
-    scale = max(1.0, after / (2 * local.data.response.size))
-    return before - after > margin * local.data.threshold * scale
+    before, after = (float(np.sum(fit.chi2)) for fit in (less, more))
+    scale = max(1.0, after / (2 * local.response.size))
+    return before - after > margin * local.threshold * scale
 
 
-def _in_most(local: SetData, less: SetPoles, more: SetPoles, variance: np.ndarray) -> bool:
+def _in_most(local: Data, less: PoleFit, more: PoleFit) -> bool:
     """Whether a fit with one mode more is clearly better than chance makes it in most sets."""
-    fall = _chi2(local, less, variance) - _chi2(local, more, variance)
+    fall = less.chi2 - more.chi2
     each = [np.sum(fall[chosen]) / (2 * len(chosen) + 2) for chosen in local.sets]
     return bool(np.median(each) > APART)
 
 
-def merged_modes(
-    given: SetData, fit: SetPoles, variance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def merged_modes(data: Data, fit: PoleFit) -> tuple[np.ndarray, np.ndarray]:
     """Poles (m,) and those of every set (k, m), with those made one that are one mode.
 
     What one pole for all sets cannot follow, several poles near it imitate; they excite and are
@@ -91,10 +81,10 @@ def merged_modes(
     """
     order = np.argsort(fit.poles.imag)
     poles, own, kept = fit.poles.copy(), fit.own.copy(), np.ones(fit.poles.size, bool)
-    for group in _groups(given, fit, order):
+    for group in _groups(data, fit, order):
         pairs = [group[k : k + 2] for k in range(len(group) - 1)] if len(group) > 2 else []
         for tried in (group, *pairs):
-            one = _as_one(given, fit, variance, tried)
+            one = _as_one(data, fit, tried)
             if one is not None:
                 poles[tried[0]], own[:, tried[0]] = one
                 kept[tried[1:]] = False
@@ -103,32 +93,30 @@ def merged_modes(
     return poles[order], own[:, order]
 
 
-def _groups(given: SetData, fit: SetPoles, order: np.ndarray) -> list[np.ndarray]:
+def _groups(data: Data, fit: PoleFit, order: np.ndarray) -> list[np.ndarray]:
     """Indices of poles, increasing, that lie together and take part alike."""
 
     def together(last: int, k: int) -> bool:
         gap = fit.poles[k].imag - fit.poles[last].imag
         width = 2 * max(abs(fit.poles[k].real), abs(fit.poles[last].real))
-        return gap < max(width, TOGETHER * fit.poles[k].imag) and _alike(given, fit, last, k)
+        return gap < max(width, TOGETHER * fit.poles[k].imag) and _alike(data, fit, last, k)
 
     return [np.array(group) for group in grouped(order, together) if len(group) > 1]
 
 
-def _alike(given: SetData, fit: SetPoles, first: int, second: int) -> bool:
+def _alike(data: Data, fit: PoleFit, first: int, second: int) -> bool:
     """Whether two modes take part at the references alike; always so at a single one."""
-    tables = np.moveaxis(given.table(fit.residue[:, [first, second]]), -1, 0)
+    tables = np.moveaxis(data.table(fit.residue[:, [first, second]]), -1, 0)
     vectors = np.linalg.svd(tables, full_matrices=False)[2][:, 0]
     return bool(np.abs(np.vdot(*vectors)) ** 2 > ALIKE)
 
 
-def _as_one(
-    given: SetData, fit: SetPoles, variance: np.ndarray, group: np.ndarray
-) -> tuple[complex, np.ndarray] | None:
+def _as_one(data: Data, fit: PoleFit, group: np.ndarray) -> tuple[complex, np.ndarray] | None:
     """Common pole and the sets' own of one mode instead of a group; None if that is worse."""
     share = fit.significance[group] / np.sum(fit.significance[group])
     middle = complex(np.sum(share * fit.poles[group]))
-    local, lines, near = around(given, fit, middle)
-    variance = variance[:, lines]
+    local, lines, near = around(data, fit, middle)
+    variance = fit.variance[:, lines]
     if not np.all(near[group]):
         return None
     start = fit.own[:, group] @ share
@@ -139,14 +127,14 @@ def _as_one(
     try:
         one = fit_sets(local, variance, poles, MERGED_ROUNDS, own)
         more = fit_sets(local, variance, fit.poles[near], known=fit.own[:, near])
-        if explains(local, one, more, variance, APART):
+        if explains(local, one, more, APART):
             # Where it is one mode, only sets that fitted it badly are explained better by two.
-            found = reestimated_sets(local, one, variance)
-            if _in_most(local, one, more, variance) or found is None:
+            found = reestimated_sets(local, one)
+            if _in_most(local, one, more) or found is None:
                 return None
             one = fit_sets(local, variance, one.poles, MERGED_ROUNDS, found)
     except DivergedPolesError:
         return None
-    if explains(local, one, more, variance, APART):
+    if explains(local, one, more, APART):
         return None
     return complex(one.poles[-1]), one.own[:, -1]

@@ -10,11 +10,10 @@ import numpy as np
 
 from planner.errors import InputError, RefusedError
 from planner.frf.quantities import DERIVATIVE, convert
-from planner.modal.estimate_modes import ladder
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.mode_selection import presences
 from planner.modal.modes import UNSCALED, ModalModel, Mode
-from planner.modal.plscf import Line, diagram, plscf, stable
+from planner.modal.plscf import Line, diagram, ladder, plscf, stable
 from planner.modal.residues import lsfd, rank_one
 from planner.recording.records import FrfRecord
 
@@ -82,14 +81,14 @@ def _part(frequency: np.ndarray, response: np.ndarray, part: tuple[float, float]
     high = max(part[1] * OVERLAP, part[1] + LEAST_LINES * step / 2)
     lines = (frequency >= low) & (frequency <= high)
     f, h = frequency[lines], response[..., lines]
-    orders = ladder(max(2, min(MAX_ORDER, f.size // 3)))
+    orders = ladder(MAX_ORDER, f.size)
     found = diagram(plscf(f, h, orders), (low, high))
     chosen = [line for line in stable(found) if _reach(line) >= REACH * orders[-1]]
     if not chosen:
         return []
     poles = np.array([line.pole for line in chosen])
-    residues = lsfd(f, h, poles).residue
-    present = presences(Data(f, h, None), poles, residues)
+    residues = lsfd(f, h, poles)
+    present = presences(Data(f, h, None), poles, residues[:, 0])
     modes = []
     for k, line in enumerate(chosen):
         presence = float(present[k])
@@ -99,9 +98,8 @@ def _part(frequency: np.ndarray, response: np.ndarray, part: tuple[float, float]
             share = min(1.0, _reach(line) / orders[-1] + 0.3)
             # Rough: how often it was there, how still it stood, how much of the response it is.
             certain = share * min(1.0, presence) ** 0.25 * (1 - line.scatter)
-            late = line.poles[len(line.poles) // 2 :]
-            hz_sd = float(np.std(np.abs(late)) / (2 * np.pi))
-            damping_sd = float(np.std(-late.real / np.abs(late)))
+            hz_sd = float(np.std(np.abs(line.late)) / (2 * np.pi))
+            damping_sd = float(np.std(-line.late.real / np.abs(line.late)))
             modes.append(
                 Mode(
                     line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, *UNSCALED,

@@ -88,10 +88,10 @@ def driving_figure(matrix: FrfMatrix, found: MatrixModes) -> Figure:
     """FRFs of points hit where they were felt, with the fit, and how right their sign is."""
     pairs = matrix.driving[:4]
     figure, grid = panels((12.0, 2.6 * len(pairs) + 1.2), "Driving points", len(pairs))
-    data = found.found.data
-    places = found.found.entries
+    data, (felt, hit) = found.found.data, found.found.places
     for panel, (o, i) in zip(grid[:, 0], pairs, strict=True):
-        measured, fitted = matrix.accelerance[o, i], found.found.fit.fitted[places[o, i]]
+        measured, (entry,) = matrix.accelerance[o, i], np.flatnonzero((felt == o) & (hit == i))
+        fitted = data.values[entry] - found.found.fit.error[entry]
         magnitude(panel, matrix.frequency_hz, measured, color=MEASURED, lw=1.0, label="measured")
         magnitude(panel, data.frequency_hz, fitted, color=MODEL, lw=1.0, label="fit")
         panel.set_xlim(data.frequency_hz[0], data.frequency_hz[-1])

@@ -13,8 +13,8 @@ from planner.dataset.measure import DEFAULT_BAND_HZ, measure
 from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.diagnosis.exponential_window import screen_window
 from planner.errors import InputError, RefusedError, RefusedFile
-from planner.frf.exported import joined
 from planner.frf.frf import Frf
+from planner.frf.matrix import joined
 from planner.frf.quantities import DERIVATIVE
 from planner.modal.estimate_modes import PoleIdentification, identification
 from planner.modal.matrix_modes import modes_of_matrix, with_normal_modes
@@ -165,7 +165,7 @@ def _by_channel(
     records = [r for r in read(sources[0].path) if isinstance(r, TimeRecord)]
     if not records:
         raise InputError(f"{sources[0].name} holds no time histories; leave out --force.")
-    modal, found = analyse_record(records[0], force_channel=force, band_hz=band_hz)
+    modal, found = analyse_record(records[0], force, band_hz)
     accepted, simulated = (sources[0].name,), records[0].simulated
     written = _drawn(pictures, None, lambda: found, modal, accepted, simulated)
     return _of_model(modal, accepted=accepted, simulated=simulated, **written)
@@ -237,7 +237,7 @@ def matrix_report(
         frfs=matrix.count,
         band_hz=found.band_hz,
         fit_error=found.found.fit_error,
-        order=found.found.order,
+        order=found.found.diagram.order,
         refused=given.refused,
         accepted=given.accepted,
         remarks=(*given.remarks, *found.remarks),

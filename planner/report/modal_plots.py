@@ -14,7 +14,6 @@ from planner.frf.frf import Frf
 from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.mac import mac_matrix
 from planner.modal.matrix_modes import MatrixModes
-from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel
 from planner.modal.operating import OperatingModes
 from planner.modal.plscf import Diagram, stable
@@ -154,7 +153,7 @@ def matrix_figure(frf: Frf, found: PoleIdentification, modal: ModalModel) -> Fig
     figure, grid = marks.panels(
         (13.0, 10.0), "FRFs and their fit", 6, len(columns), gridspec_kw=layout
     )
-    fitted = model(found.data, found.fit)
+    fitted = found.data.response - found.fit.error.reshape(found.data.response.shape)
     for i, k in np.ndindex(3, len(columns)):
         size, turn = grid[2 * i, k], grid[2 * i + 1, k]
         h, sd = frf.accelerance[i, columns[k]], np.sqrt(frf.variance[i, columns[k]] / 2)

@@ -19,7 +19,7 @@ from planner.measurement.nuisances import (
     actual_ports,
     basis,
 )
-from planner.modal.residues import Residues, laplace, residue_changes, synthesize
+from planner.modal.residues import laplace, residue_changes, unit
 from planner.proof.arms import KR10
 from planner.proof.deviation import Deviation
 from planner.proof.load import load_truth
@@ -163,8 +163,8 @@ def test_residues_follow_their_frf():
     beside = 2 * np.pi * np.array([64.0]) * (1j - 0.03)
     residue = 1e-4 * (rng.standard_normal((3, 3, 3)) + 1j * rng.standard_normal((3, 3, 3)))
     frequency = np.linspace(1.0, 80.0, 400)
-    none, every = np.zeros((3, 3, 0), complex), np.concatenate([poles, beside])
-    h = synthesize(laplace(frequency, 0.0, 2.0), every, Residues(residue, none))
+    lines, every = laplace(frequency, 0.0, 2.0), np.concatenate([poles, beside])
+    h = residue @ unit(lines, every) + residue.conj() @ unit(lines, every.conj())
     ones = np.ones(h.shape)
     frf = Frf(frequency, h, ones, ones, (1, 1, 0), (1.0, 80.0), tail_s=2.0)
     moved = residue_changes(frf, poles, beside, (4.0, 60.0), np.stack([h, -2 * h]))

@@ -1,8 +1,5 @@
 """`planner couple`: the shipped example, files, a posture that was not hit; and what is refused."""
 
-import io
-import json
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +7,6 @@ import numpy as np
 import pytest
 
 from planner.campaign.posture_tip import posture_tip
-from planner.cli.run import run
 from planner.errors import InputError
 from planner.frf.matrix import FrfMatrix
 from planner.frf.synthesis import pole
@@ -18,35 +14,23 @@ from planner.milling.tip_files import read_tip
 from planner.milling.tool import load_tool
 from planner.recording.dof import Dof
 from tests.support.matrix_files import write_matrix
+from tests.support.outside import refused, told
 from tests.support.rerun_columns import lines_of
 
 LEI = Path(__file__).parents[2] / "campaigns" / "irb6660_lei2023"
 PAIR = ["--tool", f"{LEI}/target.toml", "--reference", f"{LEI}/reference.toml"]
 
 
-def answered(*arguments):
-    """Exit code, and the answer or what was said on stderr."""
-    out, err = io.StringIO(), io.StringIO()
-    with redirect_stdout(out), redirect_stderr(err):
-        code = run(["couple", *map(str, arguments), "--json"])
-    return code, json.loads(out.getvalue()) if out.getvalue() else err.getvalue().strip()
-
-
-def refused(tmp_path, *arguments):
-    """What is said, in one line, of arguments that make no sense."""
-    code, said = answered(*arguments, "--out", tmp_path / "a.npz")
-    assert code == 2
-    assert len(said.splitlines()) == 1
-    return said
+def refusal(tmp_path, *arguments):
+    """What is said of arguments that make no sense."""
+    return refused("couple", *arguments, "--out", tmp_path / "a.npz", "--json")
 
 
 @pytest.fixture(scope="module")
 def coupled(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lei")
     files = ["--out", folder / "new.npz", "--plot", folder, "--rrd", folder / "new.rrd"]
-    code, answer = answered(LEI / "modes.toml", *PAIR, "--noise", 1, *files)
-    assert code == 0
-    return answer
+    return told("couple", LEI / "modes.toml", *PAIR, "--noise", 1, *files)
 
 
 def test_the_shipped_example(coupled):
@@ -86,8 +70,7 @@ def test_the_npz_is_laid_out_as_predicts(coupled):
 def test_what_was_coupled_can_be_coupled_again(coupled, tmp_path):
     """Back to the rod: its own modes come out."""
     back = ["--tool", LEI / "reference.toml", "--reference", LEI / "target.toml"]
-    code, _ = answered(coupled["npz"], *back, "--out", tmp_path / "back.npz")
-    assert code == 0
+    told("couple", coupled["npz"], *back, "--out", tmp_path / "back.npz")
     tip = read_tip(LEI / "modes.toml", None, None, 0.0)
     with np.load(tmp_path / "back.npz") as stored:
         found = stored["frf_mean"][0, :2, :2] / (2j * np.pi * stored["frequency_hz"]) ** 2
@@ -104,7 +87,7 @@ def exported(path, tip, nodes):
     ends, f = np.array(list(places.values())), tip.frequency_hz
     h = np.einsum("oa,fab,ib->oif", ends, tip.receptance, ends) * (2j * np.pi * f) ** 2
     dofs = tuple(places)
-    return write_matrix(path, FrfMatrix(f, dofs, dofs, h, np.full(h.shape, np.nan), True))
+    return write_matrix(path, FrfMatrix(f, dofs, dofs, h, True))
 
 
 def rod(path):
@@ -126,12 +109,9 @@ def test_two_points_of_a_universal_file(few, tmp_path):
     """Points that move rigidly: but for the rod's own bending of 0.02 m, the modes' answer."""
     exported(tmp_path / "frfs.uff", few, ((1, 0.0), (5, 0.02)))
     tools = ["--tool", LEI / "target.toml", "--reference", rod(tmp_path)]
-    code, answer = answered(tmp_path / "frfs.uff", *tools, "--out", tmp_path / "a.npz")
-    assert code == 0
-    code, other = answered(
-        LEI / "modes.toml", *PAIR, "--band-hz", 800, 1000, "--out", tmp_path / "b.npz"
-    )
-    assert code == 0
+    answer = told("couple", tmp_path / "frfs.uff", *tools, "--out", tmp_path / "a.npz")
+    band = "--band-hz", 800, 1000, "--out", tmp_path / "b.npz"
+    other = told("couple", LEI / "modes.toml", *PAIR, *band)
     for one, two in zip(answer["resonances"], other["resonances"], strict=True):
         assert one["frequency_hz"] == pytest.approx(two["frequency_hz"], rel=0.005)
 
@@ -139,7 +119,7 @@ def test_two_points_of_a_universal_file(few, tmp_path):
 def test_a_missing_point_is_named(few, tmp_path):
     exported(tmp_path / "one.uff", few, ((1, 0.0),))
     tools = ["--tool", LEI / "target.toml", "--reference", rod(tmp_path)]
-    said = refused(tmp_path, tmp_path / "one.uff", *tools)
+    said = refusal(tmp_path, tmp_path / "one.uff", *tools)
     assert "node 5" in said
     assert "no rotations" in said
 
@@ -150,7 +130,7 @@ def test_another_grid_of_the_same_length_is_refused(few, tmp_path):
     parts = (few, ((1, 0.0),)), (shifted, ((5, 0.02),))
     path.write_bytes(b"".join(exported(path, *part).read_bytes() for part in parts))
     tools = "--tool", LEI / "target.toml", "--reference", rod(tmp_path)
-    assert "frfs.uff" in (said := refused(tmp_path, path, *tools))
+    assert "frfs.uff" in (said := refusal(tmp_path, path, *tools))
     assert "export one grid" in said
 
 
@@ -159,11 +139,11 @@ def test_motions_alone_are_refused_with_what_to_measure(coupled, tmp_path):
         keys = ("frequency_hz", "frf_mean", "frf_sd", "pose")
         alone = {name: stored[name] for name in keys}
     np.savez(tmp_path / "lacking.npz", **alone)
-    assert "measure what lacks" in refused(tmp_path, tmp_path / "lacking.npz", *PAIR)
+    assert "measure what lacks" in refusal(tmp_path, tmp_path / "lacking.npz", *PAIR)
     for name in ("frf_mean", "frf_sd"):
         alone[name] = np.nan_to_num(alone[name])
     np.savez(tmp_path / "alone.npz", **alone)
-    said = refused(tmp_path, tmp_path / "alone.npz", *PAIR)
+    said = refusal(tmp_path, tmp_path / "alone.npz", *PAIR)
     assert "two points" in said
     assert "--robot" in said
 
@@ -179,7 +159,7 @@ def test_motions_alone_are_refused_with_what_to_measure(coupled, tmp_path):
     ],
 )
 def test_input_that_makes_no_sense(tmp_path, source, more, words):
-    assert words in refused(tmp_path, LEI / source, *PAIR, *more)
+    assert words in refusal(tmp_path, LEI / source, *PAIR, *more)
 
 
 HZ = np.arange(10.0, 60.0, 0.5)
@@ -208,7 +188,7 @@ def postures(tmp_path_factory):
     for i, angle in enumerate(np.linspace(-0.7, 0.7, 13)):
         h = receptance(angle) * (2j * np.pi * HZ) ** 2
         h *= 1 + 0.007 * (rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape))
-        matrix = FrfMatrix(HZ, POINTS, POINTS, h, np.full(h.shape, np.nan), True)
+        matrix = FrfMatrix(HZ, POINTS, POINTS, h, True)
         write_matrix(folder / f"{i}.uff", matrix)
         rows.append(f"P{i:02d},{np.rad2deg(angle):.6f},5,+x,{i}.uff")
     table = "\n".join(["pose,a_deg,b_deg,hit,file", *rows, ""])
@@ -233,22 +213,21 @@ def test_the_command_and_what_makes_no_sense(postures, tmp_path):
     folder, file = postures
     pair = ["--tool", LEI / "target.toml"]
     right = ["--reference", file, "--pose", "H1", "--out", tmp_path / "new.npz"]
-    code, answer = answered(folder, *pair, *right)
-    assert code == 0
+    answer = told("couple", folder, *pair, *right)
     assert any("13 other postures" in remark for remark in answer["remarks"])
-    for more, told in (
+    for more, words in (
         (["--reference", file], "Name a pose of"),
         (["--reference", file, "--pose", "P03"], "Name a pose of"),
         (["--reference", file, "--pose", "H2"], "turns a joint"),
         (["--pose", "H1"], "where its points are is not stated"),
     ):
-        assert told in refused(tmp_path, folder, *pair, *more)
+        assert words in refusal(tmp_path, folder, *pair, *more)
 
 
 def test_postures_of_one_point_are_refused(postures, tmp_path):
     folder, file = postures
     h = receptance(0.0)[:2, :2]
-    one = FrfMatrix(HZ, POINTS[:2], POINTS[:2], h, np.full(h.shape, np.nan), True)
+    one = FrfMatrix(HZ, POINTS[:2], POINTS[:2], h, True)
     for name in ("recordings.csv", "predict.csv"):
         (tmp_path / name).write_text((folder / name).read_text())
     for i in range(13):

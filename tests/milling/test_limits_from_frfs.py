@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.cli.run import run
 from planner.frf.matrix import FrfMatrix
 from planner.recording.dof import Dof
 from tests.support.matrix_files import write_matrix
+from tests.support.outside import call
 
 # Cuts that follow each other from structure to structure.
 CUT = """
@@ -88,7 +88,7 @@ class Tap:
         h = h + self.noise * np.abs(h).max() * (parts[0] + 1j * parts[1])
         frfs, modes, cut = folder / "tap.uff", folder / "modes.toml", folder / "cut.toml"
         ends = Dof("1", "x"), Dof("1", "y")
-        write_matrix(frfs, FrfMatrix(lines, ends, ends, h, np.full(h.shape, np.nan), True))
+        write_matrix(frfs, FrfMatrix(lines, ends, ends, h, True))
         modes.write_text("".join(
             f"[[mode]]\nfrequency_hz = {f!r}\ndamping_ratio = {z!r}\nmass_kg = {m!r}\n"
             f"direction = {d.tolist()}\n"
@@ -106,23 +106,21 @@ OPEN = "Lines or noise of these FRFs do not suffice"
 HIDDEN = re.compile(r"Below (\S+) Hz noise and lines of these FRFs would hide a mode")
 
 
-def limits(source: Path, cut: Path, capsys, *more: str) -> tuple[int, np.ndarray, str]:
+def limits(source: Path, cut: Path, *more: object) -> tuple[int, np.ndarray, str]:
     """Exit code, limits up to the largest depth asked for, and what was said."""
-    capsys.readouterr()
-    code = run(["stability", str(source), "--cut", str(cut), "--json", *more])
-    out = capsys.readouterr()
+    code, out, err = call("stability", source, "--cut", cut, "--json", *more)
     if code:
-        return code, np.zeros(4), out.err
-    said = json.loads(out.out)
+        return code, np.zeros(4), err
+    said = json.loads(out)
     depth = np.array([MOST_M if d is None else d for d in said["depth_limit_m"]])
     return code, depth, " ".join(said["remarks"])
 
 
-def outcome(tap: Tap, folder: Path, capsys) -> tuple[str, str]:
+def outcome(tap: Tap, folder: Path) -> tuple[str, str]:
     """How the limits are, and what is said of them."""
     frfs, modes, cut = tap.write(folder)
-    _, true, _ = limits(modes, cut, capsys)
-    code, found, said = limits(frfs, cut, capsys, "--samples", "60")
+    _, true, _ = limits(modes, cut)
+    code, found, said = limits(frfs, cut, "--samples", 60)
     if code:
         assert code == 2
         assert "measure" in said
@@ -140,12 +138,12 @@ def outcome(tap: Tap, folder: Path, capsys) -> tuple[str, str]:
 @pytest.mark.parametrize(
     "count", [6, pytest.param(100, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])]
 )
-def test_limits_from_frfs_of_drawn_structures(tmp_path: Path, capsys, count: int):
+def test_limits_from_frfs_of_drawn_structures(tmp_path: Path, count: int):
     rows = Counter()
     for number in range(count):
         tap = Tap.draw(SEED, number)
         (tmp_path / str(number)).mkdir()
-        rows[tap.noise > 0, *outcome(tap, tmp_path / str(number), capsys)] += 1
+        rows[tap.noise > 0, *outcome(tap, tmp_path / str(number))] += 1
     print(rows)
     assert not [row for row in rows if row[1:] == ("off", "nothing")]
     near = sum(n for (_, how, _), n in rows.items() if how == "near")

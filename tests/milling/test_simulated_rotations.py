@@ -32,7 +32,8 @@ def simulation():
 
 def carrying(simulation):
     """The same robot with the rod as a payload of its tcp."""
-    length, m, radius = ROD.length, ROD.weight, ROD.diameter / 2
+    length, radius = ROD.length, ROD.diameter / 2
+    m = ROD.material.density_kg_m3 * np.pi * radius**2 * length
     across, along = m * (3 * radius**2 + length**2) / 12, m * radius**2 / 2
     body = Payload("tcp", m, (0.0, 0.0, length / 2), (across, 0.0, 0.0, across, 0.0, along))
     config = simulation.robot.config

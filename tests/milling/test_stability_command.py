@@ -1,13 +1,12 @@
 """`planner stability` as a user gives it: the answer's JSON, and one sentence for what is wrong."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from planner.cli.run import run
 from tests.support.cuts import SLOT
+from tests.support.outside import refused, said, told
 from tests.support.rerun_columns import lines_of
 
 MODES = """
@@ -28,23 +27,21 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
     return modes, cut
 
 
-def test_answer_is_one_json_document(files, capsys):
+def test_answer_is_one_json_document(files):
     modes, cut = files
-    assert run(["stability", str(modes), "--cut", str(cut), "--json", "--point", "5000,0.001"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said["spindle_rpm"] == [10000, 20000]
-    assert said["depth_limit_m"] == pytest.approx([3.224e-4, 1.4175e-3], rel=1e-3)
-    assert said["kind"] == ["hopf", "flip"]
-    assert said["depth_limit_m_at_95"] == said["depth_limit_m"]
-    assert said["chatter_hz"] == pytest.approx([930.3, 1000.0], abs=0.1)
-    assert said["multiplier"] == pytest.approx(1.406474, abs=1e-6)
+    answer = told("stability", modes, "--cut", cut, "--point", "5000,0.001")
+    assert answer["spindle_rpm"] == [10000, 20000]
+    assert answer["depth_limit_m"] == pytest.approx([3.224e-4, 1.4175e-3], rel=1e-3)
+    assert answer["kind"] == ["hopf", "flip"]
+    assert answer["depth_limit_m_at_95"] == answer["depth_limit_m"]
+    assert answer["chatter_hz"] == pytest.approx([930.3, 1000.0], abs=0.1)
+    assert answer["multiplier"] == pytest.approx(1.406474, abs=1e-6)
     cut.write_text(CUT.replace("[0.0, 0.01, 400]", "[0.0, 1e-4, 10]"))  # stable to the deepest
-    assert run(["stability", str(modes), "--cut", str(cut), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said["depth_limit_m"] == said["kind"] == [None, None]
+    answer = told("stability", modes, "--cut", cut)
+    assert answer["depth_limit_m"] == answer["kind"] == [None, None]
 
 
-def test_frfs_of_predict_and_the_picture(files, tmp_path, capsys):
+def test_frfs_of_predict_and_the_picture(files, tmp_path):
     from tests.support.milling_cases import two_each_way
 
     _, cut = files
@@ -54,16 +51,11 @@ def test_frfs_of_predict_and_the_picture(files, tmp_path, capsys):
     h *= (2j * np.pi * lines) ** 2
     npz = tmp_path / "frfs.npz"
     np.savez(npz, frequency_hz=lines, frf_mean=h, frf_sd=0.02 * abs(h), pose=np.array(["A", "B"]))
-    command = ["stability", str(npz), "--cut", str(cut), "--json"]
-    assert run(command) == 2
-    assert "--pose" in capsys.readouterr().err
-    asked = ["--pose", "B", "--samples", "20", "--plot", str(tmp_path / "pictures")]
-    asked += ["--rrd", str(tmp_path / "lobes.rrd")]
-    assert run([*command, *asked]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert all(
-        a < b for a, b in zip(said["depth_limit_m_at_95"], said["depth_limit_m"], strict=True)
-    )
+    command = "stability", npz, "--cut", cut
+    assert "--pose" in refused(*command, "--json")
+    files = "--plot", tmp_path / "pictures", "--rrd", tmp_path / "lobes.rrd"
+    answer = told(*command, "--pose", "B", "--samples", 20, *files)
+    assert np.all(np.less(answer["depth_limit_m_at_95"], answer["depth_limit_m"]))
     assert (tmp_path / "pictures" / "stability.png").stat().st_size > 10_000
     drawn = lines_of(tmp_path / "lobes.rrd")
     low, high = (
@@ -105,23 +97,14 @@ WRONG_MODES = {
 }
 
 
-def refused(arguments: list[str], capsys) -> None:
-    assert run(arguments) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    lines = told.err.strip().splitlines()
-    assert len(lines) == 1
-    assert "failed inside" not in lines[0]
-
-
 @pytest.mark.parametrize("what", [*WRONG_CUTS, *WRONG_MODES])
-def test_wrong_cuts_and_modes_are_refused_in_a_sentence(files, capsys, what: str):
+def test_wrong_cuts_and_modes_are_refused_in_a_sentence(files, what: str):
     (modes, cut), of_cut = files, what in WRONG_CUTS
     file, text = (cut, CUT) if of_cut else (modes, MODES)
     old, new = (WRONG_CUTS if of_cut else WRONG_MODES)[what]
     assert old in text
     file.write_text(text.replace(old, new))
-    refused(["stability", str(modes), "--cut", str(cut), "--json"], capsys)
+    assert "failed inside" not in refused("stability", modes, "--cut", cut, "--json")
 
 
 POINTS = ("5000", "5000,-0.001", "0,0.001", "a,b", "5000,0.001,1", "nan,nan")
@@ -134,14 +117,15 @@ POINTS = ("5000", "5000,-0.001", "0,0.001", "a,b", "5000,0.001,1", "nan,nan")
         *((name, ()) for name in ("missing.npz", "missing.toml", "junk.npz", "junk.uff")),
     ],
 )
-def test_wrong_points_and_sources_are_refused_in_a_sentence(files, capsys, source: str, more):
+def test_wrong_points_and_sources_are_refused_in_a_sentence(files, source: str, more):
     _, cut = files
     if source.startswith("junk"):
         (cut.parent / source).write_bytes(bytes(range(256)) * 8)
-    refused(["stability", str(cut.parent / source), "--cut", str(cut), *more], capsys)
+    found = refused("stability", cut.parent / source, "--cut", cut, *more)
+    assert "failed inside" not in found
 
 
-def test_one_wrong_line_of_exact_frfs_is_no_crash(files, tmp_path, capsys):
+def test_one_wrong_line_of_exact_frfs_is_no_crash(files, tmp_path):
     """A pole of which nothing but noise-free lines tell has no variance."""
     hz, table = np.arange(0.5, 60.0, 0.5), {"frequency_hz": np.arange(0.5, 60.0, 0.5)}
     modes = (17.0, 0.022, 0.8, 0.5), (31.0, 0.017, -0.4, 0.85), (52.0, 0.031, 0.2, -0.3)
@@ -157,5 +141,4 @@ def test_one_wrong_line_of_exact_frfs_is_no_crash(files, tmp_path, capsys):
     rows = np.column_stack(list(table.values()))
     np.savetxt(frfs, rows, fmt="%.12g", delimiter=",", header=",".join(table), comments="")
     cut.write_text(CUT.replace("[10000, 20000, 2]", "[1200, 2400, 4]"))
-    assert run(["stability", str(frfs), "--cut", str(cut)]) == 0
-    capsys.readouterr()
+    said("stability", frfs, "--cut", cut)

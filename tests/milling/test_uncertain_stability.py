@@ -235,8 +235,8 @@ def test_robust_depth_is_that_of_the_coefficients_alone():
     assert np.all(drawn.robust_sd() < 0.05)
     both = sampled_limits(structure.samples(given, 40), found)
     assert np.all(both.robust() < depth)
-    assert np.all(np.diag(both.probability(depth * 0.5)) > 0.98)
-    assert np.all(np.diag(both.probability(depth * 2)) < 0.1)
+    assert np.all(np.mean(both.depth_m > depth * 0.5, axis=0) > 0.98)
+    assert np.all(np.mean(both.depth_m > depth * 2, axis=0) < 0.1)
 
 
 def test_mean_of_uncertain_frfs_is_fitted_by_modes_as_close_as_its_sd_asks():

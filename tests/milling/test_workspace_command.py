@@ -3,7 +3,6 @@
 `pytest -m slow tests/milling/test_workspace_command.py` turns along a program with another tool.
 """
 
-import json
 import shutil
 
 import numpy as np
@@ -11,11 +10,11 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.cut_source import tip_at, tip_frfs
-from planner.cli.run import run
 from planner.milling.cutter_frf import CutterFrf
 from planner.milling.tip_files import completed
 from planner.proof.arms import KR10
 from planner.proof.load import load_truth
+from tests.support import outside
 from tests.support.rerun_columns import lines_of
 
 CUT = """
@@ -62,27 +61,26 @@ def made(root, band):
     (root / "campaign.toml").write_text(campaign + "candidates = 20\n")
     for name, text in (("cut.toml", CUT), ("part.nc", PROGRAM), ("tool.toml", TOOL)):
         (root / name).write_text(text)
-    folder = str(root / "cell")
-    told = ["new", folder, "--robot", str(robot), "--campaign", str(root / "campaign.toml")]
-    assert run(told) == 0
+    outside.said("new", root / "cell", "--robot", robot, "--campaign", root / "campaign.toml")
     return root
 
 
-def asked(cell, capsys, *more, code=0):
-    capsys.readouterr()
-    told = ["stability", str(cell / "cell"), "--cut", str(cell / "cut.toml"), "--samples", "20"]
-    more = [str(cell / "part.nc" if one == "PART" else one) for one in more]
-    assert run([*told, "--json", *more]) == code
-    out = capsys.readouterr()
-    if code:
-        assert len(out.err.strip().splitlines()) == 1
-        return out.err
-    return json.loads(out.out)
+def command(cell, *more):
+    more = (cell / "part.nc" if one == "PART" else one for one in more)
+    return "stability", cell / "cell", "--cut", cell / "cut.toml", "--samples", 20, *more
 
 
-def test_map_of_the_workspace(cell, tmp_path, capsys):
+def asked(cell, *more):
+    return outside.told(*command(cell, *more))
+
+
+def refusal(cell, *more):
+    return outside.refused(*command(cell, *more), "--json")
+
+
+def test_map_of_the_workspace(cell, tmp_path):
     files = ("--plot", tmp_path, "--rrd", tmp_path / "map.rrd")
-    said = asked(cell, capsys, "--map", "--poses", 4, "--point", "6000,0.0002", *files)
+    said = asked(cell, "--map", "--poses", 4, "--point", "6000,0.0002", *files)
     assert said["spindle_rpm"] == 6000
     found, robust = (np.array(said[n], float) for n in ("depth_limit_m", "depth_limit_m_at_95"))
     assert found.shape == (4,)
@@ -94,16 +92,15 @@ def test_map_of_the_workspace(cell, tmp_path, capsys):
     assert (tmp_path / "map.rrd").stat().st_size > 10_000
 
 
-def test_poses_that_chatter_outside_the_band_are_left_out_of_the_map(tmp_path, capsys):
-    said = asked(made(tmp_path, "[5.0, 13.0]"), capsys, "--map", "--poses", 4)
+def test_poses_that_chatter_outside_the_band_are_left_out_of_the_map(tmp_path):
+    said = asked(made(tmp_path, "[5.0, 13.0]"), "--map", "--poses", 4)
     assert said["left_out"] == ["W001"]
     assert said["poses"] == ["W002", "W003", "W004"]
     assert np.array(said["position_m"]).shape == (3, 3)
     (why,) = said["remarks"]
     assert why.startswith("W001 is left out: the cut would chatter there outside the 5 to 13 Hz")
-    assert "chatter" in asked(
-        made(tmp_path / "narrow", "[5.0, 6.0]"), capsys, "--map", "--poses", 2, code=2
-    )
+    narrow = made(tmp_path / "narrow", "[5.0, 6.0]")
+    assert "chatter" in refusal(narrow, "--map", "--poses", 2)
 
 
 def test_frfs_are_carried_from_the_sensor_to_the_tip(cell):
@@ -136,16 +133,14 @@ def test_a_tool_is_coupled_to_what_the_sensor_shows(cell):
     np.testing.assert_allclose(measured, campaign.frf_at(q, lines)[0][0] / s2)
 
 
-def test_frfs_of_a_sensor_beside_the_tip_are_said_to_be_that(cell, tmp_path, capsys):
+def test_frfs_of_a_sensor_beside_the_tip_are_said_to_be_that(cell, tmp_path):
     q = Campaign(cell / "cell").cell.robot.joints.columns
     (tmp_path / "p.csv").write_text(",".join(["pose", *q]) + "\nA,10,-70,95,20,40,-30\n")
-    poses, npz = str(tmp_path / "p.csv"), str(tmp_path / "p.npz")
-    assert run(["predict", str(cell / "cell"), poses, "--out", npz]) == 0
-    capsys.readouterr()
-    (tmp_path / "cut.toml").write_text((cell / "cut.toml").read_text().replace('"base"', '"frf"'))
-    cut = str(tmp_path / "cut.toml")
-    assert run(["stability", npz, "--cut", cut, "--samples", "20", "--json"]) == 0
-    assert any("not at the tcp" in text for text in json.loads(capsys.readouterr().out)["remarks"])
+    cut, npz = tmp_path / "cut.toml", tmp_path / "p.npz"
+    outside.said("predict", cell / "cell", tmp_path / "p.csv", "--out", npz)
+    cut.write_text((cell / "cut.toml").read_text().replace('"base"', '"frf"'))
+    answer = outside.told("stability", npz, "--cut", cut, "--samples", 20)
+    assert any("not at the tcp" in text for text in answer["remarks"])
 
 
 def test_tip_and_sensor_may_be_points_of_robot_toml(cell, tmp_path):
@@ -167,19 +162,19 @@ def test_tip_and_sensor_may_be_points_of_robot_toml(cell, tmp_path):
         np.testing.assert_allclose(found, known, rtol=1e-9)
 
 
-def test_a_spindle_beyond_the_tip_is_remarked_upon(cell, tmp_path, capsys):
+def test_a_spindle_beyond_the_tip_is_remarked_upon(cell, tmp_path):
     remarks = []
     for z in ("1.0", "-1.0"):
         text = "".join(line for line in CUT.splitlines(True) if not line.startswith("axis"))
         (tmp_path / "cut.toml").write_text(f"axis = [0.0, 0.0, {z}]\n{text}")
-        said = asked(cell, capsys, "--cut", tmp_path / "cut.toml", "--map", "--poses", 2)
+        said = asked(cell, "--cut", tmp_path / "cut.toml", "--map", "--poses", 2)
         remarks.append(any("beyond the tip" in text for text in said["remarks"]))
     assert sorted(remarks) == [False, True]
 
 
 @pytest.mark.slow
-def test_a_program_with_turns_and_another_tool(cell, tmp_path, capsys):
-    said = asked(cell, capsys, *WAY, "--turns", "--plot", tmp_path, "--rrd", tmp_path / "path.rrd")
+def test_a_program_with_turns_and_another_tool(cell, tmp_path):
+    said = asked(cell, *WAY, "--turns", "--plot", tmp_path, "--rrd", tmp_path / "path.rrd")
     assert "/figures/path/0/whole_path__95___probability" in lines_of(tmp_path / "path.rrd")
     turn = said["turn"]
     depth = np.array(turn["depth_m"], float)
@@ -190,7 +185,7 @@ def test_a_program_with_turns_and_another_tool(cell, tmp_path, capsys):
         assert turn["turn_deg"][int(np.nanargmax(row))] == best
     assert (tmp_path / "turns.png").exists()
     assert said["feed"]["direction_base"] is not None
-    longer = asked(cell, capsys, *WAY, "--tool", cell / "tool.toml")
+    longer = asked(cell, *WAY, "--tool", cell / "tool.toml")
     assert longer["depth_limit_m"] != said["depth_limit_m"]
     assert {len(one["poses"]) for one in (longer, said)} == {2}
 
@@ -200,7 +195,7 @@ def _at(said, rpm):
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "words"),
     [
         (("--path", "PART"), "--origin"),
         (("--path", "PART", "--origin", "a,b"), "--origin"),
@@ -213,11 +208,11 @@ def _at(said, rpm):
         (("--noise", "2", "--map"), "go with --tool"),
     ],
 )
-def test_what_cannot_be_is_said_in_a_sentence(cell, capsys, more, told):
-    assert told in asked(cell, capsys, *more, code=2)
+def test_what_cannot_be_is_said_in_a_sentence(cell, more, words):
+    assert words in refusal(cell, *more)
 
 
-def test_a_tool_that_points_the_other_way_is_refused(cell, tmp_path, capsys):
+def test_a_tool_that_points_the_other_way_is_refused(cell, tmp_path):
     tool = tmp_path / "tool.toml"
     tool.write_text(TOOL.replace("-1.0]", "1.0]"))
-    assert "to_spindle" not in asked(cell, capsys, *WAY, "--tool", tool, code=2).split(";")[-1]
+    assert "to_spindle" not in refusal(cell, *WAY, "--tool", tool).split(";")[-1]

@@ -93,7 +93,7 @@ def struck(hits: tuple[int, ...] = (100, 2600), n: int = 5200, dead: bool = Fals
 
 @pytest.mark.parametrize("hits", [(100,), (100, 2600)])
 def test_modes_after_hits(hits):
-    model, _ = analyse_record(struck(hits), band_hz=(3.0, 50.0))
+    model, _ = analyse_record(struck(hits), "HAMMER", band_hz=(3.0, 50.0))
     assert [m.frequency_hz for m in model.modes] == pytest.approx([8.0, 21.0], rel=1e-3)
     assert [m.damping_ratio for m in model.modes] == pytest.approx([0.01, 0.006], rel=0.05)
     for mode, shape in zip(model.modes, ([1.0, 0.7, -0.4], [0.5, -1.0, 0.8]), strict=True):
@@ -104,7 +104,7 @@ def test_modes_after_hits(hits):
 
 
 def test_dead_sensor_is_named_and_left_out():
-    model, _ = analyse_record(struck(dead=True), band_hz=(3.0, 50.0))
+    model, _ = analyse_record(struck(dead=True), "HAMMER", band_hz=(3.0, 50.0))
     assert [m.frequency_hz for m in model.modes] == pytest.approx([8.0, 21.0], rel=1e-3)
     assert any("Sensor A1" in remark for remark in model.remarks)
     assert all(mode.shape.shape == (2,) for mode in model.modes)
@@ -112,14 +112,20 @@ def test_dead_sensor_is_named_and_left_out():
 
 def test_unknown_force_channel_is_an_input_error():
     with pytest.raises(InputError, match="no channel 'X'"):
-        analyse_record(struck(), force_channel="X")
+        analyse_record(struck(), "X")
+
+
+def hit_first(name: str, *channels: Channel) -> TimeRecord:
+    """A record that begins with a hit."""
+    force = Channel("HAMMER", "voltage", "V", 0, np.eye(2, channels[0].samples.size)[1])
+    return TimeRecord(Path(name), RATE, (*channels, force))
 
 
 def test_record_without_oscillation_is_refused():
     rng = np.random.default_rng(2)
     channel = Channel("A", "acceleration", "m/s^2", 0, rng.normal(size=3000))
     with pytest.raises(RefusedError, match="no decaying oscillation"):
-        analyse_record(TimeRecord(Path("noise.csv"), RATE, (channel,)))
+        analyse_record(hit_first("noise.csv", channel), "HAMMER")
 
 
 def test_mode_that_changes_with_amplitude_is_one_mode():
@@ -130,8 +136,8 @@ def test_mode_that_changes_with_amplitude_is_one_mode():
     phase = 2 * np.pi * np.cumsum(9.0 - 0.25 * np.exp(-t / 0.6)) / RATE
     wave = np.exp(-np.cumsum(rate) / RATE) * np.cos(phase)
     x = np.outer([1.0, 0.6, -0.5], wave) + 0.002 * rng.normal(size=(3, t.size))
-    channels = tuple(Channel(f"A{k}", "acceleration", "m/s^2", 0, x[k]) for k in range(3))
-    model, _ = analyse_record(TimeRecord(Path("friction.csv"), RATE, channels), band_hz=(4, 20))
+    channels = (Channel(f"A{k}", "acceleration", "m/s^2", 0, x[k]) for k in range(3))
+    model, _ = analyse_record(hit_first("friction.csv", *channels), "HAMMER", (4, 20))
     assert len(model.modes) == 1
     assert model.modes[0].frequency_hz == pytest.approx(9.0, rel=0.02)
     assert any("depends on amplitude" in remark for remark in model.remarks)
@@ -141,7 +147,7 @@ def test_mode_that_changes_with_amplitude_is_one_mode():
 def test_three_modes_and_the_faults(shared_data, name):
     (record,) = read(shared_data / "imphammer_mit" / name)
     assert isinstance(record, TimeRecord)
-    model, _ = analyse_record(record)
+    model, _ = analyse_record(record, "CH8")
     found = [mode.frequency_hz for mode in model.modes]
     for frequency in REPORTED_HZ:
         assert min(abs(f / frequency - 1) for f in found) < 0.02

@@ -16,7 +16,7 @@ from planner.campaign.config import load_campaign_config
 from planner.campaign.journal import Journal
 from planner.dataset.screened_files import Source, read_files
 from planner.errors import PlannerError, RefusedError
-from planner.frf.exported import from_records
+from planner.frf.matrix import from_records
 from planner.proof.hits import Hammer, SimulatedHit
 from planner.proof.recordings import write_uff
 from planner.recording.folder import read_poses, read_recordings

@@ -118,7 +118,7 @@ def test_stabilisation_diagram_holds_singular_values_every_pole_and_the_modes(fi
     poles = np.concatenate([entry.poles for entry in found.diagram.sets])
     assert np.allclose(np.sort(drawn), np.sort(np.abs(poles)) / (2 * np.pi))
     # Poles of the highest order that are called stable lie on true modes.
-    top = stays.get_xdata()[stays.get_ydata() == found.order]
+    top = stays.get_xdata()[stays.get_ydata() == found.diagram.order]
     near = np.min(np.abs(top[:, None] / system.frequency_hz - 1), axis=1)
     assert np.sum(near < 0.01) >= len(system.frequency_hz)
     assert verticals(left) == pytest.approx([mode.frequency_hz for mode in modal.modes])

@@ -26,7 +26,6 @@ def hit_frfs(
         tuple(dof_of(structure, i) for i in range(len(structure.nodes))),
         tuple(dof_of(structure, i) for i in references),
         h,
-        np.full(h.shape, np.nan),
         True,
     )
 

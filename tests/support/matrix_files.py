@@ -55,5 +55,4 @@ def transposed(matrix: FrfMatrix) -> FrfMatrix:
         responses=matrix.references,
         references=matrix.responses,
         accelerance=np.swapaxes(matrix.accelerance, 0, 1),
-        coherence=np.swapaxes(matrix.coherence, 0, 1),
     )

@@ -6,8 +6,7 @@ import numpy as np
 
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes, real_modes
-from planner.milling.machine import Machine
-from planner.milling.semi_discretisation import semi_monodromies, semi_monodromy
+from planner.milling.machine import Machine, semi_monodromies, semi_monodromy
 
 # Insperger and Stépán's mode, as Ding et al. (2010) use it.
 HERTZ, ZETA, KILOGRAM = 922.0, 0.011, 0.03993

@@ -107,7 +107,7 @@ def _struck(
     h[gone] = np.nan
     felt = tuple(dof_of(structure, o) for o in range(len(structure.nodes)))
     hit = tuple(dof_of(structure, i) for i in references)
-    return FrfMatrix(frequency_hz, felt, hit, h, np.full(h.shape, np.nan), True)
+    return FrfMatrix(frequency_hz, felt, hit, h, True)
 
 
 def _damped(structure: Structure, rng: np.random.Generator) -> Structure:
@@ -276,10 +276,10 @@ def spoiled(
     Every row is fitted by itself and the poles do not know names: what would be found in the
     spoiled matrix is what was found, spoiled.
     """
-    table = np.full((*sign.shape, found.fit.poles.size), np.nan + 0j)
-    table[found.rows, found.columns] = found.fit.residue
+    table = np.full((*sign.shape, found.fit.coefficients.shape[1]), np.nan)
+    table[found.data.row, found.data.column] = found.fit.coefficients
     table = table[order] * sign[..., None]
     matrix = replace(case.matrix, accelerance=case.matrix.accelerance[order] * sign[..., None])
     rows, columns = np.nonzero(matrix.measured)
-    fit = replace(found.fit, residue=table[rows, columns])
-    return matrix, replace(found, rows=rows, columns=columns, fit=fit)
+    fit = replace(found.fit, coefficients=table[rows, columns])
+    return matrix, replace(found, data=replace(found.data, row=rows, column=columns), fit=fit)
