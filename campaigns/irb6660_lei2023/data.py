@@ -66,25 +66,23 @@ def parameters(truth: Truth, q: np.ndarray, reference: np.ndarray | None = None)
     """
     each = [_modes(truth, posture) for posture in q]
     poles, left, right = (np.array([e[i] for e in each]) for i in range(3))  # (n, 9, ...)
-    least = np.min(np.abs(left) / np.linalg.norm(left, axis=2, keepdims=True), axis=0)
-    rows = np.empty((len(q), MODES, 16))
-    chosen = np.argmax(least, axis=1) if reference is None else reference
-    for k, one in enumerate(chosen):
-        scale = left[:, k, one, None]
-        rows[:, k, 0] = np.abs(poles[:, k]) / (2 * np.pi)
-        rows[:, k, 1] = -poles[:, k].real / np.abs(poles[:, k])
-        rows[:, k, LEFT] = _parts(np.delete(left[:, k], one, axis=1) / scale)
-        rows[:, k, RIGHT] = _parts(right[:, k] * scale)
-    return rows
+    size = np.abs(poles)
+    natural = np.stack([size / (2 * np.pi), -poles.real / size], axis=-1)
+    return _scaled(natural, left, right, reference).values
 
 
 def _modes(truth: Truth, q: np.ndarray) -> tuple[np.ndarray, ...]:
     """Poles (9,), L and R (9, 4) of one posture by rising frequency, points as 1X, 1aX, 1Y, 1aY."""
     poles, shapes, entry, *_ = truth.modal(q)
-    axes = truth.tcp(q)[0].T[:2]
-    points = [truth.along(q, "link_6", np.array(p), axis) for axis in axes for p in (TIP, BACK)]
+    points = _points(truth, q)
     order = [k for k in np.argsort(np.abs(poles)) if poles[k].imag > 1e-6][:MODES]
-    return poles[order], entry[order] @ np.transpose(points), (points @ shapes[:, order]).T
+    return poles[order], entry[order] @ points.T, (points @ shapes[:, order]).T
+
+
+def _points(truth: Truth, q: np.ndarray) -> np.ndarray:
+    """How 1X, 1aX, 1Y and 1aY move with each spring (4, e)."""
+    axes = truth.tcp(q)[0].T[:2]
+    return np.array([truth.along(q, "link_6", np.array(p), a) for a in axes for p in (TIP, BACK)])
 
 
 def _parts(values: np.ndarray) -> np.ndarray:
@@ -165,9 +163,7 @@ def _frf(
     """Lines (F,), accelerances (4, 4, F) in m/s²/N by H1, and their variances."""
     poles, shapes, entry, *_ = truth.modal(q)
     inverse = np.linalg.inv(truth.matrices(q)[0])
-    axes = truth.tcp(q)[0].T
-    heard = np.array([truth.along(q, "link_6", np.array(p), a) for a in axes[:2]
-                      for p in (TIP, BACK)])  # fmt: skip
+    axes, heard = truth.tcp(q)[0].T, _points(truth, q)
     n = round(HAMMER.record_s * HAMMER.sampling_rate_hz)
     hz = np.fft.rfftfreq(n, 1 / HAMMER.sampling_rate_hz)
     h, variance = np.empty((4, 4, len(hz)), complex), np.empty((4, 4, len(hz)))
@@ -209,20 +205,26 @@ def _mode(one: Mode) -> Mode:
 
 
 def _parameters(poles: np.ndarray, residues: np.ndarray) -> HitParameters:
-    """f, ζ, L without its entry that is 1, and R, as `lei2023_data.parameters` has them."""
+    """As `parameters` has them, from f and ζ (n, modes, 2) and residues (n, modes, 4, 4)."""
     n, modes = poles.shape[:2]
     left, right = np.full((2, n, modes, 4), np.nan + 0j)
     for i, k in zip(*np.nonzero(np.isfinite(poles[..., 0])), strict=True):
         right[i, k], left[i, k], _ = rank_one(residues[i, k])
-    size = np.abs(left) / np.linalg.norm(left, axis=2, keepdims=True)
-    with np.errstate(all="ignore"):  # as before
-        least = np.nanmin(np.where(np.isfinite(size), size, np.inf), axis=0)
-    reference = np.argmax(least, axis=1)
-    rows = np.full((n, modes, 16), np.nan)
-    for k, one in enumerate(reference):
-        scale = left[:, k, one, None]
-        rows[:, k, :2] = poles[:, k]
-        with np.errstate(all="ignore"):  # NaN where the mode was not found
+    return _scaled(poles, left, right)
+
+
+def _scaled(
+    natural: np.ndarray, left: np.ndarray, right: np.ndarray, reference: np.ndarray | None = None
+) -> HitParameters:
+    """From f and ζ (n, modes, 2), L and R (n, modes, 4), NaN where a mode was not found."""
+    rows = np.full((*left.shape[:2], 16), np.nan)
+    with np.errstate(all="ignore"):
+        size = np.abs(left) / np.linalg.norm(left, axis=2, keepdims=True)
+        least = np.min(np.where(np.isfinite(size), size, np.inf), axis=0)
+        reference = np.argmax(least, axis=1) if reference is None else reference
+        for k, one in enumerate(reference):
+            scale = left[:, k, one, None]
+            rows[:, k, :2] = natural[:, k]
             rows[:, k, LEFT] = _parts(np.delete(left[:, k], one, axis=1) / scale)
-        rows[:, k, RIGHT] = _parts(right[:, k] * scale)
+            rows[:, k, RIGHT] = _parts(right[:, k] * scale)
     return HitParameters(rows, reference)

@@ -1,7 +1,7 @@
 """Data for Seyed Hosseini et al. 2025: hits at 254 postures, modes by the four-step check.
 
 A KR210-like robot in MuJoCo along a trajectory of its tool; three axes at three levels, everyday
-errors (`everyday_hits`), modal analysis, tracking, and the check of neighbouring postures
+errors (`planner.studies.hits`), modal analysis, tracking, and the check of neighbouring postures
 (`four_steps`).
 """
 
@@ -11,8 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.errors import RefusedError
-from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
 from planner.progress import ProgressCallback, part_of
@@ -62,18 +60,7 @@ def load(folder: Path, seed: int, small: bool, progress: ProgressCallback) -> Po
     x = (q - q.min(axis=0)) / np.maximum(np.ptp(q, axis=0), 1e-3)  # joint 4 hardly moves
     injected = everyday_faults(truth, seed)
     struck = simulate_hits(truth, injected, q, HAMMER, BAND_HZ, seed, part_of(progress, 0.0, 0.7))
-    found: list[tuple[Mode, ...]] = []
-    doubtful: list[tuple[Mode, ...]] = []
-    for i, frf in enumerate(struck.frfs):
-        progress(f"modal analysis of posture {i + 1}", 0.7 + 0.3 * i / len(q))
-        try:
-            model = estimate_modes(frf, BAND_HZ)
-        except RefusedError:
-            found.append(())
-            doubtful.append(())
-            continue
-        found.append(model.modes)
-        doubtful.append(model.doubtful)
+    found, doubtful = struck.modes(BAND_HZ, part_of(progress, 0.7, 1.0))
     simulated = Simulation(Robot.load(robot_toml)).modes(q, MODES + 2)
     guide = Guide(simulated.frequency_hz, simulated.shape)
     tracks = track(found, guide, x, ordered=True)

@@ -58,16 +58,10 @@ def everywhere(name: str, predicted: BeyondPrediction, seen: Sweep) -> float:
 def score_table(predicted: BeyondPrediction, seen: Sweep) -> Table:
     """R² and RMSE of every model beside the paper's."""
     nan = float("nan")
-    rows = [
-        (
-            name,
-            *scores(amplitude, seen),
-            PAPER_R2.get(name, nan),
-            everywhere(name, predicted, seen),
-            PAPER_ALL.get(name, nan),
-        )
-        for name, amplitude in predicted.amplitude.items()
-    ]
+    rows = []
+    for name, amplitude in predicted.amplitude.items():
+        beyond = *scores(amplitude, seen), PAPER_R2.get(name, nan)
+        rows.append((name, *beyond, everywhere(name, predicted, seen), PAPER_ALL.get(name, nan)))
     title = f"Table 2: R² and RMSE beyond {TRAINED_DEG:.0f}°, trained below; R² over both"
     columns = ("model", "R²", "RMSE m/s²/N", "R² in the paper", "R² over both", "in the paper")
     return Table("busch2020_r2", title, columns, tuple(rows))
@@ -123,28 +117,19 @@ def overlays(predicted: BeyondPrediction, seen: Sweep) -> Figure:
     """FRFs at three angles beyond the training."""
     title = "FRFs beyond the training, at three angles"
     figure, grid = panels((9.0, 8.0), title, len(SHOWN_DEG))
-    colours = drawing.COLOURS
+    colours, hz = drawing.COLOURS, seen.lines_hz
     for panel, angle in zip(grid[:, 0], SHOWN_DEG, strict=True):
         i = int(np.flatnonzero(angle == BEYOND_DEG)[0])
         for name in (n for n in predicted.amplitude if n in PAPER_R2):
-            panel.plot(
-                seen.lines_hz,
-                predicted.amplitude[name][:, i],
-                color=colours[name],
-                lw=1.1,
-                label=name,
-            )
-        mean, sd = predicted.amplitude[FUSED][:, i], predicted.sd[:, i]
-        panel.fill_between(
-            seen.lines_hz, np.maximum(mean - 1.96 * sd, 0), mean + 1.96 * sd,
-            color=colours[FUSED], alpha=0.25, lw=0,
-        )  # fmt: skip
-        panel.plot(
-            seen.lines_hz, mean, color=colours[FUSED], lw=1.6, label="fused modes, 95 % band"
-        )
-        panel.plot(seen.lines_hz, seen.truth[:, i], "k--", lw=1.2, label="truth (MuJoCo)")
+            amplitude = predicted.amplitude[name][:, i]
+            panel.plot(hz, amplitude, color=colours[name], lw=1.1, label=name)
+        mean, spread = predicted.amplitude[FUSED][:, i], 1.96 * predicted.sd[:, i]
+        low, colour = np.maximum(mean - spread, 0), colours[FUSED]
+        panel.fill_between(hz, low, mean + spread, color=colour, alpha=0.25, lw=0)
+        panel.plot(hz, mean, color=colour, lw=1.6, label="fused modes, 95 % band")
+        panel.plot(hz, seen.truth[:, i], "k--", lw=1.2, label="truth (MuJoCo)")
         panel.set_title(f"joint 3 at {angle:.0f}°", fontsize=9)
-        panel.set_xlim(seen.lines_hz[0], seen.lines_hz[-1])
+        panel.set_xlim(hz[0], hz[-1])
         panel.set_ylim(0, 1.6 * seen.truth[:, i].max())
         panel.grid(True, alpha=0.25)
     name_axes(figure, grid, "frequency (Hz)", "|H| (m/s²/N)")
