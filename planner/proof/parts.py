@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from planner.proof.deviation import BentLink, Deviation, Spring
+from planner.proof.deviation import Deviation, Spring
 from planner.proof.mechanics import Hinge, Part
-from planner.proof.springs import beam_end
+from planner.proof.springs import beam_end, own_axes, vector
 
 MOST_SLENDER, LEAST_SLENDER = 0.6, 0.01  # of a bending link's mass, that is spread along it
 THICK = 0.05  # radius of a beam over its length, for the inertia of its pieces
@@ -40,6 +40,7 @@ class Builder:
         childs = {j.find("child").get("link") for js in self._children.values() for j in js}
         first = next(name for name in self._links if name not in childs)
         self._root, self._table, self._springs = root, table, springs
+        self._axes = own_axes(root)
         self._deviation, self._rng = deviation, rng
         self.parts: list[Part] = []
         self.joint_names: list[str] = []
@@ -76,8 +77,7 @@ class Builder:
             place, rotation = _placement(joint.find("origin"))
             hinges: list[Hinge] = []
             if joint.get("type") != "fixed":
-                axis, slides = joint.find("axis"), joint.get("type") == "prismatic"
-                along = np.array([1.0, 0.0, 0.0]) if axis is None else _vector(axis.get("xyz"))
+                along, slides = self._axes[name]
                 hinges = [Hinge(name, along, slides), *self._hinges(name)]
                 self.joint_names.append(name)
                 self.slides.append(slides)
@@ -91,48 +91,36 @@ class Builder:
                 child, parent, place - shift, rotation=rotation, hinges=hinges, sites=sites
             )
             self._lumps(body, child)
-            beams = [beam for beam in self._deviation.beams if beam.link == child]
-            if beams:
-                self._bent(body, beams[0])
-            elif any(s.joint == child for s in self._springs):
-                self._split(body, child)
+            springs = self._springs_within(child)
+            if springs:
+                self._bent(body, child, springs)
             else:
                 self._sites(body, child)
                 self._inertial(body, child)
                 self._grow(body, child)
 
-    def _split(self, body: int, link: str) -> None:
-        """A link in two halves with springs between, half-way to the farthest frame it carries."""
-        end = beam_end(link, self._root)
-        mass, centre, tensor = self._scattered(link)
-        along = end / np.linalg.norm(end)
-        # Two halves apart by ±d keep the link's mass, centre and inertia; a uniform rod has this d.
-        second = np.trace(tensor) / 2 * np.eye(3) - tensor
-        apart = np.sqrt(0.75 / (mass * (along @ np.linalg.solve(second, along))))
-        half = (tensor - mass * apart**2 * (np.eye(3) - np.outer(along, along))) / 2
-        self._weigh(body, (mass / 2, centre - apart * along, half))
-        self._sites(body, link, end, (-np.inf, 0.5))
-        outer = self._add(f"{link} outer", body, end / 2, hinges=self._hinges(link))
-        self._sites(outer, link, end, (0.5, np.inf), end / 2)
-        self._weigh(outer, (mass / 2, centre + apart * along - end / 2, half))
-        self._grow(outer, link, end / 2)
+    def _springs_within(self, link: str) -> list[list[Hinge]]:
+        """Along a link: those of a beam element by element, or those that sit half-way."""
+        beams = [beam for beam in self._deviation.beams if beam.link == link]
+        if beams:
+            return [self._hinges(f"{link} element {k}") for k in range(beams[0].elements)]
+        return [found] if (found := self._hinges(link)) else []
 
-    def _bent(self, body: int, beam: BentLink) -> None:
+    def _bent(self, body: int, link: str, springs: list[list[Hinge]]) -> None:
         """A link as a chain of rigid pieces; what no slender beam can have stays on the first."""
-        end, link = beam_end(beam.link, self._root), beam.link
-        slender, rest = _slender(*self._scattered(link), end, 0.5 / beam.elements)
+        end, elements = beam_end(link, self._root), len(springs)
+        slender, rest = _slender(*self._scattered(link), end, 0.5 / elements)
         self._weigh(body, rest)
-        piece, step, first = body, end / beam.elements, 0.5 / beam.elements
+        piece, step, first = body, end / elements, 0.5 / elements
         self._sites(body, link, end, (-np.inf, first))
-        for element in range(beam.elements):
+        for element, hinges in enumerate(springs):
             # Springs sit in the middle of elements; the last piece is half as long.
-            size = (0.5 if element == beam.elements - 1 else 1.0) * step
+            size = (0.5 if element == elements - 1 else 1.0) * step
             own = float(slender * np.linalg.norm(size) / np.linalg.norm(end - step / 2))
             shift = step / 2 if element == 0 else step
-            hinges = self._hinges(f"{link} element {element}")
             piece = self._add(f"{link} piece {element}", piece, shift, hinges=hinges)
-            start = first + element / beam.elements
-            reach = (start, np.inf if element == beam.elements - 1 else start + 2 * first)
+            start = first + element / elements
+            reach = (start, np.inf if element == elements - 1 else start + 2 * first)
             self._sites(piece, link, end, reach, start * end)
             self._weigh(piece, (own, size / 2, _rod(own, size, end)))
         self._grow(piece, link, end - step / 2)
@@ -216,10 +204,6 @@ def _slender(
         rod *= 0.8
 
 
-def _vector(text: str) -> np.ndarray:
-    return np.array([float(v) for v in text.split()])
-
-
 def _limits(joint: Any) -> tuple[float, float]:
     limit = joint.find("limit")
     if limit is None or joint.get("type") == "continuous":
@@ -231,7 +215,7 @@ def _placement(origin: Any) -> tuple[np.ndarray, np.ndarray]:
     """Place (3,) and rotation (3, 3) of a URDF origin."""
     if origin is None:
         return np.zeros(3), np.eye(3)
-    return _vector(origin.get("xyz", "0 0 0")), _turn(_vector(origin.get("rpy", "0 0 0")))
+    return vector(origin.get("xyz", "0 0 0")), _turn(vector(origin.get("rpy", "0 0 0")))
 
 
 def _turn(rpy: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,7 +61,11 @@ def results(
     tasks = [Task(proof, k + 1, folder if scheduler is None else None) for k in range(proof.cases)]
     found = {t.name: _unsealed(folder, t.name) for t in tasks if _path(folder, t.name).is_file()}
     todo = [t for t in tasks if t.name not in found]
-    for index, answer in _spread(todo, scheduler, jobs):
+    if scheduler is None:
+        answers = processes.each(conducted, None, todo, jobs)
+    else:
+        answers = cluster.each(conducted, None, todo, scheduler)
+    for index, answer in answers:
         name = todo[index].name
         if isinstance(answer, processes.Failure):
             raise InputError(f"{name} could not be made: {answer.reason}")
@@ -72,12 +76,6 @@ def results(
         right = "right" if found[name].right else "wrong"
         progress(f"{name} {found[name].verdict}, {right}", len(found) / proof.cases)
     return {name: found[name] for name in sorted(found)}
-
-
-def _spread(todo: list[Task], scheduler: str | None, jobs: int) -> Iterator[tuple[int, Any]]:
-    if scheduler is not None:
-        return cluster.each(conducted, None, todo, scheduler)
-    return processes.each(conducted, None, todo, jobs)
 
 
 def seal(folder: Path) -> str:
