@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from planner.proof.deviation import Deviation, Spring
+from planner.proof.deviation import BentLink, Deviation, Spring
 from planner.proof.mechanics import Hinge, Part
 from planner.proof.springs import beam_end, own_axes, vector
 
@@ -91,36 +91,48 @@ class Builder:
                 child, parent, place - shift, rotation=rotation, hinges=hinges, sites=sites
             )
             self._lumps(body, child)
-            springs = self._springs_within(child)
-            if springs:
-                self._bent(body, child, springs)
+            beams = [beam for beam in self._deviation.beams if beam.link == child]
+            if beams:
+                self._bent(body, beams[0])
+            elif any(s.joint == child for s in self._springs):
+                self._split(body, child)
             else:
                 self._sites(body, child)
                 self._inertial(body, child)
                 self._grow(body, child)
 
-    def _springs_within(self, link: str) -> list[list[Hinge]]:
-        """Along a link: those of a beam element by element, or those that sit half-way."""
-        beams = [beam for beam in self._deviation.beams if beam.link == link]
-        if beams:
-            return [self._hinges(f"{link} element {k}") for k in range(beams[0].elements)]
-        return [found] if (found := self._hinges(link)) else []
+    def _split(self, body: int, link: str) -> None:
+        """A link in two halves with springs between, half-way to the farthest frame it carries."""
+        end = beam_end(link, self._root)
+        mass, centre, tensor = self._scattered(link)
+        along = end / np.linalg.norm(end)
+        # Two halves apart by ±d keep the link's mass, centre and inertia; a uniform rod has this d.
+        second = np.trace(tensor) / 2 * np.eye(3) - tensor
+        apart = np.sqrt(0.75 / (mass * (along @ np.linalg.solve(second, along))))
+        half = (tensor - mass * apart**2 * (np.eye(3) - np.outer(along, along))) / 2
+        self._weigh(body, (mass / 2, centre - apart * along, half))
+        self._sites(body, link, end, (-np.inf, 0.5))
+        outer = self._add(f"{link} outer", body, end / 2, hinges=self._hinges(link))
+        self._sites(outer, link, end, (0.5, np.inf), end / 2)
+        self._weigh(outer, (mass / 2, centre + apart * along - end / 2, half))
+        self._grow(outer, link, end / 2)
 
-    def _bent(self, body: int, link: str, springs: list[list[Hinge]]) -> None:
+    def _bent(self, body: int, beam: BentLink) -> None:
         """A link as a chain of rigid pieces; what no slender beam can have stays on the first."""
-        end, elements = beam_end(link, self._root), len(springs)
-        slender, rest = _slender(*self._scattered(link), end, 0.5 / elements)
+        end, link = beam_end(beam.link, self._root), beam.link
+        slender, rest = _slender(*self._scattered(link), end, 0.5 / beam.elements)
         self._weigh(body, rest)
-        piece, step, first = body, end / elements, 0.5 / elements
+        piece, step, first = body, end / beam.elements, 0.5 / beam.elements
         self._sites(body, link, end, (-np.inf, first))
-        for element, hinges in enumerate(springs):
+        for element in range(beam.elements):
             # Springs sit in the middle of elements; the last piece is half as long.
-            size = (0.5 if element == elements - 1 else 1.0) * step
+            size = (0.5 if element == beam.elements - 1 else 1.0) * step
             own = float(slender * np.linalg.norm(size) / np.linalg.norm(end - step / 2))
             shift = step / 2 if element == 0 else step
+            hinges = self._hinges(f"{link} element {element}")
             piece = self._add(f"{link} piece {element}", piece, shift, hinges=hinges)
-            start = first + element / elements
-            reach = (start, np.inf if element == elements - 1 else start + 2 * first)
+            start = first + element / beam.elements
+            reach = (start, np.inf if element == beam.elements - 1 else start + 2 * first)
             self._sites(piece, link, end, reach, start * end)
             self._weigh(piece, (own, size / 2, _rod(own, size, end)))
         self._grow(piece, link, end - step / 2)
