@@ -9,7 +9,7 @@ FRFs are H1, modes come from modal analysis and are tracked over the postures wi
 simulation.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -122,17 +122,15 @@ def measured(
         progress(f"hits at posture {i + 1} of {len(q)}", i / len(q))
         there = EVERYDAY.beside(posture, rng)
         found.append(_analysed(brakes.applied(truth, i / len(q)), there, gains, rng))
-    carried = [[_mode(one) for one in modes] for modes in found]
-    tracks = track(carried, Guide.by_example(carried, MODES), x, ordered=True)
-    residues = np.full((len(q), MODES, 4, 4), np.nan + 0j)
-    poles = np.full((len(q), MODES, 2), np.nan)
+    tracks = track(found, Guide.by_example(found, MODES), x, ordered=True)
+    natural = np.full((len(q), MODES, 2), np.nan)
+    left, right = np.full((2, len(q), MODES, 4), np.nan + 0j)
     for i, row in enumerate(tracks.modes):
         for k, mode in enumerate(row[:MODES]):
             if mode is not None:
-                one = found[i][next(j for j, m in enumerate(carried[i]) if m is mode)]
-                residues[i, k] = one.residue
-                poles[i, k] = one.frequency_hz, one.damping_ratio
-    return _parameters(poles, residues)
+                natural[i, k] = mode.frequency_hz, mode.damping_ratio
+                right[i, k], left[i, k], _ = rank_one(mode.residue)
+    return _scaled(natural, left, right)
 
 
 def _channels(rng: np.random.Generator) -> np.ndarray:
@@ -154,7 +152,9 @@ def _analysed(
     data = Data(hz[lines], h[..., lines], variance[..., lines], tail_s=tail)
     told = identify(data)
     kept = [m for m in (told.modes if told else ()) if m.probability >= LEAST_PROBABILITY]
-    return tuple(m for m in kept if BAND_HZ[0] <= m.frequency_hz <= BAND_HZ[1])
+    inside = (m for m in kept if BAND_HZ[0] <= m.frequency_hz <= BAND_HZ[1])
+    # Tracking wants shapes (3,): three of the four points make them.
+    return tuple(replace(m, shape=rank_one(m.residue[:3, :3])[0]) for m in inside)
 
 
 def _frf(
@@ -193,24 +193,6 @@ def _frf(
         spread = np.sum(np.abs(left) ** 2, axis=0) / (len(LEVELS) - 1)
         variance[:, column] = np.mean(spread, axis=1, keepdims=True) / power
     return hz, h, variance
-
-
-def _mode(one: Mode) -> Mode:
-    """As tracking wants it: three of the four points make its shape."""
-    return Mode(
-        one.frequency_hz, one.frequency_sd_hz, one.damping_ratio, one.damping_sd,
-        one.residue[:3, :3], one.residue_sd[:3, :3], rank_one(one.residue[:3, :3])[0],
-        one.probability,
-    )  # fmt: skip
-
-
-def _parameters(poles: np.ndarray, residues: np.ndarray) -> HitParameters:
-    """As `parameters` has them, from f and ζ (n, modes, 2) and residues (n, modes, 4, 4)."""
-    n, modes = poles.shape[:2]
-    left, right = np.full((2, n, modes, 4), np.nan + 0j)
-    for i, k in zip(*np.nonzero(np.isfinite(poles[..., 0])), strict=True):
-        right[i, k], left[i, k], _ = rank_one(residues[i, k])
-    return _scaled(poles, left, right)
 
 
 def _scaled(

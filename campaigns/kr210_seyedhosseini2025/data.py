@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.campaign import labels
 from planner.dynamics.simulation import Simulation
-from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
 from planner.progress import ProgressCallback, part_of
 from planner.proof.arms import KR210
@@ -68,7 +68,9 @@ def load(folder: Path, seed: int, small: bool, progress: ProgressCallback) -> Po
     spare = [(*some, *rest) for some, rest in zip(tracks.unexpected, doubtful, strict=True)]
     checked = check(struck.frfs, labelled, spare)
     clean = np.array([parameters(*truth.modes(posture, MODES)) for posture in q])
-    measured = np.array([_measured(row) for row in checked.modes])
+    told = labels.gathered(x, checked.modes, simulated.lowest(MODES))
+    each = zip(told.frequency_hz, told.damping_ratio, told.residue, strict=True)
+    measured = np.array([parameters(*posture) for posture in each])
     return PostureData(q, x, measured, clean, truth, checked, tracks.frequency_hz[:, :MODES])
 
 
@@ -103,10 +105,3 @@ def stiffnesses(columns: np.ndarray) -> np.ndarray:
     parts = columns[:, RESIDUE].reshape(len(columns), MODES, 3, 2)[:, :TABLED]
     omega = np.log(2 * np.pi) + columns[:, FREQUENCY][:, :TABLED, None]
     return (omega - np.log(2 * np.hypot(parts[..., 0], parts[..., 1]))).reshape(len(columns), -1)
-
-
-def _measured(row: tuple[Mode | None, ...]) -> np.ndarray:
-    f = np.array([np.nan if m is None else m.frequency_hz for m in row])
-    zeta = np.array([np.nan if m is None else m.damping_ratio for m in row])
-    nothing = np.full((3, 3), np.nan + 1j * np.nan)
-    return parameters(f, zeta, np.array([nothing if m is None else m.residue for m in row]))

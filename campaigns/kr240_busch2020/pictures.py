@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from planner.report.plot_marks import empty, name_axes, panels
 from planner.studies import drawing
 from planner.studies.report import Table, r_squared
+from planner.surrogate.models.frf_surface import SURFACES
 
 from .data import BEYOND_DEG, TRAINED_DEG, Sweep
 
@@ -21,18 +22,16 @@ Effects = tuple[tuple[str, str | None], ...]  # effect and place
 
 @dataclass(frozen=True, eq=False)
 class BeyondPrediction:
-    """Amplitude (f, p) at BEYOND_DEG by name, the sd of the fused one, what diagnosis
-    said, and the effects that it `named`.
+    """Amplitude (f, p) at BEYOND_DEG by name, the sd of the fused one, what diagnosis said, and
+    the effects that it `named`.
 
-    Of models as published also the amplitude at the measured angles, and sd there and beyond.
+    `whole` (2, f, n + p): amplitude and sd of models as published, at the measured angles as well.
     """
 
     amplitude: dict[str, np.ndarray]
     sd: np.ndarray
     said: str = ""
-    trained: dict[str, np.ndarray] = field(default_factory=dict)
-    trained_sd: dict[str, np.ndarray] = field(default_factory=dict)
-    beyond_sd: dict[str, np.ndarray] = field(default_factory=dict)
+    whole: dict[str, np.ndarray] = field(default_factory=dict)
     named: Effects = ()
 
 
@@ -49,10 +48,9 @@ def inside(predicted: BeyondPrediction, seen: Sweep) -> float:
 
 def everywhere(name: str, predicted: BeyondPrediction, seen: Sweep) -> float:
     """R² over measured angles (against what was measured) and those beyond (against the truth)."""
-    if name not in predicted.trained:
+    if name not in predicted.whole:
         return float("nan")
-    told = np.hstack([predicted.trained[name], predicted.amplitude[name]])
-    return float(r_squared(told, np.hstack([seen.amplitude, seen.truth])))
+    return float(r_squared(predicted.whole[name][0], np.hstack([seen.amplitude, seen.truth])))
 
 
 def score_table(predicted: BeyondPrediction, seen: Sweep) -> Table:
@@ -85,13 +83,13 @@ SHOWN_DEG = (106.0, 113.0, 120.0)
 
 def sd_maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
     """Sd of the models as published over the whole sweep (Figures 8d to 8f)."""
-    names = list(predicted.beyond_sd)
+    names = [name for name in predicted.whole if name in SURFACES]
     title = f"Sd of models as published, trained to {TRAINED_DEG:.0f}°"
     figure, grid = panels((11.0, 3.6), title, 1, len(names), sharey=True)
     angles = np.concatenate([seen.angles_deg, BEYOND_DEG])
     for panel, name in zip(grid[0], names, strict=True):
-        sd = np.hstack([predicted.trained_sd[name], predicted.beyond_sd[name]])
-        image = panel.pcolormesh(angles, seen.lines_hz, sd, cmap="magma", vmin=0, rasterized=True)
+        sd, style = predicted.whole[name][1], {"cmap": "magma", "vmin": 0, "rasterized": True}
+        image = panel.pcolormesh(angles, seen.lines_hz, sd, **style)
         panel.axvline(TRAINED_DEG, color="w", ls="--", lw=1)
         panel.set_title(name, fontsize=9)
         figure.colorbar(image, ax=panel, label="sd (m/s²/N)")

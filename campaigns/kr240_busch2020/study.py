@@ -18,7 +18,7 @@ from planner.studies.claims import Bound, ClaimRule, gathered
 from planner.studies.report import Paper, Report, Table, on_each
 from planner.surrogate.frf_bands import frf_moments
 from planner.surrogate.modal_surrogate import fit_surrogate
-from planner.surrogate.models.frf_surface import SURFACES, Grid, fit_surface
+from planner.surrogate.models.frf_surface import SURFACES, Grid, Surface, fit_surface
 
 from . import pictures
 from .data import ACROSS, BAND_HZ, BEYOND_DEG, LACKS, SWEEP_DEG, Sweep, poses, sweep
@@ -139,7 +139,8 @@ def figures(run: dict[int, BeyondPrediction], seen: Sweep) -> dict[str, float]:
     found = {"least R² of fused modes over all steps": min(each[FUSED] for each in r2.values())}
     for name in r2[step].keys() & set(SURFACES):
         found[f"R² of {name} over both"] = pictures.everywhere(name, main, there)
-        grown = main.beyond_sd[name][:, -1].mean() / main.trained_sd[name].mean()
+        sd = main.whole[name][1]
+        grown = sd[:, -1].mean() / sd[:, : len(there.angles_deg)].mean()
         found[f"{name}'s sd at 120° over that in the training"] = float(grown)
     if "NARGP" not in r2[step]:
         return found
@@ -206,17 +207,18 @@ def _predict(
     low = Grid(lines[kept[0]], angles[kept[1]], seen.simulated[kept])
     measured = Grid(seen.lines_hz, seen.angles_deg, seen.amplitude)
     at, count = (seen.lines_hz, BEYOND_DEG), len(seen.angles_deg)
-    surface, said, named = fit_surface(low, low, "GP"), "", ()
-    predicted = {"simulation": surface.predict(*at)[0]}
-    trained = {"simulation": surface.predict(seen.lines_hz, seen.angles_deg)[0]}
-    trained_sd: dict[str, np.ndarray] = {}
-    beyond_sd: dict[str, np.ndarray] = {}
+
+    def everywhere(surface: Surface) -> np.ndarray:
+        """Mean and sd (2, f, n + p) at the measured angles and beyond."""
+        trained = surface.predict(seen.lines_hz, seen.angles_deg)
+        return np.concatenate([trained, surface.predict(*at)], axis=2)
+
+    whole = {"simulation": everywhere(fit_surface(low, low, "GP"))}
     published = tuple(SURFACES) if everything else tuple(n for n in SURFACES if n in THIN)
     for i, model in enumerate(published):
         progress(f"{model} as published, {count} experiments", 0.3 * i)
-        surface = fit_surface(measured, low, model)
-        predicted[model], beyond_sd[model] = surface.predict(*at)
-        trained[model], trained_sd[model] = surface.predict(seen.lines_hz, seen.angles_deg)
+        whole[model] = everywhere(fit_surface(measured, low, model))
+    predicted = {name: told[0, :, count:] for name, told in whole.items()}
     for model in LOGARITHMIC if everything and ours else ():
         progress(f"{model}, {count} experiments", 0.7)
         log = fit_surface(measured, low, model, logarithm=True)
@@ -224,10 +226,11 @@ def _predict(
     progress(f"fused modes, {count} experiments", 0.8)
     fused = _fused(seen)
     predicted |= fused.amplitude
+    said, named = "", ()
     if everything:
         progress("diagnosis", 0.85)
         predicted[DIAGNOSED], said, named = _diagnosed(seen)
-    return BeyondPrediction(predicted, fused.sd, said, trained, trained_sd, beyond_sd, named)
+    return BeyondPrediction(predicted, fused.sd, said, whole, named)
 
 
 def _diagnosed(seen: Sweep) -> tuple[np.ndarray, str, Effects]:
