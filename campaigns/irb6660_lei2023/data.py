@@ -9,7 +9,7 @@ FRFs are H1, modes come from modal analysis and are tracked over the postures wi
 simulation.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -66,25 +66,23 @@ def parameters(truth: Truth, q: np.ndarray, reference: np.ndarray | None = None)
     """
     each = [_modes(truth, posture) for posture in q]
     poles, left, right = (np.array([e[i] for e in each]) for i in range(3))  # (n, 9, ...)
-    least = np.min(np.abs(left) / np.linalg.norm(left, axis=2, keepdims=True), axis=0)
-    rows = np.empty((len(q), MODES, 16))
-    chosen = np.argmax(least, axis=1) if reference is None else reference
-    for k, one in enumerate(chosen):
-        scale = left[:, k, one, None]
-        rows[:, k, 0] = np.abs(poles[:, k]) / (2 * np.pi)
-        rows[:, k, 1] = -poles[:, k].real / np.abs(poles[:, k])
-        rows[:, k, LEFT] = _parts(np.delete(left[:, k], one, axis=1) / scale)
-        rows[:, k, RIGHT] = _parts(right[:, k] * scale)
-    return rows
+    size = np.abs(poles)
+    natural = np.stack([size / (2 * np.pi), -poles.real / size], axis=-1)
+    return _scaled(natural, left, right, reference).values
 
 
 def _modes(truth: Truth, q: np.ndarray) -> tuple[np.ndarray, ...]:
     """Poles (9,), L and R (9, 4) of one posture by rising frequency, points as 1X, 1aX, 1Y, 1aY."""
     poles, shapes, entry, *_ = truth.modal(q)
-    axes = truth.tcp(q)[0].T[:2]
-    points = [truth.along(q, "link_6", np.array(p), axis) for axis in axes for p in (TIP, BACK)]
+    points = _points(truth, q)
     order = [k for k in np.argsort(np.abs(poles)) if poles[k].imag > 1e-6][:MODES]
-    return poles[order], entry[order] @ np.transpose(points), (points @ shapes[:, order]).T
+    return poles[order], entry[order] @ points.T, (points @ shapes[:, order]).T
+
+
+def _points(truth: Truth, q: np.ndarray) -> np.ndarray:
+    """How 1X, 1aX, 1Y and 1aY move with each spring (4, e)."""
+    axes = truth.tcp(q)[0].T[:2]
+    return np.array([truth.along(q, "link_6", np.array(p), a) for a in axes for p in (TIP, BACK)])
 
 
 def _parts(values: np.ndarray) -> np.ndarray:
@@ -124,17 +122,15 @@ def measured(
         progress(f"hits at posture {i + 1} of {len(q)}", i / len(q))
         there = EVERYDAY.beside(posture, rng)
         found.append(_analysed(brakes.applied(truth, i / len(q)), there, gains, rng))
-    carried = [[_mode(one) for one in modes] for modes in found]
-    tracks = track(carried, Guide.by_example(carried, MODES), x, ordered=True)
-    residues = np.full((len(q), MODES, 4, 4), np.nan + 0j)
-    poles = np.full((len(q), MODES, 2), np.nan)
+    tracks = track(found, Guide.by_example(found, MODES), x, ordered=True)
+    natural = np.full((len(q), MODES, 2), np.nan)
+    left, right = np.full((2, len(q), MODES, 4), np.nan + 0j)
     for i, row in enumerate(tracks.modes):
         for k, mode in enumerate(row[:MODES]):
             if mode is not None:
-                one = found[i][next(j for j, m in enumerate(carried[i]) if m is mode)]
-                residues[i, k] = one.residue
-                poles[i, k] = one.frequency_hz, one.damping_ratio
-    return _parameters(poles, residues)
+                natural[i, k] = mode.frequency_hz, mode.damping_ratio
+                right[i, k], left[i, k], _ = rank_one(mode.residue)
+    return _scaled(natural, left, right)
 
 
 def _channels(rng: np.random.Generator) -> np.ndarray:
@@ -156,7 +152,9 @@ def _analysed(
     data = Data(hz[lines], h[..., lines], variance[..., lines], tail_s=tail)
     told = identify(data)
     kept = [m for m in (told.modes if told else ()) if m.probability >= LEAST_PROBABILITY]
-    return tuple(m for m in kept if BAND_HZ[0] <= m.frequency_hz <= BAND_HZ[1])
+    inside = (m for m in kept if BAND_HZ[0] <= m.frequency_hz <= BAND_HZ[1])
+    # Tracking wants shapes (3,): three of the four points make them.
+    return tuple(replace(m, shape=rank_one(m.residue[:3, :3])[0]) for m in inside)
 
 
 def _frf(
@@ -165,9 +163,7 @@ def _frf(
     """Lines (F,), accelerances (4, 4, F) in m/s²/N by H1, and their variances."""
     poles, shapes, entry, *_ = truth.modal(q)
     inverse = np.linalg.inv(truth.matrices(q)[0])
-    axes = truth.tcp(q)[0].T
-    heard = np.array([truth.along(q, "link_6", np.array(p), a) for a in axes[:2]
-                      for p in (TIP, BACK)])  # fmt: skip
+    axes, heard = truth.tcp(q)[0].T, _points(truth, q)
     n = round(HAMMER.record_s * HAMMER.sampling_rate_hz)
     hz = np.fft.rfftfreq(n, 1 / HAMMER.sampling_rate_hz)
     h, variance = np.empty((4, 4, len(hz)), complex), np.empty((4, 4, len(hz)))
@@ -199,30 +195,18 @@ def _frf(
     return hz, h, variance
 
 
-def _mode(one: Mode) -> Mode:
-    """As tracking wants it: three of the four points make its shape."""
-    return Mode(
-        one.frequency_hz, one.frequency_sd_hz, one.damping_ratio, one.damping_sd,
-        one.residue[:3, :3], one.residue_sd[:3, :3], rank_one(one.residue[:3, :3])[0],
-        one.probability,
-    )  # fmt: skip
-
-
-def _parameters(poles: np.ndarray, residues: np.ndarray) -> HitParameters:
-    """f, ζ, L without its entry that is 1, and R, as `lei2023_data.parameters` has them."""
-    n, modes = poles.shape[:2]
-    left, right = np.full((2, n, modes, 4), np.nan + 0j)
-    for i, k in zip(*np.nonzero(np.isfinite(poles[..., 0])), strict=True):
-        right[i, k], left[i, k] = rank_one(residues[i, k])
-    size = np.abs(left) / np.linalg.norm(left, axis=2, keepdims=True)
-    with np.errstate(all="ignore"):  # as before
-        least = np.nanmin(np.where(np.isfinite(size), size, np.inf), axis=0)
-    reference = np.argmax(least, axis=1)
-    rows = np.full((n, modes, 16), np.nan)
-    for k, one in enumerate(reference):
-        scale = left[:, k, one, None]
-        rows[:, k, :2] = poles[:, k]
-        with np.errstate(all="ignore"):  # NaN where the mode was not found
+def _scaled(
+    natural: np.ndarray, left: np.ndarray, right: np.ndarray, reference: np.ndarray | None = None
+) -> HitParameters:
+    """From f and ζ (n, modes, 2), L and R (n, modes, 4), NaN where a mode was not found."""
+    rows = np.full((*left.shape[:2], 16), np.nan)
+    with np.errstate(all="ignore"):
+        size = np.abs(left) / np.linalg.norm(left, axis=2, keepdims=True)
+        least = np.min(np.where(np.isfinite(size), size, np.inf), axis=0)
+        reference = np.argmax(least, axis=1) if reference is None else reference
+        for k, one in enumerate(reference):
+            scale = left[:, k, one, None]
+            rows[:, k, :2] = natural[:, k]
             rows[:, k, LEFT] = _parts(np.delete(left[:, k], one, axis=1) / scale)
-        rows[:, k, RIGHT] = _parts(right[:, k] * scale)
+            rows[:, k, RIGHT] = _parts(right[:, k] * scale)
     return HitParameters(rows, reference)

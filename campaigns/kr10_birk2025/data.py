@@ -13,7 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from planner.progress import ProgressCallback
-from planner.proof.deviation import AttachedResonator, BentLink, Deviation, Spring, StiffnessRipple
+from planner.proof.deviation import (
+    AttachedResonator,
+    BentLink,
+    Deviation,
+    StiffnessRipple,
+    soft_floor,
+)
 from planner.proof.hits import Hammer
 from planner.proof.laws import HarmonicDrive
 from planner.proof.load import load_truth
@@ -63,10 +69,6 @@ def true_robot(seed: int) -> Truth:
     """The KR10 that is hit."""
     toml = Path(__file__).parent / "robot" / "robot_24p.toml"
     rng = np.random.default_rng([seed, 9])
-    base = tuple(
-        Spring("base", axis, k, 3e-4 * k)
-        for axis, k in (((1.0, 0.0, 0.0), 4e5), ((0.0, 1.0, 0.0), 3e5))
-    )
     beams = (
         BentLink("link_2", (1.5e5, 1.2e5), 1e5, 1e-4),
         BentLink("link_3", (8e4, 8e4), 5e4, 1e-4),
@@ -85,18 +87,17 @@ def true_robot(seed: int) -> Truth:
     )
     return load_truth(
         toml,
-        Deviation(seed, STIFFNESS, 0.4, 0.12, 0.015, extra=base, beams=beams, harmonics=ripples,
-                  resonators=cables),
+        Deviation(seed, STIFFNESS, 0.4, 0.12, 0.015, extra=soft_floor(4e5, 3e5), beams=beams,
+                  harmonics=ripples, resonators=cables),
     )  # fmt: skip
 
 
 def gears(truth: Truth) -> tuple[Port, ...]:
     """Harmonic Drives in all joints: stiffer in steps."""
-    ports = []
-    for joint in truth.joint_names:
-        own = float(truth.own(joint) @ [spring.stiffness for spring in truth.springs])
-        ports.append(Port(HarmonicDrive(STEP * own, *STEPS_RAD), joint=joint))
-    return tuple(ports)
+    return tuple(
+        Port(HarmonicDrive(STEP * truth.stiffness(joint), *STEPS_RAD), joint=joint)
+        for joint in truth.joint_names
+    )
 
 
 def poses(truth: Truth, points: int) -> tuple[np.ndarray, np.ndarray]:

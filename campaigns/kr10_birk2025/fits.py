@@ -195,9 +195,9 @@ def _agreement(hits: PathHits, simulation: Simulation, band_hz: tuple[float, flo
     """Of all poses, each on its own lines in the band."""
     parts = []
     for q, frf in zip(hits.hit_poses.q, hits.hit_poses.frfs, strict=True):
-        lines = (frf.frequency_hz >= band_hz[0]) & (frf.frequency_hz <= band_hz[1])
-        simulated = simulation.accelerance(q[None], frf.frequency_hz[lines])
-        parts.append(metrics.agreement(frf.accelerance[None][..., lines], simulated))
+        seen = frf.within(band_hz)
+        simulated = simulation.accelerance(q[None], seen.frequency_hz)
+        parts.append(metrics.agreement(seen.accelerance[None], simulated))
     return metrics.stack(parts)
 
 

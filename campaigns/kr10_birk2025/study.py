@@ -12,30 +12,10 @@ from planner.progress import ProgressCallback, part_of
 from planner.studies.claims import Bound, ClaimRule, in_order
 from planner.studies.report import Paper, Report, on_each
 
+from . import fits, pictures
 from .data import BAND_HZ, PATHS, PathHits, load
-from .fits import (
-    SEARCHED,
-    Design,
-    IdentifiedModel,
-    Informative,
-    fitted,
-    paper_priors,
-    percent,
-    stated,
-)
-from .pictures import (
-    BOTH,
-    MAIN,
-    NAN,
-    Run,
-    campbell,
-    design_table,
-    direction_table,
-    directions_figure,
-    on_path,
-    table_4,
-    table_5,
-)
+from .fits import SEARCHED, percent
+from .pictures import BOTH, MAIN, NAN, Run, on_path
 
 PAPER = Paper(
     "Birk, Kipfmüller, Kotschenreuther", 2025,
@@ -45,62 +25,62 @@ PAPER = Paper(
 SEEDS = 11, 12, 13  # each another robot and other hits
 FEW = 3  # points, of which it is asked how far they suffice
 RULES = (
-    ClaimRule.of(
+    ClaimRule(
         "24P reproduces FRFs far better than 12P, by both metrics and in both bands (Table 4).",
         Bound("FRAC gained by 24P, points", above=0, paper=29.7),
         Bound("Frobenius gained by 24P, points", above=0, paper=25.8),
         Bound("FRAC gained up to 800 Hz, points", above=0, paper=14.3),
         Bound("Frobenius gained up to 800 Hz, points", above=0, paper=6.5),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "Nobody reaches 100 %: links, gears and damping are not what the models have.",
         Bound("FRAC of the better model, %", below=95, paper=70.5),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "Both models do better below 200 Hz than up to 800 Hz.",
         Bound("FRAC ≤ 200 Hz over that ≤ 800 Hz, 12P, points", above=0, paper=18.2),
         Bound("the same of 24P, points", above=0, paper=33.6),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "Global FRAC is higher than Frobenius similarity.",
         Bound("FRAC over Frobenius, lesser of both models, points", above=0, paper=21.7),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "24P is better than 12P on each of the three paths.",
         Bound("least FRAC gained on a path, points", above=0, paper=23.4),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "Both models do worst on path S3.",
         Bound("FRAC lost on S3 to the next worse path, points", above=0, paper=3.9),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "At points not identified from 24P stays as good, and 12P loses more.",
         Bound("FRAC that 24P loses, points", below=5, full=2),
         Bound("FRAC that 12P loses, points", above=0, full=2),
         Bound("FRAC that 12P loses more than 24P, points", above=0, full=2),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "All identified parameters lie within the bounds of Tables 1 and 2, none pressed to one.",
         Bound("12P's parameters at a bound, of 12", below=2, paper=0),
         Bound("24P's parameters at a bound, of 24", below=2, paper=1),  # k_trans of joint 4
     ),
-    ClaimRule.of(
+    ClaimRule(
         "Transverse stiffnesses come out 6 to 30 times the rotational ones.",
         Bound("least ratio of a joint", above=1, paper=6.2),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "(outlook) Well chosen points determine the parameters better than ends and middles.",
         Bound("parameters determined beyond the paper's nine", above=0),
         Bound("FRAC elsewhere beyond the paper's nine, points", above=0, full=1),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "24P with inertias free and hits' errors integrated out predicts better than 24P, at poses "
         "set aside.",
         Bound("FRAC gained by ours, points", above=0),
         Bound("Frobenius gained by ours, points", above=0),
         ours=True,
     ),
-    ClaimRule.of(
+    ClaimRule(
         "24P by least squares of logarithms is better than by a global search of the paper's size.",
         Bound("FRAC gained over the search, points", above=0),
         Bound("Frobenius gained over the search, points", above=0),
@@ -113,45 +93,47 @@ def study(progress: ProgressCallback, small: bool = False) -> Report:
     """FRAC and Frobenius similarity by path, direction and band, and which poses suffice."""
     seeds = SEEDS[:1] if small else SEEDS
     runs = on_each(seeds, lambda seed, part: _run(seed, small, part), progress)
-    directions = direction_table(runs[0])
+    first = runs[0]
+    table_4, table_5 = pictures.table_4(first), pictures.table_5(first)
+    directions, designs = pictures.direction_table(first), pictures.design_table(first)
     return Report(
-        f"SIMULATED: a KR10 in MuJoCo on three paths, {len(runs[0].hits.path)} points, nine hits "
+        f"SIMULATED: a KR10 in MuJoCo on three paths, {len(first.hits.path)} points, nine hits "
         "each with everyday errors; its links bend, its gears stiffen in steps and rub, its table "
         "gives way, stated stiffnesses are off by ± 40 %, inertias by 12 %: no parameters of 12P "
         f"or 24P are its own. Robots: {len(runs)}; tables and pictures of the first.",
-        (table_4(runs[0]), table_5(runs[0]), directions, design_table(runs[0])),
+        (table_4, table_5, directions, designs),
         [figures(run) for run in runs],
         _notes(runs),
         {
-            "birk2025_campbell": campbell(runs[0]),
-            "birk2025_directions": directions_figure(directions),
+            "birk2025_campbell": pictures.campbell(first),
+            "birk2025_directions": pictures.directions_figure(directions),
         },
     )
 
 
 def _run(seed: int, small: bool, progress: ProgressCallback) -> Run:
     hits = load(seed, small, part_of(progress, 0.0, 0.25))
-    models: dict[str, IdentifiedModel] = {}
+    models: dict[str, fits.IdentifiedModel] = {}
     for i, name in enumerate((*SEARCHED, *MAIN)):
         progress(f"{name}: identification from nine poses", 0.25 + 0.09 * i)
         before = models.get(f"{name}, global search")
         start = before.values if before else None
-        models[name] = fitted(hits, hits.ends_and_middles, name, small, start)
+        models[name] = fits.fitted(hits, hits.ends_and_middles, name, small, start)
     return Run(hits, models, _designs(hits, models, small, part_of(progress, 0.7, 1.0)))
 
 
 def _designs(
-    hits: PathHits, models: dict[str, IdentifiedModel], small: bool, progress: ProgressCallback
-) -> list[Design]:
+    hits: PathHits, models: dict[str, fits.IdentifiedModel], small: bool, progress: ProgressCallback
+) -> list[fits.Design]:
     """The paper's nine points, as many of the planner's, fewer of these, and one path's.
 
     Without identification also the nine with hits along one axis.
     """
-    simulation, frfs, q = stated("24P"), hits.hit_poses.frfs, hits.hit_poses.q
+    simulation, frfs, q = fits.stated("24P"), hits.hit_poses.frfs, hits.hit_poses.q
     nine = hits.ends_and_middles
     model, searched = models["24P"], models["24P, global search"].values
-    informative = Informative.of(
-        simulation, paper_priors(simulation), frfs, q, model.misfit, BAND_HZ
+    informative = fits.Informative.of(
+        simulation, fits.paper_priors(simulation), frfs, q, model.misfit, BAND_HZ
     )
     chosen = informative.best(len(nine))
     first = np.flatnonzero(hits.path == PATHS[0])[:: max(1, sum(hits.path == PATHS[0]) // FEW)]
@@ -164,13 +146,13 @@ def _designs(
     designs = []
     for i, (name, rows) in enumerate(wanted.items()):
         progress(name, i / len(wanted))
-        found = model if rows is nine else fitted(hits, rows, "24P", small, searched)
+        found = model if rows is nine else fits.fitted(hits, rows, "24P", small, searched)
         others = np.setdiff1d(np.arange(len(q)), rows)
         frac, _ = percent(found.limited[others])
-        designs.append(Design(name, rows, informative.determined(rows), frac))
+        designs.append(fits.Design(name, rows, informative.determined(rows), frac))
     for axis, letter in enumerate("xyz"):
         told = informative.determined(nine, [axis])
-        designs.append(Design(f"the paper's, hit along {letter} only", nine, told, NAN))
+        designs.append(fits.Design(f"the paper's, hit along {letter} only", nine, told, NAN))
     return designs
 
 

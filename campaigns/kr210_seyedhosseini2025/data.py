@@ -1,7 +1,7 @@
 """Data for Seyed Hosseini et al. 2025: hits at 254 postures, modes by the four-step check.
 
 A KR210-like robot in MuJoCo along a trajectory of its tool; three axes at three levels, everyday
-errors (`everyday_hits`), modal analysis, tracking, and the check of neighbouring postures
+errors (`planner.studies.hits`), modal analysis, tracking, and the check of neighbouring postures
 (`four_steps`).
 """
 
@@ -10,10 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.campaign import labels
 from planner.dynamics.simulation import Simulation
-from planner.errors import RefusedError
-from planner.modal.estimate_modes import estimate_modes
-from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
 from planner.progress import ProgressCallback, part_of
 from planner.proof.arms import KR210
@@ -62,18 +60,7 @@ def load(folder: Path, seed: int, small: bool, progress: ProgressCallback) -> Po
     x = (q - q.min(axis=0)) / np.maximum(np.ptp(q, axis=0), 1e-3)  # joint 4 hardly moves
     injected = everyday_faults(truth, seed)
     struck = simulate_hits(truth, injected, q, HAMMER, BAND_HZ, seed, part_of(progress, 0.0, 0.7))
-    found: list[tuple[Mode, ...]] = []
-    doubtful: list[tuple[Mode, ...]] = []
-    for i, frf in enumerate(struck.frfs):
-        progress(f"modal analysis of posture {i + 1}", 0.7 + 0.3 * i / len(q))
-        try:
-            model = estimate_modes(frf, BAND_HZ)
-        except RefusedError:
-            found.append(())
-            doubtful.append(())
-            continue
-        found.append(model.modes)
-        doubtful.append(model.doubtful)
+    found, doubtful = struck.modes(BAND_HZ, part_of(progress, 0.7, 1.0))
     simulated = Simulation(Robot.load(robot_toml)).modes(q, MODES + 2)
     guide = Guide(simulated.frequency_hz, simulated.shape)
     tracks = track(found, guide, x, ordered=True)
@@ -81,7 +68,9 @@ def load(folder: Path, seed: int, small: bool, progress: ProgressCallback) -> Po
     spare = [(*some, *rest) for some, rest in zip(tracks.unexpected, doubtful, strict=True)]
     checked = check(struck.frfs, labelled, spare)
     clean = np.array([parameters(*truth.modes(posture, MODES)) for posture in q])
-    measured = np.array([_measured(row) for row in checked.modes])
+    told = labels.gathered(x, checked.modes, simulated.lowest(MODES))
+    each = zip(told.frequency_hz, told.damping_ratio, told.residue, strict=True)
+    measured = np.array([parameters(*posture) for posture in each])
     return PostureData(q, x, measured, clean, truth, checked, tracks.frequency_hz[:, :MODES])
 
 
@@ -116,10 +105,3 @@ def stiffnesses(columns: np.ndarray) -> np.ndarray:
     parts = columns[:, RESIDUE].reshape(len(columns), MODES, 3, 2)[:, :TABLED]
     omega = np.log(2 * np.pi) + columns[:, FREQUENCY][:, :TABLED, None]
     return (omega - np.log(2 * np.hypot(parts[..., 0], parts[..., 1]))).reshape(len(columns), -1)
-
-
-def _measured(row: tuple[Mode | None, ...]) -> np.ndarray:
-    f = np.array([np.nan if m is None else m.frequency_hz for m in row])
-    zeta = np.array([np.nan if m is None else m.damping_ratio for m in row])
-    nothing = np.full((3, 3), np.nan + 1j * np.nan)
-    return parameters(f, zeta, np.array([nothing if m is None else m.residue for m in row]))

@@ -31,33 +31,33 @@ MSE = "MSE of frequencies, damping ratios and modal stiffnesses, scaled"
 LARGEST = "largest error of a frequency before the check over that after"
 RIGHT = 0.03  # relative error of a frequency that is the mode's own
 RULES = (
-    ClaimRule.of(
+    ClaimRule(
         "Joints 2 and 3 matter far more to modes 1 to 3 than joint 1.",
         Bound("largest |correlation| of joint 2 over joint 1's", above=1, full=2, paper="Fig. 2"),
         Bound("largest |correlation| of joint 3 over joint 1's", above=1, full=2),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "The four-step check makes modal parameters reliable.",
         Bound(LARGEST, above=1, full=2),
         Bound("mean error of a frequency before the check over that after", above=1, full=1.2),
         Bound("wrong ones among the modes that it drops, %", above=50, full=90),
         Bound("modes that it recovers from neighbours", above=0),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "A GP over joint angles predicts the last 15 postures' modal parameters accurately.",
         Bound(MSE, below=0.1, paper=PAPER_MSE),
         Bound("mean error of frequencies, %", below=2, full=1),
         Bound("inside their 95 % interval, %", above=75, full=90),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "Damping ratios are predicted less surely than frequencies.",
         Bound("damping ratios' mean error over frequencies'", above=1, full=2, paper="Fig. 4"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "FRFs put together from predicted modes agree with those measured.",
         Bound("least R² of |H| at two postures", above=0.9, full=0.95, paper="agree (Fig. 5)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "GPs together within a kind predict better than one GP an output, as published.",
         Bound("frequencies' error one by one over that together", above=1, full=1.05),
         Bound("damping ratios' error one by one over that together", above=1, full=1.05),

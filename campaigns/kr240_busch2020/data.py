@@ -2,9 +2,9 @@
 
 The published robot (`campaigns/kr240_busch2020`) as MuJoCo has it, with stiffnesses, damping and
 inertias of its own and, on its arm, a dress pack of hoses that sways across; damping of its own at
-each visit, friction, everyday errors of hits and chain (`everyday_hits`). Driving-point accelerance
-across the arm's plane, as in the paper. With the paper's measurement (8 → 10, 22 → 17 and 25 → 19
-Hz) it has in common that three resonances show there, of which the simulation has two.
+each visit, friction, everyday errors of hits and chain (`planner.studies.hits`). Driving-point
+accelerance across the arm's plane, as in the paper. With the paper's measurement (8 → 10, 22 → 17
+and 25 → 19 Hz) it has in common that three resonances show there, of which the simulation has two.
 """
 
 from dataclasses import dataclass, replace
@@ -94,16 +94,8 @@ def sweep(seed: int, progress: ProgressCallback = no_progress) -> Sweep:
     truth = true_robot(seed)
     angles = np.linspace(SWEEP_DEG[0], TRAINED_DEG, MEASURED_ANGLES)
     # Slower than half the sampling rate all is kept; hits are wanted to well above the band.
-    struck = simulate_hits(
-        truth,
-        everyday_faults(truth, seed),
-        poses(angles),
-        HAMMER,
-        HEARD_HZ,
-        seed,
-        progress,
-        axes="z",
-    )
+    q, faults = poses(angles), everyday_faults(truth, seed)
+    struck = simulate_hits(truth, faults, q, HAMMER, HEARD_HZ, seed, progress, axes="z")
     lines = np.linspace(*BAND_HZ, MEASURED_LINES)
     beyond = [truth.accelerance(q, lines)[ACROSS, ACROSS] for q in poses(BEYOND_DEG)]
     simulation = Simulation(Robot.load(_robot_toml()))

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from planner.report.plot_marks import empty, name_axes, panels
 from planner.studies import drawing
 from planner.studies.report import Table, r_squared
+from planner.surrogate.models.frf_surface import SURFACES
 
 from .data import BEYOND_DEG, TRAINED_DEG, Sweep
 
@@ -21,18 +22,16 @@ Effects = tuple[tuple[str, str | None], ...]  # effect and place
 
 @dataclass(frozen=True, eq=False)
 class BeyondPrediction:
-    """Amplitude (f, p) at BEYOND_DEG by name, the sd of the fused one, what diagnosis
-    said, and the effects that it `named`.
+    """Amplitude (f, p) at BEYOND_DEG by name, the sd of the fused one, what diagnosis said, and
+    the effects that it `named`.
 
-    Of models as published also the amplitude at the measured angles, and sd there and beyond.
+    `whole` (2, f, n + p): amplitude and sd of models as published, at the measured angles as well.
     """
 
     amplitude: dict[str, np.ndarray]
     sd: np.ndarray
     said: str = ""
-    trained: dict[str, np.ndarray] = field(default_factory=dict)
-    trained_sd: dict[str, np.ndarray] = field(default_factory=dict)
-    beyond_sd: dict[str, np.ndarray] = field(default_factory=dict)
+    whole: dict[str, np.ndarray] = field(default_factory=dict)
     named: Effects = ()
 
 
@@ -49,25 +48,18 @@ def inside(predicted: BeyondPrediction, seen: Sweep) -> float:
 
 def everywhere(name: str, predicted: BeyondPrediction, seen: Sweep) -> float:
     """R² over measured angles (against what was measured) and those beyond (against the truth)."""
-    if name not in predicted.trained:
+    if name not in predicted.whole:
         return float("nan")
-    told = np.hstack([predicted.trained[name], predicted.amplitude[name]])
-    return float(r_squared(told, np.hstack([seen.amplitude, seen.truth])))
+    return float(r_squared(predicted.whole[name][0], np.hstack([seen.amplitude, seen.truth])))
 
 
 def score_table(predicted: BeyondPrediction, seen: Sweep) -> Table:
     """R² and RMSE of every model beside the paper's."""
     nan = float("nan")
-    rows = [
-        (
-            name,
-            *scores(amplitude, seen),
-            PAPER_R2.get(name, nan),
-            everywhere(name, predicted, seen),
-            PAPER_ALL.get(name, nan),
-        )
-        for name, amplitude in predicted.amplitude.items()
-    ]
+    rows = []
+    for name, amplitude in predicted.amplitude.items():
+        beyond = *scores(amplitude, seen), PAPER_R2.get(name, nan)
+        rows.append((name, *beyond, everywhere(name, predicted, seen), PAPER_ALL.get(name, nan)))
     title = f"Table 2: R² and RMSE beyond {TRAINED_DEG:.0f}°, trained below; R² over both"
     columns = ("model", "R²", "RMSE m/s²/N", "R² in the paper", "R² over both", "in the paper")
     return Table("busch2020_r2", title, columns, tuple(rows))
@@ -91,13 +83,13 @@ SHOWN_DEG = (106.0, 113.0, 120.0)
 
 def sd_maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
     """Sd of the models as published over the whole sweep (Figures 8d to 8f)."""
-    names = list(predicted.beyond_sd)
+    names = [name for name in predicted.whole if name in SURFACES]
     title = f"Sd of models as published, trained to {TRAINED_DEG:.0f}°"
     figure, grid = panels((11.0, 3.6), title, 1, len(names), sharey=True)
     angles = np.concatenate([seen.angles_deg, BEYOND_DEG])
     for panel, name in zip(grid[0], names, strict=True):
-        sd = np.hstack([predicted.trained_sd[name], predicted.beyond_sd[name]])
-        image = panel.pcolormesh(angles, seen.lines_hz, sd, cmap="magma", vmin=0, rasterized=True)
+        sd, style = predicted.whole[name][1], {"cmap": "magma", "vmin": 0, "rasterized": True}
+        image = panel.pcolormesh(angles, seen.lines_hz, sd, **style)
         panel.axvline(TRAINED_DEG, color="w", ls="--", lw=1)
         panel.set_title(name, fontsize=9)
         figure.colorbar(image, ax=panel, label="sd (m/s²/N)")
@@ -123,28 +115,19 @@ def overlays(predicted: BeyondPrediction, seen: Sweep) -> Figure:
     """FRFs at three angles beyond the training."""
     title = "FRFs beyond the training, at three angles"
     figure, grid = panels((9.0, 8.0), title, len(SHOWN_DEG))
-    colours = drawing.COLOURS
+    colours, hz = drawing.COLOURS, seen.lines_hz
     for panel, angle in zip(grid[:, 0], SHOWN_DEG, strict=True):
         i = int(np.flatnonzero(angle == BEYOND_DEG)[0])
         for name in (n for n in predicted.amplitude if n in PAPER_R2):
-            panel.plot(
-                seen.lines_hz,
-                predicted.amplitude[name][:, i],
-                color=colours[name],
-                lw=1.1,
-                label=name,
-            )
-        mean, sd = predicted.amplitude[FUSED][:, i], predicted.sd[:, i]
-        panel.fill_between(
-            seen.lines_hz, np.maximum(mean - 1.96 * sd, 0), mean + 1.96 * sd,
-            color=colours[FUSED], alpha=0.25, lw=0,
-        )  # fmt: skip
-        panel.plot(
-            seen.lines_hz, mean, color=colours[FUSED], lw=1.6, label="fused modes, 95 % band"
-        )
-        panel.plot(seen.lines_hz, seen.truth[:, i], "k--", lw=1.2, label="truth (MuJoCo)")
+            amplitude = predicted.amplitude[name][:, i]
+            panel.plot(hz, amplitude, color=colours[name], lw=1.1, label=name)
+        mean, spread = predicted.amplitude[FUSED][:, i], 1.96 * predicted.sd[:, i]
+        low, colour = np.maximum(mean - spread, 0), colours[FUSED]
+        panel.fill_between(hz, low, mean + spread, color=colour, alpha=0.25, lw=0)
+        panel.plot(hz, mean, color=colour, lw=1.6, label="fused modes, 95 % band")
+        panel.plot(hz, seen.truth[:, i], "k--", lw=1.2, label="truth (MuJoCo)")
         panel.set_title(f"joint 3 at {angle:.0f}°", fontsize=9)
-        panel.set_xlim(seen.lines_hz[0], seen.lines_hz[-1])
+        panel.set_xlim(hz[0], hz[-1])
         panel.set_ylim(0, 1.6 * seen.truth[:, i].max())
         panel.grid(True, alpha=0.25)
     name_axes(figure, grid, "frequency (Hz)", "|H| (m/s²/N)")

@@ -10,32 +10,19 @@ changes smoothly, and that the simulation follows.
 import numpy as np
 
 from planner.api import diagnose
+from planner.campaign import labels
 from planner.errors import InputError, RefusedError
-from planner.modal.tracking import Guide, Tracks, track
+from planner.modal.tracking import Guide, track
 from planner.progress import ProgressCallback, no_progress, part_of
 from planner.studies.claims import Bound, ClaimRule, gathered
 from planner.studies.report import Paper, Report, Table, on_each
 from planner.surrogate.frf_bands import frf_moments
-from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
-from planner.surrogate.models.frf_surface import SURFACES, Grid, fit_surface
+from planner.surrogate.modal_surrogate import fit_surrogate
+from planner.surrogate.models.frf_surface import SURFACES, Grid, Surface, fit_surface
 
+from . import pictures
 from .data import ACROSS, BAND_HZ, BEYOND_DEG, LACKS, SWEEP_DEG, Sweep, poses, sweep
-from .pictures import (
-    DIAGNOSED,
-    FUSED,
-    THIN,
-    BeyondPrediction,
-    Effects,
-    everywhere,
-    experiments,
-    inside,
-    maps,
-    overlays,
-    score_table,
-    scores,
-    sd_maps,
-    thin_table,
-)
+from .pictures import DIAGNOSED, FUSED, THIN, BeyondPrediction, Effects, inside, scores
 
 PAPER = Paper(
     "Busch, Schnoes, Semm, Zaeh, Obst, Hartmann", 2020,
@@ -51,44 +38,44 @@ COARSE = 3  # the small version has every so manyth line and angle of the simula
 EXTRA_MODES = 2  # simulated, beyond those in the band, which a measured one may be instead
 NAMED = "effects that the diagnosis names"
 RULES = (
-    ClaimRule.of(
+    ClaimRule(
         "The simulation alone, which lacks a mode, predicts the FRF poorly.",
         Bound("R² of the simulation beyond 105°", below=0.5, paper=0.353),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "Over training and test data GP, MFDGP and NARGP all reach R² above 0.9.",
         Bound("R² of GP over both", above=0.9, paper=0.943),
         Bound("R² of MFDGP over both", above=0.9, paper=0.932),
         Bound("R² of NARGP over both", above=0.9, paper=0.992),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "NARGP extrapolates where GP and MFDGP do not.",
         Bound("R² of NARGP beyond 105°", above=0.9, paper=0.982),
         Bound("R² of NARGP over GP's", above=0, paper=0.197),
         Bound("R² of NARGP over MFDGP's", above=0, paper=0.224),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "GP and MFDGP say so: their sd grows from the end of the training on.",
         Bound("GP's sd at 120° over that in the training", above=1, full=2, paper="grows (Fig. 8)"),
         Bound("MFDGP's sd at 120° over that in the training", above=1, full=2),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "NARGP stays accurate with fewer experiments (9 of 26).",
         Bound("least R² of NARGP with every 1st to 3rd experiment", above=0.9,
               paper="highly accurate (Fig. 10)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "Fused modes extrapolate to R² ≥ 0.9, with every 4th experiment too.",
         Bound("least R² of fused modes over all steps", above=0.9),
         ours=True,
     ),
-    ClaimRule.of(
+    ClaimRule(
         "The diagnosis names what the simulation lacks, a dress pack that swings on link 3.",
         Bound("times that the dress pack is named", above=0),
         Bound("other effects that the diagnosis names", below=1),
         ours=True,
     ),
-    ClaimRule.of(
+    ClaimRule(
         "The diagnosed simulation extrapolates better than NARGP, with what the diagnosis adds.",
         Bound("R² of the diagnosed simulation over NARGP's", above=0),
         given=(Bound(NAMED, above=0),),
@@ -113,21 +100,21 @@ def study(progress: ProgressCallback, small: bool = False) -> Report:
     first, sweep_1 = runs[robots[0]], seen[robots[0]]
     main, trained = first[steps[0]], sweep_1.every(steps[0])
     each = [figures(runs[s], seen[s]) for s in robots]
-    thin = thin_table(first, sweep_1)
+    thin = pictures.thin_table(first, sweep_1)
     return Report(
         "SIMULATED: the published robot in MuJoCo with a swaying dress pack, hit across the arm at "
         "three levels with everyday errors, friction and damping that scatters; its simulation "
         "lacks the dress pack and has nominal stiffnesses."
         + (f" {main.said}" if main.said else "")
         + f" Robots: {len(robots)}, of which {min(ALL_MODELS, len(robots))} with every model.",
-        (score_table(main, trained), thin, _robot_table(runs, seen)),
+        (pictures.score_table(main, trained), thin, _robot_table(runs, seen)),
         each,
         _notes(gathered(each), runs, main),
         {
-            "busch2020_maps": maps(main, sweep_1),
-            "busch2020_sd": sd_maps(main, trained),
-            "busch2020_overlays": overlays(main, sweep_1),
-            "busch2020_experiments": experiments(thin, steps),
+            "busch2020_maps": pictures.maps(main, sweep_1),
+            "busch2020_sd": pictures.sd_maps(main, trained),
+            "busch2020_overlays": pictures.overlays(main, sweep_1),
+            "busch2020_experiments": pictures.experiments(thin, steps),
         },
     )
 
@@ -151,8 +138,9 @@ def figures(run: dict[int, BeyondPrediction], seen: Sweep) -> dict[str, float]:
     main, there = run[step], seen.every(step)
     found = {"least R² of fused modes over all steps": min(each[FUSED] for each in r2.values())}
     for name in r2[step].keys() & set(SURFACES):
-        found[f"R² of {name} over both"] = everywhere(name, main, there)
-        grown = main.beyond_sd[name][:, -1].mean() / main.trained_sd[name].mean()
+        found[f"R² of {name} over both"] = pictures.everywhere(name, main, there)
+        sd = main.whole[name][1]
+        grown = sd[:, -1].mean() / sd[:, : len(there.angles_deg)].mean()
         found[f"{name}'s sd at 120° over that in the training"] = float(grown)
     if "NARGP" not in r2[step]:
         return found
@@ -219,17 +207,18 @@ def _predict(
     low = Grid(lines[kept[0]], angles[kept[1]], seen.simulated[kept])
     measured = Grid(seen.lines_hz, seen.angles_deg, seen.amplitude)
     at, count = (seen.lines_hz, BEYOND_DEG), len(seen.angles_deg)
-    surface, said, named = fit_surface(low, low, "GP"), "", ()
-    predicted = {"simulation": surface.predict(*at)[0]}
-    trained = {"simulation": surface.predict(seen.lines_hz, seen.angles_deg)[0]}
-    trained_sd: dict[str, np.ndarray] = {}
-    beyond_sd: dict[str, np.ndarray] = {}
+
+    def everywhere(surface: Surface) -> np.ndarray:
+        """Mean and sd (2, f, n + p) at the measured angles and beyond."""
+        trained = surface.predict(seen.lines_hz, seen.angles_deg)
+        return np.concatenate([trained, surface.predict(*at)], axis=2)
+
+    whole = {"simulation": everywhere(fit_surface(low, low, "GP"))}
     published = tuple(SURFACES) if everything else tuple(n for n in SURFACES if n in THIN)
     for i, model in enumerate(published):
         progress(f"{model} as published, {count} experiments", 0.3 * i)
-        surface = fit_surface(measured, low, model)
-        predicted[model], beyond_sd[model] = surface.predict(*at)
-        trained[model], trained_sd[model] = surface.predict(seen.lines_hz, seen.angles_deg)
+        whole[model] = everywhere(fit_surface(measured, low, model))
+    predicted = {name: told[0, :, count:] for name, told in whole.items()}
     for model in LOGARITHMIC if everything and ours else ():
         progress(f"{model}, {count} experiments", 0.7)
         log = fit_surface(measured, low, model, logarithm=True)
@@ -237,10 +226,11 @@ def _predict(
     progress(f"fused modes, {count} experiments", 0.8)
     fused = _fused(seen)
     predicted |= fused.amplitude
+    said, named = "", ()
     if everything:
         progress("diagnosis", 0.85)
         predicted[DIAGNOSED], said, named = _diagnosed(seen)
-    return BeyondPrediction(predicted, fused.sd, said, trained, trained_sd, beyond_sd, named)
+    return BeyondPrediction(predicted, fused.sd, said, whole, named)
 
 
 def _diagnosed(seen: Sweep) -> tuple[np.ndarray, str, Effects]:
@@ -259,12 +249,12 @@ def _diagnosed(seen: Sweep) -> tuple[np.ndarray, str, Effects]:
 
 def predict_beyond(seen: Sweep) -> tuple[np.ndarray, np.ndarray]:
     """Amplitude and sd (f, p) at BEYOND_DEG in m/s²/N, from the modes of what was measured."""
-    modes = [list(each) for each in seen.hit_poses.modes(BAND_HZ, no_progress)]
+    modes, _ = seen.hit_poses.modes(BAND_HZ, no_progress)
     count = max(len(each) for each in modes)
     guide = seen.modes(seen.angles_deg, count + EXTRA_MODES)
     x = _scaled(seen.angles_deg)
     tracks = track(modes, Guide(guide.frequency_hz, guide.shape), x, ordered=True)
-    fitted = fit_surrogate(_observations(tracks, count, seen))
+    fitted = fit_surrogate(labels.gathered(x, tracks.modes, seen.modes(seen.angles_deg, count)))
     prediction = fitted.predict(_scaled(BEYOND_DEG), seen.modes(BEYOND_DEG, count))
     mean, sd = frf_moments(prediction, seen.lines_hz)
     return np.abs(mean[:, ACROSS, ACROSS]).T, sd[:, ACROSS, ACROSS].T
@@ -272,26 +262,3 @@ def predict_beyond(seen: Sweep) -> tuple[np.ndarray, np.ndarray]:
 
 def _scaled(angles_deg: np.ndarray) -> np.ndarray:
     return (angles_deg[:, None] - SWEEP_DEG[0]) / (SWEEP_DEG[1] - SWEEP_DEG[0])
-
-
-def _observations(tracks: Tracks, count: int, seen: Sweep) -> ModalObservations:
-    shape = len(seen.angles_deg), count
-
-    def gathered(name: str, empty: np.ndarray) -> np.ndarray:
-        for i, row in enumerate(tracks.modes):
-            for k, mode in enumerate(row[:count]):
-                if mode is not None:
-                    empty[i, k] = getattr(mode, name)
-        return empty
-
-    known = {
-        name: gathered(name, np.full(shape, np.nan))
-        for name in ("frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd")
-    }
-    return ModalObservations(
-        _scaled(seen.angles_deg),
-        **known,
-        residue=gathered("residue", np.full((*shape, 3, 3), np.nan + 0j)),
-        residue_sd=gathered("residue_sd", np.full((*shape, 3, 3), np.nan)),
-        simulated=seen.modes(seen.angles_deg, count),
-    )

@@ -1,7 +1,7 @@
 """Data for Busch et al. 2022: the KR240 of the shipped campaign, hit at its 35 positions.
 
 Damping does not follow the stiffness (C = βK) here: every gear has its own, partly viscous, partly
-a loss factor, joints rub, and brakes engage anew at each visit (`everyday_hits`).
+a loss factor, joints rub, and brakes engage anew at each visit (`planner.studies.hits`).
 """
 
 import csv
@@ -20,7 +20,7 @@ from planner.campaign.state import Measurement
 from planner.demo import NAME, shipped
 from planner.frf.frf import Frf
 from planner.progress import ProgressCallback, part_of
-from planner.proof.deviation import Deviation, Spring
+from planner.proof.deviation import Deviation, soft_floor
 from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.model import Truth
@@ -60,10 +60,7 @@ class AnalysedPoses:
 
 def true_robot(seed: int) -> Truth:
     """The robot that is hit: other springs, inertias, a soft base, each gear's own damping."""
-    base = tuple(
-        Spring("base", axis, k, 8.2e-4 * k)
-        for axis, k in (((1.0, 0.0, 0.0), 2.2e7), ((0.0, 1.0, 0.0), 1.9e7))
-    )
+    base = soft_floor(2.2e7, 1.9e7, 8.2e-4)
     deviation = Deviation(seed, 0.12, 0.5, 0.04, 0.005, base, mixed=1.0)
     return load_truth(shipped(NAME) / "robot" / "robot.toml", deviation)
 
@@ -101,17 +98,12 @@ def _labelled(
     cell: Cell, poses: tuple[str, ...], struck: HitPoses, progress: ProgressCallback
 ) -> ModalObservations:
     """Of the band, and as many, as the cell's config says."""
-    analysed = struck.modes(cell.config.modes.band_hz, progress)
-    found = tuple(
-        Measurement(
-            pose,
-            tuple(float(angle) for angle in np.rad2deg(there)),
-            (),
-            tuple(from_mode(mode) for mode in modes),
-        )
-        for pose, there, modes in zip(poses, struck.q, analysed, strict=True)
-    )
-    return observations(cell, label(cell, found))
+    analysed, _ = struck.modes(cell.config.modes.band_hz, progress)
+    found = []
+    for pose, there, modes in zip(poses, struck.q, analysed, strict=True):
+        angles = tuple(np.rad2deg(there).tolist())
+        found.append(Measurement(pose, angles, (), tuple(from_mode(mode) for mode in modes)))
+    return observations(cell, label(cell, tuple(found)))
 
 
 def split(x: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import norm, qmc
 
-from planner.dynamics.vibration import SimulatedModes
 from planner.frf import synthesis
 from planner.report.plot_marks import name_axes, panels
 from planner.studies import drawing
@@ -160,15 +159,13 @@ def figure_12(seen: AnalysedPoses, small: bool = False) -> Rebuilt:
     target = seen.poses.index(TARGET_POSE)
     seed = next(s for s in range(100) if target in split(seen.x, s)[1])
     train, there = split(seen.x, seed)[0][:TRAINED], np.array([target])
-    frf = seen.frfs[target]
-    lines = (frf.frequency_hz >= BAND_HZ[0]) & (frf.frequency_hz <= BAND_HZ[1])
-    hz, measured = frf.frequency_hz[lines], frf.accelerance[..., lines]
-    sd_measured = np.sqrt(frf.variance[..., lines])
+    frf = seen.frfs[target].within(BAND_HZ)
+    hz, measured, sd_measured = frf.frequency_hz, frf.accelerance, np.sqrt(frf.variance)
     draws = FEW_DRAWS if small else DRAWS
     samples = np.abs(_published(seen, train, target, hz, draws))
     low, middle, high = np.quantile(samples, (0.025, 0.5, 0.975), axis=0)
-    fitted = fit_surrogate(_rows(seen.every, train, seen.x))
-    prediction = fitted.predict(seen.x[there], _simulated(seen.every.simulated, there))
+    fitted = fit_surrogate(replace(seen.every.at(train), x=seen.x[train]))
+    prediction = fitted.predict(seen.x[there], seen.every.simulated[there])
     mean, sd = (moment[0] for moment in frf_moments(prediction, hz))
     best = synthesised(seen.every, target, hz)
     size = [np.abs(measured[i, j]) for i, j in PAIRS]
@@ -210,9 +207,9 @@ def _published(
     return synthesis.accelerance(hz, poles, parts[..., 0] + 1j * parts[..., 1])
 
 
-def saltelli(dimensions: int, draws: int, seed: int = 0) -> np.ndarray:
+def saltelli(dimensions: int, draws: int) -> np.ndarray:
     """Points (draws, dimensions) in (0, 1): A above B of Saltelli's scheme."""
-    sobol = qmc.Sobol(2 * dimensions, scramble=True, rng=np.random.default_rng(seed))
+    sobol = qmc.Sobol(2 * dimensions, scramble=True, rng=np.random.default_rng(0))
     half = -(-draws // 2)
     both = sobol.random_base2(int(np.ceil(np.log2(half))))[:half]
     points = np.vstack([both[:, :dimensions], both[:, dimensions:]])[:draws]
@@ -249,19 +246,6 @@ def _moments(seen: AnalysedPoses, train: np.ndarray, target: int) -> tuple[np.nd
         told = [model.predict(x[[target]]) for model in models]
         mean[row], sd[row] = ([float(t[i][0]) for t in told] for i in (0, 1))
     return mean, sd
-
-
-def _rows(modes: ModalObservations, which: np.ndarray, x: np.ndarray) -> ModalObservations:
-    names = ("frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd", "residue",
-             "residue_sd")  # fmt: skip
-    part = {name: getattr(modes, name)[which] for name in names}
-    return replace(modes, x=x[which], simulated=_simulated(modes.simulated, which), **part)
-
-
-def _simulated(modes: SimulatedModes, which: np.ndarray) -> SimulatedModes:
-    return SimulatedModes(
-        modes.frequency_hz[which], modes.damping_ratio[which], modes.residue[which]
-    )
 
 
 def _draw(

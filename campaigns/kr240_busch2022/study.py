@@ -29,20 +29,8 @@ from planner.surrogate.models.likelihood_gp import (
     fit_nargp,
 )
 
-from .data import (
-    COMPARED,
-    COUNTS,
-    FEW_COUNTS,
-    FREQUENCY_MODELS,
-    FUSIONS,
-    KERNELS,
-    OURS,
-    RESIDUES,
-    AnalysedPoses,
-    load,
-    nearest,
-    split,
-)
+from . import data
+from .data import FREQUENCY_MODELS, KERNELS, AnalysedPoses
 from .maps import maps
 from .pictures import TARGET_POSE, Fit, Predict, Rebuilt, figure_9, figure_12, pictures
 
@@ -56,89 +44,89 @@ FEW = 5  # poses at most that are called few
 POLYNOMIALS = "linear", "quadratic", "cubic"
 HIGH = 0.9  # R², "mostly higher than 0.9"
 RULES = (
-    ClaimRule.of(
+    ClaimRule(
         "The first frequency falls as the tool moves away from the base (figure 4).",
         Bound("rank correlation of ω₁ with the distance", below=-0.8, full=-0.95,
               paper="falls (Fig. 4)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "The first damping ratio rises roughly with the distance.",
         Bound("rank correlation of ξ₁ with the distance", above=0, full=0.3,
               paper="roughly (Fig. 4)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "Real parts of the first direct residues are far smaller than imaginary ones.",
         Bound("rms of real over that of imaginary parts, R₁,xx and R₁,yy", below=0.5, full=0.2,
               paper="significantly (Fig. 4)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "The first frequency is nearly a linear function of the simulated one (figure 6).",
         Bound("R² of a line, ω₁", above=0.8, full=0.95, paper="nearly linear (Fig. 6)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "With 15 poses RBF, AR1 and NARGP mostly reach R² > 0.9.",
         Bound("modes and models above R² 0.9, %", above=50, full=75, paper="mostly (Fig. 7)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "Linear, quadratic and cubic kernels cannot follow the frequencies.",
         Bound("best polynomial's median R²", below=HIGH, full=0.5, paper="low (Fig. 7)"),
         Bound("best polynomial's median RMSE over RBF's", above=1, full=2,
               paper="large (Fig. 7)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "With few poses both fusions are notably better than the GP.",
         Bound("worse fusion's RMSE over RBF's, 3 to 5 poses", below=1, full=0.7,
               paper="notably better (Fig. 8)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "AR1 needs the fewest poses (median mode at R² ≥ 0.9 from then on).",
         Bound("poses that the next model needs more than AR1", above=0, full=1, paper="Fig. 8"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "NARGP fluctuates, AR1 does not.",
         Bound("NARGP's mean rise of RMSE with one more pose over AR1's", above=1, full=1.5,
               paper="fluctuates (Fig. 8)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "With 3 poses the GP is over-confident about ω₂, AR1 is reliable (figure 9).",
         Bound("inside RBF's 95 % interval of ω₂, %", below=85, full=60, paper="few (Fig. 9)"),
         Bound("inside AR1's 95 % interval of ω₂, %", above=85, full=95, paper="all (Fig. 9)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "With 3 poses, hyperparameters averaged, AR1's interval is reliable.",
         Bound("inside averaged AR1's 95 % interval, all modes, %", above=85, full=90),
         ours=True,
     ),
-    ClaimRule.of(
+    ClaimRule(
         "No kernel follows the damping ratios.",
         Bound("highest R² of a damping ratio by any kernel", below=0.5, full=0.3,
               paper="low (Fig. 10)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "RBF captures ξ₁ and ξ₂ best, ξ₃ and ξ₄ like every kernel.",
         Bound("next kernel's RMSE over RBF's, ξ₁ and ξ₂", above=1, full=1.1,
               paper="significantly better (Fig. 10)"),
         Bound("largest RMSE of a kernel over the least, ξ₃ and ξ₄", below=1.5, full=1.2,
               paper="similar (Fig. 10)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "A cubic kernel overfits damping less than RBF, its interval is better: it is advised.",
         Bound("RMSE that RBF gains from trained to new poses beyond cubic, %", above=0,
               paper="prevents overfitting"),
         Bound("by how much nearer to 95 % cubic's interval holds, points", above=0,
               paper="better for uncertainty"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "Residues are best modelled with RBF, imaginary parts above all.",
         Bound("next kernel's RMSE over RBF's, imaginary parts", above=1, full=1.1,
               paper="RBF best (Fig. 11)"),
         Bound("next kernel's RMSE over RBF's, real parts", above=1, full=1.05),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "FRFs put together from five poses' modes agree with those measured (figure 12).",
         Bound("least R² of |H| of xx, xy, yx, yy", above=0.8, full=0.9, paper="agree (Fig. 12)"),
     ),
-    ClaimRule.of(
+    ClaimRule(
         "The modes fused over the simulation agree better than those as published.",
         Bound("mean R² of |H| gained by fused modes", above=0, full=0.02),
         ours=True,
@@ -173,7 +161,7 @@ class Run:
 
 def study(progress: ProgressCallback, small: bool = False) -> Report:
     """All figures, and whether what the paper found in its own holds here."""
-    counts, seeds = (FEW_COUNTS, SEEDS[:1]) if small else (COUNTS, SEEDS)
+    counts, seeds = (data.FEW_COUNTS, SEEDS[:1]) if small else (data.COUNTS, SEEDS)
     runs = on_each(seeds, lambda seed, part: _run(seed, counts, small, part), progress)
     first = runs[0]
     parts = ("seven", "eight", "ten", "eleven")
@@ -198,12 +186,12 @@ def study(progress: ProgressCallback, small: bool = False) -> Report:
 
 
 def _run(seed: int, counts: tuple[int, ...], small: bool, progress: ProgressCallback) -> Run:
-    seen = load(seed, part_of(progress, 0.0, 0.2))
-    modes, parts = seen.modes, split(seen.x, seed)
+    seen = data.load(seed, part_of(progress, 0.0, 0.2))
+    modes, parts = seen.modes, data.split(seen.x, seed)
     progress("frequencies", 0.2)
     frequencies = [_frequency(seen, k) for k in range(modes.frequency_hz.shape[1])]
     seven = _scores(seen.x, frequencies, 15, parts)
-    few = [Output(o.y, o.sd, {n: o.fits[n] for n in COMPARED}) for o in frequencies]
+    few = [Output(o.y, o.sd, {n: o.fits[n] for n in data.COMPARED}) for o in frequencies]
     eight = []
     for i, count in enumerate(counts):
         progress(f"frequencies with {count} poses", 0.3 + 0.4 * i / len(counts))
@@ -212,8 +200,8 @@ def _run(seed: int, counts: tuple[int, ...], small: bool, progress: ProgressCall
     damping = zip(100 * modes.damping_ratio.T, 100 * modes.damping_sd.T, strict=True)
     ten = _scores(seen.x, [Output(y, sd, _kernels(KERNELS)) for y, sd in damping], 15, parts)
     eleven = []
-    for i, name in enumerate(RESIDUES):
-        progress(f"residues {name}", 0.75 + 0.2 * i / len(RESIDUES))
+    for i, name in enumerate(data.RESIDUES):
+        progress(f"residues {name}", 0.75 + 0.2 * i / len(data.RESIDUES))
         eleven.append(_scores(seen.x, _residues(seen, name), 15, parts))
     progress("FRFs", 0.95)
     return Run(seen, frequencies, seven, np.array(eight), ten, np.array(eleven),
@@ -236,15 +224,10 @@ def _score(
     predict = output.fits[name](samples)
     mean, sd = predict(x[test])
     off = mean - output.y[test]
-    inside = np.abs(off) < 1.96 * np.hypot(sd, output.sd[test] if name in OURS else 0)
+    inside = np.abs(off) < 1.96 * np.hypot(sd, output.sd[test] if name in data.OURS else 0)
     own = predict(samples.x)[0] - samples.y
-    r2 = float(r_squared(mean, output.y[test]))
-    return (
-        r2,
-        float(np.sqrt(np.mean(off**2))),
-        float(inside.mean()),
-        float(np.sqrt(np.mean(own**2))),
-    )
+    r2, rmse = float(r_squared(mean, output.y[test])), float(np.sqrt(np.mean(off**2)))
+    return r2, rmse, float(inside.mean()), float(np.sqrt(np.mean(own**2)))
 
 
 def _noisy(model: LikelihoodGP | NARGP) -> Predict:
@@ -270,7 +253,7 @@ def _kernels(names: tuple[str, ...]) -> dict[str, Fit]:
 def _frequency(seen: AnalysedPoses, k: int) -> Output:
     """A mode's frequency, with the simulation's known at every pose."""
     low = seen.modes.simulated.frequency_hz[:, k]
-    exact, units = Exact(nearest(seen.x, low)), Normalisation.of(low)
+    exact, units = Exact(data.nearest(seen.x, low)), Normalisation.of(low)
     product = perdikaris(seen.x.shape[1])
     fits = _kernels(KERNELS[1:]) | {
         "AR1": lambda s: _noisy(fit_nargp(s, exact, units, isotropic=True, kernel=kennedy_ohagan)),
@@ -317,7 +300,7 @@ def figures(run: Run, counts: tuple[int, ...]) -> dict[str, float]:
         spearmanr(away[known], damped[known]).statistic,
         np.sqrt(np.nanmean(direct.real**2) / np.nanmean(direct.imag**2)),
         np.corrcoef(low[known], high[known])[0, 1] ** 2,
-        100 * np.mean([r2[name] > HIGH for name in FUSIONS]),
+        100 * np.mean([r2[name] > HIGH for name in data.FUSIONS]),
         max(np.median(r2[name]) for name in POLYNOMIALS),
         min(rmse[name] for name in POLYNOMIALS) / rmse["rbf"],
         max(few[1], few[2]) / few[0],
@@ -387,14 +370,14 @@ def _tables(
         *(
             _table(f"busch2022_figure_11_{name.replace(' ', '_')}", title.format(name), part, 1,
                    KERNELS)
-            for name, part in zip(RESIDUES, eleven, strict=True)
+            for name, part in zip(data.RESIDUES, eleven, strict=True)
         ),
     )  # fmt: skip
 
 
 def _figure_8_table(eight: np.ndarray, counts: tuple[int, ...]) -> Table:
     middle = np.median(eight[..., :3], axis=1)  # over modes
-    columns = [f"{name} {what}" for name in COMPARED for what in ("R²", "RMSE", "inside")]
+    columns = [f"{name} {what}" for name in data.COMPARED for what in ("R²", "RMSE", "inside")]
     rows = [(f"{n} poses", *map(float, row.ravel())) for n, row in zip(counts, middle, strict=True)]
     title = "Figure 8: R², RMSE in Hz and share inside the 95 % interval, medians over modes"
     return Table("busch2022_figure_8", title, ("", *columns), tuple(rows))

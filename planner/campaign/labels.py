@@ -1,5 +1,6 @@
 """Which measured mode is which: labels 1…count over all measured poses."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -73,23 +74,31 @@ def label(
     )
 
 
+def gathered(
+    x: np.ndarray, modes: Sequence[Sequence[Mode | None]], simulated: SimulatedModes
+) -> ModalObservations:
+    """Modes by label as arrays, NaN where one was not found; x (n, d), `simulated` (n, count)."""
+    shape = simulated.frequency_hz.shape
+    values = {name: np.full(shape, np.nan) for name in NUMBERS}
+    values |= {"residue": np.full((*shape, 3, 3), np.nan + 1j * np.nan)}
+    values |= {"residue_sd": np.full((*shape, 3, 3), np.nan)}
+    for i, row in enumerate(modes):
+        for k, mode in enumerate(row[: shape[1]]):
+            for name, array in values.items() if mode is not None else ():
+                array[i, k] = getattr(mode, name)
+    return ModalObservations(x, **values, simulated=simulated)
+
+
 def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObservations:
     """The labelled modes as arrays, NaN where a mode was not found or a column not hit."""
     count, n = cell.config.modes.count, len(labelled)
-    values = {name: np.full((n, count), np.nan) for name in NUMBERS}
-    values |= {"residue": np.full((n, count, 3, 3), np.nan + 1j * np.nan)}
-    values |= {"residue_sd": np.full((n, count, 3, 3), np.nan)}
-    for i, pose in enumerate(labelled):
-        for k, mode in enumerate(pose.modes):
-            for name, array in values.items() if mode is not None else ():
-                array[i, k] = getattr(mode, name)
     q = np.array([p.q for p in labelled]).reshape(n, len(cell.robot.joint_names))
     empty = np.zeros((0, count))
     simulated = SimulatedModes(empty, empty, np.zeros((0, count, 3, 3), complex))
     if n:
         simulated = SimulatedModes.joined([p.simulated for p in labelled])
     x = cell.features(q) if n else np.zeros((0, len(cell.workspace.feature_names)))
-    return ModalObservations(x, **values, simulated=simulated)
+    return gathered(x, [p.modes for p in labelled], simulated)
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,11 +66,9 @@ class Arm:
 
     def write(self, directory: Path, per_joint: int = 1) -> Path:
         """Write the folder, with 1, 2 or 3 elastic rotations a joint; returns robot.toml."""
-        directory.mkdir(parents=True, exist_ok=True)
-        (directory / "robot.urdf").write_text(self.urdf())
-        path = directory / "robot.toml"
-        path.write_text(self.toml(per_joint))
-        return path
+        return descriptions.write_robot(
+            directory, "robot.urdf", self.urdf(), self._lines(per_joint)
+        )
 
     def urdf(self) -> str:
         """URDF with visual and collision boxes, frames tcp and sensor."""
@@ -89,13 +87,11 @@ class Arm:
             parts.append(descriptions.frame(name, links[-1], _floats(place), turned))
         return descriptions.urdf(self.name.replace(" ", "_").lower(), parts)
 
-    def toml(self, per_joint: int) -> str:
-        """robot.toml; the first elastic rotation of a joint is about its own axis."""
-        lines = [
-            f'name = "{self.name}"',
-            'urdf = "robot.urdf"\ntcp_frame = "tcp"\nsensor_frame = "sensor"',
-            f"gravity = [0.0, 0.0, {self.gravity_m_s2}]\nband_hz = {list(self.band_hz)}",
-        ]
+    def _lines(self, per_joint: int) -> list[str]:
+        """Of robot.toml; the first elastic rotation of a joint is about its own axis."""
+        gravity = f"gravity = [0.0, 0.0, {self.gravity_m_s2}]"
+        files = self.name, "robot.urdf", "tcp", "sensor"
+        lines = descriptions.head(*files, self.band_hz, gravity)
         for i, joint in enumerate(self.joints):
             own = int(np.argmax(np.abs(joint.axis)))
             across = [np.eye(3)[k] for k in range(3) if k != own]
@@ -103,8 +99,8 @@ class Arm:
                 k, name = self.torsion[i] if axis[own] else self.bending[i], f"joint_{i + 1}"
                 lines.append(descriptions.compliance(name, axis.tolist(), k, self.damping_s))
         lines.append('\n[[obstacle]]\nname = "floor"')
-        lines.append("center_m = [0.0, 0.0, -0.06]\nsize_m = [8.0, 8.0, 0.1]\n")
-        return "\n".join(lines)
+        lines.append("center_m = [0.0, 0.0, -0.06]\nsize_m = [8.0, 8.0, 0.1]")
+        return lines
 
     def campaign(self, robot: str = "../robot/robot.toml", count: int = 4) -> str:
         """campaign.toml over the joint box."""

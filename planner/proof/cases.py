@@ -27,7 +27,7 @@ from planner.proof.fault_injection import (
     windowed,
 )
 from planner.proof.hits import Hammer, noisy
-from planner.proof.imperfections import imperfect
+from planner.proof.imperfections import Step, imperfect
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import EVERYDAY, MeasurementErrors
 from planner.proof.random_arms import draw_arm, standing
@@ -84,20 +84,13 @@ def make_case(
     recorded = _recorded(folder / "recordings", scene, injected, load, hammer, errors, own)
     steps = zip([plain, *(drawn.injected for drawn in found)], found, strict=False)
     asked = [_question(recorded, [(before, drawn.injected)]) for before, drawn in steps]
-    also = {
-        one.place: _question(
-            recorded, [(o.before, o.after) for o in imperfections if o.place == one.place]
-        )
-        for one in imperfections
-    }
+    also = {place: _question(recorded, steps) for place, steps in imperfections.items()}
     name = scene.arm.name if robot == RANDOM else robot
     return ConcealedCase(name, found, asked, also, _held_out(injected, recorded))
 
 
-def _question(
-    recorded: ScoredCase, steps: Sequence[tuple[InjectedFaults, InjectedFaults]]
-) -> Callable[[], DetectionProblem]:
-    """What tells of all that each of some steps, before and after, put in."""
+def _question(recorded: ScoredCase, steps: Sequence[Step]) -> Callable[[], DetectionProblem]:
+    """What tells of all that some steps put in."""
     without = recorded.measured
     for before, after in steps:
         without = without_effect(without, before, after)

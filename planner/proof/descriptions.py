@@ -1,6 +1,7 @@
 """Robot folders as text: links and joints of a URDF, blocks of robot.toml, a campaign.toml."""
 
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -73,6 +74,15 @@ def head(
         f'name = "{name}"', f'urdf = "{file}"', f'tcp_frame = "{tcp}"',
         f'sensor_frame = "{sensor}"', f"band_hz = {list(band_hz)}", *more,
     ]  # fmt: skip
+
+
+def write_robot(folder: Path, file: str, urdf: str, lines: Iterable[str]) -> Path:
+    """A folder of robot.toml, whose path it returns, and the URDF `file` that it names."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / file).write_text(urdf)
+    path = folder / "robot.toml"
+    path.write_text("\n".join([*lines, ""]))
+    return path
 
 
 def compliance(

@@ -24,8 +24,7 @@ class Hammer:
     """What the person, the hammer, the analyser and the floor are like.
 
     Noise is relative: of the responses to the hit's largest response (rms), of the force to its
-    peak. Readback angles scatter by `readback_deg` (`readback_mm`)
-    around the setpoint.
+    peak. Readback angles scatter by `readback_deg` around the setpoint.
     """
 
     peak_n: float = 1200.0
@@ -36,7 +35,6 @@ class Hammer:
     noise: float = 0.02
     force_noise: float = 5e-4
     readback_deg: float = 0.01
-    readback_mm: float = 0.1  # of joints that slide
     oversampling: int = OVERSAMPLING
     corner_hz: float = 0.0  # below which noise grows as 1/f
     bits: int = 0  # of the converter, whose full scale is four times what comes; 0: exact

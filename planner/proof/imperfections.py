@@ -1,6 +1,6 @@
 """Small unlisted imperfections: no robot is quite what its simulation has, with nothing wrong."""
 
-from dataclasses import dataclass
+from collections import defaultdict
 
 import numpy as np
 
@@ -27,32 +27,19 @@ RIPPLE = 0.01  # of a joint's stiffness
 DRIFT_SD = 0.004  # of each joint's stiffness, over the campaign
 BEAM = 30.0, 100.0  # stiffness of a link as a beam over that of its joint
 COMPENSATOR = 0.005, 0.03  # of joint 2's stiffness
+Step = tuple[InjectedFaults, InjectedFaults]  # without what it puts in, and with it
 
 
-@dataclass(frozen=True, eq=False)
-class Imperfection:
-    """What a diagnosis may call `effect`, `at` a place; the robot without it and with it."""
-
-    effect: str
-    at: str
-    before: InjectedFaults
-    after: InjectedFaults
-
-    @property
-    def place(self) -> tuple[str, str]:
-        """What it is, and where."""
-        return self.effect, self.at
-
-
-def imperfect(scene: Scene) -> tuple[InjectedFaults, tuple[Imperfection, ...]]:
+def imperfect(scene: Scene) -> tuple[InjectedFaults, dict[tuple[str, str], list[Step]]]:
     """Each joint a little nonlinear, rippled, drifting and soft across; links, hoses, a gas spring.
 
-    Damping is partly viscous, partly a loss factor, by a share of each gear's own.
+    Damping is partly viscous, partly a loss factor, by a share of each gear's own. Beside the
+    robot: what a diagnosis may call an effect, at a place, and the steps that put it in.
     """
-    rng, found = scene.rng, []
+    rng, found = scene.rng, defaultdict[tuple[str, str], list[Step]](list)
 
-    def with_it(changed: Scene, *effects: str, at: str) -> Scene:
-        found.extend(Imperfection(e, at, scene.injected, changed.injected) for e in effects)
+    def with_it(changed: Scene, effect: str, at: str) -> Scene:
+        found[effect, at].append((scene.injected, changed.injected))
         return changed
 
     common = scene.log_uniform(*SOFT) if rng.random() < SOFT_SHARE else 1.0
@@ -78,7 +65,7 @@ def imperfect(scene: Scene) -> tuple[InjectedFaults, tuple[Imperfection, ...]]:
     scene = with_it(scene.adding(beams=(beam,)), "link_flexibility", at=beam.link)
     spring = gas_spring(scene, COMPENSATOR)
     scene = with_it(scene.adding(compensators=(spring,)), "angle_dependent_stiffness", at="joint_2")
-    return scene.injected, tuple(found)
+    return scene.injected, dict(found)
 
 
 def _law(scene: Scene, joint: str) -> tuple[str, Port]:

@@ -231,13 +231,12 @@ class LuGre(Stiff):
 
 
 @dataclass(frozen=True)
-class ImpactDamping(Stiff):
+class ImpactDamping(Backlash):
     """Play with teeth that dissipate as they meet: a dead zone, and beyond it c · depth · speed.
 
     τ = -k clip(θ, -g, g) + c [|θ| - g]₊ v, after Hunt and Crossley.
     """
 
-    gap: float
     damping: float  # c, N·m·s/rad²
 
     def slope(self, step_s: float) -> float:
@@ -246,8 +245,7 @@ class ImpactDamping(Stiff):
 
     def torque(self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float) -> Pair:
         depth = np.maximum(np.abs(now) - self.gap, 0)
-        lost = -self.stiffness * np.clip(now, -self.gap, self.gap)
-        return lost + self.damping * depth * (now - before) / step_s, state
+        return self.at(now) + self.damping * depth * (now - before) / step_s, state
 
 
 @dataclass(frozen=True)

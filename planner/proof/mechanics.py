@@ -154,6 +154,11 @@ class Mujoco(Mechanics):
         return rotation.reshape(3, 3).copy(), place.copy(), both.reshape(6, -1)[:, self._order]
 
 
+def cross_matrix(v: Sequence[float] | np.ndarray) -> np.ndarray:
+    """(3, 3): what turns u into v × u."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
 def _quaternion(rotation: np.ndarray) -> np.ndarray:
     return Rotation.from_matrix(rotation).as_quat(scalar_first=True)
 

@@ -14,7 +14,7 @@ import scipy.linalg
 from scipy import signal
 
 from planner.proof.deviation import Deviation, Spring
-from planner.proof.mechanics import Frame, Mechanics
+from planner.proof.mechanics import Frame, Mechanics, cross_matrix
 from planner.proof.springs import branches, compensation
 
 SAG_STEPS = 30  # at most; each gains a digit or more where springs carry the weight at all
@@ -61,7 +61,7 @@ class Truth:
         for name in self.sensors:
             linear, turn = np.split(self._own_axes(mechanics.site(name)), 2)
             own = self.sensor_offset_m if name == "sensor" else (0.0, 0.0, 0.0)
-            each.append(linear - _cross(self.offsets_m.get(name, own)) @ turn)
+            each.append(linear - cross_matrix(self.offsets_m.get(name, own)) @ turn)
             mass = mass + self.sensor_mass_kg.get(name, 0.0) * each[-1].T @ each[-1]
         sensor = np.concatenate(each)
         damping = np.diag(self.factors(q) * [s.damping for s in self.springs])
@@ -75,7 +75,7 @@ class Truth:
             damping = damping + bridge.damping * np.outer(one - other, one - other)
         if self.deviation.spin:
             turning = self.turning(q)
-            damping = damping - turning.T @ _cross((0.0, 0.0, self.deviation.spin)) @ turning
+            damping = damping - turning.T @ cross_matrix((0.0, 0.0, self.deviation.spin)) @ turning
         return mass, damping, stiffness, hit, sensor
 
     def gravity_stiffness(self, q: np.ndarray) -> np.ndarray:
@@ -153,13 +153,17 @@ class Truth:
         """Unit vector (e,) of a joint's elastic rotation about its own axis."""
         return np.eye(len(self.springs))[self._own[joint]]
 
+    def stiffness(self, joint: str) -> float:
+        """Of a joint about its own axis, in N·m/rad."""
+        return self.springs[self._own[joint]].stiffness
+
     def along(
         self, q: np.ndarray, link: str, position_m: np.ndarray, direction: np.ndarray
     ) -> np.ndarray:
         """How a point of a link moves along a world direction (3,) with each spring (e,)."""
         rotation, _, jacobian = self._sagged(q).body(self.links(massless=True)[link][0])
         jacobian = jacobian[:, self._elastic]
-        lever = _cross(tuple(rotation @ position_m))
+        lever = cross_matrix(rotation @ position_m)
         return np.asarray(direction) @ (jacobian[:3] - lever @ jacobian[3:])
 
     def links(self, massless: bool = False) -> dict[str, list[int]]:
@@ -287,12 +291,6 @@ class Truth:
                 y = driven(pole, force_n, step_s)
                 out += twice * np.outer(residue * pole**2, y).real
         return out
-
-
-def _cross(vector: tuple[float, float, float]) -> np.ndarray:
-    """(3, 3): what turns ω into v × ω."""
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def weights(pole: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from planner.proof import deviation
 from planner.proof.fault_injection import Tone
@@ -23,8 +24,7 @@ def _artefact(scene: Scene, at: str, parameters: Parameters, **changes: Any) -> 
 def sensor_rotation(scene: Scene) -> Drawn:
     """The sensor is mounted askew."""
     axis, angle = scene.direction(), scene.size * np.deg2rad(scene.rng.uniform(10, 45))
-    skew = np.cross(np.eye(3), axis)
-    rotation = np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
+    rotation = Rotation.from_rotvec(angle * np.array(axis)).as_matrix()
     told: Parameters = {"axis": list(axis), "angle_rad": float(angle)}
     return _artefact(scene, "sensor", told, rotation=rotation)
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from planner.proof.deviation import BentLink, Deviation, Spring
 from planner.proof.mechanics import Hinge, Part
-from planner.proof.springs import beam_end
+from planner.proof.springs import beam_end, own_axes, vector
 
 MOST_SLENDER, LEAST_SLENDER = 0.6, 0.01  # of a bending link's mass, that is spread along it
 THICK = 0.05  # radius of a beam over its length, for the inertia of its pieces
@@ -40,6 +40,7 @@ class Builder:
         childs = {j.find("child").get("link") for js in self._children.values() for j in js}
         first = next(name for name in self._links if name not in childs)
         self._root, self._table, self._springs = root, table, springs
+        self._axes = own_axes(root)
         self._deviation, self._rng = deviation, rng
         self.parts: list[Part] = []
         self.joint_names: list[str] = []
@@ -76,8 +77,7 @@ class Builder:
             place, rotation = _placement(joint.find("origin"))
             hinges: list[Hinge] = []
             if joint.get("type") != "fixed":
-                axis, slides = joint.find("axis"), joint.get("type") == "prismatic"
-                along = np.array([1.0, 0.0, 0.0]) if axis is None else _vector(axis.get("xyz"))
+                along, slides = self._axes[name]
                 hinges = [Hinge(name, along, slides), *self._hinges(name)]
                 self.joint_names.append(name)
                 self.slides.append(slides)
@@ -216,10 +216,6 @@ def _slender(
         rod *= 0.8
 
 
-def _vector(text: str) -> np.ndarray:
-    return np.array([float(v) for v in text.split()])
-
-
 def _limits(joint: Any) -> tuple[float, float]:
     limit = joint.find("limit")
     if limit is None or joint.get("type") == "continuous":
@@ -231,7 +227,7 @@ def _placement(origin: Any) -> tuple[np.ndarray, np.ndarray]:
     """Place (3,) and rotation (3, 3) of a URDF origin."""
     if origin is None:
         return np.zeros(3), np.eye(3)
-    return _vector(origin.get("xyz", "0 0 0")), _turn(_vector(origin.get("rpy", "0 0 0")))
+    return vector(origin.get("xyz", "0 0 0")), _turn(vector(origin.get("rpy", "0 0 0")))
 
 
 def _turn(rpy: np.ndarray) -> np.ndarray:

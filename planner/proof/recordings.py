@@ -12,6 +12,8 @@ import numpy as np
 from planner.proof.hits import AXES, Hammer, SimulatedHit, signed, simulate_hit
 from planner.proof.model import Truth
 
+READBACK_MM = 0.1  # by which joints that slide scatter around the setpoint
+
 
 def write_uff(
     path: Path,
@@ -86,7 +88,7 @@ def record_poses(
     rows, slides, shift = [], truth.slides, np.array(truth.slides or False)
     for number, (pose, q) in enumerate(poses):
         rng = np.random.default_rng([seed, number])
-        scatter = np.where(shift, hammer.readback_mm, hammer.readback_deg)
+        scatter = np.where(shift, READBACK_MM, hammer.readback_deg)
         readback = np.round(stated(q, slides) + scatter * rng.uniform(-1, 1, len(q)), 4)
         there = np.where(shift, 1e-3 * readback, np.deg2rad(readback))
         shots = [axis for axis in hits for _ in range(repeats)]

@@ -17,6 +17,8 @@ from functools import partial
 
 import numpy as np
 
+from planner.proof.mechanics import cross_matrix
+
 SPRING_SD, STATED_SD, DAMPING_SD, LOSS_SD = 0.5, 0.25, 0.5, 0.02
 MASS_SD, CENTRE_SD, SECOND_SD = 0.06, 0.01, 0.08  # the centre's in units of the robot's reach
 GAIN_SD, CROSS_SD, FORCE_SD, PLACE_M = 0.02, 0.04, 0.02, 0.006
@@ -75,11 +77,6 @@ class Body:
             change[i, j] = change[j, i] = SECOND_SD * np.sqrt(inner[i, i] * inner[j, j])
             out.append(_spatial(0.0, np.zeros(3), change))
         return out
-
-
-def cross_matrix(v: np.ndarray) -> np.ndarray:
-    """(3, 3): what turns u into v × u."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 
 def _spatial(mass: float, first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from planner.proof.score import Place, Scored, Share, by_probability, figures
 from planner.report.answer import Answer, plain
 from planner.report.pictures import png
-from planner.report.plot_marks import ink
+from planner.report.plot_marks import empty, write_values
 
 
 @dataclass(frozen=True)
@@ -79,12 +78,8 @@ def _markdown(seal: str, scored: Sequence[Scored], found: Mapping[str, Any]) -> 
     for s in scored:
         if not s.right:
             true = [f"{e.effect} {e.at or ''} ({e.size:.2%}, {e.nats:.3g})" for e in s.shown]
-            cells = (
-                ", ".join(true) or "nothing",
-                s.verdict,
-                _places(s.named),
-                _places(s.false_names),
-            )
+            told = ", ".join(true) or "nothing"
+            cells = told, s.verdict, _places(s.named), _places(s.false_names)
             lines.append(f"| {s.name} | {s.robot} | {' | '.join(cells)} | {s.probability:.2f} |")
     return "\n".join([*lines, ""])
 
@@ -114,13 +109,10 @@ def confusion(scored: Sequence[Scored]) -> Figure:
     counts = np.zeros((len(names), len(names)), dtype=int)
     for one, other in zip(true, said, strict=True):
         counts[names.index(one), names.index(other)] += 1
-    figure = Figure(figsize=(9, 8), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = empty((9, 8))
     panel = figure.subplots()
-    image = panel.imshow(counts, cmap="Blues")
-    for (i, j), count in np.ndenumerate(counts):
-        if count:
-            panel.text(j, i, str(count), ha="center", va="center", color=ink(image.to_rgba(count)))
+    image = panel.imshow(np.where(counts > 0, counts, np.nan), cmap="Blues", vmin=0)
+    write_values(panel, image, ".0f")
     panel.set_xticks(range(len(names)), names, rotation=90)
     panel.set_yticks(range(len(names)), names)
     panel.set_xlabel("said first")
@@ -130,8 +122,7 @@ def confusion(scored: Sequence[Scored]) -> Figure:
 
 def calibration(scored: Sequence[Scored]) -> Figure:
     """How often what was said first is right, over its stated probability."""
-    figure = Figure(figsize=(5, 5), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = empty((5, 5))
     panel = figure.subplots()
     panel.plot([0, 1], [0, 1], color="black", lw=0.8, ls=":")
     for p, right in by_probability(scored):

@@ -58,7 +58,7 @@ class Scene:
 
     def stiffness(self, joint: str) -> float:
         """Of a joint about its own axis, in N·m/rad."""
-        return float(self.truth.own(joint) @ [spring.stiffness for spring in self.truth.springs])
+        return self.truth.stiffness(joint)
 
     def angle(self, joint: str) -> float:
         """A joint's largest elastic angle (rad) under a middling hit; median over some poses."""

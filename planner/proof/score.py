@@ -9,7 +9,7 @@ poses set aside, and `nats`, what the recordings tell of that (see `refit`). Wit
 - "unexplained" is right where an effect without a name has 1.5 m, "consistent" where nothing does.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -254,11 +254,13 @@ def figures(scored: Sequence[Scored]) -> dict[str, Any]:
     return {
         **{name: share(right) for name, right in shares.items()},
         "by": {
-            "group": _by(scored, lambda s: s.group),
-            "engine": _by(scored, lambda s: s.engine),
-            "robot": _by(scored, lambda s: s.robot.rstrip("0123456789").rstrip("-")),
-            "effect": _by_effect(required, lambda e: e.effect),
-            "size": _by_effect(required, lambda e: f"{10.0 ** np.floor(np.log10(e.size)):.0%} up"),
+            "group": _by((s.group, s.right) for s in scored),
+            "engine": _by((s.engine, s.right) for s in scored),
+            "robot": _by((s.robot.rstrip("0123456789").rstrip("-"), s.right) for s in scored),
+            "effect": _by((e.effect, e.in_set) for _, e in required),
+            "size": _by(
+                (f"{10.0 ** np.floor(np.log10(e.size)):.0%} up", e.in_set) for _, e in required
+            ),
         },
         "calibration_error": calibration_error(scored),
         "held_out_frac_median": float(np.median(frac)) if frac else None,
@@ -267,11 +269,9 @@ def figures(scored: Sequence[Scored]) -> dict[str, Any]:
     }
 
 
-def _by(scored: Sequence[Scored], of: Any) -> dict[str, Share]:
-    names = sorted({of(s) for s in scored})
-    return {name: share([s.right for s in scored if of(s) == name]) for name in names}
-
-
-def _by_effect(effects: Sequence[tuple[Scored, ScoredEffect]], of: Any) -> dict[str, Share]:
-    names = sorted({of(e) for _, e in effects})
-    return {name: share([e.in_set for _, e in effects if of(e) == name]) for name in names}
+def _by(named: Iterable[tuple[str, bool]]) -> dict[str, Share]:
+    """What is right of each name."""
+    found: dict[str, list[bool]] = {}
+    for name, right in named:
+        found.setdefault(name, []).append(right)
+    return {name: share(found[name]) for name in sorted(found)}

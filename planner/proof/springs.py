@@ -55,17 +55,17 @@ def springs(
     Names of others are "extra K" and "resonator K", K counting in the deviation.
     """
     nominal = [_stated(c) for c in table["compliance"]]
-    own_axes = _own_axes(root)
+    axes = own_axes(root)
     factors = {change.joint: change.factor for change in deviation.scaled}
     scattered = [
         _times(_deviating(s, deviation, rng), factors.get(s.joint, 1.0))
-        if _parallel(s, own_axes)
+        if _parallel(s, axes)
         else _deviating(s, deviation, rng)
         for s in nominal
     ]
     scattered = [_times(s, deviation.common) for s in scattered]
     if deviation.mixed > 0:  # of the gears' own springs: each branch costs the engine a state
-        gears = [i for i, s in enumerate(scattered) if _parallel(s, own_axes)]
+        gears = [i for i, s in enumerate(scattered) if _parallel(s, axes)]
         for i, s in zip(gears, mixed([scattered[i] for i in gears], deviation), strict=True):
             scattered[i] = s
     bent = [s for beam in deviation.beams for s in _beam(beam, root)]
@@ -75,7 +75,7 @@ def springs(
         k, c = r.mass_kg * w**2, 2 * r.damping_ratio * r.mass_kg * w
         small.append(Spring(f"resonator {i}", r.direction, k, c, slide=True))
     found = (*scattered, *deviation.extra, *bent, *small)
-    own = {s.joint: i for i, s in reversed(list(enumerate(found))) if _parallel(s, own_axes)}
+    own = {s.joint: i for i, s in reversed(list(enumerate(found))) if _parallel(s, axes)}
     own |= {f"extra {k}": len(nominal) + k for k in range(len(deviation.extra))}
     own |= {s.joint: len(found) - len(small) + k for k, s in enumerate(small)}
     return found, own
@@ -107,21 +107,25 @@ def _deviating(spring: Spring, deviation: Deviation, rng: np.random.Generator) -
     return replace(spring, stiffness=float(k), damping=float(c * k / spring.stiffness))
 
 
-def _own_axes(root: ElementTree.Element) -> dict[str, tuple[np.ndarray, bool]]:
+def vector(text: str) -> np.ndarray:
+    """Numbers of a URDF's attribute."""
+    return np.array([float(v) for v in text.split()])
+
+
+def own_axes(root: ElementTree.Element) -> dict[str, tuple[np.ndarray, bool]]:
     """Axes (3,) of the joints, and whether they slide along them."""
     axes = {}
     for joint in root.findall("joint"):
         axis = joint.find("axis")
         text = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
         if joint.get("type") != "fixed":
-            along = np.array([float(v) for v in text.split()])
-            axes[joint.get("name", "")] = along, joint.get("type") == "prismatic"
+            axes[joint.get("name", "")] = vector(text), joint.get("type") == "prismatic"
     return axes
 
 
-def _parallel(spring: Spring, own_axes: dict[str, tuple[np.ndarray, bool]]) -> bool:
+def _parallel(spring: Spring, axes: dict[str, tuple[np.ndarray, bool]]) -> bool:
     """Whether a spring turns about the axis of its joint, or shifts along that of one that does."""
-    own, slides = own_axes.get(spring.joint, (None, False))
+    own, slides = axes.get(spring.joint, (None, False))
     if own is None or spring.slide != slides:
         return False
     return bool(np.allclose(np.cross(own, spring.axis), 0, atol=1e-9))
@@ -145,7 +149,7 @@ def beam_end(link: str, root: ElementTree.Element) -> np.ndarray:
     for joint in root.findall("joint"):
         parent, origin = joint.find("parent"), joint.find("origin")
         if parent is not None and parent.get("link") == link and origin is not None:
-            ends.append(np.array([float(v) for v in origin.get("xyz", "0 0 0").split()]))
+            ends.append(vector(origin.get("xyz", "0 0 0")))
     return max(ends, key=lambda place: float(np.linalg.norm(place)))
 
 

@@ -108,24 +108,16 @@ class JudgedFigure:
         return self.figure, self.paper or "–", here, self.spread, self.false_if, self.reason
 
 
-@dataclass(frozen=True)
 class ClaimRule:
     """A sentence of the paper, or one claimed for this program (`ours`), and what it stands on.
 
     `given`: what must be so for the claim to say anything here.
     """
 
-    sentence: str
-    bounds: tuple[Bound, ...]
-    ours: bool = False
-    given: tuple[Bound, ...] = ()
-
-    @classmethod
-    def of(
-        cls, sentence: str, *bounds: Bound, ours: bool = False, given: tuple[Bound, ...] = ()
-    ) -> "ClaimRule":
-        """With its bounds one after the other."""
-        return cls(sentence, bounds, ours, given)
+    def __init__(
+        self, sentence: str, *bounds: Bound, ours: bool = False, given: tuple[Bound, ...] = ()
+    ) -> None:
+        self.sentence, self.bounds, self.ours, self.given = sentence, bounds, ours, given
 
     @property
     def figures(self) -> tuple[str, ...]:

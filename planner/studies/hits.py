@@ -25,7 +25,7 @@ from planner.proof.cases import planned
 from planner.proof.fault_injection import DampingScatter, HitVisit, InjectedFaults, quiet_hits
 from planner.proof.hits import Hammer, SimulatedHit, noisy
 from planner.proof.laws import BoucWen
-from planner.proof.measurement_errors import EVERYDAY, MeasurementErrors
+from planner.proof.measurement_errors import EVERYDAY
 from planner.proof.model import Truth
 from planner.proof.nonlinear import Port
 from planner.recording.records import Hit
@@ -56,16 +56,19 @@ class HitPoses:
 
     def modes(
         self, band_hz: tuple[float, float], progress: ProgressCallback
-    ) -> list[tuple[Mode, ...]]:
-        """Modes of every pose by modal analysis; none where it finds none."""
+    ) -> tuple[list[tuple[Mode, ...]], list[tuple[Mode, ...]]]:
+        """Modes of every pose by modal analysis, and doubtful ones; none where it finds none."""
         found: list[tuple[Mode, ...]] = []
+        doubtful: list[tuple[Mode, ...]] = []
         for i, frf in enumerate(self.frfs):
             progress(f"modal analysis of pose {i + 1} of {len(self.frfs)}", i / len(self.frfs))
             try:
-                found.append(estimate_modes(frf, band_hz).modes)
+                model = estimate_modes(frf, band_hz)
             except RefusedError:
-                found.append(())
-        return found
+                model = None
+            found.append(model.modes if model else ())
+            doubtful.append(model.doubtful if model else ())
+        return found, doubtful
 
 
 def upright_poses(
@@ -88,29 +91,17 @@ def upright_poses(
     return np.array(q)
 
 
-def joint_friction(truth: Truth, share: float = FRICTION) -> tuple[Port, ...]:
-    """Friction in the first three joints: it gives stiffness at rest, and takes energy."""
-    ports = []
-    for joint in truth.joint_names[:3]:
-        own = float(truth.own(joint) @ [spring.stiffness for spring in truth.springs])
-        ports.append(Port(BoucWen(share * own, share * own * SLIDING_RAD), joint=joint))
-    return tuple(ports)
-
-
-def everyday_faults(
-    truth: Truth, seed: int, errors: MeasurementErrors = EVERYDAY, ports: tuple[Port, ...] = ()
-) -> InjectedFaults:
+def everyday_faults(truth: Truth, seed: int, ports: tuple[Port, ...] = ()) -> InjectedFaults:
     """What is not as in the books: friction, damping that scatters, a chain within tolerance.
 
-    `ports` are further laws of joints.
+    Friction is in the first three joints: it gives stiffness at rest, and takes energy. `ports`
+    are further laws of joints.
     """
-    chain = errors.chain(np.random.default_rng([seed, 3]))
-    return InjectedFaults(
-        truth.deviation,
-        (*joint_friction(truth), *ports),
-        drift=DampingScatter(BRAKES, seed),
-        chain=chain,
-    )
+    shares = ((joint, FRICTION * truth.stiffness(joint)) for joint in truth.joint_names[:3])
+    friction = (Port(BoucWen(k, k * SLIDING_RAD), joint=joint) for joint, k in shares)
+    chain = EVERYDAY.chain(np.random.default_rng([seed, 3]))
+    drift = DampingScatter(BRAKES, seed)
+    return InjectedFaults(truth.deviation, (*friction, *ports), drift=drift, chain=chain)
 
 
 def simulate_hits(
@@ -121,12 +112,11 @@ def simulate_hits(
     band_hz: tuple[float, float],
     seed: int,
     progress: ProgressCallback,
-    errors: MeasurementErrors = EVERYDAY,
     axes: str = "xyz",
 ) -> HitPoses:
     """Hit a robot at poses q (n, dof) in rad, each once visited, along `axes` at three levels."""
     rng, own = np.random.default_rng([seed, 4]), np.random.default_rng([seed, 5])
-    stops = planned(q, hammer, errors, rng, own)[: len(q)]  # the first pose is not visited again
+    stops = planned(q, hammer, EVERYDAY, rng, own)[: len(q)]  # the first pose is not visited again
     visits = [_along(visit, axes) for *_, visit in stops]
     readback = np.deg2rad([readback_deg for _, readback_deg, _ in stops])
     floor: Hammer | None = None
@@ -135,7 +125,7 @@ def simulate_hits(
         progress(f"hits at pose {first + 1} of {len(q)}", first / len(q))
         quiet = quiet_hits(truth, injected, visits[first : first + AT_ONCE], hammer, rng)
         if floor is None:
-            floor = errors.floor(hammer, [hit for hits in quiet for hit in hits], own)
+            floor = EVERYDAY.floor(hammer, [hit for hits in quiet for hit in hits], own)
         hits += [as_read([noisy(h, floor, rng) for h in each], hammer) for each in quiet]
     frfs = tuple(estimate(each, band_hz) for each in hits)
     return HitPoses(readback, frfs, tuple(hits))

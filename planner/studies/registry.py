@@ -1,8 +1,8 @@
 """The studies by name, first author and year of the paper: `study.py` beside the paper's robot."""
 
-import importlib.util
 import sys
-from importlib.util import module_from_spec, spec_from_file_location
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
@@ -18,7 +18,6 @@ FOLDERS = {
     "birk2025": "kr10_birk2025",
 }
 NAMES = tuple(FOLDERS)
-PACKAGE = "planner_study_"  # and the name, as which a study's files are loaded
 ALL = "all"
 ALIASES = {f"seed-00{i}": name for i, name in enumerate(NAMES)}  # what they were called before
 NEEDED = "mujoco"  # makes the recordings, as `planner.proof` has it
@@ -29,7 +28,7 @@ def named(name: str) -> str:
     name = ALIASES.get(name, name)
     if name not in (*NAMES, ALL):
         raise InputError(f"There is no study {name}; choose one of {', '.join(NAMES)} or all.")
-    if importlib.util.find_spec(NEEDED) is None:
+    if find_spec(NEEDED) is None:
         raise InputError(
             "Studies make their recordings with MuJoCo, which is not installed; run "
             f"{sys.executable} -m pip install 'planner[truth]'"
@@ -43,21 +42,5 @@ def folder_of(name: str) -> Path:
 
 
 def load(name: str) -> ModuleType:
-    """`study.py` as a package, so that it imports the files beside it, wherever campaigns lie.
-
-    It has RULES, and `study(progress, small)`, which gives a `Report`.
-    """
-    package, folder = f"{PACKAGE}{name}", folder_of(name)
-    if package not in sys.modules:
-        spec = spec_from_file_location(
-            package, folder / "study.py", submodule_search_locations=[str(folder)]
-        )
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules[package] = module_from_spec(spec)
-        try:
-            spec.loader.exec_module(sys.modules[package])
-        except BaseException:
-            del sys.modules[package]
-            raise
-    return sys.modules[package]
+    """The study's module: it has RULES, and `study(progress, small)`, which gives a `Report`."""
+    return import_module(f"planner.studies.{FOLDERS[name]}.study")

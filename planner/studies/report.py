@@ -1,12 +1,10 @@
 """What a study answers: tables, pictures and judged claims; its answer as JSON, text and files."""
 
-import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-import cloudpickle
 import msgspec
 import numpy as np
 from rich.console import Group, RenderableType
@@ -17,7 +15,6 @@ from planner.inference.parallel import parallel_map
 from planner.progress import ProgressCallback, no_progress, part_of
 from planner.report.answer import Answer
 from planner.report.text import table
-from planner.studies import registry
 from planner.studies.claims import COLUMNS, HOLDS, IN_KIND, NOT, UNTESTED, PaperClaim
 
 if TYPE_CHECKING:
@@ -159,7 +156,7 @@ def on_each(
 
 @dataclass(frozen=True)
 class _RobotRun(Generic[R]):
-    """`run` of one robot of several, here or in another process, which loads the study first."""
+    """`run` of one robot of several, here or in another process, which tells no progress."""
 
     run: Callable[[int, ProgressCallback], R]
     count: int
@@ -171,12 +168,7 @@ class _RobotRun(Generic[R]):
         return self.run(seed, part)
 
     def __reduce__(self) -> tuple[Callable, tuple]:
-        return _of_study, (self.run.__module__, cloudpickle.dumps(self.run), self.count)
-
-
-def _of_study(module: str, run: bytes, count: int) -> _RobotRun:
-    registry.load(module.partition(".")[0].removeprefix(registry.PACKAGE))
-    return _RobotRun(pickle.loads(run), count, no_progress)
+        return _RobotRun, (self.run, self.count, no_progress)
 
 
 def r_squared(predicted: np.ndarray, measured: np.ndarray, axis: int | None = None) -> np.ndarray:

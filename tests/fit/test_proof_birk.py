@@ -19,15 +19,14 @@ from planner.proof.arms import KR10
 from planner.proof.deviation import Deviation
 from planner.proof.load import load_truth
 from planner.robot.robot import Robot
+from planner.studies.kr10_birk2025 import fits
 from tests.support.measured_frfs import measured_frfs
-from tests.support.studied import part
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
-FITS = part("birk2025", "fits")
 LINES = np.arange(5.0, 200.0, 1 / 0.64)  # records of 0.64 s
 OTHERS = KR10.poses(30, seed=900)
 SEEDS = 10
-DEGREE = FITS.DEGREE
+DEGREE = fits.DEGREE
 # Birk et al. 2025, Table 7: N·m/°, N·m/(°/s).
 TORSION = (881.7, 1503.8, 896.7, 600.8, 208.8, 409.6)
 TORSION_DAMPING = (0.316, 0.457, 0.468, 0.045, 0.01, 0.233)
@@ -62,11 +61,11 @@ def birk_bounds(transverse: bool = True) -> dict[str, tuple[float, float]]:
     """Table 2 in N·m/rad and N·m·s/rad, by parameter."""
     bounds = {}
     for i in range(6):
-        places = [(f"joint_{i + 1} about z", FITS.TORSION_BOUNDS[i])]
-        places += [(f"transverse_{i + 1}", FITS.TRANSVERSE_BOUNDS[i])] if transverse else []
+        places = [(f"joint_{i + 1} about z", fits.TORSION_BOUNDS[i])]
+        places += [(f"transverse_{i + 1}", fits.TRANSVERSE_BOUNDS[i])] if transverse else []
         for place, (low, high) in places:
             bounds[f"stiffness of {place}"] = (low * DEGREE, high * DEGREE)
-            bounds[f"damping of {place}"] = tuple(DEGREE * b for b in FITS.DAMPING_BOUNDS)
+            bounds[f"damping of {place}"] = tuple(DEGREE * b for b in fits.DAMPING_BOUNDS)
     return bounds
 
 

@@ -1,7 +1,6 @@
 """The shipped campaign: published figures, poses of Table A1, recordings that can be made again."""
 
 import csv
-import importlib.util
 import json
 
 import numpy as np
@@ -13,6 +12,7 @@ from planner.proof.hits import Hammer, simulate_hit
 from planner.proof.load import load_truth
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
+from planner.studies.kr240_plane import regenerate
 
 FOLDER = shipped("kr240_plane")
 # Table A1 of Busch et al. 2022, whose 35 positions are the whole grid.
@@ -39,16 +39,6 @@ def poses(rows):
 @pytest.fixture(scope="module")
 def true():
     return json.loads((FOLDER / "truth.json").read_text())["poses"]
-
-
-@pytest.fixture(scope="module")
-def regenerate():
-    spec = importlib.util.spec_from_file_location("regenerate", FOLDER / "regenerate.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_frequencies_follow_joint_3_as_published(nominal):
@@ -95,7 +85,7 @@ def test_recordings_are_complete_small_and_labelled_as_simulated(rows):
     assert "SIMULATED" in json.loads((FOLDER / "truth.json").read_text())["note"]
 
 
-def test_the_script_makes_these_recordings(regenerate, rows, poses, true):
+def test_the_script_makes_these_recordings(rows, poses, true):
     truth = load_truth(FOLDER / "robot" / "robot.toml", regenerate.DEVIATION)
     for number, (name, q) in enumerate(poses.items()):
         frequency, damping, _ = truth.modes(q, 4)
@@ -115,7 +105,7 @@ def test_the_script_makes_these_recordings(regenerate, rows, poses, true):
         assert np.max(np.abs(stored[1:] - hit.acceleration_m_s2)) < 1e-6 * largest
 
 
-def test_the_script_finds_these_poses(regenerate, nominal, poses):
+def test_the_script_finds_these_poses(nominal, poses):
     found = regenerate.joint_angles(nominal)
     assert list(found) == list(poses)
     for name, q in found.items():

@@ -8,9 +8,8 @@ import pytest
 from planner.frf.metrics import agreement
 from planner.studies import registry
 from planner.studies.claims import HOLDS, IN_KIND, NOT, UNTESTED, judge
-from tests.support.studied import part
+from planner.studies.kr10_birk2025 import data, fits, pictures
 
-DATA, FITS, PICTURES = (part("birk2025", name) for name in ("data", "fits", "pictures"))
 RULES = [(name, rule) for name in registry.NAMES for rule in registry.load(name).RULES]
 
 
@@ -131,11 +130,11 @@ def made_up_birk(off):
         simulation = SimpleNamespace(elasticity=SimpleNamespace(stiffness=stiffness))
         bounds = np.tile([1.0, 4.0], (2, 1))
         values = np.array([2.0, 4.0 if name == "12P" else 3.0])
-        return FITS.IdentifiedModel(simulation, agreed, agreed, 1.0, values, bounds)
+        return fits.IdentifiedModel(simulation, agreed, agreed, 1.0, values, bounds)
 
-    hits = DATA.PathHits(SimpleNamespace(frfs=()), path)
-    designs = [FITS.Design("", np.arange(9), 16, 80.0), FITS.Design("", np.arange(9), 17, 82.0)]
-    return PICTURES.Run(hits, {name: model(name) for name in off}, designs)
+    hits = data.PathHits(SimpleNamespace(frfs=()), path)
+    designs = [fits.Design("", np.arange(9), 16, 80.0), fits.Design("", np.arange(9), 17, 82.0)]
+    return pictures.Run(hits, {name: model(name) for name in off}, designs)
 
 
 def test_figures_of_birk_say_which_model_is_better():

@@ -17,10 +17,10 @@ from planner.studies.report import Paper, Report, StudyAnswer, Table
 
 AUTHORS = {"busch2022": "Busch, Zaeh", "lei2023": "Lei, Hou, Ding"}
 RULES = (
-    ClaimRule.of("It is <so>.", Bound("a", above=0.4)),
-    ClaimRule.of("It is not.", Bound("b", above=0.4, full=0.5)),
-    ClaimRule.of("Ours is better.", Bound("c", below=1, full=0.5), ours=True),
-    ClaimRule.of("Nobody knows.", Bound("d", above=0)),
+    ClaimRule("It is <so>.", Bound("a", above=0.4)),
+    ClaimRule("It is not.", Bound("b", above=0.4, full=0.5)),
+    ClaimRule("Ours is better.", Bound("c", below=1, full=0.5), ours=True),
+    ClaimRule("Nobody knows.", Bound("d", above=0)),
 )
 
 

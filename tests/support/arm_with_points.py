@@ -42,8 +42,6 @@ def _urdf() -> str:
 
 def write_arm(folder: Path, more: str = "") -> Path:
     """robot.toml of the arm, beside its URDF; `more` is added to its points."""
-    folder.mkdir(parents=True, exist_ok=True)
-    folder.joinpath("arm.urdf").write_text(_urdf())
     lines = descriptions.head("arm", "arm.urdf", "tcp", "sensor", BAND_HZ)
     for i, (axis, k) in enumerate(zip(AXES, STIFFNESS, strict=True), 1):
         along = [float(axis == a) for a in "xyz"]
@@ -51,10 +49,8 @@ def write_arm(folder: Path, more: str = "") -> Path:
     for name, link, place, turned in POINTS:
         lines.append(f'[[point]]\nname = "{name}"\nlink = "{link}"\nposition_m = {list(place)}')
         lines.append(f"rpy_deg = {list(turned)}\nnode = {NODES[name]}")
-    lines.append(f'[[point]]\nname = "sensor"\nnode = {NODES["sensor"]}\n')
-    path = folder / "robot.toml"
-    path.write_text("\n".join(lines) + more)
-    return path
+    lines.append(f'[[point]]\nname = "sensor"\nnode = {NODES["sensor"]}')
+    return descriptions.write_robot(folder, "arm.urdf", _urdf(), [*lines, more])
 
 
 def poses(count: int, seed: int = 1) -> np.ndarray:

@@ -12,11 +12,13 @@ def edited(lines: list[str], row: int, column: int, cell: str) -> list[str]:
     return [*lines[:row], ",".join(cells), *lines[row + 1 :]]
 
 
+def text(rows: list[str]) -> bytes:
+    """A table's lines as a file."""
+    return ("\n".join(rows) + "\n").encode()
+
+
 def table_mutations(lines: list[str]) -> dict[str, bytes]:
     """Mutations that both tables share; columns 1…6 are joints, of which the ends are tried."""
-
-    def text(rows: list[str]) -> bytes:
-        return ("\n".join(rows) + "\n").encode()
 
     whole = text(lines)
     found = {
@@ -48,9 +50,6 @@ def table_mutations(lines: list[str]) -> dict[str, bytes]:
 def recording_mutations(lines: list[str]) -> dict[str, bytes]:
     """Mutations of recordings.csv alone."""
     last = len(lines[0].split(",")) - 1
-
-    def text(rows: list[str]) -> bytes:
-        return ("\n".join(rows) + "\n").encode()
 
     return {
         "hit axis w": text(edited(lines, 1, last - 2, "+w")),

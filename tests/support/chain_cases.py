@@ -16,8 +16,8 @@ from planner.campaign.chain_mismatch import LOG_ODDS, HitSums, hit_sums, most_pr
 from planner.campaign.config import load_campaign_config
 from planner.campaign.imported_files import sort_paths
 from planner.dataset.measure import MeasuredPose
-from tests.support.everyday_campaigns import Cell
-from tests.support.faulty_robots import KINDS, ROBOTS, lacking
+from tests.support.everyday_campaigns import Cell, decisions, in_turn
+from tests.support.faulty_robots import ROBOTS, lacking
 
 FACTORS = {
     "× 1000": 1e3,
@@ -42,16 +42,12 @@ class Struck:
 
 def struck(folder: Path, seed: int, poses: int) -> Struck:
     """A robot of those for everyday campaigns in turn, hit at poses of its workspace."""
-    name, kind = [*ROBOTS][seed % len(ROBOTS)], KINDS[(seed + seed // len(ROBOTS)) % len(KINDS)]
+    name, kind = in_turn(seed)
     rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
     robot = ROBOTS[name](folder, rng)
     injected, _ = lacking(kind, robot, rng)
     true = Cell.of(robot, injected, rng)
-    config = folder / "campaign.toml"
-    config.write_text(
-        f"[workspace]\n{robot.workspace}\n[modes]\ncount = 3\nband_hz = {list(robot.band_hz)}\n"
-        f"[acquisition]\ncandidates = 30\n"
-    )
+    config = decisions(robot, folder / "campaign.toml", 3, 30)
     cell = CampaignCell.load(robot.toml, load_campaign_config(config))
     assert cell.simulation is not None
     joints = cell.robot.joints

@@ -90,6 +90,10 @@ class Cell:
     def state(self) -> CampaignState:
         return fold(Journal(self.log).entries)
 
+    @property
+    def played(self) -> bool:
+        return self.log.exists() and len(self.state().used) >= ENOUGH
+
     def command(self, rng: np.random.Generator | None = None) -> Command:
         """What a person might do next; without chance, what leads to the next measured pose."""
         if not self.log.exists():
@@ -167,7 +171,7 @@ def given_again(cell: Cell, command: Command, log: Path) -> list[str]:
 
 def kill(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     """One command, killed; half of the time it is given again."""
-    if cell.log.exists() and len(cell.state().used) >= ENOUGH:
+    if cell.played:
         replayed = forked(doing(["replay", str(cell.campaign)]), log)
         shutil.rmtree(cell.campaign)
         if replayed.code or not replayed.answer["reproduced"]:
@@ -188,7 +192,7 @@ def kill(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
 
 def interrupt(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     """One command, stopped as by Ctrl-C, then given again."""
-    if cell.log.exists() and len(cell.state().used) >= ENOUGH:
+    if cell.played:
         shutil.rmtree(cell.campaign)
     command, before = cell.command(rng), entries(cell)
     change = int(np.exp(rng.uniform(0, np.log(MOST_CHANGES))))
@@ -232,7 +236,7 @@ def others(cell: Cell) -> list[Command]:
 def starve(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     """One command on a disk that is nearly full, or read-only; then again with room."""
     disk, filler = cell.root, cell.root / "filler"
-    if cell.log.exists() and len(cell.state().used) >= ENOUGH:
+    if cell.played:
         shutil.rmtree(cell.campaign)
         shutil.rmtree(cell.root / "exports")  # which would fill the disk in the end
     shutil.rmtree(cell.root / "out", ignore_errors=True)

@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from shutil import rmtree
 
+import msgspec
 import numpy as np
 
 from planner.campaign.campaign import Campaign
@@ -102,12 +103,8 @@ class Score:
         off = found / true - 1
         learned = model.low.identified_robot or model.low.rejected
         inside, visit = (float(np.mean(np.abs(found - true) <= 1.96 * s)) for s in (sd, visit_sd))
-        return cls(
-            100 * float(np.sqrt(np.mean(off**2))),
-            inside,
-            visit,
-            learned.identified.misfit if learned else None,
-        )
+        misfit = learned.identified.misfit if learned else None
+        return cls(100 * float(np.sqrt(np.mean(off**2))), inside, visit, misfit)
 
 
 @dataclass(frozen=True)
@@ -141,7 +138,8 @@ def play(name: str, kind: str, seed: int, folder: Path) -> Played:
     kept = Store(folder / "models")
 
     def begun(use: str, modes: int) -> Campaign:
-        path = _decisions(robot, folder, use, modes)
+        more = f"[fidelity]\nsimulation = '{use}'\n"
+        path = decisions(robot, folder / f"{use}.toml", modes, CANDIDATES, more)
         return Campaign(Campaign.new(path.with_suffix(""), robot.toml, path).directory, kept)
 
     first = np.deg2rad(begun("frozen", MOST_MODES).next()[0].joints_deg)
@@ -176,32 +174,29 @@ def _unseen(campaign: Campaign, rng: np.random.Generator) -> np.ndarray:
     return rng.permutation(np.flatnonzero(free))[:UNSEEN]
 
 
-def _decisions(robot: Robot, folder: Path, simulation: str, modes: int) -> Path:
-    path = folder / f"{simulation}.toml"
+def decisions(robot: Robot, path: Path, modes: int, candidates: int, more: str = "") -> Path:
+    """A robot's campaign.toml."""
     path.write_text(
         f"[workspace]\n{robot.workspace}\n[modes]\ncount = {modes}\n"
-        f"band_hz = {list(robot.band_hz)}\n[fidelity]\nsimulation = '{simulation}'\n"
-        f"[acquisition]\ncandidates = {CANDIDATES}\n"
+        f"band_hz = {list(robot.band_hz)}\n[acquisition]\ncandidates = {candidates}\n{more}"
     )
     return path
 
 
+def in_turn(number: int) -> tuple[str, str]:
+    """A robot and what its simulation lacks."""
+    names = list(ROBOTS)
+    return names[number % len(names)], KINDS[(number + number // len(names)) % len(KINDS)]
+
+
 def campaigns(folder: Path, first_seed: int, wanted: int) -> Iterator[Played]:
     """As many campaigns, robots and kinds in turn; what the folder holds is not done again."""
-    names = list(ROBOTS)
     for number in range(wanted):
-        name = names[number % len(names)]
-        kind = KINDS[(number + number // len(names)) % len(KINDS)]
+        name, kind = in_turn(number)
         path = folder / f"{first_seed + number}.json"
         if not path.is_file():
             played = play(name, kind, first_seed + number, folder / str(first_seed + number))
             part = path.with_suffix(".part")
             part.write_text(json.dumps(asdict(played)))
             part.replace(path)
-        yield _read(path)
-
-
-def _read(path: Path) -> Played:
-    found = json.loads(path.read_text())
-    both = {which: tuple(Score(**score) for score in found[which]) for which in ("own", "peer")}
-    return Played(**{**found, **both})
+        yield msgspec.json.decode(path.read_bytes(), type=Played)

@@ -84,32 +84,31 @@ ROBOTS: dict[str, Callable[[Path, np.random.Generator], Robot]] = {
 
 def lacking(kind: str, robot: Robot, rng: np.random.Generator) -> tuple[InjectedFaults, float]:
     """What the simulation lacks, beside the scatter of springs and inertias, and its size."""
-    injected, size = (
-        InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31)))),
-        log_uniform(rng, *SIZES),
-    )
+    injected, size = scattered(rng), log_uniform(rng, *SIZES)
     return added(injected, kind, size, robot, rng), size
+
+
+def scattered(rng: np.random.Generator) -> InjectedFaults:
+    """Nothing but the scatter of springs and inertias."""
+    return InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
 
 
 def added(
     injected: InjectedFaults, kind: str, size: float, robot: Robot, rng: np.random.Generator
 ) -> InjectedFaults:
     """One thing more that the simulation lacks."""
-    table = tomllib.loads(robot.toml.read_text())
-    root = ElementTree.parse(robot.toml.parent / table["urdf"]).getroot()
+    root = urdf_of(robot.toml)[1]
     truth = load_truth(robot.toml, injected.deviation)
-    k = np.array([s.stiffness for s in truth.springs])
-    own = {name: float(truth.own(name) @ k) for name in truth.joint_names}
     damping_s = float(np.median([s.damping / s.stiffness for s in truth.springs]))
     links = links_moved(root, truth.joint_names)
     if kind == "soft base":
-        first = own[truth.joint_names[1]] * log_uniform(rng, 0.7, 4.0) / size
+        first = truth.stiffness(truth.joint_names[1]) * log_uniform(rng, 0.7, 4.0) / size
         tilts = first, first * log_uniform(rng, 0.7, 1.4)
         injected = deviate(injected, extra=soft_floor(*tilts, damping_s))
     elif kind == "bending link":
         able = [n for n, link in links.items() if np.linalg.norm(beam_end(link, root)) > BENDS_M]
         joint = str(rng.choice(able[: len(able) - 1] or able))
-        first = own[joint] * log_uniform(rng, 0.4, 2.0) / size
+        first = truth.stiffness(joint) * log_uniform(rng, 0.4, 2.0) / size
         bending = first, first * log_uniform(rng, 0.7, 1.4)
         twist = first * log_uniform(rng, 0.5, 3.0)
         injected = deviate(injected, beams=[BentLink(links[joint], bending, twist, damping_s)])
@@ -124,6 +123,12 @@ def added(
         )  # fmt: skip
         injected = deviate(injected, resonators=[small])
     return injected
+
+
+def urdf_of(robot_toml: Path) -> tuple[Path, ElementTree.Element]:
+    """Where the URDF of a robot.toml lies, and its root."""
+    path = robot_toml.parent / tomllib.loads(robot_toml.read_text())["urdf"]
+    return path, ElementTree.parse(path).getroot()
 
 
 def mass_that_moves(root: ElementTree.Element) -> float:

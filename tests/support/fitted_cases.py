@@ -22,7 +22,7 @@ from planner.fit.structure import RobotPrior
 from planner.frf import metrics
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
-from planner.proof.cases import SCATTER
+from planner.proof import descriptions
 from planner.proof.deviation import AttachedMass, Spring
 from planner.proof.fault_injection import InjectedFaults, LoadChange
 from planner.proof.load import load_truth
@@ -31,7 +31,15 @@ from planner.proof.model import Truth
 from planner.proof.scene import deviate, log_uniform, some_direction, triple
 from planner.robot.robot import Robot
 from tests.support.counted_modes import true_modes
-from tests.support.faulty_robots import ROBOTS, added, known, links_moved, mass_that_moves
+from tests.support.faulty_robots import (
+    ROBOTS,
+    added,
+    known,
+    links_moved,
+    mass_that_moves,
+    scattered,
+    urdf_of,
+)
 from tests.support.faulty_robots import Robot as Arm
 from tests.support.struck_poses import struck_poses
 
@@ -81,11 +89,11 @@ class Case:
     @cached_property
     def heavier(self) -> tuple[MeasuredPose, ...]:
         """The same hits with a tool that is heavier by HEAVIER of all that moves."""
-        urdf = ElementTree.parse(self.toml.parent / tomllib.loads(self.toml.read_text())["urdf"])
-        flange = list(links_moved(urdf.getroot(), self.truth.joint_names).values())[-1]
-        [link] = [e for e in urdf.getroot().findall("link") if e.get("name") == flange]
+        _, root = urdf_of(self.toml)
+        flange = list(links_moved(root, self.truth.joint_names).values())[-1]
+        [link] = [e for e in root.findall("link") if e.get("name") == flange]
         mass = sum(float(m.get("value", 0)) for m in link.iterfind("inertial/mass"))
-        more = HEAVIER * mass_that_moves(urdf.getroot()) / mass
+        more = HEAVIER * mass_that_moves(root) / mass
         return self.struck(LoadChange(flange, 1 + more, 0.0))
 
     def posterior(self) -> RobotPosterior:
@@ -99,7 +107,7 @@ class Case:
 def one_thing(name: str, kind: str, seed: int, folder: Path) -> Case:
     """One of `faulty_robots.KINDS`, large."""
     rng, arm = drawn_arm(name, seed, folder)
-    injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
+    injected = scattered(rng)
     injected = added(injected, kind, 1.0, arm, rng)
     return _measured(arm, injected, (kind,), EVERYDAY, rng)
 
@@ -107,7 +115,7 @@ def one_thing(name: str, kind: str, seed: int, folder: Path) -> Case:
 def everyday(name: str, seed: int, folder: Path) -> Case:
     """A soft base, a link that bends and a hose at once, each of a size of its own."""
     rng, arm = drawn_arm(name, seed, folder)
-    injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
+    injected = scattered(rng)
     kinds = "soft base", "bending link", "hose"
     for kind in kinds:
         injected = added(injected, kind, log_uniform(rng, 0.2, 1.0), arm, rng)
@@ -118,7 +126,7 @@ def harder(name: str, seed: int, folder: Path) -> Case:
     """A soft floor, two bearings and a hose, a spindle 3 % heavier, springs that scatter by 0.5 %
     from visit to visit, hits 3° and 5 mm off."""
     rng, arm = drawn_arm(name, seed, folder)
-    injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
+    injected = scattered(rng)
     for kind in ("soft base", "hose"):
         injected = added(injected, kind, log_uniform(rng, 0.5, 1.0), arm, rng)
     truth = load_truth(arm.toml, injected.deviation)
@@ -137,11 +145,11 @@ def forgotten(name: str, seed: int, folder: Path) -> Case:
     """A tool that robot.toml lacks, 2 to 20 % of what moves, three masses on a rod at the flange;
     every other robot stands on a soft base."""
     rng, arm = drawn_arm(name, seed, folder)
-    injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
-    urdf = ElementTree.parse(arm.toml.parent / tomllib.loads(arm.toml.read_text())["urdf"])
+    injected = scattered(rng)
+    _, root = urdf_of(arm.toml)
     truth = load_truth(arm.toml, injected.deviation)
-    flange = list(links_moved(urdf.getroot(), truth.joint_names).values())[-1]
-    kg = mass_that_moves(urdf.getroot()) * log_uniform(rng, 0.02, 0.2)
+    flange = list(links_moved(root, truth.joint_names).values())[-1]
+    kg = mass_that_moves(root) * log_uniform(rng, 0.02, 0.2)
     middle = some_direction(rng) * rng.uniform(0.02, 0.25)
     rod = some_direction(rng) * log_uniform(rng, 0.05, 0.25)
     tool = [
@@ -150,9 +158,8 @@ def forgotten(name: str, seed: int, folder: Path) -> Case:
     ]
     injected, concealed = deviate(injected, added=tool), ("tool",)
     if rng.random() < 0.5:
-        injected, concealed = added(injected, "soft base", log_uniform(rng, 0.2, 1.0), arm, rng), (
-            "tool", "soft base",
-        )  # fmt: skip
+        injected = added(injected, "soft base", log_uniform(rng, 0.2, 1.0), arm, rng)
+        concealed = "tool", "soft base"
     return _measured(arm, injected, concealed, EVERYDAY, rng)
 
 
@@ -168,15 +175,14 @@ def on_a_block(name: str, seed: int, folder: Path) -> tuple[Case, Block]:
     """On a block or pedestal of 0.2 to 3 times what moves, which rocks and shifts about its foot at
     half to twice the robot's first frequency; a link bends, too."""
     rng, arm = drawn_arm(name, seed, folder)
-    injected = InjectedFaults(replace(SCATTER, seed=int(rng.integers(2**31))))
+    injected = scattered(rng)
     injected = added(injected, "bending link", log_uniform(rng, 0.5, 1.0), arm, rng)
-    table = tomllib.loads(arm.toml.read_text())
-    root = ElementTree.parse(arm.toml.parent / table["urdf"]).getroot()
+    path, root = urdf_of(arm.toml)
     moving = mass_that_moves(root)
     block = Block(moving * log_uniform(rng, 0.2, 3.0), float(rng.uniform(0.3, 1.0)))
     shutil.copytree(arm.toml.parent, folder / "stands")
     _stand(root, block)
-    ElementTree.ElementTree(root).write(folder / "stands" / table["urdf"])
+    ElementTree.ElementTree(root).write(folder / "stands" / path.name)
     stands = folder / "stands" / arm.toml.name
     truth = load_truth(stands, injected.deviation)
     middle = np.mean([truth.lower_rad, truth.upper_rad], axis=0)
@@ -197,29 +203,19 @@ def _stand(root: ElementTree.Element, block: Block) -> None:
     """Put a robot's URDF on a block whose lower face is the world's floor."""
     carried = {child.get("link") for child in root.iterfind("joint/child")}
     [base] = [e.get("name") for e in root.findall("link") if e.get("name") not in carried]
-    moment = block.mass_kg * block.side_m**2 / 6
-    inertial = (
-        f'<inertial><origin xyz="0 0 {block.side_m / 2}"/><mass value="{block.mass_kg}"/>'
-        f'<inertia ixx="{moment}" iyy="{moment}" izz="{moment}" ixy="0" ixz="0" iyz="0"/>'
-        "</inertial>"
-    )
-    root.insert(0, ElementTree.fromstring(f'<link name="foot">{inertial}</link>'))
-    root.append(
-        ElementTree.fromstring(
-            f'<joint name="stands" type="fixed"><origin xyz="0 0 {block.side_m}"/>'
-            f'<parent link="foot"/><child link="{base}"/></joint>'
-        )
-    )
+    side, moments = block.side_m, (block.mass_kg * block.side_m**2 / 6,) * 3
+    inertial = descriptions.inertial(block.mass_kg, (0, 0, side / 2), moments)
+    root.insert(0, ElementTree.fromstring(descriptions.link("foot", inertial)))
+    root.append(ElementTree.fromstring(descriptions.fixed(str(base), "foot", (0, 0, side))))
 
 
 def _bearings(truth: Truth) -> list[tuple[str, np.ndarray, float]]:
     """Joints 2 to 4, axes about which nothing gives yet, and the stiffness about their own."""
-    k = np.array([s.stiffness for s in truth.springs])
     found = []
     for joint in truth.joint_names[1:4]:
         axes = np.array([s.axis for s in truth.springs if s.joint == joint])
         free = [a for a in np.eye(3) if np.all(np.abs(axes @ a) < 0.5)]
-        found += [(joint, axis, float(truth.own(joint) @ k)) for axis in free]
+        found += [(joint, axis, truth.stiffness(joint)) for axis in free]
     return found
 
 

@@ -71,14 +71,13 @@ class Arm:
 def make_generated_arm(folder: Path, seed: int, joints: int, modes: int) -> Arm:
     """Write an arm's robot and campaign folder; its springs are off by some 15 %."""
     rng = np.random.default_rng(seed)
-    (folder / "robot").mkdir(parents=True)
-    (folder / "robot" / "arm.urdf").write_text(_urdf(rng, joints))
+    urdf = _urdf(rng, joints)
     lines = descriptions.head("generated", "arm.urdf", "tcp", "tcp", BAND_HZ)
     for number, axis in enumerate(AXES[:joints], 1):
         stiffness = log_uniform(rng, 2e4, 8e4) / (5 if number > 3 else 1)
         lines.append(descriptions.compliance(f"joint_{number}", axis, stiffness, 4e-4))
-    robot, campaign = folder / "robot" / "robot.toml", folder / "campaign.toml"
-    robot.write_text("\n".join(lines) + "\n")
+    robot = descriptions.write_robot(folder / "robot", "arm.urdf", urdf, lines)
+    campaign = folder / "campaign.toml"
     more = "candidates = 60\n"
     campaign.write_text(descriptions.campaign(BOX_DEG[:joints], modes, BAND_HZ, more))
     off = Deviation(seed=seed + 1, stiffness=0.15, damping=0.1, inertia=0.04, com_m=0.003)

@@ -17,7 +17,11 @@ NAMES = ("force_n", *(f"acceleration_{axis}_m_s2" for axis in "xyz"))
 
 def columns(hit: Hit | SimulatedHit, rate_hz: float, every: int = 1) -> Columns:
     """A hit of the tool at a sampling rate; of its samples one of `every` so many."""
-    samples = np.vstack([hit.force_n, hit.acceleration_m_s2])[:, ::every]
+    return named(np.vstack([hit.force_n, hit.acceleration_m_s2])[:, ::every], rate_hz)
+
+
+def named(samples: np.ndarray, rate_hz: float) -> Columns:
+    """Force and accelerations (4, n) with their times."""
     time_s = np.arange(samples.shape[1]) / rate_hz
     return {"time_s": time_s, **dict(zip(NAMES, samples, strict=True))}
 

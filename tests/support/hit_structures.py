@@ -21,13 +21,16 @@ def hit_frfs(
     poles, shapes = structure.poles()
     residues = np.moveaxis(shapes[:, None] * shapes[references], -1, 0)
     h, _ = noisy(accelerance(frequency_hz, poles, residues), NOISE, rng)
-    return FrfMatrix(
-        frequency_hz,
-        tuple(dof_of(structure, i) for i in range(len(structure.nodes))),
-        tuple(dof_of(structure, i) for i in references),
-        h,
-        True,
-    )
+    return matrix_of(structure, references, frequency_hz, h)
+
+
+def matrix_of(
+    structure: Structure, references: list[int], frequency_hz: np.ndarray, h: np.ndarray
+) -> FrfMatrix:
+    """FRFs h (points, references, F) with the names of their degrees of freedom."""
+    felt = tuple(dof_of(structure, i) for i in range(len(structure.nodes)))
+    hit = tuple(dof_of(structure, i) for i in references)
+    return FrfMatrix(frequency_hz, felt, hit, h, True)
 
 
 def dof_of(structure: Structure, index: int) -> Dof:

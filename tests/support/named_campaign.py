@@ -11,7 +11,7 @@ SCRIPT, DOLLAR = "<script>alert(1)</script>", "P$2$ & co"
 LAST_REPEAT = 2  # two hits an axis are enough
 
 
-def named_campaign(folder: Path, simulation: str = "frozen") -> Campaign:
+def named_campaign(folder: Path) -> Campaign:
     """Two measured poses with unpleasant names, and a refused recording."""
     source = shipped(NAME)
     with (source / "recordings" / "recordings.csv").open() as file:
@@ -30,14 +30,10 @@ def named_campaign(folder: Path, simulation: str = "frozen") -> Campaign:
         writer.writeheader()
         writer.writerows([*chosen, broken])
     plan = folder / "campaign.toml"
-    plan.write_text(
-        (source / "campaign.toml").read_text()
-        + f'[fidelity]\nsimulation = "{simulation}" # <i>frozen</i>\n'
-    )
-    text = plan.read_text().replace("count = 4", "count = 2").replace(
-        'name = "integrated_variance"', 'name = "integrated_variance"\ncandidates = 40'
-    )  # fmt: skip
-    plan.write_text(text)
+    text = (source / "campaign.toml").read_text().replace("count = 4", "count = 2")
+    name = 'name = "integrated_variance"'
+    text = text.replace(name, f"{name}\ncandidates = 40")
+    plan.write_text(f'{text}[fidelity]\nsimulation = "frozen" # <i>frozen</i>\n')
     campaign = Campaign.new(folder / "cell", source / "robot" / "robot.toml", plan)
     campaign.next()
     campaign.import_paths((export,))

@@ -28,14 +28,10 @@ def urdf() -> str:
 
 def make_plain_arm(folder: Path, softer: float = 1.0, damping_s: float = 4e-4) -> Path:
     """Write the robot folder, its springs that much softer; returns robot.toml."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "plain.urdf").write_text(urdf())
     lines = descriptions.head("plain arm", "plain.urdf", "tcp", "tcp", BAND_HZ)
     for i, (axis, k) in enumerate(zip(AXES, STIFFNESS, strict=True), 1):
         lines.append(descriptions.compliance(f"joint_{i}", axis, k / softer, damping_s))
-    path = folder / "robot.toml"
-    path.write_text("\n".join(lines) + "\n")
-    return path
+    return descriptions.write_robot(folder, "plain.urdf", urdf(), lines)
 
 
 def plain_campaign(path: Path, acquisition: str = "integrated_variance") -> Path:

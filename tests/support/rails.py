@@ -67,15 +67,11 @@ def make_sliding(
     folder: Path, axes: tuple[Axis, ...] = RAIL_ARM, tip: Place = (0.4, 0.04, 0.05), said: str = ""
 ) -> Path:
     """Write the robot folder; returns robot.toml."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "robot.urdf").write_text(urdf(axes, tip))
     lines = descriptions.head("sliding", "robot.urdf", "tcp", "tcp", (3.0, 60.0), said)
     for one in axes:
         axis, slides = [float(v) for v in one.axis], one.kind == SLIDES
         lines.append(descriptions.compliance(one.name, axis, one.stiffness, 5e-4, slides))
-    path = folder / "robot.toml"
-    path.write_text("\n".join(lines) + "\n")
-    return path
+    return descriptions.write_robot(folder, "robot.urdf", urdf(axes, tip), lines)
 
 
 def sliding_campaign(path: Path, box: tuple[tuple[float, float], ...] = RAIL_BOX) -> Path:

@@ -43,8 +43,6 @@ def urdf() -> str:
 
 def make_arm(directory: Path, transverse: bool = False) -> Path:
     """Write the robot folder; returns the path of robot.toml. 6 elastic rotations, or 12."""
-    directory.mkdir(parents=True, exist_ok=True)
-    (directory / "arm.urdf").write_text(urdf())
     gravity = "gravity = [0.0, 0.0, -9.81]"
     lines = descriptions.head("small arm", "arm.urdf", "tool", "accelerometer", BAND_HZ, gravity)
     for i, (axis, k) in enumerate(zip(AXES, STIFFNESS, strict=True)):
@@ -52,9 +50,7 @@ def make_arm(directory: Path, transverse: bool = False) -> Path:
         springs = [(tuple(map(abs, axis)), k), (across, 4 * k)][: 1 + transverse]
         lines += [descriptions.compliance(f"joint_a{i + 1}", a, k, 3.0e-4) for a, k in springs]
     lines += ["[[obstacle]]", 'name = "floor"', "center_m = [0, 0, -0.06]", "size_m = [4, 4, 0.1]"]
-    path = directory / "robot.toml"
-    path.write_text("\n".join(lines) + "\n")
-    return path
+    return descriptions.write_robot(directory, "arm.urdf", urdf(), lines)
 
 
 def campaign_text(count: int = 4) -> str:

@@ -18,7 +18,7 @@ from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
-from tests.support.hit_structures import dof_of, unit_mass_shapes
+from tests.support.hit_structures import dof_of, matrix_of, unit_mass_shapes
 from tests.support.modal_systems import noisy
 from tests.support.structures import Structure, plate
 
@@ -66,17 +66,8 @@ def rough_set(seed: int, kind: str | None = None, **changes: float) -> RoughSet:
     inside = (hz > low) & (hz < high)
     true = shapes[:, inside]
     part = np.max(np.abs(true[references]), axis=0) / np.max(np.abs(true), axis=0)
-    return RoughSet(
-        kind,
-        structure,
-        references,
-        matrix,
-        (low, high),
-        poles[inside],
-        true,
-        part > 0.1,
-        drawn["drift"],
-    )
+    truth = poles[inside], true, part > 0.1, drawn["drift"]
+    return RoughSet(kind, structure, references, matrix, (low, high), *truth)
 
 
 def _references(rng: np.random.Generator, shapes: np.ndarray) -> list[int]:
@@ -105,9 +96,7 @@ def _struck(
     gone = rng.random(h.shape[:2]) < missing
     gone[references, np.arange(len(references))] = False
     h[gone] = np.nan
-    felt = tuple(dof_of(structure, o) for o in range(len(structure.nodes)))
-    hit = tuple(dof_of(structure, i) for i in references)
-    return FrfMatrix(frequency_hz, felt, hit, h, True)
+    return matrix_of(structure, references, frequency_hz, h)
 
 
 def _damped(structure: Structure, rng: np.random.Generator) -> Structure:

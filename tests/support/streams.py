@@ -12,7 +12,7 @@ from planner.proof.recordings import uff_channel, write_sets
 from planner.recording.hits import hits_from
 from planner.recording.read import read
 from tests.support import hit_files
-from tests.support.hit_files import NAMES
+from tests.support.hit_files import named
 
 RATE_HZ, FINER = 1024, 8
 MODES = (12.0, 0.03), (23.0, 0.025), (41.0, 0.02)  # Hz, damping ratio
@@ -60,11 +60,6 @@ def joined(folder: Path, axis: str) -> np.ndarray:
     return np.hstack(parts)
 
 
-def columns(samples: np.ndarray) -> dict[str, np.ndarray]:
-    time_s = np.arange(samples.shape[1]) / RATE_HZ
-    return {"time_s": time_s, **dict(zip(NAMES, samples, strict=True))}
-
-
 def write_uff(path: Path, samples: np.ndarray, axis: str) -> None:
     along = ("xyz".index(axis[1]) + 1) * (-1 if axis[0] == "-" else 1)
     kinds = zip(samples, (along, 1, 2, 3), (True, *3 * (False,)), strict=True)
@@ -102,6 +97,6 @@ def write_scales(path: Path, axis: str) -> None:
 
 
 WRITERS: dict[str, Callable[[Path, np.ndarray, str], object]] = {
-    suffix: lambda path, samples, axis, write=write: write(path, columns(samples), axis)
+    suffix: lambda path, samples, axis, write=write: write(path, named(samples, RATE_HZ), axis)
     for suffix, write in hit_files.WRITERS.items()
 } | {".uff": write_uff, ".wav": write_wav}

@@ -11,6 +11,7 @@ from tests.support.structures import Structure
 
 RATE_HZ, SAMPLES, LONG = 1024.0, 1024, 16
 PULSE_S, BEFORE_S, PEAK_N = 0.004, 0.1, 200.0
+NOISE = 2e-3  # of the responses, by their rms
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +30,11 @@ def tap(
     hit: int,
     felt: tuple[int, ...],
     rng: np.random.Generator,
-    noise: float = 2e-3,
     second: float = 0.0,
 ) -> Tap:
     """Records of 1 s that end while the structure rings.
 
-    Noise by the responses' rms (5e-4 of the peak on the force); `second`: size of a second pulse
-    30 ms later, relative.
+    Noise on the force is 5e-4 of its peak; `second`: relative size of a second pulse 30 ms later.
     """
     n = SAMPLES * LONG
     t = np.arange(n) / RATE_HZ
@@ -48,7 +47,7 @@ def tap(
     h = np.zeros((len(felt), hz.size), complex)
     h[:, 1:] = structure.accelerance(hz[1:], list(felt), [hit])[:, 0]
     a = np.fft.irfft(h * np.fft.rfft(force), n, axis=1)[:, :SAMPLES]
-    a = a + noise * np.std(a, axis=1, keepdims=True) * rng.standard_normal(a.shape)
+    a = a + NOISE * np.std(a, axis=1, keepdims=True) * rng.standard_normal(a.shape)
     return Tap(structure, hit, felt, force[:SAMPLES] + 0.1 * rng.standard_normal(SAMPLES), a)
 
 

@@ -45,21 +45,15 @@ def measure_all(
     band_hz: tuple[float, float],
     count: int,
     reference: np.ndarray,
-    hammer: Hammer | None = None,
-    seed: int = 0,
 ) -> Measured:
     """Hit every pose (n, dof), identify it, and say which mode is which true family."""
-    hammer = hammer or Hammer()
     place = Families(reference, poses, lambda q: undamped(truth, q)).places(poses)
-    found, true_hz, partner = (
-        [],
-        np.full((len(poses), count), np.nan),
-        np.full((len(poses), count), -1),
-    )
+    true_hz, partner = np.full((len(poses), count), np.nan), np.full((len(poses), count), -1)
+    found = []
     for i, q in enumerate(poses):
-        rng = np.random.default_rng([seed, i])
+        rng = np.random.default_rng([0, i])
         try:
-            model = estimate_modes(estimate(hits_at(truth, q, hammer, rng), band_hz), band_hz)
+            model = estimate_modes(estimate(hits_at(truth, q, Hammer(), rng), band_hz), band_hz)
             modes = model.modes
         except RefusedError:
             modes = ()
