@@ -129,7 +129,7 @@ def measured(
         for k, mode in enumerate(row[:MODES]):
             if mode is not None:
                 natural[i, k] = mode.frequency_hz, mode.damping_ratio
-                right[i, k], left[i, k], _ = rank_one(mode.residue)
+                right[i, k], left[i, k] = rank_one(mode.residue)
     return _scaled(natural, left, right)
 
 
