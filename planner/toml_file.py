@@ -4,7 +4,7 @@ import difflib
 import math
 import re
 import typing
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -49,9 +49,9 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
         raise InputError(
             f"{path} is not a valid {name} (a number has thousands of digits); correct it."
         ) from None
-    entry, value = _not_finite(msgspec.to_builtins(found), "")
-    if entry:
-        raise InputError(f"{path}: {entry} is {value}; it must be a finite number.")
+    for steps, value in _numbers(msgspec.to_builtins(found)):
+        if not math.isfinite(value):
+            raise InputError(f"{path}: {_entry(steps)} is {value}; it must be a finite number.")
     return found
 
 
@@ -70,7 +70,7 @@ def wrong_entry(path: Path, name: str, text: str, kind: type, fault: str) -> str
     unknown = re.search(r"unknown field `([^`]+)`", what)
     if unknown:
         table = _entry(steps, table=True)
-        known = _fields(kind, steps)
+        known = list(_hints(kind, steps))
         near = difflib.get_close_matches(unknown[1], known, 1)
         meant = f"; entries of {'this table' if table else f'a {name}'} are {', '.join(known)}."
         meant = f'; "{near[0]}" may be meant.' if near else meant
@@ -94,9 +94,10 @@ def _entry(steps: Sequence[str], table: bool = False) -> str:
     names = [i for i, step in enumerate(steps) if not _is_place(step)]
     said = []
     for k, i in enumerate(names):
-        listed = i + 1 < len(steps) and _is_place(steps[i + 1])
+        place = steps[i + 1] if i + 1 < len(steps) and _is_place(steps[i + 1]) else ""
         if k + 1 < len(names) or table:
-            said.append(f"[[{steps[i]}]]" if listed else f"[{steps[i]}]")
+            number = f" number {int(place) + 1}" if place.isdecimal() else ""
+            said.append(f"[[{steps[i]}]]{number}" if place else f"[{steps[i]}]")
         else:
             said.append(steps[i])
     return " ".join(said)
@@ -105,11 +106,6 @@ def _entry(steps: Sequence[str], table: bool = False) -> str:
 def _is_place(step: str) -> bool:
     """Whether a step is a place in a list, which msgspec does not always tell."""
     return step == "..." or step.isdecimal()
-
-
-def _fields(kind: Any, steps: Sequence[str]) -> list[str]:
-    """Names of the entries of a table, as far as they are known."""
-    return list(_hints(kind, steps))
 
 
 def _choices(kind: Any, steps: Sequence[str]) -> list[str]:
@@ -147,24 +143,11 @@ def _given(text: str, steps: Sequence[str]) -> str:
     return said if len(said) <= LONGEST else f"{said[:LONGEST]}…"
 
 
-def _not_finite(value: Any, name: str) -> tuple[str, float]:
-    """The first nan or inf below an entry, which no entry of ours may be, and its name."""
+def _numbers(value: Any, steps: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Every float in builtin values, after the steps that lead to it."""
     if isinstance(value, float):
-        return ("", 0.0) if math.isfinite(value) else (name, value)
-    pairs: list[tuple[str, Any]] = []
-    if isinstance(value, dict):
-        for key, item in value.items():
-            if isinstance(item, dict):
-                pairs.append((f"{name} [{key}]".strip(), item))
-            elif isinstance(item, list | tuple) and item and isinstance(item[0], dict):
-                numbered = enumerate(item, 1)
-                pairs += [(f"{name} [[{key}]] number {i}".strip(), one) for i, one in numbered]
-            else:
-                pairs.append((f"{name} {key}".strip(), item))
-    elif isinstance(value, list | tuple):
-        pairs = [(name, item) for item in value]
-    for inner, item in pairs:
-        entry, number = _not_finite(item, inner)
-        if entry:
-            return entry, number
-    return "", 0.0
+        yield steps, value
+    elif isinstance(value, dict | list | tuple):
+        pairs = value.items() if isinstance(value, dict) else enumerate(value)
+        for step, item in pairs:
+            yield from _numbers(item, (*steps, str(step)))
