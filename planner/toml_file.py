@@ -51,7 +51,9 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
         ) from None
     for steps, value in _numbers(msgspec.to_builtins(found)):
         if not math.isfinite(value):
-            raise InputError(f"{path}: {_entry(steps)} is {value}; it must be a finite number.")
+            raise InputError(
+                f"{path}: {_entry(steps, numbered=True)} is {value}; it must be a finite number."
+            )
     return found
 
 
@@ -89,14 +91,17 @@ def wrong_entry(path: Path, name: str, text: str, kind: type, fault: str) -> str
     return f"{path}: {_entry(steps)} must be {' or '.join(kinds)}, not {_given(text, steps)}."
 
 
-def _entry(steps: Sequence[str], table: bool = False) -> str:
-    """Where an entry, or a `table`, stands, as one would look for it: "[modes] count"."""
+def _entry(steps: Sequence[str], table: bool = False, numbered: bool = False) -> str:
+    """Where an entry, or a `table`, stands, as one would look for it: "[modes] count".
+
+    Tables of a list with their number, where `numbered`.
+    """
     names = [i for i, step in enumerate(steps) if not _is_place(step)]
     said = []
     for k, i in enumerate(names):
         place = steps[i + 1] if i + 1 < len(steps) and _is_place(steps[i + 1]) else ""
         if k + 1 < len(names) or table:
-            number = f" number {int(place) + 1}" if place.isdecimal() else ""
+            number = f" number {int(place) + 1}" if numbered and place else ""
             said.append(f"[[{steps[i]}]]{number}" if place else f"[{steps[i]}]")
         else:
             said.append(steps[i])

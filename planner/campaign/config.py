@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 
@@ -159,6 +159,26 @@ def check_config(config: CampaignConfig, path: Path) -> None:
         check_sds(table, f"{path}: [{name}]")
 
 
+# Least and largest values of numbers, by entry.
+LIMITS = {
+    "[cut] speed_rpm": (1.0, 1e6), "[cut] depth_m": (1e-9, 1.0),
+    "[cost] speed_share": (1e-3, 1.0), "[cost] minutes_per_pose": (0.0, 1e3),
+    "[cost] minutes_per_hit": (1e-3, 1e3), "[cost] hits_per_axis": (1, 100),
+    "[cost] minutes_per_sensor": (1e-3, 1e3), "[stop] probability": (0.5, 0.999),
+    "[modes] count": (1, 20), "[modes] window_rate_1_s": (0.0, 1000.0),
+    "[acquisition] candidates": (10, 20_000), "[stop] frequency_sd_percent": (1e-6, 100.0),
+    "[stop] measurements_min": (0, 1000), "[stop] measurements_max": (1, 1000),
+    "[acquisition] singularity_margin": (0.0, 1.0),
+}  # fmt: skip
+RISING = "[acquisition] hammer_height_m", "[goal] band_hz"  # ranges that are no single value
+
+
+def _value(config: CampaignConfig, entry: str) -> Any:
+    """Of an entry, "[modes] count"; None where its table is not there."""
+    table, name = entry.removeprefix("[").split("] ")
+    return getattr(getattr(config, table), name, None)
+
+
 def _wrong(config: CampaignConfig) -> Iterator[str]:
     """What makes no sense, a sentence each; later ones rely on what earlier ones ask for."""
     yield from _of_workspace(config.workspace)
@@ -169,8 +189,9 @@ def _wrong(config: CampaignConfig) -> Iterator[str]:
     if not 0 < band[0] < band[1]:
         yield f"[modes] band_hz {list(band)} must rise from above 0 Hz."
     yield from _of_choices(config)
-    for name, value, low, high in _limits(config):
-        if not low <= value <= high:
+    for name, (low, high) in LIMITS.items():
+        value = _value(config, name)
+        if value is not None and not low <= value <= high:
             yield f"{name} is {value}; it must lie between {low:g} and {high:g}."
 
 
@@ -183,49 +204,19 @@ def _of_workspace(w: WorkspaceTable) -> Iterator[str]:
         yield "[workspace] position_m needs ranges of x, y, z and a tool_axis; add them."
 
 
-def _limits(config: CampaignConfig) -> list[tuple[str, float, float, float]]:
-    """Numbers with their least and largest values."""
-    cost, stop, chosen = config.cost, config.stop, config.acquisition
-    cut = [
-        ("[cut] speed_rpm", config.cut.speed_rpm, 1.0, 1e6),
-        ("[cut] depth_m", config.cut.depth_m, 1e-9, 1.0),
-    ] if config.cut else []  # fmt: skip
-    return [
-        *cut,
-        ("[cost] speed_share", cost.speed_share, 1e-3, 1.0),
-        ("[cost] minutes_per_pose", cost.minutes_per_pose, 0.0, 1e3),
-        ("[cost] minutes_per_hit", cost.minutes_per_hit, 1e-3, 1e3),
-        ("[cost] hits_per_axis", cost.hits_per_axis, 1, 100),
-        ("[cost] minutes_per_sensor", cost.minutes_per_sensor, 1e-3, 1e3),
-        ("[stop] probability", stop.probability, 0.5, 0.999),
-        ("[modes] count", config.modes.count, 1, 20),
-        ("[modes] window_rate_1_s", config.modes.window_rate_1_s, 0.0, 1000.0),
-        ("[acquisition] candidates", chosen.candidates, 10, 20_000),
-        ("[stop] frequency_sd_percent", stop.frequency_sd_percent, 1e-6, 100.0),
-        ("[stop] measurements_min", stop.measurements_min, 0, 1000),
-        ("[stop] measurements_max", stop.measurements_max, 1, 1000),
-        ("[acquisition] singularity_margin", chosen.singularity_margin, 0.0, 1.0),
-    ]
-
-
 def _ranges(config: CampaignConfig) -> Iterator[tuple[str, tuple[float, float]]]:
     """Every range: its entry, with its number where there are several, lower and upper bound."""
-    w = config.workspace
     yield "[modes] band_hz", config.modes.band_hz
-    for name, ranges in (
-        ("[workspace] joints_deg", w.joints_deg), ("[workspace] position_m", w.position_m),
-        *(("[[forbidden]] position_m", zone.position_m) for zone in config.forbidden),
-        *(("[[forbidden]] joints_deg", zone.joints_deg) for zone in config.forbidden),
-    ):  # fmt: skip
-        yield from ((f"{name}, range {k}", one) for k, one in enumerate(ranges or (), 1))
-    for name, range_ in (("[workspace] rotation_deg", w.rotation_deg), *_rising(config)):
-        if range_:
+    for table, zone in (
+        ("[workspace]", config.workspace),
+        *(("[[forbidden]]", zone) for zone in config.forbidden),
+    ):
+        for name in ("joints_deg", "position_m"):
+            for k, one in enumerate(getattr(zone, name) or (), 1):
+                yield f"{table} {name}, range {k}", one
+    for name in ("[workspace] rotation_deg", *RISING):
+        if range_ := _value(config, name):
             yield name, range_
-
-
-def _rising(config: CampaignConfig) -> tuple[tuple[str, tuple[float, float] | None], ...]:
-    height = "[acquisition] hammer_height_m", config.acquisition.hammer_height_m
-    return height, ("[goal] band_hz", config.goal.band_hz)
 
 
 def _of_choices(config: CampaignConfig) -> Iterator[str]:
@@ -242,7 +233,8 @@ def _of_choices(config: CampaignConfig) -> Iterator[str]:
     ):
         if poses is not None and (not poses or len({len(pose) for pose in poses}) != 1):
             yield f"{name} needs one list of joint angles a pose; correct it."
-    for name, range_ in _rising(config):
+    for name in RISING:
+        range_ = _value(config, name)
         if range_ is not None and not range_[0] < range_[1]:
             yield f"{name} {list(range_)} must rise; correct it."
     if chosen.own_only and not chosen.own_poses_deg:
