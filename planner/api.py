@@ -180,8 +180,7 @@ def diagnose_source(
     """
     robot = robot or given.nominal
     dataset = given.read(robot, robot.config.band_hz, lambda text, share: progress(text, 0.0))
-    offered = dict(zip(given.names, given.offered, strict=True))
-    return diagnose(dataset, robot, offered=offered, progress=progress)
+    return diagnose(dataset, robot, offered=given.offered, progress=progress)
 
 
 def _frf_of(dataset: Dataset, pose: str | None) -> Frf:

@@ -175,13 +175,11 @@ class AskTell:
 
     def records(self) -> list[dict[str, Any]]:
         """All modes that were told, one row each: what pandas.DataFrame takes."""
-        return measured_records(self._cell.robot.joints, self._state.measurements.values())
+        return measured_records(self._cell, self._state)
 
     def predict_records(self, joints_deg: ArrayLike) -> list[dict[str, Any]]:
         """`predict` as rows, one for each mode of each pose."""
-        q = self._cell.poses(joints_deg)
-        there = self._cell.inside(q)
-        return predicted_records(self._cell.robot.joints, q, self.model.predict(q), there)
+        return predicted_records(self.model, joints_deg)
 
 
 def _mode(given: Mode | Mapping[str, float] | Sequence[float]) -> MeasuredMode:

@@ -16,15 +16,10 @@ from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
 from planner.campaign.importing import ImportReport
 from planner.campaign.labels import label, observations
-from planner.campaign.measured_modes import from_modal
-from planner.campaign.state import Measurement
-from planner.dataset.measure import measure
-from planner.dataset.screened_files import Source
+from planner.compare.pool import PoseFiles, make, poses_of
+from planner.dataset.visits import recordings_in
 from planner.errors import InputError, NoPoseLeftError
 from planner.progress import ProgressCallback
-from planner.recording.folder import read_recordings
-from planner.recording.joints import JointUnits
-from planner.recording.records import PoseRow
 from planner.report.answer import Answer, plain
 from planner.report.rerun.event_logger import EventLogger
 from planner.report.text import SIMULATED, number, table
@@ -40,36 +35,6 @@ def shipped(name: str) -> Path:
         if (root / name / "campaign.toml").is_file():
             return root / name
     raise InputError(f"The shipped campaign {name} is missing; install the package again.")
-
-
-@dataclass(frozen=True, eq=False)
-class Pool:
-    """Recorded poses that the demonstration may draw on."""
-
-    folder: Path
-    joints: JointUnits
-    rows: dict[str, tuple[PoseRow, ...]]
-
-    @classmethod
-    def load(cls, folder: Path, joints: JointUnits | Sequence[str]) -> "Pool":
-        """Read a recordings folder."""
-        rows: dict[str, list[PoseRow]] = {}
-        for row in read_recordings(folder, joints):
-            rows.setdefault(row.pose, []).append(row)
-        return cls(
-            folder, JointUnits.of(joints), {pose: tuple(group) for pose, group in rows.items()}
-        )
-
-    def q(self, poses: list[str]) -> np.ndarray:
-        """Readback angles (n, dof) in rad."""
-        return self.joints.internal([self.rows[pose][0].joints_deg for pose in poses])
-
-    def nearest(self, cell: Cell, proposal: Proposal, used: list[str]) -> str:
-        """The unused recorded pose that is nearest to a proposal, in model coordinates."""
-        left = [pose for pose in self.rows if pose not in used]
-        target = cell.features(self.joints.internal([proposal.joints_deg]))
-        distance = np.linalg.norm(cell.features(self.q(left)) - target, axis=1)
-        return left[int(np.argmin(distance))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +55,7 @@ class DemonstrationReport(Answer):
     """Answer of `demo`, judged on n poses of the pool that were not used: (n, modes) in Hz."""
 
     campaign: Campaign
-    pool: Pool
+    pool: tuple[PoseFiles, ...]
     steps: tuple[DemonstrationStep, ...]
     measured_hz: np.ndarray
     predicted_hz: np.ndarray
@@ -120,7 +85,7 @@ class DemonstrationReport(Answer):
         each = list(zip(*modes, strict=True)) or [(), (), ()]
         return plain({
             "campaign": str(self.campaign.directory), "robot": self.campaign.cell.robot.name,
-            "simulated": True, "pool": len(self.pool.rows), "measurements": len(self.steps),
+            "simulated": True, "pool": len(self.pool), "measurements": len(self.steps),
             "used": [step.pose for step in self.steps], "unused": len(self.measured_hz),
             "modes_compared": int(np.isfinite(self.measured_hz).sum()),
             "frequency_rmse_percent": ours, "simulation_rmse_percent": simulation,
@@ -141,7 +106,7 @@ class DemonstrationReport(Answer):
             course.add_row(str(k), step.pose, hz, sd)
         made = table(
             f"Demonstration on {self.campaign.cell.robot.name}: {len(self.steps)} of "
-            f"{len(self.pool.rows)} poses",
+            f"{len(self.pool)} poses",
             *("mode", "planner RMSE (%)", "simulation alone RMSE (%)", "in 95 % interval (%)"),
         )
         every, *modes = self.errors
@@ -167,23 +132,24 @@ def play(
     source = shipped(NAME)
     directory = directory or Path(tempfile.mkdtemp(prefix="planner-demo-")) / NAME
     campaign = Campaign.new(directory, source / "robot" / "robot.toml", source / "campaign.toml")
-    pool = Pool.load(source / "recordings", campaign.cell.robot.joints)
+    joints, recordings = campaign.cell.robot.joints, source / "recordings"
+    listed = recordings_in(recordings, joints)
+    pool = unused = poses_of(listed, joints, campaign.cell.config.modes)
     rrd = campaign.directory / "demo.rrd"
-    used: list[str] = []
     steps: list[DemonstrationStep] = []
     started = time.perf_counter()
     with EventLogger(campaign.cell, rrd, viewer, simulated=True) as story:
         story.log(campaign.entries[0], campaign.model)
         proposal = campaign.next()[0]
         story.log(campaign.entries[-1], campaign.model)
-        while len(used) < min(measurements, len(pool.rows)) and not campaign.model.done:
-            pose = pool.nearest(campaign.cell, proposal, used)
-            progress(f"measurement {len(used) + 1}: pose {pose}", len(used) / measurements)
-            if used:
+        while len(steps) < min(measurements, len(pool)) and not campaign.model.done:
+            here = _nearest(campaign.cell, unused, proposal)
+            progress(f"measurement {len(steps) + 1}: pose {here.pose}", len(steps) / measurements)
+            if steps:
                 started = time.perf_counter()
-            report = campaign.import_paths((pool.folder,), pose)[0]
+            report = campaign.import_paths((recordings,), here.pose)[0]
             imported = campaign.entries[-1], campaign.model
-            used.append(pose)
+            unused = tuple(one for one in unused if one is not here)
             try:
                 proposal = campaign.next()[0]
             except NoPoseLeftError:
@@ -192,8 +158,8 @@ def play(
                 steps.append(_step(report, proposal, time.perf_counter() - started))
                 story.log(*imported, report.measured)
             story.log(campaign.entries[-1], campaign.model)
-    cell, unused = campaign.cell, [pose for pose in pool.rows if pose not in used]
-    truth, q = _measured_hz(cell, pool, unused, progress), pool.q(unused)
+    cell, truth = campaign.cell, _measured_hz(campaign.cell, unused, progress)
+    q = joints.internal([one.joints_deg for one in unused])
     expected, simulated = campaign.model.predict(q), cell.frozen.simulate(q)
     predicted = expected.frequency_hz, expected.frequency_sd_hz
     return DemonstrationReport(
@@ -209,19 +175,20 @@ def _step(report: ImportReport, proposal: Proposal, seconds: float) -> Demonstra
     )  # fmt: skip
 
 
-def _measured_hz(
-    cell: Cell, pool: Pool, poses: list[str], progress: ProgressCallback
-) -> np.ndarray:
+def _nearest(cell: Cell, pool: Sequence[PoseFiles], proposal: Proposal) -> PoseFiles:
+    """The recorded pose that is nearest to a proposal, in model coordinates."""
+    joints = cell.robot.joints
+    target = cell.features(joints.internal([proposal.joints_deg]))
+    there = cell.features(joints.internal([one.joints_deg for one in pool]))
+    return pool[int(np.argmin(np.linalg.norm(there - target, axis=1)))]
+
+
+def _measured_hz(cell: Cell, poses: Sequence[PoseFiles], progress: ProgressCallback) -> np.ndarray:
     """Frequencies (n, count) in Hz that the recordings of poses give; NaN where none was found."""
     found = []
     for i, pose in enumerate(poses):
         progress(f"checking on unused pose {i + 1}", i / len(poses))
-        rows = pool.rows[pose]
-        sources = tuple(Source.of(r) for r in rows if r.file)
-        table = cell.config.modes
-        measured = measure(sources, table.band_hz, window_rate_1_s=table.window_rate_1_s)
-        modes = from_modal(measured.modal)
-        found.append(Measurement(pose, pool.rows[pose][0].joints_deg, (), modes))
+        found.append(make(None, pose).measurement)
     return observations(cell, label(cell, tuple(found))).frequency_hz
 
 

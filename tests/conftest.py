@@ -18,7 +18,7 @@ SHARED_DATA = Path(__file__).parents[2] / "shared" / "data"
 @pytest.fixture(autouse=True)
 def no_lines_of_progress(monkeypatch):
     """What a command says hangs on no clock: lines of progress come after seconds."""
-    monkeypatch.setattr("planner.cli.progress.FIRST_S", 3600.0)
+    monkeypatch.setattr("planner.cli.answer.FIRST_S", 3600.0)
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -8,7 +8,7 @@ import numpy as np
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.frequencies_by_simulation import tuned_frequencies
-from planner.campaign.hit_error_estimates import CampaignHitErrors, Visited, estimate
+from planner.campaign.hit_errors import CampaignHitErrors, Visited, estimate
 from planner.campaign.labels import LabelledPose, label, observations
 from planner.campaign.low_fidelity import LowFidelity, Recall, identify_low_fidelity, in_memory
 from planner.campaign.model import Model

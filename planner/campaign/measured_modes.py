@@ -1,17 +1,18 @@
 """Measured modes: from and to the log, and as rows for pandas.DataFrame."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planner.campaign.events import MeasuredMode
-from planner.campaign.state import Measurement
+from planner.campaign.state import CampaignState
 from planner.modal.modes import ModalModel, Mode
-from planner.recording.joints import JointUnits
 
 if TYPE_CHECKING:
-    from planner.surrogate.frf_bands import ModalPrediction
+    from planner.campaign.cell import Cell
+    from planner.campaign.model import Model
 
 
 def to_mode(measured: MeasuredMode) -> Mode:
@@ -62,38 +63,36 @@ def from_modal(modal: ModalModel | None) -> tuple[MeasuredMode, ...]:
 NUMBERS = "frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd"  # of a mode
 
 
-def measured_records(
-    joints: JointUnits, measurements: Iterable[Measurement]
-) -> list[dict[str, Any]]:
+def measured_records(cell: "Cell", state: CampaignState) -> list[dict[str, Any]]:
     """One row a measured mode: pose, joint angles in degrees, Hz, ratios, sds, probability."""
     return [
         {
-            **{"pose": m.pose, **_angles(joints, m.joints_deg), "mode": k},
+            **{"pose": m.pose, **_angles(cell, m.joints_deg), "mode": k},
             **{name: getattr(mode, name) for name in (*NUMBERS, "probability")},
             "withdrawn": m.withdrawn,
         }
-        for m in measurements
+        for m in state.measurements.values()
         for k, mode in enumerate((x for x in m.modes if x.likely), 1)
     ]
 
 
-def predicted_records(
-    joints: JointUnits, q_rad: np.ndarray, prediction: "ModalPrediction", inside: np.ndarray
-) -> list[dict[str, Any]]:
-    """One row for each mode of each pose q (n, dof) in rad of a prediction.
+def predicted_records(model: "Model", joints_deg: ArrayLike) -> list[dict[str, Any]]:
+    """One row for each mode at each of the poses (n, dof) in degrees: what a model predicts.
 
-    `inside` (n,) says which of them lie in the workspace.
+    And whether the pose lies outside the workspace.
     """
+    q = model.cell.poses(joints_deg)
+    found, inside = model.predict(q), model.cell.inside(q)
     return [
         {
-            **{"pose": i + 1, **_angles(joints, joints.shown(row).tolist()), "mode": k + 1},
-            **{name: float(getattr(prediction, name)[i, k]) for name in NUMBERS},
+            **{"pose": i + 1, **_angles(model.cell, model.cell.robot.joints.shown(row))},
+            **{"mode": k + 1, **{name: float(getattr(found, name)[i, k]) for name in NUMBERS}},
             "outside": not inside[i],
         }
-        for i, row in enumerate(q_rad)
-        for k in range(prediction.frequency_hz.shape[1])
+        for i, row in enumerate(q)
+        for k in range(found.frequency_hz.shape[1])
     ]
 
 
-def _angles(joints: JointUnits, joints_deg: Sequence[float]) -> dict[str, float]:
-    return dict(zip(joints.columns, map(float, joints_deg), strict=True))
+def _angles(cell: "Cell", joints_deg: Sequence[float] | np.ndarray) -> dict[str, float]:
+    return dict(zip(cell.robot.joints.columns, map(float, joints_deg), strict=True))

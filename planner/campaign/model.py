@@ -8,8 +8,7 @@ import numpy as np
 
 from planner.campaign.acquisition_inputs import acquisition_inputs, poses_at, uncertain_parameters
 from planner.campaign.cell import Cell
-from planner.campaign.hit_error_estimates import CampaignHitErrors
-from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
+from planner.campaign.hit_errors import CampaignHitErrors, HitErrorEstimate, systematic_errors
 from planner.campaign.labels import LabelledPose, observations
 from planner.campaign.low_fidelity import FEW_POSES, LowFidelity
 from planner.campaign.state import Measurement

@@ -294,14 +294,13 @@ class ReadOnlyCampaign:
         """All measured modes, one row each: what pandas.DataFrame takes."""
         from planner.campaign.measured_modes import measured_records
 
-        return measured_records(self.cell.robot.joints, self.state.measurements.values())
+        return measured_records(self.cell, self.state)
 
     def predict_records(self, *, joints_deg: "ArrayLike") -> list[dict[str, Any]]:
         """`predict` as rows, one for each mode of each pose."""
         from planner.campaign.measured_modes import predicted_records
 
-        q, there = self.cell.poses(joints_deg), self.model.predict
-        return predicted_records(self.cell.robot.joints, q, there(q), self.cell.inside(q))
+        return predicted_records(self.model, joints_deg)
 
     @property
     def frequency_lines(self) -> np.ndarray:

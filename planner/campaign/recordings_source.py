@@ -1,6 +1,6 @@
 """What recordings of several poses come from: folders and a robot, or a campaign."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,15 +22,14 @@ from planner.robot.robot import Robot
 class RecordingsSource:
     """Recordings, robot.toml, the analyser's window rate, and poses that could be measured next.
 
-    `recordings` is their folder, in which a `campaign` keeps its own. `offered` (n, dof) in rad,
-    with their names; empty where none are known.
+    `recordings` is their folder, in which a `campaign` keeps its own. `offered` are joint angles
+    (dof,) in rad by name; empty where none are known.
     """
 
     recordings: Path
     robot: Path
     window_rate_1_s: float
-    offered: np.ndarray
-    names: tuple[str, ...]
+    offered: Mapping[str, np.ndarray]
     campaign: Campaign | None = None
 
     @property
@@ -63,11 +62,9 @@ class RecordingsSource:
 
     def with_poses(self, rows: tuple[PoseRow, ...]) -> "RecordingsSource":
         """The same with the poses of a table, unless a campaign offers its own."""
-        if len(self.offered) or not rows:
-            return self
-        q = self.nominal.joints.internal([row.joints_deg for row in rows])
-        names = tuple(row.pose for row in rows)
-        return replace(self, offered=q, names=names)
+        joints = self.nominal.joints
+        listed = {row.pose: joints.internal(row.joints_deg) for row in rows}
+        return replace(self, offered=self.offered or listed)
 
 
 def recordings_source(folder: Path, robot: Path | None, window_rate_1_s: float) -> RecordingsSource:
@@ -81,12 +78,12 @@ def recordings_source(folder: Path, robot: Path | None, window_rate_1_s: float) 
         if robot is None:
             raise InputError(f"{folder} is no campaign; name the robot with --robot ROBOT_TOML.")
         recordings = folder.parent if folder.name == TABLE else folder
-        return RecordingsSource(recordings, robot, window_rate_1_s, np.zeros((0, 0)), ())
+        return RecordingsSource(recordings, robot, window_rate_1_s, {})
     campaign = Campaign(folder)
     cell = campaign.cell
     chosen = np.flatnonzero(cell.allowed)[:MOST_INFORMED]
-    names = tuple(f"candidate {i + 1}" for i in chosen)
+    offered = {f"candidate {i + 1}": cell.candidates.q[i] for i in chosen}
     path = robot or campaign.robot_toml
     rate = window_rate_1_s or cell.config.modes.window_rate_1_s
     recordings = campaign.directory / store.RECORDINGS
-    return RecordingsSource(recordings, path, rate, cell.candidates.q[chosen], names, campaign)
+    return RecordingsSource(recordings, path, rate, offered, campaign)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.campaign.hit_error_estimates import CampaignHitErrors, Visited, estimate
+from planner.campaign.hit_errors import CampaignHitErrors, Visited, estimate
 from planner.campaign.labels import ABOVE
 from planner.campaign.low_fidelity import LowFidelity, identify_low_fidelity
 from planner.dataset.hit_columns import hits_of

@@ -13,6 +13,7 @@ from planner.cli.answer import (
     Rrd,
     argument,
     option,
+    progress_bar,
     refusals,
     respond,
     warn,
@@ -21,7 +22,6 @@ from planner.cli.campaign_commands import confirm, export, new, redo, report, sk
 from planner.cli.documentation import check, manual, prove, schema, study
 from planner.cli.identification import compare, diagnose, identify
 from planner.cli.modes import modes
-from planner.cli.progress import progress_bar
 from planner.cli.stability import couple, stability
 from planner.errors import InputError
 from planner.words import command

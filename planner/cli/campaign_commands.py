@@ -3,8 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from planner.cli.answer import AsJson, Directory, argument, option, refusals, respond
-from planner.cli.progress import progress_bar
+from planner.cli.answer import AsJson, Directory, argument, option, progress_bar, refusals, respond
 from planner.errors import InputError
 
 

@@ -5,8 +5,7 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, PictureFormat, argument, option, respond, warn
-from planner.cli.progress import progress_bar
+from planner.cli.answer import AsJson, PictureFormat, argument, option, progress_bar, respond, warn
 from planner.report.answer import Done
 
 

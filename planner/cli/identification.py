@@ -14,11 +14,11 @@ from planner.cli.answer import (
     WindowRate,
     argument,
     option,
+    progress_bar,
     refusals,
     respond,
     warn,
 )
-from planner.cli.progress import progress_bar
 from planner.errors import InputError
 
 

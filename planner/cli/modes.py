@@ -11,10 +11,10 @@ from planner.cli.answer import (
     WindowRate,
     argument,
     option,
+    progress_bar,
     refusals,
     respond,
 )
-from planner.cli.progress import progress_bar
 from planner.errors import InputError
 
 

@@ -5,8 +5,16 @@ from typing import Annotated
 
 import msgspec
 
-from planner.cli.answer import AsJson, FromNames, PictureFormat, Rrd, argument, option, respond
-from planner.cli.progress import progress_bar
+from planner.cli.answer import (
+    AsJson,
+    FromNames,
+    PictureFormat,
+    Rrd,
+    argument,
+    option,
+    progress_bar,
+    respond,
+)
 from planner.errors import InputError
 
 

@@ -9,7 +9,6 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.campaign.events import MeasuredMode
-from planner.campaign.hit_errors import systematic_errors
 from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.report.answer import Done
@@ -153,6 +152,8 @@ def named(dof: Dof) -> tuple[int | str, str]:
 
 def survey_report(found: "Survey", pictures: Pictures, folder: str) -> Done:
     """Of the labelled modes of all poses; their frequencies are drawn pose by pose."""
+    from planner.campaign.hit_errors import systematic_errors
+
     tracks, bare, poses = found.tracks, found.bare, []
     for i, name in enumerate(found.poses):
 

@@ -188,7 +188,8 @@ def import_waiting(
     session.rerun_queue.note(reports)
     for report in reports:
         if report.question is not None and report.question.disagree and state.here:
-            return _right(session, state, report)
+            said = f"The hits of {report.pose} are used, as you said."
+            return replace(_used(session, state, report.pose, said), visit=None, here=frozenset())
         left = {hit: session.mark(Path(hit.file), hit.sha256) for hit in report.left_out}
         new = [hit for hit, mark in left.items() if mark not in state.aside]
         told = ((short_name(h.file), h.reason) for h in new if not h.reason.startswith(REFUSED))
@@ -211,13 +212,13 @@ def _imported_files(session: Session, files: Sequence[Path], pose: str) -> tuple
     return (*reports, *(session.campaign.import_paths(bare, pose) if bare else ()))
 
 
-def _right(session: Session, state: SessionState, report: ImportReport) -> SessionState:
-    """The engineer said before that hits which contradict others are right."""
+def _used(session: Session, state: SessionState, pose: str, said: str) -> SessionState:
+    """The engineer says, or said before, that held hits are right."""
     with session.screen.working("refitting"):
-        session.campaign.confirm(report.pose)
-    session.rerun_queue.note()
-    session.say(f"The hits of {report.pose} are used, as you said.")
-    return replace(measured(session, state, report.pose), visit=None, here=frozenset())
+        session.campaign.confirm(pose)
+        session.rerun_queue.note()
+    session.say(said)
+    return measured(session, state, pose)
 
 
 def undo(session: Session, state: SessionState) -> SessionState:
@@ -249,11 +250,7 @@ def answer(session: Session, state: SessionState, key: str | None, other: str) -
     campaign, pose = session.campaign, state.asking
     answered = replace(state, asking="")
     if key == "a":
-        with session.screen.working("refitting"):
-            campaign.confirm(pose)
-            session.rerun_queue.note()
-        session.say(f"The hits of {pose} are used.")
-        answered = measured(session, answered, pose)
+        answered = _used(session, answered, pose, f"The hits of {pose} are used.")
     elif key == "r":
         campaign.refuse_held(pose)
         session.rerun_queue.note()

@@ -95,8 +95,8 @@ def test_every_fault_can_be_told_in_words():
 
 def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
     campaign, pool = shipped_campaign(tmp_path), shipped_pool()
-    paths = [scaled(row, tmp_path, 1e3) for row in pool.rows["A11"]]
-    names = [row.file.name for row in pool.rows["A11"]]
+    paths = [scaled(row, tmp_path, 1e3) for row in pool["A11"]]
+    names = [row.file.name for row in pool["A11"]]
     lines = (RECORDINGS / TABLE).read_text().splitlines()
     own = [line for line in lines[1:] if any(line.endswith(name) for name in names)]
     (tmp_path / TABLE).write_text("\n".join([lines[0], *own]).replace("data/", "") + "\n")
@@ -112,7 +112,7 @@ def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
     held.confirm("A11")
     assert [m.pose for m in held.state.used] == ["A11"]
     # Of a chain that the engineer called right the same is not asked again; another one is.
-    rows, band_hz = pool.rows["A57"], held.cell.config.modes.band_hz
+    rows, band_hz = pool["A57"], held.cell.config.modes.band_hz
     for factor, doubted in ((1e3, False), (1.0, True)):
         (folder := tmp_path / f"{factor:g}").mkdir()
         sources = tuple(Source(scaled(r, folder, factor), r.file.name, r.hit) for r in rows)
@@ -124,7 +124,7 @@ def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
 
 def test_a_window_that_nobody_stated_is_asked_about(tmp_path):
     campaign, pool = shipped_campaign(tmp_path), shipped_pool()
-    rows, band_hz = pool.rows["A11"], campaign.cell.config.modes.band_hz
+    rows, band_hz = pool["A11"], campaign.cell.config.modes.band_hz
 
     def faded(hit: Hit, rate_1_s: float) -> Hit:
         t = (np.arange(len(hit.force_n)) - hit.pulse.peak) / hit.sampling_rate_hz
@@ -149,7 +149,7 @@ def test_a_window_that_nobody_stated_is_asked_about(tmp_path):
 
 def test_a_readback_far_from_its_setpoint_is_asked_about_at_the_first_pose(tmp_path):
     campaign, pool = shipped_campaign(tmp_path), shipped_pool()
-    rows, band_hz = pool.rows["A11"], campaign.cell.config.modes.band_hz
+    rows, band_hz = pool["A11"], campaign.cell.config.modes.band_hz
     stated = np.array(rows[0].joints_deg)
     measured = measure(tuple(Source(r.file, r.file.name, r.hit) for r in rows), band_hz)
     for off_deg, asks in ((3.0, False), (60.0, True)):

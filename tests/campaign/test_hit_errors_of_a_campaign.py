@@ -11,8 +11,7 @@ from msgspec.structs import replace
 from planner.campaign.build import build
 from planner.campaign.campaign import Campaign
 from planner.campaign.config import FidelityTable
-from planner.campaign.hit_error_estimates import CampaignHitErrors
-from planner.campaign.hit_errors import HitErrorEstimate, systematic_errors
+from planner.campaign.hit_errors import CampaignHitErrors, HitErrorEstimate, systematic_errors
 from planner.dataset.store import Store
 from planner.fit.hit_error_fit import VisitHitErrors
 from planner.measurement.nuisances import Tolerances

@@ -25,7 +25,7 @@ from planner.replay import replay
 from planner.report.status import status
 from tests.support.chain_cases import scaled
 from tests.support.outside import FROZEN, call
-from tests.support.shipped_campaign import shipped_campaign, shipped_pool
+from tests.support.shipped_campaign import RECORDINGS, shipped_campaign, shipped_pool
 
 MEASURED = ("A11", "A57")
 WRONG, CLAIMED = "A25", "A42"
@@ -41,7 +41,7 @@ def three(tmp_path_factory, pool):
     """A campaign of two poses, to be copied."""
     campaign = shipped_campaign(tmp_path_factory.mktemp("three"))
     for pose in MEASURED:
-        (report,) = campaign.import_paths((pool.folder,), pose)
+        (report,) = campaign.import_paths((RECORDINGS,), pose)
         assert report.question is None
     return campaign.directory
 
@@ -73,9 +73,9 @@ def claim(folder, pool, at=CLAIMED, off_deg=(0.0,) * 6, other_way="", louder=1.0
         table = csv.writer(file)
         joints = [f"joint_{i}_deg" for i in range(1, 7)]
         table.writerow(["pose", *joints, "hit", "repeat", "file"])
-        for row in pool.rows[WRONG]:
+        for row in pool[WRONG]:
             scaled(row, folder / "data", louder)
-            angles = np.add(pool.rows[at][0].joints_deg, off_deg)
+            angles = np.add(pool[at][0].joints_deg, off_deg)
             sign, axis = row.hit
             hit = f"{'-' if sign == '+' else '+'}{axis}" if axis == other_way else row.hit
             table.writerow(["X1", *angles, hit, row.repeat, f"data/{row.file.name}"])
@@ -151,7 +151,7 @@ def test_a_refused_import_says_nothing_of_the_robot_again(campaign, pool, tmp_pa
 
 def test_hits_listed_along_wrong_axes_are_asked_about(campaign, pool):
     """Of files that do not say their axes themselves."""
-    rows, band_hz = pool.rows[WRONG], campaign.cell.config.modes.band_hz
+    rows, band_hz = pool[WRONG], campaign.cell.config.modes.band_hz
     hits = measure([Source(row.file, row.file.name, row.hit) for row in rows], band_hz).hits
 
     def asked(along):
@@ -185,12 +185,12 @@ def test_misread_angles_and_hits_from_behind_are_asked_about(
     assert said in report.question.text
     if about == "readback":
         read = float(report.question.text.split(said)[1].split("°")[0])
-        stated = np.array(pool.rows[WRONG][0].joints_deg)
+        stated = np.array(pool[WRONG][0].joints_deg)
         assert abs(read - stated[int(said.split("_")[1][0]) - 1]) < 0.5
 
 
 def test_angles_in_radians_are_asked_about_as_that(campaign, pool):
-    sent = pool.rows[WRONG][0].joints_deg
+    sent = pool[WRONG][0].joints_deg
     state = SimpleNamespace(proposals={"P9": SimpleNamespace(joints_deg=sent)})
     for typed, said in (
         (tuple(np.deg2rad(sent) + 0.01), "are its angles in radians?"),
@@ -203,7 +203,7 @@ def test_angles_in_radians_are_asked_about_as_that(campaign, pool):
 @pytest.mark.slow
 def test_more_hits_at_a_measured_pose_are_looked_at_alone(campaign, pool, tmp_path):
     extra = tmp_path / "extra.uff"
-    shutil.copy(pool.rows["A21"][0].file, extra)
+    shutil.copy(pool["A21"][0].file, extra)
     (report,) = campaign.import_paths((extra,), "A57")
     assert report.question is not None
     assert [h.file for h in report.refused] == [str(extra)]
@@ -213,7 +213,7 @@ def test_more_hits_at_a_measured_pose_are_looked_at_alone(campaign, pool, tmp_pa
 
 def test_held_hits_set_aside_are_refused_ones_and_further_ones_wait(held, wrong, pool, tmp_path):
     other = tmp_path / "other.uff"
-    shutil.copy(pool.rows[CLAIMED][0].file, other)
+    shutil.copy(pool[CLAIMED][0].file, other)
     (report,) = held.import_paths((other,), "X1")
     assert "wait for an answer" in report.left_out[0].reason
     held.withdraw("X1")
@@ -231,7 +231,7 @@ def test_held_hits_set_aside_are_refused_ones_and_further_ones_wait(held, wrong,
 
 def test_refused_files_stay_out_unless_they_are_named(tmp_path, pool):
     campaign = shipped_campaign(tmp_path, FROZEN)
-    files = tuple(row.file for row in pool.rows["A46"])
+    files = tuple(row.file for row in pool["A46"])
     version = campaign.state.model_version
     campaign.refuse("A46", files[:3])
     again = Campaign(campaign.directory)
@@ -239,7 +239,7 @@ def test_refused_files_stay_out_unless_they_are_named(tmp_path, pool):
     assert [r["file"] for r in listed] == [str(path) for path in files[:3]]
     assert {r["reason"] for r in listed} == {"refused by the engineer"}
     assert again.state.model_version == version
-    (report,) = again.import_paths((pool.folder,), "A46")
+    (report,) = again.import_paths((RECORDINGS,), "A46")
     assert len(report.accepted) == 9
     assert [hit.file for hit in report.left_out] == [str(path) for path in files[:3]]
     (report,) = again.import_paths((files[0],), "A46")

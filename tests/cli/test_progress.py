@@ -4,13 +4,13 @@ import time
 
 import pytest
 
-from planner.cli import progress
+from planner.cli import answer
 
 
 @pytest.mark.parametrize("quiet", [False, True])
 def test_long_work_is_told_in_lines(quiet, monkeypatch, capsys):
-    monkeypatch.setattr(progress, "FIRST_S", 0.02)
-    with progress.progress_bar("comparing", quiet) as tell:
+    monkeypatch.setattr(answer, "FIRST_S", 0.02)
+    with answer.progress_bar("comparing", quiet) as tell:
         tell("runs", 0.25)
         time.sleep(0.3)
     said = capsys.readouterr()

@@ -8,10 +8,11 @@ import pytest
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.recordings_source import recordings_source
-from planner.demo import NAME, Pool, shipped
+from planner.demo import NAME, shipped
 from planner.errors import InputError
 from planner.progress import no_progress
 from tests.support.outside import FROZEN, refused, told
+from tests.support.shipped_campaign import RECORDINGS, shipped_pool
 
 
 def content(folder: Path) -> dict[str, tuple[str, int]]:
@@ -37,9 +38,8 @@ def campaign(tmp_path_factory):
     band_hz = made.cell.config.modes.band_hz
     with pytest.raises(InputError, match="import"):
         made.dataset(band_hz)
-    pool = Pool.load(source / "recordings", made.cell.robot.joint_names)
-    for pose in list(pool.rows)[:2]:
-        made.import_paths((pool.folder,), pose)
+    for pose in [*shipped_pool()][:2]:
+        made.import_paths((RECORDINGS,), pose)
     return made
 
 

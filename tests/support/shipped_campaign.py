@@ -4,7 +4,9 @@ from pathlib import Path
 
 from planner.campaign.campaign import Campaign
 from planner.dataset.store import Store
-from planner.demo import NAME, Pool, shipped
+from planner.demo import NAME, shipped
+from planner.recording.folder import read_recordings
+from planner.recording.records import PoseRow
 
 RECORDINGS = shipped(NAME) / "recordings"
 
@@ -17,6 +19,9 @@ def shipped_campaign(parent: Path, more: str = "", store: Store | None = None) -
     return Campaign(begun.directory, store)
 
 
-def shipped_pool() -> Pool:
-    """What was recorded."""
-    return Pool.load(RECORDINGS, tuple(f"joint_{i}" for i in range(1, 7)))
+def shipped_pool() -> dict[str, list[PoseRow]]:
+    """What was recorded, by pose."""
+    pool: dict[str, list[PoseRow]] = {}
+    for row in read_recordings(RECORDINGS, tuple(f"joint_{i}" for i in range(1, 7))):
+        pool.setdefault(row.pose, []).append(row)
+    return pool
