@@ -18,13 +18,13 @@ from planner.campaign.build import build, hits_unknown
 from planner.campaign.cell import Cell, refuse_errors
 from planner.campaign.config import CampaignConfig, check_config, load_campaign_config
 from planner.campaign.events import MeasuredMode, Proposal
-from planner.campaign.low_fidelity import in_memory
-from planner.campaign.measured_modes import (
+from planner.campaign.labels import (
     from_modal,
     from_mode,
     measured_records,
     predicted_records,
 )
+from planner.campaign.low_fidelity import in_memory
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement

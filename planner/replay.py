@@ -22,8 +22,8 @@ from planner.campaign.events import (
     Proposal,
     Proposed,
 )
+from planner.campaign.labels import from_modal
 from planner.campaign.low_fidelity import Recall, in_memory
-from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement, fold, without

@@ -14,8 +14,7 @@ from scipy.stats import qmc
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
-from planner.campaign.labels import label, observations
-from planner.campaign.measured_modes import from_mode
+from planner.campaign.labels import from_mode, label, observations
 from planner.campaign.state import Measurement
 from planner.demo import NAME, shipped
 from planner.frf.frf import Frf

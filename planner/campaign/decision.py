@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import norm
 
-from planner.campaign.acquisition_inputs import poses_at
+from planner.campaign.proposals import poses_at
 from planner.design.acquisitions import share_left, stability, with_margins
 from planner.design.frequency_posterior import FrequencyOutputs, Margins
 from planner.errors import InputError

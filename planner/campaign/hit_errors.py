@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.campaign.labels import LabelledPose
-from planner.campaign.measured_modes import to_mode
+from planner.campaign.labels import LabelledPose, to_mode
 from planner.campaign.state import Measurement
 from planner.dataset.hit_columns import HitColumns
 from planner.fit.hit_error_fit import (

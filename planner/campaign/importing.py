@@ -33,7 +33,7 @@ from planner.campaign.imported_files import (
     sort_paths,
     superseded,
 )
-from planner.campaign.measured_modes import from_modal
+from planner.campaign.labels import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement, without_entries
 from planner.campaign.store import KeptRecordings

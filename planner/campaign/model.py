@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.campaign.acquisition_inputs import acquisition_inputs, poses_at, uncertain_parameters
 from planner.campaign.cell import Cell
 from planner.campaign.hit_errors import CampaignHitErrors, HitErrorEstimate, systematic_errors
 from planner.campaign.labels import LabelledPose, observations
 from planner.campaign.low_fidelity import FEW_POSES, LowFidelity
+from planner.campaign.proposals import acquisition_inputs, poses_at, uncertain_parameters
 from planner.campaign.state import Measurement
 from planner.design.acquisitions import mixed, parameter_variance, repeat_gain
 from planner.design.frequency_posterior import FrequencyOutputs, Poses

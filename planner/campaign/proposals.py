@@ -1,32 +1,41 @@
-"""Where to measure next, as the campaign's log records it."""
+"""Where to measure next, as the log records it; what acquisitions see of a campaign's model."""
 
 from dataclasses import replace
 from itertools import count as counted
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.campaign.acquisition_inputs import (
-    informed_candidates,
-    poses_at,
-    uncertain_parameters,
-)
+from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
-from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.design.cost import axis_shares
-from planner.design.parameter_sensitivity import BetterPlaces, better_places
+from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
+from planner.design.parameter_sensitivity import (
+    BetterPlaces,
+    FrfNoise,
+    UncertainParameters,
+    better_places,
+)
 from planner.design.propose import DESCRIPTIONS, INFORMED, Pick, Travel
 from planner.design.propose import propose as choose
 from planner.design.space_filling import DESIGNS
 from planner.errors import NoPoseLeftError
+from planner.fit.posterior import RobotBelief
 from planner.words import small
+
+if TYPE_CHECKING:
+    from planner.campaign.model import Model
 
 # Radius, in model coordinates over √d, around a pose whose neighbours are to be avoided too.
 AVOIDED = 0.1
+# The first of the candidates (a Sobol prefix: evenly spread), which stand for the workspace, and
+# whose information about parameters is worked out.
+MOST_INFORMED = 200
 
 
 def propose(
-    model: Model, state: CampaignState, count: int, acquisition: str
+    model: "Model", state: CampaignState, count: int, acquisition: str
 ) -> tuple[Proposal, ...]:
     """The next poses to measure; NoPoseLeftError when no candidate is left.
 
@@ -43,7 +52,7 @@ def propose(
 
 
 def _new_poses(
-    model: Model, state: CampaignState, count: int, acquisition: str
+    model: "Model", state: CampaignState, count: int, acquisition: str
 ) -> tuple[Proposal, ...]:
     cell = model.cell
     candidates = cell.candidates
@@ -84,7 +93,7 @@ def _names(state: CampaignState, angles: list[tuple[float, ...]]) -> list[str]:
     return [known.get(joints_deg) or next(new) for joints_deg in angles]
 
 
-def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
+def _picks(model: "Model", state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
     cell = model.cell
     joints, x = cell.robot.joints, cell.candidates.features
     stood = [m.joints_deg for m in state.measurements.values()]
@@ -112,7 +121,7 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
     return tuple(replace(pick, index=int(asked[pick.index])) for pick in picks)
 
 
-def places_for(model: Model, state: CampaignState, proposal: Proposal) -> BetterPlaces | None:
+def places_for(model: "Model", state: CampaignState, proposal: Proposal) -> BetterPlaces | None:
     """Where one more sensor, or another point to hit, would tell more at a proposed pose.
 
     None where nothing would, or the simulation does not learn.
@@ -137,7 +146,7 @@ def _xyz(position_m: np.ndarray) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _reason(model: Model, index: int, acquisition: str) -> str:
+def _reason(model: "Model", index: int, acquisition: str) -> str:
     hz, sd = (row[0] for row in model.frequencies(model.cell.candidates.q[[index]]))
     k = int(np.argmax(sd / hz))
     percent = small(100 * sd[k] / hz[k], ".1f")
@@ -148,3 +157,63 @@ def _reason(model: Model, index: int, acquisition: str) -> str:
         near = model.labelled[int(np.argmin(distance))].pose
         text += f" here, nearest measured pose {near}"
     return f"{DESCRIPTIONS[acquisition]} ({acquisition.replace('_', ' ')}); {text}"
+
+
+def uncertain_parameters(model: "Model") -> UncertainParameters | None:
+    """The simulation's parameters as measured so far; None where it does not learn."""
+    config, low = model.cell.config, model.low
+    # One that was identified and then set aside has nothing to learn that would be believed.
+    if config.fidelity.simulation != "updated" or low.nominal is None or low.rejected is not None:
+        return None
+    noise = model.frf_noise or FrfNoise.of((), config.modes.band_hz, 1.0)
+    fit = low.identified_robot  # None: before it is measured
+    known = fit.posterior if fit else RobotBelief.stated(low.prior, low.tolerances)
+    return UncertainParameters(known, noise, config.modes.band_hz)
+
+
+def informed_candidates(cell: Cell) -> np.ndarray:
+    """Indices of the candidates whose information about parameters is asked for; own ones too."""
+    own = np.arange(cell.spread, len(cell.candidates.q))
+    return np.concatenate([np.arange(min(cell.spread, MOST_INFORMED)), own])
+
+
+def acquisition_inputs(model: "Model", informed: bool) -> tuple[FrequencyOutputs, Poses]:
+    """Posterior over the workspace (and the goal), and candidates as poses.
+
+    `informed`: the poses are those of `informed_candidates`, with what they tell of parameters.
+    """
+    cell, surrogate, open_ = model.cell, model.surrogate, uncertain_parameters(model)
+    candidates, simulated = cell.candidates, model.simulated_candidates
+    asked = informed_candidates(cell) if informed else np.arange(len(candidates.q))
+    x, inputs = candidates.features[asked], surrogate.frequency_inputs(simulated)[asked]
+    if open_ is None:
+        poses, covariance = Poses.plain(x, inputs), None
+    else:
+        poses = open_.poses(x, inputs, candidates.q[asked], simulated[asked], informed)
+        covariance = open_.covariance
+    workspace = poses[: min(MOST_INFORMED, cell.spread)]
+    weights = cell.config.acquisition.mode_weights
+    target = Target.evenly(workspace, None if weights is None else np.array(weights))
+    return FrequencyOutputs.of(surrogate, target, _goal(model, target), covariance), poses
+
+
+def _goal(model: "Model", workspace: Target) -> Target:
+    """What [goal] names: poses, and the modes that lie in a band there."""
+    table, poses = model.cell.config.goal, workspace.poses
+    hertz = model.simulated_candidates.frequency_hz[: len(poses)]
+    if table.joints_deg is not None:
+        poses, hertz = poses_at(model, model.cell.robot.joints.internal(table.joints_deg))
+    importance = np.tile(workspace.importance.sum(axis=0), (len(poses), 1))
+    if table.band_hz is not None:
+        with np.errstate(invalid="ignore"):
+            inside = (hertz >= table.band_hz[0]) & (hertz <= table.band_hz[1])
+        importance = importance * (inside if inside.any() else 1.0)
+    return Target(poses, importance / importance.sum())
+
+
+def poses_at(model: "Model", q: np.ndarray) -> tuple[Poses, np.ndarray]:
+    """Poses q (n, dof) in rad as targets, and their simulated frequencies (n, k) in Hz."""
+    said, x, open_ = model.low.simulate(q), model.cell.features(q), uncertain_parameters(model)
+    inputs = model.surrogate.frequency_inputs(said)
+    poses = open_.poses(x, inputs, q, said, False) if open_ else Poses.plain(x, inputs)
+    return poses, said.frequency_hz

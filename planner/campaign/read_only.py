@@ -292,13 +292,13 @@ class ReadOnlyCampaign:
 
     def records(self) -> list[dict[str, Any]]:
         """All measured modes, one row each: what pandas.DataFrame takes."""
-        from planner.campaign.measured_modes import measured_records
+        from planner.campaign.labels import measured_records
 
         return measured_records(self.cell, self.state)
 
     def predict_records(self, *, joints_deg: "ArrayLike") -> list[dict[str, Any]]:
         """`predict` as rows, one for each mode of each pose."""
-        from planner.campaign.measured_modes import predicted_records
+        from planner.campaign.labels import predicted_records
 
         return predicted_records(self.model, joints_deg)
 

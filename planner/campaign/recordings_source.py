@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from planner.campaign import store
-from planner.campaign.acquisition_inputs import MOST_INFORMED
 from planner.campaign.campaign import Campaign
+from planner.campaign.proposals import MOST_INFORMED
 from planner.dataset.dataset import Dataset
 from planner.dataset.visits import Recording, recordings_in, unlisted_folders
 from planner.errors import InputError

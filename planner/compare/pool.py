@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from planner.campaign.config import ModesTable
-from planner.campaign.measured_modes import from_modal
+from planner.campaign.labels import from_modal
 from planner.campaign.state import Measurement
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source

@@ -11,8 +11,8 @@ from planner.campaign.build import build
 from planner.campaign.cell import Cell
 from planner.campaign.config import CampaignConfig
 from planner.campaign.events import Proposal
+from planner.campaign.labels import from_modal
 from planner.campaign.low_fidelity import Recall, in_memory
-from planner.campaign.measured_modes import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.hit_columns import PoseHits, no_columns
