@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -90,12 +91,18 @@ class Campaign(ReadOnlyCampaign):
         `reasons` are what was found wrong with some of them, `stated` what a table says of some:
         those are judged again once it says something else.
         """
-        from planner.campaign.importing import refusals
+        from planner.campaign.imported_files import record_of
 
         with self._acting():
-            if paths:
-                hits = refusals(self.directory, paths, reasons or {}, stated or {})
-                self.append(events.Refused(pose, hits))
+            hits = []
+            for path in paths:
+                given = (stated or {}).get(path, Source(path, ""))
+                kept = store.store_recording(self.directory, path)
+                why = (reasons or {}).get(path)
+                said = f"{why} ({events.REFUSED})" if why else events.REFUSED
+                hits.append(record_of(replace(given, name=str(path), path=kept), said))
+            if hits:
+                self.append(events.Refused(pose, tuple(hits)))
 
     def confirm(self, pose: str) -> "ImportReport":
         """Held hits are from their pose indeed, or those of a withdrawn one good: they are used."""

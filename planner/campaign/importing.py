@@ -3,7 +3,7 @@
 import itertools
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import replace as replaced
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
-from planner.campaign import events, store
+from planner.campaign import events
 from planner.campaign.cell import Cell
 from planner.campaign.events import REFUSED, HitRecord, Question
 from planner.campaign.hit_errors import HitErrorEstimate
@@ -110,25 +110,6 @@ def readback_of(cell: Cell, state: CampaignState, delivery: ImportedFiles) -> tu
                 f"give the new measurement another name."
             )
     return delivery.joints_deg
-
-
-def refusals(
-    directory: Path,
-    paths: tuple[Path, ...],
-    reasons: Mapping[Path, str],
-    stated: Mapping[Path, Source],
-) -> tuple[HitRecord, ...]:
-    """The engineer's refusal of each of these files, which are kept like any other.
-
-    `stated` is what a table said of some of them.
-    """
-    said = {path: f"{text} ({REFUSED})" for path, text in reasons.items() if text}
-    found = []
-    for path in paths:
-        kept = store.store_recording(directory, path)
-        source = replaced(stated.get(path, Source(path, "")), name=str(path), path=kept)
-        found.append(record_of(source, said.get(path, REFUSED)))
-    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,15 @@
-"""JSON and text of answers: what every one of them has in common."""
+"""JSON and text of answers: what every one of them has in common; and progress until then."""
 
 import json
+import time
 from dataclasses import dataclass, field
 
 import msgspec
 import numpy as np
+import pytest
 from rich.text import Text
 
+from planner.cli import answer
 from planner.report.answer import NOT_IN_JSON, Answer, encoded
 
 
@@ -49,3 +52,14 @@ def test_a_notebook_shows_what_the_screen_does():
 
 def test_a_key_appears_once_it_is_set():
     assert Whole(np.zeros(0), (), 0j, left_out=3).to_json()["left_out"] == 3
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_long_work_is_told_in_lines_where_nobody_looks_at_a_terminal(quiet, monkeypatch, capsys):
+    monkeypatch.setattr(answer, "FIRST_S", 0.02)
+    with answer.progress_bar("comparing", quiet) as tell:
+        tell("runs", 0.25)
+        time.sleep(0.3)
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert ("comparing: runs, 25 % (0 s)" in said.err) == (not quiet)

@@ -1,4 +1,4 @@
-"""Tables of recordings that come into the watched folder: in subfolders, and without joints."""
+"""What comes into the watched folder beside hits: tables in subfolders, without joints; streams."""
 
 import csv
 import shutil
@@ -11,7 +11,8 @@ from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from planner.session.inbox import FolderTable
 from tests.support.hit_files import write_hit
-from tests.support.outside import call
+from tests.support.outside import HAMMER, call
+from tests.support.streams import joined, write_wav
 
 
 @pytest.fixture
@@ -123,3 +124,30 @@ def test_a_table_without_one_of_the_joints_is_not_followed_and_says_why(posed, s
     assert "cannot be used: recordings.csv" in said
     assert "has no column joint_a2_deg" in said
     assert not campaign.state.used
+
+
+def test_streams_wait_for_their_scales_and_are_judged_hit_by_hit(cell, first_pose, session):
+    campaign, _, inbox = cell
+    rate = round(HAMMER.sampling_rate_hz)
+    for axis in "xyz":
+        samples = joined(first_pose.made, f"p{axis}")
+        if axis == "x":  # the second hit rebounds
+            top = rate + int(samples[0, rate : 4 * rate].argmax())
+            samples[0, top + 40 : top + 80] += 0.5 * samples[0, top - 20 : top + 20]
+        write_wav(inbox / f"{axis}.wav", samples, f"+{axis}", rate_hz=rate)
+    table = (inbox / "channels.csv").read_text()
+    (inbox / "channels.csv").unlink()
+
+    def scale(text):
+        if "says nothing of scale" not in " ".join(text.split()):
+            return False
+        (inbox / "channels.csv").write_text(table)
+        return True
+
+    text = session(
+        campaign, inbox, (scale, "s"), ("3 hits in x.wav: 2 good", "a"), ("Hits are missing", "a"),
+        ("P001: 8 hits in", "q"), limit_s=40,
+    ).flat  # fmt: skip
+    assert "3 hits in y.wav: 3 good" in text
+    assert "refused x.wav (hit 2 at 2.47 s)" in text
+    assert len(campaign.state.used[0].accepted) == 8

@@ -1,4 +1,4 @@
-"""`planner new --urdf`: from a maker's description to the first pose, whatever it lacks."""
+"""`planner new`: from a maker's description, or the example, to the first pose."""
 
 import re
 import shutil
@@ -185,3 +185,25 @@ def test_the_default_workspace_lies_within_the_limits(high, tmp_path):
     ranges = Campaign(str(tmp_path / "cell")).cell.config.workspace.joints_deg
     assert ranges is not None
     assert np.rad2deg(high) - 1e-3 <= ranges[2][1] <= np.rad2deg(high) + 1e-9
+
+
+def test_the_example_goes_from_check_to_a_proposal(tmp_path):
+    written = told("new", "--example", tmp_path / "own")
+    assert {Path(f).name for f in written["files"]} == {
+        "robot.toml", "robot.urdf", "campaign.toml", "ask_tell.py",
+        "cut.toml", "tool.toml",
+    }  # fmt: skip
+    texts = [Path(f).read_text() for f in written["files"]]
+    assert all("#" in text or "<!--" in text for text in texts)
+    assert told("check", written["robot"])["ok"]
+    new = told("new", tmp_path / "cell", "--robot", written["robot"], "--campaign",
+              written["campaign"])  # fmt: skip
+    assert new["findings"] == []
+    (proposal,) = told("next", tmp_path / "cell")["proposals"]
+    assert len(proposal["joints_deg"]) == 6
+
+
+def test_the_example_overwrites_nothing(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    assert "not empty" in refused("new", "--example", tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["mine.txt"]
