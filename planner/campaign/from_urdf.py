@@ -274,33 +274,23 @@ def _remarks(robot: Robot, chain: ArmChain, weights: StatedMasses) -> Iterator[s
 
 def _robot_text(guessed: Guessed) -> str:
     """robot.toml, with a comment on what is guessed."""
-    config, document = guessed.robot.config, tomlkit.document()
-    for line in (
-        "Begun by planner new --urdf: numbers here are guesses by size and payload until they are",
-        "put right. First: tcp_frame and sensor_frame, the tool ([[payload]]), obstacles.",
-    ):
-        document.add(tomlkit.comment(line))
+    config = guessed.robot.config
     x, y, z = (round(float(v), 4) + 0.0 for v in EXAMPLE_M * _off_the_arm(guessed.robot))
     both = ' and sensor_frame = "tcp"' if config.sensor_frame == config.tcp_frame else ""
-    for line in (
+    said = (
+        "Begun by planner new --urdf: numbers here are guesses by size and payload until they are",
+        "put right. First: tcp_frame and sensor_frame, the tool ([[payload]]), obstacles.",
         f"To move the tcp {EXAMPLE_M:g} m beyond {config.tcp_frame}, where a tool's tip is, write",
         f'tcp_frame = "tcp"{both} below, and at the end of this file:',
         "[[point]]", 'name = "tcp"', f'link = "{config.tcp_frame}"',
         f"position_m = [{x}, {y}, {z}]",
-    ):  # fmt: skip
-        document.add(tomlkit.comment(line))
-    for entry in ("name", "urdf", "tcp_frame", "sensor_frame"):
-        document.add(entry, getattr(config, entry))
-    document.add("band_hz", list(config.band_hz))
-    if config.held:
-        document.add("held", tomlkit.item(config.held))
-    for name in ("payload", "obstacle", "link", "compliance"):
-        rows = tomlkit.aot()
-        for block in getattr(config, name):
-            rows.append(tomlkit.item(_entries(block)))
-        if len(rows):
-            document.add(name, rows)
-    return tomlkit.dumps(document)
+    )  # fmt: skip
+    stated = {name: getattr(config, name) for name in ("name", "urdf", "tcp_frame", "sensor_frame")}
+    stated |= {"band_hz": list(config.band_hz), "held": config.held}
+    blocks = ("payload", "obstacle", "link", "compliance")
+    stated |= {name: [_entries(block) for block in getattr(config, name)] for name in blocks}
+    comment = "".join(f"# {line}\n" for line in said)
+    return comment + tomlkit.dumps({name: value for name, value in stated.items() if value})
 
 
 def _entries(block: Compliance | LinkTable | Payload | Obstacle) -> dict:

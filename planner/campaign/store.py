@@ -250,12 +250,8 @@ def _default(directory: Path, robot_file: str) -> str:
 
 def campaign_text(said: str, robot: str, joints_deg: list[list[float]], modes: dict) -> str:
     """A campaign.toml for a workspace of which something is `said` in a comment."""
-    document = tomlkit.document()
-    document.add(tomlkit.comment(said))
-    document.add("robot", tomlkit.item(robot))
-    document.add("workspace", tomlkit.item({"joints_deg": joints_deg}))
-    document.add("modes", tomlkit.item(modes))
-    return tomlkit.dumps(document)
+    tables = {"robot": robot, "workspace": {"joints_deg": joints_deg}, "modes": modes}
+    return f"# {said}\n{tomlkit.dumps(tables)}"
 
 
 EXAMPLE = Path(__file__).parent.parent / "example"
