@@ -1,4 +1,4 @@
-"""Hashes of all that a result depends on: the names under which results are kept."""
+"""Hashes of all that a result depends on: the names under which results are kept; and where."""
 
 import hashlib
 from functools import cache
@@ -6,6 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import msgspec
+import platformdirs
 
 
 def digest(*parts: bytes | str) -> str:
@@ -48,3 +49,11 @@ def _texts() -> dict[str, str]:
     files = {p.relative_to(root).as_posix(): p for p in root.rglob("*.py")}
     own = sorted(name for name in files if "campaigns" not in name.split("/"))
     return {name: files[name].read_text("utf-8") for name in own}
+
+
+def cache_folder(name: str) -> Path:
+    """The user's folder for a kind of cache; RuntimeError for a user without a home."""
+    path = platformdirs.user_cache_path("planner", appauthor=False)
+    if not path.is_absolute():
+        raise RuntimeError("There is no home folder.")
+    return path / name

@@ -19,7 +19,7 @@ import numpy as np
 from jax.experimental.compilation_cache import compilation_cache
 from threadpoolctl import ThreadpoolController
 
-from planner import cache_folder
+from planner import content_hash
 
 # Matrices here are small: threads gain nothing, and on few cores nested parallel LAPACK calls
 # wait for each other for ever. NPROC is how XLA learns the size of its thread pool; it and the
@@ -158,7 +158,7 @@ def _kept_on_disk() -> Iterator[None]:
 def _folder() -> Path | None:
     """Where compiled code is kept; None where nothing can be: that costs seconds, nothing else."""
     try:
-        folder = cache_folder.folder("jax")
+        folder = content_hash.cache_folder("jax")
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder  # JAX would warn at every compilation if it could not write there

@@ -158,7 +158,7 @@ def compare(
 
     Example: planner compare exports --robot robot/robot.toml --strategies random,default
     """
-    from planner import cache_folder
+    from planner import content_hash
     from planner.campaign import store
     from planner.campaign.recordings_source import recordings_source
     from planner.compare.bench import assemble, comparison_config
@@ -177,7 +177,7 @@ def compare(
         campaign = given.campaign.directory / store.CONFIG
     config = comparison_config(loaded, listed, campaign, simulation)
     try:
-        folder = out or cache_folder.folder("compare")
+        folder = out or content_hash.cache_folder("compare")
     except RuntimeError:
         what = "There is no home folder to keep results in; name one with --out."
         raise InputError(what) from None

@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from planner import cache_folder
+from planner import content_hash
 
 MOST_BYTES = 768 * 1024 * 1024  # a thousand poses, fifty models; then those unused longest go
 LEFT_SHARE = 0.8  # of MOST_BYTES that is left when some went, so that the next ones fit
@@ -121,7 +121,7 @@ class Store:
 def user_store() -> Store:
     """The store of this user; one that keeps nothing where there is no home."""
     try:
-        return _store_in(cache_folder.folder("results"))
+        return _store_in(content_hash.cache_folder("results"))
     except RuntimeError:
         return Store(None)
 

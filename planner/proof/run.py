@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from planner import program
 from planner.compare import processes
 from planner.errors import InputError
 from planner.frf import metrics
@@ -135,10 +134,11 @@ def _made(task: Task, folder: Path, *more: str) -> str | processes.Failure:
 
 def diagnosed(case: Path) -> dict[str, Any]:
     """What the command says of a folder with recordings and robot; or why it failed."""
-    command = program.command(
+    command = [
+        sys.executable, "-c", "from planner.cli import main; main()",
         "diagnose", str(case / "recordings"), "--robot", str(case / "robot" / "robot.toml"),
         "--predict", str(case / "recordings" / "predict.csv"), "--json",
-    )  # fmt: skip
+    ]  # fmt: skip
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)
     except subprocess.TimeoutExpired:
