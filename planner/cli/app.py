@@ -20,8 +20,7 @@ from planner.cli.answer import (
 )
 from planner.cli.campaign_commands import confirm, export, new, redo, report, skip, undo, withdraw
 from planner.cli.documentation import check, manual, prove, schema, study
-from planner.cli.identification import compare, diagnose, identify
-from planner.cli.modes import modes
+from planner.cli.identification import compare, diagnose, identify, modes
 from planner.cli.stability import couple, stability
 from planner.errors import InputError
 from planner.words import command
