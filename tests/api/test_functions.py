@@ -1,6 +1,9 @@
 """What scripts call, on hits of a small arm: the same as the commands say, and typed."""
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -87,3 +90,15 @@ def test_identify_says_what_the_command_says_and_more(recorded, dataset):
     h = found.simulation.accelerance(dataset.q[:1], np.array([5.0, 10.0]))
     assert h.shape == (1, 3, 3, 2)
     assert found.with_pictures(Pictures()) is found
+
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_types_hold():
+    command = (
+        sys.executable, "-m", "pyrefly", "check", "--python-interpreter-path", sys.executable,
+        "--config", str(ROOT / "pyproject.toml"), "--min-severity", "error",
+    )  # fmt: skip
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr

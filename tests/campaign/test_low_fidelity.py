@@ -1,5 +1,6 @@
 """A low fidelity that learns: identified from recordings, uncertain where it should be, doubted.
 
+And frequencies told from FRFs by its own modes.
 `pytest -m slow tests/campaign/test_low_fidelity.py` leaves bearings out of the description.
 """
 
@@ -8,6 +9,7 @@ import re
 import numpy as np
 import pytest
 
+from planner.campaign.frequencies_by_simulation import tuned_frequencies
 from planner.campaign.low_fidelity import LowFidelity, identify_low_fidelity
 from planner.dataset.measure import MeasuredPose
 from planner.dynamics.simulation import Simulation
@@ -15,6 +17,7 @@ from planner.fit.frequency_uncertainty import log_frequency_slope
 from planner.fit.posterior import RobotBelief
 from planner.fit.structure import exported
 from planner.fit.write_robot import updated_toml
+from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.measurement.nuisances import Tolerances
 from planner.proof.deviation import AttachedResonator, Deviation
@@ -174,3 +177,38 @@ def test_a_joint_that_only_creeps_is_no_modes_stiffness(right):
     moved = np.log(creeping(1 + step).modes(q, COUNT).frequency_hz)
     by_difference = (moved - np.log(creeping(1 - step).modes(q, COUNT).frequency_hz)) / (2 * step)
     np.testing.assert_allclose(slope, by_difference, atol=1e-6)
+
+
+WIDE_HZ, FEW = (4.0, 90.0), 3
+NOISY = Hammer(peak_n=250.0, duration_s=0.005, sampling_rate_hz=512.0, record_s=2.0, noise=0.03)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """An arm as stated, FRFs of noisy records at three poses (n, 4), and its frequencies there."""
+    path = write_arm(tmp_path_factory.mktemp("arm"))
+    truth, q, rng = load_truth(path, Deviation()), poses(3), np.random.default_rng(5)
+    frfs = [estimate(hits_at(truth, one, NOISY, rng), WIDE_HZ).within(WIDE_HZ) for one in q]
+    true_hz = np.array([truth.modes(one, FEW)[0] for one in q])
+    return Simulation(Robot.load(path)), frfs, q, true_hz
+
+
+def off_by(simulation: Simulation, factor: float) -> Simulation:
+    """The same with all stiffnesses times a factor."""
+    e = simulation.elasticity
+    return simulation.changed(type(e)(factor * e.stiffness, e.damping, e.loss_factor))
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.98, 1.03])
+def test_frequencies_are_told_though_the_simulation_is_a_percent_off(recorded, factor):
+    simulation, frfs, q, true_hz = recorded
+    wrong = off_by(simulation, factor)
+    hz, sd = tuned_frequencies(wrong, frfs, q, WIDE_HZ, Tolerances(), FEW)
+    assert np.max(np.abs(hz / true_hz - 1)) < 2e-3
+    assert np.max(np.abs(hz - true_hz) / sd) < 3.5
+
+
+def test_a_simulation_that_is_far_off_tells_nothing(recorded):
+    simulation, frfs, q, _ = recorded
+    _, sd = tuned_frequencies(off_by(simulation, 0.5), frfs, q, WIDE_HZ, Tolerances(), FEW)
+    assert not np.isfinite(sd).any()

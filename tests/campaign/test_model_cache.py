@@ -1,6 +1,8 @@
-"""A fitted model that is kept on disk: the same as a new one, never a damaged or outdated one."""
+"""What is kept on disk: a fitted model is the same as a new one, never a damaged or outdated one;
+recordings are looked through before the next fit, whole ones once."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -9,12 +11,13 @@ import sys
 import numpy as np
 import pytest
 
-from planner import content_hash
+from planner import content_hash, file_content
 from planner.campaign import build as build_module
 from planner.campaign.campaign import Campaign
 from planner.campaign.model import Model
 from planner.campaign.store import CONFIG
 from planner.dataset.store import Store
+from planner.errors import InputError
 from planner.fit.fitted import FitRecord
 from planner.replay import replay
 from planner.report.status import status
@@ -156,3 +159,62 @@ def test_status_of_a_kept_model_needs_no_heavy_library(folder):
         "sys.exit(code or len(heavy))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.fixture(scope="module")
+def one(tmp_path_factory):
+    """A campaign of one pose."""
+    campaign = shipped_campaign(tmp_path_factory.mktemp("one"), FROZEN)
+    campaign.import_paths((RECORDINGS,), "A11")
+    return campaign.directory
+
+
+@pytest.fixture
+def measured_once(one, tmp_path):
+    return shutil.copytree(one, tmp_path / "campaign")
+
+
+@pytest.fixture
+def look(measured_once, tmp_path, monkeypatch):
+    """Looks through a campaign's recordings as the next command does; the files that it reads."""
+    read = file_content.read
+
+    def looked():
+        names = []
+        with monkeypatch.context() as patched:
+            patched.setattr(file_content, "_hashes", {})
+            patched.setattr(file_content, "_contents", type(file_content._contents)())
+            patched.setattr(file_content, "read", lambda path: names.append(path) or read(path))
+            campaign = Campaign(measured_once, Store(tmp_path / "found"))
+            campaign.recordings.look_through(campaign.state.used, Store(tmp_path / "found"))
+        return [path for path in names if path.parent.name == "recordings"]
+
+    return looked
+
+
+def test_whole_ones_are_read_once(look, tmp_path):
+    first = look()
+    assert len(first) == 12
+    assert look() == []
+    os.utime(first[0])  # somebody has touched one
+    assert look() == first[:1]
+    (entry,) = (tmp_path / "found").iterdir()
+    entry.write_bytes(entry.read_bytes()[:-1])  # what is kept of them is damaged
+    assert look() == first
+
+
+@pytest.mark.parametrize("damage", ["cut", "flipped", "gone"])
+def test_a_damaged_one_is_told(look, damage):
+    path = look()[-1]
+    data, times = path.read_bytes(), path.stat()
+    if damage == "gone":
+        path.unlink()
+    else:
+        flipped = data[:-1] + bytes([data[-1] ^ 1])
+        path.write_bytes(data[:-1] if damage == "cut" else flipped)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+    for _ in range(2):
+        with pytest.raises(InputError, match=path.name):
+            look()
+    path.write_bytes(data)
+    look()
