@@ -1,6 +1,6 @@
 """FRFs of a campaign: what is left out says what to trust, and how far off FRFs are elsewhere.
 
-How good they are on fifty robots: test_frf_campaigns.py.
+How good they are on fifty robots: test_everyday_campaigns.py.
 """
 
 from dataclasses import replace

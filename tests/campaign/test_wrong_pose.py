@@ -1,13 +1,17 @@
-"""Hits of another pose, or with a wrong angle, under a pose's name, after few measurements.
+"""Hits of another pose, with a wrong angle, by another chain or tool, after few measurements.
 
 How often it is asked after more, and of what else: test_pose_mismatch_rates.py.
 """
 
 import csv
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from planner.campaign.alternatives import OTHER_TOOL
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Question
 from planner.campaign.import_checks import Claim, question_about
@@ -16,6 +20,8 @@ from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from planner.report.imports import how_to_answer
+from tests.support.case_campaigns import CaseCampaign
+from tests.support.fitted_cases import Case, everyday
 from tests.support.generated_arms import BAND_HZ, Arm, make_generated_arm
 
 OTHERS = 3  # poses of the workspace that are hit beside
@@ -105,3 +111,46 @@ def other_sign(folder: Path, column: str) -> float:
         table.writeheader()
         table.writerows({**row, column: read} for row in rows)
     return read
+
+
+POSES, LOUD = 4, 1.2
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory) -> Case:
+    return everyday("arm of four", 7002, tmp_path_factory.mktemp("case"))
+
+
+def test_another_tool_is_asked_about_and_the_same_one_is_not(case):
+    campaign = CaseCampaign.of(case)
+    state = campaign.state(POSES, unlisted=[POSES])
+    claim = Claim(campaign.model(state), state, "X", campaign.angles(case.q[POSES]))
+    asked = [
+        question_about(claim, MeasuredPose((), case.band_hz, given=poses[POSES].hits))
+        for poses in (case.measured, case.heavier)
+    ]
+    assert asked[0] is None
+    assert OTHER_TOOL in asked[1].text
+
+
+def louder(pose: MeasuredPose) -> MeasuredPose:
+    hits = (replace(h, acceleration_m_s2=LOUD * h.acceleration_m_s2) for h in pose.hits)
+    return MeasuredPose((), pose.band_hz, given=tuple(hits))
+
+
+@pytest.mark.parametrize("visit", [None, 1])
+def test_a_visit_with_another_gain_is_told_and_bends_nothing(case, visit):
+    changed = list(case.measured)
+    if visit is not None:
+        changed[visit] = louder(changed[visit])
+    model = CaseCampaign.of(replace(case, measured=tuple(changed))).after(POSES)
+    told = " ".join(model.low.misread)
+    if visit is None:
+        assert told == ""
+    else:
+        size = re.search(rf"at P{visit} accelerations are (\S+) times as large", told)
+        assert float(size[1]) == pytest.approx(LOUD, abs=0.05)
+    posterior = model.low.identified_robot.posterior
+    scale, allowed = posterior.chain_scale
+    assert posterior.explains
+    assert abs(scale) < 2 * allowed
