@@ -37,7 +37,7 @@ def option(text: str, metavar: str | None = None, *names: str, **limits: Any) ->
 AsJson = Annotated[bool, option("Answer with one JSON document.", None, "--json")]
 Directory = Annotated[Path, argument("Campaign folder.", "DIR")]
 RobotOption = Annotated[
-    Path | None, option("The robot's robot.toml (a campaign has its own).", "ROBOT_TOML", "--robot")
+    Path | None, option("The robot's robot.toml (a campaign has its own).", "ROBOT_TOML")
 ]
 FromNames = Annotated[
     bool,

@@ -179,7 +179,6 @@ def predict(
         option(
             "Of hits, where POSES_CSV states none: joints may not be linear ([[law]]).",
             "N",
-            "--peak-force-n",
             min=0.001,
         ),
     ] = None,

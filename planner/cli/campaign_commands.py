@@ -62,7 +62,7 @@ PoseArgument = Annotated[str, argument("Name of the pose.", "POSE")]
 def confirm(
     directory: Directory,
     pose: PoseArgument,
-    at: Annotated[str | None, option("Where they are from instead.", "POSE", "--at")] = None,
+    at: Annotated[str | None, option("Where they are from instead.", "POSE")] = None,
     as_json: AsJson = False,
 ) -> int:
     """Use the held hits of a pose: they are from there indeed, or from another pose.

@@ -23,7 +23,7 @@ def stability(
         Path,
         argument("npz of predict, FRFs (a file or a folder), a campaign, modes TOML.", "SOURCE"),
     ],
-    cut: Annotated[Path, option("Cutter and cut.", "CUT_TOML", "--cut")],
+    cut: Annotated[Path, option("Cutter and cut.", "CUT_TOML")],
     pose: Annotated[str | None, option("Of the source's poses; all: each.", "NAME")] = None,
     path: Annotated[
         Path | None, option("Of a campaign: poses, or G-code or APT.", "CSV|PROGRAM")
@@ -51,7 +51,6 @@ def stability(
         option(
             "Of a campaign: linearise joints that are not linear ([[law]]) for such hits.",
             "N",
-            "--peak-force-n",
             min=0.001,
         ),
     ] = None,
@@ -134,8 +133,7 @@ def couple(
         Path | None, option("Measured with TOOL there: its contact is identified.", "FRFS")
     ] = None,
     band_hz: Annotated[
-        tuple[float, float] | None,
-        option("Band in Hz, which has to be covered.", "LOW HIGH", "--band-hz"),
+        tuple[float, float] | None, option("Band in Hz, which has to be covered.", "LOW HIGH")
     ] = None,
     plot: Annotated[Path | None, option("Draw the FRFs into this folder.", "FOLDER")] = None,
     format_: PictureFormat = "png",
