@@ -109,17 +109,14 @@ def stack(
     return Measured(frequency, laplace(frequency, rates), h, sd, tails, layout)
 
 
-def matrices_at(
-    elastic: ElasticModel, q: np.ndarray, frfs: Sequence[Frf], sloped: bool = False
-) -> Matrices:
+def matrices_at(elastic: ElasticModel, q: np.ndarray, frfs: Sequence[Frf]) -> Matrices:
     """Matrices at q (n, dof) between the points of FRFs measured there, their sensors' mass on.
 
-    `sloped`: with slopes by the joint angles, for readbacks may err.
+    With slopes by the joint angles, for readbacks may err.
     """
     layout = together([frf.layout for frf in frfs])
-    found = elastic.with_slopes(q, layout) if sloped else elastic.matrices(q, layout=layout)
     there = np.array([[name in f.layout.sensors for name in layout.sensors] for f in frfs])
-    return with_sensors(found, elastic.robot, layout, there)
+    return with_sensors(elastic.with_slopes(q, layout), elastic.robot, layout, there)
 
 
 def with_sensors(found: Matrices, robot: Robot, layout: Layout, there: np.ndarray) -> Matrices:

@@ -31,14 +31,7 @@ from planner.recording.column_names import (
     time_unit,
     unit_text,
 )
-from planner.recording.records import (
-    Channel,
-    End,
-    FrfRecord,
-    Record,
-    TimeRecord,
-    check_numbers,
-)
+from planner.recording.records import Channel, End, FrfRecord, Record, TimeRecord, check_numbers
 from planner.recording.sampling import UNEVEN, aligned, sampling_rate
 
 _AT = re.compile(r"acceleration_(.+)_[xyz]$")
