@@ -52,10 +52,8 @@ class Named:
 
     def attribute(self, *names: str) -> str | None:
         """The first attribute of these names; letters alone count."""
-        for key, value in self.attributes.items():
-            if _letters(key) in names:
-                return str(value)
-        return None
+        each = self.attributes.items()
+        return next((str(value) for key, value in each if _letters(key) in names), None)
 
     @property
     def simulated(self) -> bool:
