@@ -68,7 +68,7 @@ def load(folder: Path, seed: int, small: bool, progress: ProgressCallback) -> Po
     spare = [(*some, *rest) for some, rest in zip(tracks.unexpected, doubtful, strict=True)]
     checked = check(struck.frfs, labelled, spare)
     clean = np.array([parameters(*truth.modes(posture, MODES)) for posture in q])
-    told = labels.gathered(x, checked.modes, simulated.lowest(MODES))
+    told = labels.gathered(x, checked.modes, simulated[:, :MODES])
     each = zip(told.frequency_hz, told.damping_ratio, told.residue, strict=True)
     measured = np.array([parameters(*posture) for posture in each])
     return PostureData(q, x, measured, clean, truth, checked, tracks.frequency_hz[:, :MODES])

@@ -164,7 +164,7 @@ def figure_12(seen: AnalysedPoses, small: bool = False) -> Rebuilt:
     draws = FEW_DRAWS if small else DRAWS
     samples = np.abs(_published(seen, train, target, hz, draws))
     low, middle, high = np.quantile(samples, (0.025, 0.5, 0.975), axis=0)
-    fitted = fit_surrogate(replace(seen.every.at(train), x=seen.x[train]))
+    fitted = fit_surrogate(replace(seen.every[train], x=seen.x[train]))
     prediction = fitted.predict(seen.x[there], seen.every.simulated[there])
     mean, sd = (moment[0] for moment in frf_moments(prediction, hz))
     best = synthesised(seen.every, target, hz)

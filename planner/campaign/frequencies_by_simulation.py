@@ -43,7 +43,7 @@ def tuned_frequencies(
     """
     lines = int(np.clip(LINES // len(frfs), LEAST, MOST))
     measured = stack(frfs, band_hz, lines, MODEL_ERROR)
-    matrices = matrices_at(simulation.elastic, q, frfs, True)
+    matrices = matrices_at(simulation.elastic, q, frfs)
     s = measured.s
     motion = moved(matrices, simulation.elasticity, s, matrices.mass)
     h = motion.accelerance

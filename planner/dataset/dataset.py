@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,29 +19,12 @@ from planner.frf.frf import Frf
 from planner.modal.modes import ModalModel
 from planner.progress import ProgressCallback, no_progress
 from planner.recording.force_levels import level_of, levels
-from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, together
 from planner.recording.records import Hit
 
 # Rate (1/s) of an exponential window that is laid over all records: decays that they cut off are
 # then too small to matter, and FRFs hold at s = iω + rate.
 LAID = 2.0
-
-
-class Recorded(Protocol):
-    """What recordings are read with of a robot."""
-
-    @property
-    def joints(self) -> JointUnits:
-        """Names and units of its joints, in the order of angles."""
-
-    @property
-    def points(self) -> Any:
-        """`PointNames`: where it may be hit and heard."""
-
-    @property
-    def config(self) -> Any:
-        """What robot.toml says; its `band_hz` is needed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +50,7 @@ class Dataset:
     def read(
         cls,
         folder: Path | str,
-        robot: "Recorded",
+        robot: Any,
         band_hz: tuple[float, float] | None = None,
         *,
         window_rate_1_s: float = 0.0,
@@ -79,7 +62,7 @@ class Dataset:
         Args:
             folder: Holds recordings.csv and the files that it names, or subfolders that do; or
                 the table itself.
-            robot: Whose joints the table has, and where it may be hit and heard.
+            robot: A `Robot`: whose joints the table has, and where it may be hit and heard.
             band_hz: Which the hits have to excite, and in which FRFs are wanted; by default that of
                 robot.toml.
             window_rate_1_s: Of an exponential window that the analyser laid over all channels.
@@ -150,10 +133,7 @@ class Dataset:
 
     @classmethod
     def of_visits(
-        cls,
-        visits: Iterable[Visit],
-        band_hz: tuple[float, float],
-        window_rate_1_s: float = 0.0,
+        cls, visits: Iterable[Visit], band_hz: tuple[float, float], window_rate_1_s: float = 0.0
     ) -> "Dataset":
         """Of good hits that are at hand already; each visit is an entry of its own."""
         return cls((), (), band_hz).corrected(visits, window_rate_1_s)
@@ -201,17 +181,17 @@ class Dataset:
     @property
     def frfs(self) -> tuple[Frf, ...]:
         """Of each pose, all its visits and force levels together, at all points."""
-        return _known(entry.measured.whole for entry in self.measured)
+        return tuple(frf for entry in self.measured if (frf := entry.measured.whole))
 
     @property
     def ended_frfs(self) -> tuple[Frf, ...]:
         """The same, weighted, under exponential windows by which decays are over at the end."""
-        return _known(entry.measured.ended_frf for entry in self.measured)
+        return tuple(frf for entry in self.measured if (frf := entry.measured.ended_frf))
 
     @property
     def one_hit_frfs(self) -> tuple[Frf, ...]:
         """The same, each of one hit in the middle of all (`MeasuredPose.one_hit_frf`)."""
-        return _known(entry.measured.one_hit_frf for entry in self.measured)
+        return tuple(frf for entry in self.measured if (frf := entry.measured.one_hit_frf))
 
     @property
     def modes(self) -> tuple[ModalModel | None, ...]:
@@ -295,7 +275,3 @@ class Dataset:
     def level(self, hit: Hit) -> int:
         """Which of `level_n` a hit belongs to."""
         return int(level_of(np.array(hit.pulse.peak_n), self._by_level))
-
-
-def _known(frfs: Iterable[Frf | None]) -> tuple[Frf, ...]:
-    return tuple(frf for frf in frfs if frf is not None)

@@ -54,16 +54,13 @@ def export(what: Exported, folder: Path) -> list[Path]:
         write_sets(files[0], [_header(what), *_geometry(what), *_shapes(what)])
         write_sets(files[1], [_header(what), *_frfs(what)])
         _table(files[2], MODES, _mode_rows(what.found))
-        _table(files[3], VALUES, _shape_rows(what.found))
+        shapes = [(k, "", what.found.dofs, m.shape, m.shape_sd)
+                  for k, m in enumerate(what.found.modes, 1) if m.shape_sd is not None]  # fmt: skip
+        _table(files[3], VALUES, [(k, *values) for k, _, *values in _rows(shapes)])
         if apart := _vectors(what):
             files += [folder / name for name in ("vectors.uff", "vectors.csv")]
             write_sets(files[4], [_header(what), *_geometry(what), *_vector_sets(what, apart)])
-            rows = [
-                (k, side, *row)
-                for k, side, dofs, vector, sd in apart
-                for row in _rows(dofs, vector, sd)
-            ]
-            _table(files[5], ("mode", "side", *VALUES[1:]), rows)
+            _table(files[5], ("mode", "side", *VALUES[1:]), _rows(apart))
     return files
 
 
@@ -196,19 +193,11 @@ def _mode_rows(found: MatrixModes) -> list[tuple[Any, ...]]:
     ]  # fmt: skip
 
 
-def _shape_rows(found: MatrixModes) -> list[tuple[Any, ...]]:
+def _rows(vectors: Vectors) -> list[tuple[Any, ...]]:
+    """Of vectors (n,) mode, side, degrees of freedom, real and imaginary part, and sd."""
     return [
-        (k, *row)
-        for k, mode in enumerate(found.modes, 1)
-        if mode.shape_sd is not None
-        for row in _rows(found.dofs, mode.shape, mode.shape_sd)
-    ]
-
-
-def _rows(dofs: tuple[Dof, ...], vector: np.ndarray, sd: np.ndarray) -> list[tuple[Any, ...]]:
-    """Of a vector (n,) its degrees of freedom, real and imaginary part, and sd."""
-    return [
-        (dof.node, dof.direction, float(value.real), float(value.imag), float(error))
+        (k, side, dof.node, dof.direction, float(value.real), float(value.imag), float(error))
+        for k, side, dofs, vector, sd in vectors
         for dof, value, error in zip(dofs, vector, sd, strict=True)
     ]
 

@@ -47,7 +47,7 @@ class FrfData:
         seen = common_band(frfs, band_hz)
         measured = stack(frfs, seen, lines, SMALLEST, geometric=True)
         elastic = prior.carried
-        matrices = matrices_at(elastic, q, frfs, sloped=True)
+        matrices = matrices_at(elastic, q, frfs)
         return cls(q, measured, matrices, elastic.body_jacobians(q), order)
 
     @cached_property

@@ -109,15 +109,13 @@ def stack(
     return Measured(frequency, laplace(frequency, rates), h, sd, tails, layout)
 
 
-def matrices_at(
-    elastic: ElasticModel, q: np.ndarray, frfs: Sequence[Frf], sloped: bool = False
-) -> Matrices:
+def matrices_at(elastic: ElasticModel, q: np.ndarray, frfs: Sequence[Frf]) -> Matrices:
     """Matrices at q (n, dof) between the points of FRFs measured there, their sensors' mass on.
 
-    `sloped`: with slopes by the joint angles, for readbacks may err.
+    With slopes by the joint angles, for readbacks may err.
     """
     layout = together([frf.layout for frf in frfs])
-    found = elastic.matrices(q, layout=layout, slopes=sloped)
+    found = elastic.matrices(q, layout=layout, slopes=True)
     there = np.array([[name in f.layout.sensors for name in layout.sensors] for f in frfs])
     return with_sensors(found, elastic.robot, layout, there)
 

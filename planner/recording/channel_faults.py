@@ -4,10 +4,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
-from planner.recording.pulse import find_pulse
-from planner.recording.records import Channel, Fault, Hit, TimeRecord
+from planner.recording.records import Channel, Fault, Hit, TimeRecord, find_pulse
 
 # Overload: so improbable is it that equal samples at the top are chance, judged by samples that
 # lie below the top by a share of NEAR at most. A pulse of NARROW samples above its half is so sharp
@@ -181,10 +179,11 @@ def lost_samples(record: TimeRecord) -> tuple[Fault, ...]:
     changes = np.flatnonzero(np.any(np.diff(after, axis=1), axis=0))
     if len(changes) <= 2 * CHANGES:
         return ()
+    from scipy.ndimage import maximum_filter
+
     rests = np.diff(changes)
-    padded = np.pad(rests, CHANGES)
-    usual = np.max(sliding_window_view(padded, CHANGES), axis=1)
-    around = np.maximum(usual[: len(rests)], usual[CHANGES + 1 :])
+    beside = np.arange(-CHANGES, CHANGES + 1) != 0
+    around = maximum_filter(rests, footprint=beside, mode="constant")
     inner = slice(CHANGES, len(rests) - CHANGES)
     candidates = np.flatnonzero(rests[inner] > LONGER * around[inner]) + CHANGES
     steps = [step(x) for x in after] if candidates.size else []

@@ -207,25 +207,20 @@ def name_of(attributes: Attributes) -> str:
 
 def names_of(attributes: Attributes, count: int) -> tuple[str, ...]:
     """Names stated of `count` columns, () where none are."""
-    named = _lists(_of_keys(attributes, _NAMES), count)
     units = _lists(_of_keys(attributes, _UNITS), count)
-    each = [*named, *_lists(attributes.items(), count)]
-    return next((v for v in each if v not in units and not _are_units(v)), ())
+    each = _lists([*_of_keys(attributes, _NAMES), *attributes.items()], count)
+    return next((v for v in each if v not in units and not all(map(lookup, v))), ())
 
 
 def units_of(attributes: Attributes, count: int) -> tuple[str, ...]:
     """Units stated of `count` columns, each or of all; "" where none is."""
     stated = _lists(_of_keys(attributes, _UNITS), count)
-    each = [*stated, *(v for v in _lists(attributes.items(), count) if _are_units(v))]
+    each = [*stated, *(v for v in _lists(attributes.items(), count) if all(map(lookup, v)))]
     return each[0] if each else (unit_of(attributes),) * count
 
 
 def _lists(entries: Iterable[tuple[str, object]], count: int) -> list[tuple[str, ...]]:
     return [v for _, v in entries if isinstance(v, tuple) and len(v) == count > 1]
-
-
-def _are_units(texts: tuple[str, ...]) -> bool:
-    return all(lookup(text) for text in texts)
 
 
 def unit_of(attributes: Attributes) -> str:

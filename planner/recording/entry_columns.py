@@ -387,13 +387,9 @@ def _common_step(file: Path, steps: Mapping[str, float]) -> float | None:
 
 def _attributes(columns: Sequence[EntryColumn]) -> dict[str, str]:
     """What is stated of all columns, or of some and contradicted of none."""
-    found: dict[str, str] = {}
-    contradicted = set()
+    found: dict[str, set[str]] = {}
     for column in columns:
         for key, value in {**column.shared, **column.own}.items():
-            name, text = key.rpartition(".")[2], text_of(value)
-            if isinstance(value, tuple) or is_axis(key):
-                continue
-            if found.setdefault(name, text) != text:
-                contradicted.add(name)
-    return {name: text for name, text in found.items() if name not in contradicted}
+            if not isinstance(value, tuple) and not is_axis(key):
+                found.setdefault(key.rpartition(".")[2], set()).add(text_of(value))
+    return {name: texts.pop() for name, texts in found.items() if len(texts) == 1}

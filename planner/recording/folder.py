@@ -32,7 +32,7 @@ def several_poses(paths: list[Path], least: int = 2) -> bool:
     """Whether a single folder is named whose recordings.csv lists that many poses at least."""
     if len(paths) != 1 or not (paths[0] / TABLE).is_file():
         return False
-    header, rows = _rows(paths[0] / TABLE)
+    header, rows = read_table(paths[0] / TABLE)
     # A table without poses is refused where it is read in earnest.
     return "pose" not in header or len({row.cell("pose") for row in rows}) >= least
 
@@ -59,7 +59,7 @@ def read_recordings(
     """
     points = points or PointNames()
     path = folder / TABLE
-    header, lines = _rows(path)
+    header, lines = read_table(path)
     units = JointUnits.of(joints)
     told = not bare or (units.names and any(map(ANGLE_LIKE.search, header)))
     columns = _joint_columns(path, header, units) if told else ()
@@ -87,7 +87,7 @@ def read_recordings(
 
 def read_poses(path: Path, joints: JointUnits | Sequence[str]) -> tuple[PoseRow, ...]:
     """Poses at which a prediction is wanted. Raises InputError naming file, row and remedy."""
-    header, lines = _rows(path)
+    header, lines = read_table(path)
     columns = _joint_columns(path, header, JointUnits.of(joints))
     if "pose" not in header:
         raise InputError(f"{path} has no column pose; add one that names each row.")
@@ -132,13 +132,12 @@ def shown(path: Path, folder: Path) -> bool:
     return not any(part[0] == "." for part in path.relative_to(folder).parts)
 
 
-def read_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Header and rows of a table with their line numbers. Raises InputError for what is wrong."""
-    return table_of(path, decoded(path, MAX_BYTES))
+def read_table(path: Path, text: str | None = None) -> tuple[list[str], list["TableRow"]]:
+    """Header and rows of a table, or of a text that messages call `path`.
 
-
-def table_of(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """The same of a text; `path` is what messages name."""
+    Raises InputError for what is wrong.
+    """
+    text = decoded(path, MAX_BYTES) if text is None else text
     first = text.split("\n", 1)[0]
     delimiter = next((d for d in (",", ";", "\t") if d in first), ",")
     try:
@@ -162,7 +161,7 @@ def table_of(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str
                 f"{path}, row {number}: {len(row)} cells, the header has {len(header)}; "
                 f"correct the row."
             )
-    return header, numbered[1:]
+    return header, [TableRow(path, n, dict(zip(header, v, strict=True))) for n, v in numbered[1:]]
 
 
 def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[AxisColumn, ...]:
@@ -190,7 +189,7 @@ def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[A
 
 
 @dataclass(frozen=True)
-class _Row:
+class TableRow:
     """A row of a table: its line in the file, and its cells by column."""
 
     path: Path
@@ -271,13 +270,8 @@ class _Row:
         return StatedPoints(hit_point, responses, self.number, names)
 
 
-def _rows(path: Path) -> tuple[list[str], list[_Row]]:
-    header, lines = read_table(path)
-    return header, [_Row(path, n, dict(zip(header, v, strict=True))) for n, v in lines]
-
-
 def _recording_row(
-    row: _Row, folder: Path, columns: Sequence[AxisColumn], points: PointNames
+    row: TableRow, folder: Path, columns: Sequence[AxisColumn], points: PointNames
 ) -> PoseRow:
     response = row.signed_axis("response", "sensor") if row.cell("response") else None
     repeat = row.value("repeat") if row.cell("repeat") else None

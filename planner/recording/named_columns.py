@@ -31,14 +31,7 @@ from planner.recording.column_names import (
     time_unit,
     unit_text,
 )
-from planner.recording.records import (
-    Channel,
-    End,
-    FrfRecord,
-    Record,
-    TimeRecord,
-    check_numbers,
-)
+from planner.recording.records import Channel, End, FrfRecord, Record, TimeRecord, check_numbers
 from planner.recording.sampling import UNEVEN, aligned, sampling_rate
 
 _AT = re.compile(r"acceleration_(.+)_[xyz]$")
@@ -59,10 +52,8 @@ class Named:
 
     def attribute(self, *names: str) -> str | None:
         """The first attribute of these names; letters alone count."""
-        for key, value in self.attributes.items():
-            if _letters(key) in names:
-                return str(value)
-        return None
+        each = self.attributes.items()
+        return next((str(value) for key, value in each if _letters(key) in names), None)
 
     @property
     def simulated(self) -> bool:

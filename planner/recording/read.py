@@ -124,16 +124,12 @@ def _read_txt(path: Path) -> tuple[Record, ...]:
 
 
 READERS: dict[str, Callable[[Path], tuple[Record, ...]]] = {
-    ".uff": read_uff,
-    ".unv": read_uff,
-    ".uf58": read_uff,
+    **dict.fromkeys((".uff", ".unv", ".uf58"), read_uff),
     ".mat": read_mat,
-    ".h5": read_hdf5,
-    ".hdf5": read_hdf5,
+    **dict.fromkeys((".h5", ".hdf5"), read_hdf5),
     ".tdms": read_tdms,
     ".lvm": read_lvm,
-    ".csv": read_text,
-    ".tsv": read_text,
+    **dict.fromkeys((".csv", ".tsv"), read_text),
     ".txt": _read_txt,
     ".gz": read_text,
     WAV: read_wav,

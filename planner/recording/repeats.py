@@ -92,10 +92,9 @@ class _Alike:
 
     def faults(self, axis: int) -> Iterator[tuple[int, Fault]]:
         """Hits that disagree with three or more along an axis, and how."""
-        group, across = np.flatnonzero(self.axes == axis), self._across(axis)
+        group, own = np.flatnonzero(self.axes == axis), self._agreement(axis, self.centres[axis])
         if len(group) < 3:
             return
-        own = _Agreement(self.centres[axis], tuple(across.values()))
         alike = np.array([own.of(frf) for frf in self.frfs[group]])
         typical, sizes = float(np.median(alike)), own.sizes(self.frfs[group])
         for i, share, size in zip(group.tolist(), alike, sizes, strict=True):
@@ -103,10 +102,10 @@ class _Alike:
                 text = f"It {other_size(size, 'its repeats')} Correct the file, or hit again."
                 yield i, Fault("other_size", text)
                 continue
-            if share > typical - FAR_BELOW and not _struck(self.frfs[i], own.centre, across):
+            if share > typical - FAR_BELOW and not own.struck(self.frfs[i]):
                 continue
             same = [self.frfs[j] for j in group if j != i and self.level[j] == self.level[i]]
-            if told := _disagreement(self.frfs[i], own, across, same):
+            if told := own.disagreement(self.frfs[i], same):
                 text = f"Its FRF {told[1]} (correlation {share:.2f}, others {typical:.2f})"
                 yield i, Fault(told[0], f"{text}; check axis and hit point, and hit again.")
 
@@ -125,38 +124,32 @@ class _Alike:
 
     def _sized(self, i: int, same: list[int]) -> Doubt | None:
         own = self.frfs[[i, *same]]
-        agreement = _Agreement(_centre(own), tuple(self._across(self.axes[i]).values()))
+        agreement = self._agreement(self.axes[i], _centre(own))
         sizes = agreement.sizes(own)
         if not sizes[0] or outvoted(sizes):
             return None
         other = tuple(j for j, size in zip(same, sizes[1:], strict=True) if size * sizes[0] <= 0)
         return Doubt(other, agreement.of(own[0]), size=float(sizes[0]))
 
-    def _across(self, axis: int) -> dict[int, np.ndarray]:
-        return {other: centre for other, centre in self.centres.items() if other != axis}
-
-    def _elsewhere(self, i: int) -> bool:
-        """Whether a hit answers as those along another axis do."""
-        return any(
-            abs(_likeness(self.frfs[i], c)) > LIKE for c in self._across(self.axes[i]).values()
-        )
+    def _agreement(self, axis: int, centre: np.ndarray) -> "_Agreement":
+        across = {other: frf for other, frf in self.centres.items() if other != axis}
+        return _Agreement(centre, across)
 
     def _contradicted(self, i: int, j: int) -> Doubt | None:
-        across = self._across(self.axes[i])
-        others = tuple(across.values())
-        a, b = self.frfs[i], self.frfs[j]
-        likeness = max(_Agreement(b, others).of(a), _Agreement(a, others).of(b))
-        struck = _struck(a, b, across), _struck(b, a, across)
-        if likeness > UNLIKE and not any(struck):
+        both = self.frfs[i], self.frfs[j]
+        beside = [self._agreement(self.axes[i], frf) for frf in reversed(both)]
+        likeness = max(own.of(frf) for own, frf in zip(beside, both, strict=True))
+        struck = any(own.struck(frf) for own, frf in zip(beside, both, strict=True))
+        if likeness > UNLIKE and not struck:
             return None
-        odd = self._elsewhere(i), self._elsewhere(j)
+        odd = [bool(own.elsewhere(frf)) for own, frf in zip(beside, both, strict=True)]
         # Levels of what is not linear may be unlike; they are not opposite, nor of another axis.
         if self.level[i] != self.level[j] and likeness > -UNLIKE and not any(odd):
             return None
         return None if odd[1] and not odd[0] else Doubt((j,), likeness)
 
     def _repeated(self, i: int) -> Doubt | None:
-        for axis, centre in self._across(self.axes[i]).items():
+        for axis, centre in self._agreement(self.axes[i], self.frfs[i]).across.items():
             if abs(_likeness_in_size(self.frfs[i], centre)) >= SAME:
                 others = tuple(int(j) for j in np.flatnonzero(self.axes == axis))
                 return Doubt(others, _likeness(self.frfs[i], centre), AXES[axis])
@@ -189,7 +182,7 @@ class _Agreement:
     """How hits along an axis are answered, and in `across` those along the others."""
 
     centre: np.ndarray
-    across: tuple[np.ndarray, ...]
+    across: dict[int, np.ndarray]
 
     def of(self, frf: np.ndarray) -> float:
         """Likeness of an FRF, had it been tilted to the axis as far as hands tilt at most."""
@@ -221,14 +214,43 @@ class _Agreement:
         """
         if not self.across:
             return frfs
+        across = np.array(list(self.across.values()))
         norms = np.linalg.norm(frfs, axis=1, keepdims=True)
         size = np.where(norms > 0, norms / np.linalg.norm(self.centre), 1.0)
         both = [
-            by * (self.centre + untilted(frfs / by - self.centre, np.array(self.across)))
+            by * (self.centre + untilted(frfs / by - self.centre, across))
             for by in (np.ones_like(size), size)
         ]
         pairs = zip(*both, strict=True)
         return np.array([a if _likeness(a, self.centre) > LIKE else b for a, b in pairs])
+
+    def elsewhere(self, frf: np.ndarray) -> str:
+        """Along which other axis hits are answered as this one; "" where along none."""
+        centres = self.across.items()
+        return next((AXES[k] for k, other in centres if abs(_likeness(frf, other)) > LIKE), "")
+
+    def struck(self, frf: np.ndarray) -> bool:
+        """Whether an FRF is that of another axis in size too: no tilt brings in so much of it."""
+        plain = _likeness(frf, self.centre)
+        return any(
+            abs(_likeness(frf, other)) > max(LIKE, plain + FAR_BELOW)
+            and abs(np.vdot(other, frf)) > WHOLE * np.linalg.norm(other) ** 2
+            for other in self.across.values()
+        )
+
+    def disagreement(self, frf: np.ndarray, same: list[np.ndarray]) -> tuple[str, str] | None:
+        """Kind and text where an FRF that is unlike others of its axis is a mistake."""
+        if self.of(-frf) > UNLIKE:  # modes that move make FRFs unlike, never opposite
+            return "wrong_axis", "has the opposite sign of the others"
+        if axis := self.elsewhere(frf):
+            return "wrong_axis", f"is that of hits along {axis}"
+        # A structure that is not linear answers each level differently: only hits of the same force
+        # count, if they agree with each other or with all.
+        if any(replace(self, centre=one).of(frf) > LIKE for one in same):
+            return None
+        voters = [*same, self.centre]
+        agreed = any(_likeness(a, b) > LIKE for i, a in enumerate(voters) for b in voters[:i])
+        return ("incoherent", "does not agree with the others of its axis") if agreed else None
 
 
 def untilted(off: np.ndarray, across: np.ndarray) -> np.ndarray:
@@ -239,36 +261,6 @@ def untilted(off: np.ndarray, across: np.ndarray) -> np.ndarray:
     normal = (across.conj() @ across.T).real
     tilts = np.linalg.lstsq(normal, (off @ across.conj().T).real.T, rcond=None)[0]
     return off - np.clip(tilts, -MOST_TILT, MOST_TILT).T @ across
-
-
-def _disagreement(
-    frf: np.ndarray, own: _Agreement, across: dict[int, np.ndarray], same: list[np.ndarray]
-) -> tuple[str, str] | None:
-    """Kind and text where an FRF that is unlike others of its axis is a mistake."""
-    if own.of(-frf) > UNLIKE:  # modes that move make FRFs unlike, never opposite
-        return "wrong_axis", "has the opposite sign of the others"
-    for axis, centre in across.items():
-        if abs(_likeness(frf, centre)) > LIKE:
-            return "wrong_axis", f"is that of hits along {AXES[axis]}"
-    # A structure that is not linear answers each level differently: only hits of the same force
-    # count, if they agree with each other or with all.
-    if any(_Agreement(one, own.across).of(frf) > LIKE for one in same):
-        return None
-    voters = [*same, own.centre]
-    agreed = any(_likeness(a, b) > LIKE for i, a in enumerate(voters) for b in voters[:i])
-    if not agreed:
-        return None
-    return "incoherent", "does not agree with the others of its axis"
-
-
-def _struck(frf: np.ndarray, own: np.ndarray, across: dict[int, np.ndarray]) -> bool:
-    """Whether an FRF is that of another axis in size too: no tilt brings in so much of it."""
-    plain = _likeness(frf, own)
-    return any(
-        abs(_likeness(frf, other)) > max(LIKE, plain + FAR_BELOW)
-        and abs(np.vdot(other, frf)) > WHOLE * np.linalg.norm(other) ** 2
-        for other in across.values()
-    )
 
 
 def _centre(frfs: np.ndarray) -> np.ndarray:

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.recording.channel_faults import lost_samples
-from planner.recording.pulse import NORMAL_MAD, RISING_SAMPLES
-from planner.recording.records import Fault, TimeRecord
+from planner.recording.records import NORMAL_MAD, RISING_SAMPLES, Fault, TimeRecord
 from planner.recording.screening import (
     ANSWER_S,
     LEAST_RESPONSE_SNR,

@@ -133,11 +133,8 @@ def _start(lines: Sequence[str], form: Form) -> tuple[int, int]:
 
 def _width(lines: Sequence[str], form: Form) -> int:
     """How many leading cells are numbers in all of these lines."""
-    widths = []
-    for line in lines:
-        cells = form.split(line)
-        widths.append(next((i for i, c in enumerate(cells) if not _is_number(c)), len(cells)))
-    return min(widths)
+    rows = map(form.split, lines)
+    return min(next((i for i, c in enumerate(row) if not _is_number(c)), len(row)) for row in rows)
 
 
 def _header(

@@ -11,14 +11,7 @@ import numpy as np
 
 from planner.errors import ForeignFileError, InputError
 from planner.recording.column_names import MOTIONS, Unit, lookup, lookup_ratio
-from planner.recording.records import (
-    Channel,
-    End,
-    FrfRecord,
-    Record,
-    TimeRecord,
-    check_numbers,
-)
+from planner.recording.records import Channel, End, FrfRecord, Record, TimeRecord, check_numbers
 from planner.recording.sampling import aligned, sampling_rate
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.recording.entry_columns import check_size
-from planner.recording.folder import CHANNELS, read_table, table_of
+from planner.recording.folder import CHANNELS, TableRow, read_table
 from planner.recording.named_columns import Named, to_records
 from planner.recording.records import Record
 
@@ -140,7 +140,7 @@ def _scales(path: Path, data: bytes) -> list[Scaled]:
     table = scales_beside(path)
     own = _chunks(data).get(CHUNK)
     if own is not None:
-        header, rows = table_of(path, data[own].decode("utf-8", "replace"))
+        header, rows = read_table(path, data[own].decode("utf-8", "replace"))
     elif table.is_file():
         header, rows = read_table(table)
     else:
@@ -152,12 +152,9 @@ def _scales(path: Path, data: bytes) -> list[Scaled]:
     missing = [name for name in Scaled._fields[:4] if name not in header]
     if missing:
         raise InputError(f"{table} has no column {missing[0]}; its lines are such as {EXAMPLE}.")
-    cells = [(n, {k: v.strip() for k, v in zip(header, row, strict=True)}) for n, row in rows]
-    own_rows = [
-        _scaled(table, number, row)
-        for number, row in cells
-        if row.get("file", "") in ("", path.name)
-    ]
+    rows = [TableRow(table, row.number, dict(zip(header, row.cells.values(), strict=True)))
+            for row in rows]  # fmt: skip
+    own_rows = [_scaled(row) for row in rows if row.cell("file") in ("", path.name)]
     for key in ("channel", "name"):
         each = [getattr(one, key) for one in own_rows]
         twice = next((value for value in each if each.count(value) > 1), None)
@@ -168,15 +165,15 @@ def _scales(path: Path, data: bytes) -> list[Scaled]:
     return own_rows
 
 
-def _scaled(table: Path, number: int, cells: dict[str, str]) -> Scaled:
+def _scaled(row: TableRow) -> Scaled:
     try:
-        channel, full_scale = int(cells["channel"]), float(cells["full_scale"])
+        channel, full_scale = int(row.cell("channel")), float(row.cell("full_scale"))
     except ValueError:
         channel, full_scale = 0, math.nan
-    if channel < 1 or not 0 < full_scale < math.inf or not cells["name"] or not cells["unit"]:
-        raise InputError(
-            f"{table}, row {number}: channel {cells['channel'] or '?'} needs a number from 1, a "
-            f"name, a unit and a full_scale above 0; its lines are such as {EXAMPLE}."
+    name, unit, hit, hit_point = map(row.cell, ("name", "unit", "hit", "hit_point"))
+    if channel < 1 or not 0 < full_scale < math.inf or not name or not unit:
+        raise row.wrong(
+            f"channel {row.cell('channel') or '?'} needs a number from 1, a name, a unit and a "
+            f"full_scale above 0; its lines are such as {EXAMPLE}."
         )
-    of_file = cells.get("hit", ""), cells.get("hit_point", "")
-    return Scaled(channel, cells["name"], cells["unit"], full_scale, *of_file)
+    return Scaled(channel, name, unit, full_scale, hit, hit_point)

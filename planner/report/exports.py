@@ -11,9 +11,15 @@ from rich.text import Text
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError, writing
 from planner.export import uff
-from planner.export.collected import ExportData, export_data
-from planner.export.model_file import LOADER, model_arrays
-from planner.export.tables import frfs_csv, mat_arrays, modes_csv
+from planner.export.campaign_files import (
+    LOADER,
+    ExportData,
+    export_data,
+    frfs_csv,
+    mat_arrays,
+    model_arrays,
+    modes_csv,
+)
 from planner.recording.folder import read_poses
 from planner.recording.records import PoseRow
 from planner.report.answer import Done
@@ -69,7 +75,7 @@ def export(campaign: Campaign, kind: str, out: Path | None, poses_csv: Path | No
         files = {f"{identifier(found.name)}.mat": mat_arrays(found)}
     else:
         files = {"modes.csv": modes_csv(found), "frfs.csv": frfs_csv(found)}
-    poses = dict.fromkeys([*(m.pose for m in found.measured), *found.poses])
+    poses = dict.fromkeys([*(m.pose for m, _ in found.measured), *found.poses])
     return _written(kind, folder, files, list(poses), found.simulated, loader, errors)
 
 
@@ -102,12 +108,12 @@ def _program(campaign: Campaign, kind: str, folder: Path, rows: Sequence[PoseRow
 def _uff(found: ExportData) -> dict[str, Any]:
     """A file for each pose: FRFs and modes as measured, FRFs as predicted."""
     files, used = {}, set[str]()
-    for one in found.measured:
-        name, frf = unique(identifier(one.pose), used), one.frf
-        title = f"{found.label}, pose {one.pose}, measured"
+    for m, frf in found.measured:
+        name = unique(identifier(m.pose), used)
+        title = f"{found.label}, pose {m.pose}, measured"
         sets = uff.tool_frfs(frf.frequency_hz, frf.accelerance, title, frf.coherence)
         files[f"{name}_measured.unv"] = sets
-        files[f"{name}_modes.unv"] = uff.tool_modes(one.modes, title)
+        files[f"{name}_modes.unv"] = uff.tool_modes(m.modes, title)
     used = set[str]()
     for i, pose in enumerate(found.poses):
         title = f"{found.label}, pose {pose}, predicted"

@@ -9,14 +9,20 @@ import numpy as np
 import pytest
 
 from planner.dataset.dataset import LAID, Dataset, Recording, Visit
-from planner.dataset.measure import OVER
+from planner.dataset.measure import OVER, MeasuredPose
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
 from planner.dataset.visits import recordings_in, unlisted_folders
+from planner.dynamics.simulation import Simulation
 from planner.errors import InputError, RefusedError
 from planner.frf.estimator import estimate
+from planner.proof.hits import AXES, simulate_hit
+from planner.proof.load import load_truth
 from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames
+from planner.robot.robot import Robot
+from planner.studies.hits import as_read
+from tests.support.fitted_cases import drawn_arm, limits
 from tests.support.hit_files import write_hit
 from tests.support.simulated_hits import make_hit
 
@@ -115,15 +121,11 @@ def test_files_wherever_they_are_give_the_same(folder, read, tmp_path):
 
 
 def test_corrected_hits_make_entries_of_their_own(read):
-    louder = [
-        replace(
-            visit,
-            hits=tuple(
-                replace(hit, acceleration_m_s2=2 * hit.acceleration_m_s2) for hit in visit.hits
-            ),
-        )
+    twice = [
+        tuple(replace(hit, acceleration_m_s2=2 * hit.acceleration_m_s2) for hit in visit.hits)
         for visit in read.visits
     ]
+    louder = [replace(visit, hits=hits) for visit, hits in zip(read.visits, twice, strict=True)]
     now = read.corrected(louder, 0.5)
     assert now.poses == ("A", "B", "A")
     assert now.frfs[0].hits == (2, 2, 2)
@@ -196,3 +198,25 @@ def test_folders_whose_recordings_no_table_names_are_told_of(tmp_path):
     (said,) = unlisted_folders(tmp_path, found)
     assert "P2 is left out: no recordings.csv says" in said
     assert "name the campaign" in said
+
+
+POSES = 2
+
+
+@pytest.mark.parametrize("name", ["kr10", "irb6640", "kr210"])
+def test_perfect_hits_give_the_true_frfs(name, tmp_path):
+    rng, arm = drawn_arm(name, 31, tmp_path)
+    truth = load_truth(arm.toml)
+    low, high = limits(arm, Simulation(Robot.load(arm.toml)))
+    hammer = replace(arm.hammer, noise=0.0, force_noise=0.0)
+    for q in rng.uniform(low, high, (POSES, len(low))):
+        hits = [simulate_hit(truth, q, f"+{axis}", hammer, rng) for axis in AXES]
+        frf = MeasuredPose((), arm.band_hz, given=as_read(hits, hammer)).frf.within(arm.band_hz)
+        s = 2j * np.pi * frf.frequency_hz + frf.exponential_rate_1_s
+        poles, residues, _ = truth.poles(q)
+        each = 1 / (s - poles[:, None])
+        true = s**2 * np.einsum("kij,kf->ijf", residues, each)
+        ringing = residues * poles[:, None, None] ** 2
+        cut = each * np.exp((poles[:, None] - s) * frf.tail_s)
+        off = frf.accelerance - (true - np.einsum("kij,kf->ijf", ringing, cut))
+        assert np.linalg.norm(off) < 1e-3 * np.linalg.norm(true)

@@ -24,13 +24,7 @@ from planner.dynamics.simulation import Simulation
 from planner.effects.table import EffectLibrary, diagnosed
 from planner.proof.cases import SCATTER
 from planner.proof.detectability import ScoredCase, detection_problem
-from planner.proof.deviation import (
-    AttachedResonator,
-    BentLink,
-    Deviation,
-    Spring,
-    StiffnessRipple,
-)
+from planner.proof.deviation import AttachedResonator, BentLink, Deviation, Spring, StiffnessRipple
 from planner.proof.fault_injection import HitVisit, InjectedFaults, hit_poses, quiet_hits
 from planner.proof.hits import Hammer
 from planner.proof.load import load_truth

@@ -53,6 +53,7 @@ def test_a_file_of_one_sensor_is_the_tools_whatever_its_node() -> None:
     assert hit.responses == tuple(Dof("sensor", a) for a in "xyz")
 
 
+ELBOW = PointNames({"elbow": "xyz"}, {"3": "elbow"})
 TOOL_AT_2 = replace(NAMES, nodes={**NAMES.nodes, "2": "sensor"})
 
 
@@ -88,44 +89,29 @@ def test_a_node_that_nobody_listed_is_that_of_the_stated_point_without_one() -> 
 
 
 @pytest.mark.parametrize(
-    ("given", "stated", "told"),
+    ("given", "stated", "names", "told"),
     [
-        (record(("8", 1)), StatedPoints(names=NAMES, row=5), "node 8, which is none of robot.toml"),
-        (
-            record(("3", 1)),
-            StatedPoints("", ("base",), 5, NAMES),
-            "node 3, which is elbow, the tab",
-        ),
-        (
-            record(("4", 2)),
-            StatedPoints(names=NAMES, row=5),
-            "along y at base, whose sensor has x ",
-        ),
-        (record(("", 1)), StatedPoints("", ("base", "elbow"), 5, NAMES), "which of base, elbow"),
-        (
-            record(("3", 1), hit_node="4"),
-            StatedPoints("elbow", (), 5, NAMES),
-            "was hit at node 4, which is base, the table says elbow",
-        ),
+        (record(("8", 1)), ("", ()), NAMES, "node 8, which is none of robot.toml"),
+        (record(("3", 1)), ("", ("base",)), NAMES, "node 3, which is elbow, the tab"),
+        (record(("4", 2)), ("", ()), NAMES, "along y at base, whose sensor has x "),
+        (record(("", 1)), ("", ("base", "elbow")), NAMES, "which of base, elbow"),
+        (record(("3", 1), hit_node="4"), ("elbow", ()), NAMES,
+         "was hit at node 4, which is base, the table says elbow"),
+        # An unknown node that may be the tool's.
+        (record(("3", 1), hit_node="1"), ("", ()), ELBOW,
+         '[[point]] (name = "tcp", node = 1, if it is the'),
+        (record(("1", 1), hit_node="3"), ("", ()), ELBOW,
+         '(name = "sensor", node = 1, if it is the'),
+        (record(("2", 1), hit_node="1"), ("", ()), PointNames({"tcp": "xyz"}, {"2": "tcp"}),
+         "add a [[point]]."),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_point_or_another_is_refused(
-    given: TimeRecord, stated: StatedPoints, told: str
+    given: TimeRecord, stated: tuple[str, tuple[str, ...]], names: PointNames, told: str
 ) -> None:
     with pytest.raises(InputError, match=r"^a\.uff \(row 5 of recordings\.csv\)") as refused:
-        hits_from([given], "+x", stated)
+        hits_from([given], "+x", StatedPoints(*stated, 5, names))
     assert told in str(refused.value)
-
-
-def test_an_unknown_node_that_may_be_the_tools_is_told_how_to_say_so() -> None:
-    nodes = PointNames({"elbow": "xyz"}, {"3": "elbow"})
-    with pytest.raises(InputError, match=r'\[\[point\]\] \(name = "tcp", node = 1, if it is the'):
-        hits_from([record(("3", 1), hit_node="1")], "+x", StatedPoints(names=nodes))
-    with pytest.raises(InputError, match=r'\(name = "sensor", node = 1, if it is the'):
-        hits_from([record(("1", 1), hit_node="3")], "+x", StatedPoints(names=nodes))
-    said = PointNames({"tcp": "xyz"}, {"2": "tcp"})
-    with pytest.raises(InputError, match=r"add a \[\[point\]\]\.$"):
-        hits_from([record(("2", 1), hit_node="1")], "+x", StatedPoints(names=said))
 
 
 def test_columns_name_points() -> None:
@@ -184,3 +170,22 @@ def test_a_table_that_names_no_point_is_refused(
     with pytest.raises(InputError) as refused:
         read_recordings(table(tmp_path, *cells), ("j",), NAMES)
     assert told in str(refused.value)
+
+
+@pytest.mark.parametrize("number", range(-6, 7))
+def test_a_direction_number_comes_back(number: int) -> None:
+    dof = Dof.of_uff(12, number)
+    assert (dof.node, dof.number) == ("12", number)
+    assert dof.positive.number == abs(number)
+    assert dof.sign * dof.positive.number == number
+
+
+def test_directions_are_spelled_by_axis_and_unknown_ones_refused() -> None:
+    assert Dof.of_uff(7, -3) == Dof("7", "-z")
+    assert str(Dof("P3", "y")) == "P3:y"
+    assert [Dof.of_uff(1, number).is_turn for number in (2, 5)] == [False, True]
+    for direction in ("w", "+x", "-scalar", ""):
+        with pytest.raises(InputError, match="direction"):
+            Dof("3", direction)
+    with pytest.raises(InputError, match="direction 7"):
+        Dof.of_uff(3, 7)

@@ -1,6 +1,7 @@
-"""FRFs under another point's name, where only the simulation can tell."""
+"""What only the simulation tells of sensors and hits: whether they were there, what they weigh."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,10 +9,15 @@ import pytest
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.measurement.point_places import misplaced
+from planner.measurement.sensor_loading import unloaded
+from planner.modal.modes import Mode
+from planner.proof.deviation import Deviation
+from planner.proof.fault_injection import InjectedFaults
 from planner.proof.load import load_truth
 from planner.recording.points import Layout
 from planner.robot.robot import Robot
-from tests.support.arm_with_points import poses, write_arm
+from tests.support.arm_with_points import poses, record, write_arm
+from tests.support.outside import told
 
 HZ, BAND = np.linspace(6.0, 80.0, 150), (6.0, 80.0)
 NAMES = "P001", "P002"
@@ -79,3 +85,72 @@ def test_a_simulation_that_describes_nothing_asks_nothing(
     assert misplaced([far], poses(2), frfs(h, wrong), BAND, NAMES) == ()
     # Beside one that describes them, it does no harm.
     assert misplaced([far, simulation], poses(2), frfs(h, wrong), BAND, NAMES) != ()
+
+
+# Two heavy clusters of sensors; the tool's own weighs nothing.
+KG = {"shoulder": 3.0, "elbow": 1.5}
+BOTH = ("sensor", "shoulder", "elbow")
+HEARD = ("sensor", "elbow")
+
+
+def heavy_arm(folder: Path) -> Path:
+    """robot.toml of the arm whose points carry masses."""
+    toml = write_arm(folder)
+    text = toml.read_text()
+    for name, kg in KG.items():
+        text = text.replace(f'name = "{name}"\n', f'name = "{name}"\nmass_kg = {kg}\n')
+    toml.write_text(text)
+    return toml
+
+
+@pytest.fixture(scope="module")
+def surveyed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, np.ndarray]:
+    """Folder, robot.toml and joint angles; at P002 the clusters roved."""
+    folder = tmp_path_factory.mktemp("loaded")
+    toml, q = heavy_arm(folder / "robot"), poses(2)
+    stays = [
+        ("P001", q[0], "tcp", HEARD),
+        ("P002", q[1], "tcp", HEARD),
+        ("P002", q[1], "tcp", BOTH[:2]),
+    ]
+    record(folder / "recordings", toml, stays, InjectedFaults(Deviation()))
+    return folder / "recordings", toml, q
+
+
+def bare(toml: Path, q: np.ndarray, sensors: tuple[str, ...] = ("sensor",)) -> np.ndarray:
+    """True frequencies in Hz with the masses of some sensors."""
+    return replace(load_truth(toml), sensors=sensors).modes(q, 4)[0]
+
+
+@pytest.mark.slow
+def test_frequencies_are_given_without_the_sensors(surveyed: tuple[Path, Path, np.ndarray]) -> None:
+    folder, toml, q = surveyed
+    found = told("modes", folder, "--robot", toml)
+    for pose, row in zip(found["poses"], q, strict=True):
+        true = bare(toml, row)
+        for mode in (*pose["modes"], *pose["unlabelled"]):
+            nearest = true[np.argmin(np.abs(np.log(true / mode["frequency_hz"])))]
+            off = abs(mode["frequency_hz"] - nearest)
+            assert off < 3 * mode["frequency_sd_hz"]
+            assert off < 0.003 * nearest
+    lowered = [m["sensors_lowered_percent"] for m in found["poses"][0]["modes"]]
+    loaded = bare(toml, q[0], HEARD)
+    expected = 100 * (1 - loaded / bare(toml, q[0]))
+    assert max(lowered) == pytest.approx(np.max(expected[: len(lowered)]), rel=0.1)
+    assert max(lowered) > 1.0
+    assert "elbow (1.5 kg)" in found["remarks"][0]
+    assert any(text.startswith("P002: sensors were moved") for text in found["remarks"])
+    assert not any(text.startswith("P001: sensors were moved") for text in found["remarks"])
+
+
+def test_without_masses_nothing_is_corrected(tmp_path: Path) -> None:
+    nothing = np.full((3, 3), np.nan)
+    modes = [Mode(24.0, 0.1, 0.02, 0.001, nothing, nothing, np.array([1.0, 0.0, 0.0]))]
+    light = Simulation(Robot.load(write_arm(tmp_path / "light")))
+    assert unloaded(modes, light, poses(1)[0], BOTH).modes == tuple(modes)
+    heavy = Simulation(Robot.load(heavy_arm(tmp_path / "heavy")))
+    assert unloaded(modes, heavy, poses(1)[0], ("sensor",)).modes == tuple(modes)
+    far = [replace(modes[0], frequency_hz=5.0)]
+    found = unloaded(far, heavy, poses(1)[0], BOTH)
+    assert np.isnan(found.lowered).all()
+    assert found.modes == tuple(far)

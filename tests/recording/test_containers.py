@@ -10,8 +10,7 @@ from planner.errors import InputError
 from planner.recording.hits import hits_from
 from planner.recording.read import hits_in, read
 from planner.recording.records import FrfRecord
-from tests.support.containers import MANY_HITS, ONE_HIT, SPECIAL, late_h5, lvm_file, tdms
-from tests.support.lvm_files import lvm
+from tests.support.containers import MANY_HITS, ONE_HIT, SPECIAL, late_h5, lvm, lvm_file, tdms
 from tests.support.simulated_hits import make_hit
 
 
@@ -94,17 +93,12 @@ def test_frfs_of_a_measuring_program_are_read(tmp_path):
     lines = np.linspace(0.0, 100.0, 201)
     values = (1 + 1j * lines) / 100
     x = {"start_value": 0.0, "increment": 0.5, "quantity": {"label": "Hz"}}
-    scipy.io.savemat(
-        tmp_path / "frfs.mat",
-        {
-            f"FRF_{k}": {
-                "x_values": x,
-                "y_values": {"values": values * k, "quantity": {"label": "(mm/s^2)/N"}},
-                "function_record": {"name": f"acc {axis}"},
-            }
-            for k, axis in enumerate("XYZ", 1)
-        },
-    )
+    made = {}
+    for k, axis in enumerate("XYZ", 1):
+        y = {"values": values * k, "quantity": {"label": "(mm/s^2)/N"}}
+        own = {"x_values": x, "y_values": y, "function_record": {"name": f"acc {axis}"}}
+        made[f"FRF_{k}"] = own
+    scipy.io.savemat(tmp_path / "frfs.mat", made)
     (record,) = read(tmp_path / "frfs.mat")
     assert isinstance(record, FrfRecord)
     assert (record.quantity, record.unit) == ("accelerance", "m/s^2/N")

@@ -1,12 +1,20 @@
-"""Screening: bad hits are refused for the right reason, good ones are not."""
+"""Screening: bad hits and channels are refused for the right reason, good ones are not."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from planner.dataset.dataset import Dataset, Visit
+from planner.frf.estimator import estimate
+from planner.frf.frf import unreciprocal
+from planner.recording.channel_faults import by_good_sensors
+from planner.recording.dof import Dof
+from planner.recording.force_levels import levels
+from planner.recording.records import Hit
 from planner.recording.repeats import doubts, screen_repeats
-from planner.recording.screening import screen
+from planner.recording.screening import driving_point, screen
 from tests.support.simulated_hits import POLES, RESIDUES, make_hit
 
 BAND = (4.0, 60.0)
@@ -157,3 +165,98 @@ def test_a_coarse_converter_is_no_overload_and_no_error():
     assert "clipped" not in refused(replace(good, acceleration_m_s2=samples))
     samples[2] = step * (np.arange(samples.shape[1]) % 2)
     assert "clipped" not in refused(replace(good, acceleration_m_s2=samples))
+
+
+ELBOW = tuple(Dof("elbow", axis) for axis in "xyz")
+
+
+def by_two_sensors(rng, spoil=lambda samples: samples):
+    """A hit that the tool's sensor and one at the elbow heard; elbow y is spoilt."""
+    hit = make_hit(rng)
+    own = hit.acceleration_m_s2
+    more = 0.4 * own[[1, 2, 0]]
+    more[1] = spoil(more[1])
+    return replace(
+        hit, acceleration_m_s2=np.vstack([own, more]), responses=(*hit.responses, *ELBOW)
+    )
+
+
+def clipped(samples):
+    most = 0.3 * np.max(np.abs(samples))
+    return np.clip(samples, -most, most)
+
+
+@pytest.mark.parametrize(
+    ("kind", "spoil", "said"),
+    [("dead", lambda samples: np.full_like(samples, 0.3), "elbow y is constant"),
+     ("clipped", clipped, "elbow y is clipped")],
+)  # fmt: skip
+def test_a_bad_channel_costs_its_sensor_and_no_other(kind, spoil, said):
+    hit = by_two_sensors(np.random.default_rng(0), spoil)
+    assert kind in {fault.kind for fault in screen(hit, BAND)}
+    left, told = by_good_sensors(hit)
+    assert left.responses == hit.responses[:3]
+    np.testing.assert_array_equal(left.acceleration_m_s2, hit.acceleration_m_s2[:3])
+    assert [fault.kind for fault in told] == [kind]
+    assert said in told[0].text
+    assert not any(fault.refuse for fault in (*told, *screen(left, BAND)))
+
+
+def test_good_sensors_stay_and_the_only_one_is_refused_as_before():
+    rng = np.random.default_rng(2)
+    whole = by_two_sensors(rng)
+    assert by_good_sensors(whole) == (whole, ())
+    alone = make_hit(rng)
+    dead = alone.acceleration_m_s2 * np.array([[1.0], [0.0], [1.0]])
+    alone = replace(alone, acceleration_m_s2=dead)
+    assert by_good_sensors(alone) == (alone, ())
+    assert {fault.kind for fault in screen(alone, BAND) if fault.refuse} == {"dead"}
+
+
+def test_a_hit_whose_sign_is_turned_answers_against_itself():
+    rng = np.random.default_rng(3)
+    for axis in ("+x", "-x", "+y", "-y", "+z", "-z"):
+        hit = make_hit(rng, axis, noise=0.05)
+        assert driving_point(hit, BAND) == ()
+        other = ("-" if axis[0] == "+" else "+") + axis[1]
+        (fault,) = driving_point(replace(hit, axis=other), BAND)
+        assert not fault.refuse
+        assert f"hits along {other}" in fault.text
+        assert driving_point(replace(hit, axis=other, hit_point="elbow"), BAND) == ()
+
+
+def test_axes_that_do_not_fit_each_other_are_said():
+    rng = np.random.default_rng(4)
+    hits = tuple(make_hit(rng, axis) for axis in ("+x", "+y", "+z") * 2)
+    assert unreciprocal(estimate(hits, BAND)) == ()
+    turned = np.array([[1.0], [-1.0], [1.0]])
+    wrong = tuple(replace(h, acceleration_m_s2=turned * h.acceleration_m_s2) for h in hits)
+    told = unreciprocal(estimate(wrong, BAND))
+    assert told
+    assert all("along y" in text for text in told)
+
+
+def pushed(peak):
+    force = np.zeros(64)
+    force[8] = peak
+    return Hit(Path("hit"), "+x", 400.0, force, np.zeros((3, 64)))
+
+
+def scattered(rng, *usual, count=8):
+    """Nobody hits alike twice."""
+    return [peak * factor for peak in usual for factor in rng.uniform(0.75, 1.25, count)]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_levels_are_told_apart_whether_or_not_forces_lie_in_between(seed):
+    rng = np.random.default_rng(seed)
+    assert len(levels(np.sort(scattered(rng, 1000.0, count=20)))) == 1
+    found = levels(np.sort(scattered(rng, 400.0, 1000.0, 2500.0)))
+    assert [len(group) for group in found] == [8, 8, 8]
+    # Hits asked for between the levels so far fill the gap that told them apart.
+    between = scattered(rng, 1400.0, 1700.0, 2000.0, 2500.0, count=2)
+    assert len(levels(np.sort(scattered(rng, 1200.0, 3000.0) + between))) > 1
+    hits = tuple(pushed(peak) for peak in rng.permutation(np.geomspace(500, 3500, 24)))
+    recorded = Dataset.of_visits((Visit("P1", np.zeros(6), 0.0, hits),), (5.0, 50.0))
+    groups = levels(np.sort([hit.pulse.peak_n for hit in hits]))
+    assert all(hit.pulse.peak_n in groups[recorded.level(hit)] for hit in hits)
