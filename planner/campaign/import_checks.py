@@ -229,9 +229,9 @@ def unexpected_modes(before: Model, model: Model, pose: str) -> tuple[str, ...]:
     if not told:
         return ()
     return (
-        f"Not as expected: {'; '.join(told)}. Labels count modes from the lowest: one that was not "
-        f"expected may have come in between; else an angle of {pose}, or of a pose before, may be "
-        f"wrong.",
+        f"Not as expected: {'; '.join(told)}. Modes are numbered from the lowest: one more, or one "
+        f"less, shifts all numbers above. If that is not it, an angle of {pose}, or of a pose "
+        f"before, may be wrong.",
     )
 
 

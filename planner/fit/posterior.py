@@ -7,6 +7,7 @@ import numpy as np
 
 from planner.dynamics.simulation import Simulation
 from planner.effects.effect import Operator
+from planner.effects.one_visit import OfOneVisit
 from planner.fit.data import FrfData
 from planner.fit.fitted import StructureFit
 from planner.fit.misfit import FrfMisfit
@@ -179,15 +180,21 @@ class RobotPosterior(RobotBelief):
         """What the structure has beside what is stated and that matters, and by how much."""
         return tuple(
             f"{words} A simulation without it has FRFs {significant(100 * share)} % off."
-            for share, words in self._told(artefacts=False)
+            for share, words, _ in self._told(artefacts=False)
         )
 
     @cached_property
     def misread(self) -> tuple[str, ...]:
-        """Where recordings are not of what they are said to be of, where that matters."""
-        return tuple(words for _, words in self._told(artefacts=True))
+        """Where recordings are not of what they are said to be of, where that matters.
 
-    def _told(self, artefacts: bool) -> list[tuple[float, str]]:
+        Of a pose what changes most: the rest stands in for what that has not.
+        """
+        told: dict[str, str] = {}
+        for _, words, effect in self._told(artefacts=True):
+            told.setdefault(effect.pose if isinstance(effect, OfOneVisit) else words, words)
+        return tuple(told.values())
+
+    def _told(self, artefacts: bool) -> list[tuple[float, str, Operator]]:
         """Shares of FRFs that effects change, largest first, and what each is."""
         told, known = [], dict(zip(self.structure.effects, self.found.shares, strict=True))
         for things in self._things:
@@ -195,8 +202,8 @@ class RobotPosterior(RobotBelief):
             share = known[first] if len(things) == 1 else self.found.share_of(things)
             if share >= MATTERS and first.artefact == artefacts:
                 words = first.words_together([self.values(effect) for effect in things])
-                told.append((share, words.replace(first.at, first.name[1])))
-        return sorted(told, reverse=True)
+                told.append((share, words.replace(first.at, first.name[1]), first))
+        return sorted(told, key=lambda one: one[:2], reverse=True)
 
     @property
     def _things(self) -> list[list[Operator]]:

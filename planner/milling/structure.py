@@ -162,7 +162,7 @@ def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
     if np.any(spread > 0):
         remarks.append(
             f"Depths at 95 %: frequency, damping and size of each mode are drawn so that the FRFs "
-            f"scatter by their sd ({100 * given:.0f} % of its square is met)."
+            f"scatter by {100 * np.sqrt(given):.0f} % of their sd."
         )
     noisy = fit if plane.sd is None and fit.found.fit_error > ROUNDING else None
     return Structure(fit.modes, spread, plane, tuple(remarks), noisy)

@@ -18,6 +18,7 @@ from planner.modal.residues import rank_one
 # so that it is judged by lines that hold it.
 CUT = 0.12
 LEAST_LINES = 32
+COPIES = 1e6  # of the square of what a fit misses, in the scatter of hits: these do not scatter
 
 
 def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
@@ -242,7 +243,12 @@ def _at_all_axes(mode: Mode, columns: np.ndarray) -> Mode:
 def _remarks(found: PoleIdentification, doubtful: tuple[Mode, ...]) -> tuple[str, ...]:
     remarks = []
     excess = float(np.median(found.fit.excess)) / found.data.correlated
-    if found.data.variance is not None and excess >= 4:
+    if found.data.variance is not None and excess >= COPIES:
+        remarks.append(
+            "The hits of an axis are equal to rounding, so their scatter tells nothing: are they"
+            " copies of one recording?"
+        )
+    elif found.data.variance is not None and excess >= 4:
         remarks.append(
             f"The fit misses the FRFs by {np.sqrt(excess):.2g} times their scatter between hits:"
             " standard deviations were enlarged accordingly."

@@ -158,8 +158,8 @@ class IdentificationReport(Answer):
     def _agreement(self) -> RenderableType:
         aside = self.held_out
         made = table(
-            f"Agreement of simulated with measured FRFs (misfit {self.misfit:.2f}, 1 at the "
-            f"noise; {self.seconds:.1f} s)",
+            f"Agreement of simulated with measured FRFs (mean square residual {self.misfit:.2f} of "
+            f"the noise's; {self.seconds:.1f} s)",
             *("poses", "FRAC before", "FRAC after", "Frobenius before", "Frobenius after"),
         )
         rows = [("all", self.fit)]

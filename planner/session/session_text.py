@@ -33,7 +33,7 @@ LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it
 def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
     """What came out against what was expected."""
     table = plain_table(
-        "mode", "measured (Hz)", "expected (Hz)", "off by (sd)", "damping (%)", "is this mode (%)"
+        "mode", "measured (Hz)", "expected (Hz)", "off by (sd)", "damping (%)", "number sure (%)"
     )
     for one in found_modes(report.pose, report.model, report.model_before):
         expected, mode = with_sd(one.expected_hz, one.sd_hz), one.mode
