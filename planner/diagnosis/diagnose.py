@@ -18,6 +18,7 @@ from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import EffectLibrary, diagnosed
 from planner.errors import InputError
+from planner.fit.expected import ExpectedFrfs
 from planner.fit.explanations import ExploredStructures, most_probable
 from planner.fit.fitted import StructureFit, settled, size_of
 from planner.fit.held_out import set_aside
@@ -51,10 +52,6 @@ class ThreefoldSimilarity:
     refitted: Similarity = NO_SIMILARITY
     explained: Similarity = NO_SIMILARITY
     poses: tuple[str, ...] | UnsetType = UNSET
-
-    def worse(self, matters: float) -> bool:
-        """Whether what explains predicts worse than the robot refitted, by what matters of |H|."""
-        return self.refitted.frobenius - self.explained.frobenius > matters
 
 
 @dataclass(frozen=True)
@@ -191,9 +188,8 @@ def explain(
     recorded, search, explored, levels = _explored(recorded, search, simulation, progress)
     fits, aside = (explored.plain, most_probable(explored.settled)), set_aside(recorded.q)
     progress("judging", 0.9)
-    held_out = _held_out(search, fits, aside) if aside else None
-    worse = held_out is not None and held_out.worse(matters)
-    verdict = judged(explored, matters, between(recorded.q), from_signals, levels, worse)
+    held_out, left = _held_out(search, fits, aside) if aside else (None, 0.0)
+    verdict = judged(explored, matters, between(recorded.q), from_signals, levels, left)
     return Diagnosis(
         recorded,
         search,
@@ -312,8 +308,9 @@ def _agreement(
 
 def _held_out(
     search: Search, fits: tuple[StructureFit, StructureFit], aside: tuple[int, ...]
-) -> ThreefoldSimilarity:
-    """Of fits that never saw the poses set aside; the structure was chosen with all."""
+) -> tuple[ThreefoldSimilarity, float]:
+    """Of fits that never saw the poses set aside, and what share of FRFs the last of them misses
+    there; the structure was chosen with all."""
     data = search.data(SEARCHED)
     kept = np.array([i for i in range(len(data.q)) if i not in aside])
     again = []
@@ -324,4 +321,6 @@ def _held_out(
         again.append(settled(misfit, misfit(fit.at.x, fit.at.own[kept])))
     there = replace(again[0].misfit, data=data.at(np.array(aside)))
     shown = StructureFit(there, again[0].at, 0.0)
-    return _agreement((again[0], again[1]), (shown, shown))
+    expected = ExpectedFrfs(RobotPosterior.of(again[1]), search.band_hz)
+    left = max(expected.discrepancy(data.at(np.array([pose]))) for pose in aside)
+    return _agreement((again[0], again[1]), (shown, shown)), left

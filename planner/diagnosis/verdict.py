@@ -90,7 +90,7 @@ def judged(
     q: np.ndarray,
     from_signals: Sequence[Place] = (),
     levels: Levels | None = None,
-    worse: bool = False,
+    aside: float = 0.0,
 ) -> Verdict:
     """Of what was explored, of effects `from_signals` in the signals, and of laws of force
     `levels`.
@@ -98,7 +98,7 @@ def judged(
     Sizes are told at q (n, dof) in rad, poses that were not measured. Averages over levels are bent
     by what is left of a joint's law: beside one only what changes FRFs by more is told, and no more
     need be explained than what makes a simulation worth following. What is
-    named and predicts poses set aside `worse` than the refitted robot explains nothing.
+    named and misses FRFs of poses set `aside` by a share that matters explains nothing.
     """
     weights, best = probabilities(explored.settled), most_probable(explored.settled)
     sizes = _Sizes(explored, weights, matters, q)
@@ -108,7 +108,7 @@ def judged(
     laws = levels.laws if levels else ()
     named = [e for e in effects if e.counts]
     nameless = any(e.operator.general for e in named)
-    wrong = nameless or (worse and named)
+    wrong = nameless or (aside > matters and named)
     bound = FOLLOWED if laws else EXPLAINS * matters
     left = size_of(best) > bound or (wrong and not laws)
     unknown = left or bool(levels and levels.unexplained) or UNKNOWN in from_signals

@@ -95,8 +95,11 @@ class ExpectedFrfs:
         return str(robot.model.names[robot.model.frames[robot.tcp_id].parentJoint])
 
     def _misfit(self, q: np.ndarray, frf: Frf, size: float) -> FrfMisfit:
-        structure = self._structure(frf.layout.sensors)
-        data = FrfData.of(structure.prior, (frf,), q[None], self.band_hz, LINES)
+        prior = self.posterior.structure.prior
+        return self._of(FrfData.of(prior, (frf,), q[None], self.band_hz, LINES), size)
+
+    def _of(self, data: FrfData, size: float) -> FrfMisfit:
+        structure = self._structure(data.measured.layout.sensors)
         return FrfMisfit(structure, data, self.tolerances, size)
 
     def outlier_log_density(self, q: np.ndarray, frf: Frf) -> float:
@@ -106,7 +109,13 @@ class ExpectedFrfs:
 
     def density(self, q: np.ndarray, frf: Frf) -> tuple[float, float]:
         """The same if it is, but for a discrepancy like that of the poses before; its size."""
-        misfit = self._misfit(q, frf, SIZES[0])
+        return self._density(self._misfit(q, frf, SIZES[0]))
+
+    def discrepancy(self, data: FrfData) -> float:
+        """Share of FRFs that is not as expected, hits and chain apart, where `data` are of."""
+        return self._density(self._of(data, SIZES[0]))[1]
+
+    def _density(self, misfit: FrfMisfit) -> tuple[float, float]:
         usual, each = np.log(max(self.posterior.size, SIZES[-1])), []
         x, own = misfit.structure.mean, None
         for size in SIZES:

@@ -171,7 +171,7 @@ def test_cases_are_kept_as_they_come_and_not_done_again(tmp_path, monkeypatch):
     """The answer of a case that was changed after it was sealed is noticed."""
     done = []
 
-    def each(_function, _shared, tasks, _jobs):
+    def each(_function, _shared, tasks, _jobs, _scheduler):
         for k, task in enumerate(tasks):
             done.append(task.name)
             text = json.dumps(answer(MASS))

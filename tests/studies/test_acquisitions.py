@@ -16,7 +16,7 @@ import pytest
 from planner.campaign.build import build, hits_unknown
 from planner.campaign.cell import Cell
 from planner.campaign.config import CampaignConfig
-from planner.campaign.measured_modes import from_mode
+from planner.campaign.labels import from_mode
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
