@@ -177,7 +177,7 @@ class _Neighbourhood:
         trials = np.tile(poles, (shift.size, 1))
         trials[:, a] += shift
         trials = trials[trials[:, a].real < 0]
-        return trials[np.argmin(self._bound(trials))]
+        return trials[np.argmin(self._bound(trials))] if trials.size else poles
 
     @cached_property
     def _turns(self) -> np.ndarray:
