@@ -133,7 +133,10 @@ def harder(name: str, seed: int, folder: Path) -> Case:
     concealed = ("soft base", "bearings", "hose")
     free = _bearings(truth)
     if len(free) < 2:  # robot.toml states them all
-        injected, concealed = added(injected, "bending link", 1.0, arm, rng), ("soft base", "bending link", "hose")
+        injected, concealed = (
+            added(injected, "bending link", 1.0, arm, rng),
+            ("soft base", "bending link", "hose"),
+        )
     for joint, axis, own in (free[i] for i in rng.permutation(len(free))[:2]):
         k = 6 * own * log_uniform(rng, 0.5, 2.0)
         injected = deviate(injected, extra=[Spring(joint, triple(axis), k, 4e-4 * k)])
