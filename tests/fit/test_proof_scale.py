@@ -13,8 +13,11 @@ from tests.support.fitted_cases import ARMS, Case, Judged, everyday, forgotten, 
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(14400)]
 FIRST, EVERYDAY, HARDER, FORGOTTEN = 5100, 50, 15, 30
-NAMES = {"soft base": ("soft_base", "shifting_base", "foundation"), "bending link": ("link_flexibility",),
-         "hose": ("local_resonator",)}  # fmt: skip
+NAMES = {
+    "soft base": ("soft_base", "shifting_base", "foundation"),
+    "bending link": ("link_flexibility",),
+    "hose": ("local_resonator",),
+}
 
 
 def judged(
