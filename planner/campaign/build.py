@@ -134,13 +134,14 @@ def _guided(
     labelled, table = label(cell, used, low), cell.config.surrogate
     seen = observations(cell, labelled)
     if tuned is not None:
+        known = np.isfinite(tuned[1]) & np.array([[pose.own] for pose in labelled])
         hz, sd = (
-            np.where(np.isfinite(tuned[1]), own, found)
+            np.where(known, own, found)
             for own, found in zip(tuned, (seen.frequency_hz, seen.frequency_sd_hz), strict=True)
         )
         seen = replace(seen, frequency_hz=hz, frequency_sd_hz=sd)
-    known, elsewhere = low.discrepancy if labelled else None, simulated_elsewhere(cell, low)
-    primary = fit_primary(seen, known, low.belief, table.model, table.kernel, elsewhere)
+    left, elsewhere = low.discrepancy if labelled else None, simulated_elsewhere(cell, low)
+    primary = fit_primary(seen, left, low.belief, table.model, table.kernel, elsewhere)
     return labelled, seen, primary
 
 

@@ -74,7 +74,8 @@ def from_modal(modal: ModalModel | None) -> tuple[MeasuredMode, ...]:
 class LabelledPose:
     """A measured pose, q (dof,) in rad where it stood, with its modes by label (None: not found).
 
-    `simulated` are the simulation's (1, count), NaN where it has no such mode.
+    `simulated` are the simulation's (1, count), NaN where it has no such mode. They are the robot's
+    `own` where nothing was on it, or held it, that is not there elsewhere.
     """
 
     pose: str
@@ -82,6 +83,7 @@ class LabelledPose:
     modes: tuple[Mode | None, ...]
     probability: np.ndarray  # (count,) that the label is right
     simulated: SimulatedModes
+    own: bool = True
 
     @property
     def simulated_hz(self) -> np.ndarray:
@@ -116,6 +118,7 @@ def label(
             tracks.modes[i][:count],
             tracks.probability[i, :count],
             lowest[i : i + 1],
+            m.pose not in low.of_other_robots,
         )
         for i, m in enumerate(measurements)
     )
@@ -137,7 +140,8 @@ def gathered(
 
 
 def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObservations:
-    """The labelled modes as arrays, NaN where a mode was not found or a column not hit."""
+    """The labelled modes as arrays, NaN where one was not found or is not the robot's own, or a
+    column was not hit."""
     count, n = cell.config.modes.count, len(labelled)
     q = np.array([p.q for p in labelled]).reshape(n, len(cell.robot.joint_names))
     empty = np.zeros((0, count))
@@ -145,7 +149,7 @@ def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObserva
     if n:
         simulated = SimulatedModes.joined([p.simulated for p in labelled])
     x = cell.features(q) if n else np.zeros((0, len(cell.workspace.feature_names)))
-    return gathered(x, [p.modes for p in labelled], simulated)
+    return gathered(x, [p.modes if p.own else () for p in labelled], simulated)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,10 +183,15 @@ def found_modes(pose: str, model: "Model", before: "Model | None") -> list[Found
     found = [FoundMode(k, mode, certain) for k, (mode, certain) in labels]
     if before is None:
         return found
-    each = (row[0].tolist() for row in before.frequencies(labelled.q[None]))
-    return [
-        replace(one, expected_hz=hz, sd_hz=sd) for one, hz, sd in zip(found, *each, strict=True)
-    ]
+    # What was expected of a mode, whatever number it had then.
+    then = next(p for p in label(before.cell, model.used, before.low) if p.pose == pose)
+    numbers = {mode.frequency_hz: k for k, mode in enumerate(then.modes) if mode is not None}
+    hz, sd = (row[0].tolist() for row in before.frequencies(labelled.q[None]))
+    out = []
+    for k, one in enumerate(found):
+        was = numbers.get(one.mode.frequency_hz, -1) if one.mode else k
+        out.append(one if was < 0 else replace(one, expected_hz=hz[was], sd_hz=sd[was]))
+    return out
 
 
 def measured_records(cell: Cell, state: CampaignState) -> list[dict[str, Any]]:

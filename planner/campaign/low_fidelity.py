@@ -81,6 +81,12 @@ class LowFidelity:
         return q + belief.structure.stood_off(belief.x, q)
 
     @property
+    def of_other_robots(self) -> frozenset[str]:
+        """Poses at which something was on the robot, or held it, that is not there elsewhere."""
+        fit = self.identified_robot
+        return fit.posterior.of_other_robots if fit else frozenset()
+
+    @property
     def misread(self) -> tuple[str, ...]:
         """Where they stood elsewhere than is stated, or were heard otherwise, a sentence each."""
         fit = self.identified_robot
@@ -146,6 +152,17 @@ class LowFidelity:
             return ""
         if fit.fits:
             return " ".join(filter(None, (*self.misread, fit.scale, fit.words, fit.departures)))
+        return self.caution
+
+    @property
+    def caution(self) -> str:
+        """What who uses its predictions must know before; empty where it explains the recordings.
+
+        Of few poses, which tell that it was wrong but not where, too.
+        """
+        fit = self.identified_robot or self.rejected
+        if fit is None or fit.fits:
+            return fit.unplaced if fit else ""
         text = (
             f"Fitted to the recordings, the simulation still differs from them by "
             f"{self.misfit_sds:.2g} times their noise: it lacks physics"

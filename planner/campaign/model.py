@@ -291,11 +291,33 @@ class Model:
         )
 
     @property
+    def never_found(self) -> str:
+        """What to say of modes that the simulation expects and that no pose has shown; ""."""
+        low, high = self.cell.config.modes.band_hz
+        missing = []
+        for k in range(self.surrogate.count):
+            hz = [pose.simulated_hz[k] for pose in self.labelled if pose.modes[k] is None]
+            if len(hz) == len(self.labelled) > 0 and low < np.median(hz) < high:
+                missing.append(f"mode {k + 1} (about {np.median(hz):.1f} Hz)")
+        if not missing:
+            return ""
+        return (
+            f"No pose has shown {listed(missing)}, which the simulation expects: where one does "
+            f"not exist, the modes above it are numbered one too high."
+        )
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """What who uses predictions must know before."""
+        caution = with_names(self.low.caution, place_names(self.cell.robot))
+        return tuple(filter(None, (caution, self.never_found)))
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """What the engineer should know of the model: doubts about the simulation."""
         low = with_names(self.low.remark, place_names(self.cell.robot))
         found = [low] if low else []
-        found += self.surrogate.remarks
+        found += filter(None, (self.never_found, *self.surrogate.remarks))
         if isinstance(self.surrogate.primary, Predicting):
             found.append(
                 f"The model {self.cell.config.surrogate.model} does not say how poses go together: "

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -24,6 +25,7 @@ class OfOneVisit(Operator):
     pose: str = ""
 
     artefact = True
+    other_robot: ClassVar[bool] = False  # what was measured there is not of the robot elsewhere
 
     def _among(self, q: np.ndarray) -> slice:
         """Where its pose is; nowhere in other data."""
@@ -75,6 +77,8 @@ class MisreadAngle(OfOneVisit):
 @dataclass(frozen=True)
 class OtherImpedance(OfOneVisit):
     """Something on the last link that was not there at the other poses."""
+
+    other_robot = True
 
     def impedance(self, poses: PosedBodies, psi: np.ndarray) -> Impedance:
         """Of its pose."""

@@ -125,16 +125,23 @@ class IdentifiedRobot:
     def words(self) -> str:
         """What the robot has that robot.toml does not state; empty where that is nothing."""
         found = " ".join(self.posterior.words)
-        if not found or self.poses >= PLACED:
+        if not self.unplaced:
             return found and f"The recordings show what robot.toml does not state. {found}"
-        said = (
+        if self.poses == 1:  # many sets of causes explain a single pose
+            return self.unplaced
+        of = "One explanation of both poses, of several that there may be"
+        return f"{self.unplaced} {of}: {found}"
+
+    @property
+    def unplaced(self) -> str:
+        """What to say where too few poses show that the robot differs from robot.toml, else ""."""
+        if not self.posterior.words or self.poses >= PLACED:
+            return ""
+        return (
             f"The robot differs from what robot.toml states. From {counted(self.poses, 'pose')} "
             f"nothing tells where: repair nothing yet, and measure "
             f"{counted(PLACED - self.poses, 'more pose')}."
         )
-        if self.poses == 1:  # many sets of causes explain a single pose
-            return said
-        return f"{said} One explanation of both poses, of several that there may be: {found}"
 
 
 def _same(every_hz: np.ndarray, hertz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

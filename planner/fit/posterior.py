@@ -183,15 +183,24 @@ class RobotPosterior(RobotBelief):
             for share, words, _ in self._told(artefacts=False)
         )
 
-    @cached_property
+    @property
     def misread(self) -> tuple[str, ...]:
-        """Where recordings are not of what they are said to be of, where that matters.
+        """Where recordings are not of what they are said to be of, where that matters."""
+        return tuple(words for words, _ in self._otherwise)
 
-        Of a pose what changes most: the rest stands in for what that has not.
-        """
-        told: dict[str, str] = {}
+    @property
+    def of_other_robots(self) -> frozenset[str]:
+        """Poses at which something was on the robot, or held it, that is not there elsewhere."""
+        effects = (effect for _, effect in self._otherwise)
+        return frozenset(e.pose for e in effects if isinstance(e, OfOneVisit) and e.other_robot)
+
+    @cached_property
+    def _otherwise(self) -> tuple[tuple[str, Operator], ...]:
+        """Of a pose what changes most: the rest stands in for what that has not."""
+        told: dict[str, tuple[str, Operator]] = {}
         for _, words, effect in self._told(artefacts=True):
-            told.setdefault(effect.pose if isinstance(effect, OfOneVisit) else words, words)
+            pose = effect.pose if isinstance(effect, OfOneVisit) else words
+            told.setdefault(pose, (words, effect))
         return tuple(told.values())
 
     def _told(self, artefacts: bool) -> list[tuple[float, str, Operator]]:

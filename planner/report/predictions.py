@@ -84,10 +84,10 @@ def predictions(
 
     angles, lines = np.array(q), campaign.frequency_lines
     prediction, (mean, sd) = campaign.model.predict(angles), campaign.frf_at(angles)
-    said, asked = (), bool(np.any(np.isfinite(force_n)))
+    said, asked = campaign.model.cautions, bool(np.any(np.isfinite(force_n)))
     if asked:
         struck = campaign.model.struck
-        said = () if struck else (UNCHANGED,)
+        said += () if struck else (UNCHANGED,)
         if struck is not None:
             prediction = struck_modes(struck, prediction, angles, force_n)
             mean = mean + change_at_force(struck, angles, force_n, lines)

@@ -128,7 +128,7 @@ def result_line(report: ImportReport) -> str:
     said += f"; {', '.join(f'{one.mode.frequency_hz:.2f}' for one in found if one.mode)} Hz"
     if not found:
         return said
-    off = max(abs(one.off) for one in found)
+    off = max((abs(one.off) for one in found if np.isfinite(one.off)), default=np.nan)
     missing = len(every) - len(found)
     lacks = f", {counted(missing, 'mode')} not found" if missing else ""
     return f"{said}, within {off:.1f} sd of what was expected{lacks}"

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from planner.campaign import labels
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import (
     Entry,
@@ -125,15 +126,48 @@ def shown(*hertz: float):
 
 
 @pytest.mark.parametrize(("found", "said"), [(14.66, 0), (9.99, 1)])
-def test_a_mode_far_from_where_it_was_expected_is_said(found, said):
+def test_a_mode_far_from_where_it_was_expected_is_said(found, said, monkeypatch):
     expected = np.array([[9.23, 14.65]]), np.array([[0.02, 0.06]])
-    before = SimpleNamespace(labelled=("P001",), frequencies=lambda q: expected)
+    before = SimpleNamespace(
+        labelled=("P001",), frequencies=lambda q: expected, cell=None, low=None
+    )
     sure, own = np.ones(2), shown(9.24, found)
     here = SimpleNamespace(pose="P002", q=np.zeros(6), modes=own, probability=sure)
-    told = unexpected_modes(before, SimpleNamespace(labelled=(here,)), "P002")
+    monkeypatch.setattr(labels, "label", lambda *given: (here,))
+    told = unexpected_modes(before, SimpleNamespace(labelled=(here,), used=()), "P002")
     assert len(told) == said
     assert all("mode 2 at 9.99 Hz, expected at 14.650 ± 0.060 Hz (78 sd off)" in t for t in told)
     assert not unexpected_modes(SimpleNamespace(labelled=()), SimpleNamespace(labelled=()), "P002")
+
+
+def test_modes_are_compared_by_what_they_are_where_their_numbers_moved(monkeypatch):
+    """A mode that does not exist was the first of three expected."""
+    expected = np.array([[4.0, 9.23, 14.65]]), np.array([[0.5, 0.02, 0.06]])
+    before = SimpleNamespace(
+        labelled=("P001",), frequencies=lambda q: expected, cell=None, low=None
+    )
+    first, second, third = shown(9.24, 14.66, 19.0)
+    here = SimpleNamespace(pose="P002", q=np.zeros(6), modes=(first, second, third))
+    here.probability = np.ones(3)
+    then = SimpleNamespace(pose="P002", modes=(None, first, second))
+    monkeypatch.setattr(labels, "label", lambda *given: (then,))
+    model = SimpleNamespace(labelled=(here,), used=())
+    found = labels.found_modes("P002", model, before)
+    np.testing.assert_array_equal([one.expected_hz for one in found], [9.23, 14.65, np.nan])
+    assert not unexpected_modes(before, model, "P002")
+
+
+def test_a_mode_that_no_pose_has_shown_is_told():
+    config = SimpleNamespace(modes=SimpleNamespace(band_hz=(3.0, 20.0)))
+    poses = [
+        SimpleNamespace(modes=(None, *shown(9.2), None), simulated_hz=np.array([4.0, 9.1, 30.0])),
+        SimpleNamespace(modes=(None, *shown(9.5), None), simulated_hz=np.array([4.2, 9.4, 31.0])),
+    ]
+    cell, surrogate = SimpleNamespace(config=config), SimpleNamespace(count=3)
+    model = SimpleNamespace(labelled=poses, cell=cell, surrogate=surrogate)
+    assert "No pose has shown mode 1 (about 4.1 Hz)," in Model.never_found.fget(model)
+    poses[0].modes = (*shown(4.0), *poses[0].modes[1:])
+    assert Model.never_found.fget(model) == ""
 
 
 def test_modes_beside_those_predicted_are_said_where_every_pose_shows_them():

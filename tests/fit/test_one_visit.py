@@ -125,6 +125,7 @@ def test_a_heavier_tool_at_one_pose_is_found_with_its_mass(case, prior):
     assert sd < 0.2 * mass
     (text,) = told.misread
     assert f"At {NAMES[pose]} the last link carried" in text
+    assert low.of_other_robots == {NAMES[pose]}
 
 
 def test_none_is_found_where_all_are_right(case, prior):
@@ -133,6 +134,7 @@ def test_none_is_found_where_all_are_right(case, prior):
     right = low.identified_robot.posterior
     assert not [e for e in right.structure.effects if isinstance(e, OfOneVisit)]
     assert right.misread == ()
+    assert low.of_other_robots == frozenset()
     np.testing.assert_array_equal(low.stood(case.q[:3]), case.q[:3])
 
 
