@@ -97,7 +97,9 @@ def _poses(claim: Claim) -> Iterator[Alternative]:
     known |= {name: state.proposals[name].joints_deg for name in state.open}
     known.pop(claim.pose, None)
     for name, there in known.items():
-        what = f"repeat those of {name}" if state.hit_at(name) else f"fit {name} far better"
+        what = f"fit {name} far better"
+        if state.hit_at(name):
+            what = f"repeat those of {name}, if those were of {name}"
         yield Alternative(claim.joints.internal(there), what, name)
 
 

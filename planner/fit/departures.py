@@ -1,16 +1,18 @@
 """Springs and bodies that a fit moved far from what robot.toml states: something is missing."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.fit.posterior import RobotBelief
 from planner.fit.structure import RobotStructure
 from planner.robot.virtual_joints import OUTER
 from planner.words import significant
 
 DEPARTED = 4.0  # prior sds
 TOLD = 3  # at most
+HALVED = 0.5  # sd of a mass that the recordings tell, in sds of what is stated: as for springs
 KNOWN = 0.3  # sd of ln k to which a stiffness is known when a word is said of it
 
 
@@ -54,12 +56,16 @@ def _springs(s: RobotStructure, x: np.ndarray, far: tuple[int, ...]) -> Iterator
 
 @dataclass(frozen=True)
 class RefittedMass:
-    """A link with what is mounted on it: kg as stated, how many more by a fit, and their sd."""
+    """A link with what is mounted on it: kg as stated, how many more by a fit, and their sd.
+
+    `left_kg` is the sd that the recordings leave of them, where it was asked for.
+    """
 
     link: str
     stated_kg: float
     more_kg: float
     sd_kg: float
+    left_kg: float = float("nan")
 
     @property
     def text(self) -> str:
@@ -78,6 +84,21 @@ def refitted_masses(s: RobotStructure, x: np.ndarray) -> list[RefittedMass]:
         sd = float(np.linalg.norm(bodies.sigma[parts] * bodies.nominal[parts, 0]))
         found.append(RefittedMass(link, mass, more, sd))
     return found
+
+
+def known_masses(belief: RobotBelief) -> list[RefittedMass]:
+    """Those whose sd the recordings halve, or more."""
+    s, numbers = belief.structure, belief.structure.inertial
+    bodies, links, slopes = s.bodies, np.array(_links(s)), s.bodies.slopes(belief.x[numbers])
+    told = []
+    for mass in refitted_masses(s, belief.x):
+        by_number = np.zeros(bodies.size)
+        for k in np.flatnonzero(links == mass.link):
+            by_number[bodies.mine[k]] += slopes[k][:, 0]
+        left = float(np.sqrt(by_number @ belief.covariance[numbers, numbers] @ by_number))
+        if left < HALVED * mass.sd_kg:
+            told.append(replace(mass, left_kg=left))
+    return told
 
 
 def _links(s: RobotStructure) -> list[str]:

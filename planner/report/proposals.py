@@ -52,17 +52,18 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> Done:
     from planner.robot.place_names import axes_in_the_room
 
     cell, model = campaign.cell, campaign.model
-    robot, joints, forecast, repeat = cell.robot, cell.robot.joints, model.forecast, model.repeat()
+    robot, joints, forecast = cell.robot, cell.robot.joints, model.forecast
+    held = [unanswered(m.question.text) for m in campaign.state.held.values() if m.question]
+    repeat = None if held else model.repeat()  # what was hit is asked about first
     q = joints.internal([p.joints_deg for p in found])
     expected = model.predict(q)
     places = places_for(model, campaign.state, found[0])
-    each, parts = [], list[RenderableType]()
+    told = (*held, *cell.remarks)
+    each, parts = [], list[RenderableType](Text(remark, style="yellow") for remark in told)
     for i, proposal in enumerate(found):
         modes, ways = ExpectedMode.all_of(expected, i), axes_in_the_room(robot, q[i])
         each.append({**plain(proposal), "expected": modes, "axes_in_the_room": ways})
         parts += _pose(proposal, modes, ways, joints, cell.config.cost.hits_per_axis)
-    held = (m.question.text for m in campaign.state.held.values() if m.question)
-    told = (*cell.remarks, *map(unanswered, held))
     keys = {
         "proposals": each, "joint_names": joints.names, "forecast": forecast_json(forecast),
         "repeat": repeat, "remarks": told, "places": places, "joint_units": joints.declared,
@@ -71,8 +72,7 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> Done:
     lacks = model.waits_for, model.not_predicted
     said = standing(forecast, *lacks, repeat.text if repeat else "")
     said = " ".join(filter(None, (said, places.sentence if places else "")))
-    lines = [Text(said), *(Text(remark, style="yellow") for remark in told)]
-    return Done(keys, Group(*parts, *lines, *_then(campaign.directory, found[0].pose)))
+    return Done(keys, Group(*parts, Text(said), *_then(campaign.directory, found[0].pose)))
 
 
 def _pose(

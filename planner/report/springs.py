@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
+from planner.fit.departures import RefittedMass, known_masses
 from planner.words import with_sd
 
 if TYPE_CHECKING:
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from planner.robot.robot import Robot
 
 COLUMNS = "joint and axis", "stated", "refitted ± sd", "unit", "known"
+MASS_COLUMNS = "link", "stated ± sd (kg)", "refitted ± sd (kg)"
 NOT_KNOWN = (
     "Known, yes: the recordings tell this stiffness; its sd is half of what was assumed before, or "
     "less. No: they tell less, and the value leans on what was assumed, or lies so far off what is "
@@ -102,6 +104,18 @@ def refitted_springs(model: "Model") -> tuple[RefittedSpring, ...]:
         )
         for n, estimate in sorted(told.items())
     )  # fmt: skip
+
+
+def refitted_masses(model: "Model") -> tuple[RefittedMass, ...]:
+    """Of links whose masses the recordings tell; none where the simulation does not learn."""
+    fit = model.low.identified_robot
+    return tuple(known_masses(fit.posterior)) if fit else ()
+
+
+def mass_cells(mass: RefittedMass) -> tuple[str, str, str]:
+    """A row of the table."""
+    stated = with_sd(mass.stated_kg, mass.sd_kg)
+    return mass.link, stated, with_sd(mass.stated_kg + mass.more_kg, mass.left_kg)
 
 
 def identified_springs(robot: "Robot", found: "Identification") -> tuple[IdentifiedSpring, ...]:

@@ -15,12 +15,21 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.model_status import DecisionStatus, LeftOutValues, found_without, left_out
 from planner.campaign.state import Measurement
 from planner.design.stopping import Forecast
+from planner.fit.departures import RefittedMass
 from planner.report.answer import Done
 from planner.report.imports import asked_of
 from planner.report.pictures import Pictures
 from planner.report.proposals import forecast_json, standing, unanswered
 from planner.report.saved_diagnosis import diagnosis_of, read_diagnosis, two_answers
-from planner.report.springs import COLUMNS, NOT_KNOWN, RefittedSpring, refitted_springs
+from planner.report.springs import (
+    COLUMNS,
+    MASS_COLUMNS,
+    NOT_KNOWN,
+    RefittedSpring,
+    mass_cells,
+    refitted_masses,
+    refitted_springs,
+)
 from planner.report.text import ending, sds_over_workspace, table
 from planner.words import by_reason, counted, local_time, significant
 
@@ -47,6 +56,7 @@ class ModelStatus:
     decision: DecisionStatus | None = None  # where the campaign is for a cut
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
+    masses: tuple[RefittedMass, ...] = ()  # of links, where the recordings tell them
     waits_for: str = ""  # what lacks until the target is reached
     frf_sd_percent: tuple[float, ...] = ()  # of predicted FRFs, and of their common scale
     not_predicted: str = ""  # modes that every pose shows beside those predicted
@@ -67,6 +77,7 @@ class ModelStatus:
             decision=DecisionStatus.of(model),
             joint_units=cell.robot.joints.declared,
             springs=refitted_springs(model),
+            masses=refitted_masses(model),
             waits_for=model.waits_for,
             frf_sd_percent=model.frf_sd_percent,
             not_predicted=model.not_predicted,
@@ -127,6 +138,9 @@ def _tables(keys: Mapping[str, Any]) -> list[RenderableType]:
         title = "Stiffnesses of the simulation, refitted to all recordings"
         each = (spring.cells for spring in keys["springs"])
         parts += [table(title, *COLUMNS, rows=each), Text(f"  {NOT_KNOWN}")]
+    if keys["masses"]:
+        title = "Masses that the recordings tell, of each link with what is mounted on it"
+        parts.append(table(title, *MASS_COLUMNS, rows=map(mass_cells, keys["masses"])))
     return parts + ([] if keys["models"] is msgspec.UNSET else models_text(keys["models"]))
 
 

@@ -42,7 +42,7 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
         if mode is None:
             table.add_row(str(one.label), "not found", expected, "–", "–", sure)
             continue
-        off = Text(f"{one.off:+.1f}", style="bold yellow" if abs(one.off) > 3 else "")
+        off = Text(f"{one.off:+z.1f}", style="bold yellow" if abs(one.off) > 3 else "")
         measured = with_sd(mode.frequency_hz, mode.frequency_sd_hz, ".3f")
         damping = with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd)
         table.add_row(str(one.label), measured, expected, off, damping, sure)
@@ -141,7 +141,7 @@ def against_expected(pose: str, model: Model, before: Model | None) -> str:
         mode = one.mode
         said = f"mode {one.label} not found" if mode is None else f"{mode.frequency_hz:.2f} Hz"
         if before is not None:
-            off = "" if mode is None else f", {one.off:+.1f} sd"
+            off = "" if mode is None else f", {one.off:+z.1f} sd"
             said += f" (expected {one.expected_hz:.2f}{off})"
         each.append(said)
     return ", ".join(each) or "no modes"
