@@ -8,8 +8,9 @@ hits says next to nothing of how well.
 
 "one_hit" is for a model of how hits miss: each hit has one share, by its signal to noise, in all
 channels and at all lines, so that the FRF is what a single hit with the mean of all misses gives;
-and its variance is that of the noise alone. With weights that differ from channel to channel each
-would show another mean miss, which no single hit explains.
+and its variance is that of the noise alone: white as before the pulse, and (f_c/f)² times that
+below a corner f_c, for floors rumble and what a record's offset is off leaks as 1/f. With weights
+that differ from channel to channel each would show another mean miss, which no single hit explains.
 """
 
 import numpy as np
@@ -23,6 +24,8 @@ ESTIMATORS = "h1", "h2", "hv", "weighted", "one_hit"
 DROP_DB = 20.0  # of the force spectrum, where the pulse ceases to excite
 LEVEL_LINES = 7  # to either side, over which scatter is compared with what noise explains
 PRIOR = 12.0  # real values of scatter that the pooled level counts for, beside those near a line
+# Corners in lowest lines, and by how much of a pose's FRFs hits miss, that are considered.
+CORNERS, MISSES = np.append(0.0, np.geomspace(0.5, 64.0, 15)), np.geomspace(1e-3, 0.3, 13)
 
 # FRF, variance, coherence (r, F) of one hit axis, and the share (F,) of the force's noise.
 Estimated = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
@@ -76,7 +79,7 @@ def of_spectra(
     shape = (*layout.shape, frequency.size)
     h, variance = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
     coherence, share = np.full(shape, np.nan), np.full((shape[1], frequency.size), np.nan)
-    counts = []
+    counts, groups = [], list[tuple[list[HitSpectra], np.ndarray]]()
     if not all(s.noise_known and s.noise.all() for s in spectra.hits):
         estimator = "h1" if estimator in ("weighted", "one_hit") else estimator
     for column in range(shape[1]):
@@ -89,6 +92,10 @@ def of_spectra(
             rows = np.array(layout.rows(inner))[list(own)]
             h[rows, column], variance[rows, column], coherence[rows, column] = found[:3]
             share[column] = found[3]
+            groups.append((group, h[rows, column]))
+    if estimator == "one_hit" and by_scatter:
+        slow = (_corner_hz(groups, frequency) / frequency) ** 2
+        variance += (variance - np.abs(h) ** 2 * share) * slow
     return Frf(
         frequency,
         h,
@@ -118,8 +125,7 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
     told = weight[:, :, None] * square[:, None] / sff  # (n, r, F), sums to 1 over hits
     h = _frf(sff, sxx, sxf, estimator)
     if estimator == "one_hit":
-        strength = np.sum(square, axis=1) * np.sum(1 / noise, axis=1)
-        told = np.broadcast_to((strength / strength.sum())[:, None, None], response.shape)
+        told = np.broadcast_to(_shares(group)[:, None, None], response.shape)
         h = np.sum(told * response / force[:, None], axis=0)
     force_share = np.array([s.force_noise for s in group])[:, None] / square  # (n, F)
     share = np.mean(np.sum(told**2 * force_share[:, None], axis=0), axis=0)
@@ -145,6 +151,39 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
             variance = np.sum(running_mean(error, 5) * told, axis=0) / sff
     coherence = np.clip(np.abs(sxf) ** 2 / np.maximum(sff * sxx, 1e-300), 0.0, 1.0)
     return h, variance, coherence if len(group) > 1 else unknown, share
+
+
+def _shares(group: list[HitSpectra]) -> np.ndarray:
+    """(n,) of hits in an FRF, by their signal to noise."""
+    strength = [np.sum(np.abs(s.force) ** 2) * np.sum(1 / s.noise) for s in group]
+    return np.array(strength) / np.sum(strength)
+
+
+def _corner_hz(groups: list[tuple[list[HitSpectra], np.ndarray]], hz: np.ndarray) -> float:
+    """Below which noise is above the white, most likely, by how hits along an axis scatter.
+
+    `groups` of hits with their FRFs (r, F). Beside noise they scatter as they miss, in proportion
+    to the FRFs' size.
+    """
+    size = np.mean(np.concatenate([np.abs(h) ** 2 for _, h in groups]), axis=0)
+    left, white, miss, values = (np.zeros(len(hz)) for _ in range(4))
+    for group, h in groups:
+        told = _shares(group)
+        for s, share in zip(group, told, strict=True):
+            own, square = 1 - 2 * share, np.abs(s.force) ** 2
+            left += np.sum(np.abs(s.response - h * s.force) ** 2, axis=0)
+            others = (t**2 * np.sum(o.noise) / np.abs(o.force) ** 2
+                      for o, t in zip(group, told, strict=True))  # fmt: skip
+            white += own * np.sum(s.noise) + square * sum(others)
+            miss += len(h) * size * square * (own + np.sum(told**2))
+        values += len(h) * (len(group) - 1)
+    if not values.any():
+        return 0.0
+    corners = CORNERS * hz[0]
+    noise = white * (1 + (corners[:, None] / hz) ** 2)
+    expected = noise[:, None] + MISSES[:, None] ** 2 * miss  # (corners, misses, F)
+    likelihood = -np.sum(values * (np.log(expected) + left / expected), axis=-1)
+    return float(corners[np.argmax(np.max(likelihood, axis=1))])
 
 
 def _frf(sff: np.ndarray, sxx: np.ndarray, sxf: np.ndarray, estimator: str) -> np.ndarray:
