@@ -53,6 +53,28 @@ def test_stated_variance_is_the_scatter(repeats):
     assert 0.7 < np.mean(ratio) < 1.5
 
 
+@pytest.mark.parametrize("rumble", [0.0, 0.5, 3.0])
+def test_variance_of_a_hit_holds_where_the_floor_rumbles(rumble):
+    """A floor's slow sway, and the offset that it leaves in what is subtracted, are no white noise."""
+    rng, ratios = np.random.default_rng(7), []
+    for _ in range(6):
+        hits = []
+        for hit in hits_of(rng, 0.05, 2, record_s=3.0):
+            t = np.arange(hit.acceleration_m_s2.shape[1]) / hit.sampling_rate_hz
+            sway = np.sin(2 * np.pi * 4.3 * t + rng.uniform(0, 7, (3, 1)))
+            slow = rumble * np.std(hit.acceleration_m_s2[:, -64:]) * sway
+            hits.append(replace(hit, acceleration_m_s2=hit.acceleration_m_s2 + slow))
+        frf = estimate(tuple(hits), BAND, "one_hit", 5.5 / 3.0)
+        s = 2j * np.pi * frf.frequency_hz + frf.exponential_rate_1_s
+        exact = exact_accelerance(s / (2j * np.pi))
+        error = np.abs(frf.accelerance - exact) ** 2 / frf.variance
+        low = (frf.frequency_hz > 5) & (frf.frequency_hz < 12)
+        ratios.append([error[..., low].mean(), error[..., (frf.frequency_hz > 20)].mean()])
+    low, high = np.mean(ratios, axis=0)
+    assert 0.4 < low < 2.5
+    assert 0.5 < high < 2.0
+
+
 def test_pyfrf_agrees():
     from pyFRF import FRF
 
