@@ -234,7 +234,7 @@ class Model:
         """
         fit = self.low.identified_robot
         if self.frfs and fit is not None and fit.fits:
-            return fit.posterior.predicted(q, frequency_hz)
+            return fit.predicted(q, frequency_hz)
         mean, sd = self._modal_frf(q, frequency_hz)
         if not self.frfs:
             return mean, sd
@@ -354,7 +354,7 @@ class Model:
         fit = self.low.identified_robot
         if fit is None or not fit.fits:
             return ()
-        return fit.posterior.frf_sd_percent(self.cell.candidates.q[:FEW_POSES])
+        return fit.frf_sd_percent(self.cell.candidates.q[:FEW_POSES])
 
     @cached_property
     def frequency_sd_percent(self) -> np.ndarray:

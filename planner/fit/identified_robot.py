@@ -79,6 +79,23 @@ class IdentifiedRobot:
         wider = SimulatedModes(hertz, ratio, modes.residue)
         return np.minimum(np.hypot(self.wider.frequency_sd(q, wider), away), NOT_THERE)
 
+    def predicted(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """FRFs (n, 3, 3, F) of the tool in m/s²/N at q (n, dof) in rad, and their sds.
+
+        Of one pose, which many structures explain, with the wider one's sds and how far it is off.
+        """
+        mean, sd = self.posterior.predicted(q, frequency_hz)
+        if self.wider is None or self.poses > 1:
+            return mean, sd
+        other, sd = self.wider.posterior.predicted(q, frequency_hz)
+        return mean, np.hypot(sd, np.abs(other - mean))
+
+    def frf_sd_percent(self, q: np.ndarray) -> tuple[float, float]:
+        """Root mean square sd of FRFs at q (n, dof) in rad in % of them, and of it the scale's."""
+        mean, sd = self.predicted(q, self.posterior.lines_hz)
+        whole = float(np.linalg.norm(sd) / np.linalg.norm(mean))
+        return 100 * whole, 100 * self.posterior.scale_sd
+
     @property
     def fits(self) -> bool:
         """Whether it explains the recordings."""

@@ -125,11 +125,11 @@ class RobotPosterior(RobotBelief):
         along = np.einsum("nijf,ndijf->d", h.conj(), slopes).real / float(np.sum(np.abs(h) ** 2))
         return float(np.linalg.norm(self.root.T @ along))
 
-    def frf_sd_percent(self, q: np.ndarray) -> tuple[float, float]:
-        """Root mean square sd of FRFs at q (n, dof) in rad in % of them, and of it the scale's."""
+    @property
+    def lines_hz(self) -> np.ndarray:
+        """Some (F,) of the band, where sds of FRFs are told."""
         lines = np.unique(self.found.misfit.data.measured.frequency_hz)
-        mean, sd = self.predicted(q, lines[:: max(1, len(lines) // LOOKED_AT)])
-        return 100 * float(np.linalg.norm(sd) / np.linalg.norm(mean)), 100 * self.scale_sd
+        return lines[:: max(1, len(lines) // LOOKED_AT)]
 
     @property
     def chain_scale(self) -> tuple[float, float]:
