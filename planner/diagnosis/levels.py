@@ -107,7 +107,7 @@ def laws_of(
     search, left = _Search(groups, {}), [g.accelerance for g in groups]
     null, rho = search.most_probable(lambda w: evidence(w, left))
     seen = differences(search.at(rho), left)
-    found = Levels(seen, seen)
+    found, candidates = Levels(seen, seen), list[tuple[tuple[str, str, float], ...]]()
     joints = {p.at: (p, JointMotions.of(groups, j, p.stiffness)) for j, p in enumerate(ports)}
     while len(found.laws) < most and found.left.size >= matters and joints:
         columns = {at: _columns(motions) for at, (_, motions) in joints.items()}
@@ -118,8 +118,9 @@ def laws_of(
             break
         fits = search.fits(lower, *joints.pop(at), left, null)
         best = max(fits, key=lambda f: f.law.gain_nats)
+        candidates.append(_candidates(fits, gains))
         if not found.laws:
-            found = replace(found, free=gains, candidates=_candidates(fits, gains))
+            found = replace(found, free=gains, candidates=candidates[0])
         least = max([LEAST, *(EXPLAINS * law.gain_nats for law in found.laws)])
         if best.law.effect == UNKNOWN or best.law.gain_nats < least:
             break
@@ -128,8 +129,17 @@ def laws_of(
         after = differences(search.at(rho), left)
         found = replace(found, laws=(*found.laws, best.law), left=after)
     if found.explained >= EXPLAINS:
-        return replace(found, laws=tuple(law for law in found.laws if law.share >= matters))
+        return those_that_matter(found, candidates, matters)
     return replace(found, laws=(), unexplained=found.left.matter(matters, BY_CHANCE))
+
+
+def those_that_matter(
+    found: Levels, candidates: Sequence[tuple[tuple[str, str, float], ...]], matters: float
+) -> Levels:
+    """Without laws that are too small; `candidates` of each, kept of the first that is left."""
+    told = [k for k, law in enumerate(found.laws) if law.share >= matters]
+    laws = tuple(found.laws[k] for k in told)
+    return replace(found, laws=laws, candidates=candidates[told[0]] if told else ())
 
 
 def gain(weighed: Weighed, columns: Values, left: Values) -> float:

@@ -12,7 +12,8 @@ import pytest
 
 from planner.dataset.dataset import Dataset
 from planner.dataset.visits import Visit
-from planner.diagnosis.levels import Levels, level_laws
+from planner.diagnosis.levels import LevelLaw, Levels, level_laws, those_that_matter
+from planner.diagnosis.levels_weighing import Differences
 from planner.dynamics.simulation import Simulation
 from planner.effects.parameters import CAD_INERTIAS
 from planner.effects.table import EffectLibrary
@@ -138,6 +139,18 @@ def test_a_law_is_named_with_its_numbers(
     assert sum(p for *_, p in found.candidates) == pytest.approx(1)
     assert found.explained > 0.8
     assert not found.unexplained
+
+
+def test_what_is_told_was_weighed_where_the_first_law_is_too_small():
+    laws = tuple(
+        LevelLaw("friction", at, 99.0, {}, size) for at, size in (("a", 0.004), ("b", 0.02))
+    )
+    weighed = [((law.effect, law.at, 1.0),) for law in laws]
+    found = Levels(Differences(0.1, 0.0), Differences(0.0, 1.0), laws, candidates=weighed[0])
+    told = those_that_matter(found, weighed, 0.01)
+    assert told.laws == laws[1:]
+    assert told.candidates == weighed[1]
+    assert those_that_matter(found, weighed, 0.5).laws == ()
 
 
 def test_what_no_library_law_describes_is_unexplained(tmp_path: Path):
