@@ -150,7 +150,7 @@ class Diagnosis:
         told = [e for e in self.verdict.effects if not e.counts and e.gain_nats > LEAST]
         why = {True: "Too small to matter", False: "Not sure enough to be a finding"}
         return tuple(
-            f"{why[e.change < self.search.floor]} ({significant(100 * e.change)} % of |H|): "
+            f"{why[e.change < self.search.floor]} (it changes |H| by {significant(100 * e.change)} %): "
             f"{self._established(e, e.probability).text}"
             for e in told
         )
@@ -245,11 +245,11 @@ def _words(law: LevelLaw) -> str:
     said = {
         "friction": f"{law.at} rubs: check its lubrication, seals and brake.",
         "backlash": f"{law.at} has play: check its gear and bearings.",
-        "nonlinear_stiffness": f"The stiffness of {law.at} goes with how far it swings: check the "
+        "nonlinear_stiffness": f"The stiffness of {law.at} depends on amplitude: check the "
         "gear's preload and what it is mounted on.",
     }
     share = significant(100 * law.share)
-    return f"{said[law.effect]} Hits of different force differ by {share} % of |H|."
+    return f"{said[law.effect]} FRFs of hits of different force differ by {share} %."
 
 
 def searching(

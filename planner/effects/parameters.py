@@ -176,7 +176,7 @@ def axis_name(axis: tuple[float, float, float]) -> str:
     for i, letter in enumerate("xyz"):
         if abs(axis[i]) > 1 - 1e-9:
             return letter if axis[i] > 0 else f"−{letter}"
-    return "(" + ", ".join(f"{a:.3g}" for a in axis) + ")"
+    return "(" + ", ".join(f"{round(a, 3) + 0.0:g}" for a in axis) + ")"
 
 
 def _bounded(name: str, kind: str, blocks: tuple[int, ...], low: float, high: float) -> Parameter:

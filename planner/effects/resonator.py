@@ -162,8 +162,8 @@ class LinkResonator(Operator):
         at = [f"{hertz} along {listed(sorted(way))}" for hertz, way in sorted(ways.items())]
         at = at if len(each) > 1 else [*ways]
         return (
-            f"Something of {told} kg on {self.at} swings on its own at {listed(at)}: check hose "
-            f"pack, brackets and covers there."
+            f"Something of {told} kg on {self.at} has a resonance of its own at {listed(at)}: "
+            f"check hose pack, brackets and covers there."
         )
 
     def tables(self, values: Mapping[str, tuple[float, float]]) -> dict[str, list[dict[str, Any]]]:

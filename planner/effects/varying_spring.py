@@ -85,7 +85,9 @@ class AngleSpring(VaryingSpring):
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
         share = np.sqrt(sum(v**2 for v, _ in values.values()))
-        return f"The stiffness of {self.at} goes with its angle, by ± {significant(100 * share)} %."
+        return (
+            f"The stiffness of {self.at} varies with its angle, by ± {significant(100 * share)} %."
+        )
 
     def tables(self, values: Mapping[str, tuple[float, float]]) -> dict[str, list[dict[str, Any]]]:
         """Harmonics of [[effects]]."""
@@ -144,6 +146,6 @@ class FrequencyDependentJoint(VaryingSpring):
     def words(self, values: Mapping[str, tuple[float, float]]) -> str:
         """See `Operator.words`."""
         return (
-            f"The stiffness of {self.at} goes with the frequency: look at its drive's controller, "
+            f"The stiffness of {self.at} depends on frequency: look at its drive's controller, "
             "its coupling and its damper."
         )

@@ -143,7 +143,7 @@ class IdentifiedRobot:
         """What the robot has that robot.toml does not state; empty where that is nothing."""
         found = " ".join(self.posterior.words)
         if not self.unplaced:
-            return found and f"The recordings show what robot.toml does not state. {found}"
+            return found and f"In the recordings, but not in robot.toml: {found}"
         if self.poses == 1:  # many sets of causes explain a single pose
             return self.unplaced
         of = "One explanation of both poses, of several that there may be"

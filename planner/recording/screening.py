@@ -199,8 +199,9 @@ def driving_point(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
         return ()
     axis = AXES[hit.axis_index]
     text = (
-        f"The tool answers hits along {hit.axis} against their direction (Im H < 0 along {axis}, "
-        f"where it is hit); check the sign of the axis and the polarity of force and acceleration."
+        f"The driving-point FRF of hits along {hit.axis} has the wrong sign (imaginary part of "
+        f"acceleration/force below 0 along {axis}): check the sign of the axis and the polarity of "
+        f"force and acceleration."
     )
     return (Fault("driving_point", text, refuse=False),)
 

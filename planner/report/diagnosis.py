@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 SHOWN = 6  # candidates in the table
 VERDICTS = {
     "consistent": "The simulation explains the recordings once its own parameters are refitted.",
-    "explained": "The simulation lacks something, and this explains the recordings:",
+    "explained": "The simulation alone does not explain the recordings; with this it does:",
     "unexplained": "Something makes the robot differ from the simulation, and none of the effects "
     "that planner knows describes it.",
 }
@@ -79,7 +79,7 @@ def established_effects(
         EstablishedEffect(
             e.effect, e.at, e.probability, None if e.change is None else 100 * e.change,
             {name: ParameterValue(*value) for name, value in e.parameters.items()},
-            with_names(f"{e.text} ({probable(e.probability)}){rest(e)}", names),
+            with_names(f"{e.text} (probability {probable(e.probability)}){rest(e)}", names),
         )
         for e in found.findings
     )  # fmt: skip
@@ -242,14 +242,14 @@ class DiagnosisReport(Answer):
         first = self.candidates[0] if self.candidates else None
         if self.verdict != "unexplained" or not self.closest or first is None:
             return VERDICTS[self.verdict]
-        near = " and ".join(f"{e.effect.replace('_', ' ')} at {e.at}" for e in self.closest)
+        near = listed([f"{e.effect.replace('_', ' ')} at {e.at}" for e in self.closest])
         near = with_names(near, self.place_names)
         agrees = self.fit.explained.frac
         return (
-            f"None of the effects that planner knows explains the recordings (probability "
-            f"{probable(first.probability)}). Closest comes {near}: with it, simulated and "
-            f"measured FRFs agree to {100 * agrees:.2f} % (FRAC). That may be the larger part "
-            f"of the cause, with something unknown beside it. Before you repair anything, check "
+            f"No effects that planner knows explain the recordings (probability "
+            f"{probable(first.probability)}). Closest, together: {near}; with them the FRFs' FRAC "
+            f"is {100 * agrees:.2f} %. They may be most of the cause, with something unknown "
+            f"beside them. Before you repair anything, check "
             f"sensor, hammer and the stated poses, and look for what else touched or hung on the "
             f"robot."
         )

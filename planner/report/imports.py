@@ -132,7 +132,7 @@ class PoseImport(Answer):
         )
         if asked:
             there = ", ".join(with_sd(mode.frequency_hz, mode.sd_hz) for mode in self.expected)
-            held = "  Nothing changed: these hits are used once you say that they are right."
+            held = "  The model has not changed: these hits are used once you confirm them."
             said = Text(f"  Expected at {pose}: {there} Hz.")
             return [made, said, *remarks(told), Text(held)]
         sds = (one.frequency_sd_percent for one in (report.model_before, report.model))
@@ -229,8 +229,8 @@ def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
         return (
             f"{asked.text} The new hits of {pose} are held, not used. If they are right: "
             f"{confirm}. If files or recordings.csv are wrong: correct them and import again "
-            f"(--pose {pose}). To refuse all: {withdraw}. To undo the import: "
-            f"{command('planner', 'undo', directory)}."
+            f"(--pose {pose}). To refuse all: {withdraw}. As if never "
+            f"imported: {command('planner', 'undo', directory)}."
         )
     there = command(asked.fits or "OTHER")
     return (

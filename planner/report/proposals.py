@@ -98,8 +98,8 @@ def _then(directory: Path, pose: str) -> list[Text]:
     """Where the recordings go, and the command that takes them in."""
     where = Text(
         f"Export the hits of {pose} into a folder of their own, say exports/{pose}, under any "
-        f"names; where files do not say the axis that was hit, a recordings.csv beside them "
-        f"does (columns pose, hit, file). Then:"
+        f"names; where files do not say which axis was hit, add a recordings.csv beside them "
+        f"(columns pose, hit, file; hit is such as +x). Then:"
     )
     act = "planner", "import", directory, f"exports/{pose}", "--pose", pose
     return [where, command_line("  ", *act)]

@@ -17,9 +17,8 @@ if TYPE_CHECKING:
 COLUMNS = "joint and axis", "stated", "refitted ± sd", "unit", "known"
 MASS_COLUMNS = "link", "stated ± sd (kg)", "refitted ± sd (kg)"
 NOT_KNOWN = (
-    "Known, yes: the recordings tell this stiffness; its sd is half of what was assumed before, or "
-    "less. No: they tell less, and the value leans on what was assumed, or lies so far off what is "
-    "stated that something else may have moved it."
+    "Known, yes: the recordings determine it (sd at most half of the tolerance of robot.toml). No: "
+    "the value rests on robot.toml, or is so far from it that another effect may have moved it."
 )
 
 

@@ -184,8 +184,8 @@ def _lines(believed: ModelStatus, keys: Mapping[str, Any]) -> list[str]:
     ]
     if believed.frf_sd_percent:
         whole, scale = map(significant, believed.frf_sd_percent)
-        lines.insert(3, f"sd of FRFs over the workspace: {whole} %, of which {scale} % is a "
-                        f"scale common to all (gains and masses)")  # fmt: skip
+        lines.insert(3, f"sd of predicted FRFs over the workspace: {whole} %; {scale} % of it "
+                        f"a factor common to all (gains and masses)")  # fmt: skip
     if keys["log"]["torn_bytes"]:
         lines.append("The log's last line was torn by a crash; the next act sets it aside.")
     if keys["stored_but_not_imported"]:

@@ -52,8 +52,8 @@ def number(value: float | None, form: str = ".2f") -> str:
 def sds_over_workspace(sd_percent: Iterable[float], target_percent: float) -> str:
     """How sure the frequency of each mode is over the workspace, and how sure all are to be."""
     each = ", ".join(f"mode {k} {significant(sd)} %" for k, sd in enumerate(sd_percent, 1))
-    target = f"all together: target {target_percent:g} %"
-    return f"sd of frequencies over the workspace: {each} ({target})"
+    target = f"target {target_percent:g} % rms of all"
+    return f"sd of predicted frequencies over the workspace: {each} ({target})"
 
 
 def with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:

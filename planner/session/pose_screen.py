@@ -92,7 +92,9 @@ class PosePage:
         path, most = command(self.folder), WIDTH - 25
         # Of one that is too long for the line the end: folders differ there.
         end = path if len(path) <= most else f"…{path[1 - most :]}"
-        waits = "all hits are in: [a]; more may come in" if self.complete else "waiting for hits in"
+        waits = "waiting for hits in"
+        if self.complete:
+            waits = "all hits are in: [a] accepts them; more may follow in"
         where = [Text(f"{waits} {one}", "dim") for one in (end, path)]
         parts.append(ScreenText([None, *where], 4))
         parts.append(ScreenText([Text(self.keys, style="reverse")]))

@@ -207,7 +207,7 @@ def test_one_mass_that_swings_in_three_directions_is_told_once():
     assert not hose.same_thing(x, swinging(4.0, 14.0, 0, 1, 0))
     assert not hose.same_thing(x, swinging(12.1, 30.0, 1, 0.2, 0))
     told = hose.words_together([y, x, z])
-    assert "Something of 12 kg on link_3 swings on its own at" in told
+    assert "Something of 12 kg on link_3 has a resonance of its own at" in told
     assert "14.0 Hz along x and y and 16.0 Hz along z" in told
 
 

@@ -146,7 +146,7 @@ def test_a_mass_that_swings_on_a_link_is_found_and_named(tmp_path):
     other = poses(12, seed=2)
     true_hz = np.array([truth.modes(one, COUNT)[0] for one in other])
     assert rmse(after, other, true_hz) < 0.01 < 0.1 < rmse(before, other, true_hz)
-    assert "on link_4 swings on its own at 59.8 Hz" in after.remark
+    assert "on link_4 has a resonance of its own at 59.8 Hz" in after.remark
 
 
 def test_a_joint_that_only_creeps_is_no_modes_stiffness(right):

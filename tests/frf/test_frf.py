@@ -55,7 +55,7 @@ def test_stated_variance_is_the_scatter(repeats):
 
 @pytest.mark.parametrize("rumble", [0.0, 0.5, 3.0])
 def test_variance_of_a_hit_holds_where_the_floor_rumbles(rumble):
-    """A floor's slow sway, and the offset that it leaves in what is subtracted, are no white noise."""
+    """A slow sway, and what it leaves in the offset that is subtracted, are no white noise."""
     rng, ratios = np.random.default_rng(7), []
     for _ in range(6):
         hits = []

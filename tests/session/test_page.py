@@ -34,8 +34,9 @@ DOUBLE = judged(
 )  # fmt: skip
 AGAINST = judged(
     2, "-x", "good",
-    "The tool answers hits along -x against their direction (Im H < 0 along x, where it is hit); "
-    "check the sign of the axis and the polarity of force and acceleration.",
+    "The driving-point FRF of hits along -x has the wrong sign (imaginary part of "
+    "acceleration/force below 0 along x): check the sign of the axis and the polarity of force and "
+    "acceleration.",
 )  # fmt: skip
 CLIPPED = judged(
     3, "", "repeat",
