@@ -150,8 +150,8 @@ class Diagnosis:
         told = [e for e in self.verdict.effects if not e.counts and e.gain_nats > LEAST]
         why = {True: "Too small to matter", False: "Not sure enough to be a finding"}
         return tuple(
-            f"{why[e.change < self.search.floor]} (it changes |H| by {significant(100 * e.change)} %): "
-            f"{self._established(e, e.probability).text}"
+            f"{why[e.change < self.search.floor]} (it changes |H| by "
+            f"{significant(100 * e.change)} %): {self._established(e, e.probability).text}"
             for e in told
         )
 

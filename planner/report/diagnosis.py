@@ -21,7 +21,7 @@ from planner.measurement.agreement import Similarity, fit_similarity
 from planner.report.answer import NOT_IN_JSON, Answer, encoded, plain
 from planner.report.text import command_line, ending, remarks, table
 from planner.robot.place_names import place_names, with_names
-from planner.words import probable
+from planner.words import listed, probable
 
 if TYPE_CHECKING:
     from planner.diagnosis.diagnose import Diagnosis
