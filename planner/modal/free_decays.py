@@ -37,8 +37,8 @@ def analyse_record(
     samples, names = _decays(record, _force(record, force_channel), remarks)
     rate = record.sampling_rate_hz
     band = band_hz or (max(10 * rate / samples.shape[-1], 0.01 * rate), 0.45 * rate)
-    names, found = _identify_sound(record, samples, names, band, remarks)
-    sure = [mode for mode in found.modes if mode.probability >= 0.5]
+    names, every, found = _identify_sound(record, samples, names, band, remarks)
+    sure = [mode for mode in every if mode.probability >= 0.5]
     kept = [mode for mode in sure if band[0] <= mode.frequency_hz <= band[1]]
     modes = tuple(_merged(group, remarks) for group in grouped(kept, _same))
     if not modes:
@@ -145,7 +145,7 @@ def _remark_on_pulse(force: Channel, hits: np.ndarray, rate: float, remarks: lis
 def _identify_sound(
     record: TimeRecord, samples: np.ndarray, names: tuple[str, ...], band: tuple[float, float],
     remarks: list[str],
-) -> tuple[tuple[str, ...], PoleIdentification]:  # fmt: skip
+) -> tuple[tuple[str, ...], tuple[Mode, ...], PoleIdentification]:  # fmt: skip
     """Identify, leave out channels that the modes do not explain, identify again."""
     factor = np.std(samples, axis=(1, 2))[:, None]
     factor[factor == 0] = 1.0
@@ -162,7 +162,7 @@ def _identify_sound(
                     shape=rank_one(m.residue * factor)[0])
             for m in found.modes
         )  # fmt: skip
-        return names, replace(found, modes=tuple(modes))
+        return names, tuple(modes), found
     for name, share in zip(np.array(names)[~sound], explained[~sound], strict=True):
         remarks.append(
             f"Sensor {name} does not follow the hits (the modes explain {100 * share:.0f} % of"

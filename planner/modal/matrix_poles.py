@@ -3,11 +3,12 @@
 Poles of the diagram are fitted, every set with its own; which of them are modes is judged then.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
+from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.mode_selection import (
     doubt,
@@ -15,12 +16,10 @@ from planner.modal.mode_selection import (
     falls,
     first_variance,
     presences,
-    scales,
     scatter,
 )
 from planner.modal.plscf import Diagram, diagram, ladder, plscf, row_errors, stable
 from planner.modal.pole_fit import ROUNDS, DivergedPolesError, PoleFit, fit_sets, refine
-from planner.modal.rank_one_fit import Entries, FittedShape, fit_shape
 from planner.modal.set_search import reestimated_sets
 from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
 
@@ -37,44 +36,7 @@ DAMPING_ADDED, LINES_BELOW = 0.1, 6
 SETTLING = 2  # rounds of a fit that has been fitted before, to other lines or but for a few sets
 
 
-@dataclass(frozen=True, eq=False)
-class MatrixPoles:
-    """Poles common to all FRFs and what they came from.
-
-    Rows of `data` are the points of the longer side (which roved), `hit` or felt; columns those
-    that stayed. `scale` (m,) by which noise around a mode exceeds its variance; `weak` (m,) as
-    `mode_selection.doubt`, `presence` (m,) share of the response.
-    """
-
-    data: Data
-    fit: PoleFit
-    diagram: Diagram
-    scale: np.ndarray
-    weak: np.ndarray
-    presence: np.ndarray
-    hit: bool
-
-    @property
-    def places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Response and reference (indices) of each entry."""
-        row, column = self.data.row, self.data.column
-        return (column, row) if self.hit else (row, column)
-
-    def shape(
-        self, k: int, entries: Entries, gain: float = 0.0, near: np.ndarray | None = None
-    ) -> FittedShape:
-        """Of a mode (index); `entries` have the fit's order, the rest is as in `fit_shape`."""
-        variance = self.scale[k] * self.fit.residue_variance[:, k]
-        damped_1_s = self.fit.poles[k].imag
-        return fit_shape(entries, self.fit.residue[:, k], variance, damped_1_s, gain, near)
-
-    @property
-    def fit_error(self) -> float:
-        """‖H − fit‖/‖H‖."""
-        return float(np.linalg.norm(self.fit.error) / np.linalg.norm(self.data.response))
-
-
-def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPoles | None:
+def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> PoleIdentification | None:
     """All poles that the matrix holds in and right beside a band; None where there is none.
 
     Raises RefusedError where too few lines lie in the band.
@@ -93,7 +55,7 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     sets = tuple(np.flatnonzero(nodes == node) for node in dict.fromkeys(nodes.tolist()))
     data = Data(
         f[chosen], response, None, rate, tail_s=matrix.tail_s, near=True, above=True, sets=sets,
-        row=rows, column=columns,
+        row=rows, column=columns, hit=hit,
     )  # fmt: skip
     # A record cut off while it rings leaves ripples, which polynomials take for poles.
     smooth = matrix.ended or matrix
@@ -101,12 +63,8 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     start = np.array([line.pole for line in stable(found)]) + smooth.exponential_rate_1_s
     if not start.size:
         return None
-    start = data.with_one_above(start)
-    fit = select_modes(data, start)
-    if not fit.poles.size:
-        return None
-    told = scales(data, fit), doubt(data, fit), presences(data, fit.poles, fit.residue)
-    return MatrixPoles(data, fit, found, *told, hit)
+    fit = select_modes(data, data.with_one_above(start))
+    return PoleIdentification(data, found, fit) if fit.poles.size else None
 
 
 def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> Diagram:

@@ -238,6 +238,13 @@ class Diagram:
         """The highest."""
         return self.sets[-1].order
 
+    def support(self, pole: complex) -> float:
+        """Share of the upper half of the orders with a pole within half a bandwidth or 0.5 %."""
+        upper = self.sets[len(self.sets) // 2 :]
+        reach = max(abs(pole.real), 0.005 * abs(pole))
+        near = [np.any(np.abs(entry.poles.imag - pole.imag) < reach) for entry in upper]
+        return float(np.mean(near))
+
 
 def diagram(sets: tuple[PoleSet, ...], band_hz: tuple[float, float]) -> Diagram:
     """Join the poles of increasing orders to lines.
