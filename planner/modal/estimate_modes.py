@@ -28,21 +28,20 @@ def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
     For poles in the s-plane (accelerance). `shared` (2m, 2m) is the covariance of the poles from
     errors that lines have in common: it moves the poles of parts of the band too.
     """
-    scale = scales(data, fitted)
-    m = fitted.poles.size
-    own, common = _pairs(fitted.covariance) * scale[:, None], _pairs(shared)
+    m, scale = fitted.poles.size, np.tile(scales(data, fitted), 2)
+    own = np.maximum(np.diag(fitted.covariance), 0.0) * scale
     factor = np.ones(m)
     for part, judged in _parts(data, fitted.poles).items():
         moved, covariance = _step(data, fitted, slice(*part))
-        k = np.array(judged)
-        variance = np.maximum(_pairs(covariance) * scale[:, None], own)[k]
-        by_chance = variance - own[k] + common[k]
-        # An error of the model, too, moves a pole the farther the less the lines hold it. Real and
-        # imaginary parts suffer from the same cause: one factor a mode.
-        beyond = np.maximum(moved.reshape(2, m).T[k] ** 2 - by_chance, 0.0)
+        variance = np.maximum(np.diag(covariance) * scale, own)
+        by_chance = variance - own + np.maximum(np.diag(shared), 0.0)
+        # An error of the model, too, moves a pole the farther the less the lines hold it.
+        beyond = np.maximum(moved**2 - by_chance, 0.0)
         # A pole that exact FRFs hold has no variance to inflate.
         beyond = np.divide(beyond, variance, out=np.zeros_like(beyond), where=variance > 0)
-        factor[k] = np.maximum(factor[k], 1 + np.max(beyond, axis=1))
+        # Real and imaginary parts suffer from the same cause: one factor a mode.
+        here = 1 + np.max(beyond.reshape(2, m), axis=0)[judged]
+        factor[judged] = np.maximum(factor[judged], here)
     return factor
 
 
@@ -76,11 +75,6 @@ def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndar
     # Of the information on the best held pole: below, rounding rules
     covariance = np.linalg.pinv(point.normal * turned, rcond=1e-10, hermitian=True) * turned
     return -covariance @ point.gradient, covariance
-
-
-def _pairs(covariance: np.ndarray) -> np.ndarray:
-    """(m, 2) variances of the real and imaginary parts of the poles."""
-    return np.maximum(np.diag(covariance), 0.0).reshape(2, -1).T
 
 
 MAX_ORDER = 40
@@ -181,13 +175,15 @@ def estimate_modes(frf: Frf, band_hz: tuple[float, float]) -> ModalModel:
     exceeds it, and from the error alone where the variance is unknown. Raises RefusedError where
     no mode can be found.
     """
-    found = identification(frf, band_hz)
-    inside = [
-        _at_all_axes(mode, np.flatnonzero(frf.measured)) for mode in (found.modes if found else ())
-        if band_hz[0] <= mode.frequency_hz <= band_hz[1]
-    ]  # fmt: skip
-    modes = tuple(mode for mode in inside if mode.probability >= LEAST_PROBABILITY)
-    doubtful = tuple(mode for mode in inside if mode.probability < LEAST_PROBABILITY)
+    found, hit = identification(frf, band_hz), np.flatnonzero(frf.measured)
+    sure: tuple[list[Mode], list[Mode]] = ([], [])
+    for mode in found.modes if found else ():
+        if band_hz[0] <= mode.frequency_hz <= band_hz[1]:
+            both = np.full((3, 3), np.nan + 1j * np.nan), np.full((3, 3), np.nan)
+            both[0][:, hit], both[1][:, hit] = mode.residue, mode.residue_sd
+            certain = mode.probability >= LEAST_PROBABILITY
+            sure[certain].append(replace(mode, residue=both[0], residue_sd=both[1]))
+    doubtful, modes = map(tuple, sure)
     if found is None or not modes:
         raise RefusedError(
             f"No mode could be found between {band_hz[0]:g} and {band_hz[1]:g} Hz: hit harder or"
@@ -224,13 +220,6 @@ def identification(frf: Frf, band_hz: tuple[float, float]) -> PoleIdentification
         force_window_s=frf.force_window_s,
     )
     return identify(data)
-
-
-def _at_all_axes(mode: Mode, columns: np.ndarray) -> Mode:
-    """With residues at all three hit axes, NaN where nothing was hit."""
-    residue, residue_sd = np.full((3, 3), np.nan + 1j * np.nan), np.full((3, 3), np.nan)
-    residue[:, columns], residue_sd[:, columns] = mode.residue, mode.residue_sd
-    return replace(mode, residue=residue, residue_sd=residue_sd)
 
 
 def _remarks(found: PoleIdentification, doubtful: tuple[Mode, ...]) -> tuple[str, ...]:

@@ -59,7 +59,17 @@ def plscf(
     normal, coupling = _normal(z, scaled, weight, max(orders))
     found = []
     for order in orders:
-        roots, participation = _solve(order, normal, coupling, scale)
+        coefficients = _denominator(order, normal, coupling)
+        # 1/z for det Σ A_r z^r = 0 with A₀ = I: eigenvalues of the block companion matrix
+        inputs = coefficients.shape[1]
+        companion = np.eye(order * inputs, k=-inputs)
+        companion[:inputs] = -coefficients[1:].transpose(1, 0, 2).reshape(inputs, -1)
+        roots = np.linalg.eigvals(companion)
+        roots = 1 / roots[np.abs(roots) > 1e-12]
+        inside = (np.abs(roots) < 1) & (np.abs(roots) > 1e-6) & (roots.imag > 0)
+        roots = roots[inside].astype(complex)
+        participation = _participation(coefficients, roots) * scale
+        participation /= np.linalg.norm(participation, axis=1, keepdims=True)
         poles = np.log(roots) / step + 1j * base
         by_frequency = np.argsort(poles.imag)
         found.append(PoleSet(order, poles[by_frequency], participation[by_frequency]))
@@ -147,22 +157,6 @@ def _normal(
 def _two_sided(lags: np.ndarray, data: np.ndarray) -> np.ndarray:
     """Σ_f z^l data_f for l = −n…n."""
     return np.concatenate([(lags[:0:-1].conj()) @ data, lags @ data])
-
-
-def _solve(
-    order: int, normal: np.ndarray, coupling: np.ndarray, scale: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Roots (k,) in the z-plane, in the upper half of the circle, and their participation."""
-    coefficients = _denominator(order, normal, coupling)
-    # 1/z for det Σ A_r z^r = 0 with A₀ = I: eigenvalues of the block companion matrix
-    inputs = coefficients.shape[1]
-    companion = np.eye(order * inputs, k=-inputs)
-    companion[:inputs] = -coefficients[1:].transpose(1, 0, 2).reshape(inputs, -1)
-    roots = np.linalg.eigvals(companion)
-    z = 1 / roots[np.abs(roots) > 1e-12]
-    z = z[(np.abs(z) < 1) & (np.abs(z) > 1e-6) & (z.imag > 0)].astype(complex)
-    participation = _participation(coefficients, z) * scale
-    return z, participation / np.linalg.norm(participation, axis=1, keepdims=True)
 
 
 def _denominator(order: int, normal: np.ndarray, coupling: np.ndarray) -> np.ndarray:

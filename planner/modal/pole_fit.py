@@ -110,7 +110,11 @@ def refine(data: Data, variance: np.ndarray, start: np.ndarray) -> PoleFit:
         step = -unit * np.linalg.lstsq(damped, unit * point.gradient)[0]
         there = poles + complex_of(step)
         tried = reduced_together(sets, there) if data.allowed(there) else None
-        settled = tried is not None and damping < DAMPING and _still(point, tried, step)
+        settled = False
+        if tried is not None and damping < DAMPING:  # what damping keeps short tells nothing
+            # Far below a standard deviation, or changed by rounding alone
+            sds = np.abs(step) * np.sqrt(np.maximum(diagonal, 0.0))
+            settled = np.max(sds) < 1e-3 or abs(point.chi2 - tried.chi2) < 1e-9 * point.chi2
         if tried is not None and tried.chi2 < point.chi2:
             poles, point, damping = there, tried, LIGHTER * damping
         else:
@@ -120,15 +124,6 @@ def refine(data: Data, variance: np.ndarray, start: np.ndarray) -> PoleFit:
     common, covariance = stack(poles), np.linalg.pinv(point.normal, hermitian=True)
     found = _finish(sets, data, variance, common[None], common, 0 * common, covariance)
     return found if data.step_s is None else _in_rad_s(data, found, data.step_s)
-
-
-def _still(before: ReducedFit, after: ReducedFit, step: np.ndarray) -> bool:
-    """Whether a step changed nothing: far below a standard deviation, or by rounding alone.
-
-    A short step tells nothing as long as damping keeps it short.
-    """
-    sds = np.abs(step) * np.sqrt(np.maximum(np.diag(before.normal), 0.0))
-    return bool(np.max(sds) < 1e-3 or abs(before.chi2 - after.chi2) < 1e-9 * before.chi2)
 
 
 def _in_rad_s(data: Data, found: PoleFit, step_s: float) -> PoleFit:

@@ -66,13 +66,6 @@ def explains(local: Data, less: PoleFit, more: PoleFit, margin: float = 1.0) -> 
     return before - after > margin * local.threshold * scale
 
 
-def _in_most(local: Data, less: PoleFit, more: PoleFit) -> bool:
-    """Whether a fit with one mode more is clearly better than chance makes it in most sets."""
-    fall = less.chi2 - more.chi2
-    each = [np.sum(fall[chosen]) / (2 * len(chosen) + 2) for chosen in local.sets]
-    return bool(np.median(each) > APART)
-
-
 def merged_modes(data: Data, fit: PoleFit) -> tuple[np.ndarray, np.ndarray]:
     """Poles (m,) and those of every set (k, m), with those made one that are one mode.
 
@@ -94,21 +87,18 @@ def merged_modes(data: Data, fit: PoleFit) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _groups(data: Data, fit: PoleFit, order: np.ndarray) -> list[np.ndarray]:
-    """Indices of poles, increasing, that lie together and take part alike."""
+    """Indices of poles, increasing, that lie together and take part at the references alike."""
 
     def together(last: int, k: int) -> bool:
         gap = fit.poles[k].imag - fit.poles[last].imag
         width = 2 * max(abs(fit.poles[k].real), abs(fit.poles[last].real))
-        return gap < max(width, TOGETHER * fit.poles[k].imag) and _alike(data, fit, last, k)
+        if gap >= max(width, TOGETHER * fit.poles[k].imag):
+            return False
+        tables = np.moveaxis(data.table(fit.residue[:, [last, k]]), -1, 0)
+        vectors = np.linalg.svd(tables, full_matrices=False)[2][:, 0]
+        return bool(np.abs(np.vdot(*vectors)) ** 2 > ALIKE)
 
     return [np.array(group) for group in grouped(order, together) if len(group) > 1]
-
-
-def _alike(data: Data, fit: PoleFit, first: int, second: int) -> bool:
-    """Whether two modes take part at the references alike; always so at a single one."""
-    tables = np.moveaxis(data.table(fit.residue[:, [first, second]]), -1, 0)
-    vectors = np.linalg.svd(tables, full_matrices=False)[2][:, 0]
-    return bool(np.abs(np.vdot(*vectors)) ** 2 > ALIKE)
 
 
 def _as_one(data: Data, fit: PoleFit, group: np.ndarray) -> tuple[complex, np.ndarray] | None:
@@ -129,8 +119,9 @@ def _as_one(data: Data, fit: PoleFit, group: np.ndarray) -> tuple[complex, np.nd
         more = fit_sets(local, variance, fit.poles[near], known=fit.own[:, near])
         if explains(local, one, more, APART):
             # Where it is one mode, only sets that fitted it badly are explained better by two.
-            found = reestimated_sets(local, one)
-            if _in_most(local, one, more) or found is None:
+            fall, found = one.chi2 - more.chi2, reestimated_sets(local, one)
+            each = [np.sum(fall[chosen]) / (2 * len(chosen) + 2) for chosen in local.sets]
+            if np.median(each) > APART or found is None:
                 return None
             one = fit_sets(local, variance, one.poles, MERGED_ROUNDS, found)
     except DivergedPolesError:
