@@ -82,11 +82,8 @@ def _response_snr(hit: Hit) -> float | None:
 def _pulse(hit: Hit) -> Iterator[Fault]:
     pulse, samples = hit.pulse, len(hit.force_n)
     if hit.force_n[pulse.peak] <= pulse.offset_n:
-        yield Fault(
-            "polarity",
-            f"The force pulse of {significant(pulse.peak_n, 3)} N is negative: a hammer only "
-            f"pushes; check the polarity of the force channel.",
-        )
+        text = f"The force pulse of {significant(pulse.peak_n, 3)} N is negative: a hammer only"
+        yield Fault("polarity", f"{text} pushes; check the polarity of the force channel.")
     if pulse.first < LEAST_PRETRIGGER:
         yield Fault("truncated", "The pulse starts at the record's edge; set a pre-trigger.")
     elif pulse.end > samples - 8 or pulse.peak > 0.8 * samples:
@@ -107,12 +104,9 @@ def _double(hit: Hit) -> Iterator[Fault]:
     valley = _valley(force[pulse.first : pulse.end])
     least = max(SECOND_PEAK * peak, 6 * pulse.noise_n, 1.5 * ringing)
     if max(second, valley) > least:
-        yield Fault(
-            "double_hit",
-            f"A second pulse of {significant(max(second, valley), 3)} N follows the first of "
-            f"{significant(peak, 3)} N; "
-            f"hit once and let it bounce off.",
-        )
+        text = f"A second pulse of {significant(max(second, valley), 3)} N follows the first of"
+        text += f" {significant(peak, 3)} N; hit once and let it bounce off."
+        yield Fault("double_hit", text)
 
 
 def _valley(pulse: np.ndarray) -> float:
@@ -146,11 +140,8 @@ def _soft(hit: Hit, band_hz: tuple[float, float]) -> Iterator[Fault]:
     elif inside.size and end.size:
         drop = 20 * np.log10(np.max(inside) / max(float(np.mean(end)), 1e-30))
         if drop > ROLL_OFF_DB:
-            yield Fault(
-                "too_soft",
-                f"The pulse is too soft: its spectrum has fallen by {drop:.0f} dB at {high:g} Hz; "
-                f"use a harder tip.",
-            )
+            text = f"The pulse is too soft: its spectrum has fallen by {drop:.0f} dB at {high:g} Hz"
+            yield Fault("too_soft", f"{text}; use a harder tip.")
 
 
 def band_spectra(
