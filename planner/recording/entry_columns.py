@@ -11,13 +11,13 @@ from planner.recording.column_names import (
     Axis,
     Unit,
     axis_of,
+    axis_unit,
     is_abscissa,
     is_axis,
     lookup,
     name_of,
     names_of,
     rescaled,
-    time_unit,
     unit_of,
     unit_text,
     units_of,
@@ -192,7 +192,7 @@ def found_in(
         else:
             own = {k: v for alone, of in here if alone for k, v in of.items()}
             own |= _of_one(name, here[-1][1])
-            if path and not (unit_text(name) or time_unit(name, "")):
+            if path and not (unit_text(name) or axis_unit(name, "", "time")):
                 unit = unit_of(here[-1][1])  # of all that is in the group
                 own = {**({"unit": unit} if lookup(unit) else {}), **own}
             shared = {k: v for alone, of in here if not alone for k, v in of.items()}
@@ -273,7 +273,7 @@ def _axis_unit(name: str, said: Stated) -> Unit | None:
     unit = lookup(unit_of(said))
     if unit and unit.quantity in ("time", "frequency") and is_abscissa(name):
         return unit
-    return time_unit(name, unit_of(said))
+    return axis_unit(name, unit_of(said), "time")
 
 
 def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Named:

@@ -122,17 +122,11 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
     name = _axis(source, force, axis, remarks)
     if unlabelled := without_unit(record):
         remarks.append(f"Left out, as their unit is not known: {unlabelled}.")
+    noticed = (Fault(NOTICED, text, refuse=False) for text in remarks)
     return Hit(
-        source,
-        name,
-        record.sampling_rate_hz,
-        force.samples,
-        samples,
-        simulated=record.simulated,
-        hit_point=hit_point,
-        responses=tuple(order),
-        faults=(*record.faults, *(Fault(NOTICED, t, refuse=False) for t in remarks), *left_out),
-    )
+        source, name, record.sampling_rate_hz, force.samples, samples, record.simulated, hit_point,
+        tuple(order), (*record.faults, *noticed, *left_out),
+    )  # fmt: skip
 
 
 def _at_points(
