@@ -27,7 +27,11 @@ def reestimated_sets(data: Data, fit: PoleFit) -> np.ndarray | None:
     shares = _participation(data, fit)[data.column]
     off = _off(data, fit) | _apart(data, fit, shares)
     own, moved = fit.own.copy(), False
-    for modes in _together(data, fit):
+    # Modes among the lines, in groups whose peaks may overlap
+    omega, far, imag = 2 * np.pi * data.frequency_hz[[0, -1]], _reach(fit), fit.poles.imag
+    order = (int(k) for k in np.argsort(imag) if omega[0] < imag[k] < omega[1])
+    for group in grouped(order, lambda a, b: imag[b] - imag[a] < far[a] + far[b]):
+        modes = np.array(group)
         for s in np.flatnonzero(off[:, modes].any(axis=1)):
             found = _Neighbourhood.of(data, fit, shares, int(s), modes).best()
             if found is not None:
@@ -63,15 +67,6 @@ def _near(data: Data, fit: PoleFit, mode: int) -> np.ndarray:
     """(F,) bool: lines around a mode, wherever a set may have it."""
     far = _reach(fit)[mode] + REACH * np.abs(fit.poles[mode].real)
     return np.abs(2 * np.pi * data.frequency_hz - fit.poles[mode].imag) < far
-
-
-def _together(data: Data, fit: PoleFit) -> list[np.ndarray]:
-    """Modes (indices) among the lines, in groups whose peaks may overlap."""
-    omega, far = 2 * np.pi * data.frequency_hz[[0, -1]], _reach(fit)
-    inside = (fit.poles.imag > omega[0]) & (fit.poles.imag < omega[1])
-    order = [int(k) for k in np.argsort(fit.poles.imag) if inside[k]]
-    groups = grouped(order, lambda a, b: np.diff(fit.poles[[a, b]].imag)[0] < far[a] + far[b])
-    return [np.array(group) for group in groups]
 
 
 def _off(data: Data, fit: PoleFit) -> np.ndarray:

@@ -243,7 +243,12 @@ def axis_of(path: Path, attributes: Attributes) -> Axis:
     """What samples stand at. Raises InputError where it is stated twice and differently."""
     steps = [n for _, v in _of_keys(attributes, STEPS) if (n := number(v)) is not None and n]
     rates = [n for _, v in _of_keys(attributes, RATES) if (n := number(v)) is not None and n]
-    quantity, _, factor = next(_abscissae(attributes), _AXES["time"][0])
+    on_axis = (
+        lookup(value) for key, value in attributes.items()
+        if isinstance(value, str) and (_on_abscissa(key) or set(_forms(key)) & _X_UNITS)
+    )  # fmt: skip
+    units = (unit for unit in on_axis if unit and unit.quantity in _AXES)
+    quantity, _, factor = next(units, _AXES["time"][0])
     found = [1 / rate for rate in rates] + [step * factor for step in steps]
     for step in found[1:]:
         if not abs(step - found[0]) <= UNEVEN * abs(found[0]):
@@ -262,15 +267,6 @@ def is_axis(key: str) -> bool:
     """Whether an attribute is of one channel's axis, unit or name, and of no record."""
     known = STEPS | RATES | _STARTS | _UNITS | _NAMES | _X_UNITS
     return any(form in known for form in _forms(key))
-
-
-def _abscissae(attributes: Attributes) -> Iterator[Unit]:
-    """Units stated of what samples stand at."""
-    for key, value in attributes.items():
-        if isinstance(value, str) and (_on_abscissa(key) or set(_forms(key)) & _X_UNITS):
-            unit = lookup(value)
-            if unit and unit.quantity in _AXES:
-                yield unit
 
 
 def _date(value: object) -> float | None:

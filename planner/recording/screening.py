@@ -101,23 +101,17 @@ def _double(hit: Hit) -> Iterator[Fault]:
     ringing = max(0.0, -float(np.min(force)))
     rest = np.concatenate([force[: max(0, pulse.first - 1)], force[pulse.end + 1 :]])
     second = float(np.max(rest, initial=0.0))
-    valley = _valley(force[pulse.first : pulse.end])
+    # How far the force rises again above the lowest point between two tops of the pulse; coming
+    # back from below zero is the filter's ringing.
+    inside = np.clip(force[pulse.first : pulse.end], 0.0, None)
+    top = int(np.argmax(inside))
+    sides = inside[top:], inside[top::-1]
+    valley = max(float(np.max(side - np.minimum.accumulate(side))) for side in sides)
     least = max(SECOND_PEAK * peak, 6 * pulse.noise_n, 1.5 * ringing)
     if max(second, valley) > least:
         text = f"A second pulse of {significant(max(second, valley), 3)} N follows the first of"
         text += f" {significant(peak, 3)} N; hit once and let it bounce off."
         yield Fault("double_hit", text)
-
-
-def _valley(pulse: np.ndarray) -> float:
-    """How far the force rises again inside one pulse, above the lowest point between two tops."""
-    top = int(np.argmax(pulse))
-    pulse = np.clip(pulse, 0.0, None)  # coming back from below zero is the filter's ringing
-    rise = 0.0
-    for side in (pulse[top:], pulse[top::-1]):
-        lowest = np.minimum.accumulate(side)
-        rise = max(rise, float(np.max(side - lowest)))
-    return rise
 
 
 def _soft(hit: Hit, band_hz: tuple[float, float]) -> Iterator[Fault]:
@@ -186,7 +180,15 @@ def driving_point(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
     The sensor has to be near the point that is hit; only hits at the tcp are judged.
     """
     own = hit.channels_of(SENSOR)
-    if own is None or hit.hit_point != TCP or _positive_share(own, band_hz) > TURNED:
+    if own is None or hit.hit_point != TCP:
+        return ()
+    force, answers = band_spectra(own, band_hz, own.pulse.offset_n)
+    power = np.abs(force) ** 2
+    strong = power > FLOOR**2 * np.max(power, initial=0.0)
+    answer = answers[own.axis_index, strong]
+    imag = np.imag(answer * force[strong].conj()) / power[strong]
+    total = np.sum(np.abs(imag))
+    if not total > 0 or np.sum(imag[imag > 0]) / total > TURNED:
         return ()
     axis = AXES[hit.axis_index]
     text = (
@@ -194,14 +196,3 @@ def driving_point(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
         f"where it is hit); check the sign of the axis and the polarity of force and acceleration."
     )
     return (Fault("driving_point", text, refuse=False),)
-
-
-def _positive_share(hit: Hit, band_hz: tuple[float, float]) -> float:
-    """Share of |Im H|, in [0, 1], with the right sign; H of the hit's own axis, x, y, z heard."""
-    force, answers = band_spectra(hit, band_hz, hit.pulse.offset_n)
-    answer = answers[hit.axis_index]
-    power = np.abs(force) ** 2
-    strong = power > FLOOR**2 * np.max(power, initial=0.0)
-    imag = np.imag(answer[strong] * force[strong].conj()) / power[strong]
-    total = np.sum(np.abs(imag))
-    return float(np.sum(imag[imag > 0]) / total) if total > 0 else 1.0
