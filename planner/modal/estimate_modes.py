@@ -11,7 +11,7 @@ from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.least_squares import WeightedSets, reduced_together
 from planner.modal.mode_selection import doubt, fit, presences, scales, strongest
 from planner.modal.modes import LEAST_PROBABILITY, ModalModel, Mode
-from planner.modal.plscf import Diagram, diagram, ladder, plscf, stable
+from planner.modal.plscf import Diagram, plscf
 from planner.modal.pole_fit import PoleFit, shared_error
 from planner.modal.residues import rank_one
 
@@ -152,11 +152,9 @@ class PoleIdentification:
 
 def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | None:
     """All modes that the lines of `data` carry, None where there is no pole."""
-    orders = ladder(max_order, data.frequency_hz.size)
     weight = None if data.variance is None else 1 / np.mean(data.variance, axis=1)
-    sets = plscf(data.frequency_hz, data.response, orders, weight)
-    found = diagram(sets, (data.frequency_hz[0] * 0.95, data.frequency_hz[-1] * 1.05))
-    start = np.array([line.pole for line in stable(found)]) + data.rate_1_s
+    found = plscf(data.frequency_hz, data.response, max_order, weight)
+    start = found.start + data.rate_1_s
     start = start if start.size else strongest(data)
     if start.size == 0:
         return None

@@ -176,7 +176,6 @@ def _same(a: Mode, b: Mode) -> bool:
     exponentials; two modes of one structure at one place would differ in shape.
     """
     width = max(a.damping_ratio * a.frequency_hz, b.damping_ratio * b.frequency_hz)
-    # MAC above which neighbours within a bandwidth are one mode.
     return abs(a.frequency_hz - b.frequency_hz) < width and mac(a.shape, b.shape) > 0.95
 
 

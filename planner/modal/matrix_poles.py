@@ -18,7 +18,7 @@ from planner.modal.mode_selection import (
     presences,
     scatter,
 )
-from planner.modal.plscf import Diagram, diagram, ladder, plscf, row_errors, stable
+from planner.modal.plscf import Diagram, ladder, plscf, row_errors
 from planner.modal.pole_fit import ROUNDS, DivergedPolesError, PoleFit, fit_sets, refine
 from planner.modal.set_search import reestimated_sets
 from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
@@ -44,7 +44,6 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> PoleIden
     hit, matrix = matrix.hit, matrix.roved
     f = matrix.frequency_hz
     chosen = (f >= band_hz[0] / (1 + MARGIN)) & (f <= band_hz[1] * (1 + MARGIN))
-    # Least lines.
     if np.count_nonzero(chosen) < 16:
         raise too_few_lines(chosen, f, band_hz)
     rows, columns = np.nonzero(matrix.measured)
@@ -60,7 +59,7 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> PoleIden
     # A record cut off while it rings leaves ripples, which polynomials take for poles.
     smooth = matrix.ended or matrix
     found = _diagram(smooth, chosen)
-    start = np.array([line.pole for line in stable(found)]) + smooth.exponential_rate_1_s
+    start = found.start + smooth.exponential_rate_1_s
     if not start.size:
         return None
     fit = select_modes(data, data.with_one_above(start))
@@ -75,16 +74,13 @@ def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> Diagram:
     block = table[complete][:, columns]
     level = np.mean(np.abs(block) ** 2, axis=(1, 2))
     weight = np.ones(block.shape[::2]) / np.maximum(level, 1e-300)[:, None]
-    orders = ladder(MAX_ORDER, block.shape[-1])
-    frequency = matrix.frequency_hz[chosen]
-    # Rows that do not go with the others are taken down.
+    order, frequency = ladder(MAX_ORDER, block.shape[-1])[-1], matrix.frequency_hz[chosen]
     changed = weight
     for _ in range(REWEIGHED if block.shape[0] >= LEAST_ROWS and block.shape[1] > 1 else 0):
-        errors = row_errors(frequency, block, orders[-1], changed)
+        errors = row_errors(frequency, block, order, changed)
         usual = max(float(np.median(errors)), 1e-300)
         changed = weight * np.minimum(1.0, ODD * usual / np.maximum(errors, 1e-300))[:, None] ** 2
-    sets = plscf(frequency, block, orders, changed)
-    return diagram(sets, (frequency[0] * 0.95, frequency[-1] * 1.05))
+    return plscf(frequency, block, MAX_ORDER, changed)
 
 
 def _references(measured: np.ndarray) -> np.ndarray:
@@ -109,8 +105,7 @@ def select_modes(data: Data, poles: np.ndarray) -> PoleFit:
     # Rough rounds of the first fit, whose weights do not know yet how sets differ
     fit = _fit(data, begun, fit.poles, fit.own, 2)
     searched = False
-    # Passes of leaving out and adding
-    for _ in range(4):
+    for _ in range(4):  # passes of leaving out and adding
         # Not before: sets would be moved to where they imitate the modes that a fit lacks.
         fit = _settled(data, fit) if searched else fit
         present = presences(data, fit.poles, fit.residue) >= PRESENT
@@ -165,10 +160,9 @@ def _missing(data: Data, fit: PoleFit) -> np.ndarray:
     poles, fall = falls(data, weight, weight * fit.error)
     failed, step = 0, data.frequency_hz[1] - data.frequency_hz[0]
     fall[poles.imag / (2 * np.pi) < LINES_BELOW * step] = 0.0
-    # Most added.
-    for _ in range(6):
+    for _ in range(6):  # most that are added
         best = int(np.argmax(fall))
-        # Most failed: candidates in a row that are no modes: weaker ones are not tried
+        # After two candidates in a row that are no modes weaker ones are not tried.
         if fall[best] <= data.threshold or failed == 2:
             break
         pole = complex(poles[best])

@@ -41,12 +41,10 @@ def ladder(most: int, lines: int) -> tuple[int, ...]:
 
 
 def plscf(
-    frequency_hz: np.ndarray,
-    frf: np.ndarray,
-    orders: tuple[int, ...],
-    weight: np.ndarray | None = None,
-) -> tuple[PoleSet, ...]:
-    """Poles of every model order.
+    frequency_hz: np.ndarray, frf: np.ndarray, most: int, weight: np.ndarray | None = None,
+    reach_hz: tuple[float, float] | None = None,
+) -> "Diagram":  # fmt: skip
+    """Poles of model orders up to `most`, followed in `reach_hz` (the lines and 5 % beyond).
 
     frequency_hz (F,) increasing, > 0; frf (outputs, inputs, F) complex, finite, of any kind
     (receptance, mobility, accelerance: the poles are the same and the numerator takes the
@@ -56,8 +54,8 @@ def plscf(
     """
     base, step, z = _circle(2 * np.pi * np.asarray(frequency_hz))
     scale, scaled = _scaled(frf)
-    normal, coupling = _normal(z, scaled, weight, max(orders))
-    found = []
+    orders, found = ladder(most, len(z)), []
+    normal, coupling = _normal(z, scaled, weight, orders[-1])
     for order in orders:
         coefficients = _denominator(order, normal, coupling)
         # 1/z for det Σ A_r z^r = 0 with A₀ = I: eigenvalues of the block companion matrix
@@ -73,7 +71,7 @@ def plscf(
         poles = np.log(roots) / step + 1j * base
         by_frequency = np.argsort(poles.imag)
         found.append(PoleSet(order, poles[by_frequency], participation[by_frequency]))
-    return tuple(found)
+    return diagram(tuple(found), reach_hz or (0.95 * frequency_hz[0], 1.05 * frequency_hz[-1]))
 
 
 def row_errors(
@@ -197,6 +195,11 @@ class Line:
     share: float  # orders present / orders tried since it first appeared
 
     @property
+    def reach(self) -> int:
+        """Over how many orders it goes."""
+        return int(self.orders[-1] - self.orders[0])
+
+    @property
     def late(self) -> np.ndarray:
         """Those of the upper half of the orders, where bias has died out."""
         return self.poles[len(self.poles) // 2 :]
@@ -231,6 +234,11 @@ class Diagram:
     def order(self) -> int:
         """The highest."""
         return self.sets[-1].order
+
+    @property
+    def start(self) -> np.ndarray:
+        """(m,) in rad/s: the poles of stable lines."""
+        return np.array([line.pole for line in stable(self)], complex)
 
     def support(self, pole: complex) -> float:
         """Share of the upper half of the orders with a pole within half a bandwidth or 0.5 %."""

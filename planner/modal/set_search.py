@@ -48,8 +48,7 @@ def _participation(data: Data, fit: PoleFit) -> np.ndarray:
     tables = np.moveaxis(data.table(fit.residue), -1, 0)
     usual = np.median(np.linalg.norm(tables, axis=2), axis=1, keepdims=True)
     weight, right = np.ones(tables.shape[:2]), np.zeros(tables.shape[::2], complex)
-    # Robust rounds.
-    for _ in range(5):
+    for _ in range(5):  # robust rounds
         right = np.linalg.svd(weight[..., None] * tables, full_matrices=False)[2][:, 0]
         off = tables - (tables @ right[..., None].conj()) * right[:, None]
         weight = 1 / np.sqrt(np.linalg.norm(off, axis=2) + 0.1 * usual + 1e-300)
@@ -149,8 +148,7 @@ class _Neighbourhood:
         for _ in range(2 if poles.size > 1 else 1):
             before = poles
             for a in range(poles.size):
-                # Step and most: trials lie so many half bandwidths apart, at most so many to either
-                # side
+                # Trials lie half a half bandwidth apart, at most so many to either side.
                 count = min(40, int(np.ceil(reach[a] / (0.5 * half[a]))))
                 shift = np.linspace(-reach[a], reach[a], 2 * count + 1)
                 poles = self._along(poles, a, common[a] - poles[a] + 1j * shift)
@@ -212,7 +210,7 @@ class _Neighbourhood:
 def _explained(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
     """(t,) fall of χ² by least squares from normal (t, c, c) and right (t, c, k)."""
     size = np.maximum(np.sqrt(np.einsum("taa->ta", normal)), 1e-300)
-    # Ridge.
-    normal = normal / size[:, :, None] / size[:, None] + 1e-9 * np.eye(size.shape[1])
+    ridge = 1e-9 * np.eye(size.shape[1])
+    normal = normal / size[:, :, None] / size[:, None] + ridge
     right = right / size[..., None]
     return np.sum(right * np.linalg.solve(normal, right), axis=(1, 2))
