@@ -79,9 +79,12 @@ def fit(data: Data, start: np.ndarray) -> PoleFit:
         if candidate is None:
             break
         tried.append(candidate)
-        poles = np.append(current.poles, candidate)
-        grown = _refine(data, poles, current)
-        if _worth(data, current, grown):
+        grown = _refine(data, np.append(current.poles, candidate), current)
+        fall = np.abs(current.error) ** 2 - np.abs(grown.error) ** 2
+        scale = scales(data, grown)[np.argmax(weakness(data, grown))]
+        if data.variance is None:
+            scale *= np.mean(grown.variance / current.variance)
+        if np.sum(2 / current.variance * fall) > data.threshold * scale:
             current = _prune(data, grown)
     return current if data.steady else _merged_twins(data, current)
 
@@ -195,16 +198,6 @@ def scales(data: Data, current: PoleFit) -> np.ndarray:
     """(m,) factor on the covariance of each mode, from the error around it."""
     frequency = np.abs(current.poles) / (2 * np.pi)
     return np.interp(frequency, data.frequency_hz, current.excess)
-
-
-def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:
-    weight = 2 / before.variance
-    rise = np.sum(weight * (np.abs(before.error) ** 2 - np.abs(after.error) ** 2))
-    new = int(np.argmax(weakness(data, after)))
-    scale = scales(data, after)[new]
-    if data.variance is None:
-        scale *= float(np.mean(after.variance / before.variance))
-    return bool(rise > data.threshold * scale)
 
 
 def strongest(data: Data) -> np.ndarray:

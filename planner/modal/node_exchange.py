@@ -111,8 +111,11 @@ def exchanged_nodes(
 
 
 def _surprise(found: RowPrediction, nodes: Sequence[np.ndarray]) -> np.ndarray:
-    """(n,) of nodes, given by their rows, over all modes and directions."""
-    each = np.sum(found.surprise, axis=1)
+    """(n,) squared differences to what the others foretell, over their variance.
+
+    Of nodes, given by their rows, over all modes and directions.
+    """
+    each = np.sum(found.pull**2, axis=1) / np.diag(found.precision)
     return np.array([np.sum(each[rows]) for rows in nodes])
 
 

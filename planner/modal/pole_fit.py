@@ -252,19 +252,6 @@ def _common(
     return covariance @ right, covariance
 
 
-def _student(point: ReducedFit, spread: np.ndarray) -> np.ndarray:
-    """(2m,) factors of sds, since so many sets alone tell how much sets differ.
-
-    Student's t over the normal quantile, for that part of the variance which comes from it.
-    """
-    known = np.einsum("kaa->ka", point.normal)
-    weight = known / (1 + spread * known)
-    total = np.maximum(np.sum(weight, axis=0), 1e-300)
-    freedom = np.maximum(total**2 / np.maximum(np.sum(weight**2, axis=0), 1e-300) - 1, 2.0)
-    noise = total / np.maximum(np.sum(known, axis=0), 1e-300)
-    return np.sqrt(noise + (1 - noise) * widening_factor(freedom) ** 2)
-
-
 def _own(point: ReducedFit, x: np.ndarray, common: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """The sets' most probable poles (k, 2m), shrunk towards the common ones."""
     pull = np.einsum("kab,kb->ka", point.normal, x - common) - point.gradient
@@ -297,7 +284,14 @@ def _finish(
     square = np.maximum(alone / np.maximum(sets.weight, 1e-300)[..., None] + spent, 0.0)
     residue_variance, there = np.zeros((data.entries, m)), sets.entries >= 0
     residue_variance[sets.entries[there]] = of_each(square, m)[there]
-    factor = _student(point, spread)
+    # Student's t over the normal quantile for that part of the variance that comes from how sets
+    # differ: so many alone tell it.
+    known = np.einsum("kaa->ka", point.normal)
+    weight = known / (1 + spread * known)
+    whole = np.maximum(np.sum(weight, axis=0), 1e-300)
+    freedom = np.maximum(whole**2 / np.maximum(np.sum(weight**2, axis=0), 1e-300) - 1, 2.0)
+    noise = whole / np.maximum(np.sum(known, axis=0), 1e-300)
+    factor = np.sqrt(noise + (1 - noise) * widening_factor(freedom) ** 2)
     return PoleFit(
         complex_of(common), poles, factor[:, None] * covariance * factor, spread, coefficients,
         residue_variance, error, variance, point.significance(sets.weight),

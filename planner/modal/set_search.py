@@ -159,7 +159,8 @@ class _Neighbourhood:
                 for way in (1j, 1.0):
                     poles = self._along(poles, a, way * step * half[a] * np.arange(-2, 3))
         last = np.stack([poles, self.own])
-        bound, free = self._bound(last), self._free(last)
+        (total, gram, cross), bound = self._sums(last), self._bound(last)
+        free = total - _explained(gram, cross / np.sqrt(self.level))  # residues left free
         gain = bound[1] - bound[0]
         # Gain of χ², from which what was found takes the place of what was there
         # Share of that gain by which χ² with residues left free may rise: an FRF may be spoiled
@@ -188,11 +189,6 @@ class _Neighbourhood:
         pull = np.sum((poles.imag - self.common.imag) ** 2 / self.spread, axis=1)
         total = pull + np.sum(self.values**2 / self.level[:, None])
         return total, columns @ columns.transpose(0, 2, 1), columns @ self.values.T
-
-    def _free(self, poles: np.ndarray) -> np.ndarray:
-        """(t,) χ² of trials (t, n) with residues left free."""
-        total, gram, cross = self._sums(poles)
-        return total - _explained(gram, cross / np.sqrt(self.level))
 
     def _bound(self, poles: np.ndarray) -> np.ndarray:
         """(t,) χ² of trials (t, n) excited as in all sets."""

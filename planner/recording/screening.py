@@ -50,33 +50,25 @@ def screen(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
 
 
 def _weak(hit: Hit) -> Iterator[Fault]:
-    peak, noise, ratio = hit.pulse.peak_n, hit.pulse.noise_n, _response_snr(hit)
+    pulse, peak, noise = hit.pulse, hit.pulse.peak_n, hit.pulse.noise_n
     if peak < LEAST_SNR * noise:
         text = (
             f"The force peak of {significant(peak, 3)} N is only {peak / noise:.1f} times the noise"
         )
         yield Fault("too_weak", f"{text}; hit harder.")
-    told = any(fault.kind == "not_at_rest" for fault in hit.faults)
-    if ratio is not None and not told and ratio < LEAST_RESPONSE_SNR:
+    if pulse.quiet < QUIET_SAMPLES or any(fault.kind == "not_at_rest" for fault in hit.faults):
+        return
+    # Rms of the strongest response, soon after the pulse, over the noise before it
+    samples = hit.acceleration_m_s2
+    mean = np.mean(samples[:, : pulse.quiet], axis=1, keepdims=True)
+    rounding = np.array([step(channel) for channel in samples]) / np.sqrt(12)
+    before = np.hypot(np.std(samples[:, : pulse.quiet], axis=1), rounding)
+    long = max(QUIET_SAMPLES, round(ANSWER_S * hit.sampling_rate_hz))
+    after = samples[:, pulse.first : pulse.first + long] - mean
+    ratio = float(np.max(np.sqrt(np.mean(after**2, axis=1)) / np.maximum(before, SILENCE)))
+    if ratio < LEAST_RESPONSE_SNR:
         text = f"The response is only {ratio:.1f} times the noise before the hit; hit harder."
         yield Fault("too_weak", text)
-
-
-def _response_snr(hit: Hit) -> float | None:
-    """Rms of the strongest response, soon after the pulse, over the noise before it.
-
-    None where the record holds no such time.
-    """
-    pulse, rate = hit.pulse, hit.sampling_rate_hz
-    after = slice(pulse.first, pulse.first + max(QUIET_SAMPLES, round(ANSWER_S * rate)))
-    if pulse.quiet < QUIET_SAMPLES:
-        return None
-    before = hit.acceleration_m_s2[:, : pulse.quiet]
-    mean = np.mean(before, axis=1, keepdims=True)
-    rounding = np.array([step(samples) for samples in hit.acceleration_m_s2]) / np.sqrt(12)
-    noise = np.hypot(np.std(before, axis=1), rounding)
-    answer = np.sqrt(np.mean((hit.acceleration_m_s2[:, after] - mean) ** 2, axis=1))
-    return float(np.max(answer / np.maximum(noise, SILENCE)))
 
 
 def _pulse(hit: Hit) -> Iterator[Fault]:

@@ -51,18 +51,13 @@ def _pulses(force_n: np.ndarray, rate_hz: float) -> list[tuple[int, int]]:
     least, found = SECOND_PEAK * float(np.max(size)), []
     apart = max(APART_S * rate_hz, APART_SAMPLES)
     while True:
-        groups = _groups(np.flatnonzero(size > max(least, floor)), apart)
+        loud = np.flatnonzero(size > max(least, floor))
+        each = np.split(loud, np.flatnonzero(np.diff(loud) > apart) + 1)
+        groups = [(int(one[0]), int(one[-1]) + 1) for one in each if one.size]
         if len(groups) <= max(1, len(found)):
             return found or groups
         found = groups
         least = SECOND_PEAK * min(float(np.max(size[a:b])) for a, b in groups)
-
-
-def _groups(samples: np.ndarray, apart: float) -> list[tuple[int, int]]:
-    if not samples.size:
-        return []
-    each = np.split(samples, np.flatnonzero(np.diff(samples) > apart) + 1)
-    return [(int(one[0]), int(one[-1]) + 1) for one in each]
 
 
 def _parts(record: TimeRecord, pulses: list[tuple[int, int]]) -> tuple[TimeRecord, ...]:
