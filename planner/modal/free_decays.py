@@ -118,12 +118,8 @@ def _lifetime(values: np.ndarray, starts: list[int], length: int, rate: float) -
         return length
     # Differences, because drifts would pass for background.
     steps = np.diff(values, axis=1, append=values[:, -1:])
-    energy = np.stack(
-        [
-            np.sum(steps[:, s : s + count * block].reshape(len(values), count, block) ** 2, axis=2)
-            for s in starts
-        ]
-    )
+    each = np.stack([steps[:, s : s + count * block] for s in starts])
+    energy = np.sum(each.reshape(len(starts), len(values), count, block) ** 2, axis=3)
     level = energy / np.maximum(np.median(energy, axis=2, keepdims=True), 1e-300)
     alive = np.flatnonzero(np.max(np.median(level, axis=1), axis=0) < ALIVE)
     quiet = int(alive[0]) if alive.size else count

@@ -47,9 +47,8 @@ def homogeneity(
         frfs = [estimate(group, band_hz, window_rate_1_s=window_rate_1_s) for group in groups]
     except RefusedError:
         return None
-    levels = tuple(
-        _level(group, frf, modal, band_hz) for group, frf in zip(groups, frfs, strict=True)
-    )
+    each = zip(groups, frfs, strict=True)
+    levels = tuple(_level(group, frf, modal, band_hz) for group, frf in each)
     pairs = [(a, b) for a in range(len(frfs)) for b in range(a)]
     worst = max(_difference(frfs[a], frfs[b], band_hz) for a, b in pairs)
     p = _chance(groups, band_hz, window_rate_1_s)

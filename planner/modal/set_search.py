@@ -14,7 +14,7 @@ import numpy as np
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped
 from planner.modal.pole_fit import FARTHEST, PoleFit
-from planner.modal.residues import Lines, basis, stack, unit
+from planner.modal.residues import Lines, basis, response, stack
 
 # Poles are looked for up to so many sds of the sets' poles, and half bandwidths, from the common
 # ones; the lines looked at reach so many half bandwidths farther.
@@ -124,16 +124,14 @@ class _Neighbourhood:
         chosen = np.flatnonzero(np.any([_near(data, fit, j) for j in modes], axis=0))
         lines, common = data.lines.part(chosen), fit.poles[modes]
         others = np.setdiff1d(np.arange(fit.poles.size), modes)
-        residue, own = fit.residue[np.ix_(entries, others)], fit.own[s, others]
-        response = data.values[np.ix_(entries, chosen)] - residue @ unit(lines, own)
-        response = response - residue.conj() @ unit(lines, own.conj())
+        apart = response(lines, fit.own[s, others], fit.residue[np.ix_(entries, others)])
         variance = fit.variance[np.ix_(entries, chosen)]
         # In any case a pole may move by half its bandwidth.
         spread = np.maximum(fit.spread[fit.poles.size + modes], common.real**2)
         profile = np.sqrt(variance[0, 0] / variance[0])
         line = np.stack([np.ones(lines.x.size), np.linspace(-1, 1, lines.x.size)]) * profile
         far = np.linalg.qr(stack(np.concatenate([line, 1j * line])).T)[0]
-        values = stack(response * profile)
+        values = stack((data.values[np.ix_(entries, chosen)] - apart) * profile)
         return cls(
             lines, profile, variance[:, 0] / 2, values - values @ far @ far.T, far,
             data.row[entries], shares[np.ix_(entries, modes)], common, fit.own[s, modes],

@@ -7,7 +7,7 @@ import numpy as np
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped
 from planner.modal.pole_fit import DivergedPolesError, PoleFit, fit_sets
-from planner.modal.residues import unit
+from planner.modal.residues import response
 from planner.modal.set_search import reestimated_sets
 
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
@@ -48,14 +48,11 @@ def around(data: Data, fit: PoleFit, pole: complex) -> tuple[Data, np.ndarray, n
     lines = lines[np.abs(data.frequency_hz[lines] - centre) < reach]
     # Of a fine grid, one line in so many: more than these lines are not needed
     lines = lines[:: 1 + lines.size // 240]
-    response = data.response[..., lines]
-    part = replace(data, frequency_hz=data.frequency_hz[lines], response=response, near=False)
+    values = data.response[..., lines]
+    part = replace(data, frequency_hz=data.frequency_hz[lines], response=values, near=False)
     near = np.abs(fit.poles.imag / (2 * np.pi) - centre) < reach
-    own = fit.own[:, ~near]
-    up, down = unit(part.lines, own), unit(part.lines, own.conj())
-    for k, chosen in enumerate(data.sets):
-        far = fit.residue[np.ix_(chosen, ~near)]
-        response[chosen, 0] -= far @ up[k] + far.conj() @ down[k]
+    for own, chosen in zip(fit.own, data.sets, strict=True):
+        values[chosen, 0] -= response(part.lines, own[~near], fit.residue[np.ix_(chosen, ~near)])
     return part, lines, near
 
 

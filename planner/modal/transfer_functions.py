@@ -98,10 +98,7 @@ def _part(frequency: np.ndarray, response: np.ndarray, part: tuple[float, float]
             certain = share * min(1.0, presence) ** 0.25 * (1 - line.scatter)
             hz_sd = float(np.std(np.abs(line.late)) / (2 * np.pi))
             damping_sd = float(np.std(-line.late.real / np.abs(line.late)))
-            modes.append(
-                Mode(
-                    line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, *UNSCALED,
-                    rank_one(residues[:, :, k])[0], float(certain),
-                )
-            )  # fmt: skip
+            told = line.frequency_hz, hz_sd, line.damping_ratio, damping_sd
+            shape = rank_one(residues[:, :, k])[0]
+            modes.append(Mode(*told, *UNSCALED, shape, float(certain)))
     return modes

@@ -201,8 +201,8 @@ class Axis:
 
 def name_of(attributes: Attributes) -> str:
     """The name stated of a channel, "" where none is."""
-    found = (str(v) for _, v in _of_keys(attributes, _NAMES) if isinstance(v, str))
-    return next((text for text in found if text and not lookup(text)), "")
+    each = _of_keys(attributes, _NAMES)
+    return next((v for _, v in each if isinstance(v, str) and v and not lookup(v)), "")
 
 
 def names_of(attributes: Attributes, count: int) -> tuple[str, ...]:
@@ -225,8 +225,7 @@ def _lists(entries: Iterable[tuple[str, object]], count: int) -> list[tuple[str,
 
 def unit_of(attributes: Attributes) -> str:
     """The unit stated of a channel, "" where none is."""
-    texts = (str(v) for _, v in _of_keys(attributes, _UNITS) if isinstance(v, str))
-    return next((text for text in texts if text), "")
+    return next((v for _, v in _of_keys(attributes, _UNITS) if isinstance(v, str) and v), "")
 
 
 def rescaled(attributes: Attributes) -> str:
