@@ -108,8 +108,10 @@ class PoleIdentification:
         """(m,) share of the response at each pole's frequency that is the mode's."""
         return presences(self.data, self.fit.poles, self.fit.residue)
 
-    def natural(self, scale: np.ndarray, shared: np.ndarray | float = 0.0) -> np.ndarray:
-        """(m, 4) frequency (Hz), its sd, damping ratio, its sd (linearised).
+    def natural(
+        self, scale: np.ndarray, shared: np.ndarray | float = 0.0
+    ) -> list[tuple[float, float, float, float]]:
+        """Frequency (Hz), its sd, damping ratio, its sd (linearised) of each of the m poles.
 
         The poles' covariance counts `scale` (m,) times; `shared` (2m, 2m) is added.
         """
@@ -119,8 +121,9 @@ class PoleIdentification:
         size, real, imag = np.abs(poles), poles.real, poles.imag
         slope = np.stack([real / size, imag / size, -(imag**2) / size**3, real * imag / size**3])
         slope = slope.T.reshape(m, 2, 2) / np.array([[2 * np.pi], [1.0]])
-        sd = np.sqrt(np.maximum(0.0, np.einsum("kia,kab,kib->ki", slope, own, slope)))
-        return np.stack([size / (2 * np.pi), sd[:, 0], -real / size, sd[:, 1]], axis=1)
+        sd = np.sqrt(np.maximum(0.0, np.einsum("kia,kab,kib->ik", slope, own, slope)))
+        each = (part.tolist() for part in (size / (2 * np.pi), sd[0], -real / size, sd[1]))
+        return list(zip(*each, strict=True))
 
     def probability(self, k: int, pole: complex) -> float:
         """That a pole (index), in the diagram at `pole`, is a mode: logistic in what tells modes.
@@ -143,10 +146,10 @@ class PoleIdentification:
         told, shape = self.natural(scale, shared_pole), data.response.shape[:2]
         sd = np.sqrt(scale * fitted.residue_variance + shared_residue)
         modes = []
-        for k in np.flatnonzero(self.weak <= 1):
+        for k in np.flatnonzero(self.weak <= 1).tolist():
             residue = fitted.residue[:, k].reshape(shape), sd[:, k].reshape(shape)
             likely = self.probability(k, fitted.poles[k] - data.rate_1_s)
-            modes.append(Mode(*told[k].tolist(), *residue, rank_one(residue[0])[0], likely))
+            modes.append(Mode(*told[k], *residue, rank_one(residue[0])[0], likely))
         return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
 
 

@@ -166,7 +166,7 @@ def _mode(
         shape, shape_sd = shape * realign(shape) / size, shape_sd / size
     poles = found.fit.poles
     return Mode(
-        *found.natural(found.scale)[k].tolist(), *UNSCALED, shape,
+        *found.natural(found.scale)[k], *UNSCALED, shape,
         found.probability(k, poles[k]), shape_sd, scaled,
         phase_collinearity(shape), phase_deviation_deg(shape),
         float(np.sqrt(found.fit.spread[poles.size + k]) / (2 * np.pi)),
