@@ -18,7 +18,6 @@ from planner.milling.cut import check_limits, check_unit
 from planner.milling.cutter_frf import CutterFrf
 from planner.modal.estimate_modes import PoleIdentification, identify, inflation
 from planner.modal.fit_data import Data
-from planner.modal.mode_selection import scales, weakness
 from planner.modal.rank_one_fit import Entries
 from planner.modal.residues import unpack
 from planner.modal.shape_fit import ShapeFit, shape_fit
@@ -165,7 +164,7 @@ class CutterFit:
                 f"the band of the modes that chatter, at finer lines or with more averages."
             )
         alone = np.zeros((2 * found.fit.poles.size,) * 2)
-        scale = scales(data, found.fit) * inflation(data, found.fit, alone)
+        scale = found.scale * inflation(data, found.fit, alone)
         rows, columns = np.nonzero(there)
         return cls(frf, there, found, shape_fit(data, found.fit, Entries(rows, columns, 2), scale))
 
@@ -190,8 +189,7 @@ class CutterFit:
         Predicted FRFs hold no noise: all their poles count, however damped.
         """
         residue, rest = (self._whole(part) for part in unpack(coefficients, fitted.size))
-        weak = weakness(self.found.data, self.found.fit)
-        kept = np.flatnonzero((weak <= 1) | (self.frf.sd is not None))
+        kept = np.flatnonzero((self.found.weak <= 1) | (self.frf.sd is not None))
         which = np.repeat(kept, np.where(np.isin(kept, self.shaped.shaped), 1, 2))
         part = np.append(0, (np.diff(which) == 0).astype(int))
         left, sizes, right = np.linalg.svd(np.moveaxis(residue, -1, 0)[which])

@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
-from planner.modal.matrix_poles import MatrixPoles
+from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.motion_fields import turned_rows
 from planner.modal.node_exchange import (
     Exchange,
@@ -67,7 +67,10 @@ class Consistency:
 
 
 def check(
-    matrix: FrfMatrix, found: MatrixPoles, modes: np.ndarray, geometry: Geometry | None = None
+    matrix: FrfMatrix,
+    found: PoleIdentification,
+    modes: np.ndarray,
+    geometry: Geometry | None = None,
 ) -> Consistency:
     """Check FRFs and residues of the modes (indices) that were established."""
     sides, (low, high) = RovingSides.of(matrix, found, modes), found.data.frequency_hz[[0, -1]]
@@ -122,14 +125,14 @@ def _driving(
 
 
 def _reciprocity(
-    matrix: FrfMatrix, found: MatrixPoles, modes: np.ndarray
+    matrix: FrfMatrix, found: PoleIdentification, modes: np.ndarray
 ) -> tuple[Reciprocity, ...]:
     """Of all pairs of points that were measured both ways."""
     # The heights of the peaks; the lines themselves differ wherever frequencies drift.
     decay, fit = np.abs(found.fit.poles[modes].real), found.fit
     height = fit.residue[:, modes] / decay
     noise = 2 * found.scale[modes] * fit.residue_variance[:, modes] / decay**2
-    entry = {pair: e for e, pair in enumerate(zip(*found.places, strict=True))}
+    entry = {pair: e for e, pair in enumerate(zip(*found.data.places, strict=True))}
     both = [
         (d, matrix.index(d), i) for i, d in enumerate(matrix.references) if d in matrix.responses
     ]

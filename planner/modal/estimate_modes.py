@@ -1,6 +1,7 @@
 """From the FRF matrix of one pose to its modes, without an expert."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -8,9 +9,9 @@ from planner.errors import RefusedError
 from planner.frf.frf import Frf
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.least_squares import WeightedSets, reduced_together
-from planner.modal.mode_selection import fit, presences, scales, strongest, weakness
+from planner.modal.mode_selection import doubt, fit, presences, scales, strongest
 from planner.modal.modes import LEAST_PROBABILITY, ModalModel, Mode
-from planner.modal.plscf import Diagram, PoleSet, diagram, ladder, plscf, stable
+from planner.modal.plscf import Diagram, plscf
 from planner.modal.pole_fit import PoleFit, shared_error
 from planner.modal.residues import rank_one
 
@@ -27,21 +28,20 @@ def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
     For poles in the s-plane (accelerance). `shared` (2m, 2m) is the covariance of the poles from
     errors that lines have in common: it moves the poles of parts of the band too.
     """
-    scale = scales(data, fitted)
-    m = fitted.poles.size
-    own, common = _pairs(fitted.covariance) * scale[:, None], _pairs(shared)
+    m, scale = fitted.poles.size, np.tile(scales(data, fitted), 2)
+    own = np.maximum(np.diag(fitted.covariance), 0.0) * scale
     factor = np.ones(m)
     for part, judged in _parts(data, fitted.poles).items():
         moved, covariance = _step(data, fitted, slice(*part))
-        k = np.array(judged)
-        variance = np.maximum(_pairs(covariance) * scale[:, None], own)[k]
-        by_chance = variance - own[k] + common[k]
-        # An error of the model, too, moves a pole the farther the less the lines hold it. Real and
-        # imaginary parts suffer from the same cause: one factor a mode.
-        beyond = np.maximum(moved.reshape(2, m).T[k] ** 2 - by_chance, 0.0)
+        variance = np.maximum(np.diag(covariance) * scale, own)
+        by_chance = variance - own + np.maximum(np.diag(shared), 0.0)
+        # An error of the model, too, moves a pole the farther the less the lines hold it.
+        beyond = np.maximum(moved**2 - by_chance, 0.0)
         # A pole that exact FRFs hold has no variance to inflate.
         beyond = np.divide(beyond, variance, out=np.zeros_like(beyond), where=variance > 0)
-        factor[k] = np.maximum(factor[k], 1 + np.max(beyond, axis=1))
+        # Real and imaginary parts suffer from the same cause: one factor a mode.
+        here = 1 + np.max(beyond.reshape(2, m), axis=0)[judged]
+        factor[judged] = np.maximum(factor[judged], here)
     return factor
 
 
@@ -77,103 +77,91 @@ def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndar
     return -covariance @ point.gradient, covariance
 
 
-def _pairs(covariance: np.ndarray) -> np.ndarray:
-    """(m, 2) variances of the real and imaginary parts of the poles."""
-    return np.maximum(np.diag(covariance), 0.0).reshape(2, -1).T
-
-
 MAX_ORDER = 40
 
 
 @dataclass(frozen=True, eq=False)
 class PoleIdentification:
-    """Modes in increasing frequency, and what they came from."""
+    """Poles fitted to data, the diagram that they came from, and which of them are modes."""
 
-    modes: tuple[Mode, ...]
     data: Data
     diagram: Diagram
     fit: PoleFit
-    fit_error: float  # ‖H − fit‖/‖H‖
+
+    @property
+    def fit_error(self) -> float:
+        """‖H − fit‖/‖H‖."""
+        return float(np.linalg.norm(self.fit.error) / np.linalg.norm(self.data.response))
+
+    @cached_property
+    def scale(self) -> np.ndarray:
+        """(m,) factor by which noise around each pole exceeds its variance."""
+        return scales(self.data, self.fit)
+
+    @cached_property
+    def weak(self) -> np.ndarray:
+        """(m,) above 1 where a pole is not established, as `mode_selection.doubt`."""
+        return doubt(self.data, self.fit)
+
+    @cached_property
+    def presence(self) -> np.ndarray:
+        """(m,) share of the response at each pole's frequency that is the mode's."""
+        return presences(self.data, self.fit.poles, self.fit.residue)
+
+    def natural(
+        self, scale: np.ndarray, shared: np.ndarray | float = 0.0
+    ) -> list[tuple[float, float, float, float]]:
+        """Frequency (Hz), its sd, damping ratio, its sd (linearised) of each of the m poles.
+
+        The poles' covariance counts `scale` (m,) times; `shared` (2m, 2m) is added.
+        """
+        poles, m = self.fit.poles, self.fit.poles.size
+        covariance = np.tile(scale, 2)[:, None] * self.fit.covariance + shared
+        own = np.einsum("akbk->kab", covariance.reshape(2, m, 2, m))
+        size, real, imag = np.abs(poles), poles.real, poles.imag
+        slope = np.stack([real / size, imag / size, -(imag**2) / size**3, real * imag / size**3])
+        slope = slope.T.reshape(m, 2, 2) / np.array([[2 * np.pi], [1.0]])
+        sd = np.sqrt(np.maximum(0.0, np.einsum("kia,kab,kib->ik", slope, own, slope)))
+        each = (part.tolist() for part in (size / (2 * np.pi), sd[0], -real / size, sd[1]))
+        return list(zip(*each, strict=True))
+
+    def probability(self, k: int, pole: complex) -> float:
+        """That a pole (index), in the diagram at `pole`, is a mode: logistic in what tells modes.
+
+        That is: the share of the response that is the mode's, its support in the diagram, and how
+        far it is from the limits of `weak`. Coefficients from 200 simulated poses (2-s records,
+        hits that disagree by 0.3 %, a 3 % ripple, short records, weak modes; 1,100 poles).
+        """
+        size = np.log(np.clip(self.presence[k], 1e-3, 1.0))
+        score = 1.2 * self.diagram.support(pole) - 3.1 * np.log(max(self.weak[k], 1e-6))
+        return float(1 / (1 + np.exp(0.3 - score - 2.1 * size)))
+
+    @cached_property
+    def modes(self) -> tuple[Mode, ...]:
+        """The poles that are established, in increasing frequency."""
+        data, fitted, scale = self.data, self.fit, self.scale
+        shared_pole, shared_residue = shared_error(data, fitted)
+        if data.step_s is None:
+            scale = scale * inflation(data, fitted, shared_pole)
+        told, shape = self.natural(scale, shared_pole), data.response.shape[:2]
+        sd = np.sqrt(scale * fitted.residue_variance + shared_residue)
+        modes = []
+        for k in np.flatnonzero(self.weak <= 1).tolist():
+            residue = fitted.residue[:, k].reshape(shape), sd[:, k].reshape(shape)
+            likely = self.probability(k, fitted.poles[k] - data.rate_1_s)
+            modes.append(Mode(*told[k], *residue, rank_one(residue[0])[0], likely))
+        return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
 
 
 def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | None:
     """All modes that the lines of `data` carry, None where there is no pole."""
-    orders = ladder(max_order, data.frequency_hz.size)
     weight = None if data.variance is None else 1 / np.mean(data.variance, axis=1)
-    sets = plscf(data.frequency_hz, data.response, orders, weight)
-    reach = (data.frequency_hz[0] * 0.95, data.frequency_hz[-1] * 1.05)
-    found = diagram(sets, reach)
-    start = np.array([line.pole for line in stable(found)]) + data.rate_1_s
-    if start.size == 0:
-        start = strongest(data)
+    found = plscf(data.frequency_hz, data.response, max_order, weight)
+    start = found.start + data.rate_1_s
+    start = start if start.size else strongest(data)
     if start.size == 0:
         return None
-    fitted = fit(data, data.with_one_above(start))
-    modes = modes_of_fit(data, fitted, sets)
-    relative = float(np.linalg.norm(fitted.error) / np.linalg.norm(data.response))
-    return PoleIdentification(modes, data, found, fitted, relative)
-
-
-def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Mode, ...]:
-    """The poles of a fit that are established, with standard deviations and probabilities."""
-    m = fitted.poles.size
-    scale = scales(data, fitted)
-    weak = weakness(data, fitted)
-    shared_pole, shared_residue = shared_error(data, fitted)
-    if data.step_s is None:
-        scale = scale * inflation(data, fitted, shared_pole)
-    present = presences(data, fitted.poles, fitted.residue)
-    modes = []
-    for k in range(m):
-        if weak[k] > 1:
-            continue
-        index = [k, m + k]
-        covariance = scale[k] * fitted.covariance[np.ix_(index, index)]
-        covariance = covariance + shared_pole[np.ix_(index, index)]
-        pole = complex(fitted.poles[k])
-        frequency, damping, sd = natural(pole, covariance)
-        residue = fitted.residue[:, k].reshape(data.response.shape[:2])
-        variance = scale[k] * fitted.residue_variance[:, k] + shared_residue[:, k]
-        supported = support(pole - data.rate_1_s, sets)
-        residue_sd = np.sqrt(variance).reshape(residue.shape)
-        modes.append(
-            Mode(
-                frequency, float(sd[0]), damping, float(sd[1]), residue, residue_sd,
-                rank_one(residue)[0], probability(float(present[k]), supported, float(weak[k])),
-            )
-        )  # fmt: skip
-    return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
-
-
-def natural(pole: complex, covariance: np.ndarray) -> tuple[float, float, np.ndarray]:
-    """Natural frequency (Hz), damping ratio and their standard deviations (linearised)."""
-    size = abs(pole)
-    slope = np.array([
-        [pole.real / size / (2 * np.pi), pole.imag / size / (2 * np.pi)],
-        [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3],
-    ])  # fmt: skip
-    sd = np.sqrt(np.maximum(0.0, np.diag(slope @ covariance @ slope.T)))
-    return size / (2 * np.pi), -pole.real / size, sd
-
-
-def support(pole: complex, sets: tuple[PoleSet, ...]) -> float:
-    """Share of the upper half of the orders with a pole within half a bandwidth or 0.5 %."""
-    upper = sets[len(sets) // 2 :]
-    reach = max(abs(pole.real), 0.005 * abs(pole))
-    near = [np.any(np.abs(entry.poles.imag - pole.imag) < reach) for entry in upper]
-    return float(np.mean(near))
-
-
-def probability(presence: float, support: float, weak: float) -> float:
-    """Logistic in what separates modes from artefacts.
-
-    That is: the share of the response that is the mode's, its support in the diagram, and how
-    far it is from the limits of `weakness`. Coefficients from 200 simulated poses (2-s records,
-    hits that disagree by 0.3 %, a 3 % ripple, short records, weak modes; 1,100 poles).
-    """
-    size = np.log(np.clip(presence, 1e-3, 1.0))
-    score = -0.3 + 1.2 * support - 3.1 * np.log(max(weak, 1e-6)) + 2.1 * size
-    return float(1 / (1 + np.exp(-score)))
+    return PoleIdentification(data, found, fit(data, data.with_one_above(start)))
 
 
 # Lines beyond the band that are fitted too, so that modes at its edges are met from both sides.
@@ -188,13 +176,15 @@ def estimate_modes(frf: Frf, band_hz: tuple[float, float]) -> ModalModel:
     exceeds it, and from the error alone where the variance is unknown. Raises RefusedError where
     no mode can be found.
     """
-    found = identification(frf, band_hz)
-    inside = [
-        _at_all_axes(mode, np.flatnonzero(frf.measured)) for mode in (found.modes if found else ())
-        if band_hz[0] <= mode.frequency_hz <= band_hz[1]
-    ]  # fmt: skip
-    modes = tuple(mode for mode in inside if mode.probability >= LEAST_PROBABILITY)
-    doubtful = tuple(mode for mode in inside if mode.probability < LEAST_PROBABILITY)
+    found, hit = identification(frf, band_hz), np.flatnonzero(frf.measured)
+    sure: tuple[list[Mode], list[Mode]] = ([], [])
+    for mode in found.modes if found else ():
+        if band_hz[0] <= mode.frequency_hz <= band_hz[1]:
+            both = np.full((3, 3), np.nan + 1j * np.nan), np.full((3, 3), np.nan)
+            both[0][:, hit], both[1][:, hit] = mode.residue, mode.residue_sd
+            certain = mode.probability >= LEAST_PROBABILITY
+            sure[certain].append(replace(mode, residue=both[0], residue_sd=both[1]))
+    doubtful, modes = map(tuple, sure)
     if found is None or not modes:
         raise RefusedError(
             f"No mode could be found between {band_hz[0]:g} and {band_hz[1]:g} Hz: hit harder or"
@@ -231,13 +221,6 @@ def identification(frf: Frf, band_hz: tuple[float, float]) -> PoleIdentification
         force_window_s=frf.force_window_s,
     )
     return identify(data)
-
-
-def _at_all_axes(mode: Mode, columns: np.ndarray) -> Mode:
-    """With residues at all three hit axes, NaN where nothing was hit."""
-    residue, residue_sd = np.full((3, 3), np.nan + 1j * np.nan), np.full((3, 3), np.nan)
-    residue[:, columns], residue_sd[:, columns] = mode.residue, mode.residue_sd
-    return replace(mode, residue=residue, residue_sd=residue_sd)
 
 
 def _remarks(found: PoleIdentification, doubtful: tuple[Mode, ...]) -> tuple[str, ...]:

@@ -22,7 +22,8 @@ class Data:
     modes may lie close below the band. `above`: a pole above the lines stands for all modes there.
     `steady`: nothing changes between hits, so that poles close to each other are modes, however
     alike. Of responses (e, 1, F) that were measured in several `sets` these are the entries
-    (indices) of each, `row` and `column` (e,) those of the matrix, columns of the few references.
+    (indices) of each, `row` and `column` (e,) those of the matrix, rows of the points that roved,
+    which were `hit` or else felt, columns of the few that stayed.
     """
 
     frequency_hz: np.ndarray  # (F,)
@@ -39,6 +40,7 @@ class Data:
     sets: tuple[np.ndarray, ...] = ()
     row: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     column: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    hit: bool = False
 
     @cached_property
     def lines(self) -> Lines:
@@ -113,6 +115,11 @@ class Data:
     def values(self) -> np.ndarray:
         """(e, F) responses, one entry after the other."""
         return self.response.reshape(self.entries, -1)
+
+    @property
+    def places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Response and reference (indices) of each entry."""
+        return (self.column, self.row) if self.hit else (self.row, self.column)
 
     def table(self, values: np.ndarray) -> np.ndarray:
         """(r, c, …) of values (e, …), 0 where nothing was measured."""

@@ -34,11 +34,15 @@ def analyse_record(
     Returned beside the modes is all that led to them (stabilisation diagram, fit).
     """
     remarks = [*record.remarks, *(fault.text for fault in record.faults)]
-    samples, names = _decays(record, _force(record, force_channel), remarks)
+    force = next((c for c in record.channels if c.name == force_channel), None)
+    if force is None:
+        names = ", ".join(channel.name for channel in record.channels)
+        raise InputError(f"{record.source} has no channel {force_channel!r}; it has {names}.")
+    samples, names = _decays(record, force, remarks)
     rate = record.sampling_rate_hz
     band = band_hz or (max(10 * rate / samples.shape[-1], 0.01 * rate), 0.45 * rate)
-    names, found = _identify_sound(record, samples, names, band, remarks)
-    sure = [mode for mode in found.modes if mode.probability >= 0.5]
+    names, every, found = _identify_sound(record, samples, names, band, remarks)
+    sure = [mode for mode in every if mode.probability >= 0.5]
     kept = [mode for mode in sure if band[0] <= mode.frequency_hz <= band[1]]
     modes = tuple(_merged(group, remarks) for group in grouped(kept, _same))
     if not modes:
@@ -58,22 +62,6 @@ def _nothing(record: TimeRecord, band: tuple[float, float]) -> str:
     )
 
 
-def _force(record: TimeRecord, name: str) -> Channel:
-    names = [channel.name for channel in record.channels]
-    if name not in names:
-        raise InputError(f"{record.source} has no channel {name!r}; it has {', '.join(names)}.")
-    return record.channels[names.index(name)]
-
-
-def _hits(force: np.ndarray, apart: int) -> np.ndarray:
-    """Samples at which pulses peak, `apart` samples from each other at least."""
-    size = np.abs(force - np.median(force))
-    most = float(np.max(size, initial=0.0))
-    noise = max(float(np.median(size)), 1e-12 * most)
-    # Out of the channel's own noise, and a good share of the largest.
-    return find_peaks(np.r_[0.0, size, 0.0], max(20 * noise, 0.15 * most), distance=apart)[0] - 1
-
-
 def _decays(
     record: TimeRecord, force: Channel, remarks: list[str]
 ) -> tuple[np.ndarray, tuple[str, ...]]:
@@ -83,15 +71,7 @@ def _decays(
     values = np.array([c.samples for c in responses], float)
     if values.size == 0:
         raise RefusedError(f"{record.source} holds no response channel; record accelerations.")
-    apart = round(LEAST_DECAY_S * rate)
-    hits = _hits(force.samples, apart)
-    hits = hits[hits < values.shape[1] - apart]
-    if not hits.size:
-        raise RefusedError(
-            f"{record.source}: no hit stands out of channel {force.name}; hit harder."
-        )
-    starts = [_pulse_end(force.samples, int(hit), rate) for hit in hits]
-    _remark_on_pulse(force, hits, rate, remarks)
+    starts = _pulse_ends(record, force, values.shape[1], remarks)
     ends = [*starts[1:], values.shape[1]]
     margin = round(0.05 * rate)  # the foot of the next pulse
     length = min(e - s for s, e in zip(starts, ends, strict=True)) - margin
@@ -103,6 +83,33 @@ def _decays(
     return samples.transpose(1, 0, 2), tuple(c.name for c in responses)
 
 
+def _pulse_ends(record: TimeRecord, force: Channel, samples: int, remarks: list[str]) -> list[int]:
+    """Samples at which the pulses of the hits have ended, and remarks on them."""
+    rate, size = record.sampling_rate_hz, np.abs(force.samples - np.median(force.samples))
+    most, apart = float(np.max(size, initial=0.0)), round(LEAST_DECAY_S * rate)
+    noise = max(float(np.median(size)), 1e-12 * most)
+    # Out of the channel's own noise, and a good share of the largest.
+    least, beyond = max(20 * noise, 0.15 * most), np.r_[0.0, size, 0.0]
+    hits = find_peaks(beyond, least, distance=apart)[0] - 1
+    hits = hits[hits < samples - apart]
+    if not hits.size:
+        raise RefusedError(
+            f"{record.source}: no hit stands out of channel {force.name}; hit harder."
+        )
+    width = float(np.median(peak_widths(size, hits)[0]))
+    # Samples above half the peak that a pulse needs for its amplitude to mean anything.
+    if width < 4:
+        remarks.append(
+            f"The hammer pulse in {force.name} is under-sampled ({width:.0f} samples above half "
+            f"its peak at {rate:g} Hz): its amplitude is useless and was not used."
+        )
+    if force.unit and force.unit != "N":
+        remarks.append(f"{force.name} is in {force.unit}, not N: FRFs cannot be scaled.")
+    long = max(2, round(PULSE_LONGEST_S * rate))
+    loud = (np.flatnonzero(size[hit : hit + long] > PULSE_END * size[hit]) for hit in hits)
+    return [int(hit + still[-1]) + 1 for hit, still in zip(hits, loud, strict=True)]
+
+
 def _lifetime(values: np.ndarray, starts: list[int], length: int, rate: float) -> int:
     """Samples until the responses of the longest-lived decay have sunk to the background."""
     block = max(8, round(BLOCK_S * rate))
@@ -111,41 +118,18 @@ def _lifetime(values: np.ndarray, starts: list[int], length: int, rate: float) -
         return length
     # Differences, because drifts would pass for background.
     steps = np.diff(values, axis=1, append=values[:, -1:])
-    energy = np.stack(
-        [
-            np.sum(steps[:, s : s + count * block].reshape(len(values), count, block) ** 2, axis=2)
-            for s in starts
-        ]
-    )
+    each = np.stack([steps[:, s : s + count * block] for s in starts])
+    energy = np.sum(each.reshape(len(starts), len(values), count, block) ** 2, axis=3)
     level = energy / np.maximum(np.median(energy, axis=2, keepdims=True), 1e-300)
     alive = np.flatnonzero(np.max(np.median(level, axis=1), axis=0) < ALIVE)
     quiet = int(alive[0]) if alive.size else count
     return max(round(LEAST_DECAY_S * rate), (quiet + 1) * block)
 
 
-def _pulse_end(force: np.ndarray, hit: int, rate: float) -> int:
-    size = np.abs(force - np.median(force))
-    last = min(force.size, hit + max(2, round(PULSE_LONGEST_S * rate)))
-    still = np.flatnonzero(size[hit:last] > PULSE_END * size[hit])
-    return hit + int(still[-1]) + 1
-
-
-def _remark_on_pulse(force: Channel, hits: np.ndarray, rate: float, remarks: list[str]) -> None:
-    widths = peak_widths(np.abs(force.samples - np.median(force.samples)), hits)[0]
-    # Samples above half the peak that a pulse needs for its amplitude to mean anything.
-    if np.median(widths) < 4:
-        remarks.append(
-            f"The hammer pulse in {force.name} is under-sampled ({np.median(widths):.0f} samples"
-            f" above half its peak at {rate:g} Hz): its amplitude is useless and was not used."
-        )
-    if force.unit and force.unit != "N":
-        remarks.append(f"{force.name} is in {force.unit}, not N: FRFs cannot be scaled.")
-
-
 def _identify_sound(
     record: TimeRecord, samples: np.ndarray, names: tuple[str, ...], band: tuple[float, float],
     remarks: list[str],
-) -> tuple[tuple[str, ...], PoleIdentification]:  # fmt: skip
+) -> tuple[tuple[str, ...], tuple[Mode, ...], PoleIdentification]:  # fmt: skip
     """Identify, leave out channels that the modes do not explain, identify again."""
     factor = np.std(samples, axis=(1, 2))[:, None]
     factor[factor == 0] = 1.0
@@ -162,7 +146,7 @@ def _identify_sound(
                     shape=rank_one(m.residue * factor)[0])
             for m in found.modes
         )  # fmt: skip
-        return names, replace(found, modes=tuple(modes))
+        return names, tuple(modes), found
     for name, share in zip(np.array(names)[~sound], explained[~sound], strict=True):
         remarks.append(
             f"Sensor {name} does not follow the hits (the modes explain {100 * share:.0f} % of"
@@ -188,7 +172,6 @@ def _same(a: Mode, b: Mode) -> bool:
     exponentials; two modes of one structure at one place would differ in shape.
     """
     width = max(a.damping_ratio * a.frequency_hz, b.damping_ratio * b.frequency_hz)
-    # MAC above which neighbours within a bandwidth are one mode.
     return abs(a.frequency_hz - b.frequency_hz) < width and mac(a.shape, b.shape) > 0.95
 
 

@@ -19,7 +19,7 @@ from planner.frf.frf import Frf
 from planner.frf.spectra import transform
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac
-from planner.modal.modes import ForceLevel, Homogeneity, ModalModel, Mode
+from planner.modal.modes import ForceLevel, Homogeneity, ModalModel
 from planner.recording.force_levels import by_level
 from planner.recording.records import Hit
 from planner.recording.repeats import untilted
@@ -47,9 +47,8 @@ def homogeneity(
         frfs = [estimate(group, band_hz, window_rate_1_s=window_rate_1_s) for group in groups]
     except RefusedError:
         return None
-    levels = tuple(
-        _level(group, frf, modal, band_hz) for group, frf in zip(groups, frfs, strict=True)
-    )
+    each = zip(groups, frfs, strict=True)
+    levels = tuple(_level(group, frf, modal, band_hz) for group, frf in each)
     pairs = [(a, b) for a in range(len(frfs)) for b in range(a)]
     worst = max(_difference(frfs[a], frfs[b], band_hz) for a, b in pairs)
     p = _chance(groups, band_hz, window_rate_1_s)
@@ -142,22 +141,19 @@ def _level(
         found = estimate_modes(frf, band_hz).modes
     except RefusedError:
         found = ()
-    own = [_same(mode, found) for mode in modal.modes]
+    own = []
+    for mode in modal.modes:
+        # The same mode: within these in log frequency and MAC
+        near = [
+            other for other in found
+            if abs(np.log(other.frequency_hz / mode.frequency_hz)) < 0.1
+            and mac(other.shape, mode.shape) > 0.5
+        ]  # fmt: skip
+        apart = [abs(other.frequency_hz - mode.frequency_hz) for other in near]
+        own.append(near[int(np.argmin(apart))] if near else None)
     told = ("frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd")
     rows = (tuple(getattr(m, name) if m else None for m in own) for name in told)
     return ForceLevel(force, len(hits), *rows)
-
-
-def _same(mode: Mode, found: tuple[Mode, ...]) -> Mode | None:
-    """The mode of one level that is a mode of the whole pose: near in frequency, alike in shape."""
-    # Near and alike: log frequency and MAC within which it is the same mode
-    near = [
-        other
-        for other in found
-        if abs(np.log(other.frequency_hz / mode.frequency_hz)) < 0.1
-        and mac(other.shape, mode.shape) > 0.5
-    ]
-    return min(near, key=lambda other: abs(other.frequency_hz - mode.frequency_hz), default=None)
 
 
 def ways(labels: np.ndarray) -> float:

@@ -6,6 +6,7 @@ from typing import TypeVar
 import numpy as np
 
 from planner.frf.metrics import unit_and_length
+from planner.inference.assignment import least_cost
 
 Item = TypeVar("Item")
 
@@ -80,12 +81,9 @@ def real_normal_modes(poles: np.ndarray, shapes: np.ndarray) -> np.ndarray:
     system = -np.linalg.solve(state.T, (both * values**2).T).T
     square, vectors = np.linalg.eig(system[:, :count].real)
     normal = (basis @ vectors).real
-    likeness = np.abs(turned.conj().T @ (normal / np.linalg.norm(normal, axis=0)))
-    taken, real = [], turned.real.copy()
-    for k in np.argsort(-np.max(likeness, axis=1)):
-        free = [j for j in range(count) if j not in taken]
-        best = max(free, key=lambda j: likeness[k, j])
-        taken.append(best)
+    likeness = np.abs(turned.conj().T @ unit_and_length(normal.T)[0].T)
+    real = turned.real.copy()
+    for k, best in zip(*least_cost(-likeness), strict=True):
         if square[best].real > 0 and np.linalg.norm(normal[:, best]) > 0:
             scale = normal[:, best] @ turned[:, k].real / (normal[:, best] @ normal[:, best])
             real[:, k] = scale * normal[:, best]

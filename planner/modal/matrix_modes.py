@@ -1,18 +1,19 @@
 """Modes of any matrix of FRFs: poles common to all, one shape per mode over all points."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from planner.errors import RefusedError
 from planner.frf.matrix import FrfMatrix, by_number
 from planner.modal.consistency import Consistency, check
-from planner.modal.estimate_modes import natural, probability, support
+from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.mac import phase_collinearity, phase_deviation_deg, real_normal_modes
-from planner.modal.matrix_poles import MatrixPoles, identify_matrix
+from planner.modal.matrix_poles import identify_matrix
 from planner.modal.modes import UNSCALED, Eigenvectors, Mode
 from planner.modal.motion_fields import expected
-from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, row_gain
+from planner.modal.rank_one_fit import FREE_GAIN, Entries, FittedShape, fit_shape, row_gain
 from planner.modal.residues import realign
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
@@ -27,7 +28,7 @@ class MatrixModes:
     modes: tuple[Mode, ...]
     band_hz: tuple[float, float]
     remarks: tuple[str, ...]
-    found: MatrixPoles
+    found: PoleIdentification
     checks: Consistency
 
 
@@ -64,7 +65,9 @@ def modes_of_matrix(
     return MatrixModes(dofs, tuple(modes), band, remarks, found, checks)
 
 
-def _put_right(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> MatrixPoles:
+def _put_right(
+    matrix: FrfMatrix, found: PoleIdentification, checks: Consistency
+) -> PoleIdentification:
     """With residues of turned points as they should be; odd ones count for nothing."""
     roved, stayed = matrix.roved.responses, matrix.roved.references
     named = [(roved[r], stayed[c]) for r, c in zip(found.data.row, found.data.column, strict=True)]
@@ -77,14 +80,14 @@ def _put_right(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> Ma
 
 
 def _points(
-    matrix: FrfMatrix, found: MatrixPoles, checks: Consistency
+    matrix: FrfMatrix, found: PoleIdentification, checks: Consistency
 ) -> tuple[tuple[Dof, ...], Entries]:
     """All points hit or felt, and the entries by their indices.
 
     References whose column does not go with their row are points of their own, behind the others.
     A point that was only hit is among them where a driving point ties its size to the rest.
     """
-    responses, references = found.places
+    responses, references = found.data.places
     tied = [d for d in matrix.references if d not in checks.untied] if checks.driving else []
     seen = {matrix.responses[o] for o in responses}
     dofs = tuple(sorted({*seen, *tied}, key=by_number))
@@ -93,24 +96,31 @@ def _points(
     hit_at = place | {dof: len(dofs) + k for k, dof in enumerate(apart)}
     felt = np.array([place[matrix.responses[o]] for o in responses])
     hit = np.array([hit_at[matrix.references[i]] for i in references])
-    roved = (hit, felt) if found.hit else (felt, hit)
+    roved = (hit, felt) if found.data.hit else (felt, hit)
     return dofs, Entries(*roved, len(dofs) + len(apart))
 
 
-def _shapes(found: MatrixPoles, modes: list[int], entries: Entries) -> list[FittedShape]:
+def _shapes(found: PoleIdentification, modes: list[int], entries: Entries) -> list[FittedShape]:
     """Shapes of modes (indices); rows err as a whole by what those of the references show.
 
     Points that are rows and columns tell it, at first fitted with their gains left free.
     """
     if np.intersect1d(entries.rows, entries.columns).size < 2:
-        return [found.shape(k, entries) for k in modes]
-    free = [found.shape(k, entries, FREE_GAIN) for k in modes]
+        return [_shape(found, k, entries) for k in modes]
+    free = [_shape(found, k, entries, FREE_GAIN) for k in modes]
     gain = row_gain(free)
-    return [found.shape(k, entries, gain, one.shape) for k, one in zip(modes, free, strict=True)]
+    return [_shape(found, k, entries, gain, one.shape) for k, one in zip(modes, free, strict=True)]
+
+
+def _shape(found: PoleIdentification, k: int, entries: Entries, *options: Any) -> FittedShape:
+    """Of a mode (index); `entries` have the fit's order, the options are as in `fit_shape`."""
+    fit = found.fit
+    variance = found.scale[k] * fit.residue_variance[:, k]
+    return fit_shape(entries, fit.residue[:, k], variance, fit.poles[k].imag, *options)
 
 
 def _with_vectors(
-    modes: list[Mode], dofs: tuple[Dof, ...], matrix: FrfMatrix, found: MatrixPoles,
+    modes: list[Mode], dofs: tuple[Dof, ...], matrix: FrfMatrix, found: PoleIdentification,
     inside: list[int],
 ) -> list[Mode]:  # fmt: skip
     """With right and left vectors of modes `inside` (indices), without reciprocity.
@@ -120,7 +130,7 @@ def _with_vectors(
     scales.
     """
     felt, hit = len(matrix.responses), len(matrix.references)
-    responses, references = found.places
+    responses, references = found.data.places
     entries = Entries(responses, felt + references, felt + hit)
     group, _ = entries.groups
     if len(np.unique(group[entries.rows])) > 1:
@@ -129,7 +139,7 @@ def _with_vectors(
     o, i = np.array(there, int).reshape(-1, 2).T
 
     def apart(k: int, mode: Mode) -> Eigenvectors:
-        fitted = found.shape(k, entries)
+        fitted = _shape(found, k, entries)
         right, left = fitted.shape[:felt], fitted.shape[felt:]
         alike = np.sum(left[i] * right[o].conj()) / max(np.sum(np.abs(right[o]) ** 2), 1e-300)
         factor = np.sqrt(alike) if abs(alike) > 0 else realign(right)
@@ -143,12 +153,9 @@ def _with_vectors(
     return [replace(m, vectors=apart(k, m)) for k, m in zip(inside, modes, strict=True)]
 
 
-def _mode(found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, scaled: bool) -> Mode:
-    fit, m = found.fit, found.fit.poles.size
-    pole = complex(fit.poles[k])
-    index = [k, m + k]
-    covariance = found.scale[k] * fit.covariance[np.ix_(index, index)]
-    frequency, damping, sd = natural(pole, covariance)
+def _mode(
+    found: PoleIdentification, k: int, fitted: FittedShape, entries: Entries, scaled: bool
+) -> Mode:
     group, odd = entries.groups
     shape, shape_sd = fitted.shape, fitted.sd
     scaled = scaled and bool(np.all(odd[group[: shape.size]]))
@@ -157,13 +164,12 @@ def _mode(found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, sca
     else:
         size = max(float(np.linalg.norm(shape)), 1e-300)
         shape, shape_sd = shape * realign(shape) / size, shape_sd / size
-    spread = np.sqrt(fit.spread[m + k]) / (2 * np.pi)
-    supported = support(pole, found.diagram.sets)
-    likely = probability(float(found.presence[k]), supported, float(found.weak[k]))
+    poles = found.fit.poles
     return Mode(
-        frequency, float(sd[0]), damping, float(sd[1]), *UNSCALED, shape,
-        likely, shape_sd, scaled, phase_collinearity(shape), phase_deviation_deg(shape),
-        float(spread),
+        *found.natural(found.scale)[k], *UNSCALED, shape,
+        found.probability(k, poles[k]), shape_sd, scaled,
+        phase_collinearity(shape), phase_deviation_deg(shape),
+        float(np.sqrt(found.fit.spread[poles.size + k]) / (2 * np.pi)),
     )  # fmt: skip
 
 

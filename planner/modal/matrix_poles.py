@@ -3,11 +3,12 @@
 Poles of the diagram are fitted, every set with its own; which of them are modes is judged then.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
+from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.mode_selection import (
     doubt,
@@ -15,12 +16,10 @@ from planner.modal.mode_selection import (
     falls,
     first_variance,
     presences,
-    scales,
     scatter,
 )
-from planner.modal.plscf import Diagram, diagram, ladder, plscf, row_errors, stable
+from planner.modal.plscf import Diagram, ladder, plscf, row_errors
 from planner.modal.pole_fit import ROUNDS, DivergedPolesError, PoleFit, fit_sets, refine
-from planner.modal.rank_one_fit import Entries, FittedShape, fit_shape
 from planner.modal.set_search import reestimated_sets
 from planner.modal.split_modes import REACH, around, explains, merged_modes, thinned
 
@@ -37,44 +36,7 @@ DAMPING_ADDED, LINES_BELOW = 0.1, 6
 SETTLING = 2  # rounds of a fit that has been fitted before, to other lines or but for a few sets
 
 
-@dataclass(frozen=True, eq=False)
-class MatrixPoles:
-    """Poles common to all FRFs and what they came from.
-
-    Rows of `data` are the points of the longer side (which roved), `hit` or felt; columns those
-    that stayed. `scale` (m,) by which noise around a mode exceeds its variance; `weak` (m,) as
-    `mode_selection.doubt`, `presence` (m,) share of the response.
-    """
-
-    data: Data
-    fit: PoleFit
-    diagram: Diagram
-    scale: np.ndarray
-    weak: np.ndarray
-    presence: np.ndarray
-    hit: bool
-
-    @property
-    def places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Response and reference (indices) of each entry."""
-        row, column = self.data.row, self.data.column
-        return (column, row) if self.hit else (row, column)
-
-    def shape(
-        self, k: int, entries: Entries, gain: float = 0.0, near: np.ndarray | None = None
-    ) -> FittedShape:
-        """Of a mode (index); `entries` have the fit's order, the rest is as in `fit_shape`."""
-        variance = self.scale[k] * self.fit.residue_variance[:, k]
-        damped_1_s = self.fit.poles[k].imag
-        return fit_shape(entries, self.fit.residue[:, k], variance, damped_1_s, gain, near)
-
-    @property
-    def fit_error(self) -> float:
-        """‖H − fit‖/‖H‖."""
-        return float(np.linalg.norm(self.fit.error) / np.linalg.norm(self.data.response))
-
-
-def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPoles | None:
+def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> PoleIdentification | None:
     """All poles that the matrix holds in and right beside a band; None where there is none.
 
     Raises RefusedError where too few lines lie in the band.
@@ -82,7 +44,6 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     hit, matrix = matrix.hit, matrix.roved
     f = matrix.frequency_hz
     chosen = (f >= band_hz[0] / (1 + MARGIN)) & (f <= band_hz[1] * (1 + MARGIN))
-    # Least lines.
     if np.count_nonzero(chosen) < 16:
         raise too_few_lines(chosen, f, band_hz)
     rows, columns = np.nonzero(matrix.measured)
@@ -93,20 +54,16 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     sets = tuple(np.flatnonzero(nodes == node) for node in dict.fromkeys(nodes.tolist()))
     data = Data(
         f[chosen], response, None, rate, tail_s=matrix.tail_s, near=True, above=True, sets=sets,
-        row=rows, column=columns,
+        row=rows, column=columns, hit=hit,
     )  # fmt: skip
     # A record cut off while it rings leaves ripples, which polynomials take for poles.
     smooth = matrix.ended or matrix
     found = _diagram(smooth, chosen)
-    start = np.array([line.pole for line in stable(found)]) + smooth.exponential_rate_1_s
+    start = found.start + smooth.exponential_rate_1_s
     if not start.size:
         return None
-    start = data.with_one_above(start)
-    fit = select_modes(data, start)
-    if not fit.poles.size:
-        return None
-    told = scales(data, fit), doubt(data, fit), presences(data, fit.poles, fit.residue)
-    return MatrixPoles(data, fit, found, *told, hit)
+    fit = select_modes(data, data.with_one_above(start))
+    return PoleIdentification(data, found, fit) if fit.poles.size else None
 
 
 def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> Diagram:
@@ -117,16 +74,13 @@ def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> Diagram:
     block = table[complete][:, columns]
     level = np.mean(np.abs(block) ** 2, axis=(1, 2))
     weight = np.ones(block.shape[::2]) / np.maximum(level, 1e-300)[:, None]
-    orders = ladder(MAX_ORDER, block.shape[-1])
-    frequency = matrix.frequency_hz[chosen]
-    # Rows that do not go with the others are taken down.
+    order, frequency = ladder(MAX_ORDER, block.shape[-1])[-1], matrix.frequency_hz[chosen]
     changed = weight
     for _ in range(REWEIGHED if block.shape[0] >= LEAST_ROWS and block.shape[1] > 1 else 0):
-        errors = row_errors(frequency, block, orders[-1], changed)
+        errors = row_errors(frequency, block, order, changed)
         usual = max(float(np.median(errors)), 1e-300)
         changed = weight * np.minimum(1.0, ODD * usual / np.maximum(errors, 1e-300))[:, None] ** 2
-    sets = plscf(frequency, block, orders, changed)
-    return diagram(sets, (frequency[0] * 0.95, frequency[-1] * 1.05))
+    return plscf(frequency, block, MAX_ORDER, changed)
 
 
 def _references(measured: np.ndarray) -> np.ndarray:
@@ -151,8 +105,7 @@ def select_modes(data: Data, poles: np.ndarray) -> PoleFit:
     # Rough rounds of the first fit, whose weights do not know yet how sets differ
     fit = _fit(data, begun, fit.poles, fit.own, 2)
     searched = False
-    # Passes of leaving out and adding
-    for _ in range(4):
+    for _ in range(4):  # passes of leaving out and adding
         # Not before: sets would be moved to where they imitate the modes that a fit lacks.
         fit = _settled(data, fit) if searched else fit
         present = presences(data, fit.poles, fit.residue) >= PRESENT
@@ -207,10 +160,9 @@ def _missing(data: Data, fit: PoleFit) -> np.ndarray:
     poles, fall = falls(data, weight, weight * fit.error)
     failed, step = 0, data.frequency_hz[1] - data.frequency_hz[0]
     fall[poles.imag / (2 * np.pi) < LINES_BELOW * step] = 0.0
-    # Most added.
-    for _ in range(6):
+    for _ in range(6):  # most that are added
         best = int(np.argmax(fall))
-        # Most failed: candidates in a row that are no modes: weaker ones are not tried
+        # After two candidates in a row that are no modes weaker ones are not tried.
         if fall[best] <= data.threshold or failed == 2:
             break
         pole = complex(poles[best])

@@ -79,9 +79,12 @@ def fit(data: Data, start: np.ndarray) -> PoleFit:
         if candidate is None:
             break
         tried.append(candidate)
-        poles = np.append(current.poles, candidate)
-        grown = _refine(data, poles, current)
-        if _worth(data, current, grown):
+        grown = _refine(data, np.append(current.poles, candidate), current)
+        fall = np.abs(current.error) ** 2 - np.abs(grown.error) ** 2
+        scale = scales(data, grown)[np.argmax(weakness(data, grown))]
+        if data.variance is None:
+            scale *= np.mean(grown.variance / current.variance)
+        if np.sum(2 / current.variance * fall) > data.threshold * scale:
             current = _prune(data, grown)
     return current if data.steady else _merged_twins(data, current)
 
@@ -159,27 +162,19 @@ def _merged_twins(data: Data, current: PoleFit) -> PoleFit:
     Between two hits a mode moves a little (warmth, amplitude, a clamp that settles); its second
     pole then has the same shape. Two modes of a structure within a bandwidth differ in shape.
     """
-    while (pair := _twins(data, current)) is not None:
-        weight = current.significance[list(pair)]
-        middle = np.sum(weight * current.poles[list(pair)]) / np.sum(weight)
-        poles = np.append(np.delete(current.poles, pair), middle)
-        current = _refine(data, poles, current)
-    return current
-
-
-def _twins(data: Data, current: PoleFit) -> tuple[int, int] | None:
-    if data.response.shape[0] < 2:
-        return None
-    order = np.argsort(current.poles.imag)
+    poles, order = current.poles, np.argsort(current.poles.imag)
     residue = current.residue.reshape(*data.response.shape[:2], -1)
-    shapes = [rank_one(residue[..., k])[0] for k in range(order.size)]
-    for a, b in pairwise(order):
-        apart = abs(current.poles[a] - current.poles[b])
-        width = np.max(data.rate_1_s - current.poles[[a, b]].real)
-        near = apart < min(TWIN_WIDTHS * width, TWIN_SHARE * abs(current.poles[a]))
+    shapes = [rank_one(residue[..., k])[0] for k in range(poles.size)]
+    for pair in pairwise(order) if len(residue) > 1 else ():
+        a, b = pair
+        width = np.max(data.rate_1_s - poles[[a, b]].real)
+        near = abs(poles[a] - poles[b]) < min(TWIN_WIDTHS * width, TWIN_SHARE * abs(poles[a]))
         if near and abs(np.vdot(shapes[a], shapes[b])) ** 2 > TWIN_MAC:
-            return int(a), int(b)
-    return None
+            weight = current.significance[[a, b]]
+            middle = np.sum(weight * poles[[a, b]]) / np.sum(weight)
+            merged = _refine(data, np.append(np.delete(poles, pair), middle), current)
+            return _merged_twins(data, merged)
+    return current
 
 
 def weakness(data: Data, fit: PoleFit) -> np.ndarray:
@@ -203,16 +198,6 @@ def scales(data: Data, current: PoleFit) -> np.ndarray:
     """(m,) factor on the covariance of each mode, from the error around it."""
     frequency = np.abs(current.poles) / (2 * np.pi)
     return np.interp(frequency, data.frequency_hz, current.excess)
-
-
-def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:
-    weight = 2 / before.variance
-    rise = np.sum(weight * (np.abs(before.error) ** 2 - np.abs(after.error) ** 2))
-    new = int(np.argmax(weakness(data, after)))
-    scale = scales(data, after)[new]
-    if data.variance is None:
-        scale *= float(np.mean(after.variance / before.variance))
-    return bool(rise > data.threshold * scale)
 
 
 def strongest(data: Data) -> np.ndarray:

@@ -181,11 +181,6 @@ class RowPrediction:
     values: np.ndarray
     precision: np.ndarray
 
-    @property
-    def surprise(self) -> np.ndarray:
-        """(n, m) difference to what the others foretell, squared, over its variance."""
-        return self.pull**2 / np.diag(self.precision)[:, None]
-
     @cached_property
     def pull(self) -> np.ndarray:
         """(n, m) half the slope of −2 log likelihood by the values."""
@@ -201,13 +196,6 @@ class RowPrediction:
     def gain(self) -> np.ndarray:
         """(n,) fall where a row is turned."""
         return self.fall(np.arange(len(self.values))[:, None], -self.values[:, None])
-
-    def turning(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) relative squared difference to what is predicted: as stated, and turned."""
-        off = self.pull / np.diag(self.precision)[:, None]
-        power = np.maximum(np.sum(self.values**2, axis=1), 1e-300)
-        turned = np.sum((2 * self.values - off) ** 2, axis=1)
-        return np.sum(off**2, axis=1) / power, turned / power
 
 
 def predicted_rows(
@@ -262,8 +250,11 @@ def _clearest(found: RowPrediction, moves: np.ndarray) -> int | None:
     """The row (index) that is clearly turned, None where none is or another might be instead."""
     gain = found.gain
     k = int(np.argmax(gain))
-    stated, turned = found.turning()
-    if turned[k] > TURNED or stated[k] < STATED or not moves[found.index[k]]:
+    # Squared difference to what is predicted, relative to the row: as stated, and turned
+    row, off = found.values[k], found.pull[k] / found.precision[k, k]
+    power = max(float(row @ row), 1e-300)
+    stated, turned = np.sum(off**2) / power, np.sum((2 * row - off) ** 2) / power
+    if turned > TURNED or stated < STATED or not moves[found.index[k]]:
         return None
     values = found.values.copy()
     values[k] *= -1

@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
-from planner.modal.matrix_poles import MatrixPoles
+from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.motion_fields import RowPrediction, predicted_rows
 from planner.modal.residues import realign
 from planner.recording.dof import Dof
@@ -35,7 +35,7 @@ class RovingSides:
     driving: tuple[tuple[int, int], ...]
 
     @classmethod
-    def of(cls, matrix: FrfMatrix, found: MatrixPoles, modes: np.ndarray) -> "RovingSides":
+    def of(cls, matrix: FrfMatrix, found: PoleIdentification, modes: np.ndarray) -> "RovingSides":
         """From residues of the modes (indices)."""
         values, side = found.fit.residue[:, modes] * 2j * found.fit.poles[modes].imag, matrix.roved
         table = np.full((*side.measured.shape, modes.size), np.nan + 0j)
@@ -111,8 +111,11 @@ def exchanged_nodes(
 
 
 def _surprise(found: RowPrediction, nodes: Sequence[np.ndarray]) -> np.ndarray:
-    """(n,) of nodes, given by their rows, over all modes and directions."""
-    each = np.sum(found.surprise, axis=1)
+    """(n,) squared differences to what the others foretell, over their variance.
+
+    Of nodes, given by their rows, over all modes and directions.
+    """
+    each = np.sum(found.pull**2, axis=1) / np.diag(found.precision)
     return np.array([np.sum(each[rows]) for rows in nodes])
 
 

@@ -76,7 +76,12 @@ def operating_modes(
     if not modes:
         raise RefusedError(NOTHING.format(*band))
     tones_hz = tuple(line.frequency_hz for line in tones)
-    return OperatingModes(modes, band, tones_hz, found, *_spectrum(values, rate))
+    # Cross power spectra of channels of unit variance
+    hz, table = scipy.signal.csd(
+        values[:, None], values[None], fs=rate, nperseg=min(values.shape[1], 2048), axis=-1,
+        detrend="constant",
+    )  # fmt: skip
+    return OperatingModes(modes, band, tones_hz, found, hz[1:], table[..., 1:])
 
 
 def _once(modes: Iterable[Mode]) -> tuple[Mode, ...]:
@@ -189,12 +194,3 @@ def _mode(line: Line, parts: list[tuple[complex, np.ndarray]], size: np.ndarray)
         line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, *UNSCALED, shape, likely,
         shape_sd, collinearity=phase_collinearity(shape), deviation_deg=phase_deviation_deg(shape),
     )  # fmt: skip
-
-
-def _spectrum(values: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Lines (Hz) and cross power spectra (channels, channels, F), of unit variance channels."""
-    length = min(values.shape[1], 2048)
-    hz, table = scipy.signal.csd(
-        values[:, None], values[None], fs=rate, nperseg=length, axis=-1, detrend="constant"
-    )
-    return hz[1:], table[..., 1:]

@@ -41,12 +41,10 @@ def ladder(most: int, lines: int) -> tuple[int, ...]:
 
 
 def plscf(
-    frequency_hz: np.ndarray,
-    frf: np.ndarray,
-    orders: tuple[int, ...],
-    weight: np.ndarray | None = None,
-) -> tuple[PoleSet, ...]:
-    """Poles of every model order.
+    frequency_hz: np.ndarray, frf: np.ndarray, most: int, weight: np.ndarray | None = None,
+    reach_hz: tuple[float, float] | None = None,
+) -> "Diagram":  # fmt: skip
+    """Poles of model orders up to `most`, followed in `reach_hz` (the lines and 5 % beyond).
 
     frequency_hz (F,) increasing, > 0; frf (outputs, inputs, F) complex, finite, of any kind
     (receptance, mobility, accelerance: the poles are the same and the numerator takes the
@@ -56,14 +54,24 @@ def plscf(
     """
     base, step, z = _circle(2 * np.pi * np.asarray(frequency_hz))
     scale, scaled = _scaled(frf)
-    normal, coupling = _normal(z, scaled, weight, max(orders))
-    found = []
+    orders, found = ladder(most, len(z)), []
+    normal, coupling = _normal(z, scaled, weight, orders[-1])
     for order in orders:
-        roots, participation = _solve(order, normal, coupling, scale)
+        coefficients = _denominator(order, normal, coupling)
+        # 1/z for det Σ A_r z^r = 0 with A₀ = I: eigenvalues of the block companion matrix
+        inputs = coefficients.shape[1]
+        companion = np.eye(order * inputs, k=-inputs)
+        companion[:inputs] = -coefficients[1:].transpose(1, 0, 2).reshape(inputs, -1)
+        roots = np.linalg.eigvals(companion)
+        roots = 1 / roots[np.abs(roots) > 1e-12]
+        inside = (np.abs(roots) < 1) & (np.abs(roots) > 1e-6) & (roots.imag > 0)
+        roots = roots[inside].astype(complex)
+        participation = _participation(coefficients, roots) * scale
+        participation /= np.linalg.norm(participation, axis=1, keepdims=True)
         poles = np.log(roots) / step + 1j * base
         by_frequency = np.argsort(poles.imag)
         found.append(PoleSet(order, poles[by_frequency], participation[by_frequency]))
-    return tuple(found)
+    return diagram(tuple(found), reach_hz or (0.95 * frequency_hz[0], 1.05 * frequency_hz[-1]))
 
 
 def row_errors(
@@ -149,22 +157,6 @@ def _two_sided(lags: np.ndarray, data: np.ndarray) -> np.ndarray:
     return np.concatenate([(lags[:0:-1].conj()) @ data, lags @ data])
 
 
-def _solve(
-    order: int, normal: np.ndarray, coupling: np.ndarray, scale: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Roots (k,) in the z-plane, in the upper half of the circle, and their participation."""
-    coefficients = _denominator(order, normal, coupling)
-    # 1/z for det Σ A_r z^r = 0 with A₀ = I: eigenvalues of the block companion matrix
-    inputs = coefficients.shape[1]
-    companion = np.eye(order * inputs, k=-inputs)
-    companion[:inputs] = -coefficients[1:].transpose(1, 0, 2).reshape(inputs, -1)
-    roots = np.linalg.eigvals(companion)
-    z = 1 / roots[np.abs(roots) > 1e-12]
-    z = z[(np.abs(z) < 1) & (np.abs(z) > 1e-6) & (z.imag > 0)].astype(complex)
-    participation = _participation(coefficients, z) * scale
-    return z, participation / np.linalg.norm(participation, axis=1, keepdims=True)
-
-
 def _denominator(order: int, normal: np.ndarray, coupling: np.ndarray) -> np.ndarray:
     """(order + 1, inputs, inputs) coefficients A_r, A₀ = I."""
     inputs = normal.shape[1]
@@ -203,6 +195,11 @@ class Line:
     share: float  # orders present / orders tried since it first appeared
 
     @property
+    def reach(self) -> int:
+        """Over how many orders it goes."""
+        return int(self.orders[-1] - self.orders[0])
+
+    @property
     def late(self) -> np.ndarray:
         """Those of the upper half of the orders, where bias has died out."""
         return self.poles[len(self.poles) // 2 :]
@@ -237,6 +234,18 @@ class Diagram:
     def order(self) -> int:
         """The highest."""
         return self.sets[-1].order
+
+    @property
+    def start(self) -> np.ndarray:
+        """(m,) in rad/s: the poles of stable lines."""
+        return np.array([line.pole for line in stable(self)], complex)
+
+    def support(self, pole: complex) -> float:
+        """Share of the upper half of the orders with a pole within half a bandwidth or 0.5 %."""
+        upper = self.sets[len(self.sets) // 2 :]
+        reach = max(abs(pole.real), 0.005 * abs(pole))
+        near = [np.any(np.abs(entry.poles.imag - pole.imag) < reach) for entry in upper]
+        return float(np.mean(near))
 
 
 def diagram(sets: tuple[PoleSet, ...], band_hz: tuple[float, float]) -> Diagram:

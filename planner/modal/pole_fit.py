@@ -110,7 +110,11 @@ def refine(data: Data, variance: np.ndarray, start: np.ndarray) -> PoleFit:
         step = -unit * np.linalg.lstsq(damped, unit * point.gradient)[0]
         there = poles + complex_of(step)
         tried = reduced_together(sets, there) if data.allowed(there) else None
-        settled = tried is not None and damping < DAMPING and _still(point, tried, step)
+        settled = False
+        if tried is not None and damping < DAMPING:  # what damping keeps short tells nothing
+            # Far below a standard deviation, or changed by rounding alone
+            sds = np.abs(step) * np.sqrt(np.maximum(diagonal, 0.0))
+            settled = np.max(sds) < 1e-3 or abs(point.chi2 - tried.chi2) < 1e-9 * point.chi2
         if tried is not None and tried.chi2 < point.chi2:
             poles, point, damping = there, tried, LIGHTER * damping
         else:
@@ -120,15 +124,6 @@ def refine(data: Data, variance: np.ndarray, start: np.ndarray) -> PoleFit:
     common, covariance = stack(poles), np.linalg.pinv(point.normal, hermitian=True)
     found = _finish(sets, data, variance, common[None], common, 0 * common, covariance)
     return found if data.step_s is None else _in_rad_s(data, found, data.step_s)
-
-
-def _still(before: ReducedFit, after: ReducedFit, step: np.ndarray) -> bool:
-    """Whether a step changed nothing: far below a standard deviation, or by rounding alone.
-
-    A short step tells nothing as long as damping keeps it short.
-    """
-    sds = np.abs(step) * np.sqrt(np.maximum(np.diag(before.normal), 0.0))
-    return bool(np.max(sds) < 1e-3 or abs(before.chi2 - after.chi2) < 1e-9 * before.chi2)
 
 
 def _in_rad_s(data: Data, found: PoleFit, step_s: float) -> PoleFit:
@@ -257,19 +252,6 @@ def _common(
     return covariance @ right, covariance
 
 
-def _student(point: ReducedFit, spread: np.ndarray) -> np.ndarray:
-    """(2m,) factors of sds, since so many sets alone tell how much sets differ.
-
-    Student's t over the normal quantile, for that part of the variance which comes from it.
-    """
-    known = np.einsum("kaa->ka", point.normal)
-    weight = known / (1 + spread * known)
-    total = np.maximum(np.sum(weight, axis=0), 1e-300)
-    freedom = np.maximum(total**2 / np.maximum(np.sum(weight**2, axis=0), 1e-300) - 1, 2.0)
-    noise = total / np.maximum(np.sum(known, axis=0), 1e-300)
-    return np.sqrt(noise + (1 - noise) * widening_factor(freedom) ** 2)
-
-
 def _own(point: ReducedFit, x: np.ndarray, common: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """The sets' most probable poles (k, 2m), shrunk towards the common ones."""
     pull = np.einsum("kab,kb->ka", point.normal, x - common) - point.gradient
@@ -302,7 +284,14 @@ def _finish(
     square = np.maximum(alone / np.maximum(sets.weight, 1e-300)[..., None] + spent, 0.0)
     residue_variance, there = np.zeros((data.entries, m)), sets.entries >= 0
     residue_variance[sets.entries[there]] = of_each(square, m)[there]
-    factor = _student(point, spread)
+    # Student's t over the normal quantile for that part of the variance that comes from how sets
+    # differ: so many alone tell it.
+    known = np.einsum("kaa->ka", point.normal)
+    weight = known / (1 + spread * known)
+    whole = np.maximum(np.sum(weight, axis=0), 1e-300)
+    freedom = np.maximum(whole**2 / np.maximum(np.sum(weight**2, axis=0), 1e-300) - 1, 2.0)
+    noise = whole / np.maximum(np.sum(known, axis=0), 1e-300)
+    factor = np.sqrt(noise + (1 - noise) * widening_factor(freedom) ** 2)
     return PoleFit(
         complex_of(common), poles, factor[:, None] * covariance * factor, spread, coefficients,
         residue_variance, error, variance, point.significance(sets.weight),

@@ -62,6 +62,11 @@ def unit(lines: Lines, poles: np.ndarray) -> np.ndarray:
     return (lines.factor - tail) / apart
 
 
+def response(lines: Lines, poles: np.ndarray, residue: np.ndarray) -> np.ndarray:
+    """(e, F) of poles (m,) with residues (e, m)."""
+    return residue @ unit(lines, poles) + residue.conj() @ unit(lines, poles.conj())
+
+
 def unit_slope(lines: Lines, poles: np.ndarray) -> np.ndarray:
     """Derivative of `unit` by the poles (complex-analytic)."""
     apart = lines.x - poles[..., None]

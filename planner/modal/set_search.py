@@ -14,7 +14,7 @@ import numpy as np
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped
 from planner.modal.pole_fit import FARTHEST, PoleFit
-from planner.modal.residues import Lines, basis, stack, unit
+from planner.modal.residues import Lines, basis, response, stack
 
 # Poles are looked for up to so many sds of the sets' poles, and half bandwidths, from the common
 # ones; the lines looked at reach so many half bandwidths farther.
@@ -27,7 +27,11 @@ def reestimated_sets(data: Data, fit: PoleFit) -> np.ndarray | None:
     shares = _participation(data, fit)[data.column]
     off = _off(data, fit) | _apart(data, fit, shares)
     own, moved = fit.own.copy(), False
-    for modes in _together(data, fit):
+    # Modes among the lines, in groups whose peaks may overlap
+    omega, far, imag = 2 * np.pi * data.frequency_hz[[0, -1]], _reach(fit), fit.poles.imag
+    order = (int(k) for k in np.argsort(imag) if omega[0] < imag[k] < omega[1])
+    for group in grouped(order, lambda a, b: imag[b] - imag[a] < far[a] + far[b]):
+        modes = np.array(group)
         for s in np.flatnonzero(off[:, modes].any(axis=1)):
             found = _Neighbourhood.of(data, fit, shares, int(s), modes).best()
             if found is not None:
@@ -44,8 +48,7 @@ def _participation(data: Data, fit: PoleFit) -> np.ndarray:
     tables = np.moveaxis(data.table(fit.residue), -1, 0)
     usual = np.median(np.linalg.norm(tables, axis=2), axis=1, keepdims=True)
     weight, right = np.ones(tables.shape[:2]), np.zeros(tables.shape[::2], complex)
-    # Robust rounds.
-    for _ in range(5):
+    for _ in range(5):  # robust rounds
         right = np.linalg.svd(weight[..., None] * tables, full_matrices=False)[2][:, 0]
         off = tables - (tables @ right[..., None].conj()) * right[:, None]
         weight = 1 / np.sqrt(np.linalg.norm(off, axis=2) + 0.1 * usual + 1e-300)
@@ -63,15 +66,6 @@ def _near(data: Data, fit: PoleFit, mode: int) -> np.ndarray:
     """(F,) bool: lines around a mode, wherever a set may have it."""
     far = _reach(fit)[mode] + REACH * np.abs(fit.poles[mode].real)
     return np.abs(2 * np.pi * data.frequency_hz - fit.poles[mode].imag) < far
-
-
-def _together(data: Data, fit: PoleFit) -> list[np.ndarray]:
-    """Modes (indices) among the lines, in groups whose peaks may overlap."""
-    omega, far = 2 * np.pi * data.frequency_hz[[0, -1]], _reach(fit)
-    inside = (fit.poles.imag > omega[0]) & (fit.poles.imag < omega[1])
-    order = [int(k) for k in np.argsort(fit.poles.imag) if inside[k]]
-    groups = grouped(order, lambda a, b: np.diff(fit.poles[[a, b]].imag)[0] < far[a] + far[b])
-    return [np.array(group) for group in groups]
 
 
 def _off(data: Data, fit: PoleFit) -> np.ndarray:
@@ -130,16 +124,14 @@ class _Neighbourhood:
         chosen = np.flatnonzero(np.any([_near(data, fit, j) for j in modes], axis=0))
         lines, common = data.lines.part(chosen), fit.poles[modes]
         others = np.setdiff1d(np.arange(fit.poles.size), modes)
-        residue, own = fit.residue[np.ix_(entries, others)], fit.own[s, others]
-        response = data.values[np.ix_(entries, chosen)] - residue @ unit(lines, own)
-        response = response - residue.conj() @ unit(lines, own.conj())
+        apart = response(lines, fit.own[s, others], fit.residue[np.ix_(entries, others)])
         variance = fit.variance[np.ix_(entries, chosen)]
         # In any case a pole may move by half its bandwidth.
         spread = np.maximum(fit.spread[fit.poles.size + modes], common.real**2)
         profile = np.sqrt(variance[0, 0] / variance[0])
         line = np.stack([np.ones(lines.x.size), np.linspace(-1, 1, lines.x.size)]) * profile
         far = np.linalg.qr(stack(np.concatenate([line, 1j * line])).T)[0]
-        values = stack(response * profile)
+        values = stack((data.values[np.ix_(entries, chosen)] - apart) * profile)
         return cls(
             lines, profile, variance[:, 0] / 2, values - values @ far @ far.T, far,
             data.row[entries], shares[np.ix_(entries, modes)], common, fit.own[s, modes],
@@ -154,8 +146,7 @@ class _Neighbourhood:
         for _ in range(2 if poles.size > 1 else 1):
             before = poles
             for a in range(poles.size):
-                # Step and most: trials lie so many half bandwidths apart, at most so many to either
-                # side
+                # Trials lie half a half bandwidth apart, at most so many to either side.
                 count = min(40, int(np.ceil(reach[a] / (0.5 * half[a]))))
                 shift = np.linspace(-reach[a], reach[a], 2 * count + 1)
                 poles = self._along(poles, a, common[a] - poles[a] + 1j * shift)
@@ -166,7 +157,8 @@ class _Neighbourhood:
                 for way in (1j, 1.0):
                     poles = self._along(poles, a, way * step * half[a] * np.arange(-2, 3))
         last = np.stack([poles, self.own])
-        bound, free = self._bound(last), self._free(last)
+        (total, gram, cross), bound = self._sums(last), self._bound(last)
+        free = total - _explained(gram, cross / np.sqrt(self.level))  # residues left free
         gain = bound[1] - bound[0]
         # Gain of χ², from which what was found takes the place of what was there
         # Share of that gain by which χ² with residues left free may rise: an FRF may be spoiled
@@ -196,11 +188,6 @@ class _Neighbourhood:
         total = pull + np.sum(self.values**2 / self.level[:, None])
         return total, columns @ columns.transpose(0, 2, 1), columns @ self.values.T
 
-    def _free(self, poles: np.ndarray) -> np.ndarray:
-        """(t,) χ² of trials (t, n) with residues left free."""
-        total, gram, cross = self._sums(poles)
-        return total - _explained(gram, cross / np.sqrt(self.level))
-
     def _bound(self, poles: np.ndarray) -> np.ndarray:
         """(t,) χ² of trials (t, n) excited as in all sets."""
         total, gram, cross = self._sums(poles)
@@ -217,7 +204,7 @@ class _Neighbourhood:
 def _explained(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
     """(t,) fall of χ² by least squares from normal (t, c, c) and right (t, c, k)."""
     size = np.maximum(np.sqrt(np.einsum("taa->ta", normal)), 1e-300)
-    # Ridge.
-    normal = normal / size[:, :, None] / size[:, None] + 1e-9 * np.eye(size.shape[1])
+    ridge = 1e-9 * np.eye(size.shape[1])
+    normal = normal / size[:, :, None] / size[:, None] + ridge
     right = right / size[..., None]
     return np.sum(right * np.linalg.solve(normal, right), axis=(1, 2))

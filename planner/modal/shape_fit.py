@@ -49,13 +49,9 @@ class ShapeFit:
         m, lines = self.poles.size, self.data.lines
         columns, slope = basis(lines, self.poles), basis_slope(lines, self.poles)
         own = self.root[2 * m :].reshape(*self.coefficients.shape, -1)
-        return np.stack(
-            [
-                self.root[: 2 * m].T @ slope_turn(c, m).T @ slope + part.T @ columns
-                for c, part in zip(self.coefficients, own, strict=True)
-            ],
-            axis=1,
-        )
+        by_poles = slope_turn(self.coefficients, m).transpose(0, 2, 1) @ slope
+        errors = self.root[: 2 * m].T @ by_poles + own.transpose(0, 2, 1) @ columns
+        return errors.transpose(1, 0, 2)
 
     def drawn(self, count: int, seed: int) -> list[tuple[np.ndarray, np.ndarray]]:
         """So many poles and coefficients that are as likely as each other."""

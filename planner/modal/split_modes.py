@@ -7,7 +7,7 @@ import numpy as np
 from planner.modal.fit_data import Data
 from planner.modal.mac import grouped
 from planner.modal.pole_fit import DivergedPolesError, PoleFit, fit_sets
-from planner.modal.residues import unit
+from planner.modal.residues import response
 from planner.modal.set_search import reestimated_sets
 
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
@@ -48,14 +48,11 @@ def around(data: Data, fit: PoleFit, pole: complex) -> tuple[Data, np.ndarray, n
     lines = lines[np.abs(data.frequency_hz[lines] - centre) < reach]
     # Of a fine grid, one line in so many: more than these lines are not needed
     lines = lines[:: 1 + lines.size // 240]
-    response = data.response[..., lines]
-    part = replace(data, frequency_hz=data.frequency_hz[lines], response=response, near=False)
+    values = data.response[..., lines]
+    part = replace(data, frequency_hz=data.frequency_hz[lines], response=values, near=False)
     near = np.abs(fit.poles.imag / (2 * np.pi) - centre) < reach
-    own = fit.own[:, ~near]
-    up, down = unit(part.lines, own), unit(part.lines, own.conj())
-    for k, chosen in enumerate(data.sets):
-        far = fit.residue[np.ix_(chosen, ~near)]
-        response[chosen, 0] -= far @ up[k] + far.conj() @ down[k]
+    for own, chosen in zip(fit.own, data.sets, strict=True):
+        values[chosen, 0] -= response(part.lines, own[~near], fit.residue[np.ix_(chosen, ~near)])
     return part, lines, near
 
 
@@ -64,13 +61,6 @@ def explains(local: Data, less: PoleFit, more: PoleFit, margin: float = 1.0) -> 
     before, after = (float(np.sum(fit.chi2)) for fit in (less, more))
     scale = max(1.0, after / (2 * local.response.size))
     return before - after > margin * local.threshold * scale
-
-
-def _in_most(local: Data, less: PoleFit, more: PoleFit) -> bool:
-    """Whether a fit with one mode more is clearly better than chance makes it in most sets."""
-    fall = less.chi2 - more.chi2
-    each = [np.sum(fall[chosen]) / (2 * len(chosen) + 2) for chosen in local.sets]
-    return bool(np.median(each) > APART)
 
 
 def merged_modes(data: Data, fit: PoleFit) -> tuple[np.ndarray, np.ndarray]:
@@ -94,21 +84,18 @@ def merged_modes(data: Data, fit: PoleFit) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _groups(data: Data, fit: PoleFit, order: np.ndarray) -> list[np.ndarray]:
-    """Indices of poles, increasing, that lie together and take part alike."""
+    """Indices of poles, increasing, that lie together and take part at the references alike."""
 
     def together(last: int, k: int) -> bool:
         gap = fit.poles[k].imag - fit.poles[last].imag
         width = 2 * max(abs(fit.poles[k].real), abs(fit.poles[last].real))
-        return gap < max(width, TOGETHER * fit.poles[k].imag) and _alike(data, fit, last, k)
+        if gap >= max(width, TOGETHER * fit.poles[k].imag):
+            return False
+        tables = np.moveaxis(data.table(fit.residue[:, [last, k]]), -1, 0)
+        vectors = np.linalg.svd(tables, full_matrices=False)[2][:, 0]
+        return bool(np.abs(np.vdot(*vectors)) ** 2 > ALIKE)
 
     return [np.array(group) for group in grouped(order, together) if len(group) > 1]
-
-
-def _alike(data: Data, fit: PoleFit, first: int, second: int) -> bool:
-    """Whether two modes take part at the references alike; always so at a single one."""
-    tables = np.moveaxis(data.table(fit.residue[:, [first, second]]), -1, 0)
-    vectors = np.linalg.svd(tables, full_matrices=False)[2][:, 0]
-    return bool(np.abs(np.vdot(*vectors)) ** 2 > ALIKE)
 
 
 def _as_one(data: Data, fit: PoleFit, group: np.ndarray) -> tuple[complex, np.ndarray] | None:
@@ -129,8 +116,9 @@ def _as_one(data: Data, fit: PoleFit, group: np.ndarray) -> tuple[complex, np.nd
         more = fit_sets(local, variance, fit.poles[near], known=fit.own[:, near])
         if explains(local, one, more, APART):
             # Where it is one mode, only sets that fitted it badly are explained better by two.
-            found = reestimated_sets(local, one)
-            if _in_most(local, one, more) or found is None:
+            fall, found = one.chi2 - more.chi2, reestimated_sets(local, one)
+            each = [np.sum(fall[chosen]) / (2 * len(chosen) + 2) for chosen in local.sets]
+            if np.median(each) > APART or found is None:
                 return None
             one = fit_sets(local, variance, one.poles, MERGED_ROUNDS, found)
     except DivergedPolesError:

@@ -115,8 +115,7 @@ def _matched(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray, order
     chosen = [_first(*one) for one in each]
     seen: list[list[np.ndarray]] = [chosen]
     certain = np.ones(expected.shape)
-    # Max rounds.
-    for _ in range(8):
+    for _ in range(8):  # rounds at most
         gains = _gains(poses, chosen, certain, guide, x)
         chosen = [best(gain, ordered) for gain in gains]
         chance = [chances(gain, ordered) for gain in gains]

@@ -13,7 +13,7 @@ from planner.frf.quantities import DERIVATIVE, convert
 from planner.modal.fit_data import Data, too_few_lines
 from planner.modal.mode_selection import presences
 from planner.modal.modes import UNSCALED, ModalModel, Mode
-from planner.modal.plscf import Line, diagram, ladder, plscf, stable
+from planner.modal.plscf import plscf, stable
 from planner.modal.residues import lsfd, rank_one
 from planner.recording.records import FrfRecord
 
@@ -49,7 +49,6 @@ def modes_from_transfer_functions(
     step = frequency[1] - frequency[0]
     band = band_hz or (8 * float(step), float(frequency[-1]) / 1.2)
     inside = (frequency >= band[0]) & (frequency <= band[1])
-    # Least in band.
     if np.count_nonzero(inside) < 8:
         raise too_few_lines(inside, frequency, band)
     modes = [m for part in _parts(band, step) for m in _part(frequency, response, part)]
@@ -81,9 +80,8 @@ def _part(frequency: np.ndarray, response: np.ndarray, part: tuple[float, float]
     high = max(part[1] * OVERLAP, part[1] + LEAST_LINES * step / 2)
     lines = (frequency >= low) & (frequency <= high)
     f, h = frequency[lines], response[..., lines]
-    orders = ladder(MAX_ORDER, f.size)
-    found = diagram(plscf(f, h, orders), (low, high))
-    chosen = [line for line in stable(found) if _reach(line) >= REACH * orders[-1]]
+    found = plscf(f, h, MAX_ORDER, reach_hz=(low, high))
+    chosen = [line for line in stable(found) if line.reach >= REACH * found.order]
     if not chosen:
         return []
     poles = np.array([line.pole for line in chosen])
@@ -95,19 +93,12 @@ def _part(frequency: np.ndarray, response: np.ndarray, part: tuple[float, float]
         inside = part[0] <= line.frequency_hz < part[1]
         still = line.share >= SHARE and line.scatter <= SCATTER
         if inside and still and line.damping_ratio <= DAMPING and presence >= PRESENCE:
-            share = min(1.0, _reach(line) / orders[-1] + 0.3)
+            share = min(1.0, line.reach / found.order + 0.3)
             # Rough: how often it was there, how still it stood, how much of the response it is.
             certain = share * min(1.0, presence) ** 0.25 * (1 - line.scatter)
             hz_sd = float(np.std(np.abs(line.late)) / (2 * np.pi))
             damping_sd = float(np.std(-line.late.real / np.abs(line.late)))
-            modes.append(
-                Mode(
-                    line.frequency_hz, hz_sd, line.damping_ratio, damping_sd, *UNSCALED,
-                    rank_one(residues[:, :, k])[0], float(certain),
-                )
-            )  # fmt: skip
+            told = line.frequency_hz, hz_sd, line.damping_ratio, damping_sd
+            shape = rank_one(residues[:, :, k])[0]
+            modes.append(Mode(*told, *UNSCALED, shape, float(certain)))
     return modes
-
-
-def _reach(line: Line) -> int:
-    return int(line.orders[-1] - line.orders[0])

@@ -87,8 +87,14 @@ _SUFFIXES = {"n": "N", "m_s2": "m/s^2", "m_s": "m/s", "m": "m", "s": "s", "hz": 
 _DIRECTION = re.compile(
     r"(?:^|[_\s.:])(?:a|acc|accel|acceleration)?[_\s]?([+-]?)([xyz])(?:$|[_\s(\[/,])", re.IGNORECASE
 )
-TIMES = ("time", "t", "zeit", "temps", "tempo", "tiempo")
-FREQUENCIES = ("frequency", "freq", "frequenz", "fréquence", "frecuencia", "frequenza")
+# What samples stand at: units where none is said, and names.
+_AXES = {
+    "time": (Unit("time", "s", 1.0), ("time", "t", "zeit", "temps", "tempo", "tiempo")),
+    "frequency": (
+        Unit("frequency", "Hz", 1.0),
+        ("frequency", "freq", "frequenz", "fréquence", "frecuencia", "frequenza"),
+    ),
+}
 
 
 def unit_text(name: str) -> str:
@@ -130,28 +136,22 @@ def _opened(name: str) -> int:
     return -1
 
 
-def time_unit(name: str, stated: str) -> Unit | None:
-    """The unit of a column of times, in s where it is not said; None of any other column."""
-    return _unit_of(name, stated, Unit("time", "s", 1.0), TIMES)
+def axis_unit(name: str, stated: str, quantity: str) -> Unit | None:
+    """The unit of a column of times ("time"), or of frequencies ("frequency"), None of any other.
 
-
-def frequency_unit(name: str, stated: str) -> Unit | None:
-    """The same of a column of frequencies, in Hz where it is not said."""
-    return _unit_of(name, stated, Unit("frequency", "Hz", 1.0), FREQUENCIES)
+    Where it is not said, s or Hz.
+    """
+    unit, (si, names) = lookup(stated or unit_text(name)), _AXES[quantity]
+    if unit is None:
+        return si if bare(name) in names else None
+    return unit if unit.quantity == quantity else None
 
 
 def says_something(name: str, stated: str = "") -> bool:
     """Whether name or unit say what a column holds."""
     said = stated or unit_text(name)
-    axis = time_unit(name, stated) or frequency_unit(name, stated)
+    axis = any(axis_unit(name, stated, quantity) for quantity in _AXES)
     return bool(axis or lookup(said) or lookup_ratio(said))
-
-
-def _unit_of(name: str, stated: str, si: Unit, names: tuple[str, ...]) -> Unit | None:
-    unit = lookup(stated or unit_text(name))
-    if unit is None:
-        return si if bare(name) in names else None
-    return unit if unit.quantity == si.quantity else None
 
 
 def direction_in(name: str) -> int:
@@ -201,8 +201,8 @@ class Axis:
 
 def name_of(attributes: Attributes) -> str:
     """The name stated of a channel, "" where none is."""
-    found = (str(v) for _, v in _of_keys(attributes, _NAMES) if isinstance(v, str))
-    return next((text for text in found if text and not lookup(text)), "")
+    each = _of_keys(attributes, _NAMES)
+    return next((v for _, v in each if isinstance(v, str) and v and not lookup(v)), "")
 
 
 def names_of(attributes: Attributes, count: int) -> tuple[str, ...]:
@@ -225,8 +225,7 @@ def _lists(entries: Iterable[tuple[str, object]], count: int) -> list[tuple[str,
 
 def unit_of(attributes: Attributes) -> str:
     """The unit stated of a channel, "" where none is."""
-    texts = (str(v) for _, v in _of_keys(attributes, _UNITS) if isinstance(v, str))
-    return next((text for text in texts if text), "")
+    return next((v for _, v in _of_keys(attributes, _UNITS) if isinstance(v, str) and v), "")
 
 
 def rescaled(attributes: Attributes) -> str:
@@ -243,7 +242,12 @@ def axis_of(path: Path, attributes: Attributes) -> Axis:
     """What samples stand at. Raises InputError where it is stated twice and differently."""
     steps = [n for _, v in _of_keys(attributes, STEPS) if (n := number(v)) is not None and n]
     rates = [n for _, v in _of_keys(attributes, RATES) if (n := number(v)) is not None and n]
-    quantity, _, factor = next(_abscissae(attributes), Unit("time", "s", 1.0))
+    on_axis = (
+        lookup(value) for key, value in attributes.items()
+        if isinstance(value, str) and (_on_abscissa(key) or set(_forms(key)) & _X_UNITS)
+    )  # fmt: skip
+    units = (unit for unit in on_axis if unit and unit.quantity in _AXES)
+    quantity, _, factor = next(units, _AXES["time"][0])
     found = [1 / rate for rate in rates] + [step * factor for step in steps]
     for step in found[1:]:
         if not abs(step - found[0]) <= UNEVEN * abs(found[0]):
@@ -262,15 +266,6 @@ def is_axis(key: str) -> bool:
     """Whether an attribute is of one channel's axis, unit or name, and of no record."""
     known = STEPS | RATES | _STARTS | _UNITS | _NAMES | _X_UNITS
     return any(form in known for form in _forms(key))
-
-
-def _abscissae(attributes: Attributes) -> Iterator[Unit]:
-    """Units stated of what samples stand at."""
-    for key, value in attributes.items():
-        if isinstance(value, str) and (_on_abscissa(key) or set(_forms(key)) & _X_UNITS):
-            unit = lookup(value)
-            if unit and unit.quantity in ("time", "frequency"):
-                yield unit
 
 
 def _date(value: object) -> float | None:

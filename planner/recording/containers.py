@@ -20,12 +20,8 @@ if TYPE_CHECKING:
     import h5py
     import nptdms
 
-NUMBERS = {
-    "double",
-    "single",
-    "logical",
-    *(f"{u}int{n}" for u in ("", "u") for n in (8, 16, 32, 64)),
-}
+_SIZED = (f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
+NUMBERS = {"double", "single", "logical", *_SIZED}
 
 
 def read_hdf5(path: Path) -> tuple[Record, ...]:

@@ -8,16 +8,17 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.recording.column_names import (
+    Attributes,
     Axis,
     Unit,
     axis_of,
+    axis_unit,
     is_abscissa,
     is_axis,
     lookup,
     name_of,
     names_of,
     rescaled,
-    time_unit,
     unit_of,
     unit_text,
     units_of,
@@ -143,9 +144,6 @@ def _of_structs(values: Sequence[Mapping[str, object]]) -> dict[str, object]:
     return found
 
 
-Stated = Mapping[str, object]
-
-
 @dataclass(frozen=True, eq=False)
 class EntryColumn:
     """An array of a file: a column, or one that lacks names (`lacks` says so).
@@ -155,8 +153,8 @@ class EntryColumn:
 
     path: tuple[str, ...]
     values: np.ndarray  # (n,) unless it lacks something
-    own: Stated
-    shared: Stated
+    own: Attributes
+    shared: Attributes
     title: str = ""
     unit: str = ""
     lacks: str = ""
@@ -176,7 +174,7 @@ def found_in(
     file: Path,
     tree: EntryTree,
     path: tuple[str, ...] = (),
-    above: Sequence[tuple[bool, Stated]] = (),
+    above: Sequence[tuple[bool, Attributes]] = (),
 ) -> Iterator[EntryColumn]:
     """Every array of a file, or below a group of it.
 
@@ -192,14 +190,14 @@ def found_in(
         else:
             own = {k: v for alone, of in here if alone for k, v in of.items()}
             own |= _of_one(name, here[-1][1])
-            if path and not (unit_text(name) or time_unit(name, "")):
+            if path and not (unit_text(name) or axis_unit(name, "", "time")):
                 unit = unit_of(here[-1][1])  # of all that is in the group
                 own = {**({"unit": unit} if lookup(unit) else {}), **own}
             shared = {k: v for alone, of in here if not alone for k, v in of.items()}
             yield from _columns(at, part, own, shared)
 
 
-def _of_one(name: str, beside: Stated) -> dict[str, object]:
+def _of_one(name: str, beside: Attributes) -> dict[str, object]:
     """Of what is stated beside arrays that which names one: "Channel_1_Unit" of Channel_1_Data."""
     stems = [stem for stem in (name.rpartition("_")[0], name) if stem]
     return {
@@ -259,7 +257,7 @@ def _with_own_times(file: Path, tree: EntryTree) -> EntryTree:
     return EntryTree({**tree.attributes, **axis}, rest, tree.unread)
 
 
-def _only(part: EntryTree | np.ndarray) -> tuple[np.ndarray, Stated] | None:
+def _only(part: EntryTree | np.ndarray) -> tuple[np.ndarray, Attributes] | None:
     """The one column that a part holds and what is stated of it; None where it holds others."""
     if not isinstance(part, EntryTree):
         return (part, {}) if part.ndim == 1 else None
@@ -268,12 +266,12 @@ def _only(part: EntryTree | np.ndarray) -> tuple[np.ndarray, Stated] | None:
     return (found[0], {**part.attributes, **_beside(part), **found[1]}) if found else None
 
 
-def _axis_unit(name: str, said: Stated) -> Unit | None:
+def _axis_unit(name: str, said: Attributes) -> Unit | None:
     """The unit of what samples stand at, where a part is named so."""
     unit = lookup(unit_of(said))
     if unit and unit.quantity in ("time", "frequency") and is_abscissa(name):
         return unit
-    return time_unit(name, unit_of(said))
+    return axis_unit(name, unit_of(said), "time")
 
 
 def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Named:

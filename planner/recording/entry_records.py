@@ -42,12 +42,7 @@ def records_of(path: Path, root: EntryTree) -> tuple[Record, ...]:
         return tuple(replace(record, remarks=record.remarks + remarks) for record, _ in wholes)
     if others or not any(_known(column) for column in columns):
         raise InputError(f"{path} holds {_held(found, root)}: {LOOKED_FOR}; name columns so.")
-    return _as_it_is(path, columns)
-
-
-def _as_it_is(path: Path, columns: Columns) -> tuple[Record, ...]:
-    """What is no whole hit: responses alone, or what is to be refused in words."""
-    try:
+    try:  # what is no whole hit: responses alone, or what is to be refused in words
         return to_records(path, named_from(path, columns, False))
     except InputError:
         with suppress(InputError):

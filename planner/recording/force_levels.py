@@ -32,13 +32,10 @@ def far_below(hit: Hit, others: Sequence[Hit]) -> float | None:
 
 def by_level(hits: tuple[Hit, ...]) -> tuple[tuple[Hit, ...], ...]:
     """The hits by strength, weakest level first; a gap of SAME_LEVEL between peaks separates."""
-    groups: list[list[Hit]] = []
-    for hit in sorted(hits, key=lambda hit: hit.pulse.peak_n):
-        if groups and hit.pulse.peak_n < SAME_LEVEL * groups[-1][-1].pulse.peak_n:
-            groups[-1].append(hit)
-        else:
-            groups.append([hit])
-    return tuple(tuple(group) for group in groups)
+    ordered = sorted(hits, key=lambda hit: hit.pulse.peak_n)
+    peaks = np.array([hit.pulse.peak_n for hit in ordered])
+    gaps = np.flatnonzero(peaks[1:] >= SAME_LEVEL * peaks[:-1]) + 1
+    return tuple(tuple(ordered[i] for i in own) for own in np.split(np.arange(len(hits)), gaps))
 
 
 def level_of(peaks_n: np.ndarray, groups: Sequence[np.ndarray]) -> np.ndarray:

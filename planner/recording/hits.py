@@ -23,6 +23,14 @@ from planner.recording.records import (
     TimeRecord,
 )
 
+# How files of a kind state the axis of a hit.
+STATED_IN = {
+    **dict.fromkeys(("csv", "tsv", "txt"), 'begin the file with a line such as "# hit: +x"'),
+    **dict.fromkeys(("uff", "unv", "uf58"), "state it in the file (ref_dir)"),
+    "lvm": "write it into its header, as a line of hit, a tab and +x",
+    "wav": 'state it in channels.csv (column hit, such as "+x")',
+}
+
 
 def hits_from(
     records: Sequence[Record], axis: str | None = None, stated: StatedPoints | None = None
@@ -122,17 +130,11 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
     name = _axis(source, force, axis, remarks)
     if unlabelled := without_unit(record):
         remarks.append(f"Left out, as their unit is not known: {unlabelled}.")
+    noticed = (Fault(NOTICED, text, refuse=False) for text in remarks)
     return Hit(
-        source,
-        name,
-        record.sampling_rate_hz,
-        force.samples,
-        samples,
-        simulated=record.simulated,
-        hit_point=hit_point,
-        responses=tuple(order),
-        faults=(*record.faults, *(Fault(NOTICED, t, refuse=False) for t in remarks), *left_out),
-    )
+        source, name, record.sampling_rate_hz, force.samples, samples, record.simulated, hit_point,
+        tuple(order), (*record.faults, *noticed, *left_out),
+    )  # fmt: skip
 
 
 def _at_points(
@@ -218,9 +220,11 @@ def _axis(source: Path, force: Channel, axis: str | None, remarks: list[str]) ->
     if axis and not stated:
         raise InputError(f'{source}: hit "{axis}" is no signed axis such as +x; correct it.')
     if not own and not stated:
+        kind = source.name.lower().removesuffix(".gz").rpartition(".")[2]
+        how = STATED_IN.get(kind, 'state it in the file (attribute hit, such as "+x")')
         raise AxisNotStatedError(
-            f"{source} does not say along which axis it was hit; {_in_the_file(source)}, or list "
-            f"the file in recordings.csv with its pose, joint angles and hit."
+            f"{source} does not say along which axis it was hit; {how}, or list the file in "
+            f"recordings.csv with its pose, joint angles and hit."
         )
     if own and stated and own != stated:
         if abs(own) != abs(stated) or own < 0:
@@ -230,17 +234,6 @@ def _axis(source: Path, force: Channel, axis: str | None, remarks: list[str]) ->
             )
         remarks.append(f"The file names the axis without its sign; {_name(stated)} is used.")
     return _name(stated or own)
-
-
-def _in_the_file(source: Path) -> str:
-    """How a file of its kind states the hit's axis."""
-    kind = source.name.lower().removesuffix(".gz").rpartition(".")[2]
-    return {
-        **dict.fromkeys(("csv", "tsv", "txt"), 'begin the file with a line such as "# hit: +x"'),
-        **dict.fromkeys(("uff", "unv", "uf58"), "state it in the file (ref_dir)"),
-        "lvm": "write it into its header, as a line of hit, a tab and +x",
-        "wav": 'state it in channels.csv (column hit, such as "+x")',
-    }.get(kind, 'state it in the file (attribute hit, such as "+x")')
 
 
 def _name(direction: int) -> str:

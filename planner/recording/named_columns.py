@@ -21,14 +21,13 @@ from planner.recording.column_names import (
     RATES,
     STEPS,
     Unit,
+    axis_unit,
     bare,
     direction_in,
-    frequency_unit,
     hit_direction,
     lookup,
     lookup_ratio,
     number,
-    time_unit,
     unit_text,
 )
 from planner.recording.records import Channel, End, FrfRecord, Record, TimeRecord, check_numbers
@@ -65,6 +64,10 @@ class Named:
         """The unit of a column as stated beside it or in its name."""
         return self.units.get(name) or unit_text(name)
 
+    def axis(self, name: str, quantity: str) -> Unit | None:
+        """The unit of a column of times or frequencies ("time", "frequency"), None of others."""
+        return axis_unit(name, self.units.get(name, ""), quantity)
+
 
 def _letters(text: str) -> str:
     return re.sub(r"[^a-z]", "", text.lower())
@@ -87,7 +90,7 @@ def to_records(path: Path, named: Named) -> tuple[Record, ...]:
 
 
 def _time(path: Path, named: Named) -> TimeRecord:
-    times = {n: u for n in named.columns if (u := time_unit(n, named.units.get(n, "")))}
+    times = {n: u for n in named.columns if (u := named.axis(n, "time"))}
     start_s = dict(named.start_s)
     rates = _stated_rates(path, named)
     current = next(iter(times), None)
@@ -184,17 +187,17 @@ def holds_frfs(named: Named) -> bool:
     """Whether the columns are FRFs (of one, or lacking some): values over frequency."""
     if any(_own(name) for name in named.columns):
         return True
-    over_frequency = any(_frequency(name, named) for name in named.columns)
+    over_frequency = any(named.axis(name, "frequency") for name in named.columns)
     return over_frequency and any(_part(name, named) for name in named.columns)
 
 
 def frf_record(path: Path, named: Named) -> FrfRecord:
     """The FRFs of a file's columns. Raises InputError saying what is wrong or missing."""
-    axis = next((name for name in named.columns if _frequency(name, named)), None)
-    if axis is None:
+    axes = {name: unit for name in named.columns if (unit := named.axis(name, "frequency"))}
+    if not axes:
         raise InputError(f"{path} holds FRFs but no column frequency_hz; export it too.")
-    unit = frequency_unit(axis, named.units.get(axis, ""))
-    frequency = np.real(named.columns[axis]) * (unit.factor if unit else 1.0)
+    axis, unit = next(iter(axes.items()))
+    frequency = np.real(named.columns[axis]) * unit.factor
     # The line at 0 Hz is used nowhere, and is often none (infinitely many dB below, no phase).
     keep = slice(int(len(frequency) > 1 and frequency[0] == 0), None)
     entries = _entries(named)
@@ -212,7 +215,7 @@ def frf_record(path: Path, named: Named) -> FrfRecord:
     kinds = {kind for kind, _, _ in read}
     if len(kinds) != 1:
         raise InputError(f"{path} mixes {' and '.join(sorted(kinds))}; export one kind.")
-    kind, known = kinds.pop(), all(stated for _, stated, _ in read)
+    kind, unit = kinds.pop(), _SI[read[0][0]] if all(stated for _, stated, _ in read) else ""
     unknown = np.full(len(frequency), np.nan)
     coherence = [
         np.real(named.columns[e.parts["coherence"]]) if "coherence" in e.parts else unknown
@@ -223,21 +226,12 @@ def frf_record(path: Path, named: Named) -> FrfRecord:
     felt = _end(named, "response", "resp", "output") if alone else End("", 0)
     hit = _end(named, "hit", "reference", "ref", "input", "excitation")
     said = [felt._replace(direction=direction_in(e.stem) or felt.direction) for e in entries]
+    places = tuple(e.place or (end, hit) for e, end in zip(entries, said, strict=True))
+    frfs = np.array([values[keep] for _, _, values in read])
     return FrfRecord(
-        path,
-        frequency[keep],
-        np.array([values[keep] for _, _, values in read]),
-        tuple(e.place or (end, hit) for e, end in zip(entries, said, strict=True)),
-        kind,
-        _SI[kind] if known else "",
-        np.array(coherence)[:, keep],
-        named.remarks,
-        named.simulated,
-    )
-
-
-def _frequency(name: str, named: Named) -> bool:
-    return frequency_unit(name, named.units.get(name, "")) is not None
+        path, frequency[keep], frfs, places, kind, unit, np.array(coherence)[:, keep],
+        named.remarks, named.simulated,
+    )  # fmt: skip
 
 
 def _own(name: str) -> tuple[str, tuple[End, End], str] | None:
@@ -266,7 +260,7 @@ def _entries(named: Named) -> list[_Entry]:
             part = "coherence" if own[0] == "coherence" else own[2].strip("_") or "complex"
             stem, kind, place = str(own[1]), own[0], own[1]
         else:
-            part = "" if _frequency(name, named) else _part(name, named)
+            part = "" if named.axis(name, "frequency") else _part(name, named)
             # The stem is what a name says beside its part.
             stem, place, plain = bare(name), None, name.lower()
             stem = _PARTS[part].sub("", stem).strip(" _") if part in _PARTS else stem

@@ -62,27 +62,23 @@ _remembered: OrderedDict[tuple[Path, tuple[int, ...]], ReadFile] = OrderedDict()
 
 def read_mat(path: Path) -> tuple[Record, ...]:
     """MATLAB files up to v7; v7.3 is HDF5."""
-    entries = read_mat5(path) if is_version_5(path) else _older(path)
-    if entries is None:
-        return read_hdf5(path)
+    if is_version_5(path):
+        entries = read_mat5(path)
+    else:
+        import scipy.io
+
+        try:
+            listed = scipy.io.whosmat(str(path))
+            # Real or complex is not said before it is read.
+            check_size(path, sum(8 * int(np.prod(shape, dtype=float)) for _, shape, _ in listed))
+            entries = scipy.io.loadmat(str(path))
+        except NotImplementedError:  # of version 7.3
+            return read_hdf5(path)
     visible = {name: v for name, v in entries.items() if name and not name.startswith("__")}
     arrays = {name for name, value in visible.items() if isinstance(value, np.ndarray)}
     if {"yspec", "npts", "freq", "tfun"} <= arrays:
         return to_records(path, _logged_spectra(path, visible))
     return records_of(path, tree_of(visible))
-
-
-def _older(path: Path) -> dict[str, object] | None:
-    """Entries of a file of version 4; None where it is of version 7.3."""
-    import scipy.io
-
-    try:
-        listed = scipy.io.whosmat(str(path))
-        # Real or complex is not said before it is read.
-        check_size(path, sum(8 * int(np.prod(shape, dtype=float)) for _, shape, _ in listed))
-        return scipy.io.loadmat(str(path))
-    except NotImplementedError:
-        return None
 
 
 def _logged_spectra(path: Path, entries: dict[str, object]) -> Named:

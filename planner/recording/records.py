@@ -237,7 +237,19 @@ def check_records(path: Path, records: Sequence[Record]) -> None:
     """Raise InputError saying what of the records of a file no instrument can have given."""
     for record in records:
         if isinstance(record, FrfRecord):
-            _check_frfs(path, record)
+            lines, frfs = record.frequency_hz, record.values
+            if len(lines) < 2:
+                raise InputError(
+                    f"{path} holds FRFs of shape {frfs.shape} over {lines.size} frequency lines; "
+                    f"export FRFs and their frequencies together."
+                )
+            check_numbers(path, "frequency", lines)
+            if lines[0] < 0 or not np.all(np.diff(lines) > 0):
+                raise InputError(
+                    f"{path}: the FRFs' frequency lines do not rise; export them in order."
+                )
+            for number, row in enumerate(frfs, 1):
+                check_numbers(path, f"FRF {number}", row)
             continue
         rate = record.sampling_rate_hz
         if not SLOWEST_HZ <= rate <= FASTEST_HZ:
@@ -257,17 +269,3 @@ def check_numbers(path: Path, name: str, values: np.ndarray) -> None:
         if np.isfinite(values[at]):
             fault = f"is {abs(values[at]):.3g}, which no instrument gives"
         raise InputError(f"{path}: {name}, sample {at + 1} {fault}; export it again.")
-
-
-def _check_frfs(path: Path, record: FrfRecord) -> None:
-    lines, values = record.frequency_hz, record.values
-    if len(lines) < 2:
-        raise InputError(
-            f"{path} holds FRFs of shape {values.shape} over {lines.size} frequency lines; export "
-            f"FRFs and their frequencies together."
-        )
-    check_numbers(path, "frequency", lines)
-    if lines[0] < 0 or not np.all(np.diff(lines) > 0):
-        raise InputError(f"{path}: the FRFs' frequency lines do not rise; export them in order.")
-    for number, row in enumerate(values, 1):
-        check_numbers(path, f"FRF {number}", row)

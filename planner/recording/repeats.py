@@ -31,8 +31,7 @@ def screen_repeats(
     that is for the diagnosis to say.
     """
     faults: list[tuple[Fault, ...]] = [() for _ in hits]
-    for own in _groups(hits):
-        alike = _Alike.of([hits[i] for i in own], band_hz)
+    for own, alike in _groups(hits, band_hz):
         for axis in alike.centres:
             for i, fault in alike.faults(axis):
                 faults[own[i]] = (fault,)
@@ -61,13 +60,10 @@ def doubts(hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> tuple[Doubt |
     differ in size, and no majority tells which is right.
     """
     found: list[Doubt | None] = [None] * len(hits)
-    for own in _groups(hits):
-        alike = _Alike.of([hits[i] for i in own], band_hz)
-        for i in range(len(own)):
-            doubt = alike.doubt(i)
-            if doubt is not None:
-                others = tuple(own[j] for j in doubt.others)
-                found[own[i]] = replace(doubt, others=others)
+    for own, alike in _groups(hits, band_hz):
+        for i, place in enumerate(own):
+            if doubt := alike.doubt(i):
+                found[place] = replace(doubt, others=tuple(own[j] for j in doubt.others))
     return tuple(found)
 
 
@@ -156,24 +152,19 @@ class _Alike:
         return None
 
 
-def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float]) -> float:
-    """How alike a hit's FRF and the likest of `others` along its axis are, in size too; 0: none.
-
-    Some of the others may be wrong, so that their mean would be like none of them.
-    """
-    same = [o for o in others if o.axis_index == hit.axis_index and _comparable(o, hit)]
-    if not same:
-        return 0.0
-    frf, *theirs = _frfs((hit, *same), band_hz)
-    return max(_likeness_in_size(frf, one) for one in theirs)
-
-
 def answered_as(
     hit: Hit, theirs: tuple[Hit, ...], own: tuple[Hit, ...], band_hz: tuple[float, float]
 ) -> bool:
     """Whether a hit is answered as `theirs` at another pose: the same, or much more like them than
     like its `own` pose's along that axis, which may be few and poor."""
-    there, here = (likeness_to(hit, others, band_hz) for others in (theirs, own))
+
+    def likest(others: tuple[Hit, ...]) -> float:
+        """Likeness to one of them, in size too: some may be wrong, and their mean like none."""
+        same = [o for o in others if o.axis_index == hit.axis_index and _comparable(o, hit)]
+        frf, *rest = _frfs((hit, *same), band_hz)
+        return max((_likeness_in_size(frf, one) for one in rest), default=0.0)
+
+    there, here = likest(theirs), likest(own)
     return there >= SAME or (here > 0 and there > max(LIKE, here + FAR_BELOW))
 
 
@@ -273,15 +264,17 @@ def _comparable(one: Hit, other: Hit) -> bool:
     return places[0] == places[1] and same_rate(one, other)
 
 
-def _groups(hits: tuple[Hit, ...]) -> list[list[int]]:
-    """Which hits, by their places among all, can be compared with each other."""
+def _groups(
+    hits: tuple[Hit, ...], band_hz: tuple[float, float]
+) -> Iterator[tuple[list[int], _Alike]]:
+    """Hits that can be compared with each other: their places among all, and their FRFs."""
     groups: list[list[int]] = []
     for i, hit in enumerate(hits):
         own = next((group for group in groups if _comparable(hits[group[0]], hit)), [])
         if not own:
             groups.append(own)
         own.append(i)
-    return groups
+    return ((own, _Alike.of([hits[i] for i in own], band_hz)) for own in groups)
 
 
 def _frfs(hits: Sequence[Hit], band_hz: tuple[float, float]) -> np.ndarray:

@@ -50,43 +50,32 @@ def screen(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
 
 
 def _weak(hit: Hit) -> Iterator[Fault]:
-    peak, noise, ratio = hit.pulse.peak_n, hit.pulse.noise_n, _response_snr(hit)
+    pulse, peak, noise = hit.pulse, hit.pulse.peak_n, hit.pulse.noise_n
     if peak < LEAST_SNR * noise:
         text = (
             f"The force peak of {significant(peak, 3)} N is only {peak / noise:.1f} times the noise"
         )
         yield Fault("too_weak", f"{text}; hit harder.")
-    told = any(fault.kind == "not_at_rest" for fault in hit.faults)
-    if ratio is not None and not told and ratio < LEAST_RESPONSE_SNR:
+    if pulse.quiet < QUIET_SAMPLES or any(fault.kind == "not_at_rest" for fault in hit.faults):
+        return
+    # Rms of the strongest response, soon after the pulse, over the noise before it
+    samples = hit.acceleration_m_s2
+    mean = np.mean(samples[:, : pulse.quiet], axis=1, keepdims=True)
+    rounding = np.array([step(channel) for channel in samples]) / np.sqrt(12)
+    before = np.hypot(np.std(samples[:, : pulse.quiet], axis=1), rounding)
+    long = max(QUIET_SAMPLES, round(ANSWER_S * hit.sampling_rate_hz))
+    after = samples[:, pulse.first : pulse.first + long] - mean
+    ratio = float(np.max(np.sqrt(np.mean(after**2, axis=1)) / np.maximum(before, SILENCE)))
+    if ratio < LEAST_RESPONSE_SNR:
         text = f"The response is only {ratio:.1f} times the noise before the hit; hit harder."
         yield Fault("too_weak", text)
-
-
-def _response_snr(hit: Hit) -> float | None:
-    """Rms of the strongest response, soon after the pulse, over the noise before it.
-
-    None where the record holds no such time.
-    """
-    pulse, rate = hit.pulse, hit.sampling_rate_hz
-    after = slice(pulse.first, pulse.first + max(QUIET_SAMPLES, round(ANSWER_S * rate)))
-    if pulse.quiet < QUIET_SAMPLES:
-        return None
-    before = hit.acceleration_m_s2[:, : pulse.quiet]
-    mean = np.mean(before, axis=1, keepdims=True)
-    rounding = np.array([step(samples) for samples in hit.acceleration_m_s2]) / np.sqrt(12)
-    noise = np.hypot(np.std(before, axis=1), rounding)
-    answer = np.sqrt(np.mean((hit.acceleration_m_s2[:, after] - mean) ** 2, axis=1))
-    return float(np.max(answer / np.maximum(noise, SILENCE)))
 
 
 def _pulse(hit: Hit) -> Iterator[Fault]:
     pulse, samples = hit.pulse, len(hit.force_n)
     if hit.force_n[pulse.peak] <= pulse.offset_n:
-        yield Fault(
-            "polarity",
-            f"The force pulse of {significant(pulse.peak_n, 3)} N is negative: a hammer only "
-            f"pushes; check the polarity of the force channel.",
-        )
+        text = f"The force pulse of {significant(pulse.peak_n, 3)} N is negative: a hammer only"
+        yield Fault("polarity", f"{text} pushes; check the polarity of the force channel.")
     if pulse.first < LEAST_PRETRIGGER:
         yield Fault("truncated", "The pulse starts at the record's edge; set a pre-trigger.")
     elif pulse.end > samples - 8 or pulse.peak > 0.8 * samples:
@@ -104,26 +93,17 @@ def _double(hit: Hit) -> Iterator[Fault]:
     ringing = max(0.0, -float(np.min(force)))
     rest = np.concatenate([force[: max(0, pulse.first - 1)], force[pulse.end + 1 :]])
     second = float(np.max(rest, initial=0.0))
-    valley = _valley(force[pulse.first : pulse.end])
+    # How far the force rises again above the lowest point between two tops of the pulse; coming
+    # back from below zero is the filter's ringing.
+    inside = np.clip(force[pulse.first : pulse.end], 0.0, None)
+    top = int(np.argmax(inside))
+    sides = inside[top:], inside[top::-1]
+    valley = max(float(np.max(side - np.minimum.accumulate(side))) for side in sides)
     least = max(SECOND_PEAK * peak, 6 * pulse.noise_n, 1.5 * ringing)
     if max(second, valley) > least:
-        yield Fault(
-            "double_hit",
-            f"A second pulse of {significant(max(second, valley), 3)} N follows the first of "
-            f"{significant(peak, 3)} N; "
-            f"hit once and let it bounce off.",
-        )
-
-
-def _valley(pulse: np.ndarray) -> float:
-    """How far the force rises again inside one pulse, above the lowest point between two tops."""
-    top = int(np.argmax(pulse))
-    pulse = np.clip(pulse, 0.0, None)  # coming back from below zero is the filter's ringing
-    rise = 0.0
-    for side in (pulse[top:], pulse[top::-1]):
-        lowest = np.minimum.accumulate(side)
-        rise = max(rise, float(np.max(side - lowest)))
-    return rise
+        text = f"A second pulse of {significant(max(second, valley), 3)} N follows the first of"
+        text += f" {significant(peak, 3)} N; hit once and let it bounce off."
+        yield Fault("double_hit", text)
 
 
 def _soft(hit: Hit, band_hz: tuple[float, float]) -> Iterator[Fault]:
@@ -146,11 +126,8 @@ def _soft(hit: Hit, band_hz: tuple[float, float]) -> Iterator[Fault]:
     elif inside.size and end.size:
         drop = 20 * np.log10(np.max(inside) / max(float(np.mean(end)), 1e-30))
         if drop > ROLL_OFF_DB:
-            yield Fault(
-                "too_soft",
-                f"The pulse is too soft: its spectrum has fallen by {drop:.0f} dB at {high:g} Hz; "
-                f"use a harder tip.",
-            )
+            text = f"The pulse is too soft: its spectrum has fallen by {drop:.0f} dB at {high:g} Hz"
+            yield Fault("too_soft", f"{text}; use a harder tip.")
 
 
 def band_spectra(
@@ -195,7 +172,15 @@ def driving_point(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
     The sensor has to be near the point that is hit; only hits at the tcp are judged.
     """
     own = hit.channels_of(SENSOR)
-    if own is None or hit.hit_point != TCP or _positive_share(own, band_hz) > TURNED:
+    if own is None or hit.hit_point != TCP:
+        return ()
+    force, answers = band_spectra(own, band_hz, own.pulse.offset_n)
+    power = np.abs(force) ** 2
+    strong = power > FLOOR**2 * np.max(power, initial=0.0)
+    answer = answers[own.axis_index, strong]
+    imag = np.imag(answer * force[strong].conj()) / power[strong]
+    total = np.sum(np.abs(imag))
+    if not total > 0 or np.sum(imag[imag > 0]) / total > TURNED:
         return ()
     axis = AXES[hit.axis_index]
     text = (
@@ -204,14 +189,3 @@ def driving_point(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
         f"force and acceleration."
     )
     return (Fault("driving_point", text, refuse=False),)
-
-
-def _positive_share(hit: Hit, band_hz: tuple[float, float]) -> float:
-    """Share of |Im H|, in [0, 1], with the right sign; H of the hit's own axis, x, y, z heard."""
-    force, answers = band_spectra(hit, band_hz, hit.pulse.offset_n)
-    answer = answers[hit.axis_index]
-    power = np.abs(force) ** 2
-    strong = power > FLOOR**2 * np.max(power, initial=0.0)
-    imag = np.imag(answer[strong] * force[strong].conj()) / power[strong]
-    total = np.sum(np.abs(imag))
-    return float(np.sum(imag[imag > 0]) / total) if total > 0 else 1.0

@@ -1,7 +1,7 @@
 """A recorder that ran on while one hit again and again: its record cut into hits by the pulses."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,20 +26,6 @@ RESTLESS, OUT_OF_NOISE = 0.02, 2.0
 LEAST_QUIET = 2 * RISING_SAMPLES  # samples by which rest is judged
 
 
-@dataclass(frozen=True)
-class _Struck:
-    """Samples of a hit in a stream: of its pulse, and of the part that is kept of it.
-
-    `restless` is the movement before it as a share of the answer to it.
-    """
-
-    first: int
-    begin: int
-    stop: int
-    cut_off: bool
-    restless: float
-
-
 def cut_into_hits(record: TimeRecord) -> tuple[TimeRecord, ...]:
     """Each hit of a record by itself; of a single hit the record as it is.
 
@@ -51,8 +37,7 @@ def cut_into_hits(record: TimeRecord) -> tuple[TimeRecord, ...]:
     if len(pulses) < 2:
         found = lost_samples(record)
         return (replace(record, faults=(*record.faults, *found)) if found else record,)
-    struck = _struck(record, pulses)
-    return tuple(_part(record, one, struck) for one in struck)
+    return _parts(record, pulses)
 
 
 def _pulses(force_n: np.ndarray, rate_hz: float) -> list[tuple[int, int]]:
@@ -66,21 +51,16 @@ def _pulses(force_n: np.ndarray, rate_hz: float) -> list[tuple[int, int]]:
     least, found = SECOND_PEAK * float(np.max(size)), []
     apart = max(APART_S * rate_hz, APART_SAMPLES)
     while True:
-        groups = _groups(np.flatnonzero(size > max(least, floor)), apart)
+        loud = np.flatnonzero(size > max(least, floor))
+        each = np.split(loud, np.flatnonzero(np.diff(loud) > apart) + 1)
+        groups = [(int(one[0]), int(one[-1]) + 1) for one in each if one.size]
         if len(groups) <= max(1, len(found)):
             return found or groups
         found = groups
         least = SECOND_PEAK * min(float(np.max(size[a:b])) for a, b in groups)
 
 
-def _groups(samples: np.ndarray, apart: float) -> list[tuple[int, int]]:
-    if not samples.size:
-        return []
-    each = np.split(samples, np.flatnonzero(np.diff(samples) > apart) + 1)
-    return [(int(one[0]), int(one[-1]) + 1) for one in each]
-
-
-def _struck(record: TimeRecord, pulses: list[tuple[int, int]]) -> list[_Struck]:
+def _parts(record: TimeRecord, pulses: list[tuple[int, int]]) -> tuple[TimeRecord, ...]:
     """What is kept of each hit of a record, and how far it was from rest."""
     samples = len(record.channels[0].samples)
     first, end = np.array(pulses).T
@@ -96,9 +76,13 @@ def _struck(record: TimeRecord, pulses: list[tuple[int, int]]) -> list[_Struck]:
     ringing = np.sqrt(np.nan_to_num(moved[1:], nan=np.inf) / answer)
     length = stop - first
     cut_off = (length < SHORT * np.median(length)) & (ringing > RESTLESS)
-    stop = np.where(cut_off, stop, first + np.min(length[~cut_off]))
-    each = (a.tolist() for a in (first, begin, stop, cut_off, restless))
-    return [_Struck(*one) for one in zip(*each, strict=True)]
+    usual = int(np.min(length[~cut_off]))
+    stop = np.where(cut_off, stop, first + usual)
+    each = zip(*(a.tolist() for a in (first, begin, stop, cut_off, restless)), strict=True)
+    return tuple(
+        _part(record, at, slice(start, end), usual if short else 0, moving, at == first[-1])
+        for at, start, end, short, moving in each
+    )
 
 
 def _movement(
@@ -121,24 +105,25 @@ def _movement(
     return moved, answer
 
 
-def _part(record: TimeRecord, one: _Struck, struck: list[_Struck]) -> TimeRecord:
-    """One hit of a record."""
-    rate, last = record.sampling_rate_hz, one is struck[-1]
-    kept = slice(one.begin, one.stop)
+def _part(
+    record: TimeRecord, at: int, kept: slice, usual: int, restless: float, last: bool
+) -> TimeRecord:
+    """The hit at a sample of a record, with what was wrong: faults of the record are the last's.
+
+    Others have `usual` samples after the hit where it was cut off, else 0; `restless` is the
+    movement before it as a share of the answer to it.
+    """
+    rate = record.sampling_rate_hz
     channels = tuple(replace(c, samples=c.samples[kept].copy()) for c in record.channels)
-    part = replace(record, channels=channels, at_s=float(one.first / rate), faults=())
+    part = replace(record, channels=channels, at_s=at / rate, faults=())
     told = [*(record.faults if last else ()), *lost_samples(part)]
-    if one.cut_off:
-        usual = min(s.stop - s.first for s in struck if not s.cut_off)
+    if usual:
         ends = "the record ends" if last else "the next hit follows"
-        text = f"It is cut off: {ends} {(one.stop - one.first) / rate:.2g} s after it, other hits "
+        text = f"It is cut off: {ends} {(kept.stop - at) / rate:.2g} s after it, other hits "
         text += f"have {usual / rate:.2g} s; wait as long after each."
         told.append(Fault("cut_off", text))
-    if one.restless > RESTLESS:
-        text = (
-            f"The structure was not at rest: before this hit it moved by {100 * one.restless:.0f}"
-        )
+    if restless > RESTLESS:
+        text = f"The structure was not at rest: before this hit it moved by {100 * restless:.0f}"
         text += " % of its answer; wait longer between hits."
-        refuse = one.restless > 1 / LEAST_RESPONSE_SNR
-        told.append(Fault("not_at_rest", text, refuse))
+        told.append(Fault("not_at_rest", text, refuse=restless > 1 / LEAST_RESPONSE_SNR))
     return replace(part, faults=tuple(told))

@@ -50,7 +50,15 @@ FORMS = tuple(Form(d, p) for d in ("\t", ";", ",", "") for p in ".," if d != p)
 
 def read_text(path: Path) -> tuple[Record, ...]:
     """Records of a text table. Raises InputError saying what is wrong."""
-    return to_records(path, parse_table(path, decoded(path, MAX_BYTES)))
+    # Columns are those of the longest block of numbers, named by the lines above it.
+    lines = decoded(path, MAX_BYTES).splitlines()
+    form, first = _block(path, lines)
+    width = _width(lines[first : first + LEAST_ROWS], form)
+    names, units, attributes = _header(lines[:first], form, width)
+    values = _numbers(path, [line for line in lines[first:] if line.strip()], first, form, width)
+    columns = {name: values[:, i] for i, name in enumerate(names)}
+    stated = {n: u for n, u in zip(names, units, strict=True) if u}
+    return to_records(path, Named(columns, stated, attributes))
 
 
 def decoded(path: Path, most_bytes: int) -> str:
@@ -79,19 +87,6 @@ def _is_number(cell: str, kind: type[float] | type[complex] = float) -> bool:
     except ValueError:
         return False
     return True
-
-
-def parse_table(path: Path, text: str) -> Named:
-    """Columns of the longest block of numbers, named by the lines above it."""
-    lines = text.splitlines()
-    form, first = _block(path, lines)
-    width = _width(lines[first : first + LEAST_ROWS], form)
-    header = lines[:first]
-    names, units, attributes = _header(header, form, width)
-    values = _numbers(path, [line for line in lines[first:] if line.strip()], first, form, width)
-    columns = {name: values[:, i] for i, name in enumerate(names)}
-    stated = {n: u for n, u in zip(names, units, strict=True) if u}
-    return Named(columns, stated, attributes)
 
 
 def _block(path: Path, lines: Sequence[str]) -> tuple[Form, int]:

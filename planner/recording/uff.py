@@ -229,17 +229,11 @@ def _frf_record(
         raise InputError(f"{path} mixes FRFs of different kinds; export accelerance only.")
     quantity, unit = kinds.pop()
     remarks = () if unit else ("The FRFs' unit is not stated.",)
+    places = tuple(zip(_ends(sets, "rsp"), _ends(sets, "ref"), strict=True))
     return FrfRecord(
-        path,
-        frequency,
-        np.array(values),
-        tuple(zip(_ends(sets, "rsp"), _ends(sets, "ref"), strict=True)),
-        quantity,
-        unit,
-        np.array(coherence),
-        remarks,
+        path, frequency, np.array(values), places, quantity, unit, np.array(coherence), remarks,
         _simulated(sets),
-    )
+    )  # fmt: skip
 
 
 def _place(s: dict[str, Any]) -> tuple[int, ...]:

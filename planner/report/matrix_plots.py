@@ -88,7 +88,7 @@ def driving_figure(matrix: FrfMatrix, found: MatrixModes) -> Figure:
     """FRFs of points hit where they were felt, with the fit, and how right their sign is."""
     pairs = matrix.driving[:4]
     figure, grid = panels((12.0, 2.6 * len(pairs) + 1.2), "Driving points", len(pairs))
-    data, (felt, hit) = found.found.data, found.found.places
+    data, (felt, hit) = found.found.data, found.found.data.places
     for panel, (o, i) in zip(grid[:, 0], pairs, strict=True):
         measured, (entry,) = matrix.accelerance[o, i], np.flatnonzero((felt == o) & (hit == i))
         fitted = data.values[entry] - found.found.fit.error[entry]

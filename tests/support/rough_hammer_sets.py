@@ -13,8 +13,8 @@ import scipy.linalg
 
 from planner.frf.matrix import FrfMatrix
 from planner.frf.synthesis import accelerance
+from planner.modal.estimate_modes import PoleIdentification
 from planner.modal.mac import mac
-from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.modes import Mode
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
@@ -258,8 +258,8 @@ def told(case: RoughSet, modes: Sequence[Mode], dofs: Sequence[Dof]) -> list[Tol
 
 
 def spoiled(
-    case: RoughSet, found: MatrixPoles, order: np.ndarray, sign: np.ndarray
-) -> tuple[FrfMatrix, MatrixPoles]:
+    case: RoughSet, found: PoleIdentification, order: np.ndarray, sign: np.ndarray
+) -> tuple[FrfMatrix, PoleIdentification]:
     """Matrix and poles with rows in another order and signs (n, 3) turned.
 
     Every row is fitted by itself and the poles do not know names: what would be found in the
