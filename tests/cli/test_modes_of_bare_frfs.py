@@ -15,8 +15,8 @@ from planner.modal.mac import mac
 from planner.proof.recordings import uff_channel, write_sets
 from planner.recording.read import place_in_name
 from planner.robot.robot import Robot
-from tests.support.cuts import SLOT
 from tests.support.hit_files import write_table
+from tests.support.milling_cases import cut_toml, modes_toml
 from tests.support.outside import modes, only_told, refused, told
 from tests.support.rerun_columns import lines_of
 from tests.support.running import response
@@ -162,7 +162,7 @@ def test_two_files_are_refused(record):
 
 
 MODES = {"xx": (22.0, 0.03, 200.0), "yy": (27.0, 0.025, 250.0)}
-CUT = SLOT.format("600, 1400, 5", "0.0, 0.02, 200", "full_discretisation")
+CUT = cut_toml(spindle_rpm=(600, 1400, 5), depth_m=(0.0, 0.02, 200))
 
 
 def write_frf(path: Path, hertz: np.ndarray, values: np.ndarray, unit: str) -> None:
@@ -192,15 +192,13 @@ def test_a_tap_test_in_files_of_one_frf_each(tmp_path):
     taps.mkdir()
     cut.write_text(CUT)
     hertz = np.arange(1, 400) * 0.25
-    w, modes = 2 * np.pi * hertz, ""
+    w = 2 * np.pi * hertz
     for name, (f, z, m) in MODES.items():
         wn = 2 * np.pi * f
         h = 1e6 / m / (wn**2 - w**2 + 2j * z * wn * w)
         write_frf(taps / f"tap_{name}.txt", hertz, h, "µm/N")
-        axis = [1.0, 0.0, 0.0] if name == "xx" else [0.0, 1.0, 0.0]
-        modes += f"[[mode]]\nfrequency_hz = {f}\ndamping_ratio = {z}\nmass_kg = {m}\n"
-        modes += f"direction = {axis}\n"
-    (tmp_path / "modes.toml").write_text(modes)
+    own = zip(*MODES.values(), strict=True)
+    (tmp_path / "modes.toml").write_text(modes_toml(*own, np.eye(3)[:2].tolist()))
     assert "does not state its directions" in refused("stability", taps, "--cut", cut)
     found = told("stability", taps, "--cut", cut, "--from-names")
     right = told("stability", tmp_path / "modes.toml", "--cut", cut)

@@ -13,7 +13,7 @@ from planner.campaign.events import Proposed
 from planner.design.propose import ACQUISITIONS, DESIGNS
 from planner.session.screen import no_keys
 from planner.session.watch import watch
-from tests.support.cuts import SLOT
+from tests.support.milling_cases import cut_toml
 from tests.support.outside import said, told
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
@@ -25,7 +25,7 @@ def robot(tmp_path) -> Path:
     return make_plain_arm(tmp_path / "robot")
 
 
-CUT = SLOT.format("600, 3000, 3", "0.0, 0.001, 4", "zeroth_order")
+CUT = cut_toml(spindle_rpm=(600, 3000, 3), depth_m=(0.0, 0.001, 4), method="zeroth_order")
 
 
 def begun(

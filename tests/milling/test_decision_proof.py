@@ -33,6 +33,7 @@ from planner.proof.deviation import Deviation
 from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.model import Truth
+from tests.support.milling_cases import cut_toml
 from tests.support.plain_arm import JOINTS_DEG, make_plain_arm
 from tests.support.true_modes import hits_at
 
@@ -42,17 +43,10 @@ LINES = np.arange(2.0, 60.01, 0.25)
 PATH, CANDIDATES, INITIAL = 12, 100, 2
 SPEEDS = np.linspace(500.0, 2500.0, 9)  # rpm that a case chooses from
 GAP = 0.12  # of ln of the path's true limits at least, in whose middle the wanted depth lies
-CUT = """teeth = 2
-diameter_m = 0.016
-milling = "down"
-radial_immersion = 0.5
-kt_n_m2 = 8.0e8
-kr_n_m2 = 2.5e8
-feed = [1.0, 0.0, 0.0]
-axis = [0.0, 0.0, -1.0]
-spindle_rpm = [500, 2500, 9]
-depth_m = [0.0, 0.05, 500]
-"""
+CUT = cut_toml(
+    diameter_m=0.016, milling="down", radial_immersion=0.5, kt_n_m2=8e8, kr_n_m2=2.5e8,
+    axis=(0.0, 0.0, -1.0), spindle_rpm=(500, 2500, 9), depth_m=(0.0, 0.05, 500),
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
