@@ -15,6 +15,7 @@ from planner.milling.tip_files import completed
 from planner.proof.arms import KR10
 from planner.proof.load import load_truth
 from tests.support import outside
+from tests.support.direct_solution import direct_accelerance
 from tests.support.milling_cases import cut_toml
 from tests.support.rerun_columns import lines_of
 
@@ -102,10 +103,8 @@ def test_frfs_are_carried_from_the_sensor_to_the_tip(cell):
     assert config.sensor_frame != config.tcp_frame
     q = campaign.cell.poses([[10.0, -70.0, 95.0, 20.0, 40.0, -30.0]])
     truth = load_truth(cell / "robot" / "robot.toml")
-    mass, damping, stiffness, hit, sensor = truth.matrices(q[0])
-    s = 2j * np.pi * lines[:, None, None]
-    moved = s**2 * np.linalg.solve(s**2 * mass + s * damping + stiffness, hit.T[None])
-    apart = np.moveaxis((hit - sensor) @ moved, 0, 2)
+    *matrices, hit, sensor = truth.matrices(q[0])
+    apart = direct_accelerance(*matrices, hit, hit - sensor, lines)
     found, sd = tip_frfs(campaign, q, lines)
     np.testing.assert_allclose(found[0] - campaign.frf_at(q, lines)[0][0], apart, rtol=1e-6)
     assert np.all(sd > 0)
