@@ -33,7 +33,7 @@ def no_more_processes_than_cores():
 @pytest.fixture(scope="session")
 def first_pose_once(tmp_path_factory):
     """A campaign with a proposal and its recordings: not to be changed."""
-    from tests.support.first_pose import FirstPose  # most tests need no simulated robot
+    from tests.support.outside import FirstPose  # most tests need no simulated robot
 
     return FirstPose.begun(tmp_path_factory.mktemp("first"))
 

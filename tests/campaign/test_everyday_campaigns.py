@@ -21,10 +21,10 @@ import numpy as np
 import pytest
 
 from tests.support.case_campaigns import FrfScore, lacking
-from tests.support.counted_modes import counted
 from tests.support.everyday_campaigns import POSES, Played, campaigns
 from tests.support.faulty_robots import KINDS, ROBOTS
 from tests.support.fitted_cases import ARMS
+from tests.support.true_modes import counted
 
 FIRST = 71_001
 PERCENT, WORSE_PERCENT = 1.0, 0.1  # RMSE asked for; by how much a peer is better that is no matter

@@ -159,18 +159,18 @@ def disks_can_be_filled() -> bool:
     )
 
 
-def test_kills_full_disks_and_damage(tmp_path):
+def test_kills_and_full_disks(tmp_path):
     full = ("--full", 1) if disks_can_be_filled() else ()
-    few = "--kills", 2, "--stopped", 1, "--damaged", 1, *full, "--seed", 2
+    few = "--kills", 2, "--stopped", 1, *full, "--seed", 2
     assert "kills: 2, " in lab(tmp_path, *few)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(7200)
-def test_500_kills_50_full_disks_50_damaged_files(tmp_path):
+def test_500_kills_and_50_full_disks(tmp_path):
     if not disks_can_be_filled():
         pytest.skip("no disk of its own can be mounted here, so that none can be filled")
-    lab(tmp_path, "--kills", 1000, "--stopped", 60, "--full", 50, "--damaged", 50)
+    lab(tmp_path, "--kills", 1000, "--stopped", 60, "--full", 50)
     killed = (tmp_path / "kills.jsonl").read_text().count('"killed": true')
     print(f"{killed} kills struck")
     assert killed >= 500

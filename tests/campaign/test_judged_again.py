@@ -11,9 +11,8 @@ from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from planner.replay import replay
-from tests.support.first_pose import FirstPose
 from tests.support.hit_files import write_hit
-from tests.support.outside import call
+from tests.support.outside import FirstPose, call
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """Ways to get the input wrong, by tables: one plain sentence, exit 2 or 3, no traceback."""
 
+import re
 import shutil
 from collections.abc import Callable, Mapping
 from typing import TypeVar
@@ -135,6 +136,16 @@ def added(lines: str):
     return change
 
 
+def by_stability(cut: str):
+    """The text with an acquisition that is about a cut."""
+    return lambda text: f"{replaced('integrated_variance', 'stability')(text)}\n[cut]\n{cut}\n"
+
+
+def with_tool_axis(axis: str):
+    place = f"position_m = [[0.5, 0.7], [-0.2, 0.2], [0.4, 0.5]]\ntool_axis = {axis}"
+    return lambda text: re.sub(r"joints_deg = .*", place, text)
+
+
 STIFF = "stiffness = 60000.0"
 BAND = "band_hz = [5.0, 110.0]"
 # What is wrong in a file, and a part of the sentence that says so; test_robot_config.py has more.
@@ -171,7 +182,10 @@ CONFIGURATIONS = {
         "no mode": (replaced("count = 4", "count = 0"), "[modes] count"),
         "five joints": (replaced("[[-40, 40], ", "["), "5 ranges"),
         "a range of words": (replaced("[[-40, 40]", '[["a", 40]'), "joints_deg must be a number"),
-        "beyond a limit": (replaced("[-40, 40]", "[-400, 40]"), "joints_deg of joint_a1"),
+        "beyond a limit": (
+            replaced("[-40, 40]", "[-400, 40]"),
+            "limits are -170.0° to 170.0°; narrow",
+        ),
         "upside down": (replaced("[[-40, 40]", "[[40, -40]"), "range 1 is [40, -40]; give finite"),
         "band upside down": (replaced(BAND, "band_hz = [40.0, 8.0]"), "band_hz is [40, 8]"),
         "unknown acquisition": (replaced("integrated_variance", "ei"), "there is no acquisition"),
@@ -180,6 +194,16 @@ CONFIGURATIONS = {
             'no model "kriging"; choose one',
         ),
         "unknown kernel": (added('[surrogate]\nkernel = "cosine"'), 'there is no kernel "cosine"'),
+        "no cut": (replaced("integrated_variance", "stability"), "needs [cut]"),
+        "speed 0": (by_stability("speed_rpm = 0\ndepth_m = 1e-3"), "speed_rpm"),
+        "no depth": (by_stability("speed_rpm = 3000\ndepth_m = -1e-3"), "depth_m"),
+        "depth in mm": (by_stability("speed_rpm = 3000\ndepth_mm = 1.0"), "depth_mm"),
+        "cut nowhere": (
+            by_stability("speed_rpm = 3000\ndepth_m = 1e-3\njoints_deg = []"),
+            "names no pose",
+        ),
+        "axis of length 2": (with_tool_axis("[0.0, 0.0, -2.0]"), "tool_axis is no unit vector"),
+        "axis of length 0": (with_tool_axis("[0.0, 0.0, 0.0]"), "tool_axis is no unit vector"),
         "no end": (added("[goal]\njoints_deg = [[0, inf, 0, 0, 0, 0]]"), "joints_deg"),
         "empty": (lambda text: "", "is missing; add it."),
     },

@@ -11,6 +11,7 @@ from planner.proof.load import load_truth
 from planner.proof.model import Truth
 from planner.surrogate.frequency_models import MODELS
 from planner.words import with_sd
+from tests.support import outside
 from tests.support.outside import call, make_cell, record, refused, said, told
 from tests.support.robots import JOINTS_DEG
 
@@ -58,10 +59,8 @@ def three(tmp_path_factory) -> Three:
         assert "RMSE" not in screen
     after, names = {0: predicted(cell, table)}, []
     for number in range(3):
-        (proposal,) = told("next", cell)["proposals"]
+        proposal, report = outside.measured(truth, cell, root / f"export{number}", number)
         names.append(proposal["pose"])
-        folder = record(truth, root / f"export{number}", names[-1], proposal["joints_deg"], number)
-        report = told("import", cell, folder)
         assert (report["pose"], len(report["accepted"])) == (names[-1], 9)
         assert report["refused"] == []
         if number:
@@ -179,10 +178,8 @@ def test_what_another_acquisition_would_have_proposed_and_saved(tmp_path):
     cell, measured = tmp_path / "cell", []
     told("new", cell, "--robot", robot, "--campaign", campaign_toml)
     for number in range(5):
-        (proposal,) = told("next", cell)["proposals"]
+        proposal, _ = outside.measured(truth, cell, tmp_path / f"export{number}", number)
         measured.append(proposal["pose"])
-        told("import", cell, record(truth, tmp_path / f"export{number}", measured[-1],
-                                    proposal["joints_deg"], seed=number))  # fmt: skip
     replayed = told("replay", cell, "--acquisition", "variance")
     assert replayed["reproduced"]
     proposed = [step for step in replayed["steps"] if step["event"] == "proposed"]

@@ -8,7 +8,7 @@ from rerun.chunk import RrdReader
 
 from planner.demo import shipped
 from tests.support.outside import told
-from tests.support.rerun_frames import WORLD, Frames
+from tests.support.rerun_columns import WORLD, Frames, rows_of
 
 MEASUREMENTS = 1  # that is replayed
 
@@ -73,17 +73,11 @@ def check_replay(tmp_path, summary):
 
 def rows(path):
     """Values by entity, column and measurement, in order; how they were batched is chance."""
-    reader, found = RrdReader(path), {}
-    for chunk in reader.stream(store=reader.recordings()[0]):
-        batch = chunk.to_record_batch()
-        names = batch.schema.names
-        times = batch.column("measurement").to_pylist() if "measurement" in names else None
-        ids = batch.column(0).to_pylist()
-        for name in names[1:]:
-            if name == "measurement":
-                continue
-            for i, value in enumerate(batch.column(name).to_pylist()):
-                key = (str(chunk.entity_path), name, times[i] if times else None)
-                found.setdefault(key, []).append((ids[i], value))
-    order = {key: sorted(values, key=lambda v: v[0]) for key, values in found.items()}
-    return {key: [value for _, value in values] for key, values in order.items()}
+    found = {}
+    for entity, row in rows_of(path):
+        time, (_, number), *values = row.pop("measurement", None), *row.items()
+        for name, value in values:
+            found.setdefault((entity, name, time), []).append((number, value))
+    return {
+        key: [v for _, v in sorted(values, key=lambda v: v[0])] for key, values in found.items()
+    }

@@ -12,11 +12,10 @@ from planner.dynamics.simulation import Simulation
 from planner.measurement.agreement import fit_similarity
 from planner.proof.deviation import Deviation
 from planner.proof.load import load_truth
-from planner.proof.recordings import record_poses
 from planner.robot.robot import Robot
-from tests.support.outside import HAMMER, call, part_of, refused, told
+from tests.support.outside import call, part_of, record_pool, refused, told
 from tests.support.rerun_columns import columns_of
-from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
+from tests.support.robots import BAND_HZ, make_arm
 
 POSES = 5
 
@@ -34,15 +33,7 @@ def cell(tmp_path_factory):
         file.write("cross_axis_sd_percent = 0.2\nmounting_sd_deg = 0.1\nposition_sd_mm = 0.2\n")
     off = Deviation(seed=5, stiffness=0.2, damping=0.3, inertia=0.04, com_m=0.003)
     truth = load_truth(robot, off)
-    return robot, recorded(truth, root / "hits", POSES, 0), truth
-
-
-def recorded(truth, folder, poses, seed):
-    """Hits at random poses P0, P1, ..."""
-    low, high = np.deg2rad(np.array(JOINTS_DEG, dtype=float)).T
-    q = np.random.default_rng(seed).uniform(low, high, (poses, 6))
-    named = [(f"P{i}", row) for i, row in enumerate(q)]
-    return record_poses(truth, named, folder, repeats=3, hammer=HAMMER)
+    return robot, record_pool(truth, root / "hits", POSES, 0), truth
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +97,7 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
     copy = tmp_path / "robot"
     shutil.copytree(robot.parent, copy)
     toml, out = copy / robot.name, copy / "identified.toml"
-    few = part_of(folder, tmp_path / "few", {"P0", "P1"})
+    few = part_of(folder, tmp_path / "few", {"P000", "P001"})
     options = ["--held-out", 0, "--no-extend", "--no-inertias"]  # which is quick
     options += ["--plot", tmp_path / "plots", "--rrd", tmp_path / "found.rrd"]
     code, said, _ = call("identify", few, "--robot", toml, "--out", out, *options)
@@ -114,7 +105,7 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
     wanted = "joint_a1", "N·m/rad", "SIMULATED", "No pose was held out"
     assert (code, [words for words in wanted if words not in said]) == (0, [])
     assert (tmp_path / "plots" / "map_xx_after.png").stat().st_size > 10_000
-    assert (tmp_path / "plots" / "frf_P0.png").stat().st_size > 10_000
+    assert (tmp_path / "plots" / "frf_P000.png").stat().st_size > 10_000
     drawn = columns_of(tmp_path / "found.rrd")
     assert drawn[("/pose/0/measured", "pose")] == [1, 2]
     assert ("/figures/map_zz_after/frame", "EncodedImage:blob") in drawn
@@ -124,7 +115,7 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
 
 def test_a_refused_hit_is_told_and_two_poses_leave_none_to_judge_by(cell, tmp_path):
     robot, folder, _ = cell
-    few = part_of(folder, tmp_path / "few", {"P0", "P1"})
+    few = part_of(folder, tmp_path / "few", {"P000", "P001"})
     victim = sorted((few / "data").iterdir())[0]
     victim.write_bytes(b"not a recording")
     quick = "--no-extend", "--no-inertias"
@@ -163,7 +154,7 @@ def test_bad_options_are_one_sentence(cell, tmp_path, options, says):
 def test_bad_recordings_are_one_sentence(cell, tmp_path):
     robot, folder, _ = cell
     assert "recordings.csv" in refused("identify", tmp_path / "none", "--robot", robot)
-    broken = part_of(folder, tmp_path / "broken", {"P0"})
+    broken = part_of(folder, tmp_path / "broken", {"P000"})
     table = broken / "recordings.csv"
     text = table.read_text()
     table.write_text(text.replace("joint_a2_deg", "elbow_deg"))
@@ -178,7 +169,7 @@ def test_bad_recordings_are_one_sentence(cell, tmp_path):
 def test_compliance_that_the_description_lacks_is_added_unless_that_is_not_wanted(tmp_path):
     """Truth tilts in every joint; the stated torsion springs alone cannot follow."""
     truth = load_truth(make_arm(tmp_path / "true", transverse=True), Deviation(6, 0.15, 0.15))
-    folder = recorded(truth, tmp_path / "hits", 3, 1)
+    folder = record_pool(truth, tmp_path / "hits", 3, 1)
     robot, out = make_arm(tmp_path / "stated"), tmp_path / "found" / "robot.toml"
     plain = told("identify", folder, "--robot", robot, "--no-extend")
     wider = told("identify", folder, "--robot", robot, "--out", out)

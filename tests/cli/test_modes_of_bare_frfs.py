@@ -7,20 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 from scipy.io import savemat
 
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
-from planner.modal.mac import mac
 from planner.proof.recordings import uff_channel, write_sets
 from planner.recording.read import place_in_name
 from planner.robot.robot import Robot
-from tests.support.cuts import SLOT
 from tests.support.hit_files import write_table
+from tests.support.hit_structures import agree
+from tests.support.milling_cases import cut_toml, modes_toml
 from tests.support.outside import modes, only_told, refused, told
 from tests.support.rerun_columns import lines_of
-from tests.support.running import response
-from tests.support.structures import plate
+from tests.support.structures import Structure, plate
 
 BAND = (25.0, 120.0)
 PLATE = plate(3, 3)
@@ -116,6 +116,24 @@ POINTS = [0, 5, 8, 15, 18, 23]
 OPERATING_HZ = (30.0, 250.0)
 
 
+def response(
+    structure: Structure, points: list[int], seconds: float, rate_hz: float,
+    rng: np.random.Generator,
+) -> np.ndarray:  # fmt: skip
+    """Accelerations (points, n) of modes below 0.45 of the rate, 2 % sensor noise on top."""
+    poles, shapes = structure.poles()
+    n = int(seconds * rate_hz)
+    force = rng.normal(size=(len(structure.nodes), n))
+    values = np.zeros((len(points), n))
+    for pole, shape in zip(poles, shapes.T, strict=True):
+        if np.abs(pole) / (2 * np.pi) > 0.45 * rate_hz:
+            continue
+        state = scipy.signal.lfilter([1], [1, -np.exp(pole / rate_hz)], shape @ force / rate_hz)
+        values += 2 * np.real((shape[points] * pole**2)[:, None] * state)
+    noise = 0.02 * np.std(values, axis=1, keepdims=True)
+    return values + noise * rng.normal(size=values.shape)
+
+
 @pytest.fixture(scope="module")
 def structure():
     return plate(6, 4, ratio=(0.01, 0.01))
@@ -137,17 +155,7 @@ def record(structure, tmp_path_factory):
 def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path):
     drawn = "--plot", tmp_path, "--rrd", tmp_path / "modes.rrd"
     answer = only_told("modes", record, "--operating", "--band-hz", *OPERATING_HZ, *drawn)
-    poles, shapes = structure.poles()
-    hz, damping = np.abs(poles) / (2 * np.pi), -poles.real / np.abs(poles)
-    inside = np.flatnonzero((hz > OPERATING_HZ[0]) & (hz < OPERATING_HZ[1]))
-    assert len(answer["modes"]) == inside.size
-    for k, mode in zip(inside, answer["modes"], strict=True):
-        shape = np.array([complex(*value) for value in mode["shape"]])
-        assert mode["frequency_hz"] == pytest.approx(hz[k], rel=3e-3)
-        assert abs(mode["frequency_hz"] - hz[k]) < 4 * mode["frequency_sd_hz"]
-        assert mode["damping_ratio"] == pytest.approx(damping[k], rel=0.25)
-        assert mac(shape, shapes[POINTS, k]) > 0.98
-        assert mode["scaled"] is False
+    agree(answer, structure, OPERATING_HZ, 3e-3, 0.25, least=0.98, scale=None)
     assert answer["dofs"] == [[structure.nodes[p], "z"] for p in POINTS]
     assert answer["scaled"] is False
     assert answer["tones_hz"] == [pytest.approx(TONE_HZ, rel=1e-3)]
@@ -162,7 +170,7 @@ def test_two_files_are_refused(record):
 
 
 MODES = {"xx": (22.0, 0.03, 200.0), "yy": (27.0, 0.025, 250.0)}
-CUT = SLOT.format("600, 1400, 5", "0.0, 0.02, 200", "full_discretisation")
+CUT = cut_toml(spindle_rpm=(600, 1400, 5), depth_m=(0.0, 0.02, 200))
 
 
 def write_frf(path: Path, hertz: np.ndarray, values: np.ndarray, unit: str) -> None:
@@ -192,15 +200,13 @@ def test_a_tap_test_in_files_of_one_frf_each(tmp_path):
     taps.mkdir()
     cut.write_text(CUT)
     hertz = np.arange(1, 400) * 0.25
-    w, modes = 2 * np.pi * hertz, ""
+    w = 2 * np.pi * hertz
     for name, (f, z, m) in MODES.items():
         wn = 2 * np.pi * f
         h = 1e6 / m / (wn**2 - w**2 + 2j * z * wn * w)
         write_frf(taps / f"tap_{name}.txt", hertz, h, "µm/N")
-        axis = [1.0, 0.0, 0.0] if name == "xx" else [0.0, 1.0, 0.0]
-        modes += f"[[mode]]\nfrequency_hz = {f}\ndamping_ratio = {z}\nmass_kg = {m}\n"
-        modes += f"direction = {axis}\n"
-    (tmp_path / "modes.toml").write_text(modes)
+    own = zip(*MODES.values(), strict=True)
+    (tmp_path / "modes.toml").write_text(modes_toml(*own, np.eye(3)[:2].tolist()))
     assert "does not state its directions" in refused("stability", taps, "--cut", cut)
     found = told("stability", taps, "--cut", cut, "--from-names")
     right = told("stability", tmp_path / "modes.toml", "--cut", cut)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.cuts import SLOT
+from tests.support.milling_cases import cut_toml
 from tests.support.outside import make_cell, refused, said, told
 from tests.support.robots import JOINTS_DEG
 
@@ -16,7 +16,7 @@ kind = "hardening"
 stiffness_n_m_rad = 4e4
 angle_rad = 2e-4
 """
-CUT = SLOT.format("5000, 6000, 2", "0.0, 0.05, 100", "zeroth_order")
+CUT = cut_toml(spindle_rpm=(5000, 6000, 2), depth_m=(0.0, 0.05, 100), method="zeroth_order")
 MIDDLE = ",".join(str(np.mean(pair)) for pair in JOINTS_DEG)
 
 

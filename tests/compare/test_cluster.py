@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 import planner
+from tests.support.outside import make_pool
 from tests.support.outside import planner as command
-from tests.support.pools import make_pool
 
 pytest.importorskip("distributed")
 RUNS = 8

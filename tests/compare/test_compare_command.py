@@ -19,8 +19,7 @@ from planner.compare.run import run
 from planner.compare.tasks import Task
 from planner.dataset.visits import recordings_in
 from planner.robot.robot import Robot
-from tests.support.outside import PLANNER, refused, said, told
-from tests.support.pools import make_pool
+from tests.support.outside import PLANNER, make_pool, refused, said, told
 
 POSES, STRATEGIES = 12, "maximin_lhs,random,default"
 SMALL = ("--repeats", "2", "--initial", "2", "--budget", "4", "--simulation", "frozen",

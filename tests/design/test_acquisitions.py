@@ -11,8 +11,15 @@ from planner.design.propose import ACQUISITIONS
 from planner.design.space_filling import DESIGNS, NESTED
 from planner.errors import InputError
 from planner.surrogate.modal_surrogate import fit_surrogate
-from tests.support.scored_poses import X, conditioned_variance, over, proposed, with_parameters
-from tests.support.surrogates import observed, simulated
+from tests.support.surrogates import (
+    X,
+    conditioned_variance,
+    observed,
+    over,
+    proposed,
+    simulated,
+    with_parameters,
+)
 
 NAMES = [*ACQUISITIONS, *DESIGNS]
 

@@ -35,8 +35,7 @@ from planner.measurement.nuisances import EXACT_HITS, Tolerances
 from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import fit_surrogate
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
-from tests.support.scored_poses import X, over, proposed, with_parameters
-from tests.support.surrogates import observed
+from tests.support.surrogates import X, observed, over, proposed, with_parameters
 
 
 @pytest.fixture(scope="module")

@@ -24,13 +24,14 @@ from planner.milling.structure import of_frf
 from planner.milling.tool import load_tool
 from planner.proof.arms import KR210
 from planner.proof.deviation import Deviation, soft_floor
-from planner.proof.fault_injection import InjectedFaults, hand_visits, hit_poses
+from planner.proof.fault_injection import InjectedFaults
 from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import MeasurementErrors
 from planner.proof.model import Truth
-from planner.proof.recordings import write_recordings
+from tests.support.direct_solution import direct_accelerance
 from tests.support.milling_cases import cut
+from tests.support.struck_poses import record_by_hand
 
 SEED, ROBOTS = 401, 10
 POSES, MEASURED, REPEATS, SAMPLES, NEAR = 5, 5, 2, 48, 0.10  # of each robot
@@ -92,19 +93,16 @@ def hit(truth: Truth, deviation: Deviation, q: np.ndarray, folder: Path, seed: i
     """Recordings of REPEATS hits an axis at poses P0, P1, … (n, 6)."""
     rng = np.random.default_rng(seed)
     injected = InjectedFaults(deviation, chain=AS_STATED.chain(rng))
-    shots = [(f"+{axis}", HAMMER.peak_n) for axis in "xyz" for _ in range(REPEATS)]
-    found = hit_poses(truth, injected, hand_visits(AS_STATED, q, shots, rng), HAMMER, rng)
-    rows = [(f"P{i}", np.rad2deg(q[i]), hits) for i, hits in enumerate(found)]
-    write_recordings(folder, truth.joint_names, rows, HAMMER, truth.description)
+    axes = [f"+{axis}" for axis in "xyz" for _ in range(REPEATS)]
+    poses = [(f"P{i}", row) for i, row in enumerate(np.rad2deg(q))]
+    record_by_hand(folder, truth, injected, AS_STATED, poses, axes, HAMMER, rng)
 
 
 def six_by_six(truth: Truth, q: np.ndarray, lines: np.ndarray) -> np.ndarray:
     """(6, 6, F) in m/N and the like at the tip."""
-    mass, damping, stiffness, hit, _ = truth.matrices(q)
+    *matrices, hit, _ = truth.matrices(q)
     both = np.concatenate([hit, truth.turning(q)])
-    found = [both @ np.linalg.solve(stiffness + 1j * w * damping - w**2 * mass, both.T)
-             for w in 2 * np.pi * lines]  # fmt: skip
-    return np.moveaxis(np.array(found), 0, -1)
+    return direct_accelerance(*matrices, both, both, lines) / (2j * np.pi * lines) ** 2
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,21 +16,15 @@ import pytest
 from planner.frf.matrix import FrfMatrix
 from planner.recording.dof import Dof
 from tests.support.matrix_files import write_matrix
+from tests.support.milling_cases import cut_toml, modes_toml
 from tests.support.outside import call
 
-# Cuts that follow each other from structure to structure.
-CUT = """
-teeth = 3
-diameter_m = 0.02
-milling = "{}"
-radial_immersion = {}
-kt_n_m2 = 8.0e8
-kr_n_m2 = 2.5e8
-spindle_rpm = [4000.0, 12000.0, 4]
-depth_m = [0.0, {}, 400]
-method = "{}"
-"""
 MOST_M = 0.05
+CUT = {
+    "teeth": 3, "kt_n_m2": 8e8, "kr_n_m2": 2.5e8, "spindle_rpm": (4000.0, 12000.0, 4),
+    "depth_m": (0.0, MOST_M, 400),
+}  # fmt: skip
+# Cuts that follow each other from structure to structure.
 IMMERSIONS = (("down", 0.3), ("up", 0.6), ("slot", 1.0))
 METHODS = ("zeroth_order", "full_discretisation")
 NOISES = (0.0, 0.001, 0.003, 0.01)  # of the largest accelerance, on every line alike
@@ -89,13 +83,10 @@ class Tap:
         frfs, modes, cut = folder / "tap.uff", folder / "modes.toml", folder / "cut.toml"
         ends = Dof("1", "x"), Dof("1", "y")
         write_matrix(frfs, FrfMatrix(lines, ends, ends, h, True))
-        modes.write_text("".join(
-            f"[[mode]]\nfrequency_hz = {f!r}\ndamping_ratio = {z!r}\nmass_kg = {m!r}\n"
-            f"direction = {d.tolist()}\n"
-            for f, z, m, d in zip(self.hertz.tolist(), self.damping.tolist(),
-                                  self.mass_kg.tolist(), self.direction, strict=True)
-        ))  # fmt: skip
-        cut.write_text(CUT.format(*self.immersion, MOST_M, self.method))
+        own = self.hertz, self.damping, self.mass_kg, self.direction
+        modes.write_text(modes_toml(*(values.tolist() for values in own)))
+        milling, share = self.immersion
+        cut.write_text(cut_toml(**CUT, milling=milling, radial_immersion=share, method=self.method))
         return frfs, modes, cut
 
 

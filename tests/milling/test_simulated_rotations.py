@@ -17,6 +17,7 @@ from planner.milling.tip_files import completed
 from planner.milling.tool import Tool
 from planner.robot.config import Payload
 from planner.robot.robot import Robot
+from tests.support.direct_solution import direct_accelerance
 
 ROBOT = Path(__file__).parents[2] / "campaigns" / "kr240_plane" / "robot" / "robot.toml"
 FREQUENCY = np.arange(4.0, 60.0, 0.5)
@@ -46,12 +47,8 @@ def rods_tip(simulation):
     m = simulation.elastic.matrices(Q)
     lever = np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 0]]) * ROD.length  # θ × (0, 0, L)
     moved = m.hit[0] + lever @ m.hit_turn[0]
-    k = simulation.stiffness + m.geometric[0]
-    out = []
-    for w in 2 * np.pi * FREQUENCY:
-        z = k + 1j * w * simulation.damping - w**2 * m.mass[0]
-        out.append(moved @ np.linalg.solve(z, moved.T))
-    return np.moveaxis(out, 0, -1)
+    matrices = m.mass[0], simulation.damping, simulation.stiffness + m.geometric[0]
+    return direct_accelerance(*matrices, moved, moved, FREQUENCY) / (2j * np.pi * FREQUENCY) ** 2
 
 
 def motion(simulation, noise=0.01):

@@ -5,18 +5,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.cuts import SLOT
+from tests.support.milling_cases import (
+    HERTZ,
+    KILOGRAM,
+    ZETA,
+    cut_toml,
+    modes_toml,
+    two_each_way,
+)
 from tests.support.outside import refused, said, told
 from tests.support.rerun_columns import lines_of
 
-MODES = """
-[[mode]]
-frequency_hz = 922.0
-damping_ratio = 0.011
-mass_kg = 0.03993
-direction = [1.0, 0.0, 0.0]
-"""
-CUT = SLOT.format("10000, 20000, 2", "0.0, 0.01, 400", "full_discretisation")
+MODES = modes_toml([HERTZ], [ZETA], [KILOGRAM], [[1.0, 0.0, 0.0]])
+CUT = cut_toml(spindle_rpm=(10000, 20000, 2))
 
 
 @pytest.fixture
@@ -42,8 +43,6 @@ def test_answer_is_one_json_document(files):
 
 
 def test_frfs_of_predict_and_the_picture(files, tmp_path):
-    from tests.support.milling_cases import two_each_way
-
     _, cut = files
     lines = np.arange(200.0, 2400.0, 2.0)
     h = np.zeros((2, 3, 3, len(lines)), complex)
@@ -74,14 +73,14 @@ WRONG_CUTS = {
     "no depth": ("[0.0, 0.01, 400]", "[0.0, 0.0, 400]"),
     "a misspelt key": ("kt_n_m2", "kt_n_mm2"),
     "a missing unit": ("diameter_m =", "diameter ="),
-    "coefficient in N/mm2": ("kt_n_m2 = 6.0e8", "kt_n_m2 = 600"),
+    "coefficient in N/mm2": ("kt_n_m2 = 600000000.0", "kt_n_m2 = 600"),
     "no speed": ("[10000, 20000, 2]", "[0, 20000, 2]"),
     "one speed of two": ("[10000, 20000, 2]", "[10000, 20000, 1]"),
     "feed along the axis": ("feed = [1.0, 0.0, 0.0]", "feed = [0.0, 0.0, 1.0]"),
     "feed of no length": ("feed = [1.0, 0.0, 0.0]", "feed = [0.0, 0.0, 0.0]"),
     "another sort of milling": ('"slot"', '"sideways"'),
     "a narrow slot": ("radial_immersion = 1.0", "radial_immersion = 0.5"),
-    "not a number": ("kr_n_m2 = 2.0e8", "kr_n_m2 = nan"),
+    "not a number": ("kr_n_m2 = 200000000.0", "kr_n_m2 = nan"),
     "another method": ('"full_discretisation"', '"fast"'),
     "pitches that do not close": ("teeth = 2", "teeth = 2\npitch_deg = [100.0, 200.0]"),
     "no TOML": ("teeth = 2", "teeth 2"),

@@ -15,22 +15,15 @@ from planner.milling.tip_files import completed
 from planner.proof.arms import KR10
 from planner.proof.load import load_truth
 from tests.support import outside
+from tests.support.direct_solution import direct_accelerance
+from tests.support.milling_cases import cut_toml
 from tests.support.rerun_columns import lines_of
 
-CUT = """
-teeth = 2
-diameter_m = 0.016
-milling = "down"
-radial_immersion = 0.5
-kt_n_m2 = 8.0e8
-kr_n_m2 = 2.5e8
-feed = [0.0, 1.0, 0.0]
-feed_in = "base"
-axis = [0.0, 0.0, -1.0]
-spindle_rpm = [5000, 8000, 2]
-depth_m = [0.0, 0.02, 100]
-method = "zeroth_order"
-"""
+CUT = {
+    "diameter_m": 0.016, "milling": "down", "radial_immersion": 0.5, "kt_n_m2": 8e8,
+    "kr_n_m2": 2.5e8, "feed": (0.0, 1.0, 0.0), "feed_in": "base", "axis": (0.0, 0.0, -1.0),
+    "spindle_rpm": (5000, 8000, 2), "depth_m": (0.0, 0.02, 100), "method": "zeroth_order",
+}  # fmt: skip
 PROGRAM = "G21 G90 G0 X0 Y0 Z5\nG1 Z-1\nX80\nG3 X120 Y40 J40\n"
 TOOL = """
 name = "long mill"
@@ -59,7 +52,7 @@ def made(root, band):
     robot = KR10.write(root / "robot", 2)
     campaign = KR10.campaign(str(robot)).replace("[5.0, 150.0]", band)
     (root / "campaign.toml").write_text(campaign + "candidates = 20\n")
-    for name, text in (("cut.toml", CUT), ("part.nc", PROGRAM), ("tool.toml", TOOL)):
+    for name, text in (("cut.toml", cut_toml(**CUT)), ("part.nc", PROGRAM), ("tool.toml", TOOL)):
         (root / name).write_text(text)
     outside.said("new", root / "cell", "--robot", robot, "--campaign", root / "campaign.toml")
     return root
@@ -110,10 +103,8 @@ def test_frfs_are_carried_from_the_sensor_to_the_tip(cell):
     assert config.sensor_frame != config.tcp_frame
     q = campaign.cell.poses([[10.0, -70.0, 95.0, 20.0, 40.0, -30.0]])
     truth = load_truth(cell / "robot" / "robot.toml")
-    mass, damping, stiffness, hit, sensor = truth.matrices(q[0])
-    s = 2j * np.pi * lines[:, None, None]
-    moved = s**2 * np.linalg.solve(s**2 * mass + s * damping + stiffness, hit.T[None])
-    apart = np.moveaxis((hit - sensor) @ moved, 0, 2)
+    *matrices, hit, sensor = truth.matrices(q[0])
+    apart = direct_accelerance(*matrices, hit, hit - sensor, lines)
     found, sd = tip_frfs(campaign, q, lines)
     np.testing.assert_allclose(found[0] - campaign.frf_at(q, lines)[0][0], apart, rtol=1e-6)
     assert np.all(sd > 0)
@@ -138,7 +129,7 @@ def test_frfs_of_a_sensor_beside_the_tip_are_said_to_be_that(cell, tmp_path):
     (tmp_path / "p.csv").write_text(",".join(["pose", *q]) + "\nA,10,-70,95,20,40,-30\n")
     cut, npz = tmp_path / "cut.toml", tmp_path / "p.npz"
     outside.said("predict", cell / "cell", tmp_path / "p.csv", "--out", npz)
-    cut.write_text((cell / "cut.toml").read_text().replace('"base"', '"frf"'))
+    cut.write_text(cut_toml(**CUT | {"feed_in": "frf"}))
     answer = outside.told("stability", npz, "--cut", cut, "--samples", 20)
     assert any("not at the tcp" in text for text in answer["remarks"])
 
@@ -164,9 +155,8 @@ def test_tip_and_sensor_may_be_points_of_robot_toml(cell, tmp_path):
 
 def test_a_spindle_beyond_the_tip_is_remarked_upon(cell, tmp_path):
     remarks = []
-    for z in ("1.0", "-1.0"):
-        text = "".join(line for line in CUT.splitlines(True) if not line.startswith("axis"))
-        (tmp_path / "cut.toml").write_text(f"axis = [0.0, 0.0, {z}]\n{text}")
+    for z in (1.0, -1.0):
+        (tmp_path / "cut.toml").write_text(cut_toml(**CUT | {"axis": (0.0, 0.0, z)}))
         said = asked(cell, "--cut", tmp_path / "cut.toml", "--map", "--poses", 2)
         remarks.append(any("beyond the tip" in text for text in said["remarks"]))
     assert sorted(remarks) == [False, True]

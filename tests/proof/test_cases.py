@@ -26,7 +26,7 @@ from planner.proof.load import load_truth
 from planner.proof.measurement_errors import LABORATORY
 from planner.proof.nonlinear import HitPose, respond
 from planner.proof.scene import Scene
-from planner.proof.table import DRIVES, KINDS, OUT_OF_LIBRARY_KINDS, TABLE, drawn
+from planner.proof.table import DRIVES, KINDS, TABLE, drawn
 from planner.recording.folder import read_poses, read_recordings
 from planner.recording.read import read
 from planner.robot.robot import Robot
@@ -175,11 +175,6 @@ def heard(scene: Scene, injected: InjectedFaults, path, progress: float = 1.0) -
     force = scene.peak_n * np.sin(np.pi * np.clip(t / 0.008, 0, 1)) ** 2
     pose = HitPose(truth, scene.poses[0], np.tile(force, (3, 1)), EXACTLY[[0, 1, 2]])
     return STEP_S * np.cumsum(respond([pose], injected.ports, STEP_S)[0], axis=2)
-
-
-def test_there_are_outsiders_of_many_kinds_and_mixed_damping_is_no_effect():
-    assert len(OUT_OF_LIBRARY_KINDS) >= 8
-    assert "structural_damping" not in TABLE
 
 
 @pytest.mark.parametrize("robot", sorted(ARMS))

@@ -1,4 +1,4 @@
-"""What each concealed effect does to FRFs, as physics says."""
+"""What concealed effects do, as physics says: each against a formula or a rigid limit."""
 
 from dataclasses import replace
 
@@ -8,6 +8,9 @@ import pytest
 from planner.proof.arms import KR10, KR210
 from planner.proof.deviation import (
     AttachedResonator,
+    BentLink,
+    Bridge,
+    Compensator,
     Deviation,
     Feedback,
     ScaledJoint,
@@ -29,6 +32,7 @@ from planner.proof.laws import Contact
 from planner.proof.load import load_truth
 from planner.proof.model import Truth
 from planner.proof.nonlinear import Port
+from planner.proof.springs import LOSS_BAND_HZ, branches, compensation
 from tests.support.direct_solution import direct_accelerance
 
 Q = KR210.poses(1)[0]
@@ -39,10 +43,6 @@ BAND = (4.0, 60.0)
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
     return replace(KR210, damping_s=9.5e-4).write(tmp_path_factory.mktemp("kr210"))
-
-
-def frequencies(path, **changes: tuple) -> np.ndarray:
-    return load_truth(path, Deviation(**changes)).modes(Q, 4)[0]
 
 
 def measured(truth: Truth, injected: InjectedFaults | None = None, **hammer: float) -> np.ndarray:
@@ -59,41 +59,33 @@ def test_frfs_of_hits_are_the_linear_accelerance(path):
     assert np.max(np.abs(H[0] - exact)) < 1e-3 * np.max(np.abs(exact))
 
 
-def test_a_split_link_that_does_not_give_way_is_the_link(path):
-    axes = np.eye(3)
-    rigid = [Spring("link_2", tuple(a), 1e11, 1.0) for a in axes]
-    assert frequencies(path, extra=tuple(rigid)) == pytest.approx(frequencies(path), rel=1e-4)
-    stiffness = [1e11, 1e11, 1e11]
-    for k in range(3):
-        soft = [replace(s, stiffness=2e6 if i == k else stiffness[i]) for i, s in enumerate(rigid)]
-        lower = frequencies(path, extra=tuple(soft))
-        assert np.all(lower <= frequencies(path) * (1 + 1e-4))
-        assert np.any(lower < 0.98 * frequencies(path))
+RIPPLE = StiffnessRipple("joint_3", 2, 0.3, -0.1)
+# What scatters, and by how much the stiffness of each joint changes at q.
+CHANGES = {
+    "one joint": ({"scaled": (ScaledJoint("joint_2", 0.4),)}, lambda q: [1, 0.4, 1, 1, 1, 1]),
+    "all joints": ({"common": 0.6}, lambda q: [0.6] * 6),
+    "with the angle": (
+        {"harmonics": (RIPPLE,)},
+        lambda q: [1, 1, 1 + 0.3 * np.cos(2 * q[2]) - 0.1 * np.sin(2 * q[2]), 1, 1, 1],
+    ),
+    "with another's angle": (
+        {"harmonics": (replace(RIPPLE, order=1, by="joint_2"),)},
+        lambda q: [1, 1, 1 + 0.3 * np.cos(q[1]) - 0.1 * np.sin(q[1]), 1, 1, 1],
+    ),
+}
 
 
-def test_a_base_that_shifts_lowers_frequencies(path):
-    def shifting(stiffness: float) -> np.ndarray:
-        axes = [tuple(float(v) for v in a) for a in np.eye(3)]
-        springs = tuple(Spring("base", a, stiffness, 0.0, slide=True) for a in axes)  # type: ignore
-        return frequencies(path, extra=springs)
-
-    assert shifting(1e11) == pytest.approx(frequencies(path), rel=1e-4)
-    assert np.all(shifting(1e7) < frequencies(path))
-
-
-def test_scaling_and_harmonics_change_the_stiffness_of_one_joint(path):
+@pytest.mark.parametrize("case", CHANGES)
+def test_stiffness_of_joints_changes_as_stated(path, case):
     def springs(truth: Truth, q: np.ndarray) -> np.ndarray:
-        return np.diag(truth.matrices(q)[2] - truth.gravity_stiffness(q))
+        return np.diag(truth.matrices(q)[2] - truth.gravity_stiffness(q))[:6]
 
-    K = springs(load_truth(path), Q)
-    soft = load_truth(path, Deviation(scaled=(ScaledJoint("joint_2", 0.4),)))
-    assert springs(soft, Q) / K == pytest.approx([1, 0.4, 1, 1, 1, 1])
-    assert soft.modes(Q, 1)[0] < load_truth(path).modes(Q, 1)[0]
-    waves = Deviation(harmonics=(StiffnessRipple("joint_3", 2, 0.3, -0.1),))
-    for q in KR210.poses(3):
-        expected = 1 + 0.3 * np.cos(2 * q[2]) - 0.1 * np.sin(2 * q[2])
-        ratio = springs(load_truth(path, waves), q) / K
-        assert ratio == pytest.approx([1, 1, expected, 1, 1, 1])
+    change, factors = CHANGES[case]
+    base = Spring("base", (1, 0, 0), 1e7, 1.0)  # which is as it is stated here
+    plain, changed = load_truth(path), load_truth(path, Deviation(**change, extra=(base,)))
+    assert changed.springs[-1].stiffness == 1e7
+    for q in (Q, *KR210.poses(3)):
+        assert springs(changed, q) / springs(plain, q) == pytest.approx(factors(q))
 
 
 def test_feedback_breaks_reciprocity_and_nothing_else_does(tmp_path):
@@ -186,3 +178,111 @@ def test_a_tone_hums_before_the_hit_and_at_its_frequency_only(path):
     amplitude = np.max(np.abs(one.acceleration_m_s2[:, 200:]))
     assert amplitude == pytest.approx(np.max(np.abs(two.acceleration_m_s2[:, 200:])), rel=0.02)
     assert not np.allclose(one.acceleration_m_s2, two.acceleration_m_s2)
+
+
+@pytest.mark.parametrize("robot", [KR10, KR210], ids=lambda r: r.name.split()[0])
+@pytest.mark.parametrize("link", ["link_2", "link_3", "link_4"])
+def test_a_stiff_beam_is_the_rigid_link(robot, link, tmp_path):
+    path, q = robot.write(tmp_path), robot.poses(1)[0]
+    stiff = BentLink(link, (1e12, 1e12), 1e12, 1e-9)
+    ours = load_truth(path, Deviation(7, inertia=0.05, beams=(stiff,))).modes(q, 5)
+    rigid = load_truth(path, Deviation(7, inertia=0.05)).modes(q, 5)
+    assert ours[0] == pytest.approx(rigid[0], rel=1e-5)
+
+
+def test_a_beams_compliance_settles_with_its_elements(tmp_path):
+    """All joints stiff: what gives way is the beam alone, and 5 elements are nearly all of it."""
+    path = KR210.write(tmp_path)
+    text = path.read_text()
+    for k in (*KR210.torsion, *KR210.bending):
+        text = text.replace(f"stiffness = {k}\n", "stiffness = 1e13\n")
+    path.write_text("geometric_stiffness = false\n" + text)
+    k = 5e6
+
+    def compliance(elements: int) -> np.ndarray:
+        beam = BentLink("link_2", (k, k), k, 1e-4, elements)
+        truth = load_truth(path, Deviation(beams=(beam,)))
+        _, _, stiffness, hit, _ = truth.matrices(Q)
+        return hit @ np.linalg.solve(stiffness, hit.T)
+
+    coarse, fine, finest = (compliance(n) for n in (5, 20, 40))
+    assert np.max(np.abs(fine - finest)) < 0.01 * np.max(np.abs(finest))
+    assert np.max(np.abs(coarse - finest)) < 0.1 * np.max(np.abs(finest))
+
+
+def test_a_loss_factor_is_nearly_the_same_over_the_band():
+    spring = Spring("j", (0.0, 0.0, 1.0), 1e6, 0.0, loss=0.05)
+    low, high = LOSS_BAND_HZ
+    for f in np.geomspace(3 * low, high / 3, 25):
+        s = 2j * np.pi * f
+        stiff = 1e6 + sum(k * s / (s + rate) for _, k, rate in branches([spring], np.array([1e6])))
+        assert stiff.imag == pytest.approx(0.05 * 1e6, rel=0.15)
+        assert 1.0 < stiff.real / 1e6 < 1.25
+
+
+def test_mixed_damping_is_damped_and_its_modes_are_those_of_the_dynamic_stiffness(path):
+    truth = load_truth(path, Deviation(3, mixed=1.0))
+    mass, damping, stiffness, hit, sensor = truth.matrices(Q)
+    f = np.linspace(4, 60, 29)
+    exact = []
+    for s in 2j * np.pi * f:
+        whole = stiffness + s * damping + s**2 * mass
+        own = np.array([spring.stiffness for spring in truth.springs])
+        for j, more, rate in branches(truth.springs, own):
+            whole[j, j] += more * s / (s + rate)
+        exact.append(s**2 * sensor @ np.linalg.solve(whole, hit.T))
+    ours = truth.accelerance(Q, f)
+    assert np.max(np.abs(ours - np.moveaxis(np.array(exact), 0, 2))) < 1e-8 * np.max(np.abs(exact))
+    assert all(0 < d < 0.3 for d in truth.modes(Q, 3)[1])
+    shares = [s.loss * s.stiffness / (s.damping + 1e-12) for s in truth.springs]
+    assert max(shares) > 3 * min(shares)  # no two joints alike: not proportional to stiffness
+
+
+def test_a_gas_spring_has_the_stiffness_of_its_energy():
+    spring = Compensator("joint_2", 0.2, 0.7, 0.4, 8e3, 2e4)
+
+    def energy(q: float) -> float:
+        length = np.sqrt(0.2**2 + 0.7**2 - 2 * 0.2 * 0.7 * np.cos(q + 0.4))
+        return 8e3 * length + 2e4 * (length - 0.2) ** 2 / 2
+
+    for q in (-1.0, 0.0, 0.8):
+        h = 1e-3
+        second = (energy(q + h) - 2 * energy(q) + energy(q - h)) / h**2
+        assert compensation(spring, q) == pytest.approx(second, rel=1e-4)
+
+
+def test_a_gas_spring_stiffens_its_joint(path):
+    spring = Compensator("joint_2", 0.3, 0.9, 0.4, 5e4, 4e6)
+    with_it = load_truth(path, Deviation(compensators=(spring,))).matrices(Q)[2]
+    without = load_truth(path).matrices(Q)[2]
+    change, own = with_it - without, load_truth(path).own("joint_2")
+    expected = compensation(spring, Q[1])
+    assert own @ change @ own == pytest.approx(expected, rel=0.02)  # the weight sags otherwise
+    assert abs(expected) > 1e5
+
+
+def test_a_spindle_that_turns_couples_without_taking_energy(path):
+    still, turning = load_truth(path), load_truth(path, Deviation(spin=40.0))
+    change = turning.matrices(Q)[1] - still.matrices(Q)[1]
+    assert change == pytest.approx(-change.T)
+    axes = turning.turning(Q)  # about the tool's x and y, the torques are h times the other's rate
+    assert np.max(np.abs(change)) == pytest.approx(
+        40 * np.max(np.abs(np.outer(axes[0], axes[1]) - np.outer(axes[1], axes[0]))), rel=1e-9
+    )
+    back = turning.accelerance(Q, np.array([20.0]))[:, :, 0]
+    assert np.max(np.abs(back - still.accelerance(Q, np.array([20.0]))[:, :, 0])) > 0
+
+
+def test_a_bridge_between_links_is_a_spring_between_their_points(path):
+    bridge = Bridge(
+        ("link_2", "link_5"), ((0.1, 0.0, 0.0), (0.0, 0.0, 0.1)), (0.0, 0.6, 0.8), 2e6, 50.0
+    )
+    with_it, without = load_truth(path, Deviation(bridges=(bridge,))), load_truth(path)
+    ends = [
+        without.along(Q, link, np.array(at), np.array(bridge.direction))
+        for link, at in zip(bridge.links, bridge.positions_m, strict=True)
+    ]
+    b = ends[0] - ends[1]
+    for which, size in ((1, 50.0), (2, 2e6)):
+        change = with_it.matrices(Q)[which] - without.matrices(Q)[which]
+        assert change == pytest.approx(size * np.outer(b, b))

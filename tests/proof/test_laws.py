@@ -1,34 +1,218 @@
-"""Robots with nonlinear joints: an ODE solver, the linear limit, and what textbooks say.
+"""Laws of joints: energies and backbones that can be written down; robots with such joints.
 
+Those beside an ODE solver, the linear limit, and what textbooks say.
 `pytest -m slow tests/proof/test_laws.py` integrates the other laws as well.
 """
 
+import itertools
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad, solve_ivp
 
 from planner.errors import InputError
 from planner.proof.arms import KR10
 from planner.proof.deviation import Deviation
 from planner.proof.fault_injection import InjectedFaults, frfs, once
 from planner.proof.hits import Hammer
-from planner.proof.laws import Backlash, Contact, Friction, Hardening, JointLaw
+from planner.proof.laws import (
+    AmplitudeSoftening,
+    Backlash,
+    BoucWen,
+    Contact,
+    Friction,
+    Hardening,
+    HarmonicDrive,
+    ImpactDamping,
+    Iwan,
+    JointLaw,
+    LuGre,
+    QuadraticDamping,
+    Stops,
+    stacked,
+)
 from planner.proof.load import load_truth
 from planner.proof.model import Truth
 from planner.proof.nonlinear import HitPose, Port, respond
 
+K, COULOMB, A, RATE = 6e4, 9.0, 3e-4, 60.0  # N·m/rad, N·m, rad, rad/s
+Z = COULOMB / K
+STEPS = 2000  # a cycle
+STEP_S = 2 * np.pi / RATE / STEPS
+CYCLES = 12
+PLAIN = "hardening", "softening", "backlash", "friction", "contact"  # with exact bounds
+LAWS = {
+    "hardening": Hardening(8e4, A),
+    "softening": Hardening(-4e4, A),
+    "backlash": Backlash(5e4, A / 2),
+    "friction": Friction(K, K * A / 3),
+    "contact": Contact(3e4, A / 3),
+    "harmonic drive": HarmonicDrive(K, A / 3, A / 2),
+    "amplitude softening": AmplitudeSoftening(K, A / 2),
+    "Bouc-Wen": BoucWen(K, COULOMB),
+    "Iwan": Iwan(K, COULOMB),
+    "LuGre": LuGre(K, COULOMB, 1.5 * COULOMB, 0.01, 5.0),
+    "impact damping": ImpactDamping(K, A / 3, 2e6),
+    "quadratic damping": QuadraticDamping(3e4, 2 * RATE * A),
+    "stops": Stops(K, A / 3),
+}
+
+
+def along(law: JointLaw, angles: np.ndarray) -> np.ndarray:
+    """Torques along a path of angles (n,)."""
+    state, torques = law.at_rest((1,)), [0.0]
+    for before, now in itertools.pairwise(angles):
+        torque, state = law.torque(state, np.array([before]), np.array([now]), STEP_S)
+        torques.append(float(torque[0]))
+    return np.array(torques)
+
+
+def cycle(law: JointLaw, amplitude: float = A) -> tuple[np.ndarray, np.ndarray]:
+    """Angles and torques over the last cycle of a sine."""
+    angles = amplitude * np.sin(2 * np.pi * np.arange(CYCLES * STEPS + 1) / STEPS)
+    return angles[-STEPS - 1 :], along(law, angles)[-STEPS - 1 :]
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    st.sampled_from(PLAIN),
+    st.floats(0.05, 20.0),
+    st.integers(0, 2**31),
+)
+def test_no_law_gives_energy_over_a_closed_path(name, size, seed):
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 2 * np.pi, 1500)
+    path = sum(rng.standard_normal() * np.sin(k * t) / k for k in (1, 2, 3))
+    angles = size * A * np.tile(path, 3)  # the same way three times
+    torques = along(LAWS[name], angles)
+    middles = (torques[1:] + torques[:-1]) / 2
+    work = float(np.sum((middles * np.diff(angles))[1500:]))
+    scale = float(np.sum(np.abs(middles * np.diff(angles))))
+    assert work > -1e-3 * scale
+    if name != "friction":
+        assert work == pytest.approx(0, abs=1e-3 * scale)
+
+
+def test_friction_stays_below_its_coulomb_torque_and_repeats_itself():
+    law = Friction(K, K * A / 3)
+    torques = along(law, 5 * A * np.sin(np.linspace(0, 6 * np.pi, 3001)))
+    assert np.max(np.abs(torques)) < law.coulomb * (1 + 1e-12)
+    assert np.max(np.abs(torques)) > 0.99 * law.coulomb
+    assert torques[1000:2000] == pytest.approx(torques[2000:3000], abs=1e-3 * law.coulomb)
+
+
+def lost(law: JointLaw, amplitude: float = A) -> float:
+    """Energy of a cycle in J; torques belong to the middle of a step where they have a rate."""
+    angles, torques = cycle(law, amplitude)
+    rated = isinstance(law, ImpactDamping | QuadraticDamping | LuGre)
+    there = torques[1:] if rated else (torques[1:] + torques[:-1]) / 2
+    return float(there @ np.diff(angles))
+
+
+@pytest.mark.parametrize("name", ["harmonic drive", "amplitude softening", "stops"])
+def test_elastic_laws_lose_nothing_and_have_their_backbone(name):
+    law = LAWS[name]
+    assert abs(lost(law)) < 1e-6 * K * A**2
+    angles, torques = cycle(law)
+    softer = lambda u: (1 + (2 * u / A) ** 2) ** -0.5 - 1  # noqa: E731
+    half = {
+        "harmonic drive": lambda t: K * (max(t - A / 3, 0) + max(t - A / 2, 0)),
+        "amplitude softening": lambda t: K * quad(softer, 0, t)[0],
+        "stops": lambda t: K * max(t - A / 3, 0),
+    }[name]
+    for k in range(0, len(angles), 97):
+        expected = np.sign(angles[k]) * half(abs(angles[k]))
+        assert torques[k] == pytest.approx(expected, rel=1e-9, abs=1e-9 * K * A)
+
+
+def fixed(step: Callable[[float], float]) -> float:
+    """Where z = step(z), between 0 and Z, for a step that falls."""
+    low, high = 0.0, Z
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if step(middle) > middle else (low, middle)
+    return low
+
+
+def test_bouc_wens_loop_is_a_line_and_a_tanh():
+    """Unloading by z_m, then loading to it again: z_m = z_c tanh((2A - z_m) / z_c)."""
+    for amplitude in (A / 5, A, 5 * A):
+        top = fixed(lambda z, a=amplitude: Z * np.tanh((2 * a - z) / Z))
+        loading = Z**2 * np.log(np.cosh((2 * amplitude - top) / Z))
+        expected = 2 * K * (loading - top**2 / 2)
+        assert lost(BoucWen(K, COULOMB), amplitude) == pytest.approx(expected, rel=2e-3)
+
+
+def test_iwans_sliders_lose_what_masing_says():
+    law = Iwan(K, COULOMB)
+    for amplitude in (A / 5, A, 5 * A):
+        limit = law.limits()
+        each = 4 * K / len(limit) * limit * np.maximum(amplitude - limit, 0)
+        assert lost(law, amplitude) == pytest.approx(np.sum(each), rel=2e-3)
+        _, torques = cycle(law, amplitude)
+        backbone = K * np.mean(np.minimum(amplitude, limit))
+        assert np.max(torques) == pytest.approx(backbone, rel=1e-3)
+
+
+def test_dahls_loop_is_two_exponentials():
+    for amplitude in (A / 5, A):
+        top = Z * np.tanh(amplitude / Z)
+        way = Z * 2 * amplitude - Z * (Z + top) * (1 - np.exp(-2 * amplitude / Z))
+        assert lost(Friction(K, COULOMB), amplitude) == pytest.approx(2 * K * way, rel=2e-3)
+
+
+def test_lugre_is_dahl_at_its_limits_and_slips_more_easily_when_fast():
+    dahl = lost(Friction(K, COULOMB))
+    same = LuGre(K, COULOMB, COULOMB, 1.0, 0.0)
+    assert lost(same) == pytest.approx(dahl, rel=5e-3)
+    slow, fast = (LuGre(K, COULOMB, 2 * COULOMB, v, 0.0) for v in (1e3, 1e-9))
+    assert lost(slow) == pytest.approx(lost(Friction(K, 2 * COULOMB)), rel=5e-3)
+    assert lost(fast) == pytest.approx(dahl, rel=5e-3)
+    viscous = LuGre(K, COULOMB, COULOMB, 1.0, 5.0)
+    assert lost(viscous) - lost(same) == pytest.approx(np.pi * 5.0 * RATE * A**2, rel=1e-3)
+
+
+def test_dampers_lose_their_integrals():
+    assert lost(QuadraticDamping(3e4, 1.0)) == pytest.approx(8 / 3 * 3e4 * RATE**2 * A**3, rel=1e-3)
+    law, gap = ImpactDamping(K, A / 3, 2e6), A / 3
+    path = quad(lambda t: (t - gap) * np.sqrt(A**2 - t**2), gap, A)[0]
+    assert lost(law) == pytest.approx(4 * 2e6 * RATE * path, rel=1e-2)
+    undamped, play = (cycle(law)[1] for law in (ImpactDamping(K, gap, 0.0), Backlash(K, gap)))
+    assert undamped == pytest.approx(play)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_slopes_are_bounds_and_laws_side_by_side_are_each_alone(name):
+    law = LAWS[name]
+    angles, torques = cycle(law)
+    steps = np.abs(np.diff(torques))
+    share, slack = (1e-6, 1e-12) if name in PLAIN else (1e-3, 1e-3 * K * A)
+    assert np.all(steps <= law.slope(STEP_S) * np.abs(np.diff(angles)) * (1 + share) + slack)
+    rng = np.random.default_rng(0)
+    path = rng.standard_normal((30, 2, 3)) * A
+    both = stacked([law, law])
+    state, alone = both.at_rest((2, 3)), law.at_rest((3,))
+    for before, now in itertools.pairwise(path):
+        torque, state = both.torque(state, before, now, STEP_S)
+        one, alone = law.torque(alone, before[1], now[1], STEP_S)
+        assert torque[1] == pytest.approx(one, rel=1e-9, abs=1e-12)
+
+
+def test_different_laws_of_a_kind_go_side_by_side():
+    laws = [Hardening(1e4, A), Hardening(-2e4, A / 2)]
+    now = np.array([[A, 2 * A], [A, 2 * A]])
+    torque, _ = stacked(laws).torque(np.zeros((2, 2)), 0 * now, now, STEP_S)
+    for row, law in zip(torque, laws, strict=True):
+        assert row == pytest.approx(law.at(now[0]))
+
+
 STEP, N = 1 / 6400, 3200
 EXACTLY = np.eye(6)  # wrenches of hits exactly along an axis of the tcp, and at it
 Q = KR10.poses(1)[0]
-ANGLE = 3e-4
 QUIET = Hammer(80.0, 0.004, record_s=2.56, noise=0.0, force_noise=0.0)
-LAWS = {
-    "hardening": Hardening(8e4, ANGLE),
-    "softening": Hardening(-4e4, ANGLE),
-    "backlash": Backlash(5e4, ANGLE / 2),
-    "friction": Friction(6e4, 6e4 * ANGLE / 3),
-    "contact": Contact(3e4, ANGLE / 3),
-}
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +233,10 @@ def test_without_laws_it_is_the_linear_truth(truth):
 
 
 QUICK = "hardening", "friction"  # of an elastic law and of one with a memory
-EACH = [pytest.param(v, marks=() if k in QUICK else pytest.mark.slow) for k, v in LAWS.items()]
+EACH = [pytest.param(LAWS[k], marks=() if k in QUICK else pytest.mark.slow) for k in PLAIN]
 
 
-@pytest.mark.parametrize("law", [None, *EACH], ids=["linear", *LAWS])
+@pytest.mark.parametrize("law", [None, *EACH], ids=["linear", *PLAIN])
 def test_response_is_that_of_an_ode_solver(truth, law):
     force = pulses([300.0])
     linear = truth.respond(Q, force[0], 1, STEP)
@@ -91,7 +275,7 @@ def test_response_is_that_of_an_ode_solver(truth, law):
         assert np.std(response - linear) > 0.05 * np.std(linear)  # it does something
 
 
-@pytest.mark.parametrize("law", EACH, ids=LAWS)
+@pytest.mark.parametrize("law", EACH, ids=PLAIN)
 def test_hits_die_out(truth, law):
     force = np.pad(pulses([300.0]), ((0, 0), (0, 5 * N)))
     response = respond(
@@ -124,29 +308,25 @@ def resonance(truth: Truth, law: JointLaw, peak_n: float) -> float:
     return float(np.sum(power[near] * f[near]) / np.sum(power[near]))
 
 
-def test_hardening_raises_and_softening_lowers_the_frequency_with_the_level(truth):
-    low, middle, high = (resonance(truth, LAWS["hardening"], p) for p in (3.0, 200.0, 600.0))
-    assert low < middle - 0.1 < high - 0.2
-    low, middle, high = (resonance(truth, LAWS["softening"], p) for p in (3.0, 200.0, 600.0))
-    assert low > middle + 0.1 > high + 0.2
-    linear = truth.modes(Q, 1)[0][0]
-    assert low == pytest.approx(linear, abs=0.3)
+# A law, peaks of hits in N, by how many Hz the frequency rises at least from one to the next (falls
+# at least, if negative), and which of them is that of the robot without the law.
+LEVELS = {
+    "hardening": (LAWS["hardening"], (3.0, 200.0, 600.0), (0.1, 0.1), 0),
+    "softening": (LAWS["softening"], (3.0, 200.0, 600.0), (-0.1, -0.1), 0),
+    "backlash": (Backlash(3e4, A / 2), (3.0, 600.0, 2000.0), (0.3, 0.0), 2),
+    "friction": (Friction(4e4, 4e4 * A / 10), (0.5, 2000.0), (-0.5,), 1),
+}
 
 
-def test_backlash_lowers_the_frequency_at_low_level(truth):
-    law = Backlash(3e4, ANGLE / 2)
-    assert resonance(truth, law, 3.0) < resonance(truth, law, 600.0) - 0.3
-    assert resonance(truth, law, 2000.0) == pytest.approx(truth.modes(Q, 1)[0][0], abs=0.5)
-
-
-def test_friction_stiffens_a_joint_at_low_level_only(truth):
-    law = Friction(4e4, 4e4 * ANGLE / 10)
-    low, high = resonance(truth, law, 0.5), resonance(truth, law, 2000.0)
-    assert low > high + 0.5
-    assert high == pytest.approx(truth.modes(Q, 1)[0][0], abs=0.5)
+@pytest.mark.parametrize("name", LEVELS)
+def test_the_frequency_goes_with_the_level(truth, name):
+    law, peaks_n, least, linear = LEVELS[name]
+    found = np.array([resonance(truth, law, peak) for peak in peaks_n])
+    assert np.all(np.sign(least) * np.diff(found) >= np.abs(least))
+    assert found[linear] == pytest.approx(truth.modes(Q, 1)[0][0], abs=0.5 if linear else 0.3)
 
 
 def test_a_step_too_long_is_refused(truth):
-    port = Port(Hardening(1e9, ANGLE), joint="joint_6")
+    port = Port(Hardening(1e9, A), joint="joint_6")
     with pytest.raises(InputError, match="shorten the step"):
         respond([HitPose(truth, Q, pulses([1.0]), EXACTLY[[0]])], [port], STEP)

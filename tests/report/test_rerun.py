@@ -18,8 +18,7 @@ from planner.report.rerun.campaign import RerunView, _blueprint
 from planner.report.rerun.event_logger import EventLogger
 from planner.report.rerun.figures import one_by_one, open_stream, record_figures
 from planner.report.rerun.progress import MeasuredSeries
-from tests.support.rerun_columns import columns_of, lines_of
-from tests.support.rerun_frames import WORLD, Frames, rotation
+from tests.support.rerun_columns import WORLD, Frames, columns_of, lines_of, rotation
 from tests.support.robots import campaign_text, make_arm, urdf
 
 X = np.linspace(1.0, 9.0, 33)

@@ -20,7 +20,7 @@ from planner.robot.controller_program import PoseToDrive, program
 from planner.robot.robot import Robot
 from planner.session.pose_screen import PosePage
 from tests.support.rails import GANTRY, GANTRY_BOX, make_sliding, sliding_campaign
-from tests.support.rerun_frames import Frames
+from tests.support.rerun_columns import Frames
 
 STANDS = (1200.0, 30.0, -10.0)
 TIP = (0, 0.03, -0.25)

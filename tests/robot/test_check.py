@@ -11,7 +11,6 @@ from planner.campaign.store import EXAMPLE
 from planner.check.description import CheckRemark
 from planner.report.robot_check import _summary
 from tests.support.outside import call, said
-from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 ROBOT, URDF, PLAN = "robot/robot.toml", "robot/robot.urdf", "campaign.toml"
 INERTIAL = r"<inertial>.*?</inertial>"
@@ -169,13 +168,6 @@ def test_what_would_crash_later_is_refused_and_leaves_nothing(name, tmp_path):
     assert err.count("\n") == 1
     assert ".part" not in err  # names the user's file, not a copy that is gone
     assert [p.name for p in tmp_path.iterdir()] == ["own"]
-
-
-def test_new_warns_and_begins_all_the_same(tmp_path):
-    robot = make_plain_arm(tmp_path / "robot")
-    plan = plain_campaign(tmp_path / PLAN)
-    screen = " ".join(said("new", tmp_path / "cell", "--robot", robot, "--campaign", plan).split())
-    assert screen.count("Nothing is checked for collision") == 1
 
 
 def test_a_change_by_hand_that_cannot_be_is_refused_and_not_believed(tmp_path):

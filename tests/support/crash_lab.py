@@ -1,6 +1,6 @@
-"""A small campaign that is killed, starved of disk and damaged: what is lost, and what is said.
+"""A small campaign that is killed and starved of disk: what is lost, and what is said.
 
-A script of its own: `python -m tests.support.crash_lab ROOT --kills 500 --full 50 --damaged 50`.
+A script of its own: `python -m tests.support.crash_lab ROOT --kills 500 --full 50`.
 Each trial is one line of ROOT/KIND.jsonl; started again, it goes on after the last.
 """
 
@@ -14,7 +14,6 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -94,8 +93,8 @@ class Cell:
     def played(self) -> bool:
         return self.log.exists() and len(self.state().used) >= ENOUGH
 
-    def command(self, rng: np.random.Generator | None = None) -> Command:
-        """What a person might do next; without chance, what leads to the next measured pose."""
+    def command(self, rng: np.random.Generator) -> Command:
+        """What a person might do next."""
         if not self.log.exists():
             return self.begun()
         state, there = self.state(), str(self.campaign)
@@ -105,7 +104,7 @@ class Cell:
         folder = self.exported(pose, state.proposals[pose].joints_deg)
         kinds = ["import", "watch", "undo", "skip", "withdraw", "next"]
         chances = [0.45, 0.25, 0.12, 0.06, 0.06, 0.06]
-        kind = "import" if rng is None else str(rng.choice(kinds, p=chances))
+        kind = str(rng.choice(kinds, p=chances))
         if kind == "withdraw" and state.used:
             return ["withdraw", there, state.used[-1].pose]
         if kind == "watch":
@@ -278,59 +277,7 @@ def _fill(filler: Path, pages: int) -> None:
             file.truncate(max(0, file.tell() - pages * PAGE))
 
 
-def damage(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
-    """Cut or flip a file of a campaign, ask, and put it back."""
-    while not cell.log.exists() or len(cell.state().used) < 3:
-        steady = cell.command()
-        made = forked(doing(steady), log)
-        assert made.code == 0, (steady, made.err)
-    cache = Path(os.environ["XDG_CACHE_HOME"]) / "planner"
-    asked, whole = undamaged(cell, log)
-    kind = str(rng.choice(["log", "recording", "cache"], p=[0.5, 0.3, 0.2]))
-    recordings = sorted((cell.campaign / "recordings").glob("*.uff"))
-    kept = sorted(p for p in (cache / "results").glob("*") if p.is_file())
-    among = {"log": [cell.log], "recording": recordings, "cache": kept}[kind]
-    path = among[int(rng.integers(len(among)))]
-    content, entries_before = path.read_bytes(), entries(cell)
-    at, cut = int(rng.integers(len(content))), bool(rng.random() < 0.5)
-    flipped = bytes([content[at] ^ (1 << int(rng.integers(8)))])
-    path.write_bytes(content[:at] if cut else content[:at] + flipped + content[at + 1 :])
-    faults = []
-    for command, good in zip(asked, whole, strict=True):
-        outcome = forked(doing(command), log)
-        faults += outcome.faults((0, 2, 5))
-        if kind == "cache" and _figures(outcome) != _figures(good):
-            faults.append(f"{command[0]} believes a damaged cache")
-        if kind == "recording" and command[0] == "replay" and path.name not in outcome.err:
-            faults.append(f"replay does not name the recording: {outcome.code} {outcome.err}")
-        if kind == "log" and outcome.code == 0 and not _prefix(cell, entries_before):
-            faults.append("a damaged log is believed")
-    path.write_bytes(content)
-    if entries(cell) != entries_before:
-        faults.append("the log changed though nothing was done")
-    return {"command": [kind], "cut": cut, "at": at, "code": outcome.code,
-            "said": outcome.err.strip()[:200], "faults": faults}  # fmt: skip
-
-
-@cache
-def undamaged(cell: Cell, log: Path) -> tuple[list[Command], list[Outcome]]:
-    """What is asked of a damaged campaign, and the answers while it is whole."""
-    asked = [[command, str(cell.campaign)] for command in ("status", "replay")]
-    return asked, [forked(doing(command), log) for command in asked]
-
-
-def _figures(outcome: Outcome) -> object:
-    """An answer but for the times it took."""
-    answer = outcome.answer
-    return {k: v for k, v in answer.items() if "seconds" not in k} if answer else outcome.err
-
-
-def _prefix(cell: Cell, before: tuple) -> bool:
-    now = entries(cell)
-    return now == before[: len(now)]
-
-
-TRIALS = {"kills": kill, "stopped": interrupt, "full": starve, "damaged": damage}
+TRIALS = {"kills": kill, "stopped": interrupt, "full": starve}
 
 
 def trials(root: Path, kind: str, count: int, seed: int) -> Iterator[dict]:

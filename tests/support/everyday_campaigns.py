@@ -25,8 +25,8 @@ from planner.proof.load import load_truth
 from planner.proof.measurement_errors import EVERYDAY, HitError
 from planner.proof.model import Truth
 from planner.proof.recordings import write_recordings
-from tests.support.counted_modes import NOT_COUNTED, counted, own_of_hose, true_modes
 from tests.support.faulty_robots import KINDS, MOST_MODES, ROBOTS, Robot, lacking
+from tests.support.true_modes import NOT_COUNTED, counted, own_of_hose, true_modes
 
 POSES, UNSEEN, REPEATS, CANDIDATES = 5, 24, 2, 60
 MOST = 12  # modes that are looked at when they are counted

@@ -9,7 +9,7 @@ import io
 import shutil
 from collections import Counter
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,15 +20,16 @@ from planner.dataset.screened_files import Source
 from planner.errors import PlannerError
 from planner.file_content import sha256
 from planner.proof.deviation import Deviation
-from planner.proof.hits import AXES, Hammer, SimulatedHit, simulate_hit
+from planner.proof.hits import AXES, SimulatedHit, simulate_hit
 from planner.proof.load import load_truth
 from planner.proof.recordings import write_uff
 from planner.replay import replay
 from planner.session.watch import watch
+from tests.support import outside
 from tests.support.hit_files import write_hit
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
-HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=320.0, oversampling=4)
+HAMMER = replace(outside.HAMMER, sampling_rate_hz=320.0, oversampling=4)
 MOST_KEYS, POSES, SESSIONS = 90, 4, 6
 
 

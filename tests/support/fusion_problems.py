@@ -1,7 +1,6 @@
-"""Two-fidelity problems of the literature and one like a robot's poses, on the unit cube.
+"""Two-fidelity problems of the literature on the unit cube.
 
-Forrester et al. 2007; Perdikaris et al. 2017 (Branin); Xiong, Qian & Wu 2013 (Currin). The
-pose-like one are natural frequencies of a planar two-link arm with flexible joints.
+Forrester et al. 2007; Perdikaris et al. 2017 (Branin); Xiong, Qian & Wu 2013 (Currin).
 """
 
 from collections.abc import Callable
@@ -82,27 +81,6 @@ def _currin_low(x: np.ndarray) -> np.ndarray:
     shifts = [(0.05, 0.05), (0.05, -0.05), (-0.05, 0.05), (-0.05, -0.05)]
     moved = [np.column_stack([x[:, 0] + a, np.maximum(x[:, 1] + b, 0)]) for a, b in shifts]
     return np.mean([_currin(m) for m in moved], axis=0)
-
-
-def arm_hz(x: np.ndarray, stiffness: tuple[float, float], base: float | None) -> np.ndarray:
-    """Natural frequencies (n, 2) in Hz of two links of 1.2 and 1.0 m at joint angles (q2, q3)."""
-    q2, q3 = 0.3 + 1.2 * x[:, 0], -2.2 + 1.6 * x[:, 1]
-    l1, l2, m1, m2 = 1.2, 1.0, 160.0, 90.0
-    c = m2 * l1 * l2 / 2 * np.cos(q3)
-    inner = 18.0 + m2 * (l2 / 2) ** 2
-    m = np.empty((len(x), 3, 3))
-    m[:, 0, 0] = 25 + m1 * (l1 / 2) ** 2 + m2 * l1**2 + inner + 2 * c
-    m[:, 0, 1] = m[:, 1, 0] = inner + c
-    m[:, 1, 1] = inner
-    # The base moves sideways: the links' masses times how high they stand.
-    lever1, lever2 = (m1 / 2 + m2) * l1 * np.sin(q2), m2 / 2 * l2 * np.sin(q2 + q3)
-    m[:, 2, 2] = 600.0
-    m[:, 0, 2] = m[:, 2, 0] = -(lever1 + lever2)
-    m[:, 1, 2] = m[:, 2, 1] = -lever2
-    k = np.diag([*stiffness, base or 0.0])
-    size = 2 if base is None else 3
-    values = np.linalg.eigvals(np.linalg.solve(m[:, :size, :size], k[None, :size, :size]))
-    return np.sqrt(np.sort(values.real, axis=1)[:, :2]) / (2 * np.pi)
 
 
 PROBLEMS: dict[str, Problem] = {

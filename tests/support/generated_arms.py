@@ -8,44 +8,18 @@ import numpy as np
 
 from planner.proof import descriptions
 from planner.proof.deviation import Deviation
-from planner.proof.hits import Hammer
+from planner.proof.fault_injection import InjectedFaults
 from planner.proof.load import load_truth
+from planner.proof.measurement_errors import MeasurementErrors
 from planner.proof.model import Truth
-from planner.proof.recordings import record_poses
 from planner.proof.scene import log_uniform
+from tests.support.outside import HAMMER
+from tests.support.struck_poses import record_by_hand
 
-HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)
 BAND_HZ = (3.0, 60.0)
 AXES = ((0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0))
 BOX_DEG = ((-60, 60), (-80, -10), (10, 90), (-90, 90), (-60, 60), (-90, 90))
-TILT_RAD = np.deg2rad(2.0)  # sd of a hit's direction about each of two axes across it
-
-
-@dataclass
-class Tilting:
-    """A true robot whose hits are tilted by chance."""
-
-    truth: Truth
-    rng: np.random.Generator
-
-    @property
-    def joint_names(self) -> tuple[str, ...]:
-        return self.truth.joint_names
-
-    @property
-    def slides(self) -> tuple[bool, ...]:
-        return self.truth.slides
-
-    @property
-    def description(self) -> str:
-        return self.truth.description
-
-    def respond(self, q: np.ndarray, force_n: np.ndarray, axis: int, step_s: float) -> np.ndarray:
-        found = self.truth.respond(q, force_n, axis, step_s)
-        for across in (1, 2):
-            tilt = self.rng.normal(0, TILT_RAD)
-            found = found + tilt * self.truth.respond(q, force_n, (axis + across) % 3, step_s)
-        return found
+ASKEW = MeasurementErrors(angle_deg=2.0, readback_deg=0.005)
 
 
 @dataclass(frozen=True)
@@ -54,7 +28,7 @@ class Arm:
 
     robot_toml: Path
     campaign_toml: Path
-    truth: Tilting
+    truth: Truth
     seed: int
 
     @property
@@ -64,8 +38,12 @@ class Arm:
 
     def record(self, folder: Path, poses: Sequence[tuple[str, np.ndarray]], number: int) -> Path:
         """Two hits an axis at each pose."""
-        seed = 10 * self.seed + number
-        return record_poses(self.truth, poses, folder, repeats=2, hammer=HAMMER, seed=seed)
+        stated = [(name, np.round(np.rad2deg(q), 4)) for name, q in poses]
+        axes = [f"+{axis}" for axis in "xyz" for _ in range(2)]
+        rng = np.random.default_rng([self.seed, number])
+        record_by_hand(folder, self.truth, InjectedFaults(Deviation()), ASKEW, stated, axes, HAMMER,
+                       rng)  # fmt: skip
+        return folder
 
 
 def make_generated_arm(folder: Path, seed: int, joints: int, modes: int) -> Arm:
@@ -81,8 +59,7 @@ def make_generated_arm(folder: Path, seed: int, joints: int, modes: int) -> Arm:
     more = "candidates = 60\n"
     campaign.write_text(descriptions.campaign(BOX_DEG[:joints], modes, BAND_HZ, more))
     off = Deviation(seed=seed + 1, stiffness=0.15, damping=0.1, inertia=0.04, com_m=0.003)
-    truth = Tilting(load_truth(robot, off), np.random.default_rng(seed))
-    return Arm(robot, campaign, truth, seed)
+    return Arm(robot, campaign, load_truth(robot, off), seed)
 
 
 def _urdf(rng: np.random.Generator, joints: int) -> str:

@@ -9,13 +9,13 @@ from planner.campaign.hit_errors import HitErrorEstimate
 from planner.campaign.model import Model
 from planner.proof.arms import ARMS
 from planner.proof.deviation import Deviation
-from planner.proof.fault_injection import InjectedFaults, hand_visits, hit_poses
+from planner.proof.fault_injection import InjectedFaults
 from planner.proof.hits import AXES, Hammer
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import EVERYDAY, HitError, MeasuringChain
 from planner.proof.model import Truth
-from planner.proof.recordings import write_recordings
 from planner.proof.scene import PULSE_S
+from tests.support.struck_poses import record_by_hand
 
 SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do
 
@@ -75,15 +75,14 @@ def missed_cell(folder: Path, robot: str, poses: int, repeats: int, seed: int) -
     deviation = replace(SCATTER, seed=seed)
     truth, hammer = load_truth(robot_toml, deviation), Hammer(arm.peak_n, PULSE_S, noise=NOISE)
     chain, common = HAND.chain(rng), HAND.common(rng)
-    shots = [(f"{'+-'[k % 2]}{a}", hammer.peak_n) for a in AXES for k in range(repeats)]
+    axes = [f"{'+-'[k % 2]}{a}" for a in AXES for k in range(repeats)]
     readback = np.round(np.rad2deg(arm.poses(poses, seed)), 4)
-    visits = hand_visits(HAND, np.deg2rad(readback), shots, rng, common)
-    found = hit_poses(truth, InjectedFaults(deviation, chain=chain), visits, hammer, noise)
-    names = [f"P{i + 1:02d}" for i in range(poses)]
-    rows = list(zip(names, readback, found, strict=True))
-    stood = {name: visit.q for name, visit in zip(names, visits, strict=True)}
-    aimed = {name: [*visit.aims] for name, visit in zip(names, visits, strict=True)}
-    write_recordings(folder / "recordings", truth.joint_names, rows, hammer, "missed hits")
+    hit = [(f"P{i:02d}", row) for i, row in enumerate(readback, 1)]
+    injected = InjectedFaults(deviation, chain=chain)
+    visits = record_by_hand(folder / "recordings", truth, injected, HAND, hit, axes, hammer, rng,
+                            common=common, noise=noise)  # fmt: skip
+    stood = {name: visit.q for (name, _), visit in zip(hit, visits, strict=True)}
+    aimed = {name: [*visit.aims] for (name, _), visit in zip(hit, visits, strict=True)}
     campaign_toml = folder / "campaign.toml"
     campaign_toml.write_text(arm.campaign())
     return MissedCell(robot_toml, campaign_toml, folder / "recordings", truth, chain, stood, aimed)

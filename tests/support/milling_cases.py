@@ -1,5 +1,7 @@
 """Cuts of the literature and their limits, found by other methods than the planner's."""
 
+import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,13 +26,34 @@ ONE_MODE: dict[tuple[str, float], tuple[tuple[float, ...], tuple[bool, ...]]] = 
 TWO_EQUAL = (0.0475, 0.0548, 0.0714, 0.1144, 0.0632)  # of two such modes, x and y, slot
 
 
+GIVEN: dict[str, Any] = {
+    "teeth": 2, "diameter_m": 0.02, "milling": "slot", "radial_immersion": 1.0, "kt_n_m2": 6e8,
+    "kr_n_m2": 2e8, "feed": (1.0, 0.0, 0.0), "axis": (0.0, 0.0, 1.0),
+    "spindle_rpm": (5000.0, 20000.0, 4), "depth_m": (0.0, 0.01, 400),
+    "method": "full_discretisation",
+}  # fmt: skip
+
+
 def cut(**changes: Any) -> Cut:
     """A slot with two teeth, or what is changed of it."""
-    given: dict[str, Any] = {
-        "teeth": 2, "diameter_m": 0.02, "milling": "slot", "kt_n_m2": 6e8, "kr_n_m2": 2e8,
-        "spindle_rpm": (5000.0, 20000.0, 4), "depth_m": (0.0, 0.01, 400),
-    }  # fmt: skip
-    return Cut(**(given | changes))
+    return Cut(**(GIVEN | changes))
+
+
+def cut_toml(**changes: Any) -> str:
+    """The same as text of cut.toml."""
+    return "".join(f"{key} = {json.dumps(value)}\n" for key, value in (GIVEN | changes).items())
+
+
+def modes_toml(
+    hertz: Sequence[float], damping: Sequence[float], mass_kg: Sequence[float],
+    direction: Sequence[Sequence[float]],
+) -> str:  # fmt: skip
+    """Modes of a structure as text of modes.toml."""
+    rows = zip(hertz, damping, mass_kg, direction, strict=True)
+    return "".join(
+        f"[[mode]]\nfrequency_hz = {f}\ndamping_ratio = {z}\nmass_kg = {m}\ndirection = {list(d)}\n"
+        for f, z, m, d in rows
+    )
 
 
 def one_mode(direction: tuple[float, float] = (1.0, 0.0)) -> CutterModes:

@@ -8,19 +8,21 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Collection
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from planner.cli.run import run
+from planner.proof import descriptions
 from planner.proof.deviation import Deviation
 from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.model import Truth
 from planner.proof.recordings import record_poses
 from planner.recording.folder import TABLE
-from tests.support.robots import campaign_text, make_arm
+from tests.support.robots import BAND_HZ, JOINTS_DEG, campaign_text, make_arm
 
 PLANNER = (sys.executable, "-c", "from planner.cli import main; main()")
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)
@@ -111,3 +113,64 @@ def record(truth: Truth, folder: Path, pose: str, joints_deg: list[float], seed:
     """What the analyser would export for a pose."""
     q = np.deg2rad(joints_deg)
     return record_poses(truth, [(pose, q)], folder, repeats=3, hammer=HAMMER, seed=seed)
+
+
+def measured(truth: Truth, cell: Path, folder: Path, seed: int = 0) -> tuple[dict, dict]:
+    """What `next` proposes, and what `import` says of hits that were recorded there."""
+    (proposal,) = told("next", cell)["proposals"]
+    hits = record(truth, folder, proposal["pose"], proposal["joints_deg"], seed)
+    return proposal, told("import", cell, hits)
+
+
+def record_pool(truth: Truth, folder: Path, poses: int, seed: int, repeats: int = 3) -> Path:
+    """Hits at random poses P000, P001, ... of the joint box."""
+    low, high = np.deg2rad(np.array(JOINTS_DEG, dtype=float)).T
+    q = np.random.default_rng(seed).uniform(low, high, (poses, 6))
+    named = [(f"P{i:03d}", row) for i, row in enumerate(q)]
+    return record_poses(truth, named, folder, repeats=repeats, hammer=HAMMER, seed=seed)
+
+
+def make_pool(root: Path, poses: int, seed: int) -> tuple[Path, Path, Path]:
+    """Recordings of poses in the joint box, robot.toml, campaign.toml."""
+    robot = make_arm(root / "robot")
+    off = Deviation(seed=seed, stiffness=0.15, damping=0.1, inertia=0.04, com_m=0.003)
+    recordings = record_pool(load_truth(robot, off), root / "hits", poses, seed, 1)
+    campaign = root / "campaign.toml"
+    campaign.write_text(descriptions.campaign(JOINTS_DEG, 3, BAND_HZ, 'name = "variance"\n'))
+    return recordings, robot, campaign
+
+
+@dataclass(frozen=True)
+class FirstPose:
+    """A campaign whose simulation does not learn, which is quick, and nine hits at its pose."""
+
+    cell: Path
+    robot: Path
+    plan: Path
+    truth: Truth
+    pose: str
+    joints_deg: list[float]
+    made: Path
+
+    @classmethod
+    def begun(cls, root: Path) -> "FirstPose":
+        robot, plan, truth = make_cell(root, learns=False)
+        told("new", root / "cell", "--robot", robot, "--campaign", plan)
+        (proposal,) = told("next", root / "cell")["proposals"]
+        pose, joints_deg = proposal["pose"], proposal["joints_deg"]
+        made = record(truth, root / "made", pose, joints_deg)
+        return cls(root / "cell", robot, plan, truth, pose, joints_deg, made)
+
+    def copied(self, folder: Path, name: str = "cell") -> "FirstPose":
+        """The campaign under a name, and its recordings, to be changed."""
+        cell = shutil.copytree(self.cell, folder / name)
+        return replace(self, cell=cell, made=shutil.copytree(self.made, folder / "made"))
+
+    @property
+    def files(self) -> list[Path]:
+        """The recorded hits."""
+        return sorted((self.made / "data").iterdir())
+
+    def at(self, folder: Path, pose: str, joints_deg: list[float], seed: int = 0) -> Path:
+        """What would be recorded at another pose, or again."""
+        return record(self.truth, folder, pose, joints_deg, seed)

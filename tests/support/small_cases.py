@@ -20,14 +20,13 @@ from planner.proof.fault_injection import (
     Artefact,
     InjectedFaults,
     JointDrift,
-    hand_visits,
-    hit_poses,
 )
 from planner.proof.hits import Hammer
 from planner.proof.load import load_truth
 from planner.proof.measurement_errors import LABORATORY, MeasurementErrors
-from planner.proof.recordings import write_predict, write_recordings
+from planner.proof.recordings import write_predict
 from tests.support.arm_with_points import NODES, poses, write_arm
+from tests.support.struck_poses import record_by_hand
 
 # Springs, dampers and bodies never are as stated; nobody is to call that a finding.
 SCATTER = Deviation(5, stiffness=0.1, damping=0.15, inertia=0.03, com_m=0.003)
@@ -57,37 +56,29 @@ def _artefact(effect: str, at: str, **change: object) -> Concealed:
     return Concealed(((effect, at),), rest={"artefact": replace(Artefact(), **change)})
 
 
+def _physics(effect: str, at: str, **change: object) -> Concealed:
+    return Concealed(((effect, at),), change)
+
+
+BENT = BentLink("l2", (1.6e6, 2e6), 1.6e6, 3e-4)
+HOSE = AttachedResonator("l3", (0.1, 0.1, 0), (0, 0.6, 0.8), HOSE_KG, HOSE_HZ, 0.03)
+MASS = AttachedMass("l3", (0.2, 0.15, 0.1), MASS_KG)
+RIPPLE = StiffnessRipple("a2", 2, 0.35, 0.2)
+BREAKING = Feedback(driven="a2", sensed="a3", gain=2e5)  # reciprocity, as only a controller can
 CONCEALED = {
     "nothing": Concealed(),
-    "soft base": Concealed((("base_compliance", "base"),), {"extra": SOFT}),
-    "bending link": Concealed(
-        (("link_flexibility", "link_2"),), {"beams": (BentLink("l2", (1.6e6, 2e6), 1.6e6, 3e-4),)}
-    ),
-    "added mass": Concealed(
-        (("added_mass", "link_3"),), {"added": (AttachedMass("l3", (0.2, 0.15, 0.1), MASS_KG),)}
-    ),
-    "hose": Concealed(
-        (("local_resonator", "link_3"),),
-        {
-            "resonators": (
-                AttachedResonator("l3", (0.1, 0.1, 0), (0, 0.6, 0.8), HOSE_KG, HOSE_HZ, 0.03),
-            )
-        },
-    ),
+    "soft base": _physics("base_compliance", "base", extra=SOFT),
+    "bending link": _physics("link_flexibility", "link_2", beams=(BENT,)),
+    "added mass": _physics("added_mass", "link_3", added=(MASS,)),
+    "hose": _physics("local_resonator", "link_3", resonators=(HOSE,)),
     "turned sensor": _artefact("sensor_rotation", "sensor", rotation=TURNED),
     "polarity": _artefact("polarity", "sensor_z", gain=(1.0, 1.0, -1.0)),
     "gain": _artefact("sensor_gain", "sensor_y", gain=(1.0, GAIN, 1.0)),
     "window": _artefact("exponential_window", "sensor", window_s=WINDOW_S),
     "drift": Concealed((("drift", "campaign"),), rest={"drift": DRIFT}),
-    "angle": Concealed(
-        (("angle_dependent_stiffness", "joint_2"),),
-        {"harmonics": (StiffnessRipple("a2", 2, 0.35, 0.2),)},
-    ),
-    # A controller that breaks reciprocity: nothing that only holds or weighs does.
-    "outsider": Concealed(
-        (("unknown", ""),), {"feedback": (Feedback(driven="a2", sensed="a3", gain=2e5),)}
-    ),
-}  # fmt: skip
+    "angle": _physics("angle_dependent_stiffness", "joint_2", harmonics=(RIPPLE,)),
+    "outsider": _physics("unknown", "", feedback=(BREAKING,)),
+}
 CONCEALED["base and gain"] = CONCEALED["soft base"] | CONCEALED["gain"]
 
 
@@ -106,14 +97,9 @@ def small_case(folder: Path, of: Concealed, errors: MeasurementErrors = LABORATO
     robot_toml, q = write_arm(folder / "robot", tcp), poses(POSES + 1, SEED)
     own = np.random.default_rng(SEED)
     injected = InjectedFaults(replace(SCATTER, **of.change), chain=errors.chain(own), **of.rest)
-    truth, shots = load_truth(robot_toml, injected.deviation), [(f"+{a}", 250.0) for a in "xyz"]
-    visits = hand_visits(errors, q[:POSES], shots, own)
-    found = hit_poses(truth, injected, visits, HAMMER, np.random.default_rng(SEED))
-    pairs = enumerate(zip(q, found, strict=False), 1)
-    rows = [(f"P{i}", np.rad2deg(row), hits) for i, (row, hits) in pairs]
-    folder /= "recordings"
-    write_recordings(
-        folder, truth.joint_names, rows, HAMMER, "small case", NODES | {"tcp": TCP_NODE}
-    )
+    truth, folder = load_truth(robot_toml, injected.deviation), folder / "recordings"
+    hit = [(f"P{i}", row) for i, row in enumerate(np.rad2deg(q[:POSES]), 1)]
+    record_by_hand(folder, truth, injected, errors, hit, ("+x", "+y", "+z"), HAMMER, own,
+                   noise=np.random.default_rng(SEED), nodes=NODES | {"tcp": TCP_NODE})  # fmt: skip
     unused = [("H1", q[POSES])]
     return SmallCase(robot_toml, folder, write_predict(folder, truth.joint_names, unused))

@@ -157,44 +157,44 @@ def gaussian(middle: np.ndarray, sd: np.ndarray):
     return log_density
 
 
-def test_peak_of_a_gaussian_within_bounds_of_each_entry():
-    density = gaussian(np.array([0.5, 3.0, 3.0]), np.array([1.0, 0.1, 3.0]))
+def two_peaks(x: np.ndarray) -> tuple[float, np.ndarray]:
+    if x[0] < 0:
+        return gaussian(np.array([-2.0]), np.ones(1))(x)
+    value, slope = gaussian(np.array([2.0]), np.ones(1))(x)
+    return value + 1.0, slope
+
+
+def with_a_logarithm(x: np.ndarray) -> tuple[float, np.ndarray]:
+    """log x − x: its first long step from 5 leads below zero, where there is no logarithm."""
+    if x[0] <= 0:
+        return np.nan, np.array([np.nan])
+    return 20 * (np.log(x[0]) - x[0]), 20 * (1 / x - 1)
+
+
+THREE = gaussian(np.array([0.5, 3.0, 3.0]), np.array([1.0, 0.1, 3.0]))
+# Density, starts, bounds, where the peak is, and how high.
+PEAKS = {
+    "within bounds of each entry": (THREE, [[0.0] * 3], -1.0, [4.0, 1.0, 9.0], [0.5, 1, 3], -200),
+    "the higher of two": (two_peaks, [[-3.0], [3.0]], -4.0, 4.0, [2.0], 1.0),
+    "the higher of two, begun there": (two_peaks, [[3.0], [-3.0]], -4.0, 4.0, [2.0], 1.0),
+    "stepped back from nowhere": (with_a_logarithm, [[5.0]], -100.0, 100.0, [1.0], -20.0),
+    "the first start, nothing being finite": (
+        lambda x: (-np.inf, np.zeros(1)), [[1.0], [2.0]], -4.0, 4.0, [1.0], -np.inf,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PEAKS)
+def test_the_peak_is_found(name):
+    density, starts, low, high, where, height = PEAKS[name]
+    given = [np.array(start) for start in starts]
+    bounds = (np.broadcast_to(bound, len(given[0])) for bound in (low, high))
+    peak = maximise(density, given, *bounds)
+    np.testing.assert_allclose(peak.x, where, atol=1e-4)
+    assert peak.log_density == pytest.approx(height, rel=1e-6)
+
+
+def test_few_steps_are_not_enough():
     high = np.array([4.0, 1.0, 9.0])
-    peak = maximise(density, [np.zeros(3)], -np.ones(3), high)
-    np.testing.assert_allclose(peak.x, [0.5, 1.0, 3.0], atol=1e-4)
-    assert peak.log_density == pytest.approx(-0.5 * 20**2, rel=1e-6)
-    few = maximise(density, [np.zeros(3)], -np.ones(3), high, most_steps=1)
-    assert few.log_density < peak.log_density - 0.1
-
-
-def test_the_higher_of_two_peaks_is_taken():
-    left, right = gaussian(np.array([-2.0]), np.ones(1)), gaussian(np.array([2.0]), np.ones(1))
-
-    def log_density(x: np.ndarray) -> tuple[float, np.ndarray]:
-        if x[0] < 0:
-            return left(x)
-        value, slope = right(x)
-        return value + 1.0, slope
-
-    for starts in ([-3.0, 3.0], [3.0, -3.0]):
-        peak = maximise(log_density, [np.array([s]) for s in starts], -4.0, 4.0)
-        assert peak.x[0] == pytest.approx(2.0, abs=1e-4)
-        assert peak.log_density == pytest.approx(1.0)
-
-
-def test_infeasible_points_are_stepped_back_from():
-    def log_density(x: np.ndarray) -> tuple[float, np.ndarray]:
-        # x − log x: its first long step from 5 leads below zero, where there is no logarithm.
-        if x[0] <= 0:
-            return np.nan, np.array([np.nan])
-        return 20 * (np.log(x[0]) - x[0]), 20 * (1 / x - 1)
-
-    peak = maximise(log_density, [np.array([5.0])], -100.0, 100.0)
-    assert peak.x[0] == pytest.approx(1.0, abs=1e-4)
-
-
-def test_nothing_finite_gives_the_first_start():
-    starts = [np.array([1.0]), np.array([2.0])]
-    peak = maximise(lambda x: (-np.inf, np.zeros(1)), starts, -4.0, 4.0)
-    assert peak.x[0] == 1.0
-    assert peak.log_density == -np.inf
+    few = maximise(THREE, [np.zeros(3)], -np.ones(3), high, most_steps=1)
+    assert few.log_density < -200.1

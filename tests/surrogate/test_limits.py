@@ -1,6 +1,7 @@
 """GPs: textbook, missing data, stages, slopes that are followed, jitter, hedges, leave-one-out."""
 
 import pickle
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,28 +16,21 @@ from planner.surrogate.kernels import KERNELS, parse
 from planner.surrogate.leave_one_out import leave_one_out, report
 from planner.surrogate.modal_surrogate import FREQUENCY_PRIOR, FREQUENCY_PRIOR_ALONE, fit_surrogate
 from planner.surrogate.training_data import TrainingData, pad, thinned
-from tests.support.compilations import compilations
-from tests.support.fusion_problems import arm_hz
-from tests.support.surrogates import observed, simulated
+from tests.support.surrogates import observed, simulated, true_hz
+from tests.support.timing import compilations
 
 GRID = np.random.default_rng(8).random((30, 2))
 PRIOR = OutputPrior(bias_sd=0.5, slope_sd=0.5, amplitude=0.3, nugget=0.02)
 
 
-def given(values, centre=np.nan, prior=PRIOR):
+def given(values, centre=np.nan, prior=PRIOR, alone=None):
     m = values.y.shape[1]
-    return FusionData(values, (prior,) * m, (prior,) * m, np.full(m, centre))
+    return FusionData(values, (prior,) * m, (alone or prior,) * m, np.resize(centre, m))
 
 
-def samples(n, seed=0):
-    rng = np.random.default_rng(seed)
-    x = rng.random((n, 2))
-    return x, np.sin(4 * x[:, :1]) + 0.02 * rng.standard_normal((n, 1))
-
-
-def training(n, seed=0):
-    x, y = samples(n, seed)
-    return TrainingData(x, y, np.full((n, 1), 0.02), np.full((n, 1), np.nan))
+def without_simulation(n):
+    values = drawn(n, 1, noise=0.02)
+    return replace(values, low=np.full((n, 1), np.nan))
 
 
 @pytest.mark.parametrize(
@@ -58,12 +52,12 @@ def test_slope_of_the_likelihood_of_the_hyperparameters_agrees_with_finite_diffe
 
 def test_jitter_that_was_needed_is_told(monkeypatch):
     monkeypatch.setattr(gp, "JITTERS", (0.0, 1e-7))
-    x = np.repeat(samples(1)[0], 3, axis=0)
-    data = TrainingData(x, np.ones((3, 1)), np.zeros((3, 1)), np.full((3, 1), np.nan))
+    nan = np.full((3, 1), np.nan)
+    data = TrainingData(np.full((3, 2), 0.5), np.ones((3, 1)), np.zeros((3, 1)), nan)
     certain = OutputPrior(bias_sd=0.5, slope_sd=0.0, amplitude=0.3, nugget=1e-12, spread=1e-9)
     fitted = fit_ar1(given(data, prior=certain))
     assert gp.remarks(fitted.outputs) == (gp.SINGULAR_REMARK.format(1e-7),)
-    plain = fit_ar1(given(training(4)))
+    plain = fit_ar1(given(without_simulation(4)))
     assert gp.remarks(plain.outputs) == ()
 
 
@@ -83,7 +77,7 @@ def test_what_the_kernels_are_averaged_over_follows_the_data():
 
 
 def test_without_a_simulation_the_hedge_is_a_gp():
-    data, low = given(training(7)), np.full((30, 1), np.nan)
+    data, low = given(without_simulation(7)), np.full((30, 1), np.nan)
     hedged, plain = (fit(data).predict(GRID, low) for fit in (fit_hedged, fit_ar1))
     np.testing.assert_allclose(hedged, plain, atol=1e-12)
 
@@ -149,46 +143,40 @@ def test_frequencies_told_by_the_simulations_shapes_stand_beside_their_own_predi
     np.testing.assert_allclose([r.predicted_hz for r in rows], np.exp((training.y - error)[:, 0]))
 
 
-CUBE = np.random.default_rng(5).random((200, 3))
+SQUARE = np.random.default_rng(5).random((200, 2))
 COUNTS, SEEDS = (3, 8), range(8)
 
 
-def arm(x, stiffness, base):
-    """Logarithm (n, 2) of an arm's natural frequencies in Hz; a wrist (x_3) loads the second."""
-    return np.log(arm_hz(x[:, :2], stiffness, base)) + 0.1 * np.cos(2 * x[:, 2:]) * [[0.3, 1.0]]
-
-
 def truth(x):
-    return arm(x, (9e5, 4e5), 2e7)
+    return np.log(true_hz(x, 1.12)[:, :2])
 
 
 def nominal(x):
-    return arm(x, (1.2e6, 3.4e5), None)
+    return np.log(simulated(x, 2).frequency_hz)
 
 
 SIMULATIONS = {
     "right": nominal,
-    "wrong": lambda x: nominal(x[:, [1, 0, 2]]),  # the joints mixed up
+    "wrong": lambda x: nominal(x[:, [1, 0]]),  # the joints mixed up
     "irrelevant": lambda x: np.log(20 + 8 * np.sin(9 * x[:, :2] + [[2.0, 1.0]])),
 }
 
 
-def labelled(values, centre):
-    return FusionData(values, (FREQUENCY_PRIOR,) * 2, (FREQUENCY_PRIOR_ALONE,) * 2, centre)
+PRIORS = FREQUENCY_PRIOR, FREQUENCY_PRIOR_ALONE
 
 
 def off_by(simulation, n, seed):
     """RMSE of AR1, of the GP and of both together; share of the test values inside ± 1.96 sd."""
     rng = np.random.default_rng([seed, n])
-    x = rng.random((n, 3))
+    x = rng.random((n, 2))
     y = truth(x) + 1e-3 * rng.standard_normal((n, 2))
-    sd, low, grid_low = np.full((n, 2), 1e-3), simulation(x), simulation(CUBE)
-    data = labelled(TrainingData(x, y, sd, low), low.mean(axis=0))
+    sd, low, grid_low = np.full((n, 2), 1e-3), simulation(x), simulation(SQUARE)
+    data = given(TrainingData(x, y, sd, low), low.mean(axis=0), *PRIORS)
     models = fit_ar1(data), fit_ar1(data.alone), fit_hedged(data)
-    answers = [m.predict(CUBE, grid_low) for m in models]
-    off = [np.sqrt(np.mean((mean - truth(CUBE)) ** 2)) for mean, _ in answers]
+    answers = [m.predict(SQUARE, grid_low) for m in models]
+    off = [np.sqrt(np.mean((mean - truth(SQUARE)) ** 2)) for mean, _ in answers]
     mean, spread = answers[2]
-    return *off, np.mean(np.abs(mean - truth(CUBE)) < 1.96 * spread)
+    return *off, np.mean(np.abs(mean - truth(SQUARE)) < 1.96 * spread)
 
 
 @pytest.mark.parametrize("name", SIMULATIONS)
@@ -204,19 +192,20 @@ def test_never_much_worse_than_the_better_of_the_two(name):
 
 def test_outputs_are_weighed_one_by_one():
     rng = np.random.default_rng(1)
-    x = rng.random((12, 3))
+    x = rng.random((12, 2))
     low = np.stack([SIMULATIONS["right"](x)[:, 0], SIMULATIONS["irrelevant"](x)[:, 1]], axis=1)
     data = TrainingData(x, truth(x), np.full((12, 2), 1e-3), low)
-    fitted = fit_hedged(labelled(data, low.mean(axis=0)))
+    fitted = fit_hedged(given(data, low.mean(axis=0), *PRIORS))
     assert fitted.most_probable.uses_low.tolist() == [True, False]
     assert (fitted.weights.max(axis=0) > 0.9).all()
 
 
 def test_before_a_measurement_the_simulation_is_believed():
     none = np.zeros((0, 2))
-    nowhere = np.zeros((0, 3))
-    fitted = fit_hedged(labelled(TrainingData(nowhere, none, none, none), np.array([2.0, 2.5])))
-    mean, _ = fitted.predict(CUBE[:4], np.full((4, 2), 2.2))
+    nowhere = np.zeros((0, 2))
+    nothing = TrainingData(nowhere, none, none, none)
+    fitted = fit_hedged(given(nothing, np.array([2.0, 2.5]), *PRIORS))
+    mean, _ = fitted.predict(SQUARE[:4], np.full((4, 2), 2.2))
     np.testing.assert_allclose(mean, 2.2, atol=1e-9)
 
 
@@ -236,9 +225,7 @@ def drawn(n, m=3, seed=0, noise=0.002):
 
 
 def fitted_to(training, samples=64, kept=8, **options):
-    m = training.y.shape[1]
-    given = FusionData(training, (WEAK,) * m, (WEAK,) * m, np.zeros(m))
-    return fit_ar1(given, samples, kept, **options)
+    return fit_ar1(given(training, 0.0, WEAK), samples, kept, **options)
 
 
 @pytest.mark.parametrize("kernel", ["rbf", "matern52"])
@@ -271,15 +258,6 @@ def _covariance(kernel, xa, la, xb, lb, theta):
     scale = np.exp(theta[2:])
     delta = np.exp(2 * theta[0]) * KERNELS[kernel](np, xa / scale, xb / scale)
     return delta + WEAK.bias_sd**2 + WEAK.slope_sd**2 * np.outer(la, lb)
-
-
-def test_duplicates_and_constants_work():
-    training = drawn(4)
-    twice = TrainingData(*(np.repeat(a, 3, axis=0) for a in vars(training).values()))
-    assert np.isfinite(fitted_to(twice).predict(training.x, training.low)[0]).all()
-    flat = TrainingData(training.x, np.ones((4, 3)), training.sd, np.full((4, 3), np.nan))
-    mean, _ = fitted_to(flat).predict(training.x, np.full((4, 3), np.nan))
-    np.testing.assert_allclose(mean, 1.0, atol=0.05)
 
 
 def test_padding_changes_nothing_and_growth_compiles_nothing():

@@ -76,18 +76,21 @@ def test_where_zero_lies_and_a_gp_s_unit_do_not_matter(fit):
     np.testing.assert_allclose(other[1], scale * sd, rtol=1e-4)
 
 
+def wave(x):
+    return np.sin(8 * np.pi * x[:, 0])
+
+
+def bent(x):
+    """Perdikaris et al. 2017, section 3.1: y = (x − √2) l²."""
+    return (x[:, 0] - 2**0.5) * wave(x) ** 2
+
+
 def test_ar1_nargp_follows_a_bent_relation_that_ar1_cannot():
-    x = np.random.default_rng(3).random((14, 1))
-    wave = Exact(lambda x: np.sin(8 * np.pi * x[:, 0]))  # Perdikaris et al. 2017, section 3.1
-
-    def bent(x):
-        return (x[:, 0] - 2**0.5) * wave.function(x) ** 2
-
-    grid = np.linspace(0, 1, 101)[:, None]
-    s = Samples.of(x, bent(x))
+    x, below = np.random.default_rng(3).random((14, 1)), Exact(wave)
+    s, grid = Samples.of(x, bent(x)), np.linspace(0, 1, 101)[:, None]
     off = [
         np.sqrt(np.mean((fit_averaged(s, *how).predict(grid)[0] - bent(grid)) ** 2))
-        for how in ((perdikaris(1), wave, 0.7, True), ("matern52", wave, 0.7))
+        for how in ((perdikaris(1), below, 0.7, True), ("matern52", below, 0.7))
     ]
     assert off[0] < 0.25 * off[1]
 
@@ -187,14 +190,6 @@ def test_the_level_below_is_integrated_over():
 
 
 def test_it_bends_where_a_line_cannot():
-    """Perdikaris et al. 2017, section 3.1: y = (x − √2) l²."""
-
-    def wave(x):
-        return np.sin(8 * np.pi * x[:, 0])
-
-    def bent(x):
-        return (x[:, 0] - 2**0.5) * wave(x) ** 2
-
     cheap, x = np.linspace(0, 1, 50)[:, None], np.linspace(0, 1, 14)[:, None]
     low = fit_likelihood(Samples.of(cheap, wave(cheap)), noise=1e-3)
     model = fit_nargp(Samples.of(x, bent(x)), low, low.units, noise=1e-3)

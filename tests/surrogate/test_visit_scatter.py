@@ -1,21 +1,16 @@
 """The scatter from visit to visit is learned, and is in predicted sds; what damping is believed.
 
-Frequencies of true robots (MuJoCo): a visit's ln f is the pose's plus scatter, half of its variance
-common to all modes, half each mode's own; EMA adds a noise whose sd it states.
+A visit's ln f is the pose's plus scatter, half of its variance common to all modes, half each
+mode's own; EMA adds a noise whose sd it states.
 """
 
-import tempfile
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from planner.dynamics.vibration import SimulatedModes
-from planner.proof.arms import ARMS
-from planner.proof.deviation import Deviation, Spring
-from planner.proof.load import load_truth
 from planner.surrogate.importance import normal_points, sample
 from planner.surrogate.modal_surrogate import (
     ModalObservations,
@@ -25,45 +20,20 @@ from planner.surrogate.modal_surrogate import (
 )
 from tests.support.surrogates import observed, simulated, true_hz
 
-MODES, POOL, NEW_VISITS = 4, 150, 100
+ROBOTS, MODES, POOL, NEW_VISITS = 6, 4, 150, 100
 EMA_SD = 1e-3  # of ln f
 OFF = 0.003  # rms of ln f that an identified simulation is off by, smoothly over the poses
-FLOOR_STIFFNESS = 25.0  # of the truth's floor over the stiffest stated joint
-
-
-@dataclass(frozen=True, eq=False)
-class TrueRobot:
-    """Poses x (POOL, d) in [0, 1] and ln f (POOL, MODES): the truth's and two simulations'."""
-
-    x: np.ndarray
-    truth: np.ndarray
-    simulated: dict[str, np.ndarray]
-
-
-ROBOTS = tuple(ARMS)
 
 
 @cache
-def true_robot(name: str) -> TrueRobot:
-    """One of ROBOTS; a second of MuJoCo the first time."""
-    seed, arm = ROBOTS.index(name), ARMS[name]
-    toml = arm.write(Path(tempfile.mkdtemp()), 2)
-    stiffness = FLOOR_STIFFNESS * max(*arm.torsion, *arm.bending)
-    floor = tuple(
-        Spring("base", axis, stiffness, 3e-4 * stiffness)
-        for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    )
-    true = load_truth(toml, Deviation(seed + 1, 0.15, 0.15, 0.05, 0.005, extra=floor))
+def robot(seed: int) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """Poses x (POOL, 6) in [0, 1], and ln f (POOL, MODES): the truth's and two simulations'."""
     rng = np.random.default_rng(seed)
-    low, high = np.deg2rad(np.transpose(arm.joints_deg))
-    x = rng.random((POOL, len(low)))
-    q = low + x * (high - low)
-    truth = np.log([true.modes(pose, MODES)[0] for pose in q])
-    simulated = {
-        "identified": truth + OFF * _smooth(x, rng),
-        "offset": truth + 0.05 * rng.standard_normal(MODES) + OFF / 3 * _smooth(x, rng),
-    }
-    return TrueRobot(x, truth, simulated)
+    x = rng.random((POOL, 6))
+    truth = np.log([9.0, 13.0, 22.0, 31.0]) + 0.1 * _smooth(x, rng)
+    identified = truth + OFF * _smooth(x, rng)
+    offset = truth + 0.05 * rng.standard_normal(MODES) + OFF / 3 * _smooth(x, rng)
+    return x, truth, {"identified": identified, "offset": offset}
 
 
 def _smooth(x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -90,17 +60,17 @@ class Visited:
     shown: np.ndarray
 
 
-def visited(name: str, simulation: str, n: int, scatter: float, seed: int) -> Visited:
+def visited(number: int, simulation: str, n: int, scatter: float, seed: int) -> Visited:
     """A robot measured at n poses, and NEW_VISITS (less what there is not) at others."""
-    robot = true_robot(name)
-    rng = np.random.default_rng([seed, n, ROBOTS.index(name)])
+    x, truth, simulated = robot(number)
+    rng = np.random.default_rng([seed, n, number])
     order = rng.permutation(POOL)
     used, new = order[:n], order[n : n + NEW_VISITS]
-    low = robot.simulated[simulation]
-    measured = robot.truth[used] + visits((n, MODES), scatter, rng)
+    low = simulated[simulation]
+    measured = truth[used] + visits((n, MODES), scatter, rng)
     measured += EMA_SD * rng.standard_normal((n, MODES))
-    shown = robot.truth[new] + visits((len(new), MODES), scatter, rng)
-    return Visited(observations(robot.x[used], measured, low[used]), robot.x[new], low[new], shown)
+    shown = truth[new] + visits((len(new), MODES), scatter, rng)
+    return Visited(observations(x[used], measured, low[used]), x[new], low[new], shown)
 
 
 def observations(x: np.ndarray, measured: np.ndarray, low: np.ndarray) -> ModalObservations:
@@ -123,9 +93,9 @@ def scatter_percent(fitted):
 @pytest.mark.parametrize(("n", "scatter"), [(3, 0.003), (12, 0.01)])
 def test_intervals_hold_new_visits_beside_an_identified_simulation(n, scatter):
     inside = []
-    for robot in ROBOTS:
+    for number in range(ROBOTS):
         for seed in range(2):
-            case = visited(robot, "identified", n, scatter, seed)
+            case = visited(number, "identified", n, scatter, seed)
             mean, sd = fit_primary(case.seen, *KNOWN).predict(case.x, case.simulated, nugget=True)
             inside.append(np.mean(np.abs(mean - case.shown) < 1.96 * sd))
     assert np.mean(inside) > 0.86
@@ -145,7 +115,7 @@ def test_a_pose_visited_again_tells_the_scatter():
 
 
 def test_modes_learn_the_scatter_from_one_another():
-    case = visited("kr10", "offset", 8, 0.0, 1)
+    case = visited(1, "offset", 8, 0.0, 1)
     one = np.arange(MODES) == 0
     hz = np.where(one[None, :] & (np.arange(8) > 1)[:, None], np.nan, case.seen.frequency_hz)
     with_others = fit_primary(replace(case.seen, frequency_hz=hz))
