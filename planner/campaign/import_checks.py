@@ -47,6 +47,18 @@ class Claim:
         """In which modes are looked for."""
         return self.model.cell.config.modes.band_hz
 
+    @property
+    def setpoint_deg(self) -> tuple[float, ...]:
+        """Where the robot was sent; `joints_deg` where nothing was proposed."""
+        proposal = self.state.proposals.get(self.pose)
+        return proposal.joints_deg if proposal else self.joints_deg
+
+    @property
+    def displacement(self) -> str:
+        """A sentence if the robot stood elsewhere than it was sent; else ""."""
+        off = self.joints.apart(self.setpoint_deg, self.joints_deg)
+        return f"The readback of {self.pose} is up to {off} from its setpoint." if off else ""
+
 
 def question_about(claim: Claim, measured: MeasuredPose) -> Question | None:
     """Of the first pose's hits whether the chain can be so; of others, whether pose and chain can.
@@ -69,15 +81,10 @@ def question_about(claim: Claim, measured: MeasuredPose) -> Question | None:
 
 def _far_from_setpoint(claim: Claim) -> Question | None:
     """What to ask of a readback far from the pose that was proposed, before FRFs can tell."""
-    proposal = claim.state.proposals.get(claim.pose)
-    if proposal is None:
-        return None
-    away = np.abs(np.subtract(proposal.joints_deg, claim.joints_deg)) / claim.joints.same()
+    away = np.abs(np.subtract(claim.setpoint_deg, claim.joints_deg)) / claim.joints.same()
     if np.max(away) < FAR:
         return None
-    off = claim.joints.apart(proposal.joints_deg, claim.joints_deg)
-    text = f"The readback of {claim.pose} is up to {off} from its setpoint. Is it right as stated?"
-    return Question(text, about="readback")
+    return Question(f"{claim.displacement} Is it right as stated?", about="readback")
 
 
 def _unstated_window(claim: Claim, measured: MeasuredPose) -> Question | None:
