@@ -211,9 +211,8 @@ class Cell:
     def poses(self, joints_deg: ArrayLike) -> np.ndarray:
         """Poses (n, dof) in degrees (mm), or one of them, as q in rad (m); checked each."""
         angles = np.atleast_2d(np.asarray(joints_deg, dtype=float))
-        for number, row in enumerate(angles, 1):
-            self.check_pose(tuple(row), f"joints_deg, pose {number}")
-        return self.robot.joints.internal(angles)
+        each = enumerate(angles, 1)
+        return np.array([self.check_pose(tuple(r), f"joints_deg, pose {k}") for k, r in each])
 
 
 def checked_pose(robot: Robot, joints_deg: Sequence[float], where: str) -> np.ndarray:

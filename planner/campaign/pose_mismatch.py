@@ -54,9 +54,8 @@ def pose_mismatch(claim: Claim, measured: MeasuredPose) -> Question | None:
     said = "".join(answered)  # not asked again
     likely = _setpoint(claim)
     if sure and frf.layout == TOOL:
-        known = [alternatives.far_off_hits(expected, q)]
-        known += [alternatives.other_tool(expected, q)] if placed else []
-        likely += (one for one in known if one.what not in said)
+        free = alternatives.loose(expected, q, placed)
+        likely += (one for one in free if one.what not in said)
     if stated.agree(likely):
         return None
     mistakes = [*likely, *_poses(claim)]
